@@ -1,0 +1,301 @@
+"""What a spindle is: frozen definitions in SI units, made by `model.scene.load`.
+
+Temperatures are in degrees Celsius (only differences enter the physics), angles in radians, everything else SI.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+PARTS = ("stationary", "rotating")
+MOVES = ("x", "y", "z", "tilt_x", "tilt_y")
+"""Degrees of freedom of a body on the spindle axis, in the order of every 5-vector and 5x5 matrix of the project."""
+
+
+class OutsideRange(ValueError):
+    """A table or law was asked outside the range it was made for."""
+
+
+@dataclass(frozen=True)
+class Law:
+    """A material property over temperature: piecewise linear between `temperature` (C), constant when there is one entry."""
+
+    temperature: tuple[float, ...]
+    value: tuple[float, ...]
+
+    def __call__(self, temperature: float) -> float:
+        if len(self.value) == 1:
+            return self.value[0]
+        low, high = self.temperature[0], self.temperature[-1]
+        if not low <= temperature <= high:
+            raise OutsideRange(f"a material law given from {low:g} to {high:g} C was asked at {temperature:g} C")
+        return float(np.interp(temperature, self.temperature, self.value))
+
+    def integral(self, start: float, stop: float) -> float:
+        """Integral of the property from `start` to `stop` (C), exact for the piecewise linear law."""
+        if len(self.value) == 1:
+            return self.value[0] * (stop - start)
+        low, high = sorted((start, stop))
+        knots = [low, *[t for t in self.temperature if low < t < high], high]
+        area = float(np.trapezoid([self(t) for t in knots], knots))
+        return area if stop >= start else -area
+
+
+@dataclass(frozen=True)
+class Material:
+    """An isotropic linear thermo-elastic material.
+
+    `thermal_expansion` is the instantaneous coefficient d(strain)/dT; the strain is its integral.
+    """
+
+    name: str
+    youngs_modulus: Law  # Pa
+    poisson_ratio: float
+    thermal_expansion: Law  # 1/K
+    density: float  # kg/m3
+    conductivity: float  # W/(m K)
+    heat_capacity: float  # J/(kg K)
+
+    def thermal_strain(self, temperature: float, reference: float) -> float:
+        return self.thermal_expansion.integral(reference, temperature)
+
+
+@dataclass(frozen=True)
+class Region:
+    """A ring of rectangular section, r0 <= r <= r1, z0 <= z <= z1 (m); later regions of a part cut earlier ones."""
+
+    name: str
+    part: str  # one of PARTS
+    material: str
+    r: tuple[float, float]
+    z: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Bearing:
+    """One ball row at `z` (m), between two ring regions; `contact_angle` is the loaded one of the reference state."""
+
+    name: str
+    z: float
+    inner_ring: str
+    outer_ring: str
+    balls: int
+    ball_diameter: float
+    pitch_diameter: float
+    contact_angle: float
+    inner_conformity: float
+    outer_conformity: float
+    clearance: tuple[float, float]  # diametral, smallest and largest
+    ball_material: str
+    ring_material: str
+    damping_ratio: float  # at Structure.damping_frequency
+
+    @property
+    def unloaded_distance(self) -> float:
+        """Distance of the groove curvature centres at zero load, (f_i + f_o - 1) d_B: Jang et al. 2003, Eq. (2)."""
+        return (self.inner_conformity + self.outer_conformity - 1.0) * self.ball_diameter
+
+
+@dataclass(frozen=True)
+class Pair:
+    """How the two bearings are mounted against each other.
+
+    `stiffness_arrangement` is the arrangement whose load lines the radial-tilt coupling of the 5x5 stiffness follows. It is
+    the same as `arrangement` for any real pair; the reference scene says why it needs its own.
+    """
+
+    arrangement: str  # back-to-back | face-to-face | tandem
+    preload: float  # N, axial, at the reference temperature
+    preload_kind: str  # rigid | spring
+    stiffness_arrangement: str
+    turning_ring: str  # inner | outer
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body of the rotor-base chain: centre of mass on the axis at `z`, moving in `moves`."""
+
+    name: str
+    mass: float  # kg
+    inertia: tuple[float, float, float]  # about x, y (through the centre of mass) and z, kg m2
+    z: float
+    moves: tuple[str, ...]
+    turns: bool
+    regions: tuple[str, ...]  # the section regions it is made of; empty for a body given by numbers
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A compliant joint between two bodies at height `z`: a diagonal stiffness (N/m, N m/rad) in the order of MOVES."""
+
+    name: str
+    group: str
+    bodies: tuple[str, str]
+    z: float
+    stiffness: tuple[float, float, float, float, float]
+    damping_ratio: float
+
+
+@dataclass(frozen=True)
+class Structure:
+    bodies: tuple[Body, ...]
+    joints: tuple[Joint, ...]
+    inner_body: str  # the body that carries the inner rings
+    outer_body: str
+    damping_frequency: float  # Hz; damping = 2 zeta stiffness / (2 pi this)
+
+    def body(self, name: str) -> Body:
+        return next(b for b in self.bodies if b.name == name)
+
+
+@dataclass(frozen=True)
+class Point:
+    """A measuring point; `direction` is a unit vector along an axis."""
+
+    node: int
+    name: str
+    body: str
+    position: tuple[float, float, float]
+    direction: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class HammerTest:
+    """The virtual impact test: hammer, vibrometer, acquisition and windows."""
+
+    hammer_nodes: tuple[int, ...]
+    tip_stiffness: float  # N/m
+    hammer_mass: float  # kg
+    level: float  # N, peak force
+    level_scatter: float  # relative, hit to hit
+    hits: int
+    double_hit_probability: float
+    sample_rate: float  # Hz
+    record_length: float  # s
+    exponential_end: float  # value of the exponential window at the end of the record; 1 is no window
+    band: tuple[float, float]  # Hz
+    noise_of_value: float  # relative FRF noise per line
+    noise_of_largest: float  # of the largest response to that hammer
+    step: float  # s, integration step
+
+
+@dataclass(frozen=True)
+class Convection:
+    """Convection to the chamber air on the exposed faces of `regions`."""
+
+    regions: tuple[str, ...]
+    coefficient: float  # W/(m2 K)
+
+
+@dataclass(frozen=True)
+class HeatSource:
+    """Heat made in the volume of `regions` while turning; scales with (speed / `speed`) ** `exponent`."""
+
+    name: str
+    regions: tuple[str, ...]
+    power: float  # W at `speed`
+    speed: float  # rad/s
+    exponent: float
+
+
+@dataclass(frozen=True)
+class AirGap:
+    """Heat conductance between two facing regions of different parts, over the facing area of the first."""
+
+    regions: tuple[str, str]
+    coefficient: float  # W/(m2 K)
+
+
+@dataclass(frozen=True)
+class Friction:
+    """Palmgren's bearing friction torque M0 + M1 and the conductance through one bearing (Harris, Rolling Bearing Analysis)."""
+
+    f0: float
+    f1: float
+    viscosity: Law  # kinematic, m2/s
+    conductance: float  # W/K through one bearing
+
+
+@dataclass(frozen=True)
+class Thermal:
+    convections: tuple[Convection, ...]
+    sources: tuple[HeatSource, ...]
+    gaps: tuple[AirGap, ...]
+    friction: Friction
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """One standard deviation of every build and measuring uncertainty, relative unless said."""
+
+    structure: float
+    hub: float
+    preload: float
+    damping: float
+    temperature: float  # K
+    gain: float
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where a number comes from: `origin` is printed, assumed or calibrated."""
+
+    origin: str
+    source: str
+
+
+@dataclass(frozen=True)
+class Spindle:
+    name: str
+    title: str
+    reference_temperature: float
+    materials: Mapping[str, Material]
+    regions: tuple[Region, ...]
+    bearings: tuple[Bearing, ...]  # lower first
+    pair: Pair
+    structure: Structure
+    points: tuple[Point, ...]
+    hammer: HammerTest
+    thermal: Thermal
+    tolerances: Tolerances
+    provenance: Mapping[str, Provenance] = field(default_factory=dict, repr=False)  # by dotted key of the file
+    file: Path | None = field(default=None, compare=False)
+
+    def bearing(self, name: str) -> Bearing:
+        return next(b for b in self.bearings if b.name == name)
+
+    def region(self, name: str) -> Region:
+        return next(r for r in self.regions if r.name == name)
+
+    def point(self, node: int) -> Point:
+        return next(p for p in self.points if p.node == node)
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One operating condition: uniform soak temperature (C) and speed (rad/s, positive about +z)."""
+
+    temperature: float
+    speed: float = 0.0
+
+
+@dataclass(frozen=True)
+class RingMotion:
+    """Thermal motion of one bearing's rings from the reference state (m): means over the raceway faces, r outward, z up.
+
+    The outer ring's axial motion excludes the rigid movement of the hub, which the bearings decide (Jang et al. 2003, 2.2).
+    `inner_strain`, `outer_strain`, `ball_strain` are the free thermal strains of grooves and balls.
+    """
+
+    inner_r: float
+    inner_z: float
+    outer_r: float
+    outer_z: float
+    inner_strain: float
+    outer_strain: float
+    ball_strain: float
+    temperature: float  # C, of the balls and grooves, for their elastic modulus
