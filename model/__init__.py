@@ -1,0 +1,22 @@
+"""Thermospindle's model: what a spindle is, and how its bearings and structure answer.
+
+Imports none of the other packages. Modules, in the order of the calculation:
+
+=============  ===================================================================================================
+machine        frozen definitions: spindle, materials, bearings, structure, points, condition
+scene          reads and checks `spindle.toml`; scene_file holds the file's form, units and ranges
+section        the axisymmetric section: who owns which rectangle, mass and inertia
+hertz          point contact with exact elliptic integrals
+ball_row       one ball row under any load: forces, contact loss, exact 5x5 tangent stiffness
+pair           axial equilibrium of the two rows against the thermal motion of their rings
+table          bearing stiffness over temperature and speed, as CSV
+rotor_base     the rotor-base chain as bodies and compliant elements; M, C, G, K
+mjcf           the same chain as a MuJoCo model: linear or ball-by-ball bearings, hammers, vibrometers
+modes          modes and exact FRFs of M, C, K
+=============  ===================================================================================================
+
+Axes: z is the spindle axis, up; r is radial; the tilts are right-handed rotations about x and y.
+Order of a body's five degrees of freedom, everywhere: x, y, z, tilt_x, tilt_y (`machine.MOVES`).
+Units are SI; temperatures are degrees Celsius; angles are radians; speeds are rad/s, positive about +z.
+Amplitudes are zero-to-peak; complex time dependence is exp(+i omega t).
+"""

@@ -1,0 +1,405 @@
+"""The form of a scene file: every key with its unit, type and allowed range; `Scene.spindle` converts to SI definitions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+import numpy as np
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+from model import machine as m
+
+MM, RPM = 1e-3, 2 * np.pi / 60
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Share = Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)]
+Name = Annotated[str, Field(min_length=1)]
+
+
+def _rising(span: tuple[float, float]) -> tuple[float, float]:
+    if not span[0] < span[1]:
+        raise ValueError("the first number must be smaller than the second")
+    return span
+
+
+def _along_axis(text: str) -> str:
+    if len(text) != 2 or text[0] not in "+-" or text[1] not in "XYZ":
+        raise ValueError("must be one of +X -X +Y -Y +Z -Z")
+    return text
+
+
+Span = Annotated[tuple[Finite, Finite], AfterValidator(_rising)]
+Radii = Annotated[tuple[NotNegative, Finite], AfterValidator(_rising)]
+
+
+class Table(BaseModel):
+    """A table of the file: unknown keys are refused; `origin`, `source` and `origins` say where its numbers come from."""
+
+    model_config = ConfigDict(extra="forbid", strict=False, frozen=True)
+    origin: Literal["printed", "assumed", "calibrated"] | None = None
+    source: str = ""
+    origins: dict[str, Literal["printed", "assumed", "calibrated"]] = {}
+
+
+class LawTable(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    temperature_C: list[Finite] = Field(min_length=2)
+    value: list[Positive] = Field(min_length=2)
+
+    @model_validator(mode="after")
+    def _one_value_a_temperature(self) -> LawTable:
+        if len(self.temperature_C) != len(self.value) or np.any(np.diff(self.temperature_C) <= 0):
+            raise ValueError("temperature_C must rise and have as many entries as value")
+        return self
+
+    def law(self, unit: float) -> m.Law:
+        return m.Law(tuple(self.temperature_C), tuple(unit * v for v in self.value))
+
+
+LawValue = Positive | LawTable
+
+
+def _law(value: float | LawTable, unit: float) -> m.Law:
+    return value.law(unit) if isinstance(value, LawTable) else m.Law((0.0,), (unit * value,))
+
+
+class Material(Table):
+    youngs_modulus_GPa: LawValue
+    poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5)]
+    thermal_expansion_um_per_m_K: LawValue
+    density_kg_per_m3: Positive
+    conductivity_W_per_m_K: Positive
+    heat_capacity_J_per_kg_K: Positive
+
+    def material(self, name: str) -> m.Material:
+        return m.Material(
+            name,
+            _law(self.youngs_modulus_GPa, 1e9),
+            self.poisson_ratio,
+            _law(self.thermal_expansion_um_per_m_K, 1e-6),
+            self.density_kg_per_m3,
+            self.conductivity_W_per_m_K,
+            self.heat_capacity_J_per_kg_K,
+        )
+
+
+class Region(Table):
+    name: Name
+    part: Literal["stationary", "rotating"]
+    material: str
+    r_mm: Radii
+    z_mm: Span
+
+    def region(self) -> m.Region:
+        r, z = ((span[0] * MM, span[1] * MM) for span in (self.r_mm, self.z_mm))
+        return m.Region(self.name, self.part, self.material, r, z)
+
+
+class Section(Table):
+    regions: list[Region] = Field(min_length=2)
+
+
+class BallRow(Table):
+    balls: Annotated[int, Field(ge=3)]
+    ball_diameter_mm: Positive
+    pitch_diameter_mm: Positive
+    contact_angle_deg: Annotated[float, Field(gt=0, lt=90)]
+    inner_conformity: Annotated[float, Field(gt=0.5, lt=1)]
+    outer_conformity: Annotated[float, Field(gt=0.5, lt=1)]
+    diametral_clearance_mm: Span
+    ball_material: str
+    ring_material: str
+    damping_ratio: Share
+
+    @model_validator(mode="after")
+    def _balls_fit(self) -> BallRow:
+        if self.balls * self.ball_diameter_mm > np.pi * self.pitch_diameter_mm:
+            raise ValueError("that many balls do not fit on the pitch circle; balls * ball_diameter_mm must be below pi * pitch_diameter_mm")
+        return self
+
+
+class Bearing(Table):
+    row: str
+    z_mm: Finite
+    inner_ring: str
+    outer_ring: str
+
+    def bearing(self, name: str, rows: dict[str, BallRow]) -> m.Bearing:
+        row = rows[self.row]
+        low, high = row.diametral_clearance_mm
+        return m.Bearing(
+            name,
+            self.z_mm * MM,
+            self.inner_ring,
+            self.outer_ring,
+            row.balls,
+            row.ball_diameter_mm * MM,
+            row.pitch_diameter_mm * MM,
+            float(np.radians(row.contact_angle_deg)),
+            row.inner_conformity,
+            row.outer_conformity,
+            (low * MM, high * MM),
+            row.ball_material,
+            row.ring_material,
+            row.damping_ratio,
+        )
+
+
+Arrangement = Literal["back-to-back", "face-to-face", "tandem"]
+
+
+class BearingPair(Table):
+    arrangement: Arrangement
+    preload_N: Positive
+    preload_kind: Literal["rigid", "spring"]
+    turning_ring: Literal["inner", "outer"]
+    stiffness_arrangement: Arrangement | None = None
+
+    @model_validator(mode="after")
+    def _tandem_needs_a_spring(self) -> BearingPair:
+        if self.arrangement == "tandem" and self.preload_kind == "rigid":
+            raise ValueError("a tandem pair cannot preload itself; preload_kind must be spring")
+        return self
+
+
+class StructureBody(Table):
+    name: Name
+    mass_kg: Positive | None = None
+    tilt_inertia_kg_m2: tuple[Positive, Positive] | None = None
+    polar_inertia_kg_m2: Positive | None = None
+    z_mm: Finite | None = None
+    regions: list[str] = []
+    moves: list[Literal["x", "y", "z", "tilt_x", "tilt_y"]] = Field(min_length=1)
+    turns: bool = False
+
+    @model_validator(mode="after")
+    def _inertia_given_once(self) -> StructureBody:
+        if bool(self.regions) == (self.mass_kg is not None):
+            raise ValueError("a body takes its inertia either from regions or from mass_kg and z_mm")
+        if not self.regions and self.z_mm is None:
+            raise ValueError("a body given by mass_kg needs z_mm")
+        if not self.regions and {"tilt_x", "tilt_y"} & set(self.moves) and self.tilt_inertia_kg_m2 is None:
+            raise ValueError("a body that tilts needs tilt_inertia_kg_m2")
+        if self.turns and set(self.moves) != set(m.MOVES):
+            raise ValueError("a body that turns must move in x, y, z, tilt_x and tilt_y")
+        return self
+
+    def body(self) -> m.Body:
+        ix, iy = self.tilt_inertia_kg_m2 or (0.0, 0.0)
+        inertia = (ix, iy, self.polar_inertia_kg_m2 or ix + iy)
+        moves = tuple(name for name in m.MOVES if name in self.moves)
+        return m.Body(self.name, self.mass_kg or 0.0, inertia, (self.z_mm or 0.0) * MM, moves, self.turns, tuple(self.regions))
+
+
+class StructureJoint(Table):
+    name: Name
+    group: Name
+    between: tuple[str, str]
+    z_mm: Finite
+    axial_stiffness_N_per_m: NotNegative = 0.0
+    lateral_stiffness_N_per_m: tuple[NotNegative, NotNegative] = (0.0, 0.0)
+    tilt_stiffness_N_m_per_rad: tuple[NotNegative, NotNegative] = (0.0, 0.0)
+    damping_ratio: Share
+
+    def joint(self) -> m.Joint:
+        stiffness = (*self.lateral_stiffness_N_per_m, self.axial_stiffness_N_per_m, *self.tilt_stiffness_N_m_per_rad)
+        return m.Joint(self.name, self.group, self.between, self.z_mm * MM, stiffness, self.damping_ratio)
+
+
+class Structure(Table):
+    inner_body: str
+    outer_body: str
+    damping_frequency_Hz: Positive
+    bodies: list[StructureBody] = Field(min_length=2)
+    joints: list[StructureJoint] = Field(min_length=1)
+
+    def structure(self) -> m.Structure:
+        bodies = tuple(b.body() for b in self.bodies)
+        return m.Structure(bodies, tuple(j.joint() for j in self.joints), self.inner_body, self.outer_body, self.damping_frequency_Hz)
+
+
+class Convection(Table):
+    regions: list[str] = Field(min_length=1)
+    coefficient_W_per_m2_K: Positive
+
+
+class Source(Table):
+    name: Name
+    regions: list[str] = Field(min_length=1)
+    power_W: NotNegative
+    speed_rpm: Positive
+    exponent: NotNegative
+
+
+class Gap(Table):
+    regions: tuple[str, str]
+    coefficient_W_per_m2_K: NotNegative
+
+
+class Friction(Table):
+    f0: NotNegative
+    f1: NotNegative
+    kinematic_viscosity_mm2_per_s: LawValue
+    conductance_W_per_K: NotNegative
+
+
+class Thermal(Table):
+    convection: list[Convection] = Field(min_length=1)
+    sources: list[Source] = []
+    gaps: list[Gap] = []
+    friction: Friction
+
+    def thermal(self) -> m.Thermal:
+        f = self.friction
+        return m.Thermal(
+            tuple(m.Convection(tuple(c.regions), c.coefficient_W_per_m2_K) for c in self.convection),
+            tuple(m.HeatSource(s.name, tuple(s.regions), s.power_W, s.speed_rpm * RPM, s.exponent) for s in self.sources),
+            tuple(m.AirGap(g.regions, g.coefficient_W_per_m2_K) for g in self.gaps),
+            m.Friction(f.f0, f.f1, _law(f.kinematic_viscosity_mm2_per_s, 1e-6), f.conductance_W_per_K),
+        )
+
+
+class Point(Table):
+    node: Annotated[int, Field(ge=1)]
+    name: Annotated[str, Field(min_length=1, max_length=10)]  # UFF 58 entity names hold ten characters
+    body: str
+    position_mm: tuple[Finite, Finite, Finite]
+    direction: Annotated[str, AfterValidator(_along_axis)]
+
+    def point(self) -> m.Point:
+        x, y, z = (v * MM for v in self.position_mm)
+        return m.Point(self.node, self.name, self.body, (x, y, z), axis_vector(self.direction))
+
+
+def axis_vector(direction: str) -> tuple[float, float, float]:
+    """Unit vector of a signed axis like '+Z'."""
+    vector = np.zeros(3)
+    vector["XYZ".index(direction[1])] = 1.0 if direction[0] == "+" else -1.0
+    return tuple(vector.tolist())
+
+
+class Measuring(Table):
+    points: list[Point] = Field(min_length=1)
+
+
+class HammerTest(Table):
+    hammer_nodes: list[int] = Field(min_length=1)
+    tip_stiffness_N_per_m: Positive
+    hammer_mass_g: Positive
+    level_N: Positive
+    level_scatter: Share
+    hits: Annotated[int, Field(ge=1)]
+    double_hit_probability: Annotated[float, Field(ge=0, le=1)]
+    sample_rate_Hz: Positive
+    record_length_s: Positive
+    exponential_end: Annotated[float, Field(gt=0, le=1)]
+    band_Hz: Radii
+    noise_of_value: NotNegative
+    noise_of_largest: NotNegative
+    step_us: Positive
+
+    @model_validator(mode="after")
+    def _sampling_carries_the_band(self) -> HammerTest:
+        if self.band_Hz[1] > 0.4 * self.sample_rate_Hz:
+            raise ValueError("sample_rate_Hz must be at least 2.5 times the upper end of band_Hz, for the anti-alias filter")
+        return self
+
+    def test(self) -> m.HammerTest:
+        return m.HammerTest(
+            tuple(self.hammer_nodes),
+            self.tip_stiffness_N_per_m,
+            self.hammer_mass_g * 1e-3,
+            self.level_N,
+            self.level_scatter,
+            self.hits,
+            self.double_hit_probability,
+            self.sample_rate_Hz,
+            self.record_length_s,
+            self.exponential_end,
+            self.band_Hz,
+            self.noise_of_value,
+            self.noise_of_largest,
+            self.step_us * 1e-6,
+        )
+
+
+class Tolerances(Table):
+    structure: Positive
+    hub: Positive
+    preload: Positive
+    damping: Positive
+    temperature_K: Positive
+    gain: Positive
+
+    def tolerances(self) -> m.Tolerances:
+        return m.Tolerances(self.structure, self.hub, self.preload, self.damping, self.temperature_K, self.gain)
+
+
+class Scene(Table):
+    title: Name
+    reference_temperature_C: Finite
+    materials: dict[str, Material] = Field(min_length=1)
+    section: Section
+    ball_rows: dict[str, BallRow] = Field(min_length=1)
+    bearings: dict[str, Bearing] = Field(min_length=2, max_length=2)
+    bearing_pair: BearingPair
+    structure: Structure
+    thermal: Thermal
+    measuring: Measuring
+    hammer_test: HammerTest
+    tolerances: Tolerances
+
+    @model_validator(mode="after")
+    def _rows_exist(self) -> Scene:
+        for name, bearing in self.bearings.items():
+            if bearing.row not in self.ball_rows:
+                raise ValueError(f"bearings.{name}.row = {bearing.row!r}: allowed are {', '.join(self.ball_rows)}")
+        return self
+
+    def spindle(self, name: str, file: Path, provenance: dict[str, m.Provenance]) -> m.Spindle:
+        pair = self.bearing_pair
+        bearings = sorted((b.bearing(n, self.ball_rows) for n, b in self.bearings.items()), key=lambda b: b.z)
+        return m.Spindle(
+            name,
+            self.title,
+            self.reference_temperature_C,
+            {n: t.material(n) for n, t in self.materials.items()},
+            tuple(r.region() for r in self.section.regions),
+            tuple(bearings),
+            m.Pair(
+                pair.arrangement, pair.preload_N, pair.preload_kind, pair.stiffness_arrangement or pair.arrangement, pair.turning_ring
+            ),
+            self.structure.structure(),
+            tuple(p.point() for p in self.measuring.points),
+            self.hammer_test.test(),
+            self.thermal.thermal(),
+            self.tolerances.tolerances(),
+            provenance,
+            file,
+        )
+
+
+def allowed_keys(path: list[str]) -> list[str]:
+    """Keys allowed in the table at `path` (list indices left out), read off the models; empty where there is no table."""
+    table: Any = Scene
+    for part in path:
+        if isinstance(table, type) and issubclass(table, BaseModel):
+            table = table.model_fields[part].annotation if part in table.model_fields else None
+            table = _table_in(table)
+        elif get_origin(table) is dict:
+            table = _table_in(get_args(table)[1])
+    return list(table.model_fields) if isinstance(table, type) and issubclass(table, BaseModel) else []
+
+
+def _table_in(annotation: Any) -> Any:
+    """The pydantic model inside an annotation (a list's or union's member), or the annotation itself."""
+    if get_origin(annotation) is list:
+        return _table_in(get_args(annotation)[0])
+    if get_origin(annotation) in (Union, UnionType, Annotated):
+        inner = [_table_in(a) for a in get_args(annotation)]
+        return next((a for a in inner if isinstance(a, type) and issubclass(a, BaseModel)), annotation)
+    return annotation
