@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.special import ellipe, ellipk
+from scipy.special import ellipe, ellipk, ellipkm1
 
 
 @dataclass(frozen=True)
@@ -37,16 +37,17 @@ def ellipticity(curvature_difference: float) -> float:
     """
     if not 0 <= curvature_difference < 1:
         raise ValueError(f"curvature difference {curvature_difference:g} is outside [0, 1)")
-    if curvature_difference < 1e-8:
-        return 1.0
 
-    def residual(log_k: float) -> float:
+    def difference(log_k: float) -> float:
         k2 = np.exp(2 * log_k)
         m = -np.expm1(-2 * log_k)
         e = ellipe(m)
-        return float(((k2 + 1) * e - 2 * ellipk(m)) / ((k2 - 1) * e) - curvature_difference)
+        return float(((k2 + 1) * e - 2 * ellipkm1(1 / k2)) / ((k2 - 1) * e))
 
-    return float(np.exp(brentq(residual, 1e-6, 20.0, xtol=1e-14, rtol=1e-14)))
+    nearly_round = 1e-3  # below this the quotient cancels, and log k is proportional to the difference
+    if curvature_difference <= difference(nearly_round):
+        return float(np.exp(nearly_round * curvature_difference / difference(nearly_round)))
+    return float(np.exp(brentq(lambda log_k: difference(log_k) - curvature_difference, nearly_round, 17.0, xtol=1e-14, rtol=1e-14)))
 
 
 def point_contact(
