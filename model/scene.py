@@ -76,7 +76,7 @@ def first_error(file: Path, raw: Any, error: ValidationError) -> str:
     """One sentence for the first thing pydantic found wrong."""
     problem = error.errors()[0]
     location = problem["loc"]
-    key = ".".join(str(part) for part in location)
+    key = _readable(raw, location)
     match problem["type"]:
         case "extra_forbidden":
             return f"{file}: {key}: unknown key; allowed here: {', '.join(_allowed(location)) or 'nothing'}"
@@ -84,7 +84,21 @@ def first_error(file: Path, raw: Any, error: ValidationError) -> str:
             return f"{file}: {key}: missing, and has no default"
         case _:
             message = problem["msg"].removeprefix("Value error, ")
-            return f"{file}: {key} = {problem['input']!r}: {message[0].lower()}{message[1:]}"
+            value = "" if isinstance(problem["input"], Mapping) else f" = {problem['input']!r}"
+            return f"{file}: {key}{value}: {message[0].lower()}{message[1:]}".replace(f"{file}: : ", f"{file}: ")
+
+
+def _readable(raw: Any, location: tuple[str | int, ...]) -> str:
+    """Dotted key in which entries of a list of tables go by their name."""
+    words = []
+    for part in location:
+        try:
+            raw = raw[part]
+        except (KeyError, IndexError, TypeError):
+            raw = None
+        named = isinstance(part, int) and isinstance(raw, Mapping)
+        words.append(str(raw.get("name", raw.get("node", part)) if named else part))
+    return ".".join(words)
 
 
 def _allowed(location: tuple[str | int, ...]) -> list[str]:

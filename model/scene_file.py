@@ -7,7 +7,7 @@ from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from model import machine as m
 
@@ -47,8 +47,8 @@ class Table(BaseModel):
 
 class LawTable(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
-    temperature_C: list[Finite] = Field(min_length=2)
-    value: list[Positive] = Field(min_length=2)
+    temperature_C: list[Finite] = Field(min_length=1)
+    value: list[Positive] = Field(min_length=1)
 
     @model_validator(mode="after")
     def _one_value_a_temperature(self) -> LawTable:
@@ -60,11 +60,12 @@ class LawTable(BaseModel):
         return m.Law(tuple(self.temperature_C), tuple(unit * v for v in self.value))
 
 
-LawValue = Positive | LawTable
+def _constant(value: Any) -> Any:
+    return value if isinstance(value, dict | LawTable) else {"temperature_C": [0.0], "value": [value]}
 
 
-def _law(value: float | LawTable, unit: float) -> m.Law:
-    return value.law(unit) if isinstance(value, LawTable) else m.Law((0.0,), (unit * value,))
+LawValue = Annotated[LawTable, BeforeValidator(_constant)]
+"""A number, or a table of `temperature_C` and `value`."""
 
 
 class Material(Table):
@@ -78,9 +79,9 @@ class Material(Table):
     def material(self, name: str) -> m.Material:
         return m.Material(
             name,
-            _law(self.youngs_modulus_GPa, 1e9),
+            self.youngs_modulus_GPa.law(1e9),
             self.poisson_ratio,
-            _law(self.thermal_expansion_um_per_m_K, 1e-6),
+            self.thermal_expansion_um_per_m_K.law(1e-6),
             self.density_kg_per_m3,
             self.conductivity_W_per_m_K,
             self.heat_capacity_J_per_kg_K,
@@ -259,7 +260,7 @@ class Thermal(Table):
             tuple(m.Convection(tuple(c.regions), c.coefficient_W_per_m2_K) for c in self.convection),
             tuple(m.HeatSource(s.name, tuple(s.regions), s.power_W, s.speed_rpm * RPM, s.exponent) for s in self.sources),
             tuple(m.AirGap(g.regions, g.coefficient_W_per_m2_K) for g in self.gaps),
-            m.Friction(f.f0, f.f1, _law(f.kinematic_viscosity_mm2_per_s, 1e-6), f.conductance_W_per_K),
+            m.Friction(f.f0, f.f1, f.kinematic_viscosity_mm2_per_s.law(1e-6), f.conductance_W_per_K),
         )
 
 
