@@ -113,6 +113,7 @@ class Pair:
     preload_kind: str  # rigid | spring
     stiffness_arrangement: str
     turning_ring: str  # inner | outer
+    ball_inertia: float  # share of the balls' centrifugal force and gyroscopic moment in the equilibrium, 0 to 1
 
 
 @dataclass(frozen=True)

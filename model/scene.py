@@ -188,6 +188,14 @@ def _check_section(file: Path, spindle: Spindle) -> None:
                 raise BadInput(f"{file}: section.regions.{region.name}: {where} floats; it must touch its {part} part along an edge")
 
 
+    heated = [("convection", c.regions) for c in spindle.thermal.convections]
+    heated += [("sources", s.regions) for s in spindle.thermal.sources] + [("gaps", g.regions) for g in spindle.thermal.gaps]
+    for key, used in heated:
+        for name in used:
+            if name not in names:
+                raise BadInput(f"{file}: thermal.{key}: {name!r} names no section region; allowed are {', '.join(names)}")
+
+
 def _check_bearings(file: Path, spindle: Spindle) -> None:
     for b in spindle.bearings:
         where = f"{file}: bearings.{b.name}"

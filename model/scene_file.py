@@ -159,12 +159,19 @@ class BearingPair(Table):
     preload_kind: Literal["rigid", "spring"]
     turning_ring: Literal["inner", "outer"]
     stiffness_arrangement: Arrangement | None = None
+    ball_inertia: Annotated[float, Field(ge=0, le=1)] = 0.0
 
     @model_validator(mode="after")
     def _tandem_needs_a_spring(self) -> BearingPair:
         if self.arrangement == "tandem" and self.preload_kind == "rigid":
             raise ValueError("a tandem pair cannot preload itself; preload_kind must be spring")
         return self
+
+    def pair(self) -> m.Pair:
+        stiffness_arrangement = self.stiffness_arrangement or self.arrangement
+        return m.Pair(
+            self.arrangement, self.preload_N, self.preload_kind, stiffness_arrangement, self.turning_ring, self.ball_inertia
+        )
 
 
 class StructureBody(Table):
@@ -362,7 +369,6 @@ class Scene(Table):
         return self
 
     def spindle(self, name: str, file: Path, provenance: dict[str, m.Provenance]) -> m.Spindle:
-        pair = self.bearing_pair
         bearings = sorted((b.bearing(n, self.ball_rows) for n, b in self.bearings.items()), key=lambda b: b.z)
         return m.Spindle(
             name,
@@ -371,9 +377,7 @@ class Scene(Table):
             {n: t.material(n) for n, t in self.materials.items()},
             tuple(r.region() for r in self.section.regions),
             tuple(bearings),
-            m.Pair(
-                pair.arrangement, pair.preload_N, pair.preload_kind, pair.stiffness_arrangement or pair.arrangement, pair.turning_ring
-            ),
+            self.bearing_pair.pair(),
             self.structure.structure(),
             tuple(p.point() for p in self.measuring.points),
             self.hammer_test.test(),

@@ -1,0 +1,204 @@
+"""The two ball rows against each other: axial equilibrium of the hub at a temperature, and the bearing states that follow.
+
+Jang, Kim, Han, Kim (2003): contact angle and deformation from ring motion, Eqs. (1)-(5); load-deflection and stiffness, Eqs. (6),
+(7); the hub moves until the axial forces balance, Eq. (8) and Fig. 5. Besides the ball (Eq. 3) the grooves grow too, which makes
+a uniform expansion of everything leave the contact angle alone. The secant method of Fig. 5 is replaced by a bracketing one:
+every row's axial force rises monotonically with the hub's movement, so the root is unique and cannot be missed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import brentq
+
+from model.ball_row import Array, BallInertia, BallRow, NoEquilibrium, RowForce, respond
+from model.hertz import in_series, race_contact
+from model.machine import Bearing, Condition, RingMotion, Spindle
+
+SENSE = {"back-to-back": (-1, 1), "face-to-face": (1, -1), "tandem": (1, 1)}
+"""Axial direction in which moving the outer ring loads the (lower, upper) bearing: back-to-back outer rings load apart."""
+
+
+@dataclass(frozen=True)
+class BearingState:
+    """One bearing at its operating point; forces in N, lengths in m, angles in rad.
+
+    `stiffness`, `damping`: (5, 5) between the inner and the outer body at the ring centre, order x, y, z, tilt_x, tilt_y.
+    `row` is the ball row at its loaded position, with the load lines of `Pair.stiffness_arrangement`.
+    """
+
+    name: str
+    z: float
+    contact_angle: float
+    outer_contact_angle: float
+    deformation: float
+    contact_force: float
+    ball_stiffness: float
+    preload: float
+    stiffness: Array
+    damping: Array
+    row: BallRow
+    in_contact: bool
+
+    @property
+    def radial_stiffness(self) -> float:
+        return float(self.stiffness[0, 0])
+
+    @property
+    def axial_stiffness(self) -> float:
+        return float(self.stiffness[2, 2])
+
+    @property
+    def tilt_stiffness(self) -> float:
+        return float(self.stiffness[3, 3])
+
+    @property
+    def coupling_stiffness(self) -> float:
+        """Radial force per tilt, k_x,tilt_y (N/rad)."""
+        return float(self.stiffness[0, 4])
+
+
+@dataclass(frozen=True)
+class PairState:
+    """Both bearings at one condition; `hub_movement` is the rigid axial movement of the outer rings (m)."""
+
+    condition: Condition
+    bearings: tuple[BearingState, ...]  # in the order of Spindle.bearings
+    hub_movement: float
+    status: str  # "in contact", or which bearing lost contact
+
+    def bearing(self, name: str) -> BearingState:
+        return next(b for b in self.bearings if b.name == name)
+
+
+def reference_motion(temperature: float) -> RingMotion:
+    """Rings that have not moved: the reference state."""
+    return RingMotion(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, temperature)
+
+
+def solve(spindle: Spindle, condition: Condition, motions: Mapping[str, RingMotion]) -> PairState:
+    """Axial equilibrium of the pair under the thermal ring `motions` (by bearing name)."""
+    senses = SENSE[spindle.pair.arrangement]
+    rows = [row_at(spindle, b, s, motions[b.name], condition.speed) for b, s in zip(spindle.bearings, senses, strict=True)]
+    if spindle.pair.preload_kind == "spring" and spindle.pair.arrangement != "tandem":
+        moves = [_movement_for(row, s * spindle.pair.preload) for row, s in zip(rows, senses, strict=True)]
+    else:
+        external = sum(senses) * spindle.pair.preload  # a tandem pair carries both shares together
+        moves = [_balance(rows, external)] * len(rows)
+    states = tuple(
+        _state(spindle, b, replace(row, axial=row.axial + h), k)
+        for b, row, h, k in zip(spindle.bearings, rows, moves, SENSE[spindle.pair.stiffness_arrangement], strict=True)
+    )
+    loose = [b.name for b in states if not b.in_contact]
+    status = "in contact" if not loose else f"{' and '.join(loose)} bearing lost contact"
+    return PairState(condition, states, float(np.mean(moves)), status)
+
+
+def row_at(spindle: Spindle, b: Bearing, sense: int, motion: RingMotion, speed: float) -> BallRow:
+    """The ball row of bearing `b` with its rings moved by `motion` and the hub not yet moved.
+
+    The groove curvature centres move with the rings plus the growth of the groove radii: Jang et al. 2003, Eqs. (1)-(5).
+    """
+    loaded = b.unloaded_distance + reference_deformation(spindle, b)
+    radial = loaded * np.cos(b.contact_angle)
+    axial = loaded * np.sin(b.contact_angle)
+    d, fi, fo = b.ball_diameter, b.inner_conformity, b.outer_conformity
+    radial += motion.inner_r + fi * d * motion.inner_strain - (motion.outer_r - fo * d * motion.outer_strain)
+    axial += sense * (motion.outer_z - motion.inner_z)
+    ball_radius = d / 2 * (1 + motion.ball_strain)
+    inner_constant, outer_constant = contact_constants(spindle, b, motion, float(np.arctan2(axial, radial)))
+    return BallRow(
+        balls=b.balls,
+        radial=float(radial),
+        axial=float(sense * axial),
+        inner_length=fi * d * (1 + motion.inner_strain) - ball_radius,
+        outer_length=fo * d * (1 + motion.outer_strain) - ball_radius,
+        inner_constant=inner_constant,
+        outer_constant=outer_constant,
+        arm=b.pitch_diameter / 2,
+        inertia=_ball_inertia(spindle, b, speed),
+    )
+
+
+def reference_deformation(spindle: Spindle, b: Bearing) -> float:
+    """Deformation (m) of each ball under the preload at the reference temperature, both contacts: Eq. (6) inverted."""
+    constants = contact_constants(spindle, b, reference_motion(spindle.reference_temperature), b.contact_angle)
+    return float((spindle.pair.preload / (b.balls * np.sin(b.contact_angle)) / in_series(*constants)) ** (2 / 3))
+
+
+def contact_constants(spindle: Spindle, b: Bearing, motion: RingMotion, angle: float) -> tuple[float, float]:
+    """Hertz constants (inner, outer) at the temperature of `motion`, with its grown ball and its elastic moduli."""
+    ball, ring = (
+        (spindle.materials[name].youngs_modulus(motion.temperature), spindle.materials[name].poisson_ratio)
+        for name in (b.ball_material, b.ring_material)
+    )
+    d = b.ball_diameter * (1 + motion.ball_strain)
+    inner, outer = (
+        race_contact(d, f * b.ball_diameter * (1 + strain) / d, b.pitch_diameter * (1 + strain), angle, is_inner, ball, ring).stiffness
+        for f, strain, is_inner in (
+            (b.inner_conformity, motion.inner_strain, True),
+            (b.outer_conformity, motion.outer_strain, False),
+        )
+    )
+    return inner, outer
+
+
+def _ball_inertia(spindle: Spindle, b: Bearing, speed: float) -> BallInertia | None:
+    if speed == 0.0 or spindle.pair.ball_inertia == 0.0:
+        return None
+    inner, outer = (0.0, speed) if spindle.pair.turning_ring == "outer" else (speed, 0.0)
+    density = spindle.materials[b.ball_material].density
+    return BallInertia(b.ball_diameter, b.pitch_diameter, density, inner, outer, spindle.pair.ball_inertia)
+
+
+def _axial_force(row: BallRow, movement: float) -> float:
+    """Axial force (N) needed on the outer ring when it has moved by `movement` (m); rises with it."""
+    moved = replace(row, axial=row.axial + movement)
+    if row.inertia is None:
+        length = float(np.hypot(moved.radial, moved.axial))
+        deformation = max(length - row.unloaded_distance, 0.0)
+        return row.balls * row.constant * deformation**1.5 * moved.axial / length
+    return float(respond(moved).force[2])
+
+
+def _balance(rows: list[BallRow], external: float) -> float:
+    """Hub movement at which the axial forces of all rows add up to `external`: Jang et al. 2003, Eq. (8)."""
+    return _root(lambda h: sum(_axial_force(row, h) for row in rows) - external, "the pair")
+
+
+def _movement_for(row: BallRow, force: float) -> float:
+    """Movement of one outer ring under a constant axial force."""
+    return _root(lambda h: _axial_force(row, h) - force, "a spring-loaded row")
+
+
+def _root(imbalance, what: str) -> float:
+    reach = 1e-6
+    for _ in range(12):
+        if imbalance(-reach) <= 0 <= imbalance(reach):
+            return float(brentq(imbalance, -reach, reach, xtol=1e-17, rtol=1e-14))
+        reach *= 2
+    raise NoEquilibrium(f"{what} finds no axial equilibrium within {reach * 1e3:.1f} mm of hub movement")
+
+
+def _state(spindle: Spindle, b: Bearing, row: BallRow, stiffness_sense: int) -> BearingState:
+    row = replace(row, axial=stiffness_sense * abs(row.axial))
+    answer: RowForce = respond(row)
+    zeta, omega = b.damping_ratio, 2 * np.pi * spindle.structure.damping_frequency
+    deformation = float(answer.deformation[0])
+    return BearingState(
+        name=b.name,
+        z=b.z,
+        contact_angle=float(answer.inner_angle[0]),
+        outer_contact_angle=float(answer.outer_angle[0]),
+        deformation=deformation,
+        contact_force=float(answer.ball_force[0]),
+        ball_stiffness=1.5 * row.constant * max(deformation, 0.0) ** 0.5,
+        preload=abs(float(answer.force[2])),
+        stiffness=answer.tangent,
+        damping=2 * zeta / omega * answer.tangent,
+        row=row,
+        in_contact=bool(answer.in_contact.all()),
+    )
