@@ -1,0 +1,119 @@
+"""The rotor-base chain: rigid bodies joined by compliant elements, and its matrices M, C, G, K.
+
+Small motions about the loaded state. Every body has its centre of mass on the spindle axis and moves in some of
+x, y, z, tilt_x, tilt_y; a point of it at position p is displaced by u + tilt x (p - centre). A turning body adds the gyroscopic
+moment -Ip speed tilt_rate_y about x and +Ip speed tilt_rate_x about y on the right-hand side (Genta, *Dynamics of Rotating
+Systems*, 2005, Eq. 2.23 in real coordinates), as C + G with G skew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from model.ball_row import Array
+from model.machine import MOVES, Body, Point, Spindle, Structure
+from model.pair import PairState
+
+
+@dataclass(frozen=True)
+class Element:
+    """Stiffness and damping (5, 5) between two bodies (or the ground) at height `z` on the axis; `b` moves relative to `a`."""
+
+    name: str
+    group: str
+    a: str
+    b: str
+    z: float
+    stiffness: Array
+    damping: Array
+
+
+@dataclass(frozen=True)
+class RotorBase:
+    bodies: tuple[Body, ...]
+    elements: tuple[Element, ...]
+    speed: float  # rad/s
+
+    @property
+    def dofs(self) -> tuple[tuple[str, str], ...]:
+        """(body, move) of every degree of freedom, in order."""
+        return tuple((b.name, move) for b in self.bodies for move in b.moves)
+
+    def body(self, name: str) -> Body:
+        return next(b for b in self.bodies if b.name == name)
+
+
+@dataclass(frozen=True)
+class Matrices:
+    """M, C + G (gyroscopic terms included) and K of a linearised spindle, all (n, n), with the dofs' names."""
+
+    mass: Array
+    damping: Array
+    stiffness: Array
+    dofs: tuple[tuple[str, str], ...]
+
+
+def rotor_base(spindle: Spindle, state: PairState) -> RotorBase:
+    """The chain at one condition: the structure's joints and the two bearings."""
+    structure = spindle.structure
+    joints = [joint_element(structure, i) for i in range(len(structure.joints))]
+    bearings = [
+        Element(b.name, "bearings", structure.inner_body, structure.outer_body, b.z, b.stiffness, b.damping) for b in state.bearings
+    ]
+    return RotorBase(structure.bodies, (*joints, *bearings), state.condition.speed)
+
+
+def joint_element(structure: Structure, index: int) -> Element:
+    joint = structure.joints[index]
+    stiffness = np.diag(joint.stiffness)
+    damping = 2 * joint.damping_ratio / (2 * np.pi * structure.damping_frequency) * stiffness
+    return Element(joint.name, joint.group, *joint.bodies, joint.z, stiffness, damping)
+
+
+def motion_rows(chain: RotorBase, name: str, position: Sequence[float]) -> Array:
+    """Rows (5, n) that give the displacement and tilt of the material point of a body at `position` (3,)."""
+    rows = np.zeros((5, sum(len(b.moves) for b in chain.bodies)))
+    start = 0
+    for body in chain.bodies:
+        if body.name == name:
+            x, y, z = position[0], position[1], position[2] - body.z
+            lever = np.eye(5)  # displacement from a unit motion: tilt x (p - centre)
+            lever[1:3, 3] = -z, y
+            lever[[0, 2], 4] = z, -x
+            rows[:, start : start + len(body.moves)] = lever[:, [MOVES.index(m) for m in body.moves]]
+        start += len(body.moves)
+    return rows
+
+
+def element_rows(chain: RotorBase, element: Element) -> Array:
+    """Rows (5, n) of the relative motion an element resists."""
+    at = (0.0, 0.0, element.z)
+    return motion_rows(chain, element.b, at) - motion_rows(chain, element.a, at)
+
+
+def point_row(chain: RotorBase, point: Point) -> Array:
+    """Row (n,) of the displacement of a measuring point along its direction."""
+    return np.array(point.direction) @ motion_rows(chain, point.body, point.position)[:3]
+
+
+def matrices(chain: RotorBase) -> Matrices:
+    """M, C + G, K assembled element by element (independent of MuJoCo)."""
+    n = len(chain.dofs)
+    mass, damping, stiffness = np.zeros(n), np.zeros((n, n)), np.zeros((n, n))
+    index = {dof: i for i, dof in enumerate(chain.dofs)}
+    for body in chain.bodies:
+        inertia = dict(zip(MOVES, (body.mass, body.mass, body.mass, *body.inertia[:2]), strict=True))
+        for move in body.moves:
+            mass[index[body.name, move]] = inertia[move]
+        if body.turns:
+            i, j = index[body.name, "tilt_x"], index[body.name, "tilt_y"]
+            damping[i, j] += body.inertia[2] * chain.speed
+            damping[j, i] -= body.inertia[2] * chain.speed
+    for element in chain.elements:
+        rows = element_rows(chain, element)
+        damping += rows.T @ element.damping @ rows
+        stiffness += rows.T @ element.stiffness @ rows
+    return Matrices(np.diag(mass), damping, stiffness, chain.dofs)
