@@ -73,7 +73,13 @@ def frf(linear: Matrices, response: Array, reference: Array, frequency: Array, k
     at_reference = p.left @ np.atleast_2d(reference).T
     s = 2j * np.pi * np.asarray(frequency)
     residues = at_response[:, None, :] * at_reference.T[None, :, :]
-    value = residues @ (1 / (s[None, :] - p.value[:, None]))
+    # a pole and its conjugate add up to a term with real numerators, which halves the work on the lines
+    upper, real = p.value.imag > 0, p.value.imag == 0
+    pole, residue = p.value[upper], residues[:, :, upper]
+    term = 1 / (s * (s - 2 * pole.real[:, None]) + np.abs(pole[:, None]) ** 2)
+    value = (2 * residue.real) @ (s * term) - (2 * (residue * pole.conj()).real) @ term
+    if real.any():
+        value += residues[:, :, real] @ (1 / (s - p.value[real][:, None]))
     return value * s ** {"receptance": 0, "mobility": 1, "accelerance": 2}[kind]
 
 
