@@ -100,14 +100,17 @@ def solve(spindle: Spindle, condition: Condition, motions: Mapping[str, RingMoti
 def row_at(spindle: Spindle, b: Bearing, sense: int, motion: RingMotion, speed: float) -> BallRow:
     """The ball row of bearing `b` with its rings moved by `motion` and the hub not yet moved.
 
-    The groove curvature centres move with the rings plus the growth of the groove radii: Jang et al. 2003, Eqs. (1)-(5).
+    The groove curvature centres move with the rings, plus the growth of the groove radii and of their distance from the ring's
+    middle: Jang et al. 2003, Eqs. (1)-(5).
     """
     loaded = b.unloaded_distance + reference_deformation(spindle, b)
     radial = loaded * np.cos(b.contact_angle)
     axial = loaded * np.sin(b.contact_angle)
     d, fi, fo = b.ball_diameter, b.inner_conformity, b.outer_conformity
     radial += motion.inner_r + fi * d * motion.inner_strain - (motion.outer_r - fo * d * motion.outer_strain)
-    axial += sense * (motion.outer_z - motion.inner_z)
+    inner_share = (fi - 0.5) / (fi + fo - 1)  # the groove centres lie off the ring's middle by this share of their distance
+    growth = inner_share * motion.inner_strain + (1 - inner_share) * motion.outer_strain
+    axial += sense * (motion.outer_z - motion.inner_z) + growth * axial
     ball_radius = d / 2 * (1 + motion.ball_strain)
     inner_constant, outer_constant = contact_constants(spindle, b, motion, float(np.arctan2(axial, radial)))
     return BallRow(
