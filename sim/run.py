@@ -1,0 +1,81 @@
+"""The whole chain at several temperatures: operating points, impact tests, identified modes, and the measured ones beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from model.machine import Condition, Spindle
+from sim.campaign import Campaign, Test, read_campaign
+from sim.impact import ImpactTest, impact_tests
+from sim.modal import Modes, extract
+from sim.operating import OperatingPoint, operating_point
+
+HIGHEST_MODE = 3000.0  # Hz, of tables and pictures when the scene's band does not say
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """Everything at one temperature."""
+
+    point: OperatingPoint
+    test: ImpactTest
+    identified: Modes
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A run of the whole chain; `measured` are the campaigns that come with the scene."""
+
+    spindle: Spindle
+    steps: tuple[Step, ...]
+    measured: tuple[Campaign, ...]
+
+
+def run(
+    spindle: Spindle,
+    temperatures: Sequence[float],
+    speed: float = 0.0,
+    element: str = "linear",
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda done: None,
+) -> Run:
+    """Run the chain at every temperature (C); `progress` is told in words what has been done."""
+    steps = []
+    for temperature in temperatures:
+        point = operating_point(spindle, Condition(temperature, speed))
+        progress(f"{temperature:g} C: {point.state.status}, preload {point.state.bearings[0].preload:.2f} N")
+        test = impact_tests([point], element=element, seed=seed)[0]
+        progress(f"{temperature:g} C: {spindle.hammer.hits} hits on {len(spindle.hammer.hammer_nodes)} points simulated")
+        identified = identify(test)
+        progress(f"{temperature:g} C: {len(identified.frequency)} modes identified")
+        steps.append(Step(point, test, identified))
+    return Run(spindle, tuple(steps), measured_campaigns(spindle))
+
+
+def identify(test: ImpactTest) -> Modes:
+    """Modes of an impact test, with the damping of its exponential window taken out."""
+    frf = test.estimate.h1
+    return extract(frf.frequency, frf.value, frf.sd, kind=frf.quantity, window_decay=test.estimate.window_decay)
+
+
+def measured_campaigns(spindle: Spindle) -> tuple[Campaign, ...]:
+    """The campaigns in the `measured` folder beside the scene file, by name."""
+    folder = spindle.file.parent / "measured" if spindle.file else Path("does not exist")
+    return tuple(read_campaign(path.parent) for path in sorted(folder.glob("*/campaign.toml")))
+
+
+def as_campaign(run: Run, title: str) -> Campaign:
+    """The run's virtual tests in the form of a measured campaign."""
+    tests = tuple(
+        Test(
+            id=f"T{step.point.condition.temperature:g}_n{step.point.condition.speed * 30 / 3.141592653589793:.0f}",
+            temperature=step.point.condition.temperature,
+            speed=step.point.condition.speed,
+            level=run.spindle.hammer.level,
+            frf=step.test.estimate.h1,
+        )
+        for step in run.steps
+    )
+    return Campaign(title, run.spindle.name, "mobility", run.spindle.points, tests)
