@@ -83,9 +83,7 @@ def _add_bodies(out: mujoco.MjSpec, chain: RotorBase) -> None:
             outer.add_joint(name=f"{body.name}.{move}", type=kind, axis=AXES[move])
         if body.turns:
             rest = [(1 - share) * i for i in inertia]
-            inner = outer.add_body(
-                name=body.name, ipos=[0, 0, 0], mass=(1 - share) * body.mass, inertia=rest, explicitinertial=True
-            )
+            inner = outer.add_body(name=body.name, ipos=[0, 0, 0], mass=(1 - share) * body.mass, inertia=rest, explicitinertial=True)
             inner.add_joint(name=f"{body.name}.spin", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1])
 
 

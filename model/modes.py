@@ -1,7 +1,8 @@
 """Modes and exact FRFs of a linearised spindle.
 
 With state (q, q'), poles and left and right vectors come from one eigenproblem of size 2n, and every FRF is the sum of its modal
-terms: H(omega) = sum over all 2n poles of (row phi)(psi^H column) / (i omega - lambda) (Genta 2005, ch. 5; Ewins, *Modal Testing*, 2000, 2.5-2.8).
+terms: H(omega) = sum over all 2n poles of (row phi)(psi^H column) / (i omega - lambda).
+Sources: Genta, *Dynamics of Rotating Systems* (2005), ch. 5; Ewins, *Modal Testing* (2000), 2.5-2.8.
 """
 
 from __future__ import annotations

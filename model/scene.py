@@ -56,7 +56,7 @@ def build(raw: dict[str, Any], file: Path) -> Spindle:
     try:
         form = scene_file.Scene.model_validate(raw)
     except ValidationError as error:
-        raise BadInput(first_error(file, raw, error)) from None
+        raise BadInput(scene_file.first_error(file, raw, scene_file.Scene, error)) from None
     spindle = form.spindle(name=file.parent.name, file=file, provenance=_provenance(file, raw))
     _check_section(file, spindle)
     _check_bearings(file, spindle)
@@ -70,40 +70,6 @@ def content_hash(spindle: Spindle) -> str:
     for key in ("name", "title", "file", "provenance"):
         content.pop(key)
     return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()[:12]
-
-
-def first_error(file: Path, raw: Any, error: ValidationError) -> str:
-    """One sentence for the first thing pydantic found wrong."""
-    problem = error.errors()[0]
-    location = problem["loc"]
-    key = _readable(raw, location)
-    match problem["type"]:
-        case "extra_forbidden":
-            return f"{file}: {key}: unknown key; allowed here: {', '.join(_allowed(location)) or 'nothing'}"
-        case "missing":
-            return f"{file}: {key}: missing, and has no default"
-        case _:
-            message = problem["msg"].removeprefix("Value error, ")
-            value = "" if isinstance(problem["input"], Mapping) else f" = {problem['input']!r}"
-            return f"{file}: {key}{value}: {message[0].lower()}{message[1:]}".replace(f"{file}: : ", f"{file}: ")
-
-
-def _readable(raw: Any, location: tuple[str | int, ...]) -> str:
-    """Dotted key in which entries of a list of tables go by their name."""
-    words = []
-    for part in location:
-        try:
-            raw = raw[part]
-        except (KeyError, IndexError, TypeError):
-            raw = None
-        named = isinstance(part, int) and isinstance(raw, Mapping)
-        words.append(str(raw.get("name", raw.get("node", part)) if named else part))
-    return ".".join(words)
-
-
-def _allowed(location: tuple[str | int, ...]) -> list[str]:
-    """Key names allowed where an unknown key stands, read off the file's models."""
-    return scene_file.allowed_keys([str(part) for part in location[:-1] if not isinstance(part, int)])
 
 
 def _provenance(file: Path, raw: Mapping[str, Any]) -> dict[str, Provenance]:
@@ -186,7 +152,6 @@ def _check_section(file: Path, spindle: Spindle) -> None:
             if region.name not in reached:
                 where = f"r_mm = {_mm(region.r)}, z_mm = {_mm(region.z)}"
                 raise BadInput(f"{file}: section.regions.{region.name}: {where} floats; it must touch its {part} part along an edge")
-
 
     heated = [("convection", c.regions) for c in spindle.thermal.convections]
     heated += [("sources", s.regions) for s in spindle.thermal.sources] + [("gaps", g.regions) for g in spindle.thermal.gaps]
@@ -277,7 +242,9 @@ def _check_structure(file: Path, spindle: Spindle) -> None:
     for joint in structure.joints:
         for name in joint.bodies:
             if name not in (*names, "ground"):
-                raise BadInput(f"{file}: structure.joints.{joint.name}.between: {name!r} is no body; allowed are ground, {', '.join(names)}")
+                raise BadInput(
+                    f"{file}: structure.joints.{joint.name}.between: {name!r} is no body; allowed are ground, {', '.join(names)}"
+                )
     nodes = [p.node for p in spindle.points]
     for point in spindle.points:
         if nodes.count(point.node) > 1:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from model import machine as m
 
@@ -39,7 +40,7 @@ Radii = Annotated[tuple[NotNegative, Finite], AfterValidator(_rising)]
 class Table(BaseModel):
     """A table of the file: unknown keys are refused; `origin`, `source` and `origins` say where its numbers come from."""
 
-    model_config = ConfigDict(extra="forbid", strict=False, frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True)
     origin: Literal["printed", "assumed", "calibrated"] | None = None
     source: str = ""
     origins: dict[str, Literal["printed", "assumed", "calibrated"]] = {}
@@ -119,7 +120,9 @@ class BallRow(Table):
     @model_validator(mode="after")
     def _balls_fit(self) -> BallRow:
         if self.balls * self.ball_diameter_mm > np.pi * self.pitch_diameter_mm:
-            raise ValueError("that many balls do not fit on the pitch circle; balls * ball_diameter_mm must be below pi * pitch_diameter_mm")
+            raise ValueError(
+                "that many balls do not fit on the pitch circle; balls * ball_diameter_mm must be below pi * pitch_diameter_mm"
+            )
         return self
 
 
@@ -169,9 +172,7 @@ class BearingPair(Table):
 
     def pair(self) -> m.Pair:
         stiffness_arrangement = self.stiffness_arrangement or self.arrangement
-        return m.Pair(
-            self.arrangement, self.preload_N, self.preload_kind, stiffness_arrangement, self.turning_ring, self.ball_inertia
-        )
+        return m.Pair(self.arrangement, self.preload_N, self.preload_kind, stiffness_arrangement, self.turning_ring, self.ball_inertia)
 
 
 class StructureBody(Table):
@@ -388,16 +389,43 @@ class Scene(Table):
         )
 
 
-def allowed_keys(path: list[str]) -> list[str]:
-    """Keys allowed in the table at `path` (list indices left out), read off the models; empty where there is no table."""
-    table: Any = Scene
+def first_error(where: str | Path, raw: Any, form: type[BaseModel], error: ValidationError) -> str:
+    """One sentence for the first thing pydantic found wrong in a file of `form`: a misspelt key before the one then missing.
+
+    Entries of a list of tables go by their id, node or name.
+    """
+    problem = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
+    location = problem["loc"]
+    words, value = [], raw
+    for part in location:
+        try:
+            value = value[part]
+        except (KeyError, IndexError, TypeError):
+            value = None
+        entry = value if isinstance(part, int) and isinstance(value, Mapping) else {}
+        words.append(str(next((entry[key] for key in ("id", "node", "name") if key in entry), part)))
+    key = ".".join(words)
+    match problem["type"]:
+        case "extra_forbidden":
+            return f"{where}: {key}: unknown key; allowed here: {', '.join(_allowed_keys(form, location[:-1]))}"
+        case "missing":
+            return f"{where}: {key}: missing, and has no default"
+        case _:
+            message = problem["msg"].removeprefix("Value error, ")
+            given = "" if isinstance(problem["input"], Mapping) else f" = {problem['input']!r}"
+            told = f"{key}{given}: {message[0].lower()}{message[1:]}".removeprefix(": ")
+            return f"{where}: {told}"
+
+
+def _allowed_keys(form: Any, path: tuple[str | int, ...]) -> list[str]:
+    """Keys of the table at `path`, read off the models."""
+    table = form
     for part in path:
-        if isinstance(table, type) and issubclass(table, BaseModel):
-            table = table.model_fields[part].annotation if part in table.model_fields else None
-            table = _table_in(table)
-        elif get_origin(table) is dict:
-            table = _table_in(get_args(table)[1])
-    return list(table.model_fields) if isinstance(table, type) and issubclass(table, BaseModel) else []
+        if isinstance(part, int):
+            continue
+        fields = getattr(table, "model_fields", None)
+        table = _table_in(fields[part].annotation if fields and part in fields else get_args(table)[1])
+    return list(table.model_fields)
 
 
 def _table_in(annotation: Any) -> Any:

@@ -54,6 +54,4 @@ def mass_properties(tiles: Iterable[Cell], regions: Sequence[Region], materials:
         rows.append((mass, (z0 + z1) / 2, mass / 12 * (3 * (r0**2 + r1**2) + (z1 - z0) ** 2), mass / 2 * (r0**2 + r1**2)))
     mass, z, transverse, polar = np.array(rows).T
     centre = float(np.sum(mass * z) / np.sum(mass))
-    return MassProperties(
-        float(mass.sum()), centre, float(np.sum(transverse + mass * (z - centre) ** 2)), float(polar.sum())
-    )
+    return MassProperties(float(mass.sum()), centre, float(np.sum(transverse + mass * (z - centre) ** 2)), float(polar.sum()))

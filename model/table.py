@@ -113,5 +113,3 @@ def read_table(path: Path) -> StiffnessTable:
     if any(np.isnan(grid).any() for columns in values.values() for grid in columns.values()):
         raise BadInput(f"{path}: the table has gaps; every bearing needs a row for each temperature and speed")
     return StiffnessTable(temperature, rpm * RPM, values, unloads, provenance)
-
-

@@ -78,7 +78,7 @@ def _force_window(time: Array, force: Array, open_for: float) -> Array:
     peak = np.abs(force).max(axis=-1, keepdims=True)
     touching = np.abs(force) > 0.05 * peak
     touching[..., time < PRE_TRIGGER / 2] = False
-    width = max(int(round(2 * open_for / (time[1] - time[0]))), 3)
+    width = max(round(2 * open_for / float(time[1] - time[0])), 3)
     return (uniform_filter1d(touching.astype(float), width, axis=-1, mode="nearest") > 1e-9).astype(float)
 
 

@@ -56,9 +56,7 @@ def operating_point(spindle: Spindle, condition: Condition) -> OperatingPoint:
 
 def stiffness_table(spindle: Spindle, temperatures: Sequence[float], speeds: Sequence[float] = (0.0,)) -> StiffnessTable:
     """Bearing properties over temperature (C) and speed (rad/s), and the temperature at which a bearing unloads."""
-    states = [
-        [operating_point(spindle, Condition(t, speed)).state for speed in sorted(set(speeds))] for t in sorted(set(temperatures))
-    ]
+    states = [[operating_point(spindle, Condition(t, speed)).state for speed in sorted(set(speeds))] for t in sorted(set(temperatures))]
     unloads = {b.name: _unloads(spindle, [row[0] for row in states], b.name) for b in spindle.bearings}
     return tabulate(states, unloads, provenance(spindle))
 

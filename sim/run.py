@@ -74,6 +74,7 @@ def as_campaign(run: Run, title: str) -> Campaign:
             temperature=step.point.condition.temperature,
             speed=step.point.condition.speed,
             level=run.spindle.hammer.level,
+            window_decay=step.test.estimate.window_decay,
             frf=step.test.estimate.h1,
         )
         for step in run.steps

@@ -1,0 +1,260 @@
+"""Conduction against closed forms in space and time, coupling of the parts, friction feedback, and the balance of heat."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.special import j0, j1
+from skfem import Basis
+
+from model.machine import AirGap, Convection, Friction, HeatSource, Law, Material, OutsideRange, Region, Spindle, Thermal
+from thermal import conduction, heat
+from thermal.expansion import influence
+from thermal.mesh import element, section_mesh
+
+PARTS = ("stationary", "rotating")
+RPM = 2 * np.pi / 60
+AT_REST = heat.Running(air=20.0, speed=0.0, loads={})
+
+
+def bare(spindle: Spindle, *regions: Region, **materials: Material) -> Spindle:
+    """`regions` of `materials` (by keyword) alone: no bearings, no heat but what a test adds."""
+    return replace(
+        spindle,
+        regions=regions,
+        materials=materials,
+        bearings=(),
+        thermal=Thermal((), (), (), Friction(0.0, 0.0, Law((20.0,), (1e-5,)), 0.0)),
+    )
+
+
+def material(young=200e9, poisson=0.3, expansion=1e-5, density=8000.0, conductivity=40.0, capacity=500.0) -> Material:
+    return Material("test", Law((20.0,), (young,)), poisson, Law((20.0,), (expansion,)), density, conductivity, capacity)
+
+
+def nodes(model, part):
+    mesh = model.sections[part].mesh
+    return Basis(mesh, element(mesh)).doflocs
+
+
+@pytest.fixture(scope="module")
+def reference(spindle):
+    return conduction.model(spindle, {part: section_mesh(spindle, part, 2e-3) for part in PARTS})
+
+
+# ------------------------------------------------------------------ closed forms
+
+
+def cylinder(spindle, size, shape="triangle", film=4000.0, radius=10e-3, height=16e-3):
+    """A solid cylinder with convection all around; its slowest mode J0(x r / a) cos(y (z - l) / l) (Carslaw, Jaeger, sec. 8.4)
+    decays at exactly diffusivity ((x / a)^2 + (y / l)^2), with x J1(x) = Bi J0(x) and y tan y = Bi, l half the height."""
+    metal = material(conductivity=40.0, density=8000.0, capacity=500.0)
+    part = Region("body", "stationary", "metal", (0, radius), (0, height))
+    own = bare(spindle, part, metal=metal)
+    own = replace(own, thermal=replace(own.thermal, convections=(Convection(("body",), film),)))
+    model = conduction.model(own, {"stationary": section_mesh(own, "stationary", size, shape)})
+    half, k = height / 2, metal.conductivity
+    x = brentq(lambda v: v * j1(v) - film * radius / k * j0(v), 1e-6, 2.4)
+    y = brentq(lambda v: v * np.tan(v) - film * half / k, 1e-6, 1.57)
+    r, z = nodes(model, "stationary")
+    mode = j0(x * r / radius) * np.cos(y * (z - half) / half)
+    rate = k / (metal.density * metal.heat_capacity) * ((x / radius) ** 2 + (y / half) ** 2)
+    return model, 20.0 + 30.0 * mode, rate
+
+
+@pytest.mark.parametrize("shape", ["triangle", "quadrilateral"])
+def test_cooling_cylinder_and_rate_in_space(spindle, shape):
+    """The decay of the slowest mode, with time steps so small (error 1e-8) that space decides: nodal error of third order."""
+    errors = []
+    for size in (2.5e-3, 1.25e-3):
+        model, start, rate = cylinder(spindle, size, shape)
+        times = np.linspace(0, 0.5 / rate, 41)
+        last = heat.transient(model, AT_REST, model.field(start), times).nodal[-1]
+        errors.append(np.abs(last - 20 - (start - 20) * np.exp(-0.5)).max() / 30)
+    assert errors[1] < 1e-3
+    assert np.log2(errors[0] / errors[1]) > 2.7
+
+
+def test_rate_in_time(spindle):
+    """TR-BDF2 is of second order: half the step, a quarter of the error (seen on a mesh that errs 100 times less)."""
+    model, start, rate = cylinder(spindle, 1e-3)
+    errors = []
+    for steps in (4, 8, 16):
+        last = heat.transient(model, AT_REST, model.field(start), np.linspace(0, 2 / rate, steps + 1)).nodal[-1]
+        errors.append(np.abs(last - 20 - (start - 20) * np.exp(-2)).max())
+    assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx([2, 2], abs=0.25)
+
+
+def test_one_huge_step_does_not_ring(spindle):
+    """L-stability: a step a million times the time constant lands on the air temperature from a rough start."""
+    model, start, rate = cylinder(spindle, 4e-3)
+    rough = start + np.random.default_rng(2).uniform(-5, 5, start.size)
+    assert heat.transient(model, AT_REST, model.field(rough), [0.0, 1e6 / rate]).nodal[-1] == pytest.approx(20.0, abs=1e-3)
+
+
+def test_hollow_cylinder_with_internal_heat_and_convection(spindle):
+    """Mid-plane of a long tube, heat q in its volume, film h on both faces (Carslaw, Jaeger, sec. 7.2): T = A + B ln r - q r^2 / 4k.
+    The ends are felt to exp(-100 mm / 5 mm)."""
+    a, b, film, k, length = 10e-3, 20e-3, 5000.0, 40.0, 200e-3
+    own = bare(spindle, Region("tube", "stationary", "metal", (a, b), (0, length)), metal=material(conductivity=k))
+    volume = np.pi * (b**2 - a**2) * length
+    source = HeatSource("heater", ("tube",), power=volume * 5e6, speed=100.0, exponent=2.0)
+    own = replace(own, thermal=replace(own.thermal, convections=(Convection(("tube",), film),), sources=(source,)))
+    model = conduction.model(own, {"stationary": section_mesh(own, "stationary", 2.5e-3)})
+    field = heat.steady(model, heat.Running(25.0, 200.0, {}))  # twice the speed, so four times the heat
+    q = 4 * 5e6
+    inner = [film, film * np.log(a) - k / a, film * 25.0 + film * q * a**2 / (4 * k) - q * a / 2]
+    outer = [film, film * np.log(b) + k / b, film * 25.0 + film * q * b**2 / (4 * k) + q * b / 2]
+    constant, factor = np.linalg.solve([inner[:2], outer[:2]], [inner[2], outer[2]])
+    r, z = nodes(model, "stationary")
+    middle = np.isclose(z, length / 2)
+    expected = constant + factor * np.log(r[middle]) - q * r[middle] ** 2 / (4 * k)
+    rise = np.ptp(expected)
+    assert field.nodal["stationary"][middle] == pytest.approx(expected, abs=1e-4 * rise)
+
+
+def test_soak_at_rest_is_uniform(reference):
+    """No heat: everything at the temperature of the air, through bearings and gap as well."""
+    field = heat.steady(reference, replace(AT_REST, air=60.0))
+    for part in PARTS:
+        assert field.nodal[part] == pytest.approx(60.0, abs=1e-9)
+
+
+# ------------------------------------------------------------------ coupling of the parts
+
+
+def two_rings(spindle, conductance=0.0, gaps=()):
+    """An outer ring with a film and an inner ring with a heater, of nearly perfect conductors."""
+    copper = material(conductivity=1e6)
+    inner = Region("inner", "stationary", "copper", (2e-3, 4e-3), (0, 6e-3))
+    outer = Region("outer", "rotating", "copper", (6e-3, 9e-3), (2e-3, 9e-3))
+    own = bare(spindle, inner, outer, copper=copper)
+    bearing = replace(spindle.bearings[0], inner_ring="inner", outer_ring="outer")
+    thermal = replace(
+        own.thermal,
+        convections=(Convection(("outer",), 50.0),),
+        sources=(HeatSource("heater", ("inner",), 2.0, 100.0, 1.0),),
+        gaps=gaps,
+        friction=Friction(0.0, 0.0, Law((20.0,), (1e-5,)), conductance),
+    )
+    own = replace(own, bearings=(bearing,), thermal=thermal)
+    return conduction.model(own, {part: section_mesh(own, part, 0.7e-3) for part in PARTS})
+
+
+def test_all_heat_passes_the_bearing(spindle):
+    """2 W through 0.25 W/K: 8 K between the raceways; the film carries them at 2 W / (50 W/m2K x surface)."""
+    model = two_rings(spindle, conductance=0.25)
+    drive = heat.running(model.spindle, 25.0, 100.0)
+    field = heat.steady(model, drive)
+    means = field.region_means()
+    surface = 2 * np.pi * (15e-3 * 7e-3 + (9e-3**2 - 6e-3**2))
+    assert means["inner"] - means["outer"] == pytest.approx(8.0, rel=1e-3)
+    assert means["outer"] - 25.0 == pytest.approx(2.0 / (50 * surface), rel=1e-3)
+    assert heat.flows(model, field, drive).crossing == pytest.approx(-2.0, rel=1e-9)
+
+
+def test_all_heat_passes_the_air_gap(spindle):
+    """The rings face each other from z = 2 to 6 mm: conductance h x 2 pi x 4 mm x 4 mm, over the area of the first region."""
+    model = two_rings(spindle, gaps=(AirGap(("inner", "outer"), 500.0),))
+    means = heat.steady(model, heat.running(model.spindle, 25.0, 100.0)).region_means()
+    assert means["inner"] - means["outer"] == pytest.approx(2.0 / (500 * 2 * np.pi * 4e-3 * 4e-3), rel=1e-3)
+
+
+def test_gap_couples_equal_heights(spindle):
+    """A temperature that is the same function of height on both sides sends no heat across; one that differs sends h dT dA."""
+    model = two_rings(spindle, gaps=(AirGap(("inner", "outer"), 500.0),))
+    heights = np.concatenate([nodes(model, part)[1] for part in PARTS])
+    assert model.exchange @ (3.0 + 1e3 * heights**2 / 9e-3) == pytest.approx(0.0, abs=1e-12)
+    warm = np.concatenate([np.full(nodes(model, part).shape[1], t) for part, t in (("stationary", 1.0), ("rotating", 0.0))])
+    crossing = (model.exchange @ warm)[model.spans["stationary"]].sum()
+    assert crossing == pytest.approx(500 * 2 * np.pi * 4e-3 * 4e-3, rel=1e-9)
+
+
+def test_axial_gap_and_regions_that_do_not_face(spindle):
+    model = two_rings(spindle)
+    own = model.spindle
+    above = replace(own.region("outer"), r=(3e-3, 8e-3), z=(7e-3, 9e-3))
+    disc = replace(own, regions=(own.region("inner"), above), bearings=())
+    disc = replace(disc, thermal=replace(own.thermal, gaps=(AirGap(("inner", "outer"), 500.0),)))
+    sections = {part: section_mesh(disc, part, 0.7e-3) for part in PARTS}
+    exchange = conduction.model(disc, sections).exchange
+    warm = np.zeros(exchange.shape[0])
+    warm[: nodes(model, "stationary").shape[1]] = 1.0
+    assert warm @ (exchange @ warm) == pytest.approx(500 * np.pi * (4e-3**2 - 3e-3**2), rel=1e-9)
+    away = replace(disc, regions=(own.region("inner"), replace(above, r=(5e-3, 8e-3), z=(7e-3, 9e-3))))
+    with pytest.raises(ValueError, match="face each other"):
+        conduction.model(away, {part: section_mesh(away, part, 0.7e-3) for part in PARTS})
+
+
+# ------------------------------------------------------------------ the reference spindle running
+
+
+def test_balance_of_heat_steady(spindle, reference):
+    """What the motor and the bearings make leaves by convection; friction is that of the temperature it makes."""
+    drive = heat.running(spindle, 25.0, 7200 * RPM)
+    field = heat.steady(reference, drive)
+    flow = heat.flows(reference, field, drive)
+    assert flow.motor == pytest.approx(0.5)
+    assert flow.friction > 0.5
+    assert flow.stored == pytest.approx(0.0, abs=1e-9)
+    nodal = reference.nodal(field)
+    made = heat.friction_heat(reference, nodal, drive)
+    cold = heat.friction_heat(reference, np.full(nodal.size, 25.0), drive)
+    assert np.all(made < 0.8 * cold)
+    source = reference.film * 25.0 + heat.motor_heat(reference, drive) @ reference.motor + made @ reference.bearing
+    assert reference.conductance @ nodal == pytest.approx(source, abs=1e-9)
+
+
+def test_balance_of_heat_in_time(spindle, reference):
+    """The heat of every step, added as the scheme does, is what the step stores; run-up and stop, unequal steps."""
+
+    def drive(t):
+        return heat.running(spindle, 25.0 + t / 100, 7200 * RPM * (t < 300))
+
+    history = heat.transient(reference, drive, 25.0, [0, 20, 60, 140, 300, 600, 1000])
+    stored = np.diff(history.nodal @ reference.capacity.sum(axis=1))
+    assert [h.stored for h in history.heat] == pytest.approx(stored, abs=1e-7 * np.abs(stored).max())
+    assert history.heat[0].motor == pytest.approx(0.5 * 20)
+    assert history.heat[-1].friction == 0.0
+
+
+def test_running_up_ends_steady_and_is_second_order_with_friction(spindle, reference):
+    drive = heat.running(spindle, 25.0, 7200 * RPM)
+    steady = reference.nodal(heat.steady(reference, drive))
+    assert heat.transient(reference, drive, 25.0, np.linspace(0, 7200, 21)).nodal[-1] == pytest.approx(steady, abs=1e-3)
+    warm = reference.field(25.0 + 0.3 * (steady - 25.0))  # a smooth start
+    ends = [heat.transient(reference, drive, warm, np.linspace(0, 240, n + 1)).bearings[-1] for n in (12, 24, 48)]
+    ratio = (ends[0] - ends[1]) / (ends[1] - ends[2])
+    assert ratio == pytest.approx([4, 4], abs=1.2)
+
+
+def test_mesh_of_the_influence_is_fine_enough_for_heat(spindle):
+    """Every element divided in four changes no temperature rise by more than 1e-4."""
+    drive = heat.running(spindle, 25.0, 7200 * RPM)
+    sections = influence(spindle).sections
+    once = heat.steady(conduction.model(spindle, sections), drive).region_means()
+    twice = heat.steady(conduction.model(spindle, {p: s.refined() for p, s in sections.items()}), drive).region_means()
+    assert [once[n] - 25 for n in twice] == pytest.approx([t - 25 for t in twice.values()], rel=1e-4)
+
+
+@pytest.mark.parametrize("load", [0.0, 200.0])
+def test_load_and_speed_drive_friction(spindle, reference, load):
+    """Twenty times the speed overheats the grease, and is refused; load adds f1 P1 d_m times speed."""
+    with pytest.raises(OutsideRange):
+        heat.steady(reference, heat.running(spindle, 25.0, 20 * 7200 * RPM))
+    nodal = np.full(reference.film.size, 40.0)
+    drive = heat.running(spindle, 25.0, 754.0, {b.name: load for b in spindle.bearings})
+    base = heat.friction_heat(reference, nodal, heat.running(spindle, 25.0, 754.0, {b.name: 0.0 for b in spindle.bearings}))
+    assert heat.friction_heat(reference, nodal, drive) - base == pytest.approx(0.0013 * load * 9.1e-3 * 754, abs=1e-12)
+
+
+def test_without_convection_there_is_no_steady_state(spindle):
+    own = bare(spindle, Region("a", "stationary", "m", (0, 5e-3), (0, 5e-3)), m=material())
+    with pytest.raises(ValueError, match="convection"):
+        heat.steady(conduction.model(own, {"stationary": section_mesh(own, "stationary", 2e-3)}), AT_REST)
+
+
+def test_times_must_rise(reference):
+    with pytest.raises(ValueError, match="rise"):
+        heat.transient(reference, AT_REST, 20.0, [0.0, 1.0, 1.0])

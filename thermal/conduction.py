@@ -1,0 +1,218 @@
+"""The discrete heat equation of both parts together, with second-order elements.
+
+C dT/dt + K T = motor loss + bearing friction + film x air temperature. K couples the parts: by rank one through each bearing,
+its conductance times the difference of the two mean raceway temperatures, and point by point at equal height (or radius)
+across air gaps. Half of a bearing's friction heat enters each raceway face, motor loss the volume of its regions, both evenly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import block_diag, coo_array, csr_array, diags_array
+from skfem import Basis, BilinearForm, FacetBasis, LinearForm
+from skfem.helpers import dot, grad
+
+from model.machine import AirGap, Bearing, Region, Spindle
+from thermal.mesh import PartMesh, element
+from thermal.temperature import TemperatureField
+
+GAUSS = 3  # points between nodes of an air gap: exact for products of quadratics, and for r in them
+
+
+@BilinearForm
+def conduct(u, v, w):
+    return w.coefficient * dot(grad(u), grad(v)) * w.x[0]
+
+
+@BilinearForm
+def mass(u, v, w):
+    return w.coefficient * u * v * w.x[0]
+
+
+@LinearForm
+def supply(v, w):
+    return w.coefficient * v * w.x[0]
+
+
+@dataclass(frozen=True, eq=False)
+class HeatModel:
+    """Discrete heat equation over the nodes of all parts, in the order of `sections`; W, K, J, whole turns (2 pi included).
+
+    `conduction`, `convection`, `exchange` (bearings and gaps) add up to K; `capacity` is C. `film` is convection's load for air
+    1 K above zero, `motor[s]` the load of heat source s for 1 W, `bearing[b]` that of 1 W of friction in bearing b. The same
+    vector reads a bearing's temperature, the mean of its two raceway means.
+    """
+
+    spindle: Spindle
+    sections: Mapping[str, PartMesh]
+    spans: Mapping[str, slice]
+    conduction: csr_array
+    convection: csr_array
+    exchange: csr_array
+    capacity: csr_array
+    film: np.ndarray  # (nodes,)
+    motor: np.ndarray  # (sources, nodes)
+    bearing: np.ndarray  # (bearings, nodes)
+
+    @property
+    def conductance(self) -> csr_array:
+        return self.conduction + self.convection + self.exchange
+
+    def field(self, nodal: np.ndarray) -> TemperatureField:
+        """Temperatures (nodes,) of the model as a field of both parts."""
+        return TemperatureField(self.sections, {part: nodal[span] for part, span in self.spans.items()})
+
+    def nodal(self, start: float | TemperatureField) -> np.ndarray:
+        """A uniform temperature (C) or a field of this model as one array (nodes,)."""
+        if isinstance(start, TemperatureField):
+            return np.concatenate([start.nodal[part] for part in self.sections])
+        return np.full(self.film.size, float(start))
+
+
+def model(spindle: Spindle, sections: Mapping[str, PartMesh]) -> HeatModel:
+    """Assemble the heat equation of `spindle` on its parts' meshes, for example `influence(spindle).sections`.
+
+    ValueError for an air gap whose regions do not face each other.
+    """
+    bases = {part: Basis(s.mesh, element(s.mesh), intorder=4) for part, s in sections.items()}
+    ends = np.cumsum([0, *[b.N for b in bases.values()]])
+    spans = {part: slice(int(a), int(b)) for part, a, b in zip(bases, ends[:-1], ends[1:], strict=True)}
+    size = int(ends[-1])
+    inside = [_conduction(spindle, sections[part], basis) for part, basis in bases.items()]
+    films = [_film(spindle, section) for section in sections.values()]
+    faces = [_raceways(spindle, bearing, sections, spans) for bearing in spindle.bearings]
+    through = [spindle.thermal.friction.conductance * _square(outer - inner) for inner, outer in faces]
+    across = [_gap(spindle, gap, sections, spans) for gap in spindle.thermal.gaps]
+    sources = [np.concatenate([_volume(s, h.regions) for s in sections.values()]) for h in spindle.thermal.sources]
+    return HeatModel(
+        spindle,
+        dict(sections),
+        spans,
+        conduction=csr_array(block_diag([k for k, _ in inside])),
+        convection=csr_array(block_diag([matrix for matrix, _ in films])),
+        exchange=csr_array(sum([*through, *across], start=csr_array((size, size)))),
+        capacity=csr_array(block_diag([c for _, c in inside])),
+        film=np.concatenate([load for _, load in films]),
+        motor=np.array([s / s.sum() for s in sources]).reshape(-1, size),
+        bearing=np.array([(inner + outer) / 2 for inner, outer in faces]).reshape(-1, size),
+    )
+
+
+def _conduction(spindle: Spindle, section: PartMesh, basis: Basis) -> tuple[csr_array, csr_array]:
+    """Conduction (W/K) and heat capacity (J/K) matrices of one part."""
+    materials = [spindle.materials[spindle.region(name).material] for name in section.regions]
+
+    def at_points(values: Sequence[float]) -> np.ndarray:
+        return np.tile(np.array(values)[section.region_of, None], (1, basis.X.shape[-1]))
+
+    conductivity = at_points([m.conductivity for m in materials])
+    capacity = at_points([m.density * m.heat_capacity for m in materials])
+    return 2 * np.pi * conduct.assemble(basis, coefficient=conductivity), 2 * np.pi * mass.assemble(basis, coefficient=capacity)
+
+
+def _film(spindle: Spindle, section: PartMesh) -> tuple[csr_array, np.ndarray]:
+    """Convection matrix (W/K) of one part and its load (W) for air 1 K above zero."""
+    size = Basis(section.mesh, element(section.mesh)).N
+    matrix, load = csr_array((size, size)), np.zeros(size)
+    for c in spindle.thermal.convections:
+        if (facets := section.exposed(c.regions)).size:
+            matrix = matrix + 2 * np.pi * mass.assemble(_face(section, facets), coefficient=c.coefficient)
+            load += 2 * np.pi * supply.assemble(_face(section, facets), coefficient=c.coefficient)
+    return matrix, load
+
+
+def _raceways(
+    spindle: Spindle, bearing: Bearing, sections: Mapping[str, PartMesh], spans: Mapping[str, slice]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Weights (nodes,) of the mean over the inner and over the outer raceway face, every area of it counting alike."""
+    weights = np.zeros((2, max(span.stop for span in spans.values())))
+    for weight, ring, side in zip(weights, (bearing.inner_ring, bearing.outer_ring), (1, 0), strict=True):
+        g = spindle.region(ring)
+        area = supply.assemble(_face(sections[g.part], sections[g.part].side(ring, 0, g.r[side])), coefficient=1.0)
+        weight[spans[g.part]] = area / area.sum()
+    return weights[0], weights[1]
+
+
+def _square(vector: np.ndarray) -> csr_array:
+    """vector vector^T, sparse."""
+    column = csr_array(vector[:, None])
+    return csr_array(column @ column.T)
+
+
+def _face(section: PartMesh, facets: np.ndarray) -> FacetBasis:
+    return FacetBasis(section.mesh, element(section.mesh), facets=facets, intorder=5)
+
+
+def _volume(section: PartMesh, regions: Sequence[str]) -> np.ndarray:
+    """Weights (nodes,) of the volume integral over those of `regions` that are in the section."""
+    own = section.elements(*[name for name in regions if name in section.regions])
+    if not own.size:
+        return np.zeros(Basis(section.mesh, element(section.mesh)).N)
+    return 2 * np.pi * supply.assemble(Basis(section.mesh, element(section.mesh), intorder=4, elements=own), coefficient=1.0)
+
+
+def _gap(spindle: Spindle, gap: AirGap, sections: Mapping[str, PartMesh], spans: Mapping[str, slice]) -> csr_array:
+    """Exchange across an air gap: P^T W P, P the temperature difference at points of the first face, W = h dA.
+
+    The points are Gauss points between neighbouring nodes of either face, so the integral is exact. ValueError where the
+    regions do not face each other.
+    """
+    first, second = (spindle.region(name) for name in gap.regions)
+    apart = [axis for axis, (a, b) in enumerate(((first.r, second.r), (first.z, second.z))) if a[1] <= b[0] or b[1] <= a[0]]
+    if not apart:
+        raise ValueError(f"air gap: {first.name!r} and {second.name!r} overlap")
+    across, along = apart[0], 1 - apart[0]
+    faces = [_facing(sections[g.part], g, other, across) for g, other in ((first, second), (second, first))]
+    meshes = [sections[g.part].mesh for g in (first, second)]
+    ends = [mesh.p[along][mesh.facets[:, facets]].ravel() for mesh, facets in zip(meshes, faces, strict=True)]
+    knots = np.unique(np.concatenate(ends))
+    abscissa, weight = np.polynomial.legendre.leggauss(GAUSS)
+    width = np.diff(knots)[:, None]
+    position = (knots[:-1, None] + width * (abscissa + 1) / 2).ravel()
+    r = position if along == 0 else _near_side(first, second, 0)
+    area = 2 * np.pi * r * (width * weight / 2).ravel()
+    size = max(span.stop for span in spans.values())
+    (here, on_first), (there, on_second) = (
+        _on_line(sections[g.part], spans[g.part].start, facets, along, position, size)
+        for g, facets in zip((first, second), faces, strict=True)
+    )
+    facing = on_first & on_second
+    if not facing.any():
+        raise ValueError(f"air gap: no exposed faces of {first.name!r} and {second.name!r} face each other")
+    difference = here - there
+    return csr_array(difference.T @ diags_array(gap.coefficient * area * facing) @ difference)
+
+
+def _facing(section: PartMesh, g: Region, other: Region, axis: int) -> np.ndarray:
+    """Exposed facets of region `g` on its side towards `other`."""
+    return np.intersect1d(section.side(g.name, axis, _near_side(g, other, axis)), section.exposed([g.name]))
+
+
+def _near_side(g: Region, other: Region, axis: int) -> float:
+    (low, high), (start, _) = ((g.r, other.r), (g.z, other.z))[axis]
+    return high if high <= start else low
+
+
+def _on_line(
+    section: PartMesh, offset: int, facets: np.ndarray, axis: int, position: np.ndarray, size: int
+) -> tuple[csr_array, np.ndarray]:
+    """Interpolation (points, size) at `position` along a straight face, and which points lie on its facets."""
+    if not facets.size:
+        return csr_array((position.size, size)), np.zeros(position.size, dtype=bool)
+    mesh = section.mesh
+    ends = mesh.facets[:, facets]
+    ends = np.where(mesh.p[axis][ends[0]] < mesh.p[axis][ends[1]], ends, ends[::-1])
+    order = np.argsort(mesh.p[axis][ends[0]])
+    ends, facets = ends[:, order], facets[order]
+    low, high = mesh.p[axis][ends]
+    k = np.clip(np.searchsorted(low, position, side="right") - 1, 0, None)
+    s = (position - low[k]) / (high - low)[k]
+    on_face = (s >= 0) & (s <= 1)
+    values = np.array([(1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s)]) * on_face
+    dofs = Basis(mesh, element(mesh)).dofs
+    nodes = offset + np.array([dofs.nodal_dofs[0, ends[0]][k], dofs.nodal_dofs[0, ends[1]][k], dofs.facet_dofs[0, facets][k]])
+    rows = np.tile(np.arange(position.size), 3)
+    return csr_array(coo_array((values.ravel(), (rows, nodes.ravel())), shape=(position.size, size))), on_face

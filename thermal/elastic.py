@@ -1,0 +1,161 @@
+"""Axisymmetric thermo-elasticity with second-order elements, and the influence of every region's thermal strain.
+
+Strains e_rr = u_r,r, e_zz = u_z,z, e_tt = u_r / r, g_rz = u_r,z + u_z,r; isotropic stress minus the free thermal strain
+(Timoshenko, Goodier, Theory of Elasticity, ch. 13). All integrals are per radian: the common 2 pi is left out.
+Nothing but temperature loads a part: it is free, u_r = 0 on the axis, and its mean axial displacement over its volume is zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse.linalg import splu
+from skfem import Basis, BilinearForm, ElementVector, FacetBasis, LinearForm
+
+from thermal.mesh import PartMesh, element
+
+QUADRATURE_ORDER = 4
+
+
+@dataclass(frozen=True)
+class Elasticity:
+    """Young's modulus (Pa) and Poisson's ratio of one region."""
+
+    youngs_modulus: float
+    poisson_ratio: float
+
+    @property
+    def lame(self) -> tuple[float, float]:
+        """Lame's constants lambda and mu (Pa)."""
+        e, nu = self.youngs_modulus, self.poisson_ratio
+        return e * nu / ((1 + nu) * (1 - 2 * nu)), e / (2 * (1 + nu))
+
+
+@dataclass(frozen=True)
+class Race:
+    """The raceway face of a ring: the side of `ring` at radius `r` (m)."""
+
+    ring: str
+    r: float
+
+
+def strain(u, r):
+    """e_rr, e_zz, e_tt, g_rz of a displacement (u_r, u_z)."""
+    return u.grad[0, 0], u.grad[1, 1], u[0] / r, u.grad[0, 1] + u.grad[1, 0]
+
+
+def dilatation(u, r):
+    """Trace of the strain, e_rr + e_zz + e_tt."""
+    return u.grad[0, 0] + u.grad[1, 1] + u[0] / r
+
+
+@BilinearForm
+def stiffness(u, v, w):
+    """Virtual work of the stress of u on the strain of v."""
+    r = w.x[0]
+    (err, ezz, ett, grz), (drr, dzz, dtt, drz) = strain(u, r), strain(v, r)
+    return (w.lam * (err + ezz + ett) * (drr + dzz + dtt) + w.mu * (2 * (err * drr + ezz * dzz + ett * dtt) + grz * drz)) * r
+
+
+@LinearForm
+def thermal_load(v, w):
+    """Virtual work of the stress that would suppress the thermal strain: (3 lambda + 2 mu) strain tr e(v)."""
+    return (3 * w.lam + 2 * w.mu) * w.strain * dilatation(v, w.x[0]) * w.x[0]
+
+
+@dataclass(frozen=True)
+class Response:
+    """How one part answers thermal strain. Rows of `gain` and `density`: race 0 r, race 0 z, race 1 r, ...
+
+    `gain[i, k]` is the motion (m) for a unit strain of region k, `density[i, e, q]` that for a unit strain at quadrature point
+    q of element e, weight included, `shape[k]` the displacement (nodes, 2) of every node for a unit strain of region k.
+    """
+
+    section: PartMesh
+    races: tuple[Race, ...]
+    gain: np.ndarray  # (2 races, regions)
+    density: np.ndarray  # (2 races, elements, points)
+    shape: np.ndarray  # (regions, nodes, 2)
+
+
+class Solid:
+    """The factorised elasticity of one part on one mesh."""
+
+    def __init__(self, section: PartMesh, elasticity: Mapping[str, Elasticity]):
+        self.section = section
+        self.scalar = Basis(section.mesh, element(section.mesh), intorder=QUADRATURE_ORDER)
+        lame = np.array([elasticity[name].lame for name in section.regions])[section.region_of]
+        points = (1, self.scalar.X.shape[-1])
+        self.lam, self.mu = (np.tile(constant[:, None], points) for constant in lame.T)
+
+    @cached_property
+    def basis(self) -> Basis:
+        return Basis(self.section.mesh, ElementVector(element(self.section.mesh)), intorder=QUADRATURE_ORDER)
+
+    @cached_property
+    def nodes(self) -> np.ndarray:
+        """Coordinates (nodes, 2) of every node, vertices first; degree of freedom 2 k + c is direction c of node k."""
+        return self.scalar.doflocs.T
+
+    @cached_property
+    def _solve(self) -> Callable[[np.ndarray], np.ndarray]:
+        matrix = stiffness.assemble(self.basis, lam=self.lam, mu=self.mu).tocsc()
+        held = np.zeros(self.basis.N, dtype=bool)
+        held[0::2] = self.nodes[:, 0] == 0.0
+        held[1] = True  # loads are in axial balance, so this node takes no force
+        free = np.flatnonzero(~held)
+        factors = splu(matrix[free][:, free], permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+
+        def solve(loads: np.ndarray) -> np.ndarray:
+            answer = np.zeros_like(loads)
+            answer[free] = factors.solve(np.ascontiguousarray(loads[free]))
+            answer[1::2] -= self.axial_mean @ answer[1::2]
+            return answer
+
+        return solve
+
+    @cached_property
+    def axial_mean(self) -> np.ndarray:
+        """Weights (nodes,) of the mean of a scalar over the part's volume."""
+        volume = LinearForm(lambda v, w: v * w.x[0]).assemble(self.scalar)
+        return volume / volume.sum()
+
+    def displacement(self, strains: np.ndarray) -> np.ndarray:
+        """Displacement (loads, nodes, 2) in m of free thermal strains (loads, elements, points) at the quadrature points."""
+        loads = [thermal_load.assemble(self.basis, lam=self.lam, mu=self.mu, strain=one) for one in strains]
+        return self._solve(np.array(loads).T).T.reshape(len(strains), -1, 2)
+
+    def region_strains(self) -> np.ndarray:
+        """Unit strain of one region after the other, (regions, elements, points)."""
+        owner = np.arange(len(self.section.regions))[:, None] == self.section.region_of
+        return np.repeat(owner[:, :, None].astype(float), self.basis.X.shape[-1], axis=2)
+
+    def race_mean(self, race: Race) -> np.ndarray:
+        """Weights (nodes,) of the mean of a scalar over a raceway face, every length of it counting alike."""
+        facets = self.section.side(race.ring, 0, race.r)
+        face = FacetBasis(self.section.mesh, element(self.section.mesh), facets=facets, intorder=4)
+        length = LinearForm(lambda v, w: v).assemble(face)
+        return length / length.sum()
+
+    def respond(self, races: Sequence[Race]) -> tuple[Response, np.ndarray]:
+        """Influence of thermal strain on the motion of `races`, and the adjoint displacements (2 races, nodes, 2) behind it.
+
+        The motion is a linear functional j of the displacement K^-1 f(strain), so it is f(strain) . K^-1 j: one adjoint
+        solution a functional answers any thermal strain (Becker, Rannacher, Acta Numerica 10 (2001), sec. 2).
+        """
+        functionals = np.zeros((2 * len(races), self.basis.N))
+        for i, race in enumerate(races):
+            functionals[2 * i, 0::2] = functionals[2 * i + 1, 1::2] = self.race_mean(race)
+        functionals[1::2, 1::2] -= self.axial_mean  # the motion is counted from the part's axial mean
+        adjoint = self._solve(functionals.T).T
+        r = self.basis.global_coordinates()[0]
+        weight = (3 * self.lam + 2 * self.mu) * r * self.basis.dx
+        density = np.array([weight * dilatation(self.basis.interpolate(a), r) for a in adjoint])
+        units = self.region_strains()
+        response = Response(
+            self.section, tuple(races), np.einsum("ieq,keq->ik", density, units), density, self.displacement(units)
+        )
+        return response, adjoint.reshape(len(adjoint), -1, 2)

@@ -1,0 +1,116 @@
+"""Thermal motion of the rings, and the deformed section for pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from model.machine import RingMotion, Spindle
+from thermal.elastic import Response, Solid
+from thermal.influence import TOLERANCE, Influence, elasticity, influence
+from thermal.temperature import TemperatureField, region_temperatures, thermal_strain
+
+__all__ = ["DeformedSection", "Influence", "expand", "field", "influence"]
+
+Temperature = float | Mapping[str, float] | TemperatureField
+"""A uniform soak (C), a temperature for every region (C), or a temperature field."""
+
+TILES = {6: ((0, 3, 5), (1, 4, 3), (2, 5, 4), (3, 4, 5)), 8: ((0, 4, 7), (1, 5, 4), (2, 6, 5), (3, 7, 6), (4, 5, 6), (4, 6, 7))}
+"""Triangles that draw a second-order element, by its number of nodes: corners first, middle k between corners k and k + 1."""
+
+
+def expand(spindle: Spindle, temperature: Temperature, tolerance: float = TOLERANCE) -> dict[str, RingMotion]:
+    """Motion of the rings of every bearing, by its name, from the reference temperature to `temperature`.
+
+    Balls and grooves have the mean temperature of their two rings, or of their own ring. ValueError for region temperatures
+    that do not match the spindle's regions; OutsideRange where a material law does not reach.
+    """
+    means = region_temperatures(spindle, temperature)
+    motions: dict[str, tuple[float, float]] = {}
+    for response in influence(spindle, tolerance, means).responses.values():
+        if isinstance(temperature, TemperatureField):
+            strains = _strain_field(spindle, Solid(response.section, elasticity(spindle, means)), temperature)
+            moved = np.einsum("ieq,eq->i", response.density, strains)
+        else:
+            moved = response.gain @ _region_strains(spindle, response, means)
+        motions |= {race.ring: (float(r), float(z)) for race, (r, z) in zip(response.races, moved.reshape(-1, 2), strict=True)}
+    result = {}
+    for b in spindle.bearings:
+        inner, outer = means[b.inner_ring], means[b.outer_ring]
+        ring, ball = spindle.materials[b.ring_material], spindle.materials[b.ball_material]
+        reference = spindle.reference_temperature
+        result[b.name] = RingMotion(
+            *motions[b.inner_ring],
+            *motions[b.outer_ring],
+            inner_strain=ring.thermal_strain(inner, reference),
+            outer_strain=ring.thermal_strain(outer, reference),
+            ball_strain=ball.thermal_strain((inner + outer) / 2, reference),
+            temperature=(inner + outer) / 2,
+        )
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class DeformedSection:
+    """The section of one part, ready to draw. Its mean axial displacement is zero; the hub's rigid movement is not in it."""
+
+    regions: tuple[str, ...]
+    nodes: np.ndarray  # (nodes, 2), r and z in m, undeformed
+    triangles: np.ndarray  # (triangles, 3), node indices
+    displacement: np.ndarray  # (nodes, 2), m
+    temperature: np.ndarray  # (nodes,), C; a node between regions of unlike temperatures has that of the later one
+    region_of: np.ndarray  # (triangles,), index into regions
+
+
+def field(spindle: Spindle, temperature: Temperature, tolerance: float = TOLERANCE) -> dict[str, DeformedSection]:
+    """The deformed section of every part, by its name; raises as `expand`."""
+    means = region_temperatures(spindle, temperature)
+    return {
+        part: _deformed_by_field(spindle, temperature, means, part)
+        if isinstance(temperature, TemperatureField)
+        else _deformed_by_regions(spindle, response, means)
+        for part, response in influence(spindle, tolerance, means).responses.items()
+    }
+
+
+def _deformed_by_field(spindle: Spindle, temperature: TemperatureField, means: Mapping[str, float], part: str) -> DeformedSection:
+    """Solved on the field's own mesh."""
+    solid = Solid(temperature.sections[part], elasticity(spindle, means))
+    displacement = solid.displacement(_strain_field(spindle, solid, temperature)[None])[0]
+    return _drawing(solid, displacement, temperature.nodal[part])
+
+
+def _deformed_by_regions(spindle: Spindle, response: Response, means: Mapping[str, float]) -> DeformedSection:
+    solid = Solid(response.section, elasticity(spindle, means))
+    nodal = np.empty(solid.scalar.N)
+    for name in response.section.regions:
+        nodal[solid.scalar.element_dofs[:, response.section.elements(name)]] = means[name]
+    return _drawing(solid, np.tensordot(_region_strains(spindle, response, means), response.shape, axes=1), nodal)
+
+
+def _drawing(solid: Solid, displacement: np.ndarray, temperature: np.ndarray) -> DeformedSection:
+    section, nodes = solid.section, solid.scalar.element_dofs
+    tiles = TILES[len(nodes)]
+    triangles = np.concatenate([nodes[list(tile)].T for tile in tiles])
+    owner = np.tile(section.region_of, len(tiles))
+    return DeformedSection(section.regions, solid.nodes, triangles, displacement, temperature, owner)
+
+
+def _region_strains(spindle: Spindle, response: Response, means: Mapping[str, float]) -> np.ndarray:
+    """Free thermal strain (regions,) of the part's regions."""
+    materials = [spindle.materials[spindle.region(name).material] for name in response.section.regions]
+    reference = spindle.reference_temperature
+    return np.array([m.thermal_strain(means[n], reference) for n, m in zip(response.section.regions, materials, strict=True)])
+
+
+def _strain_field(spindle: Spindle, solid: Solid, temperature: TemperatureField) -> np.ndarray:
+    """Free thermal strain (elements, points) at the quadrature points of `solid`."""
+    values = temperature.at_points(solid.section.part, solid.scalar)
+    strains = np.empty_like(values)
+    for name in solid.section.regions:
+        own = solid.section.elements(name)
+        material = spindle.materials[spindle.region(name).material]
+        strains[own] = thermal_strain(material, values[own], spindle.reference_temperature)
+    return strains

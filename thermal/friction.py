@@ -1,0 +1,33 @@
+"""Friction heat of a ball bearing by Palmgren's torque: Harris, Rolling Bearing Analysis, 4th ed. (2001), ch. 14.
+
+M0 = 1e-7 f0 (nu n)^(2/3) d_m^3 where nu n >= 2000, else 160e-7 f0 d_m^3; M1 = f1 P1 d_m; with N mm, mm, rpm and mm2/s.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from model.machine import Bearing, Friction
+
+RPM = 2 * np.pi / 60
+
+
+def torque(friction: Friction, bearing: Bearing, speed: float, temperature: float, load: float) -> float:
+    """Friction torque (N m, not negative) at `speed` (rad/s), `temperature` of the lubricant (C) and axial `load` (N).
+
+    The load part takes P1 = |load|, the pure axial case of angular contact. OutsideRange where the viscosity law does not
+    reach. A bearing at rest gets its starting torque; it makes no heat.
+    """
+    return viscous_torque(friction, bearing, speed, temperature) + friction.f1 * abs(load) * bearing.pitch_diameter
+
+
+def viscous_torque(friction: Friction, bearing: Bearing, speed: float, temperature: float) -> float:
+    """M0 (N m): churning and shearing of the lubricant."""
+    product = friction.viscosity(temperature) * 1e6 * abs(speed) / RPM
+    factor = 160e-7 if product < 2000 else 1e-7 * product ** (2 / 3)
+    return factor * friction.f0 * (bearing.pitch_diameter * 1e3) ** 3 * 1e-3
+
+
+def heat(friction: Friction, bearing: Bearing, speed: float, temperature: float, load: float) -> float:
+    """Friction heat (W): torque times speed."""
+    return torque(friction, bearing, speed, temperature, load) * abs(speed)
