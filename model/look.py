@@ -8,7 +8,7 @@ not import it. Regions hang on the body they move with, and turn with it: the st
 from __future__ import annotations
 
 import colorsys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from model.ball_row import Array
 from model.ball_springs import ball_springs
-from model.machine import PARTS, Body, Spindle
+from model.machine import PARTS, Body, Region, Spindle
 from model.pair import BearingState, PairState
 from model.section import Cell, cells
 
@@ -31,13 +31,13 @@ CUT = np.deg2rad([-10.0, 260.0])
 """Azimuths between which bodies are shown; the quarter between is cut away."""
 STEP = np.deg2rad(5.0)  # of azimuth, at most
 COLOURS = {
-    "aluminium": (0.80, 0.81, 0.83),
-    "steel": (0.50, 0.54, 0.59),
+    "aluminium": (0.79, 0.80, 0.80),
+    "steel": (0.46, 0.53, 0.61),
     "yoke": (0.46, 0.34, 0.25),
     "magnet": (0.15, 0.20, 0.36),
 }
 SHADES = (1.0, 0.84, 0.70, 0.58)  # of touching regions of one material
-PLATE, STRIPE, BALL, LOOSE_BALL = (0.30, 0.32, 0.36), (0.08, 0.08, 0.09), (0.86, 0.87, 0.89), (0.85, 0.30, 0.15)
+PLATE, STRIPE, BALL, LOOSE_BALL = (0.33, 0.36, 0.40), (0.95, 0.62, 0.10), (0.74, 0.75, 0.77), (0.85, 0.30, 0.15)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,15 +70,15 @@ class RegionMesh:
 
 def region_meshes(spindle: Spindle) -> list[RegionMesh]:
     """Every region of the section as a sector of a ring between the azimuths `CUT`, in the order of the regions."""
-    owned = _owned_cells(spindle)
-    touching = _touching(owned)
-    hosts, colours = region_bodies(spindle, touching), _colours(spindle, touching)
-    return [RegionMesh(name, hosts[name], *revolve(tiles), (*colours[name], 1.0)) for name, tiles in owned.items()]
+    hosts, colours = region_bodies(spindle), region_colours(spindle)
+    tiles = [tile for part in PARTS for tile in cells([g for g in spindle.regions if g.part == part])]
+    owned = {g.name: [t for t in tiles if t.region == g.name] for g in spindle.regions}
+    return [RegionMesh(name, hosts[name], *revolve(own), (*colours[name], 1.0)) for name, own in owned.items() if own]
 
 
 def plate_meshes(spindle: Spindle) -> list[RegionMesh]:
     """A ring plate for every body that no region shows, as wide as its measuring points lie, its top at their height."""
-    shown = set(region_bodies(spindle, _touching(_owned_cells(spindle))).values())
+    shown = set(region_bodies(spindle).values())
     return [_plate(spindle, body) for body in spindle.structure.bodies if body.name not in shown]
 
 
@@ -89,7 +89,7 @@ def stripe_meshes(spindle: Spindle) -> list[RegionMesh]:
         top = max((spindle.region(name) for name in body.regions), key=lambda g: (g.z[1], g.r[1]))
         (r0, r1), (z0, z1), thick = top.r, top.z, 0.004 * top.r[1]
         tiles = [Cell(top.name, (r0, r1), (z1, z1 + thick)), Cell(top.name, (r1, r1 + thick), (z0, z1 + thick))]
-        middle, half = np.deg2rad(-30.0) + CUT[1], np.deg2rad(3.0)
+        middle, half = CUT[1] - np.deg2rad(24.0), np.deg2rad(4.0)
         meshes.append(RegionMesh(f"{body.name} stripe", body.name, *revolve(tiles, middle - half, middle + half), (*STRIPE, 1.0)))
     return meshes
 
@@ -105,7 +105,7 @@ def revolve(
     count = int(np.ceil((stop - start) / STEP - 1e-9))
     azimuth = np.linspace(start, stop, count + 1)
     width = (stop - start) / count
-    radius, height = (a.ravel() * s for a, s in zip(np.meshgrid(r, z, indexing="ij"), (np.sqrt(width / np.sin(width)), 1.0)))
+    radius, height = (a.ravel() for a in np.meshgrid(r * np.sqrt(width / np.sin(width)), z, indexing="ij"))
     node = np.arange(len(radius)).reshape(len(r), len(z))
     x, y = np.outer(np.cos(azimuth), radius), np.outer(np.sin(azimuth), radius)
     vertices = np.stack([x, y, np.broadcast_to(height, x.shape)], axis=2).reshape(-1, 3)
@@ -141,54 +141,44 @@ def _merged_grid(tiles: Sequence[Cell]) -> tuple[Array, Array, NDArray[np.bool_]
     return r[across], z[up], filled[np.ix_(np.flatnonzero(across)[:-1], np.flatnonzero(up)[:-1])]
 
 
-def _owned_cells(spindle: Spindle) -> dict[str, list[Cell]]:
-    tiles = [tile for part in PARTS for tile in cells([g for g in spindle.regions if g.part == part])]
-    owned = {g.name: [t for t in tiles if t.region == g.name] for g in spindle.regions}
-    return {name: own for name, own in owned.items() if own}
-
-
 # ---------------------------------------------------------------- which body, which colour
 
 
-def region_bodies(spindle: Spindle, touching: Mapping[str, set[str]]) -> dict[str, str]:
+def region_bodies(spindle: Spindle) -> dict[str, str]:
     """The body each region moves with.
 
-    A region that makes up no body touches, at once or through its like, regions of one that has: it belongs to the body without
-    regions that this one is joined to (the seat of a shaft), or to itself if there is none.
+    A region that makes up no body touches, at once or through others like it, a body that has regions: it is part of the body
+    without regions which that one is joined to (the seat of a shaft), or of that body itself if there is none.
     """
-    structure = spindle.structure
+    structure, touching = spindle.structure, _touching(spindle.regions)
     made_of = {region: b.name for b in structure.bodies for region in b.regions}
-    hosts = dict(made_of)
-    plain = [b.name for b in structure.bodies if not b.regions]
+    without = [b.name for b in structure.bodies if not b.regions]
 
     def seat(body: str) -> str:
-        joined = [other for joint in structure.joints if body in joint.bodies for other in joint.bodies if other in plain]
-        return joined[0] if joined else body
+        joined = (other for joint in structure.joints if body in joint.bodies for other in joint.bodies if other in without)
+        return next(joined, body)
 
+    hosts = dict(made_of)
     while found := {
-        name: hosts[near] if near not in made_of else seat(hosts[near])
+        name: seat(made_of[first]) if (first := min(near)) in made_of else hosts[first]
         for name, all_near in touching.items()
-        if name not in hosts
-        for near in sorted(all_near & hosts.keys())
+        if name not in hosts and (near := all_near & hosts.keys())
     }:
         hosts |= found
-    turning_first = structure.inner_body, structure.outer_body
-    turning, still = turning_first if spindle.pair.turning_ring == "inner" else turning_first[::-1]
+    rings = structure.inner_body, structure.outer_body
+    turning, still = rings if spindle.pair.turning_ring == "inner" else rings[::-1]
     return {g.name: hosts.get(g.name, turning if g.part == "rotating" else still) for g in spindle.regions}
 
 
-def _touching(owned: Mapping[str, Sequence[Cell]]) -> dict[str, set[str]]:
-    near: dict[str, set[str]] = {name: set() for name in owned}
-    for a, b in combinations(owned, 2):
-        if any(_share_a_side(p, q) for p in owned[a] for q in owned[b]):
-            near[a].add(b)
-            near[b].add(a)
+def _touching(regions: Sequence[Region]) -> dict[str, set[str]]:
+    """The regions of the same part that each region shares a side or an area with."""
+    near: dict[str, set[str]] = {g.name: set() for g in regions}
+    for a, b in combinations(regions, 2):
+        overlap = [min(p[1], q[1]) - max(p[0], q[0]) for p, q in ((a.r, b.r), (a.z, b.z))]
+        if a.part == b.part and min(overlap) >= 0 and max(overlap) > 0:
+            near[a.name].add(b.name)
+            near[b.name].add(a.name)
     return near
-
-
-def _share_a_side(a: Cell, b: Cell) -> bool:
-    overlap = [min(p[1], q[1]) - max(p[0], q[0]) for p, q in ((a.r, b.r), (a.z, b.z))]
-    return min(overlap) >= 0 and max(overlap) > 0
 
 
 def colour(material: str) -> tuple[float, float, float]:
@@ -196,21 +186,32 @@ def colour(material: str) -> tuple[float, float, float]:
     return COLOURS.get(material) or colorsys.hsv_to_rgb(crc32(material.encode()) % 360 / 360, 0.35, 0.70)
 
 
-def _colours(spindle: Spindle, touching: Mapping[str, Iterable[str]]) -> dict[str, tuple[float, float, float]]:
-    """The material's colour, in another shade than any touching region of the same material has."""
+def region_colours(spindle: Spindle) -> dict[str, tuple[float, float, float]]:
+    """The material's colour, bearing rings lighter; of two touching regions alike the larger has the lighter shade."""
+    rings, touching = _rings(spindle), _touching(spindle.regions)
+    kind = {g.name: (g.material, g.name in rings) for g in spindle.regions}
     shade: dict[str, int] = {}
-    for name in touching:
-        material = spindle.region(name).material
-        taken = {shade[n] for n in touching[name] if n in shade and spindle.region(n).material == material}
-        shade[name] = min(set(range(len(SHADES))) - taken, default=0)
-    tones = {name: np.array(colour(spindle.region(name).material)) * SHADES[i] for name, i in shade.items()}
-    return {name: (float(r), float(g), float(b)) for name, (r, g, b) in tones.items()}
+    for region in sorted(spindle.regions, key=_bulk, reverse=True):
+        alike = {near for near in touching[region.name] if kind[near] == kind[region.name]}
+        free = set(range(len(SHADES))) - {shade[near] for near in alike & shade.keys()}
+        shade[region.name] = min(free, default=0)
+    tones = {name: np.array(colour(material)) * SHADES[shade[name]] for name, (material, _) in kind.items()}
+    tones |= {name: 0.75 * tones[name] + 0.25 for name in rings}
+    return {name: (float(red), float(green), float(blue)) for name, (red, green, blue) in tones.items()}
+
+
+def _rings(spindle: Spindle) -> set[str]:
+    return {ring for b in spindle.bearings for ring in (b.inner_ring, b.outer_ring)}
+
+
+def _bulk(region: Region) -> float:
+    return (region.r[1] ** 2 - region.r[0] ** 2) * (region.z[1] - region.z[0])
 
 
 def _plate(spindle: Spindle, body: Body) -> RegionMesh:
-    reach = max((g.r[1] for g in spindle.regions), default=0.02)
+    reach = max(g.r[1] for g in spindle.regions)
     points = [p.position for p in spindle.points if p.body == body.name]
-    outer = 1.1 * max((float(np.hypot(x, y)) for x, y, _ in points), default=1.2 * reach)
+    outer = 1.05 * max((float(np.hypot(x, y)) for x, y, _ in points), default=1.2 * reach)
     top = min((z for *_, z in points), default=body.z)
     tile = Cell(body.name, (min(0.85 * reach, 0.7 * outer), outer), (top - 0.1 * reach, top))
     return RegionMesh(f"{body.name} plate", body.name, *revolve([tile]), (*PLATE, 1.0))
@@ -224,12 +225,13 @@ def dress(out: MjSpec, spindle: Spindle, state: PairState) -> None:
     _add_surroundings(out, spindle)
     for name in sorted({g.material for g in spindle.regions}):
         out.add_material(name=name, rgba=[*colour(name), 1.0], specular=0.35, shininess=0.45)
-    out.add_material(name="plain", specular=0.15, shininess=0.3)
-    out.add_material(name="polished", rgba=[*BALL, 1.0], specular=0.9, shininess=0.8)
+    out.add_material(name="matt finish", specular=0.15, shininess=0.3)
+    out.add_material(name="polished finish", rgba=[*BALL, 1.0], specular=0.7, shininess=0.8)
     for mesh in region_meshes(spindle):
-        _add_mesh(out, spindle, mesh, spindle.region(mesh.region).material)
+        polished = mesh.region in _rings(spindle)
+        _add_mesh(out, spindle, mesh, "polished finish" if polished else spindle.region(mesh.region).material)
     for mesh in (*plate_meshes(spindle), *stripe_meshes(spindle)):
-        _add_mesh(out, spindle, mesh, "plain")
+        _add_mesh(out, spindle, mesh, "matt finish")
     for bearing in state.bearings:
         _add_balls(out, spindle, bearing)
 
@@ -252,7 +254,13 @@ def _add_balls(out: MjSpec, spindle: Spindle, bearing: BearingState) -> None:
     size = [spindle.bearing(bearing.name).ball_diameter / 2, 0, 0]
     for j, centre in enumerate(centres - [0.0, 0.0, inner.z]):
         holder.add_geom(
-            name=f"{bearing.name} ball {j}", type=SPHERE, size=size, pos=centre, material="polished", rgba=rgba, **_visual(BALLS)
+            name=f"{bearing.name} ball {j}",
+            type=SPHERE,
+            size=size,
+            pos=centre,
+            material="polished finish",
+            rgba=rgba,
+            **_visual(BALLS),
         )
 
 
@@ -265,21 +273,23 @@ def _add_surroundings(out: MjSpec, spindle: Spindle) -> None:
     reach = max(g.r[1] for g in spindle.regions)
     low, high = min(g.z[0] for g in spindle.regions), max(g.z[1] for g in spindle.regions)
     centre = np.array([0.0, 0.0, (low + high) / 2])
-    out.stat.center, out.stat.extent, out.stat.meansize = centre, 1.6 * reach, 0.05 * reach
-    view = np.mean(CUT) + np.pi
+    out.stat.center, out.stat.extent, out.stat.meansize = centre, 2.4 * reach, 0.05 * reach
+    view = float(np.mean(CUT)) + np.pi
     out.visual.map.znear, out.visual.map.zfar = 0.01, 50.0
     out.visual.headlight.ambient, out.visual.headlight.diffuse, out.visual.headlight.specular = [0.3] * 3, [0.35] * 3, [0.1] * 3
     out.visual.global_.azimuth, out.visual.global_.elevation = float(np.rad2deg(view)) % 360 - 180, -28.0
     out.visual.global_.offwidth, out.visual.global_.offheight = 1600, 1200
     out.visual.quality.shadowsize, out.visual.quality.offsamples = 4096, 8
-    out.add_texture(name="sky", type=SKYBOX, builtin=GRADIENT, rgb1=[0.93, 0.95, 0.97], rgb2=[0.55, 0.60, 0.66], width=256, height=1536)
-    for name, azimuth, height, diffuse, shadow in (("key", view + 0.7, 1.2, 0.5, True), ("fill", view - 0.9, 0.5, 0.25, False)):
+    out.add_texture(
+        name="sky", type=SKYBOX, builtin=GRADIENT, rgb1=[1.0, 1.0, 1.0], rgb2=[0.62, 0.67, 0.73], width=64, height=384
+    )
+    for name, azimuth, height, diffuse in (("key", view + 1.0, 2.2, 0.55), ("fill", view - 0.9, 0.6, 0.2)):
         towards = np.array([np.cos(azimuth), np.sin(azimuth), height])
         out.worldbody.add_light(
-            name=name, pos=centre + 4 * reach * towards, dir=-towards, diffuse=[diffuse] * 3, specular=[0.3] * 3, castshadow=shadow
+            name=name, pos=centre + 4 * reach * towards, dir=-towards, diffuse=[diffuse] * 3, specular=[0.3] * 3, castshadow=False
         )
     rows = [b.z for b in spindle.bearings]
-    shots = {"front": (centre, 6.0 * reach, 25.0, view + 0.12)}
+    shots = {"front": (centre - [0.0, 0.0, 0.15 * reach], 5.6 * reach, 27.0, view + 0.1)}
     if rows:
         shots["close"] = (np.array([0.0, 0.0, float(np.mean(rows))]), 2.6 * reach, 12.0, view + 0.05)
     for name, (target, distance, elevation, azimuth) in shots.items():
@@ -291,5 +301,4 @@ def _add_camera(out: MjSpec, name: str, target: Array, distance: float, azimuth:
     c, s = np.cos(azimuth), np.sin(azimuth)
     right = np.array([-s, c, 0.0])
     back = np.array([c * np.cos(elevation), s * np.cos(elevation), np.sin(elevation)])
-    camera = out.worldbody.add_camera(name=name, pos=target + distance * back, fovy=25.0)
-    camera.alt.xyaxes = [*right, *np.cross(back, right)]
+    out.worldbody.add_camera(name=name, pos=target + distance * back, fovy=25.0, xyaxes=[*right, *np.cross(back, right)])

@@ -20,7 +20,7 @@ from model.ball_row import Array
 from model.ball_springs import ball_springs, tangent
 from model.machine import Spindle
 from model.pair import BearingState, PairState
-from model.rotor_base import Matrices, RotorBase, element_rows, point_row, rotor_base
+from model.rotor_base import Element, Matrices, RotorBase, element_rows, point_row, rotor_base
 
 ELEMENTS = ("linear", "ball-by-ball")
 AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1), "tilt_x": (1, 0, 0), "tilt_y": (0, 1, 0)}
@@ -32,25 +32,32 @@ def spec(spindle: Spindle, state: PairState, element: str = "linear") -> mujoco.
     if element not in ELEMENTS:
         raise ValueError(f"bearing element {element!r} is unknown; allowed are {', '.join(ELEMENTS)}")
     chain = rotor_base(spindle, state)
-    out = mujoco.MjSpec()
+    balls = {b.name: b for b in state.bearings} if element == "ball-by-ball" else {}
+    out = chain_spec(chain, spindle.hammer.step, stiff=tuple(e.name for e in chain.elements if e.name not in balls))
     out.modelname = spindle.name
+    for e in chain.elements:
+        if e.name in balls:
+            _add_balls(out, chain, balls[e.name], e)
+    _add_points(out, spindle, chain)
+    return out
+
+
+def chain_spec(chain: RotorBase, step: float, stiff: tuple[str, ...] | None = None) -> mujoco.MjSpec:
+    """Bodies of a chain with the damping of all elements and the stiffness of those named in `stiff` (all by default)."""
+    out = mujoco.MjSpec()
     out.compiler.degree = False
     out.option.gravity = np.zeros(3)
     out.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
-    out.option.timestep = spindle.hammer.step
+    out.option.timestep = step
     out.option.disableflags = int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_CONTACT)
     _add_bodies(out, chain)
     for e in chain.elements:
-        bearing = next((b for b in state.bearings if b.name == e.name), None)
         rows = element_rows(chain, e)
-        if bearing is None or element == "linear":
+        if stiff is None or e.name in stiff:
             add_quadratic(out, f"{e.name}.stiffness", e.stiffness, rows, chain, "stiffness")
-        else:
-            _add_balls(out, chain, bearing, spindle.structure.inner_body, spindle.structure.outer_body, e.stiffness, rows)
         add_quadratic(out, f"{e.name}.damping", e.damping, rows, chain, "damping")
-    _add_points(out, spindle, chain)
     spin = [chain.speed if name.endswith(".spin") else 0.0 for name in joint_names(chain)]
-    out.add_key(name="loaded", qpos=np.zeros(len(spin)), qvel=spin, ctrl=np.zeros(len(spindle.points)))
+    out.add_key(name="loaded", qpos=np.zeros(len(spin)), qvel=spin)
     return out
 
 
@@ -111,26 +118,22 @@ def _wrap(tendon: mujoco.MjsTendon, chain: RotorBase, row: Array) -> None:
             tendon.wrap_joint(f"{body}.{move}", float(coefficient))
 
 
-def _add_balls(
-    out: mujoco.MjSpec, chain: RotorBase, bearing: BearingState, inner_body: str, outer_body: str, stiffness: Array, rows: Array
-) -> None:
+def _add_balls(out: mujoco.MjSpec, chain: RotorBase, bearing: BearingState, element: Element) -> None:
+    """A spatial tendon for each ball, and the linear remainder to the element's stiffness."""
     springs = ball_springs(bearing)
-    centres = {}
-    for side, body in (("inner", inner_body), ("outer", outer_body)):
-        where = chain.body(body)
-        carrier = out.body(f"{body} carrier" if where.turns else body)
-        centres[side] = where.z
+    for side, body in (("inner", chain.body(element.a)), ("outer", chain.body(element.b))):
+        holder = out.body(f"{body.name} carrier" if body.turns else body.name)
         for j, (x, y, z) in enumerate(getattr(springs, side)):
-            carrier.add_site(name=f"{bearing.name}.{side}{j}", pos=[x, y, z - where.z], size=[1e-4] * 3, group=4)
+            holder.add_site(name=f"{bearing.name}.{side}{j}", pos=[x, y, z - body.z], size=[1e-4] * 3, group=4)
     for j in range(len(springs.inner)):
-        tendon = out.add_tendon(
-            name=f"{bearing.name}.ball{j}", springlength=[0, springs.rest], stiffness=list(springs.polynomial), width=1e-5
-        )
+        tendon = out.add_tendon(name=f"{bearing.name}.ball{j}", width=1e-5)
+        tendon.springlength, tendon.stiffness = [0, springs.rest], list(springs.polynomial)
         tendon.wrap_site(f"{bearing.name}.inner{j}")
         tendon.wrap_site(f"{bearing.name}.outer{j}")
-    both = [i for name in (inner_body, outer_body) for i, (body, _) in enumerate(chain.dofs) if body == name]
-    wanted = (rows.T @ stiffness @ rows)[np.ix_(both, both)]
-    remainder = wanted - tangent(springs, centres["inner"], centres["outer"])
+    both = [i for name in (element.a, element.b) for i, (body, _) in enumerate(chain.dofs) if body == name]
+    rows = element_rows(chain, element)
+    wanted = (rows.T @ element.stiffness @ rows)[np.ix_(both, both)]
+    remainder = wanted - tangent(springs, chain.body(element.a).z, chain.body(element.b).z)
     add_quadratic(out, f"{bearing.name}.remainder", remainder, np.eye(len(chain.dofs))[both], chain, "stiffness")
 
 

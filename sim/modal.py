@@ -19,6 +19,8 @@ from scipy.optimize import linear_sum_assignment
 from sim.poles import Complex, Fit, Lines, Real, believed, information, project, realise, refine, search, split, varied
 
 KINDS = {"receptance": 0, "mobility": 1, "accelerance": 2}
+FAINT = 4.0
+"""A mode is reported if its squared shape over its covariance exceeds this many times what the information criterion asks for."""
 
 
 @dataclass(frozen=True)
@@ -172,7 +174,7 @@ def _modes(lines: Lines, fit: Fit, rank_one: bool, unit: float, given: bool, fun
     spread = jacobian @ covariance[both[:, None], both] @ jacobian.T
 
     residues = np.einsum("ri,rk->rik", fit.shape, fit.participation).reshape(a, responses, references)
-    shape, shape_sd = np.zeros((a, responses), complex), np.zeros((a, responses))
+    shape, shape_sd, weight = np.zeros((a, responses), complex), np.zeros((a, responses)), np.zeros(a)
     for r in range(a):
         sight = np.linalg.svd(residues[r])[2][0].conj()
         gather = np.eye(width) if width == responses else np.kron(np.eye(responses), sight)
@@ -186,16 +188,19 @@ def _modes(lines: Lines, fit: Fit, rank_one: bool, unit: float, given: bool, fun
         cross = covariance[np.ix_(half + x, x)]
         hermitian = covariance[real] + covariance[imag] + 1j * (cross - cross.T)
         shape_sd[r] = np.sqrt(np.einsum("ij,jk,ik->i", relative, hermitian, relative.conj()).real.clip(0))
+        x, known = np.append(x, half + x), np.append(fit.shape[r].real, fit.shape[r].imag)
+        weight[r] = known @ np.linalg.solve(covariance[np.ix_(x, x)], known)
 
     sd = np.sqrt(np.diag(spread))
-    sure = (sd[:a] < damping * frequency) & (sd[a:] < damping / 2)
+    cost = 2 * (fit.shape.shape[1] + fit.participation.shape[1]) * np.log(lines.count)
+    sure = (sd[:a] < damping * frequency) & (sd[a:] < damping / 2) & (weight > FAINT * cost)
     keep = np.flatnonzero(sure)[np.argsort(frequency[sure])]
     twice = np.append(keep, a + keep)
     chi2 = fit.chi2 / (lines.count - fit.unknowns)
     words = ["noise as given" if given else "noise estimated from neighbouring lines"]
     words += [f"chi-square {chi2:.3g} per degree of freedom" + (", errors enlarged by its root" if chi2 > 1 else "")]
     words += [] if rank_one else ["residues of rank one refused by the data, left free"]
-    words += [f"{np.sum(~sure)} uncertain poles not reported"] if not sure.all() else []
+    words += [f"{np.sum(~sure)} faint or uncertain poles not reported"] if not sure.all() else []
     edges = lines.s.imag[[0, -1]] * unit / (2 * np.pi)
     return Modes(
         frequency[keep],

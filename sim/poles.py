@@ -29,7 +29,7 @@ REACH = 2.0
 """Poles are looked for from the lowest line divided by this to the highest times this; those out of the band only clean the fit."""
 DAMPING = (1e-5, 0.7)
 """Limits of the damping ratio inside the fit."""
-BELIEVED = (2e-4, 0.15)
+BELIEVED = (5e-5, 0.15)
 """Damping ratios of a mode; poles with others only clean the fit."""
 
 TRIAL = 0.02

@@ -167,7 +167,7 @@ def _bearing_heat(model: HeatModel, cold: np.ndarray, gain: np.ndarray, drive: R
     """Friction heat H (bearings,) with t = cold + gain H(t), t the bearing temperatures.
 
     Bearing after bearing, each by bracketing: friction falls with temperature and `gain` is symmetric and positive, so this
-    is a descent on a convex function and cannot fail.
+    is a descent on a convex function.
     """
     law, bearings = model.spindle.thermal.friction, model.spindle.bearings
     warmest = law.viscosity.temperature[-1] if len(law.viscosity.value) > 1 else np.inf
@@ -181,8 +181,8 @@ def _bearing_heat(model: HeatModel, cold: np.ndarray, gain: np.ndarray, drive: R
         for k, own in enumerate(np.diag(gain)):
             base = float(cold[k] + gain[k] @ heat - own * heat[k])
             most = base + 1.01 * own * made(k, base)  # friction jumps up by 0.8 % where nu n falls below 2000
-            if most > warmest > most - own * made(k, warmest):
-                most = warmest
+            if most > warmest > base and warmest - base >= own * made(k, warmest):
+                most = warmest  # the root is inside the viscosity table though the bracket is not
             heat[k] = made(k, brentq(lambda t, k=k, own=own, base=base: t - base - own * made(k, t), base, most, xtol=1e-12))
         if np.abs(gain @ (heat - before)).max() < 1e-10:
             return heat

@@ -28,7 +28,7 @@ def deck(solid, constants, expansion, temperature):
         lines.append(f"*ELEMENT,TYPE={kind},ELSET=R{index}")
         lines += [",".join(str(n) for n in (e + 1, *(nodes[:, e] + 1))) for e in section.elements(name)]
         lines += [f"*MATERIAL,NAME=M{index}", "*ELASTIC", f"{constants[name].youngs_modulus},{constants[name].poisson_ratio}"]
-        lines += ["*EXPANSION,ZERO=0", f"{expansion[name]}", f"*SOLID SECTION,ELSET=R{index},MATERIAL=M{index}"]
+        lines += ["*EXPANSION,ZERO=0", f"{expansion[name]:.10g}", f"*SOLID SECTION,ELSET=R{index},MATERIAL=M{index}"]
     held = [f"{k + 1},1,1" for k in np.flatnonzero(solid.nodes[:, 0] == 0)]
     lines += ["*BOUNDARY", *held, "1,2,2", "*INITIAL CONDITIONS,TYPE=TEMPERATURE", "ALL,0"]
     lines += ["*STEP", "*STATIC", "*TEMPERATURE", f"ALL,{temperature}", "*NODE PRINT,NSET=ALL", "U", "*END STEP", ""]

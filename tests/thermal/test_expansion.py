@@ -64,11 +64,8 @@ def test_uniform_quadrilaterals_go_to_the_same_motions(spindle):
     extrapolation is trusted to a fifth of that."""
     moduli = elasticity(spindle)
     strain = np.array([spindle.materials[g.material].thermal_strain(60, 20) for g in spindle.regions if g.part == "rotating"])
-    coarse, finer = (
-        Solid(section_mesh(spindle, "rotating", size, "quadrilateral"), moduli).respond(races(spindle, "rotating"))[0].gain
-        @ strain
-        for size in (0.5e-3, 0.25e-3)
-    )
+    meshes = [section_mesh(spindle, "rotating", size, "quadrilateral") for size in (0.5e-3, 0.25e-3)]
+    coarse, finer = (Solid(mesh, moduli).respond(races(spindle, "rotating"))[0].gain @ strain for mesh in meshes)
     limit = finer + (finer - coarse) / (2**1.09 - 1)
     expected = influence(spindle).responses["rotating"].gain @ strain
     assert np.abs(finer - expected).max() > 20e-9
@@ -147,9 +144,8 @@ def test_field_is_the_deformed_section(spindle, form):
     sections = influence(spindle).sections
     temperature = 60.0
     if form == "field":
-        temperature = TemperatureField(
-            sections, {p: np.full(s.mesh.nvertices + s.mesh.nfacets, 60.0) for p, s in sections.items()}
-        )
+        nodal = {p: np.full(s.mesh.nvertices + s.mesh.nfacets, 60.0) for p, s in sections.items()}
+        temperature = TemperatureField(sections, nodal)
     picture = field(spindle, temperature)
     motions = expand(spindle, 60.0)
     for part in PARTS:

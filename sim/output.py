@@ -1,0 +1,258 @@
+"""What the command line says: the JSON objects, the terminal tables, and the files of a run's folder."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from model import mjcf
+from model.modes import Mode, group_energy
+from model.table import StiffnessTable, write_table
+from sim.campaign import Campaign, write_campaign
+from sim.log import LogContents, write_log
+from sim.operating import OperatingPoint, provenance, stiffness_table
+from sim.report import write_report
+from sim.run import Run, Step, as_campaign
+from sim.shift import match
+
+RPM = 2 * np.pi / 60
+
+JSON_COLUMNS = (
+    "contact_angle_deg",
+    "deformation_um",
+    "contact_force_N",
+    "ball_stiffness_N_per_m",
+    "preload_N",
+    "radial_stiffness_N_per_m",
+    "axial_stiffness_N_per_m",
+    "tilt_stiffness_N_m_per_rad",
+    "coupling_stiffness_N_per_rad",
+)
+
+
+# ---------------------------------------------------------------- JSON
+
+
+def table_json(table: StiffnessTable) -> dict[str, Any]:
+    """Lists over temperature at the first speed; with several speeds each entry of `speeds` holds its own."""
+
+    def at(speed: int) -> dict[str, Any]:
+        return {name: {c: v[c][:, speed].tolist() for c in JSON_COLUMNS} for name, v in table.values.items()}
+
+    answer = {"temperature_C": table.temperature.tolist(), "bearings": at(0), "unloads_C": dict(table.unloads)}
+    if len(table.speed) > 1:
+        answer["speeds"] = [{"speed_rpm": s / RPM, "bearings": at(i)} for i, s in enumerate(table.speed.tolist())]
+    return answer | {"provenance": dict(table.provenance)}
+
+
+def modes_json(point: OperatingPoint, highest: float) -> dict[str, Any]:
+    return {
+        "temperature_C": point.condition.temperature,
+        "speed_rpm": point.condition.speed / RPM,
+        "status": point.state.status,
+        "modes": [_mode_json(point, m) for m in point.modes if m.frequency <= highest],
+    }
+
+
+def _mode_json(point: OperatingPoint, mode: Mode) -> dict[str, Any]:
+    return {
+        "frequency_Hz": mode.frequency,
+        "damping_ratio": mode.damping_ratio,
+        "kind": mode.kind,
+        "whirl": mode.whirl,
+        "energy": group_energy(point.chain, mode),
+        "energy_by_element": dict(mode.energy),
+    }
+
+
+def impact_json(step: Step) -> dict[str, Any]:
+    m = step.identified
+    rows = zip(m.frequency, m.frequency_sd, m.damping, m.damping_sd, strict=True)
+    keys = ("frequency_Hz", "frequency_sd_Hz", "damping_ratio", "damping_ratio_sd")
+    return {
+        "temperature_C": step.point.condition.temperature,
+        "speed_rpm": step.point.condition.speed / RPM,
+        "modes": [dict(zip(keys, map(float, row), strict=True)) for row in rows],
+    }
+
+
+def run_json(run: Run) -> dict[str, Any]:
+    highest = run.spindle.hammer.band[1]
+    return {
+        "provenance": provenance(run.spindle),
+        "conditions": [modes_json(s.point, highest) | {"identified": impact_json(s)["modes"]} for s in run.steps],
+    }
+
+
+def log_json(contents: LogContents) -> dict[str, Any]:
+    """What a log holds, with its FRFs as nested lists [response][reference][line]."""
+    return {
+        "scene": contents.scene,
+        "temperatures_C": list(contents.temperatures),
+        "entities": list(contents.entities),
+        "frfs": {
+            test: {
+                "frequency_Hz": frf.frequency.tolist(),
+                "response_nodes": list(frf.response_nodes),
+                "reference_nodes": list(frf.reference_nodes),
+                "quantity": frf.quantity,
+                "real": frf.value.real.tolist(),
+                "imag": frf.value.imag.tolist(),
+            }
+            for test, frf in contents.frfs.items()
+        },
+    }
+
+
+# ---------------------------------------------------------------- files
+
+
+def campaign_of(run: Run) -> Campaign:
+    return as_campaign(run, f"virtual tests of {run.spindle.title}"[:80])
+
+
+def write_campaign_of(run: Run, folder: Path) -> None:
+    write_campaign(campaign_of(run), folder)
+
+
+def write_modes(point: OperatingPoint, folder: Path) -> None:
+    """`modes.csv` and the MuJoCo model `spindle.xml` of one operating point."""
+    (folder / "spindle.xml").write_text(mjcf.xml(mjcf.spec(point.spindle, point.state, looks=True)), encoding="utf-8")
+    _write_modes_csv([point], folder / "modes.csv")
+
+
+def _write_modes_csv(points: list[OperatingPoint], path: Path) -> None:
+    elements = [e.name for e in points[0].chain.elements]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        shares = [f"energy_share_{name}" for name in elements]
+        writer.writerow(["temperature_C", "speed_rpm", "mode", "kind", "whirl", "frequency_Hz", "damping_ratio", *shares])
+        for point in points:
+            for i, m in enumerate(point.modes, 1):
+                where = (point.condition.temperature, point.condition.speed / RPM)
+                energy = [m.energy[name] for name in elements]
+                writer.writerow([*where, i, m.kind, m.whirl, m.frequency, m.damping_ratio, *energy])
+
+
+def write_run(run: Run, folder: Path, progress: Callable[[str], None]) -> None:
+    """Everything a run leaves behind: tables, model, campaign, report, Rerun log."""
+    temperatures = [s.point.condition.temperature for s in run.steps]
+    write_table(stiffness_table(run.spindle, temperatures, [run.steps[0].point.condition.speed]), folder / "table.csv")
+    points = [s.point for s in run.steps]
+    _write_modes_csv(points, folder / "modes.csv")
+    for point in points:
+        name = f"spindle_{point.condition.temperature:g}C.xml"
+        (folder / name).write_text(mjcf.xml(mjcf.spec(point.spindle, point.state, looks=True)), encoding="utf-8")
+    progress("tables and MuJoCo models written")
+    write_campaign_of(run, folder / "campaign")
+    progress("campaign written")
+    write_report(run, folder / "report.html")
+    progress("report written")
+    write_log(run, folder / "run.rrd")
+    progress("Rerun log written")
+
+
+def write_frf_tables(contents: LogContents, folder: Path) -> None:
+    """One CSV a test: frequency and the real and imaginary part of every FRF."""
+    for test, frf in contents.frfs.items():
+        names = [f"H({i},{j})" for i in frf.response_nodes for j in frf.reference_nodes]
+        with (folder / f"{test}.csv").open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(["frequency_Hz", *(f"{part} {name} ({frf.quantity})" for name in names for part in ("re", "im"))])
+            flat = frf.value.reshape(len(names), -1)
+            for line, column in zip(frf.frequency, flat.T, strict=True):
+                writer.writerow([repr(float(line)), *(repr(float(v)) for z in column for v in (z.real, z.imag))])
+    (folder / "contents.json").write_text(json.dumps({"scene": contents.scene, "entities": list(contents.entities)}, indent=1))
+
+
+# ---------------------------------------------------------------- terminal
+
+
+def _grid(title: str, *columns: str) -> Table:
+    grid = Table(title=title, title_justify="left", title_style="bold", show_edge=False, pad_edge=False)
+    for column in columns:
+        grid.add_column(column, justify="right" if column not in ("bearing", "kind", "main flexibility", "whirl") else "left")
+    return grid
+
+
+def show_table(console: Console, table: StiffnessTable) -> None:
+    grid = _grid(
+        "Bearing state",
+        "T, C", "rpm", "bearing", "angle, deg", "deform., um", "ball force, N", "ball k, N/um", "preload, N", "k_RR, N/um", "k_AA, N/um",
+    )  # fmt: skip
+    scale = (1, 1, 1, 1e-6, 1, 1e-6, 1e-6)
+    digits = (2, 3, 3, 3, 2, 2, 3)
+    for i, temperature in enumerate(table.temperature):
+        for j, speed in enumerate(table.speed):
+            for name, values in table.values.items():
+                cells = zip(JSON_COLUMNS, scale, digits, strict=False)
+                row = [f"{values[c][i, j] * s:.{d}f}" for c, s, d in cells]
+                grid.add_row(f"{temperature:g}", f"{speed / RPM:g}", name, *row)
+    console.print(grid)
+    for name, where in table.unloads.items():
+        if where is not None:
+            console.print(f"{name} bearing loses contact at {where:.2f} C")
+
+
+def show_modes(console: Console, answer: dict[str, Any], point: OperatingPoint) -> None:
+    groups = list(answer["modes"][0]["energy"]) if answer["modes"] else []
+    grid = _grid(
+        f"Modes at {answer['temperature_C']:g} C, {answer['speed_rpm']:g} rpm (bearings {answer['status']})",
+        "mode", "f, Hz", "damping, %", "kind", "whirl", *(f"{g}, %" for g in groups),
+    )  # fmt: skip
+    for i, m in enumerate(answer["modes"], 1):
+        shares = [f"{100 * m['energy'][g]:.1f}" for g in groups]
+        grid.add_row(str(i), f"{m['frequency_Hz']:.2f}", f"{100 * m['damping_ratio']:.3f}", m["kind"], m["whirl"], *shares)
+    console.print(grid)
+    console.print("The last columns share each mode's strain energy between the element groups.")
+
+
+def show_impact(console: Console, step: Step) -> None:
+    condition = step.point.condition
+    grid = _grid(
+        f"Impact test at {condition.temperature:g} C, {condition.speed / RPM:g} rpm: identified modes beside the model's own",
+        "f, Hz", "+-", "damping, %", "+-", "model f, Hz", "model damping, %",
+    )  # fmt: skip
+    m = step.identified
+    pairs = match(step)
+    for i, (f, sf, z, sz) in enumerate(zip(m.frequency, m.frequency_sd, m.damping, m.damping_sd, strict=True)):
+        exact = pairs.get(i)
+        own = ("-", "-") if exact is None else (f"{exact.frequency:.2f}", f"{100 * exact.damping_ratio:.3f}")
+        grid.add_row(f"{f:.2f}", f"{sf:.2f}", f"{100 * z:.3f}", f"{100 * sz:.3f}", *own)
+    console.print(grid)
+
+
+def show_run(console: Console, run: Run, out: Path) -> None:
+    temperatures = [s.point.condition.temperature for s in run.steps]
+    show_table(console, stiffness_table(run.spindle, temperatures, [run.steps[0].point.condition.speed]))
+    console.print()
+    measured = [(c, t) for c in run.measured for t in c.tests if t.modes]
+    grid = _grid(
+        "Modal peaks, Hz: the model's own / identified from the virtual hammer test",
+        "mode", "kind", "main flexibility", *(f"{t:g} C" for t in temperatures), "shift",
+        *(f"measured {t.temperature:g} C" for _, t in measured),
+    )  # fmt: skip
+    first, last = run.steps[0], run.steps[-1]
+    highest = run.spindle.hammer.band[1]
+    from sim.report import measured_rows
+
+    beside = measured_rows(run)
+    for i, mode in enumerate(m for m in first.point.modes if m.frequency <= highest):
+        cells = []
+        for step in run.steps:
+            identified = {id(v): k for k, v in match(step).items()}.get(id(step.point.modes[i]))
+            seen = "-" if identified is None else f"{step.identified.frequency[identified]:.1f}"
+            cells.append(f"{step.point.modes[i].frequency:.1f} / {seen}")
+        group = max(group_energy(first.point.chain, mode).items(), key=lambda item: item[1])[0]
+        shift = last.point.modes[i].frequency - mode.frequency
+        seen = [f"{beside[t.id][i].frequency:.0f}" if i in beside.get(t.id, {}) else "" for _, t in measured]
+        grid.add_row(str(i + 1), mode.kind, group, *cells, f"{shift:+.1f}", *seen)
+    console.print(grid)
+    console.print(f"\n{out}: report.html, run.rrd, table.csv, modes.csv, spindle_*.xml, campaign/", highlight=False)

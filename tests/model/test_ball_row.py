@@ -1,0 +1,157 @@
+"""One ball row: published cases, energy, exact derivatives, contact loss, ball inertia."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from model.ball_row import BallInertia, BallRow, NoEquilibrium, displacement_under, energy, respond
+from model.hertz import race_contact
+
+
+def row(balls, ball, pitch, inner, outer, angle, clearance, modulus) -> BallRow:
+    distance = (inner + outer - 1) * ball
+    k = [race_contact(ball, f, pitch, angle, side, (modulus, 0.3), (modulus, 0.3)).stiffness for f, side in ((inner, True), (outer, False))]
+    radial = distance * np.cos(angle) - clearance / 2
+    return BallRow(balls, radial, distance * np.sin(angle), (inner - 0.5) * ball, (outer - 0.5) * ball, *k, pitch / 2)
+
+
+def deep_groove(clearance: float) -> BallRow:
+    return row(7, 11.5e-3, 43.5e-3, 0.52, 0.53, 0.0, clearance, 210e9)
+
+
+ISO = [
+    pytest.param(0.0, {"x": 1000.0}, {"x": 15.1101}, id="radial"),
+    pytest.param(0.0, {"z": 1000.0}, {"z": 133.5381}, id="axial"),
+    pytest.param(10e-6, {"x": 1000.0}, {"x": 21.223}, id="radial-with-clearance"),
+    pytest.param(10e-6, {"z": 1000.0}, {"z": 149.1717}, id="axial-with-clearance"),
+    pytest.param(10e-6, {"x": 1000.0, "z": 1000.0}, {"x": 19.5923, "z": 146.4603, "tilt": 2687.2}, id="combined"),
+    pytest.param(0.0, {"tilt": 1.0}, {"tilt": 3695.7}, id="moment"),
+]
+
+
+@pytest.mark.parametrize(("clearance", "load", "expected"), ISO)
+def test_iso_16281_deep_groove(clearance, load, expected):
+    """ISO/TS 16281 cases of a commercial program, published with an open code's test (um, urad; first ball under the load).
+
+    The outer ring is pulled towards -x, which presses the ball at azimuth 0. Tolerance 3e-4: the tilt arm is half the pitch here.
+    """
+    sign = {"x": -1.0, "z": 1.0, "tilt": 1.0}
+    index = {"x": 0, "z": 2, "tilt": 4}
+    force = np.zeros(5)
+    for name, value in load.items():
+        force[index[name]] = sign[name] * value
+    found = displacement_under(deep_groove(clearance), force)
+    for name, value in expected.items():
+        assert abs(found[index[name]]) * 1e6 == pytest.approx(value, rel=3e-4)
+
+
+def test_harris_218():
+    """Harris's 218 angular contact bearing at 17.8 kN: exact Hertz with his E = 207 GPa."""
+    bearing = row(16, 22.23e-3, 125.26e-3, 0.5232, 0.5232, np.radians(40), 0.0, 207e9)
+    moved = displacement_under(bearing, np.array([0, 0, 17800.0, 0, 0]))
+    answer = respond(bearing, moved)
+    assert np.degrees(answer.inner_angle) == pytest.approx(41.50, rel=1e-3)
+    assert moved[2] * 1e3 == pytest.approx(0.0360, rel=1e-3)
+    assert answer.ball_force == pytest.approx(1679, rel=1e-3)
+
+
+def jones_9_and_10(bearing: BallRow) -> tuple[float, float]:
+    """k_RR and k_AA of the axially loaded row: Jang et al. 2003, Eqs. (9) and (10), with AB the unloaded distance."""
+    ab = bearing.unloaded_distance
+    d = np.hypot(bearing.radial, bearing.axial) - ab
+    angle = np.arctan2(abs(bearing.axial), bearing.radial)
+    common, slope = d**1.5 / (d + ab), np.sqrt(d) * (d + 3 * ab) / (2 * (d + ab))
+    k = bearing.constant * bearing.balls
+    return k / 2 * (common + slope * np.cos(angle) ** 2), k * (common + slope * np.sin(angle) ** 2)
+
+
+@pytest.mark.parametrize("axial", [43e-6, 45e-6, 60e-6, 90e-6])
+def test_equations_9_and_10_are_the_tangent(axial):
+    bearing = replace(row(10, 1.588e-3, 9.1e-3, 0.529, 0.535, np.radians(24.51), 0.0, 208e9), axial=axial)
+    tangent = respond(bearing).tangent
+    radial, along = jones_9_and_10(bearing)
+    assert tangent[0, 0] == pytest.approx(radial, rel=1e-12)
+    assert tangent[1, 1] == pytest.approx(radial, rel=1e-12)
+    assert tangent[2, 2] == pytest.approx(along, rel=1e-12)
+
+
+RANDOM = [np.random.default_rng(i).uniform(-1, 1, 5) * np.array([8e-6, 8e-6, 8e-6, 1e-3, 1e-3]) for i in range(6)]
+
+
+@pytest.mark.parametrize("moved", RANDOM, ids=range(6))
+def test_force_is_the_derivative_of_the_energy_and_stiffness_of_the_force(moved):
+    bearing = replace(deep_groove(0.0), axial=60e-6, radial=0.571e-3)
+    answer = respond(bearing, moved)
+    assert 0 < answer.in_contact.sum() <= 7
+    h = 1e-9
+    for i in range(5):
+        step = np.zeros(5)
+        step[i] = h * (1 if i < 3 else 30)
+        plus, minus = moved + step, moved - step
+        assert (energy(bearing, plus) - energy(bearing, minus)) / (2 * step[i]) == pytest.approx(answer.force[i], rel=1e-5, abs=1e-4)
+        slope = (respond(bearing, plus).force - respond(bearing, minus).force) / (2 * step[i])
+        assert slope == pytest.approx(answer.tangent[i], rel=1e-4, abs=1e-5 * np.abs(answer.tangent[i]).max())
+    assert answer.tangent == pytest.approx(answer.tangent.T, rel=1e-12)
+
+
+def test_contact_is_lost_ball_by_ball():
+    """Pulled far enough to one side, the unloaded balls carry nothing and say so."""
+    bearing = deep_groove(10e-6)
+    answer = respond(bearing, displacement_under(bearing, np.array([-1000.0, 0, 0, 0, 0])))
+    assert answer.in_contact.tolist() == [True, True, False, False, False, False, True]
+    assert np.all(answer.ball_force[~answer.in_contact] == 0)
+    assert np.all(answer.deformation[~answer.in_contact] < 0)
+
+
+def test_the_load_it_cannot_carry_is_said():
+    spinless = replace(deep_groove(0.0), balls=3)
+    with pytest.raises(NoEquilibrium, match="cannot carry"):
+        displacement_under(replace(spinless, inner_constant=1e-6, outer_constant=1e-6), np.array([-1e9, 0, 0, 0, 0]))
+
+
+FAST = BallInertia(22.23e-3, 125.26e-3, 7800.0, 1047.0, 0.0)
+
+
+def fast_218() -> BallRow:
+    return replace(row(16, 22.23e-3, 125.26e-3, 0.5232, 0.5232, np.radians(40), 0.0, 207e9), inertia=FAST)
+
+
+def test_forces_on_a_heavy_ball_balance():
+    """Radial and axial balance of inner contact, outer contact, centrifugal force and friction of the gyroscopic moment."""
+    bearing = fast_218()
+    moved = displacement_under(bearing, np.array([0, 0, 17800.0, 0, 0]))
+    answer = respond(bearing, moved)
+    inner, outer = answer.ball_force[0], answer.outer_ball_force[0]
+    ai, ao = answer.inner_angle[0], answer.outer_angle[0]
+    gamma = FAST.diameter / FAST.pitch_diameter
+    cage = FAST.inner_speed * (1 - gamma * np.cos(ao)) / 2
+    centrifugal = FAST.mass * FAST.pitch_diameter / 2 * cage**2
+    beta = np.arctan2(np.sin(ao), np.cos(ao) + gamma)
+    rolling = gamma / (1 + gamma * np.cos(ao)) + gamma / (1 - gamma * np.cos(ao))
+    spin = FAST.inner_speed / ((np.cos(ao) * np.cos(beta) + np.sin(ao) * np.sin(beta)) * rolling)
+    friction = 2 / FAST.diameter * FAST.mass * FAST.diameter**2 / 10 * spin * cage * np.sin(beta)
+    assert inner * np.cos(ai) - outer * np.cos(ao) + centrifugal + friction * np.sin(ao) == pytest.approx(0, abs=1e-6 * outer)
+    assert inner * np.sin(ai) - outer * np.sin(ao) - friction * np.cos(ao) == pytest.approx(0, abs=1e-6 * outer)
+    assert ao < np.radians(41.5) < ai
+    assert outer > inner
+    assert bearing.balls * inner * np.sin(ai) == pytest.approx(17800, rel=1e-9)
+
+
+def test_heavy_balls_tangent_is_exact():
+    bearing = fast_218()
+    moved = displacement_under(bearing, np.array([500.0, 0, 17800.0, 0, 0]))
+    tangent = respond(bearing, moved).tangent
+    for i, h in enumerate((1e-9, 1e-9, 1e-9, 1e-8, 1e-8)):
+        step = np.eye(5)[i] * h
+        slope = (respond(bearing, moved + step).force - respond(bearing, moved - step).force) / (2 * h)
+        assert slope == pytest.approx(tangent[:, i], rel=1e-5, abs=1e-6 * np.abs(tangent[:, i]).max())
+
+
+def test_no_inertia_is_the_limit_of_little():
+    bearing = fast_218()
+    moved = np.array([0, 0, 30e-6, 0, 0])
+    light = respond(replace(bearing, inertia=replace(FAST, share=1e-9)), moved)
+    none = respond(replace(bearing, inertia=replace(FAST, share=0.0)), moved)
+    assert light.force == pytest.approx(none.force, rel=1e-6, abs=1e-3)
+    assert light.tangent == pytest.approx(none.tangent, rel=1e-5, abs=1e-5 * np.abs(none.tangent).max())

@@ -1,0 +1,147 @@
+"""The pair's axial equilibrium: invariances, arrangements, preload kinds, unloading, temperature."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from model.machine import Condition, Law, RingMotion
+from model.pair import reference_motion, solve
+from model.tolerance import with_preload
+
+
+def motions(spindle, **moves):
+    nothing = reference_motion(spindle.reference_temperature)
+    return {b.name: replace(nothing, **moves.get(b.name, moves.get("both", {}))) for b in spindle.bearings}
+
+
+def test_reference_state(cold):
+    """Table 1 of the paper and what follows from it (verification.md, 1e-3)."""
+    for state in cold.bearings:
+        assert np.degrees(state.contact_angle) == pytest.approx(24.51, rel=1e-12)
+        assert state.preload == pytest.approx(16.0, rel=1e-9)
+        assert state.contact_force == pytest.approx(3.857, rel=1e-3)
+        assert state.deformation == pytest.approx(1.0542e-6, rel=1e-3)
+        assert state.ball_stiffness == pytest.approx(5.488e6, rel=1e-3)
+        assert state.radial_stiffness == pytest.approx(22.75e6, rel=1e-3)
+        assert state.axial_stiffness == pytest.approx(9.755e6, rel=1e-3)
+    assert cold.hub_movement == pytest.approx(0.0, abs=1e-15)
+    assert cold.status == "in contact"
+
+
+@pytest.mark.parametrize(("outward", "preload"), [(0.2, 12.06), (0.4, 8.51), (0.6, 5.39), (0.8, 2.78), (1.0, 0.82)])
+def test_outer_races_moved_outward(spindle, outward, preload):
+    """Preload against outward motion of both outer races at fixed axial position (verification.md, 2e-3)."""
+    state = solve(spindle, Condition(20.0), motions(spindle, both={"outer_r": outward * 1e-6}))
+    assert state.bearings[0].preload == pytest.approx(preload, abs=max(2e-3 * preload, 5e-3))
+
+
+def test_uniform_strain_changes_no_angle(spindle):
+    """Everything grown by one strain: same angle, deformation grown by the strain (exact with radii from the bearing data)."""
+    strain = 1e-3
+    moved = {}
+    for b in spindle.bearings:
+        loaded = b.unloaded_distance + 1.0542095183058289e-6
+        inner = b.pitch_diameter / 2 + loaded * np.cos(b.contact_angle) / 2 - b.inner_conformity * b.ball_diameter
+        outer = b.pitch_diameter / 2 - loaded * np.cos(b.contact_angle) / 2 + b.outer_conformity * b.ball_diameter
+        moved[b.name] = RingMotion(strain * inner, strain * b.z, strain * outer, strain * b.z, strain, strain, strain, 20.0)
+    state = solve(spindle, Condition(20.0), moved)
+    for b in state.bearings:
+        assert np.degrees(b.contact_angle) == pytest.approx(24.51, rel=1e-6)
+        assert b.deformation == pytest.approx(1.0542095183e-6 * (1 + strain), rel=1e-6)
+
+
+def test_axial_forces_balance_and_the_hub_moves_to_the_softer_side(spindle):
+    """Eq. (8): with unlike radial motion the forces stay equal, and the hub moves towards the bearing that lost more."""
+    state = solve(spindle, Condition(20.0), motions(spindle, upper={"outer_r": 0.4e-6}, lower={"outer_r": 0.1e-6}))
+    lower, upper = state.bearings
+    assert lower.preload == pytest.approx(upper.preload, rel=1e-9)
+    assert state.hub_movement > 1e-9
+    assert upper.contact_angle > lower.contact_angle
+
+
+def test_unloading_is_a_state(spindle):
+    """Races far enough apart: no contact, no force, no stiffness, and the state says so."""
+    state = solve(spindle, Condition(20.0), motions(spindle, both={"outer_r": 3e-6}))
+    for b in state.bearings:
+        assert not b.in_contact
+        assert b.contact_force == 0
+        assert np.all(b.stiffness == 0)
+        assert b.deformation < 0
+    assert state.status == "lower and upper bearing lost contact"
+
+
+def test_spring_preload_stays_constant(spindle):
+    spring = replace(spindle, pair=replace(spindle.pair, preload_kind="spring"))
+    state = solve(spring, Condition(20.0), motions(spindle, upper={"outer_r": 0.8e-6}, lower={"outer_z": 2e-6}))
+    assert [b.preload for b in state.bearings] == pytest.approx([16.0, 16.0], rel=1e-9)
+    assert state.bearings[1].contact_angle > state.bearings[0].contact_angle
+
+
+def test_face_to_face_loads_the_other_way(spindle):
+    """Outer rings moved apart axially load a back-to-back pair and unload a face-to-face one by as much."""
+    apart = motions(spindle, upper={"outer_z": 0.3e-6}, lower={"outer_z": -0.3e-6})
+    together = motions(spindle, upper={"outer_z": -0.3e-6}, lower={"outer_z": 0.3e-6})
+    face = replace(spindle, pair=replace(spindle.pair, arrangement="face-to-face"))
+    loaded, unloaded = solve(spindle, Condition(20.0), apart), solve(face, Condition(20.0), apart)
+    assert loaded.bearings[0].preload > 17
+    assert unloaded.bearings[0].preload < 15
+    assert solve(face, Condition(20.0), together).bearings[0].preload == pytest.approx(loaded.bearings[0].preload, rel=1e-9)
+
+
+def test_tandem_shares_the_load(spindle):
+    tandem = replace(spindle, pair=replace(spindle.pair, arrangement="tandem", preload_kind="spring"))
+    state = solve(tandem, Condition(20.0), motions(spindle, upper={"outer_z": 0.1e-6}))
+    lower, upper = state.bearings
+    assert lower.preload + upper.preload == pytest.approx(32.0, rel=1e-9)
+    assert upper.preload > lower.preload + 0.5
+
+
+@pytest.mark.parametrize("arrangement", ["back-to-back", "face-to-face"])
+def test_back_to_back_resists_tilting_more(spindle, arrangement):
+    """Lever of the load lines about the middle: half span +- arm tan(angle) (Harris 1991, ch. 7), in the limit of stiff balls."""
+    pair = replace(spindle.pair, stiffness_arrangement=arrangement)
+    state = solve(replace(spindle, pair=pair), Condition(20.0), motions(spindle))
+    middle = sum(b.z for b in state.bearings) / 2
+    tilt = 0.0
+    for b in state.bearings:
+        lever = np.array([b.z - middle, 0, 0, 0, 1])  # x and tilt_y of the ring centre for a unit tilt about the middle
+        tilt += float(lever @ b.stiffness @ lever)
+    sign = 1 if arrangement == "back-to-back" else -1
+    b = state.bearings[0]
+    lever = (16.5e-3 - 5e-3) / 2 + sign * 4.55e-3 * np.tan(b.contact_angle)
+    expected = 2 * 10 / 2 * b.ball_stiffness * (np.cos(b.contact_angle) * lever) ** 2
+    geometric = 2 * 10 / 2 * b.contact_force / 102.7e-6 * (lever**2 + 0.02**2)  # bound of the F/A terms left out
+    assert tilt == pytest.approx(expected, abs=geometric)
+
+
+def test_the_preload_can_be_mounted_otherwise(spindle):
+    """Another preload keeps the radial distance of the groove centres; the angle rises with the load."""
+    more = with_preload(spindle, 20.0)
+    state = solve(more, Condition(20.0), motions(spindle))
+    row, old = state.bearings[0].row, solve(spindle, Condition(20.0), motions(spindle)).bearings[0].row
+    assert state.bearings[0].preload == pytest.approx(20.0, rel=1e-9)
+    assert row.radial == pytest.approx(old.radial, rel=1e-7)  # K is taken at the drawing's angle
+    assert more.bearings[0].contact_angle > spindle.bearings[0].contact_angle
+
+
+def test_soft_hot_steel_softens_the_contact(spindle):
+    """K is proportional to E: with E(T) falling by 10 % at equal deformation the force falls by 10 %."""
+    steel = replace(spindle.materials["steel"], youngs_modulus=Law((20.0, 60.0), (208e9, 187.2e9)))
+    soft = replace(spindle, materials={**spindle.materials, "steel": steel})
+    hot = motions(spindle, both={"temperature": 60.0})
+    ratio = solve(soft, Condition(60.0), hot).bearings[0].preload / solve(spindle, Condition(60.0), hot).bearings[0].preload
+    assert ratio == pytest.approx(0.9, rel=1e-9)
+
+
+def test_ball_inertia_at_speed(spindle):
+    """Balls with inertia press the outer race by their centrifugal force: closed form of the cage, at most percents here."""
+    heavy = replace(spindle, pair=replace(spindle.pair, ball_inertia=1.0))
+    speed = 20000 * np.pi / 30
+    state = solve(heavy, Condition(20.0, speed), motions(spindle))
+    light = solve(spindle, Condition(20.0, speed), motions(spindle))
+    b = state.bearings[0]
+    assert b.outer_contact_angle < light.bearings[0].contact_angle < b.contact_angle
+    assert state.bearings[0].preload == pytest.approx(state.bearings[1].preload, rel=1e-6)
+    assert abs(b.radial_stiffness / light.bearings[0].radial_stiffness - 1) < 0.05
+    assert solve(heavy, Condition(20.0, 0.0), motions(spindle)).bearings[0].stiffness == pytest.approx(light.bearings[0].stiffness)

@@ -1,0 +1,171 @@
+"""The rotor-base chain: gyroscopic closed forms by matrices and by MuJoCo, FRFs, energies, the reference spindle's modes."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+
+from model import mjcf
+from model.machine import Body, Condition
+from model.modes import frf, group_energy, modes, point_rows, poles
+from model.pair import reference_motion, solve
+from model.rotor_base import Element, RotorBase, matrices, rotor_base
+
+RPM = np.pi / 30
+NONE = np.zeros((5, 5))
+
+
+def tilting_rotor(speed: float) -> RotorBase:
+    body = Body("rotor", 0.05, (1e-5, 1e-5, 1.6e-5), 0.0, ("tilt_x", "tilt_y"), True, ())
+    return RotorBase((body,), (Element("spring", "spring", "ground", "rotor", 0.0, np.diag([0, 0, 0, 1200.0, 1200.0]), NONE),), speed)
+
+
+def rotor_on_bearings(speed: float) -> RotorBase:
+    body = Body("rotor", 0.06, (1.2e-5, 1.2e-5, 1.8e-5), 0.0, ("x", "y", "tilt_x", "tilt_y"), True, ())
+    radial = np.diag([12e6, 12e6, 0, 0, 0])
+    springs = tuple(Element(n, "bearings", "ground", "rotor", z, radial, NONE) for n, z in (("a", 6e-3), ("b", -9e-3)))
+    return RotorBase((body,), springs, speed)
+
+
+TILTING = [(0, (1743.455,)), (7200, (1650.096, 1842.096)), (20000, (1497.064, 2030.398))]
+TWO_BEARINGS = [(0, (1675.11,)), (7200, (1589.26, 1765.44, 3206.00, 3209.82)), (60000, (1093.07, 2542.05))]
+
+
+def by_mujoco(chain: RotorBase):
+    return mjcf.linearise(mjcf.chain_spec(chain, 5e-6).compile())
+
+
+@pytest.mark.parametrize("path", [matrices, by_mujoco], ids=["matrices", "mujoco"])
+@pytest.mark.parametrize(("make", "rpm", "expected"), [(tilting_rotor, *c) for c in TILTING] + [(rotor_on_bearings, *c) for c in TWO_BEARINGS])
+def test_gyroscopic_closed_forms(path, make, rpm, expected):
+    """Natural frequencies of verification.md, 1e-5: the printed digits."""
+    chain = make(rpm * RPM)
+    found = [m.frequency for m in modes(chain, path(chain))]
+    for value in expected:
+        assert min(abs(f / value - 1) for f in found) < 5e-6
+
+
+def test_forward_whirl_is_the_faster_one():
+    low, high = modes(tilting_rotor(7200 * RPM))
+    assert (low.whirl, high.whirl) == ("backward", "forward")
+    low, high = modes(tilting_rotor(-7200 * RPM))
+    assert (low.whirl, high.whirl) == ("backward", "forward")
+
+
+EXPECTED = [
+    (20.0, 0.0, [1002.1, 1545.0, 1795.0, 1821.0, 2009.9, 2389.7, 2398.2]),
+    (20.0, 7200.0, [1002.1, 1545.0, 1793.3, 1821.6, 2009.9, 2323.1, 2468.4]),
+]
+
+
+@pytest.mark.parametrize(("temperature", "rpm", "expected"), EXPECTED, ids=["20C-rest", "20C-7200rpm"])
+def test_reference_spindle(spindle, temperature, rpm, expected):
+    """Frequencies of the data sheet's independent calculation, 0.5 Hz."""
+    still = {b.name: reference_motion(temperature) for b in spindle.bearings}
+    chain = rotor_base(spindle, solve(spindle, Condition(temperature, rpm * RPM), still))
+    found = modes(chain, highest=3000)
+    assert [m.frequency for m in found] == pytest.approx(expected, abs=0.5)
+    assert [m.kind for m in found] == ["axial", "axial", "rocking", "rocking", "axial", "rocking", "rocking"]
+    assert all(sum(m.energy.values()) == pytest.approx(1.0, rel=1e-12) for m in found)
+    assert max(group_energy(chain, found[5]).items(), key=lambda e: e[1])[0] == "bearings"
+
+
+def test_mass_and_stiffness_are_symmetric_and_positive(spindle, hot):
+    linear = matrices(rotor_base(spindle, hot))
+    for matrix in (linear.mass, linear.stiffness):
+        assert np.abs(matrix - matrix.T).max() < 1e-14 * np.abs(matrix).max()
+        scale = 1 / np.sqrt(np.diag(matrix))
+        assert np.linalg.eigvalsh(matrix * np.outer(scale, scale)).min() > 1e-6
+
+
+@pytest.mark.parametrize("kind", ["receptance", "mobility", "accelerance"])
+@pytest.mark.parametrize("rpm", [0.0, 7200.0])
+def test_frf_is_the_inverse_of_the_dynamic_stiffness(spindle, kind, rpm):
+    still = {b.name: reference_motion(20.0) for b in spindle.bearings}
+    chain = rotor_base(spindle, solve(spindle, Condition(20.0, rpm * RPM), still))
+    linear = matrices(chain)
+    rows, hammers = point_rows(spindle, chain), point_rows(spindle, chain, (1, 6))
+    frequency = np.array([400.0, 1002.0, 1808.0, 2394.0, 3000.0])
+    found = frf(linear, rows, hammers, frequency, kind)
+    for i, w in enumerate(2 * np.pi * frequency):
+        direct = rows @ np.linalg.solve(linear.stiffness - w**2 * linear.mass + 1j * w * linear.damping, hammers.T)
+        direct *= (1j * w) ** ("receptance", "mobility", "accelerance").index(kind)
+        assert found[:, :, i] == pytest.approx(direct, rel=1e-8, abs=1e-9 * np.abs(direct).max())
+
+
+def test_heavily_damped_poles_keep_the_frf_exact():
+    """A joint damped beyond critical has real poles, which the paired sum must not lose."""
+    chain = tilting_rotor(0.0)
+    damped = replace(chain, elements=(replace(chain.elements[0], damping=np.diag([0, 0, 0, 5.0, 0.01])),))
+    linear = matrices(damped)
+    assert np.sum(np.abs(poles(linear).value.imag) < 1e-9) == 2
+    rows = np.eye(2)
+    w = 2 * np.pi * 300
+    direct = np.linalg.inv(linear.stiffness - w**2 * linear.mass + 1j * w * linear.damping)
+    assert frf(linear, rows, rows, np.array([300.0]))[:, :, 0] == pytest.approx(direct, rel=1e-9)
+
+
+@pytest.mark.parametrize("element", mjcf.ELEMENTS)
+@pytest.mark.parametrize("rpm", [0.0, 7200.0])
+def test_mujoco_agrees_with_the_matrices(spindle, hot, element, rpm):
+    """Both bearing elements linearise to the table's 5x5 matrices within 1e-6, spin and base included."""
+    state = replace(hot, condition=Condition(60.0, rpm * RPM))
+    chain = rotor_base(spindle, state)
+    own, found = matrices(chain), mjcf.linearise(mjcf.spec(spindle, state, element).compile())
+    assert found.dofs == own.dofs
+    scale = np.sqrt(np.outer(np.diag(own.stiffness), np.diag(own.stiffness)))
+    assert np.abs(found.mass - own.mass).max() < 1e-9 * own.mass.max()
+    assert np.abs((found.stiffness - own.stiffness) / scale).max() < 1e-6
+    assert np.abs(found.damping - own.damping).max() < 1e-9 * np.abs(own.damping).max()
+
+
+def test_the_saved_model_is_the_same_model(spindle, hot):
+    """Ball-by-ball XML read back gives the same linearisation: six digits would not do."""
+    spec = mjcf.spec(spindle, hot, "ball-by-ball")
+    first = mjcf.linearise(spec.compile())
+    again = mjcf.linearise(mujoco.MjModel.from_xml_string(mjcf.xml(spec)))
+    assert again.stiffness == pytest.approx(first.stiffness, rel=1e-9, abs=1e-6)
+
+
+def undamped(state):
+    return replace(state, bearings=tuple(replace(b, damping=NONE) for b in state.bearings))
+
+
+@pytest.mark.parametrize("element", mjcf.ELEMENTS)
+def test_energy_is_conserved_without_damping(spindle, cold, element):
+    """A blow on the spinning, undamped spindle: RK4 keeps kinetic plus elastic energy to 1e-6 over 5 ms."""
+    joints = tuple(replace(j, damping_ratio=0.0) for j in spindle.structure.joints)
+    still = replace(spindle, structure=replace(spindle.structure, joints=joints))
+    spec = mjcf.spec(still, undamped(replace(cold, condition=Condition(20.0, 7200 * RPM))), element)
+    spec.option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
+    spec.option.timestep = 1e-6
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    rest = data.energy.sum()
+    data.qvel[[model.joint(f"hub.{m}").dofadr[0] for m in ("x", "z", "tilt_x")]] = 3e-3, 2e-3, 0.3
+    mujoco.mj_forward(model, data)
+    start = data.energy.sum() - rest
+    assert start > 1e-7
+    mujoco.mj_step(model, data, nstep=5000)
+    mujoco.mj_forward(model, data)
+    assert data.energy.sum() - rest == pytest.approx(start, rel=1e-4)
+
+
+def test_a_ball_cannot_push(spindle, cold):
+    """Hub pressed far to one side: the ball-by-ball model loses contact there and is softer than its tangent says."""
+    model = mjcf.spec(spindle, cold, "ball-by-ball").compile()
+    data = mujoco.MjData(model)
+    data.qpos[model.joint("hub.x").qposadr[0]] = 3e-6
+    mujoco.mj_forward(model, data)
+    balls = [model.tendon(f"{b}.ball{j}").id for b in ("lower", "upper") for j in range(10)]
+    slack = data.ten_length[balls] < model.tendon_lengthspring[balls, 1]
+    assert 0 < slack.sum() < 20
+    linear = mjcf.spec(spindle, cold, "linear").compile()
+    other = mujoco.MjData(linear)
+    other.qpos[linear.joint("hub.x").qposadr[0]] = 3e-6
+    mujoco.mj_forward(linear, other)
+    hub = model.joint("hub.x").dofadr[0]
+    assert abs(data.qfrc_spring[hub] / other.qfrc_spring[hub] - 1) > 0.02
