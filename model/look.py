@@ -83,7 +83,7 @@ def plate_meshes(spindle: Spindle) -> list[RegionMesh]:
 
 
 def stripe_meshes(spindle: Spindle) -> list[RegionMesh]:
-    """A dark stripe on the top and the side of every turning body's highest region: it shows the spin."""
+    """A stripe of paint on the top and the side of every turning body's highest region: it shows the spin."""
     meshes = []
     for body in (b for b in spindle.structure.bodies if b.turns and b.regions):
         top = max((spindle.region(name) for name in body.regions), key=lambda g: (g.z[1], g.r[1]))
@@ -94,9 +94,7 @@ def stripe_meshes(spindle: Spindle) -> list[RegionMesh]:
     return meshes
 
 
-def revolve(
-    tiles: Sequence[Cell], start: float = CUT[0], stop: float = CUT[1]
-) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
+def revolve(tiles: Sequence[Cell], start: float = CUT[0], stop: float = CUT[1]) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
     """Vertices (n, 3), triangles (m, 3) and patches (m,) of rectangles of the section turned from azimuth `start` to `stop`.
 
     Circles are polygons of the circle's area: volumes are exact. Tiles must not meet at a corner only.
@@ -253,15 +251,8 @@ def _add_balls(out: MjSpec, spindle: Spindle, bearing: BearingState) -> None:
     rgba = [*(BALL if bearing.in_contact else LOOSE_BALL), 1.0]
     size = [spindle.bearing(bearing.name).ball_diameter / 2, 0, 0]
     for j, centre in enumerate(centres - [0.0, 0.0, inner.z]):
-        holder.add_geom(
-            name=f"{bearing.name} ball {j}",
-            type=SPHERE,
-            size=size,
-            pos=centre,
-            material="polished finish",
-            rgba=rgba,
-            **_visual(BALLS),
-        )
+        shape = {"type": SPHERE, "size": size, "pos": centre, "material": "polished finish", "rgba": rgba}
+        holder.add_geom(name=f"{bearing.name} ball {j}", **shape, **_visual(BALLS))
 
 
 def _visual(group: int) -> dict[str, float]:
@@ -279,19 +270,18 @@ def _add_surroundings(out: MjSpec, spindle: Spindle) -> None:
     out.visual.headlight.ambient, out.visual.headlight.diffuse, out.visual.headlight.specular = [0.3] * 3, [0.35] * 3, [0.1] * 3
     out.visual.global_.azimuth, out.visual.global_.elevation = float(np.rad2deg(view)) % 360 - 180, -28.0
     out.visual.global_.offwidth, out.visual.global_.offheight = 1600, 1200
-    out.visual.quality.shadowsize, out.visual.quality.offsamples = 4096, 8
-    out.add_texture(
-        name="sky", type=SKYBOX, builtin=GRADIENT, rgb1=[1.0, 1.0, 1.0], rgb2=[0.62, 0.67, 0.73], width=64, height=384
-    )
+    out.visual.quality.offsamples = 8
+    out.add_texture(name="sky", type=SKYBOX, builtin=GRADIENT, rgb1=[1.0, 1.0, 1.0], rgb2=[0.62, 0.67, 0.73], width=64, height=384)
     for name, azimuth, height, diffuse in (("key", view + 1.0, 2.2, 0.55), ("fill", view - 0.9, 0.6, 0.2)):
         towards = np.array([np.cos(azimuth), np.sin(azimuth), height])
         out.worldbody.add_light(
             name=name, pos=centre + 4 * reach * towards, dir=-towards, diffuse=[diffuse] * 3, specular=[0.3] * 3, castshadow=False
         )
-    rows = [b.z for b in spindle.bearings]
-    shots = {"front": (centre - [0.0, 0.0, 0.15 * reach], 5.6 * reach, 27.0, view + 0.1)}
-    if rows:
-        shots["close"] = (np.array([0.0, 0.0, float(np.mean(rows))]), 2.6 * reach, 12.0, view + 0.05)
+    bearings = np.array([0.0, 0.0, np.mean([b.z for b in spindle.bearings])])
+    shots = {
+        "front": (centre - [0.0, 0.0, 0.15 * reach], 5.6 * reach, 27.0, view + 0.1),
+        "close": (bearings, 2.6 * reach, 12.0, view + 0.05),
+    }
     for name, (target, distance, elevation, azimuth) in shots.items():
         _add_camera(out, name, target, distance, azimuth, np.deg2rad(elevation))
 

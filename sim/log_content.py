@@ -294,16 +294,17 @@ def _place(value: Array | float, ticks: Array, start: float, end: float) -> Arra
 def _ticks(values: Array) -> Array:
     """Two to four round numbers that span `values`."""
     low, high = float(values.min()), float(values.max())
-    span = max(high - low, 1e-6 * max(abs(high), abs(low)), 1e-12)
+    span = max(high - low, 1e-3 * max(abs(high), abs(low))) or 1.0
     for step in _round_steps(span / 3):
-        ticks = np.arange(np.floor(low / step + 1e-9), np.ceil(high / step - 1e-9) + 1.5) * step
-        ticks = ticks[: 2 + int(np.ceil(high / step - 1e-9) - np.floor(low / step + 1e-9)) - 1]
-        if 2 <= len(ticks) <= 4:
-            return np.round(ticks, 12)
-    return np.array([low, low + span])
+        first, last = np.floor(low / step + 1e-9), np.ceil(high / step - 1e-9)
+        last = max(last, first + 1)
+        if last - first <= 3:
+            return np.round(np.arange(first, last + 1) * step, 12)
+    raise AssertionError("steps of ever larger size end the search")
 
 
 def _round_steps(least: float) -> Iterator[float]:
     start = 10.0 ** np.floor(np.log10(least) - 1)
-    for power in range(5):
-        yield from (s * start * 10.0**power for s in (1.0, 2.0, 5.0))
+    while True:
+        yield from (s * start for s in (1.0, 2.0, 5.0))
+        start *= 10.0

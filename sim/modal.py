@@ -16,11 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import median_filter
 from scipy.optimize import linear_sum_assignment
 
-from sim.poles import Complex, Fit, Lines, Real, believed, information, project, realise, refine, search, split, varied
+from sim.poles import Complex, Fit, Lines, Real, believed, information, project, realise, refine, removal, search, split, varied
 
 KINDS = {"receptance": 0, "mobility": 1, "accelerance": 2}
 FAINT = 4.0
-"""A mode is reported if its squared shape over its covariance exceeds this many times what the information criterion asks for."""
+"""A mode is reported if its squared shape, weighted by its own information, exceeds this many times what the information criterion asks for."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,8 @@ def extract(
     unit = 2 * np.pi * np.sqrt(frequency[0] * frequency[-1])
     lines = Lines(2j * np.pi * frequency / unit, frf, np.sqrt(2) / sd, KINDS[kind])
 
-    return _modes(*impose_rank_one(lines, search(lines)), unit, given, frf.shape[:2])
+    free, left = merge(lines, search(lines))
+    return _modes(*impose_rank_one(lines, free), left, unit, given, frf.shape[:2])
 
 
 def impose_rank_one(lines: Lines, free: Fit) -> tuple[Lines, Fit, bool]:
@@ -119,19 +120,41 @@ def impose_rank_one(lines: Lines, free: Fit) -> tuple[Lines, Fit, bool]:
     responses, references, n = lines.frf.shape
     first = believed(lines, free.poles)
     if not first.any():
-        return lines, project(lines, free.poles), True
+        return lines, free, True
     if min(responses, references) > 1:
         for trial in (free, None):
             trial = trial or split(lines, free)
             fit = refine(lines, start_rank_one(lines, trial), 1e-3)
             constraints = trial.unknowns - fit.unknowns
-            if (fit.chi2 - trial.chi2) / trial.scale() < constraints + 5 * np.sqrt(2 * constraints) and not doubled(lines, fit):
+            accepted = (fit.chi2 - trial.chi2) / trial.scale() < constraints + 5 * np.sqrt(2 * constraints)
+            if accepted and not same_mode(lines, fit.poles[: len(fit.shape)], fit.shape).any():
                 return lines, fit, True
     flat = Lines(lines.s, lines.frf.reshape(-1, 1, n), lines.weight.reshape(-1, 1, n), lines.power)
     free = refine(lines, free, 1e-3)
-    first = believed(lines, free.poles)
     poles = np.append(free.poles[first], free.poles[~first])
     return flat, project(flat, poles, free.residues[first], np.ones((first.sum(), 1), complex)), min(responses, references) == 1
+
+
+def merge(lines: Lines, free: Fit) -> tuple[Fit, Complex]:
+    """One pole instead of two at one place with one shape, and the poles left out.
+
+    Such pairs are a mode that was not the same in all functions: it moved between the references, or is not linear.
+    """
+    left = np.zeros(0, complex)
+    while True:
+        shape = np.linalg.svd(free.residues.reshape(-1, *lines.frf.shape[:2]))[0][:, :, 0]
+        pairs = np.argwhere(same_mode(lines, free.poles, shape) & believed(lines, free.poles))
+        if not len(pairs):
+            return free, left
+        weaker = min(pairs[0], key=lambda r: removal(free)[r])
+        left = np.append(left, free.poles[weaker])
+        free = refine(lines, project(lines, np.delete(free.poles, weaker)))
+
+
+def same_mode(lines: Lines, poles: Complex, shape: Complex) -> NDArray[np.bool_]:
+    """(m, m) which pairs of poles are closer than their half-width or a line, and have one shape (m, n_resp); upper triangle."""
+    width = np.maximum((poles.real[:, None] + poles.real) / -2, np.diff(lines.s.imag).min())
+    return np.triu((np.abs(poles[:, None] - poles) < width) & (mac(shape, shape) > 0.9), 1)
 
 
 def start_rank_one(lines: Lines, free: Fit) -> Fit:
@@ -146,14 +169,9 @@ def start_rank_one(lines: Lines, free: Fit) -> Fit:
     return project(lines, np.append(poles, free.poles[~first]), shape, participation)
 
 
-def doubled(lines: Lines, fit: Fit) -> bool:
-    """Whether two poles closer than their half-widths have one shape: a mode that moved between the references, seen twice."""
-    poles = fit.poles[: len(fit.shape)]
-    near = np.abs(poles[:, None] - poles) < -(poles.real[:, None] + poles.real) / 2
-    return bool((near & (mac(fit.shape, fit.shape) > 0.9))[np.triu_indices(len(poles), 1)].any())
-
-
-def _modes(lines: Lines, fit: Fit, rank_one: bool, unit: float, given: bool, functions: tuple[int, int]) -> Modes:
+def _modes(
+    lines: Lines, fit: Fit, rank_one: bool, left: Complex, unit: float, given: bool, functions: tuple[int, int]
+) -> Modes:
     """Physical units, standard errors, and the choice of what is reported."""
     responses, references = functions
     m, a, width = len(fit.poles), *fit.shape.shape
@@ -172,6 +190,10 @@ def _modes(lines: Lines, fit: Fit, rank_one: bool, unit: float, given: bool, fun
     both = np.r_[0:a, half : half + a]
     frequency, damping = radius * unit / (2 * np.pi), -angle.real
     spread = jacobian @ covariance[both[:, None], both] @ jacobian.T
+    for pole in left:  # a mode found at two places is known to half their distance only
+        r = np.abs(poles - pole).argmin()
+        half_way = jacobian[:, [r, a + r]] @ [(pole - poles[r]).real / 2, (pole - poles[r]).imag / 2]
+        spread += np.outer(half_way, half_way)
 
     residues = np.einsum("ri,rk->rik", fit.shape, fit.participation).reshape(a, responses, references)
     shape, shape_sd, weight = np.zeros((a, responses), complex), np.zeros((a, responses)), np.zeros(a)
@@ -189,7 +211,7 @@ def _modes(lines: Lines, fit: Fit, rank_one: bool, unit: float, given: bool, fun
         hermitian = covariance[real] + covariance[imag] + 1j * (cross - cross.T)
         shape_sd[r] = np.sqrt(np.einsum("ij,jk,ik->i", relative, hermitian, relative.conj()).real.clip(0))
         x, known = np.append(x, half + x), np.append(fit.shape[r].real, fit.shape[r].imag)
-        weight[r] = known @ np.linalg.solve(covariance[np.ix_(x, x)], known)
+        weight[r] = known @ matrix[np.ix_(x, x)] @ known / fit.scale()
 
     sd = np.sqrt(np.diag(spread))
     cost = 2 * (fit.shape.shape[1] + fit.participation.shape[1]) * np.log(lines.count)
@@ -200,6 +222,7 @@ def _modes(lines: Lines, fit: Fit, rank_one: bool, unit: float, given: bool, fun
     words = ["noise as given" if given else "noise estimated from neighbouring lines"]
     words += [f"chi-square {chi2:.3g} per degree of freedom" + (", errors enlarged by its root" if chi2 > 1 else "")]
     words += [] if rank_one else ["residues of rank one refused by the data, left free"]
+    words += [f"{len(left)} modes seen at two places nearby, errors enlarged to half the distance"] if len(left) else []
     words += [f"{np.sum(~sure)} faint or uncertain poles not reported"] if not sure.all() else []
     edges = lines.s.imag[[0, -1]] * unit / (2 * np.pi)
     return Modes(

@@ -1,0 +1,137 @@
+"""Reads a Rerun log back: what is in it, and its FRFs as numbers, bit for bit as computed."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from rerun.chunk import RrdReader
+
+from model.scene import BadInput
+from sim.frf import Frf
+from sim.log_content import Peak
+
+APPLICATION = "thermospindle"
+Columns = dict[str, list[pa.Array]]  # of one entity: chunks of lists by component
+
+
+@dataclass(frozen=True)
+class LogContents:
+    """What a log holds. `entities`: number of rows by path; `temperatures` in C, of the tests in their order."""
+
+    path: Path
+    application: str
+    recording: str
+    blueprint: bool
+    scene: str
+    title: str
+    entities: Mapping[str, int]
+    timelines: tuple[str, ...]
+    temperatures: tuple[float, ...]
+    peaks: tuple[Peak, ...]
+    frfs: Mapping[str, Frf]  # by test
+
+
+def read_log(path: Path) -> LogContents:
+    """What is in a log. Raises `BadInput`, one sentence that names the file, for anything but a whole log of ours."""
+    path = Path(path)
+    if not path.is_file():
+        raise BadInput(f"{path}: no such file")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of a file cut short; the error below says so
+            reader = RrdReader(path)
+            recordings, blueprints = reader.recordings(), reader.blueprints()
+            ours = [r for r in recordings if r.application_id == APPLICATION]
+            if recordings and not ours:
+                raise BadInput(f"{path}: is a recording of {recordings[0].application_id!r}, not of {APPLICATION!r}")
+            batches = [(c.entity_path, c.timeline_names, c.to_record_batch()) for c in reader.stream(store=ours[0])] if ours else []
+    except (RuntimeError, ValueError, OSError) as error:
+        if isinstance(error, BadInput):
+            raise
+        raise BadInput(f"{path}: not a Rerun log that can be read: {error}") from None
+    columns: dict[str, Columns] = {}
+    rows: dict[str, int] = {}
+    for entity, timelines, batch in batches:
+        rows[entity] = rows.get(entity, 0) + batch.num_rows
+        for name, column in zip(batch.schema.names, batch.columns, strict=True):
+            if name not in timelines:
+                columns.setdefault(entity, {}).setdefault(name, []).append(column)
+    try:
+        about = columns["/__properties/run"]
+        peaks = columns["/numbers/peaks"]
+        tests = {e.removesuffix("/about"): own for e, own in columns.items() if e.startswith("/numbers/") and e.endswith("/about")}
+        order = sorted(tests, key=lambda e: int(_values(tests[e], "order")[0]))
+        return LogContents(
+            path=path,
+            application=ours[0].application_id,
+            recording=ours[0].recording_id,
+            blueprint=bool(blueprints),
+            scene=_values(about, "scene")[0],
+            title=_values(about, "title")[0],
+            entities=dict(sorted(rows.items())),
+            timelines=tuple(sorted({t for _, timelines, _ in batches for t in timelines})),
+            temperatures=tuple(_values(tests[e], "temperature_C")[0] for e in order),
+            peaks=tuple(Peak(*row) for row in zip(*(_values(peaks, name) for name in Peak.__dataclass_fields__), strict=True)),
+            frfs={_values(tests[e], "id")[0]: _frf(columns[e], tests[e]) for e in order},
+        )
+    except (KeyError, IndexError) as error:
+        raise BadInput(f"{path}: is not a whole log of {APPLICATION}: {error} is missing") from None
+
+
+def _flat(columns: Columns, name: str) -> Any:
+    """All values (n,) of a component, in the order in which they were written."""
+    return pa.concat_arrays([column.flatten() for column in columns[name]])
+
+
+def _values(columns: Columns, name: str) -> list[Any]:
+    return _flat(columns, name).to_pylist()
+
+
+def _frf(columns: Columns, about: Columns) -> Frf:
+    """The FRFs of one test: every row holds one line of all (response, reference) pairs."""
+    responses, references = (tuple(_values(about, f"{role}_nodes")) for role in ("response", "reference"))
+    frequency = _flat(columns, "frequency_Hz").to_numpy()
+
+    def array(name: str) -> np.ndarray | None:
+        if name not in columns:
+            return None
+        lines = _flat(columns, name).to_numpy().reshape(len(frequency), len(responses), len(references))
+        return np.ascontiguousarray(np.moveaxis(lines, 0, 2))
+
+    value = np.empty((len(responses), len(references), len(frequency)), complex)
+    value.real, value.imag = array("real"), array("imaginary")
+    return Frf(frequency, value, responses, references, _values(about, "quantity")[0], array("coherence"), array("standard_error"))
+
+
+def describe(contents: LogContents) -> str:
+    """What a log holds, for the terminal."""
+    lines = [
+        f"{contents.path}: {contents.title}",
+        f"  scene {contents.scene}, recording {contents.recording}, {'with' if contents.blueprint else 'without'} a blueprint",
+        f"  temperatures: {', '.join(f'{t:g}' for t in contents.temperatures)} C",
+        f"  timelines: {', '.join(contents.timelines)}",
+    ]
+    groups: dict[str, list[int]] = {}
+    for entity, rows in contents.entities.items():
+        groups.setdefault(entity.split("/")[1], []).append(rows)
+    lines += [f"  {name}: {len(rows)} entities, {sum(rows)} rows" for name, rows in groups.items() if name != "__properties"]
+    for test, frf in contents.frfs.items():
+        step = frf.frequency[1] - frf.frequency[0]
+        lines.append(
+            f"  FRFs of {test}: {frf.quantity}, responses {_nodes(frf.response_nodes)}, references {_nodes(frf.reference_nodes)}, "
+            f"{len(frf.frequency)} lines from {frf.frequency[0]:g} to {frf.frequency[-1]:g} Hz every {step:.4g} Hz"
+        )
+    for source, test in dict.fromkeys((p.source, p.test) for p in contents.peaks):
+        own = [p.frequency for p in contents.peaks if (p.source, p.test) == (source, test)]
+        lines.append(f"  peaks {source}, {test}: {', '.join(f'{f:.1f}' for f in own)} Hz")
+    return "\n".join(lines)
+
+
+def _nodes(nodes: tuple[int, ...]) -> str:
+    return " ".join(map(str, nodes))

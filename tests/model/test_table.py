@@ -1,0 +1,68 @@
+"""The stiffness table: its CSV reads back, and it answers inside its grid only."""
+
+import numpy as np
+import pytest
+
+from model.machine import OutsideRange
+from model.scene import BadInput
+from model.table import COLUMNS, read_table, write_table
+from sim.operating import stiffness_table
+
+
+@pytest.fixture(scope="module")
+def table(spindle):
+    return stiffness_table(spindle, [60.0, 20.0, 40.0, 30.0, 50.0], [0.0, 754.0])
+
+
+def test_reads_back_what_was_written(table, tmp_path):
+    write_table(table, tmp_path / "table.csv")
+    again = read_table(tmp_path / "table.csv")
+    assert np.array_equal(again.temperature, [20, 30, 40, 50, 60])
+    assert again.speed == pytest.approx(table.speed, rel=1e-12)
+    assert again.provenance == table.provenance
+    assert {"scene_hash", "mujoco", "thermospindle"} <= set(again.provenance)
+    for name, columns in table.values.items():
+        for column in COLUMNS:
+            assert np.array_equal(again.values[name][column], columns[column])
+    header = (tmp_path / "table.csv").read_text().splitlines()[2].split(",")
+    assert header[:4] == ["bearing", "temperature_C", "speed_rpm", "contact_angle_deg"]
+
+
+def test_answers_between_grid_points(table, spindle):
+    exact = stiffness_table(spindle, [45.0])
+    for column in ("preload_N", "radial_stiffness_N_per_m", "contact_angle_deg"):
+        assert table.at("upper", column, 45.0) == pytest.approx(exact.at("upper", column, 45.0), rel=1e-3)
+        assert table.at("upper", column, 40.0) == pytest.approx(table.values["upper"][column][2, 0], rel=1e-12)
+
+
+@pytest.mark.parametrize(("temperature", "speed", "said"), [(61.0, 0.0, "20 to 60 C"), (19.0, 0.0, "19 C"), (40.0, 800.0, "rpm")])
+def test_nothing_outside_the_grid(table, temperature, speed, said):
+    with pytest.raises(OutsideRange, match=said):
+        table.at("lower", "preload_N", temperature, speed)
+
+
+def test_says_where_a_bearing_unloads(spindle):
+    """Preload falls to nothing between 120 and 180 C; the state just below still carries, the one above does not."""
+    table = stiffness_table(spindle, [100.0, 140.0, 180.0])
+    where = table.unloads["upper"]
+    assert 100 < where < 180
+    below, above = (stiffness_table(spindle, [t]).values["upper"]["contact_force_N"][0, 0] for t in (where - 0.01, where + 0.01))
+    assert below > 0
+    assert above == 0
+
+
+@pytest.mark.parametrize("text", ["", "a,b\n1,2\n", "# provenance: {}\n# unloads_C: {}\nbearing,temperature_C\nupper,x\n"])
+def test_other_files_are_refused(tmp_path, text):
+    path = tmp_path / "table.csv"
+    path.write_text(text)
+    with pytest.raises(BadInput, match="not a stiffness table"):
+        read_table(path)
+
+
+def test_gaps_are_refused(table, tmp_path):
+    path = tmp_path / "table.csv"
+    write_table(table, path)
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(lines[:5] + lines[6:]))
+    with pytest.raises(BadInput, match="gaps"):
+        read_table(path)
