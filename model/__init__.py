@@ -11,7 +11,10 @@ ball_row       one ball row under any load: forces, contact loss, exact 5x5 tang
 pair           axial equilibrium of the two rows against the thermal motion of their rings
 table          bearing stiffness over temperature and speed, as CSV
 rotor_base     the rotor-base chain as bodies and compliant elements; M, C, G, K
+ball_springs   balls as springs between points: what the ball-by-ball bearing element is made of
+look           cut-away meshes of the section, colours, and the visual part of the MuJoCo model
 mjcf           the same chain as a MuJoCo model: linear or ball-by-ball bearings, hammers, vibrometers
+tolerance      the toleranced build parameters of a spindle
 modes          modes and exact FRFs of M, C, K
 =============  ===================================================================================================
 

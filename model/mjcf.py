@@ -18,6 +18,7 @@ import numpy as np
 
 from model.ball_row import Array
 from model.ball_springs import ball_springs, tangent
+from model.look import dress
 from model.machine import Spindle
 from model.pair import BearingState, PairState
 from model.rotor_base import Element, Matrices, RotorBase, element_rows, point_row, rotor_base
@@ -27,8 +28,11 @@ AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1), "tilt_x": (1, 0, 0), "ti
 CARRIER_SHARE = 1e-9  # of the turning body's inertia, left on the carrier because MuJoCo wants every moving body to have some
 
 
-def spec(spindle: Spindle, state: PairState, element: str = "linear") -> mujoco.MjSpec:
-    """The MuJoCo specification of a spindle at one operating point, with keyframe "loaded" (turning at its speed)."""
+def spec(spindle: Spindle, state: PairState, element: str = "linear", looks: bool = False) -> mujoco.MjSpec:
+    """The MuJoCo specification of a spindle at one operating point, with keyframe "loaded" (turning at its speed).
+
+    `looks` adds what a person wants to see (`model.look`) and changes nothing that moves.
+    """
     if element not in ELEMENTS:
         raise ValueError(f"bearing element {element!r} is unknown; allowed are {', '.join(ELEMENTS)}")
     chain = rotor_base(spindle, state)
@@ -39,6 +43,8 @@ def spec(spindle: Spindle, state: PairState, element: str = "linear") -> mujoco.
         if e.name in balls:
             _add_balls(out, chain, balls[e.name], e)
     _add_points(out, spindle, chain)
+    if looks:
+        dress(out, spindle, state)
     return out
 
 

@@ -83,7 +83,7 @@ class Log:
 
     def write(self) -> None:
         self.recording.send_recording_name(f"{self.spindle.name}, {min(self.temperatures):g} to {max(self.temperatures):g} C")
-        self.recording.send_property("run", rr.AnyValues(scene=self.spindle.name, title=self.spindle.title, **provenance(self.spindle)))
+        self.recording.send_property("run", rr.AnyValues(title=self.spindle.title, **provenance(self.spindle)))
         self.numbers()
         self.frfs()
         self.peak_marks()

@@ -106,8 +106,8 @@ def extract(
     unit = 2 * np.pi * np.sqrt(frequency[0] * frequency[-1])
     lines = Lines(2j * np.pi * frequency / unit, frf, np.sqrt(2) / sd, KINDS[kind])
 
-    free, left = merge(lines, search(lines))
-    return _modes(*impose_rank_one(lines, free), left, unit, given, frf.shape[:2])
+    free, twice = merge(lines, search(lines))
+    return _modes(*impose_rank_one(lines, free), twice, unit, given, frf.shape[:2])
 
 
 def impose_rank_one(lines: Lines, free: Fit) -> tuple[Lines, Fit, bool]:
@@ -127,7 +127,7 @@ def impose_rank_one(lines: Lines, free: Fit) -> tuple[Lines, Fit, bool]:
             fit = refine(lines, start_rank_one(lines, trial), 1e-3)
             constraints = trial.unknowns - fit.unknowns
             accepted = (fit.chi2 - trial.chi2) / trial.scale() < constraints + 5 * np.sqrt(2 * constraints)
-            if accepted and not same_mode(lines, fit.poles[: len(fit.shape)], fit.shape).any():
+            if accepted and not same_mode(lines, fit.poles[: len(fit.shape)], fit.shape, 0.95).any():
                 return lines, fit, True
     flat = Lines(lines.s, lines.frf.reshape(-1, 1, n), lines.weight.reshape(-1, 1, n), lines.power)
     free = refine(lines, free, 1e-3)
@@ -135,26 +135,28 @@ def impose_rank_one(lines: Lines, free: Fit) -> tuple[Lines, Fit, bool]:
     return flat, project(flat, poles, free.residues[first], np.ones((first.sum(), 1), complex)), min(responses, references) == 1
 
 
-def merge(lines: Lines, free: Fit) -> tuple[Fit, Complex]:
-    """One pole instead of two at one place with one shape, and the poles left out.
+def merge(lines: Lines, free: Fit) -> tuple[Fit, list[tuple[complex, complex]]]:
+    """One pole instead of two at one place with one shape; and for each such pair the pole kept and how far its place is spread.
 
-    Such pairs are a mode that was not the same in all functions: it moved between the references, or is not linear.
+    Such a pair is one mode that was not the same in all functions: it moved between the references, or is not linear. The spread is
+    the standard deviation of two places that have the weights of their residues.
     """
-    left = np.zeros(0, complex)
+    spread = []
     while True:
         shape = np.linalg.svd(free.residues.reshape(-1, *lines.frf.shape[:2]))[0][:, :, 0]
-        pairs = np.argwhere(same_mode(lines, free.poles, shape) & believed(lines, free.poles))
+        pairs = np.argwhere(same_mode(lines, free.poles, shape, 0.8) & believed(lines, free.poles))
         if not len(pairs):
-            return free, left
-        weaker = min(pairs[0], key=lambda r: removal(free)[r])
-        left = np.append(left, free.poles[weaker])
+            return free, spread
+        weaker, kept = sorted(pairs[0], key=lambda r: removal(free)[r])
+        size = np.linalg.norm(free.residues[[weaker, kept]], axis=1) / np.linalg.norm(free.residues[[weaker, kept]], axis=1).sum()
+        spread.append((free.poles[kept], (free.poles[weaker] - free.poles[kept]) * np.sqrt(size.prod())))
         free = refine(lines, project(lines, np.delete(free.poles, weaker)))
 
 
-def same_mode(lines: Lines, poles: Complex, shape: Complex) -> NDArray[np.bool_]:
-    """(m, m) which pairs of poles are closer than their half-width or a line, and have one shape (m, n_resp); upper triangle."""
+def same_mode(lines: Lines, poles: Complex, shape: Complex, alike: float) -> NDArray[np.bool_]:
+    """(m, m) which pairs of poles are closer than their half-width or a line, and whose shapes (m, n_resp) are `alike` by MAC; upper triangle."""
     width = np.maximum((poles.real[:, None] + poles.real) / -2, np.diff(lines.s.imag).min())
-    return np.triu((np.abs(poles[:, None] - poles) < width) & (mac(shape, shape) > 0.9), 1)
+    return np.triu((np.abs(poles[:, None] - poles) < width) & (mac(shape, shape) > alike), 1)
 
 
 def start_rank_one(lines: Lines, free: Fit) -> Fit:
@@ -170,7 +172,13 @@ def start_rank_one(lines: Lines, free: Fit) -> Fit:
 
 
 def _modes(
-    lines: Lines, fit: Fit, rank_one: bool, left: Complex, unit: float, given: bool, functions: tuple[int, int]
+    lines: Lines,
+    fit: Fit,
+    rank_one: bool,
+    twice: list[tuple[complex, complex]],
+    unit: float,
+    given: bool,
+    functions: tuple[int, int],
 ) -> Modes:
     """Physical units, standard errors, and the choice of what is reported."""
     responses, references = functions
@@ -190,10 +198,6 @@ def _modes(
     both = np.r_[0:a, half : half + a]
     frequency, damping = radius * unit / (2 * np.pi), -angle.real
     spread = jacobian @ covariance[both[:, None], both] @ jacobian.T
-    for pole in left:  # a mode found at two places is known to half their distance only
-        r = np.abs(poles - pole).argmin()
-        half_way = jacobian[:, [r, a + r]] @ [(pole - poles[r]).real / 2, (pole - poles[r]).imag / 2]
-        spread += np.outer(half_way, half_way)
 
     residues = np.einsum("ri,rk->rik", fit.shape, fit.participation).reshape(a, responses, references)
     shape, shape_sd, weight = np.zeros((a, responses), complex), np.zeros((a, responses)), np.zeros(a)
@@ -216,19 +220,24 @@ def _modes(
     sd = np.sqrt(np.diag(spread))
     cost = 2 * (fit.shape.shape[1] + fit.participation.shape[1]) * np.log(lines.count)
     sure = (sd[:a] < damping * frequency) & (sd[a:] < damping / 2) & (weight > FAINT * cost)
+    for pole, offset in twice:
+        near = np.flatnonzero(np.abs(poles - pole) < -pole.real)
+        if len(near) == 1:  # else the two turned out to be modes of different shape
+            way = jacobian[:, [near[0], a + near[0]]] @ [offset.real, offset.imag]
+            spread += np.outer(way, way)
     keep = np.flatnonzero(sure)[np.argsort(frequency[sure])]
-    twice = np.append(keep, a + keep)
+    kept = np.append(keep, a + keep)
     chi2 = fit.chi2 / (lines.count - fit.unknowns)
     words = ["noise as given" if given else "noise estimated from neighbouring lines"]
     words += [f"chi-square {chi2:.3g} per degree of freedom" + (", errors enlarged by its root" if chi2 > 1 else "")]
     words += [] if rank_one else ["residues of rank one refused by the data, left free"]
-    words += [f"{len(left)} modes seen at two places nearby, errors enlarged to half the distance"] if len(left) else []
+    words += [f"{len(twice)} pairs of poles with one shape merged, errors enlarged by their distance"] if twice else []
     words += [f"{np.sum(~sure)} faint or uncertain poles not reported"] if not sure.all() else []
     edges = lines.s.imag[[0, -1]] * unit / (2 * np.pi)
     return Modes(
         frequency[keep],
         damping[keep],
-        spread[twice[:, None], twice],
+        spread[kept[:, None], kept],
         shape[keep],
         shape_sd[keep],
         residues[keep] * unit ** (1 - lines.power),

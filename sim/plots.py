@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap, to_hex
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -259,7 +258,7 @@ def section(key: str, point: OperatingPoint) -> tuple[str, float]:
             *where.T, d.triangles, size, shading="gouraud", cmap="YlOrBr", vmin=0, vmax=max(largest * 1e6, 1e-6), rasterized=True
         )
         for position, look in ((d.nodes * 1e3, {"lw": 0.6, "alpha": 0.55}), (where, {"lw": 1.0, "alpha": 1.0})):
-            right.add_collection(LineCollection([_polyline(d, position)], colors=INK, **look))
+            right.plot(*_polyline(d, position).T, color=INK, **look)
     right.set_title(f"At {point.condition.temperature:g} °C, displacement × {scale:g}")
     bar = figure.colorbar(picture, ax=right, shrink=0.75, pad=0.02)
     bar.set_label("displacement, µm")

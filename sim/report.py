@@ -1,0 +1,525 @@
+"""The report of a run: one HTML file that needs no network, with Figs. 8 to 12 and Table 2 of the paper and whatever was measured.
+
+It is a list of sections, (title, HTML); other modules add theirs through `extra_sections`. Numbers are prepared here, drawn in
+`sim.plots` and set in `report.html.j2`. No date is written: the same run gives the same file.
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+import re
+import tempfile
+import tomllib
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+
+from model.machine import Spindle
+from model.modes import frf, group_energy, point_rows
+from model.scene import BadInput, content_hash, load
+from sim import plots
+from sim.campaign import ModeRow, Test
+from sim.operating import provenance
+from sim.plots import Curve, Peaks
+from sim.run import HIGHEST_MODE, Run, Step
+from sim.shift import follow, match
+from thermal.expansion import influence
+from thermal.temperature import region_temperatures
+
+Section = tuple[str, str]
+"""Title and HTML of one section."""
+
+RPM = 2 * np.pi / 60
+SAME_TEMPERATURE = 0.5  # K within which a measurement counts as taken at a temperature of the run
+CERTAIN = 2.0  # standard errors beyond which a difference is called one
+CLOSE = 0.05  # relative distance of neighbours whose splitting is compared
+PUBLISHED_COLUMNS = ("mode", "kind", "main_flexibility", "frequency_20C_Hz, frequency_60C_Hz, ...")
+
+
+def write_report(run: Run, path: Path, extra_sections: Sequence[Section] = ()) -> None:
+    """Write the report to `path`, whole or not at all."""
+    path = Path(path)
+    handle, partial = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(html(run, extra_sections))
+        os.chmod(partial, 0o644)
+        os.replace(partial, path)
+    except BaseException:
+        os.unlink(partial)
+        raise
+
+
+def html(run: Run, extra_sections: Sequence[Section] = ()) -> str:
+    """The report as text; `extra_sections` stand between the results and the account of where they come from."""
+    run = replace(run, steps=tuple(sorted(run.steps, key=_temperature)))
+    every = [*results(run), *extra_sections, *background(run)]
+    return str(_page().page(run.spindle, _conditions(run), [(title, Markup(body)) for title, body in every]))  # type: ignore[attr-defined]
+
+
+def results(run: Run) -> list[Section]:
+    """What the model says, beside what was measured and published."""
+    page, table = _page(), compared(run)
+    cold, hot = table.temperatures
+    steps = [s for s in run.steps if _temperature(s) in (cold, hot)]
+    picture = plots.comparison("modes", table.labels(), table.peaks, cold, hot) if cold != hot else ""
+    fig8 = plots.responses("frf", driving_points(run, steps), table.peaks, run.spindle.hammer.band)
+    hottest = max(run.steps, key=lambda s: abs(_temperature(s) - run.spindle.reference_temperature)).point
+    drawing, scale = plots.section("section", hottest)
+    return [
+        ("In short", page.short(headlines(run, table), misses(table), table)),  # type: ignore[attr-defined]
+        ("Natural frequencies", page.frequencies(table, Markup(picture), table.sources())),  # type: ignore[attr-defined]
+        ("Frequency response", page.responses(Markup(fig8), run, steps, table)),  # type: ignore[attr-defined]
+        ("Bearings over temperature", page.bearings(bearing_figures(run), run)),  # type: ignore[attr-defined]
+        ("Thermal deformation", page.deformation(Markup(drawing), scale, hottest)),  # type: ignore[attr-defined]
+        ("All modes", page.modes([(s, match_back(s), in_band(s)) for s in run.steps], group_energy)),  # type: ignore[attr-defined]
+    ]
+
+
+def background(run: Run) -> list[Section]:
+    """How the results were made, and from which numbers."""
+    page, spindle, last = _page(), run.spindle, run.steps[-1].point
+    mesh = influence(spindle, temperatures=region_temperatures(spindle, last.condition.temperature))
+    origins = Counter(p.origin for p in spindle.provenance.values())
+    values, unchanged = values_of_file(spindle)
+    return [
+        ("The virtual test", page.acquisition(run.steps[0].test)),  # type: ignore[attr-defined]
+        ("Finite element meshes", page.meshes(mesh, last.condition.temperature)),  # type: ignore[attr-defined]
+        ("Where the numbers come from", page.origins(spindle, origins, values, unchanged)),  # type: ignore[attr-defined]
+        ("Versions", page.versions(provenance(spindle))),  # type: ignore[attr-defined]
+    ]
+
+
+# ---------------------------------------------------------------- which mode is which
+
+
+def measured_rows(run: Run) -> dict[str, dict[int, ModeRow]]:
+    """Which measured mode is which computed one: by test id, the measured row by index of the computed mode at the first step.
+
+    Measured modes come without shapes. So the k-th measured mode of a kind, in order of frequency, is taken for the k-th computed
+    mode of this kind at the temperature of the run nearest to the test's; from there the computed mode is followed by its shape.
+    A mode that the measurement missed would therefore shift the later ones of its kind by one place. Measured modes beyond
+    the computed ones of their kind, and tests at another speed, are left out.
+    """
+    back = [{mode: first for first, mode in enumerate(row)} for row in followed(run)]
+    found: dict[str, dict[int, ModeRow]] = {}
+    for test in (t for campaign in run.measured for t in campaign.tests):
+        if not test.modes or not _same_speed(test, run):
+            continue
+        nearest = min(range(len(run.steps)), key=lambda k: abs(_temperature(run.steps[k]) - test.temperature))
+        kinds = [m.kind for m in run.steps[nearest].point.modes]
+        pairs = by_kind([(r.kind, r.frequency) for r in test.modes], kinds)
+        found[test.id] = {back[nearest][c]: test.modes[m] for m, c in pairs.items() if c in back[nearest]}
+    return found
+
+
+def by_kind(known: Sequence[tuple[str, float]], kinds: Sequence[str]) -> dict[int, int]:
+    """Index among computed modes, whose `kinds` stand in order of frequency, for the index of each `known` (kind, frequency):
+    the k-th of a kind is the k-th of this kind."""
+    pairs = {}
+    for kind in dict.fromkeys(k for k, _ in known):
+        own = sorted((i for i, (k, _) in enumerate(known) if k == kind), key=lambda i: known[i][1])
+        pairs |= dict(zip(own, (i for i, k in enumerate(kinds) if k == kind), strict=False))
+    return dict(sorted(pairs.items()))
+
+
+def followed(run: Run) -> list[list[int]]:
+    """Index at every step of each mode of the first step, followed by shape from step to step; -1 where it was lost."""
+    rows = [list(range(len(run.steps[0].point.modes)))]
+    for a, b in pairwise(s.point for s in run.steps):
+        partner = follow(a.linear.mass, a.modes, b.modes)
+        rows.append([-1 if i < 0 else partner[i] for i in rows[-1]])
+    return rows
+
+
+def in_band(step: Step) -> list[int]:
+    """Indices of the modes below the upper end of the scene's frequency band."""
+    highest = step.point.spindle.hammer.band[1] or HIGHEST_MODE
+    return [i for i, m in enumerate(step.point.modes) if m.frequency <= highest]
+
+
+def match_back(step: Step) -> dict[int, int]:
+    """Index of the identified mode by index of the computed one."""
+    index = {id(m): i for i, m in enumerate(step.point.modes)}
+    return {index[id(mode)]: i for i, mode in match(step).items()}
+
+
+# ---------------------------------------------------------------- published frequencies
+
+
+@dataclass(frozen=True)
+class Published:
+    """Somebody else's natural frequencies, from `published/<name>.csv` beside the scene.
+
+    `frequency`: Hz by temperature (C), for every mode; `flexibility` is what the source names as its main flexibility, or empty.
+    """
+
+    title: str
+    source: str
+    kinds: tuple[str, ...]
+    flexibility: tuple[str, ...]
+    frequency: Mapping[float, tuple[float, ...]]
+
+
+def published(spindle: Spindle) -> tuple[Published, ...]:
+    """Every published table beside the scene file, by name."""
+    folder = spindle.file.parent / "published" if spindle.file else Path("does not exist")
+    return tuple(read_published(path) for path in sorted(folder.glob("*.csv")))
+
+
+def read_published(path: Path) -> Published:
+    """A table of published natural frequencies: comment lines (#) with title and source, then CSV.
+
+    Columns: mode, kind, main_flexibility (may be left out) and a frequency_<T>C_Hz for every temperature. Raises `BadInput`.
+    """
+    text = path.read_text(encoding="utf-8").splitlines()
+    comments = [line.lstrip("# ") for line in text if line.startswith("#")]
+    reader = csv.DictReader(line for line in text if line and not line.startswith("#"))
+    columns = {name: re.fullmatch(r"frequency_(-?[\d.]+)C_Hz", name) for name in reader.fieldnames or ()}
+    temperatures = {name: float(m.group(1)) for name, m in columns.items() if m}
+    unknown = [n for n in columns if n not in (*temperatures, "mode", "kind", "main_flexibility")]
+    if unknown or not temperatures or "kind" not in columns:
+        raise BadInput(f"{path}: columns {list(columns)}; expected are {', '.join(PUBLISHED_COLUMNS)}")
+    rows = list(reader)
+    try:
+        frequency = {t: tuple(float(row[name]) for row in rows) for name, t in temperatures.items()}
+    except (TypeError, ValueError) as error:
+        raise BadInput(f"{path}: a frequency is no number: {error}") from None
+    kinds, flexibility = (tuple(row.get(key) or "" for row in rows) for key in ("kind", "main_flexibility"))
+    return Published(comments[0] if comments else path.stem, " ".join(comments[1:]), kinds, flexibility, frequency)
+
+
+# ---------------------------------------------------------------- Table 2
+
+
+@dataclass(frozen=True)
+class Row:
+    """One computed mode in the table of frequencies; `number` counts from 1 in order of frequency at the coldest temperature."""
+
+    number: int
+    kind: str
+    flexibility: str  # group with the largest share of the strain energy
+    share: float
+    bearing_share: float
+    published_flexibility: str
+
+
+@dataclass(frozen=True)
+class Table:
+    """Natural frequencies of every source, at the two temperatures that are compared."""
+
+    rows: tuple[Row, ...]
+    peaks: tuple[Peaks, ...]
+    temperatures: tuple[float, float]  # C, equal for a run at one temperature only
+    titles: Mapping[str, str]  # of the sources, by label
+    elsewhere: tuple[str, ...]  # sources without a frequency at these temperatures, in words
+
+    def sources(self) -> dict[str, str]:
+        """Kind of every source by its label, in the order of the columns."""
+        return {p.label: p.source for p in self.peaks}
+
+    def of(self, source: str, temperature: float) -> Peaks | None:
+        """The first source of a kind at a temperature."""
+        return next((p for p in self.peaks if p.source == source and p.temperature == temperature), None)
+
+    def at(self, label: str, temperature: float, number: int) -> tuple[float, float | None] | None:
+        """Frequency and standard error (Hz)."""
+        values = [p.value for p in self.peaks if p.label == label and p.temperature == temperature]
+        return values[0].get(number) if values else None
+
+    def shift(self, label: str, number: int) -> tuple[float, float | None] | None:
+        """Shift and its standard error (Hz) from the first to the second temperature; errors of the two are independent."""
+        cold, hot = (self.at(label, t, number) for t in self.temperatures)
+        if cold is None or hot is None or self.temperatures[0] == self.temperatures[1]:
+            return None
+        known = cold[1] is not None and hot[1] is not None
+        return hot[0] - cold[0], float(np.hypot(cold[1], hot[1])) if known else None  # type: ignore[arg-type]
+
+    def labels(self) -> dict[int, str]:
+        """What the picture calls the modes: those that were measured or published, or all."""
+        known = {n for p in self.peaks if p.source in ("measured", "published") for n in p.value}
+        return {r.number: f"{r.number}  {r.kind}" for r in self.rows if r.number in known or not known}
+
+
+def compared(run: Run) -> Table:
+    """Measured, published, computed and identified frequencies side by side."""
+    track = followed(run)
+    numbers = {i: i + 1 for i in in_band(run.steps[0])}
+    own = [_temperature(s) for s in run.steps]
+    raw: list[Peaks] = []
+    titles: dict[str, str] = {}
+    rows = measured_rows(run)
+    several = sum(any(t.modes for t in c.tests) for c in run.measured) > 1
+    for campaign in run.measured:
+        label = f"measured, {campaign.folder.name if campaign.folder else campaign.title}" if several else "measured"
+        for temperature in dict.fromkeys(t.temperature for t in campaign.tests if t.id in rows and t.modes):
+            repeats = [rows[t.id] for t in campaign.tests if t.temperature == temperature and t.id in rows]
+            titles[label] = campaign.title
+            raw.append(Peaks("measured", label, temperature, _averaged(repeats, numbers)))
+    papers = published(run.spindle)
+    flexibility: dict[int, str] = {}
+    for paper in papers:
+        label = "published" if len(papers) == 1 else f"published, {paper.title}"
+        titles[label] = f"{paper.title}. {paper.source}"
+        for temperature, frequency in paper.frequency.items():
+            nearest = min(range(len(own)), key=lambda k: abs(own[k] - temperature))
+            back = {mode: first for first, mode in enumerate(track[nearest])}
+            pairs = by_kind(list(zip(paper.kinds, frequency, strict=True)), [m.kind for m in run.steps[nearest].point.modes])
+            mine = {numbers[back[c]]: p for p, c in pairs.items() if back.get(c) in numbers}
+            flexibility = {n: paper.flexibility[p] for n, p in mine.items()} | flexibility
+            raw.append(Peaks("published", label, temperature, {n: (frequency[p], None) for n, p in mine.items()}))
+    known = [p for p in raw if any(abs(p.temperature - t) <= SAME_TEMPERATURE for t in own)]
+    common = [t for t in own if any(abs(p.temperature - t) <= SAME_TEMPERATURE for p in known)]
+    ends = common if len(set(common)) > 1 else own
+    cold, hot = min(ends), max(ends)
+    peaks = [replace(p, temperature=t) for t in dict.fromkeys((cold, hot)) for p in known if abs(p.temperature - t) <= SAME_TEMPERATURE]
+    peaks.sort(key=lambda p: list(titles).index(p.label))
+    chosen = {t: own.index(t) for t in dict.fromkeys((cold, hot))}
+    for t, k in chosen.items():
+        modes = run.steps[k].point.modes
+        peaks.append(Peaks("computed", "computed", t, {n: (modes[track[k][i]].frequency, None) for i, n in numbers.items() if track[k][i] >= 0}))
+    for t, k in chosen.items():
+        seen, back_to, sd = run.steps[k].identified, match_back(run.steps[k]), run.steps[k].identified.frequency_sd
+        pairs = {n: back_to[track[k][i]] for i, n in numbers.items() if track[k][i] in back_to}
+        peaks.append(Peaks("identified", "identified", t, {n: (float(seen.frequency[j]), float(sd[j])) for n, j in pairs.items()}))
+    shown = {p.label for p in peaks}
+    elsewhere = [f"{label} at {', '.join(f'{p.temperature:g}' for p in raw if p.label == label)} °C" for label in titles if label not in shown]
+    lines = tuple(_row(run.steps[0], i, n, flexibility.get(n, "")) for i, n in numbers.items())
+    return Table(lines, tuple(peaks), (cold, hot), titles, tuple(elsewhere))
+
+
+def _row(step: Step, index: int, number: int, flexibility: str) -> Row:
+    mode = step.point.modes[index]
+    shares = group_energy(step.point.chain, mode)
+    largest = max(shares, key=lambda name: shares[name])
+    return Row(number, mode.kind, largest, shares[largest], shares.get("bearings", 0.0), flexibility)
+
+
+def _averaged(repeats: Sequence[Mapping[int, ModeRow]], numbers: Mapping[int, int]) -> dict[int, tuple[float, float | None]]:
+    """Mean frequency and its standard error over repeated tests, by mode number."""
+    answer: dict[int, tuple[float, float | None]] = {}
+    for index, number in numbers.items():
+        rows = [r[index] for r in repeats if index in r]
+        if rows:
+            error = float(np.sqrt(sum(r.frequency_sd**2 for r in rows)) / len(rows))
+            answer[number] = (float(np.mean([r.frequency for r in rows])), error)
+    return answer
+
+
+# ---------------------------------------------------------------- what a reader should see at once
+
+
+def headlines(run: Run, table: Table) -> list[tuple[str, str, str]]:
+    """(what, number, explanation): preload, bearing stiffness, and how far the modes of each kind of flexibility move."""
+    cold, hot = table.temperatures
+    if cold == hot:
+        b = run.steps[0].point.state.bearings
+        return [("Preload", f"{b[0].preload:.1f} N", f"at {cold:g} °C")]
+    first, last = (next(s.point.state for s in run.steps if _temperature(s) == t) for t in (cold, hot))
+    a, b = first.bearings[0], last.bearings[0]
+    cards = [("Preload", f"{a.preload:.1f} → {b.preload:.1f} N", f"{b.preload / a.preload:.0%} of it is left at {hot:g} °C")]
+    change = [(b.radial_stiffness / a.radial_stiffness - 1, b.axial_stiffness / a.axial_stiffness - 1, b.name) for a, b in zip(first.bearings, last.bearings, strict=True)]
+    cards.append(("Bearing stiffness, radial", " / ".join(f"{100 * c[0]:+.0f}" for c in change) + " %", "axial " + " / ".join(f"{100 * c[1]:+.0f}" for c in change) + " %, " + " / ".join(c[2] for c in change)))
+    groups: dict[str, list[Row]] = {}
+    for row in table.rows:
+        groups.setdefault(row.published_flexibility or row.flexibility + " ", []).append(row)
+    for name, rows in groups.items():
+        moved = [(row.number, table.shift("computed", row.number)) for row in rows]
+        shifts = [f"{s[0]:+.1f}" for _, s in moved if s is not None]
+        by = "as published" if rows[0].published_flexibility else "by the model"
+        cards.append((f"Modes {_listed([n for n, _ in moved])}: {name.strip()}, {by}", ", ".join(shifts) + " Hz", f"shift from {cold:g} to {hot:g} °C, computed"))
+    return cards
+
+
+def misses(table: Table) -> list[str]:
+    """Sentences on where the model does not meet the measurement, and on what else disagrees; every number is computed."""
+    says: list[str] = []
+    cold, hot = table.temperatures
+    rows = {r.number: r for r in table.rows}
+    own, measured, paper = (table.of(source, cold) for source in ("computed", "measured", "published"))
+    if own is None:
+        return says
+    if measured is not None and measured.value:
+        off = {n: own.value[n][0] - f for n, (f, _) in measured.value.items() if n in own.value}
+        worst = max(off, key=lambda n: abs(off[n]))
+        f = measured.value[worst][0]
+        says.append(
+            f"The largest miss at {cold:g} °C is mode {worst} ({rows[worst].kind}): computed {own.value[worst][0]:.1f} Hz, measured {f:.1f} Hz, "
+            f"{abs(off[worst]):.1f} Hz or {abs(off[worst]) / f:.1%} too {'high' if off[worst] > 0 else 'low'}. "
+            f"Over all {len(off)} measured modes the difference runs from {min(off.values()):+.1f} to {max(off.values()):+.1f} Hz."
+        )
+        for a, b in pairwise(sorted(off, key=lambda n: measured.value[n][0])):
+            apart, mine = measured.value[b][0] - measured.value[a][0], own.value[b][0] - own.value[a][0]
+            if rows[a].kind == rows[b].kind and apart < CLOSE * f and abs(apart - mine) > CERTAIN * np.hypot(*(measured.value[n][1] or 0.0 for n in (a, b))):
+                says.append(f"Modes {a} and {b} ({rows[a].kind}) are measured {apart:.1f} Hz apart, computed {mine:.1f} Hz.")
+        says += _shift_misses(table, measured.label)
+    if paper is not None and measured is not None:
+        both = [n for n in paper.value if n in measured.value and n in own.value]
+        near = max((abs(paper.value[n][0] - own.value[n][0]) for n in both), default=0.0)
+        far = max((abs(paper.value[n][0] - measured.value[n][0]) for n in both), default=0.0)
+        if both:
+            says.append(
+                f"The published analysis misses the measurement too, by up to {far:.1f} Hz at {cold:g} °C; it differs from the model by at most "
+                f"{near:.1f} Hz."
+            )
+    for name in dict.fromkeys(r.published_flexibility for r in table.rows if r.published_flexibility):
+        other = [r for r in table.rows if r.published_flexibility == name and r.flexibility.rstrip("s") not in name]
+        if other:
+            held = "; ".join(f"mode {r.number}: {r.flexibility} {r.share:.0%}, bearings {r.bearing_share:.0%}" for r in other)
+            says.append(f"The publication names “{name}” as the main flexibility where most of the model's strain energy sits elsewhere ({held}).")
+    return says
+
+
+def _shift_misses(table: Table, label: str) -> Iterator[str]:
+    """Sentences on shifts that differ by more than `CERTAIN` standard errors of the measured one."""
+    cold, hot = table.temperatures
+    both = {r.number: (table.shift(label, r.number), table.shift("computed", r.number), r.kind) for r in table.rows}
+    sure = {n: (m, c[0], kind) for n, (m, c, kind) in both.items() if m and c and abs(m[0] - c[0]) > CERTAIN * (m[1] or 0.0)}
+    for n, (m, c, kind) in sure.items():
+        if m[0] * c < 0:
+            verbs = ("rises", "falls") if m[0] > 0 else ("falls", "rises")
+            error = f" ± {m[1]:.1f}" if m[1] else ""
+            yield f"From {cold:g} to {hot:g} °C mode {n} ({kind}) {verbs[0]} by {abs(m[0]):.1f}{error} Hz when measured and {verbs[1]} by {abs(c):.1f} Hz when computed."
+    for further, words in ((True, "further"), (False, "less")):
+        some = {n: f"mode {n}: {m[0]:+.1f} against {c:+.1f} Hz" for n, (m, c, _) in sure.items() if m[0] * c > 0 and (abs(m[0]) > abs(c)) == further}
+        if some:
+            yield f"Measured frequencies move {words} than computed ones in modes {_listed(list(some))} ({'; '.join(some.values())})."
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    return " and ".join(filter(None, [", ".join(map(str, numbers[:-1])), str(numbers[-1])]))
+
+
+# ---------------------------------------------------------------- figures
+
+
+def driving_points(run: Run, steps: Sequence[Step]) -> dict[str, list[Curve]]:
+    """Exact, virtually tested and measured mobility at every hammer point, by title.
+
+    The exact one is seen through the test's exponential window, which evaluates an FRF at i omega + decay.
+    """
+    panels = {}
+    for letter, node in zip("abcdefgh", run.spindle.hammer.hammer_nodes, strict=False):
+        point = run.spindle.point(node)
+        curves = []
+        for step in steps:
+            seen, decay = step.test.estimate.h1, step.test.estimate.window_decay
+            lines = np.linspace(seen.frequency[0], seen.frequency[-1], 1600)
+            row = point_rows(run.spindle, step.point.chain, (node,))
+            exact = frf(step.point.linear, row, row, lines - 1j * decay / (2 * np.pi), kind="mobility")[0, 0]
+            curves.append(Curve("exact", _temperature(step), lines, exact))
+            i, j = seen.response_nodes.index(node), seen.reference_nodes.index(node)
+            coherence = None if seen.coherence is None else seen.coherence[i, j]
+            curves.append(Curve("test", _temperature(step), seen.frequency, seen.value[i, j], coherence))
+            curves += _measured_curves(run, step, node)
+        axis = "xyz"[int(np.argmax(np.abs(point.direction)))]
+        panels[f"{letter}) struck and measured on the {point.body}: point {node} ({point.name}), along {axis}"] = curves
+    return panels
+
+
+def _measured_curves(run: Run, step: Step, node: int) -> Iterator[Curve]:
+    for test in (t for c in run.measured for t in c.tests if t.frf is not None):
+        near = abs(test.temperature - _temperature(step)) <= SAME_TEMPERATURE and _same_speed(test, run)
+        if near and node in test.frf.response_nodes and node in test.frf.reference_nodes:  # type: ignore[union-attr]
+            h = test.frf
+            assert h is not None
+            value = h.value[h.response_nodes.index(node), h.reference_nodes.index(node)]
+            power = {"receptance": 1, "mobility": 0, "accelerance": -1}[h.quantity]
+            used = h.frequency > 0
+            yield Curve("measured", _temperature(step), h.frequency[used], value[used] * (2j * np.pi * h.frequency[used]) ** power)
+
+
+def bearing_figures(run: Run) -> list[tuple[str, Markup]]:
+    """Figs. 9 to 12: (caption, SVG)."""
+    temperature = [_temperature(s) for s in run.steps]
+    figures = (
+        ("angle", "Fig. 9. Contact angle", "contact angle, °", lambda b: np.degrees(b.contact_angle)),
+        ("deformation", "Fig. 10a. Deformation of one ball, both contacts", "deformation, µm", lambda b: b.deformation * 1e6),
+        ("force", "Fig. 10b. Contact force of one ball", "contact force, N", lambda b: b.contact_force),
+        ("ball", "Fig. 10c. Stiffness of one ball", "ball stiffness, N/µm", lambda b: b.ball_stiffness * 1e-6),
+        ("preload", "Fig. 11. Preload: axial force of the bearing", "preload, N", lambda b: b.preload),
+        ("radial", "Fig. 12. Radial stiffness of one bearing", "radial stiffness, N/µm", lambda b: b.radial_stiffness * 1e-6),
+        ("axial", "Fig. 12. Axial stiffness of one bearing", "axial stiffness, N/µm", lambda b: b.axial_stiffness * 1e-6),
+    )
+    answer = []
+    for key, caption, label, value in figures:
+        values = {b.name: [float(value(s.point.state.bearing(b.name))) for s in run.steps] for b in run.spindle.bearings}
+        answer.append((caption, Markup(plots.trend(key, temperature, values, label, from_zero=key != "angle"))))
+    return answer
+
+
+# ---------------------------------------------------------------- numbers of the scene
+
+
+def values_of_file(spindle: Spindle) -> tuple[dict[str, Any], bool]:
+    """Numbers of the scene file by the keys of `spindle.provenance`, and whether the spindle still is the file's."""
+    if spindle.file is None or not spindle.file.is_file():
+        return {}, True
+    values: dict[str, Any] = {}
+
+    def walk(node: Any, key: str) -> None:
+        if isinstance(node, Mapping):
+            for name, value in node.items():
+                walk(value, f"{key}.{name}" if key else name)
+        elif isinstance(node, list) and node and isinstance(node[0], Mapping):
+            for index, value in enumerate(node):
+                walk(value, f"{key}.{value.get('name', value.get('node', index))}")
+        elif key in spindle.provenance:
+            values[key] = node
+
+    walk(tomllib.loads(spindle.file.read_text(encoding="utf-8")), "")
+    return values, content_hash(load(spindle.file)) == content_hash(spindle)
+
+
+# ---------------------------------------------------------------- the page
+
+
+def _page() -> object:
+    """The macros of the template."""
+    environment = Environment(
+        loader=FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters |= {"signed": _signed, "with_error": _with_error, "minus": _minus}
+    environment.globals |= {"RPM": RPM, "degrees": np.degrees}
+    return environment.get_template("report.html.j2").module
+
+
+def _minus(text: str) -> str:
+    return text.replace("-", "−")
+
+
+def _signed(value: float, digits: int = 1) -> str:
+    return _minus(f"{value:+.{digits}f}")
+
+
+def _with_error(pair: tuple[float, float | None] | None, sign: bool = False, digits: int = 1) -> str:
+    """A number with its standard error, to two digits of the error; an en dash for none."""
+    if pair is None:
+        return "–"
+    value, error = pair
+    if error is None or not np.isfinite(error):
+        return _minus(f"{value:{'+' if sign else ''}.{digits}f}")
+    digits = int(np.clip(1 - np.floor(np.log10(max(error, 1e-3))), 0, 3))
+    return _minus(f"{value:{'+' if sign else ''}.{digits}f}") + f" ± {error:.{digits}f}"
+
+
+def _conditions(run: Run) -> str:
+    temperatures = ", ".join(f"{_temperature(s):g}" for s in run.steps)
+    speed = run.steps[0].point.condition.speed / RPM
+    return f"{temperatures} °C, " + (f"{speed:.0f} rpm" if speed else "at rest")
+
+
+def _temperature(step: Step) -> float:
+    return step.point.condition.temperature
+
+
+def _same_speed(test: Test, run: Run) -> bool:
+    return bool(abs(test.speed - run.steps[0].point.condition.speed) < 0.5 * RPM)
