@@ -114,6 +114,7 @@ class Pair:
     stiffness_arrangement: str
     turning_ring: str  # inner | outer
     ball_inertia: float  # share of the balls' centrifugal force and gyroscopic moment in the equilibrium, 0 to 1
+    axial_bias: float = 0.0  # N, external axial force on the outer rings' body, positive along z
 
 
 @dataclass(frozen=True)
@@ -250,6 +251,14 @@ class Provenance:
 
 
 @dataclass(frozen=True)
+class Addition:
+    """A physical effect that a scene adds to the base model: its name in the catalogue and its parameter values (their units)."""
+
+    effect: str
+    values: Mapping[str, float]
+
+
+@dataclass(frozen=True)
 class Spindle:
     name: str
     title: str
@@ -263,6 +272,7 @@ class Spindle:
     hammer: HammerTest
     thermal: Thermal
     tolerances: Tolerances
+    effects: tuple[Addition, ...] = ()
     provenance: Mapping[str, Provenance] = field(default_factory=dict, repr=False)  # by dotted key of the file
     file: Path | None = field(default=None, compare=False)
 
@@ -278,10 +288,12 @@ class Spindle:
 
 @dataclass(frozen=True)
 class Condition:
-    """One operating condition: uniform soak temperature (C) and speed (rad/s, positive about +z)."""
+    """One operating condition: chamber temperature (C), speed (rad/s, positive about +z), and what else a test may vary."""
 
     temperature: float
     speed: float = 0.0
+    level: float = 0.0  # N, peak force of the hammer; 0 is the limit of a light tap
+    soak_time: float = np.inf  # s in the chamber before the test
 
 
 @dataclass(frozen=True)

@@ -28,14 +28,16 @@ AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1), "tilt_x": (1, 0, 0), "ti
 CARRIER_SHARE = 1e-9  # of the turning body's inertia, left on the carrier because MuJoCo wants every moving body to have some
 
 
-def spec(spindle: Spindle, state: PairState, element: str = "linear", looks: bool = False) -> mujoco.MjSpec:
+def spec(
+    spindle: Spindle, state: PairState, element: str = "linear", looks: bool = False, chain: RotorBase | None = None
+) -> mujoco.MjSpec:
     """The MuJoCo specification of a spindle at one operating point, with keyframe "loaded" (turning at its speed).
 
-    `looks` adds what a person wants to see (`model.look`) and changes nothing that moves.
+    `chain` is the spindle's own at `state` by default. `looks` adds what a person wants to see (`model.look`) and changes nothing that moves.
     """
     if element not in ELEMENTS:
         raise ValueError(f"bearing element {element!r} is unknown; allowed are {', '.join(ELEMENTS)}")
-    chain = rotor_base(spindle, state)
+    chain = chain or rotor_base(spindle, state)
     balls = {b.name: b for b in state.bearings} if element == "ball-by-ball" else {}
     out = chain_spec(chain, spindle.hammer.step, stiff=tuple(e.name for e in chain.elements if e.name not in balls))
     out.modelname = spindle.name

@@ -86,7 +86,7 @@ def solve(spindle: Spindle, condition: Condition, motions: Mapping[str, RingMoti
     if spindle.pair.preload_kind == "spring" and spindle.pair.arrangement != "tandem":
         moves = [_movement_for(row, s * spindle.pair.preload) for row, s in zip(rows, senses, strict=True)]
     else:
-        external = sum(senses) * spindle.pair.preload  # a tandem pair carries both shares together
+        external = sum(senses) * spindle.pair.preload + spindle.pair.axial_bias  # a tandem pair carries both shares together
         moves = [_balance(rows, external)] * len(rows)
     states = tuple(
         _state(spindle, b, replace(row, axial=row.axial + h), k)

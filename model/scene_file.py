@@ -348,6 +348,11 @@ class Tolerances(Table):
         return m.Tolerances(self.structure, self.hub, self.preload, self.damping, self.temperature_K, self.gain)
 
 
+class Effect(Table):
+    name: Name
+    values: dict[str, Finite] = {}
+
+
 class Scene(Table):
     title: Name
     reference_temperature_C: Finite
@@ -361,6 +366,7 @@ class Scene(Table):
     measuring: Measuring
     hammer_test: HammerTest
     tolerances: Tolerances
+    effects: list[Effect] = []
 
     @model_validator(mode="after")
     def _rows_exist(self) -> Scene:
@@ -384,6 +390,7 @@ class Scene(Table):
             self.hammer_test.test(),
             self.thermal.thermal(),
             self.tolerances.tolerances(),
+            tuple(m.Addition(e.name, dict(e.values)) for e in self.effects),
             provenance,
             file,
         )

@@ -15,7 +15,6 @@ import numpy as np
 from mujoco.rollout import Rollout
 from scipy.signal import resample_poly
 
-from model import mjcf
 from model.ball_row import Array
 from model.machine import HammerTest
 from model.scene import BadInput
@@ -59,7 +58,7 @@ def impact_tests(
     for point in points:
         check_step(point, test.step)
     hits = [[draw_hits(test, np.random.default_rng([seed, i, node])) for node in test.hammer_nodes] for i in range(len(points))]
-    models = [p.model if element == "linear" else mjcf.spec(p.spindle, p.state, element).compile() for p in points]
+    models = [p.model if element == "linear" else p.spec(element).compile() for p in points]
     results = []
     for i, (point, model) in enumerate(zip(points, models, strict=True)):
         force_held, velocity = simulate(model, test, hits[i], steps)

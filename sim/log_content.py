@@ -1,35 +1,25 @@
-"""What the log of a run shows, as plain numbers: modal peaks side by side, a summary, colours, moving bodies, small charts.
+"""What the log of a run shows, as plain numbers: modal peaks side by side, a summary, which FRFs in which range.
 
-Lengths in pictures are millimetres. Nothing here knows Rerun.
+Nothing here knows Rerun.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 
-import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from model.ball_row import Array
-from model.look import RegionMesh, plate_meshes, region_meshes
-from model.machine import MOVES, Spindle
-from model.modes import ComplexArray, Mode, frf, point_rows
+from model.modes import Mode
 from sim.campaign import Test
-from sim.operating import OperatingPoint, provenance
+from sim.frf import Frf
+from sim.operating import provenance
 from sim.run import Run, as_campaign
 from sim.shift import follow, match
-from thermal.expansion import DeformedSection
 
-Colours = NDArray[np.uint8]
-MM = 1e3
-REACH = 0.16  # largest displacement of an animated mode, of the section's largest radius
-CYCLE = 20  # frames of one cycle of an animation
-HEAT = np.array([(70, 120, 255), (60, 200, 255), (235, 235, 120), (255, 160, 50), (255, 60, 60)], float)  # cold to hot
-
-
-# ---------------------------------------------------------------- peaks and summary
+Pair = tuple[int, int]  # response node, hammer node
+FRAMES = 900  # about, of the sweep through the band
 
 
 @dataclass(frozen=True)
@@ -68,22 +58,15 @@ def peaks(run: Run) -> list[Peak]:
     modes = followed_modes(run)
     for step, test, own in zip(run.steps, tests_of(run), modes, strict=True):
         number = {id(m): i for i, m in enumerate(own, 1)}
-        found += [Peak("computed", test.id, test.temperature, i, m.kind, m.frequency, np.nan, m.damping_ratio) for i, m in enumerate(own, 1)]
+        found += [
+            Peak("computed", test.id, test.temperature, i, m.kind, m.frequency, np.nan, m.damping_ratio)
+            for i, m in enumerate(own, 1)
+        ]
         seen, partners = step.identified, match(step)
         for i, (f, sd, damping) in enumerate(zip(seen.frequency, seen.frequency_sd, seen.damping, strict=True)):
             mode = partners.get(i)
-            found.append(
-                Peak(
-                    "identified",
-                    test.id,
-                    test.temperature,
-                    number.get(id(mode), 0),
-                    mode.kind if mode else "unknown",
-                    float(f),
-                    float(sd),
-                    float(damping),
-                )
-            )
+            which = (number.get(id(mode), 0), mode.kind if mode else "unknown")
+            found.append(Peak("identified", test.id, test.temperature, *which, float(f), float(sd), float(damping)))
     for campaign in run.measured:
         name = campaign.folder.name if campaign.folder else "measured"
         for test in campaign.tests:
@@ -98,19 +81,15 @@ def peaks(run: Run) -> list[Peak]:
 def summary(run: Run, found: Sequence[Peak]) -> str:
     """Markdown: the peaks of every temperature beside each other, the state of the bearings, and where it all comes from."""
     temperatures = sorted({p.temperature for p in found})
-    sources = list(dict.fromkeys(p.source for p in found))
-    value = {(p.source, p.temperature, p.mode): p.frequency for p in found if p.mode}
-    kinds = {p.mode: p.kind for p in found if p.source == "computed"}
-    lines = [f"### {run.spindle.title}", "", "Modal peaks, Hz: **computed** / identified / *measured*", ""]
-    lines += ["| mode | " + " | ".join(f"{t:g} °C" for t in temperatures) + " |", "|---|" + "--:|" * len(temperatures)]
-    for mode, kind in kinds.items():
-        cells = []
-        for t in temperatures:
-            shown = [("**{:.0f}**", "{:.0f}", "*{:.0f}*")[min(k, 2)].format(value[s, t, mode]) for k, s in enumerate(sources) if (s, t, mode) in value]
-            cells.append(" / ".join(shown))
-        lines.append(f"| {mode} {kind} | " + " | ".join(cells) + " |")
+    lines = [f"**{run.spindle.title}**", "", "Modal peaks, Hz: **computed** / identified / *measured*", ""]
+    lines += _table(found, [temperatures[0], temperatures[-1]] if len(temperatures) > 1 else temperatures)
+    if len(temperatures) > 2:
+        lines += ["", "All temperatures:", "", *_table(found, temperatures)]
     lines += ["", "Bearings:", ""]
-    lines += [f"- {s.point.condition.temperature:g} °C: {s.point.state.status}, preload {s.point.state.bearings[0].preload:.2f} N" for s in run.steps]
+    lines += [
+        f"- {s.point.condition.temperature:g} °C: {s.point.state.status}, preload {s.point.state.bearings[0].preload:.2f} N"
+        for s in run.steps
+    ]
     lines += ["", "Identification:", ""]
     lines += [f"- {s.point.condition.temperature:g} °C: {s.identified.status}" for s in run.steps]
     lines += ["", "Measured:", "", *(f"- {c.title}" for c in run.measured)] if run.measured else []
@@ -118,193 +97,78 @@ def summary(run: Run, found: Sequence[Peak]) -> str:
     return "\n".join(lines) + "\n"
 
 
-# ---------------------------------------------------------------- colours
+def _table(found: Sequence[Peak], temperatures: Sequence[float]) -> list[str]:
+    sources = list(dict.fromkeys(p.source for p in found))
+    value = {(p.source, p.temperature, p.mode): p.frequency for p in found if p.mode}
+    lines = ["| mode | " + " | ".join(f"{t:g} °C" for t in temperatures) + " |", "|---|" + "---|" * len(temperatures)]
+    for mode, kind in {p.mode: p.kind for p in found if p.source == "computed"}.items():
+        cells = []
+        for t in temperatures:
+            seen = [(k, value[s, t, mode]) for k, s in enumerate(sources) if (s, t, mode) in value]
+            cells.append(" / ".join(("**{:.0f}**", "{:.0f}", "*{:.0f}*")[min(k, 2)].format(f) for k, f in seen))
+        lines.append(f"| {mode} {kind} | " + " | ".join(cells) + " |")
+    return lines
 
 
-def heat(temperature: float, temperatures: Sequence[float]) -> Colours:
-    """Colour (3,) of a temperature, from blue for the lowest to red for the highest."""
-    low, high = min(temperatures), max(temperatures)
-    place = (temperature - low) / (high - low) if high > low else 0.0
-    return np.array([np.interp(place, np.linspace(0, 1, len(HEAT)), channel) for channel in HEAT.T]).astype(np.uint8)
-
-
-# ---------------------------------------------------------------- moving bodies
-
-
-def body_meshes(spindle: Spindle) -> dict[str, list[RegionMesh]]:
-    """The cut-away meshes by the body they move with."""
-    meshes = [*region_meshes(spindle), *plate_meshes(spindle)]
-    return {b.name: own for b in spindle.structure.bodies if (own := [m for m in meshes if m.body == b.name])}
-
-
-def largest_displacement(point: OperatingPoint, shapes: ComplexArray) -> Array:
-    """Largest displacement (k,) of any drawn vertex under motions `shapes` (n, k) of the chain."""
-    largest = np.zeros(shapes.shape[1])
-    for name, meshes in body_meshes(point.spindle).items():
-        arm = np.concatenate([m.vertices for m in meshes]) - [0.0, 0.0, point.chain.body(name).z]
-        rows = {move: i for i, (body, move) in enumerate(point.linear.dofs) if body == name}
-        u = np.array([shapes[rows[m]] if m in rows else 0 * shapes[0] for m in MOVES])  # (5, k)
-        x, y, z = (a[:, None] for a in arm.T)
-        moved = np.stack([u[0] + u[4] * z, u[1] - u[3] * z, u[2] + u[3] * y - u[4] * x])
-        largest = np.maximum(largest, np.sqrt((np.abs(moved) ** 2).sum(axis=0)).max(axis=0))
-    return largest
-
-
-def mode_motion(point: OperatingPoint, mode: Mode, frames: int) -> ComplexArray:
-    """Motion (n, frames) of a mode shape turning through one cycle every `CYCLE` frames, scaled to be seen."""
-    shape = mode.shape[:, None]
-    return _visible(point) / largest_displacement(point, shape) * shape * _turning(frames)
-
-
-def sweep_motion(point: OperatingPoint, node: int, frequency: Array) -> ComplexArray:
-    """Motion (n, frames) under a force at `node` that sweeps `frequency` (frames,) Hz; its size is drawn as the square root, so that
-    the motion between resonances can be seen."""
-    row = point_rows(point.spindle, point.chain, (node,))
-    response = frf(point.linear, np.eye(len(point.linear.mass)), row, frequency, "mobility")[:, 0]
-    size = largest_displacement(point, response)
-    return response * _visible(point) / np.sqrt(size * size.max()) * _turning(len(frequency))
-
-
-def _visible(point: OperatingPoint) -> float:
-    return REACH * max(g.r[1] for g in point.spindle.regions)
-
-
-def _turning(frames: int) -> ComplexArray:
-    return np.exp(2j * np.pi * np.arange(frames) / CYCLE)
-
-
-def poses(point: OperatingPoint, motion: ComplexArray) -> dict[str, tuple[Array, Array]]:
-    """Places (frames, 3) mm and quaternions (frames, 4) x, y, z, w of every body when the MuJoCo model takes the real part of
-    `motion` (n, frames)."""
-    model = point.model
-    data = mujoco.MjData(model)
-    address = [model.joint(f"{body}.{move}").qposadr[0] for body, move in point.linear.dofs]
-    places, turns = [], []
-    for frame in motion.real.T:
-        data.qpos[address] = frame
-        mujoco.mj_kinematics(model, data)
-        places.append(MM * data.xpos)
-        turns.append(np.roll(data.xquat, -1, axis=1))
-    place, turn = np.array(places), np.array(turns)
-    return {b.name: (place[:, i], turn[:, i]) for b in point.chain.bodies for i in [model.body(b.name).id]}
-
-
-# ---------------------------------------------------------------- the deformed section
-
-
-def exaggeration(sections: Sequence[dict[str, DeformedSection]], reach: float) -> float:
-    """A round factor that makes the largest displacement of all about 8 % of `reach` (m)."""
-    largest = max(float(np.abs(part.displacement).max()) for section in sections for part in section.values())
-    if largest == 0:
-        return 1.0
-    wanted = 0.08 * reach / largest
-    step = 10.0 ** np.floor(np.log10(wanted))
-    return float(max((s for s in (1, 2, 5) if s * step <= wanted), default=1) * step)
-
-
-def section_mesh(
-    spindle: Spindle, part: DeformedSection, shift: float, factor: float, colour: Colours
-) -> tuple[Array, NDArray[np.int64], Colours]:
-    """Vertices (v, 3) mm in the plane y = 0, triangles (t, 3), colours (v, 3): materials as shades of `colour`.
-
-    `shift` (m) is the rigid axial movement of the part, displaced by `factor` times like the rest.
-    """
-    materials = sorted({g.material for g in spindle.regions})
-    nodes = part.nodes + factor * (part.displacement + [0.0, shift])
-    corners, triangles = np.unique(part.region_of[:, None] * len(nodes) + part.triangles, return_inverse=True)
-    r, z = MM * nodes[corners % len(nodes)].T
-    shade = np.array([0.95 - 0.55 * materials.index(spindle.region(name).material) / len(materials) for name in part.regions])
-    return (
-        np.stack([r, np.zeros_like(r), z], axis=1),
-        triangles.reshape(-1, 3),
-        (shade[corners // len(nodes)][:, None] * colour).astype(np.uint8),
-    )
-
-
-def outlines(spindle: Spindle) -> list[Array]:
-    """Closed polygons (k, 3) mm of the undeformed regions and balls, right half."""
-    drawn = []
-    for g in spindle.regions:
-        (r0, r1), (z0, z1) = g.r, g.z
-        drawn.append(MM * np.array([(r, -2e-4, z) for r, z in ((r0, z0), (r1, z0), (r1, z1), (r0, z1), (r0, z0))]))
-    turn = np.linspace(0, 2 * np.pi, 33)
-    for b in spindle.bearings:
-        circle = b.ball_diameter / 2 * np.stack([np.cos(turn), 0 * turn, np.sin(turn)], axis=1)
-        drawn.append(MM * (circle + [b.pitch_diameter / 2, -2e-4, b.z]))
-    return drawn
-
-
-# ---------------------------------------------------------------- charts
-
-
-@dataclass
-class Drawing:
-    """Line strips and labels of a chart; y points down, one unit is about one pixel."""
-
-    strips: list[Array] = field(default_factory=list)
-    strip_colours: list[Colours] = field(default_factory=list)
-    points: list[tuple[float, float]] = field(default_factory=list)
-    labels: list[str] = field(default_factory=list)
-    label_colours: list[Colours] = field(default_factory=list)
-
-    def label(self, x: float, y: float, text: str, colour: Sequence[int] = (200, 200, 200)) -> None:
-        """Text centred at (x, y)."""
-        self.points.append((x, y - 13.0))
-        self.labels.append(text)
-        self.label_colours.append(np.array(colour, np.uint8))
+# ---------------------------------------------------------------- what is shown where
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
-    x: Array  # (n,)
-    y: Array  # (n,)
-    colour: Colours
+class Shown:
+    """What the log and its blueprint agree on."""
+
+    run: Run
+    tests: tuple[Test, ...]
+    peaks: tuple[Peak, ...]
+    modes: tuple[Mode, ...]  # in the band, at the first temperature
+    pairs: tuple[Pair, ...]  # FRFs with views of their own, driving points first
+    level: tuple[float, float]  # dB, limits of their plots
+    coherence: float  # lower limit of its plots
+    band: tuple[int, int]  # Hz
+    step: int  # Hz, between frames of the sweep
+
+    @property
+    def temperatures(self) -> list[float]:
+        """In C, of the tests."""
+        return [t.temperature for t in self.tests]
 
 
-def charts(panels: Sequence[tuple[str, str, Sequence[Curve]]], columns: int, width: float, height: float) -> Drawing:
-    """Small charts in rows of `columns`, each of `width` and `height`: title, unit of x, curves. Axes end at round numbers."""
-    drawing = Drawing()
-    for k, (title, unit, curves) in enumerate(panels):
-        left, top = (k % columns) * width, (k // columns) * height
-        box = (left + 46.0, top + 24.0, left + width - 16.0, top + height - 24.0)
-        x, y = (_ticks(np.concatenate([getattr(c, axis) for c in curves])) for axis in ("x", "y"))
-        drawing.label((box[0] + box[2]) / 2, top + 12.0, title, (255, 255, 255))
-        for value in y:
-            level = _place(value, y, box[3], box[1])
-            _add(drawing, np.array([(box[0], level), (box[2], level)]), (60, 60, 66))
-            drawing.label(left + 22.0, level, f"{value:g}")
-        for value in x:
-            place = _place(value, x, box[0], box[2])
-            _add(drawing, np.array([(place, box[3]), (place, box[3] + 3)]), (150, 150, 150))
-            drawing.label(place, box[3] + 13.0, f"{value:g}" + (f" {unit}" if value == x[-1] else ""))
-        for c in curves:
-            _add(drawing, np.stack([_place(c.x, x, box[0], box[2]), _place(c.y, y, box[3], box[1])], axis=1), c.colour)
-    return drawing
+def shown(run: Run) -> Shown:
+    """What to show of a run."""
+    tests = tests_of(run)
+    pairs = _pairs(frf_of(tests[0]))
+    low, high = run.spindle.hammer.band
+    level = np.array([decibel(one(frf_of(t).value, frf_of(t), pair)) for t in tests for pair in pairs])
+    coherence = [one(c, frf_of(t), pair).min() for t in tests for pair in pairs if (c := frf_of(t).coherence) is not None]
+    return Shown(
+        run,
+        tests,
+        tuple(peaks(run)),
+        tuple(followed_modes(run)[0]),
+        pairs,
+        (float(10 * np.floor(np.percentile(level, 0.5) / 10) - 10), float(10 * np.ceil(level.max() / 10))),
+        float(np.floor(10 * min(coherence, default=0.0) - 0.5) / 10),
+        (int(np.floor(low)), int(np.ceil(high))),
+        max(round((high - low) / FRAMES), 1),
+    )
 
 
-def _add(drawing: Drawing, strip: Array, colour: Sequence[int] | Colours) -> None:
-    drawing.strips.append(strip)
-    drawing.strip_colours.append(np.array(colour, np.uint8))
+def _pairs(frf: Frf) -> tuple[Pair, ...]:
+    """Driving points, the other hammer point's answer to the first hammer, and one point more."""
+    hammers, others = frf.reference_nodes, [n for n in frf.response_nodes if n not in frf.reference_nodes]
+    return (*((h, h) for h in hammers), *((n, hammers[0]) for n in (*hammers[1:2], *others[-2:-1])))
 
 
-def _place(value: Array | float, ticks: Array, start: float, end: float) -> Array:
-    return start + (np.asarray(value) - ticks[0]) / (ticks[-1] - ticks[0]) * (end - start)
+def frf_of(test: Test) -> Frf:
+    assert test.frf is not None  # virtual tests have FRFs
+    return test.frf
 
 
-def _ticks(values: Array) -> Array:
-    """Two to four round numbers that span `values`."""
-    low, high = float(values.min()), float(values.max())
-    span = max(high - low, 1e-3 * max(abs(high), abs(low))) or 1.0
-    for step in _round_steps(span / 3):
-        first, last = np.floor(low / step + 1e-9), np.ceil(high / step - 1e-9)
-        last = max(last, first + 1)
-        if last - first <= 3:
-            return np.round(np.arange(first, last + 1) * step, 12)
-    raise AssertionError("steps of ever larger size end the search")
+def one(array: Array, frf: Frf, pair: Pair) -> Array:
+    """The lines (n,) of one pair of an array (responses, references, n) of `frf`."""
+    return array[frf.response_nodes.index(pair[0]), frf.reference_nodes.index(pair[1])]
 
 
-def _round_steps(least: float) -> Iterator[float]:
-    start = 10.0 ** np.floor(np.log10(least) - 1)
-    while True:
-        yield from (s * start for s in (1.0, 2.0, 5.0))
-        start *= 10.0
+def decibel(value: Array) -> Array:
+    """20 log10 |value|, of zero -300."""
+    return 20 * np.log10(np.maximum(np.abs(value), 1e-15))

@@ -50,7 +50,9 @@ def read_log(path: Path) -> LogContents:
             ours = [r for r in recordings if r.application_id == APPLICATION]
             if recordings and not ours:
                 raise BadInput(f"{path}: is a recording of {recordings[0].application_id!r}, not of {APPLICATION!r}")
-            batches = [(c.entity_path, c.timeline_names, c.to_record_batch()) for c in reader.stream(store=ours[0])] if ours else []
+            batches = (
+                [(c.entity_path, c.timeline_names, c.to_record_batch()) for c in reader.stream(store=ours[0])] if ours else []
+            )
     except (RuntimeError, ValueError, OSError) as error:
         if isinstance(error, BadInput):
             raise
@@ -65,7 +67,9 @@ def read_log(path: Path) -> LogContents:
     try:
         about = columns["/__properties/run"]
         peaks = columns["/numbers/peaks"]
-        tests = {e.removesuffix("/about"): own for e, own in columns.items() if e.startswith("/numbers/") and e.endswith("/about")}
+        tests = {
+            e.removesuffix("/about"): own for e, own in columns.items() if e.startswith("/numbers/") and e.endswith("/about")
+        }
         order = sorted(tests, key=lambda e: int(_values(tests[e], "order")[0]))
         return LogContents(
             path=path,
@@ -106,7 +110,9 @@ def _frf(columns: Columns, about: Columns) -> Frf:
 
     value = np.empty((len(responses), len(references), len(frequency)), complex)
     value.real, value.imag = array("real"), array("imaginary")
-    return Frf(frequency, value, responses, references, _values(about, "quantity")[0], array("coherence"), array("standard_error"))
+    return Frf(
+        frequency, value, responses, references, _values(about, "quantity")[0], array("coherence"), array("standard_error")
+    )
 
 
 def describe(contents: LogContents) -> str:

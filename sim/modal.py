@@ -23,7 +23,7 @@ FAINT = 4.0
 """A mode is reported if its squared shape, weighted by its own information, exceeds this many times what the information criterion asks for."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Modes:
     """Modes in the order of frequency. m modes, n_resp responses, n_ref references.
 
@@ -85,8 +85,8 @@ def extract(
 ) -> Modes:
     """Modes within `band` (Hz, all lines if None) of `frf` (n_resp, n_ref, n) at `frequency` (n,) Hz, with noise `frf_sd` of that shape.
 
-    Without `frf_sd` it is taken from the scatter of neighbouring lines, and the status says so. Modes with impossible damping and those
-    that are not known better than to their half-width are not reported.
+    Without `frf_sd` it is taken from the `scatter` of neighbouring lines, and the status says so. Lines at 0 Hz are left out. Not reported
+    are modes out of the band or with a damping that is not `BELIEVED`, not known better than to their half-width, or `FAINT`.
     Raises ValueError if shapes do not agree or numbers are unusable.
     """
     frequency, frf = np.asarray(frequency, float), np.asarray(frf, complex)
@@ -233,7 +233,7 @@ def _modes(
     words += [] if rank_one else ["residues of rank one refused by the data, left free"]
     words += [f"{len(twice)} pairs of poles with one shape merged, errors enlarged by their distance"] if twice else []
     words += [f"{np.sum(~sure)} faint or uncertain poles not reported"] if not sure.all() else []
-    edges = lines.s.imag[[0, -1]] * unit / (2 * np.pi)
+    edges = np.round(lines.s.imag[[0, -1]] * unit / (2 * np.pi), 6)
     return Modes(
         frequency[keep],
         damping[keep],

@@ -9,34 +9,61 @@ from importlib.metadata import version
 from itertools import pairwise
 
 import mujoco
+import numpy as np
 from scipy.optimize import brentq
 
 from model import mjcf
+from model.ball_row import Array
 from model.machine import Condition, Spindle
-from model.modes import Mode, modes
+from model.modes import ComplexArray, Mode, frf, modes, point_rows
 from model.pair import PairState, solve
 from model.rotor_base import Matrices, RotorBase, rotor_base
 from model.scene import content_hash
 from model.table import StiffnessTable, tabulate
+from sim.effect import Effect, Measurement, Values
+from sim.effects import of_scene
 from thermal.expansion import expand
 
 
 @dataclass(frozen=True, eq=False)
 class OperatingPoint:
-    """One spindle at one condition, with everything that follows from it computed when first asked."""
+    """One spindle at one condition; what follows from it is computed when first asked.
+
+    `spindle` is the drawing as the effects of the scene leave it at this condition.
+    """
 
     spindle: Spindle
     condition: Condition
     state: PairState
+    effects: tuple[tuple[Effect, Values], ...] = ()
 
     @cached_property
     def chain(self) -> RotorBase:
-        return rotor_base(self.spindle, self.state)
+        chain = rotor_base(self.spindle, self.state)
+        for effect, values in self.effects:
+            if effect.chain:
+                chain = effect.chain(self.spindle, self.condition, values, chain)
+        return chain
+
+    @cached_property
+    def measurement(self) -> Measurement:
+        """How the scene's points and hammers are measured, without noise."""
+        rows = point_rows(self.spindle, self.chain)
+        hammers = point_rows(self.spindle, self.chain, self.spindle.hammer.hammer_nodes)
+        chain = Measurement(rows, hammers, np.ones(len(rows)), np.zeros(len(rows)), 0.0)
+        for effect, values in self.effects:
+            if effect.measurement:
+                chain = effect.measurement(self.spindle, self.condition, values, self.chain, chain)
+        return chain
+
+    def spec(self, element: str = "linear", looks: bool = False) -> mujoco.MjSpec:
+        """The MuJoCo specification of this point."""
+        return mjcf.spec(self.spindle, self.state, element, looks, self.chain)
 
     @cached_property
     def model(self) -> mujoco.MjModel:
         """The compiled MuJoCo model with linear bearing elements."""
-        return mjcf.spec(self.spindle, self.state).compile()
+        return self.spec().compile()
 
     @cached_property
     def linear(self) -> Matrices:
@@ -48,10 +75,40 @@ class OperatingPoint:
         """All oscillating modes, in order of frequency."""
         return modes(self.chain, self.linear)
 
+    def frf(self, frequency: Array) -> ComplexArray:
+        """Exact mobility (n_resp, n_ref, n) of the linear model at `frequency` (Hz), as the measuring chain shows it."""
+        m = self.measurement
+        s = frequency - 1j * m.decay / (2 * np.pi)
+        value = frf(self.linear, m.response_rows, m.reference_rows, s, "mobility")
+        return value * (m.gain[:, None] * np.exp(-2j * np.pi * frequency * m.delay[:, None]))[:, None, :]
 
-def operating_point(spindle: Spindle, condition: Condition) -> OperatingPoint:
-    """Thermal expansion of a uniform soak, axial equilibrium of the bearings, and what hangs on them."""
-    return OperatingPoint(spindle, condition, solve(spindle, condition, expand(spindle, condition.temperature)))
+
+def operating_point(
+    spindle: Spindle, condition: Condition, effects: Sequence[tuple[Effect, Values]] | None = None
+) -> OperatingPoint:
+    """Region temperatures, thermal expansion, axial equilibrium of the bearings, and what hangs on them.
+
+    `effects` are the scene's by default.
+    """
+    present = tuple(of_scene(spindle) if effects is None else effects)
+    for effect, values in present:
+        if effect.spindle:
+            spindle = effect.spindle(spindle, condition, values)
+    temperatures: float | dict[str, float] = condition.temperature
+    if any(effect.temperatures for effect, _ in present):
+        temperatures = {g.name: condition.temperature for g in spindle.regions}
+        for effect, values in present:
+            if effect.temperatures:
+                temperatures = effect.temperatures(spindle, condition, values, temperatures)
+    motions = expand(spindle, temperatures)
+    for effect, values in present:
+        if effect.motions:
+            motions = effect.motions(spindle, condition, values, motions)
+    state = solve(spindle, condition, motions)
+    for effect, values in present:
+        if effect.pair:
+            state = effect.pair(spindle, condition, values, state)
+    return OperatingPoint(spindle, condition, state, present)
 
 
 def stiffness_table(spindle: Spindle, temperatures: Sequence[float], speeds: Sequence[float] = (0.0,)) -> StiffnessTable:

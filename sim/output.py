@@ -124,7 +124,7 @@ def write_campaign_of(run: Run, folder: Path) -> None:
 
 def write_modes(point: OperatingPoint, folder: Path) -> None:
     """`modes.csv` and the MuJoCo model `spindle.xml` of one operating point."""
-    (folder / "spindle.xml").write_text(mjcf.xml(mjcf.spec(point.spindle, point.state, looks=True)), encoding="utf-8")
+    (folder / "spindle.xml").write_text(mjcf.xml(point.spec(looks=True)), encoding="utf-8")
     _write_modes_csv([point], folder / "modes.csv")
 
 
@@ -149,7 +149,7 @@ def write_run(run: Run, folder: Path, progress: Callable[[str], None]) -> None:
     _write_modes_csv(points, folder / "modes.csv")
     for point in points:
         name = f"spindle_{point.condition.temperature:g}C.xml"
-        (folder / name).write_text(mjcf.xml(mjcf.spec(point.spindle, point.state, looks=True)), encoding="utf-8")
+        (folder / name).write_text(mjcf.xml(point.spec(looks=True)), encoding="utf-8")
     progress("tables and MuJoCo models written")
     write_campaign_of(run, folder / "campaign")
     progress("campaign written")

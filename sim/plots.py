@@ -1,7 +1,7 @@
 """The report's figures as inline SVG, drawn with matplotlib's object-oriented interface.
 
-Text stays text and takes the page's font; ink is `currentColor`, so that figures follow the page into dark mode. The same data give
-the same characters. Two palettes never mix: cold to hot for temperatures, the rest for bearings and sources.
+Text stays text and takes the page's font; the same data give the same characters. Two palettes never mix: cold to hot for
+temperatures, the rest for bearings and sources.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from model.machine import PARTS, Spindle
 from sim.operating import OperatingPoint
 from thermal.expansion import DeformedSection, field
 
-INK = "#1b1c1d"  # written as currentColor
+INK, PALE = "#1b1c1d", "#84898f"
 TEMPERATURES = LinearSegmentedColormap.from_list("cold to hot", ["#2166ac", "#8073ac", "#c9371c"])
 BEARINGS = (("#a0741a", "o", "-"), ("#7a3d8f", "^", "--"), ("#2e7d6b", "s", ":"), ("#555f6b", "D", "-."))
 SOURCES = {"measured": (INK, "D", True), "published": (INK, "s", False), "computed": ("#1f8a70", "o", True), "identified": ("#1f8a70", "o", False)}
@@ -97,8 +97,8 @@ def svg(figure: Figure, key: str, description: str) -> str:
     body = re.sub(r'<g id="[A-Za-z.]+(_\d+)+">', "<g>", body)
     body = re.sub(r'id="([^"]+)"', rf'id="{key}-\1"', body)
     body = re.sub(r'(href="|url\()#', rf"\1#{key}-", body)
-    body = re.sub(r"(font: (?:\w+ )*[\d.]+px) [^;\"]+", r"\1 var(--sans)", body)
-    body = re.sub(r"(\d\.\d\d)\d+", r"\1", body).replace(INK, "currentColor")
+    body = re.sub(r"font-family: [^;\"]+", "font-family: var(--sans)", body)
+    body = re.sub(r"(\d\.\d\d)\d+", r"\1", body)
     view = re.search(r'viewBox="([^"]+)"', body)
     assert view is not None
     width = float(view.group(1).split()[2])
@@ -110,19 +110,22 @@ def svg(figure: Figure, key: str, description: str) -> str:
 
 
 @rc_context(STYLE)
-def trend(key: str, temperature: Sequence[float], values: Mapping[str, Sequence[float]], label: str, from_zero: bool = True) -> str:
-    """One quantity of every bearing over temperature; `values` by bearing name."""
+def trend(key: str, temperature: Sequence[float], curves: Mapping[str, Mapping[str, Sequence[float]]], label: str, from_zero: bool) -> str:
+    """One quantity of every bearing over temperature, or several beside their names: values by name and by bearing."""
     figure = Figure(figsize=(3.55, 2.45))
     axes = figure.add_subplot()
-    lines = [
-        axes.plot(temperature, series, color=c, marker=m, linestyle=s, label=name, clip_on=False)[0]
-        for (name, series), (c, m, s) in zip(values.items(), BEARINGS * len(values), strict=False)
-    ]
+    for name, values in curves.items():
+        for (bearing, series), (c, marker, line) in zip(values.items(), BEARINGS * len(values), strict=False):
+            axes.plot(temperature, series, color=c, marker=marker, linestyle=line, label=bearing, clip_on=False)
+        if len(curves) > 1:
+            highest = max(series[0] for series in values.values())
+            axes.annotate(name, (temperature[0], highest), (2, 6), textcoords="offset points", fontsize=8.5)
     axes.set(xlabel="temperature, °C", ylabel=label)
     axes.margins(x=0.06, y=0.12)
     if from_zero:
-        axes.set_ylim(0, 1.12 * max(max(series) for series in values.values()))
-    axes.legend(handles=lines[::-1], loc="lower left" if from_zero else "best")
+        axes.set_ylim(0, 1.15 * max(max(series) for values in curves.values() for series in values.values()))
+    handles = axes.get_lines()[: len(next(iter(curves.values())))]
+    axes.legend(handles=handles[::-1], loc="lower left" if from_zero else "best")
     return svg(figure, key, f"{label} over temperature")
 
 
@@ -148,6 +151,7 @@ def comparison(key: str, modes: Mapping[int, str], sources: Sequence[Peaks], col
         axes.tick_params(axis="y", length=0)
         axes.spines["left"].set_visible(False)
         axes.grid(False, axis="y")
+        axes.margins(x=0.08)
         for i in range(0, len(rows), 2):
             axes.axhspan(-i - 0.5, -i + 0.5, color=INK, alpha=0.04, lw=0)
     for k, (label, source) in enumerate(labels.items()):
@@ -158,14 +162,14 @@ def comparison(key: str, modes: Mapping[int, str], sources: Sequence[Peaks], col
         if measured and first:
             own = {m: first.value[m] for m in rows if m in first.value and m in measured.value}
             x = [f - measured.value[m][0] for m, (f, _) in own.items()]
-            panels[0].errorbar(x, [rows[m] + place for m in own], xerr=[2 * (sd or 0.0) for _, sd in own.values()], **look)
+            panels[0].errorbar(x, [rows[m] + place for m in own], xerr=[np.nan if sd is None else 2 * sd for _, sd in own.values()], **look)
         if first and last:
             both = [m for m in rows if m in first.value and m in last.value]
             x = [last.value[m][0] - first.value[m][0] for m in both]
-            error = [2 * np.hypot(first.value[m][1] or 0.0, last.value[m][1] or 0.0) for m in both]
+            error = [2 * np.hypot(*(np.nan if p.value[m][1] is None else p.value[m][1] for p in (first, last))) for m in both]
             panels[-1].errorbar(x, [rows[m] + place for m in both], xerr=error, **look)
     if measured:
-        panels[0].set(title=f"Frequency at {cold:g} °C", xlabel=f"less the measured frequency ({measured.label}), Hz")
+        panels[0].set(title=f"Frequency at {cold:g} °C", xlabel="difference from the measured frequency, Hz")
     panels[-1].set(title=f"Shift from {cold:g} to {hot:g} °C", xlabel="shift, Hz")
     handles, names = panels[-1].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside upper right", ncols=len(names), handletextpad=0.3)
@@ -179,8 +183,9 @@ def comparison(key: str, modes: Mapping[int, str], sources: Sequence[Peaks], col
 def responses(key: str, panels: Mapping[str, Sequence[Curve]], peaks: Sequence[Peaks], band: tuple[float, float]) -> str:
     """FRFs with their coherence, one panel a driving point, below a strip of the natural frequencies of every source."""
     every = sorted({curve.temperature for curves in panels.values() for curve in curves})
-    labels = list(dict.fromkeys(p.label for p in peaks))
-    heights = [0.26 * len(labels) + 0.16, *(h for _ in panels for h in (2.35, 0.55))]
+    own = ("computed", "identified")
+    labels = list(dict.fromkeys(p.label for p in sorted(peaks, key=lambda p: p.source not in own)))
+    heights = [0.26 * len(labels) + 0.22, *(h for _ in panels for h in (2.35, 0.55))]
     figure = Figure(figsize=(10.3, sum(heights) + 1.2))
     strip, *rest = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
     _strip(strip, peaks, labels, every, band)
@@ -192,8 +197,9 @@ def responses(key: str, panels: Mapping[str, Sequence[Curve]], peaks: Sequence[P
             if curve.coherence is not None:
                 below.plot(curve.frequency, curve.coherence, lw=0.9, color=kind["color"], ls=look[2])
         axes.set_title(title)
-        axes.set_ylabel("mobility,\ndB re 1 (m/s)/N")
-        below.set(ylabel="coher-\nence", ylim=(0, 1.08), yticks=(0, 0.5, 1))
+        axes.set_ylabel("mobility, dB re 1 (m/s)/N")
+        below.set(ylim=(0, 1.08), yticks=(0, 0.5, 1))
+        below.set_ylabel("coherence", fontsize=7.5)
     rest[-1].set(xlabel="frequency, Hz", xlim=band)
     handles = [Line2D([], [], color=colour(t, every), lw=2.2, label=f"{t:g} °C") for t in every]
     handles += [Line2D([], [], color=INK, lw=1.0, label="virtual test"), Line2D([], [], color=INK, lw=3.2, alpha=0.3, label="exact")]
@@ -214,9 +220,9 @@ def _strip(axes: Axes, peaks: Sequence[Peaks], labels: Sequence[str], every: Seq
         f = [f for f, _ in p.value.values()]
         axes.plot(f, [y] * len(f), marker, color=c, mfc=c if filled else "none", ms=4, mew=0.9, ls="none")
     numbered = next((p for p in peaks if p.source == "computed"), None)
-    for names, f in _grouped(numbered, 0.011 * (band[1] - band[0])) if numbered else ():
-        axes.annotate(names, (f, 0.3), ha="center", va="bottom", fontsize=8)
-    axes.set(yticks=[-i for i in range(len(labels))], yticklabels=labels, ylim=(-len(labels) + 0.4, 1.0))
+    for names, f in _grouped(numbered, 0.009 * (band[1] - band[0])) if numbered else ():
+        axes.annotate(names, (f, 0.36), ha="center", va="bottom", fontsize=8)
+    axes.set(yticks=[-i for i in range(len(labels))], yticklabels=labels, ylim=(-len(labels) + 0.4, 1.15))
     axes.tick_params(axis="both", length=0, labelbottom=False)
     axes.spines[["left", "bottom"]].set_visible(False)
     axes.set_title("Natural frequencies")
@@ -257,8 +263,8 @@ def section(key: str, point: OperatingPoint) -> tuple[str, float]:
         picture = right.tripcolor(
             *where.T, d.triangles, size, shading="gouraud", cmap="YlOrBr", vmin=0, vmax=max(largest * 1e6, 1e-6), rasterized=True
         )
-        for position, look in ((d.nodes * 1e3, {"lw": 0.6, "alpha": 0.55}), (where, {"lw": 1.0, "alpha": 1.0})):
-            right.plot(*_polyline(d, position).T, color=INK, **look)
+        for position, look in ((d.nodes * 1e3, {"lw": 0.7, "color": PALE}), (where, {"lw": 1.0, "color": INK})):
+            right.plot(*_polyline(d, position).T, **look)
     right.set_title(f"At {point.condition.temperature:g} °C, displacement × {scale:g}")
     bar = figure.colorbar(picture, ax=right, shrink=0.75, pad=0.02)
     bar.set_label("displacement, µm")
@@ -300,7 +306,10 @@ def _materials(axes: Axes, spindle: Spindle) -> None:
         axes.add_patch(Rectangle((r0, z0), r1 - r0, z1 - z0, fc=paint[g.material], ec=edges[g.part], lw=0.9))
     for b in spindle.bearings:
         axes.add_patch(Circle((b.pitch_diameter * 500, b.z * 1e3), b.ball_diameter * 500, fc="#f4f4f2", ec=INK, lw=0.8))
-        axes.annotate(f"{b.name} bearing", (b.pitch_diameter * 500, b.z * 1e3), (24, 0), textcoords="offset points", va="center", fontsize=8)
+        beside = max(g.r[1] for g in spindle.regions if g.z[0] - 1e-3 < b.z < g.z[1] + 1e-3) * 1e3
+        line = {"arrowstyle": "-", "color": INK, "lw": 0.6, "shrinkA": 1, "shrinkB": 4}
+        at = (b.pitch_diameter * 500, b.z * 1e3)
+        axes.annotate(f"{b.name} bearing", at, (beside + 1.2, b.z * 1e3), va="center", fontsize=8.5, arrowprops=line)
     handles = [Patch(fc=paint[name], ec="none", label=name) for name in used]
     handles += [Patch(fc="none", ec=edges[part], label=f"{part} part") for part in PARTS]
     axes.legend(handles=handles, loc="upper right", handlelength=1.2)

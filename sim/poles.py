@@ -9,7 +9,9 @@ k = 0, 1, 2 for receptance, mobility, accelerance; u are real and stand for what
 is independent with E|e|^2 = sd^2. Within the matrix, R_r = shape_r participation_r^T where this is imposed (any mode of a linear system
 that is not a multiple root, gyroscopic or not: Peeters et al., Shock and Vibration 11 (2004) 395, Eq. 12), otherwise free.
 
-Unknowns of the search are dropped and added by the Bayesian information criterion (Schwarz, Ann. Stat. 6 (1978) 461).
+Poles are added and dropped by the Bayesian information criterion (Schwarz, Ann. Stat. 6 (1978) 461). Candidates come from the residual
+itself (matching pursuit), not from a polynomial fit of high order (pLSCF, Peeters et al. 2004) or AAA (Nakatsukasa et al., SIAM J. Sci.
+Comput. 40 (2018) A1494): these return false poles too, which must be told from true ones, and were not better starts.
 Lines are scaled, s = i w / scale, by the caller; poles here are in that unit.
 """
 
@@ -38,7 +40,7 @@ APART = 5
 """Trial poles put at once are further apart than this many distances, not to fit the same peak."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Lines:
     """A measured matrix: s (n,) imaginary, `frf` (n_resp, n_ref, n) complex, `weight` sqrt(2)/sd of the same shape, `power` k."""
 
@@ -57,7 +59,7 @@ class Lines:
         return 2 * self.frf.size
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fit:
     """The best linear unknowns for given poles.
 
@@ -102,9 +104,9 @@ def project(lines: Lines, poles: Complex, shape: Complex | None = None, particip
     smooth = lines.s[:, None] ** (lines.power + SMOOTH)
     smooth = smooth @ np.linalg.inv(np.linalg.qr(np.vstack([smooth.real, smooth.imag]))[1])  # else parallel in a narrow band
     basis = np.hstack([_pairs(lines, poles, 1), smooth, _pairs(lines, poles, 2)])
-    p, q = 2 * m + len(SMOOTH), basis.shape[1]
-    parts = np.stack([basis.real, basis.imag], 1)
-    gram = (weight**2 @ (parts.transpose(0, 2, 1) @ parts).reshape(n, -1)).reshape(-1, q, q)
+    p = 2 * m + len(SMOOTH)
+    parts = np.vstack([basis.real, basis.imag])
+    gram = np.stack([(parts * np.tile(w, 2)[:, None]).T @ parts for w in weight**2])
     free = np.r_[a:m, m + a : p]
     inverse = _inverse(gram[:, free[:, None], free])
     coefficients = np.zeros((len(frf), p))
@@ -209,7 +211,7 @@ def search(lines: Lines, poles: Complex | None = None) -> Fit:
 
 
 def prune(lines: Lines, fit: Fit) -> Fit:
-    """Leave out poles that the information criterion does not pay for, and one of two that overlap if the other can do for both."""
+    """Leave out, weakest first, the poles that the information criterion does not pay for."""
     while len(fit.poles):
         loss = removal(fit)
         weakest = int(loss.argmin())
@@ -309,5 +311,5 @@ def _pairs(lines: Lines, poles: Complex, order: int) -> Complex:
 def _inverse(gram: Real) -> Real:
     """Inverses of positive matrices (..., p, p), scaled to unit diagonal first."""
     size = np.sqrt(np.einsum("...ii->...i", gram))
-    scaled = gram / size[..., None] / size[..., None, :] + 1e-13 * np.eye(gram.shape[-1])
+    scaled = gram / size[..., None] / size[..., None, :] + 1e-11 * np.eye(gram.shape[-1])
     return np.linalg.inv(scaled) / size[..., None] / size[..., None, :]

@@ -12,7 +12,7 @@ import re
 import tempfile
 import tomllib
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -24,6 +24,7 @@ from markupsafe import Markup
 
 from model.machine import Spindle
 from model.modes import frf, group_energy, point_rows
+from model.pair import BearingState
 from model.scene import BadInput, content_hash, load
 from sim import plots
 from sim.campaign import ModeRow, Test
@@ -262,7 +263,7 @@ def compared(run: Run) -> Table:
         label = f"measured, {campaign.folder.name if campaign.folder else campaign.title}" if several else "measured"
         for temperature in dict.fromkeys(t.temperature for t in campaign.tests if t.id in rows and t.modes):
             repeats = [rows[t.id] for t in campaign.tests if t.temperature == temperature and t.id in rows]
-            titles[label] = campaign.title
+            titles[label] = f"{campaign.title}. {campaign.note}".strip()
             raw.append(Peaks("measured", label, temperature, _averaged(repeats, numbers)))
     papers = published(run.spindle)
     flexibility: dict[int, str] = {}
@@ -325,9 +326,15 @@ def headlines(run: Run, table: Table) -> list[tuple[str, str, str]]:
         return [("Preload", f"{b[0].preload:.1f} N", f"at {cold:g} °C")]
     first, last = (next(s.point.state for s in run.steps if _temperature(s) == t) for t in (cold, hot))
     a, b = first.bearings[0], last.bearings[0]
-    cards = [("Preload", f"{a.preload:.1f} → {b.preload:.1f} N", f"{b.preload / a.preload:.0%} of it is left at {hot:g} °C")]
-    change = [(b.radial_stiffness / a.radial_stiffness - 1, b.axial_stiffness / a.axial_stiffness - 1, b.name) for a, b in zip(first.bearings, last.bearings, strict=True)]
-    cards.append(("Bearing stiffness, radial", " / ".join(f"{100 * c[0]:+.0f}" for c in change) + " %", "axial " + " / ".join(f"{100 * c[1]:+.0f}" for c in change) + " %, " + " / ".join(c[2] for c in change)))
+    cards = [("Preload", f"{a.preload:.1f} → {b.preload:.1f} N", f"{100 * b.preload / a.preload:.0f} % of it is left at {hot:g} °C")]
+    pairs = list(zip(first.bearings, last.bearings, strict=True))[::-1]
+    names = " / ".join(b.name for _, b in pairs) + " bearing"
+    turned = " / ".join(f"{np.degrees(b.contact_angle - a.contact_angle):+.2f}" for a, b in pairs)
+    radial, axial = (
+        " / ".join(f"{100 * (getattr(b, key) / getattr(a, key) - 1):+.0f}" for a, b in pairs) for key in ("radial_stiffness", "axial_stiffness")
+    )
+    cards.append(("Contact angle", f"{turned} degrees", f"{names}, from {cold:g} to {hot:g} °C"))
+    cards.append(("Radial bearing stiffness", f"{radial} %", f"{names}; axial {axial} %"))
     groups: dict[str, list[Row]] = {}
     for row in table.rows:
         groups.setdefault(row.published_flexibility or row.flexibility + " ", []).append(row)
@@ -335,7 +342,7 @@ def headlines(run: Run, table: Table) -> list[tuple[str, str, str]]:
         moved = [(row.number, table.shift("computed", row.number)) for row in rows]
         shifts = [f"{s[0]:+.1f}" for _, s in moved if s is not None]
         by = "as published" if rows[0].published_flexibility else "by the model"
-        cards.append((f"Modes {_listed([n for n, _ in moved])}: {name.strip()}, {by}", ", ".join(shifts) + " Hz", f"shift from {cold:g} to {hot:g} °C, computed"))
+        cards.append((f"Modes {_listed([n for n, _ in moved])}: {name.strip()}, {by}", ", ".join(shifts) + " Hz", f"computed shift from {cold:g} to {hot:g} °C"))
     return cards
 
 
@@ -353,7 +360,7 @@ def misses(table: Table) -> list[str]:
         f = measured.value[worst][0]
         says.append(
             f"The largest miss at {cold:g} °C is mode {worst} ({rows[worst].kind}): computed {own.value[worst][0]:.1f} Hz, measured {f:.1f} Hz, "
-            f"{abs(off[worst]):.1f} Hz or {abs(off[worst]) / f:.1%} too {'high' if off[worst] > 0 else 'low'}. "
+            f"{abs(off[worst]):.1f} Hz or {100 * abs(off[worst]) / f:.1f} % too {'high' if off[worst] > 0 else 'low'}. "
             f"Over all {len(off)} measured modes the difference runs from {min(off.values()):+.1f} to {max(off.values()):+.1f} Hz."
         )
         for a, b in pairwise(sorted(off, key=lambda n: measured.value[n][0])):
@@ -368,12 +375,12 @@ def misses(table: Table) -> list[str]:
         if both:
             says.append(
                 f"The published analysis misses the measurement too, by up to {far:.1f} Hz at {cold:g} °C; it differs from the model by at most "
-                f"{near:.1f} Hz."
+                f"{near:.1f} Hz" + (f", whose {calibrated} calibrated numbers were chosen to that end." if calibrated else ".")
             )
     for name in dict.fromkeys(r.published_flexibility for r in table.rows if r.published_flexibility):
         other = [r for r in table.rows if r.published_flexibility == name and r.flexibility.rstrip("s") not in name]
         if other:
-            held = "; ".join(f"mode {r.number}: {r.flexibility} {r.share:.0%}, bearings {r.bearing_share:.0%}" for r in other)
+            held = "; ".join(f"mode {r.number}: {r.flexibility} {100 * r.share:.0f} %, bearings {100 * r.bearing_share:.0f} %" for r in other)
             says.append(f"The publication names “{name}” as the main flexibility where most of the model's strain energy sits elsewhere ({held}).")
     return says
 
@@ -440,19 +447,24 @@ def _measured_curves(run: Run, step: Step, node: int) -> Iterator[Curve]:
 def bearing_figures(run: Run) -> list[tuple[str, Markup]]:
     """Figs. 9 to 12: (caption, SVG)."""
     temperature = [_temperature(s) for s in run.steps]
-    figures = (
-        ("angle", "Fig. 9. Contact angle", "contact angle, °", lambda b: np.degrees(b.contact_angle)),
-        ("deformation", "Fig. 10a. Deformation of one ball, both contacts", "deformation, µm", lambda b: b.deformation * 1e6),
-        ("force", "Fig. 10b. Contact force of one ball", "contact force, N", lambda b: b.contact_force),
-        ("ball", "Fig. 10c. Stiffness of one ball", "ball stiffness, N/µm", lambda b: b.ball_stiffness * 1e-6),
-        ("preload", "Fig. 11. Preload: axial force of the bearing", "preload, N", lambda b: b.preload),
-        ("radial", "Fig. 12. Radial stiffness of one bearing", "radial stiffness, N/µm", lambda b: b.radial_stiffness * 1e-6),
-        ("axial", "Fig. 12. Axial stiffness of one bearing", "axial stiffness, N/µm", lambda b: b.axial_stiffness * 1e-6),
+    figures: tuple[tuple[str, str, str, Mapping[str, Callable[[BearingState], float]]], ...] = (
+        ("angle", "Fig. 9. Contact angle.", "contact angle, degrees", {"": lambda b: np.degrees(b.contact_angle)}),
+        ("deformation", "Fig. 10a. Deformation of one ball, both contacts.", "deformation, µm", {"": lambda b: b.deformation * 1e6}),
+        ("force", "Fig. 10b. Contact force of one ball.", "contact force, N", {"": lambda b: b.contact_force}),
+        ("ball", "Fig. 10c. Stiffness of one ball.", "ball stiffness, N/µm", {"": lambda b: b.ball_stiffness * 1e-6}),
+        ("preload", "Fig. 11. Preload, the axial force of a bearing.", "preload, N", {"": lambda b: b.preload}),
+        (
+            "stiffness",
+            "Fig. 12. Radial and axial stiffness of one bearing.",
+            "bearing stiffness, N/µm",
+            {"radial": lambda b: b.radial_stiffness * 1e-6, "axial": lambda b: b.axial_stiffness * 1e-6},
+        ),
     )
+    states = {b.name: [s.point.state.bearing(b.name) for s in run.steps] for b in run.spindle.bearings}
     answer = []
-    for key, caption, label, value in figures:
-        values = {b.name: [float(value(s.point.state.bearing(b.name))) for s in run.steps] for b in run.spindle.bearings}
-        answer.append((caption, Markup(plots.trend(key, temperature, values, label, from_zero=key != "angle"))))
+    for key, caption, label, quantities in figures:
+        curves = {name: {b: [float(value(s)) for s in states[b]] for b in states} for name, value in quantities.items()}
+        answer.append((caption, Markup(plots.trend(key, temperature, curves, label, from_zero=key != "angle"))))
     return answer
 
 
@@ -493,22 +505,24 @@ def _page() -> object:
 
 
 def _minus(text: str) -> str:
-    return text.replace("-", "−")
+    """A true minus before digits, and units kept on the line of their number."""
+    return re.sub(r"(?<=\d) (?=(%|Hz|N|°C)\b|%)", "\u00a0", re.sub(r"(?<![\w-])-(?=\d)", "−", text))
 
 
 def _signed(value: float, digits: int = 1) -> str:
     return _minus(f"{value:+.{digits}f}")
 
 
-def _with_error(pair: tuple[float, float | None] | None, sign: bool = False, digits: int = 1) -> str:
-    """A number with its standard error, to two digits of the error; an en dash for none."""
+def _with_error(pair: tuple[float, float | None] | None, sign: bool = False, digits: int = 1) -> Markup:
+    """A number with its standard error, to the error's first digit (two, if that is a one); an en dash for no number."""
     if pair is None:
-        return "–"
+        return Markup("–")
     value, error = pair
-    if error is None or not np.isfinite(error):
-        return _minus(f"{value:{'+' if sign else ''}.{digits}f}")
-    digits = int(np.clip(1 - np.floor(np.log10(max(error, 1e-3))), 0, 3))
-    return _minus(f"{value:{'+' if sign else ''}.{digits}f}") + f" ± {error:.{digits}f}"
+    known = error is not None and np.isfinite(error) and error > 0
+    if known:
+        digits = int(np.clip(-np.floor(np.log10(error / 2)), 0, 5))
+    text = _minus(f"{value:{'+' if sign else ''}.{digits}f}")
+    return Markup(f"{text} <small>± {error:.{digits}f}</small>" if known else text)
 
 
 def _conditions(run: Run) -> str:

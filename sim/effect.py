@@ -1,0 +1,83 @@
+"""What a physical effect is: a file with its equation, parameters and pure functions that change what one step of the chain sees.
+
+A condition flows  spindle -> region temperatures -> ring motions -> bearing pair -> rotor-base chain -> measurement;  an effect changes
+any of these, and at its neutral values it changes nothing, exactly. Effects are applied in the order of the scene. No other code
+knows an effect by name: where it seemed to need to, the state would lack a field.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from model.ball_row import Array
+from model.machine import Condition, RingMotion, Spindle
+from model.pair import PairState
+from model.rotor_base import RotorBase
+
+Values = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of an effect: a readable row.
+
+    `typical` is a plausible size where the effect is present; `prior_sd` the width of what one believes before measuring, about
+    `neutral`; values outside `limits` are not physical.
+    """
+
+    name: str
+    unit: str
+    neutral: float
+    typical: float
+    prior_sd: float
+    limits: tuple[float, float]
+    meaning: str
+    source: str
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """The measuring chain: what is read of the chain's motion, and how.
+
+    A measured mobility is gain exp(-i omega delay) H(i omega + decay) with H between the reference and response rows.
+    """
+
+    response_rows: Array  # (n_resp, n)
+    reference_rows: Array  # (n_ref, n)
+    gain: Array  # (n_resp,)
+    delay: Array  # (n_resp,) s
+    decay: float  # 1/s, damping an uncorrected exponential window adds
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A physical effect. Each function may be left out; `Values` hold every parameter.
+
+    `spindle(spindle, condition, values)` the drawing itself at a condition: materials, structure, preload, bearings;
+    `temperatures(spindle, condition, values, by_region)` region temperatures (C);
+    `motions(spindle, condition, values, by_bearing)` thermal and other ring motions;
+    `pair(spindle, condition, values, state)` bearing states;
+    `chain(spindle, condition, values, chain)` bodies and elements;
+    `measurement(spindle, condition, values, chain, measurement)` the measuring chain.
+    """
+
+    name: str
+    title: str
+    equation: str
+    parameters: tuple[Parameter, ...]
+    sees: str  # what one sees of it
+    resembles: tuple[str, ...]  # effects it is easily confused with
+    valid: str  # where it is valid
+    spindle: Callable[[Spindle, Condition, Values], Spindle] | None = None
+    temperatures: Callable[[Spindle, Condition, Values, dict[str, float]], dict[str, float]] | None = None
+    motions: Callable[[Spindle, Condition, Values, dict[str, RingMotion]], dict[str, RingMotion]] | None = None
+    pair: Callable[[Spindle, Condition, Values, PairState], PairState] | None = None
+    chain: Callable[[Spindle, Condition, Values, RotorBase], RotorBase] | None = None
+    measurement: Callable[[Spindle, Condition, Values, RotorBase, Measurement], Measurement] | None = None
+
+    def neutral(self) -> dict[str, float]:
+        return {p.name: p.neutral for p in self.parameters}
+
+    def typical(self) -> dict[str, float]:
+        return {p.name: p.typical for p in self.parameters}
