@@ -1,0 +1,85 @@
+"""A campaign as the diagnosis sees it: for every test its modes, with covariances that are never zero."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from model.ball_row import Array
+from model.machine import Condition
+from model.modes import ComplexArray
+from sim.campaign import Campaign, Test
+from sim.modal import extract, noise_model, without_window
+
+FREQUENCY_FLOOR = 3e-5  # relative: finite elements and bearing equilibrium of the model itself
+DAMPING_FLOOR = 3e-3  # relative
+SHAPE_FLOOR = 3e-3  # relative, of a shape ratio
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """Modes of one test in order of frequency; m modes, n_resp channels.
+
+    `covariance` (2m, 2m) of [ln frequency, ln damping]; damping not measured is NaN with infinite variance. `shape` (m, n_resp) and
+    `shape_sd` are relative to the largest component, None for a table of modes, which says the `kind` of each mode instead.
+    """
+
+    test: Test
+    condition: Condition
+    frequency: Array
+    damping: Array
+    covariance: Array
+    shape: ComplexArray | None
+    shape_sd: Array | None
+    kind: tuple[str, ...] | None
+
+
+def observe(campaign: Campaign, progress: Callable[[str], None] = lambda done: None) -> list[Observation]:
+    """Mode tables of all tests; FRFs are turned into modes first, with the standard errors of the extraction."""
+    observations = []
+    for test in campaign.tests:
+        observations.append(_from_frf(campaign, test) if test.frf is not None else _from_table(test))
+        progress(f"{test.id}: {len(observations[-1].frequency)} modes")
+    return observations
+
+
+def condition_of(test: Test) -> Condition:
+    soak = np.inf if test.soak_time is None else test.soak_time
+    return Condition(test.temperature, test.speed, test.level or 0.0, soak)
+
+
+def _from_frf(campaign: Campaign, test: Test) -> Observation:
+    frf = test.frf
+    assert frf is not None
+    sd = frf.sd
+    if sd is None and campaign.noise is not None:
+        sd = noise_model(frf.value, campaign.noise.of_value, campaign.noise.of_largest)
+    found = extract(frf.frequency, frf.value, sd, kind=frf.quantity)
+    if test.window_decay:
+        found = without_window(found, test.window_decay)
+    scale = np.concatenate([found.frequency, found.damping])
+    covariance = found.covariance / np.outer(scale, scale)
+    floor = np.concatenate([np.full(len(found.frequency), f) for f in (FREQUENCY_FLOOR, DAMPING_FLOOR)])
+    return Observation(
+        test,
+        condition_of(test),
+        found.frequency,
+        found.damping,
+        covariance + np.diag(floor**2),
+        found.shape,
+        found.shape_sd,
+        None,
+    )
+
+
+def _from_table(test: Test) -> Observation:
+    rows = sorted(test.modes, key=lambda r: r.frequency)
+    frequency = np.array([r.frequency for r in rows])
+    damping = np.array([np.nan if r.damping_ratio is None else r.damping_ratio for r in rows])
+    sd_f = np.array([r.frequency_sd for r in rows]) / frequency
+    sd_z = np.array([np.inf if r.damping_ratio_sd is None or r.damping_ratio is None else r.damping_ratio_sd / r.damping_ratio for r in rows])
+    variance = np.concatenate([sd_f**2 + FREQUENCY_FLOOR**2, sd_z**2 + DAMPING_FLOOR**2])
+    kinds = tuple(r.kind for r in rows)
+    return Observation(test, condition_of(test), frequency, damping, np.diag(variance), None, None, kinds)

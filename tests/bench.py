@@ -1,0 +1,120 @@
+"""`make bench`: what the program costs, measured side by side on this machine; prints, asserts nothing.
+
+Ratios are the medians of alternating runs, so that a busy machine slows both sides alike.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from statistics import median
+
+import mujoco
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from model.machine import Condition, Spindle
+from model.mjcf import linearise
+from model.modes import modes
+from model.rotor_base import matrices
+from model.scene import load
+from sim.hammer import draw_hits
+from sim.impact import acquire, estimate_of, impact_tests, sampling, simulate
+from sim.operating import operating_point, stiffness_table
+from sim.run import identify
+from thermal.expansion import expand
+
+SCENE = Path(__file__).parents[1] / "scenes" / "hdd_2003"
+
+
+def seconds(work: Callable[[], object], repeat: int = 5) -> float:
+    """Median wall time of `repeat` calls after one to warm up."""
+    work()
+    times = []
+    for _ in range(repeat):
+        start = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - start)
+    return median(times)
+
+
+def cold_influence(spindle: Spindle) -> float:
+    """Time of the finite elements with no cache of any kind (a new process would take as long)."""
+    from thermal import influence
+
+    kept = os.environ.get("THERMOSPINDLE_CACHE")
+    with tempfile.TemporaryDirectory() as empty:
+        os.environ["THERMOSPINDLE_CACHE"] = empty
+        influence._kept.cache_clear()
+        start = time.perf_counter()
+        expand(spindle, 60.0)
+        took = time.perf_counter() - start
+    os.environ.pop("THERMOSPINDLE_CACHE")
+    if kept is not None:
+        os.environ["THERMOSPINDLE_CACHE"] = kept
+    return took
+
+
+def time_domain(spindle: Spindle, rounds: int = 5) -> tuple[float, float]:
+    """Our whole impact test (simulation, acquisition, FRFs) and MuJoCo's own stepping of the same model and steps, seconds.
+
+    MuJoCo's own: `mj_step` in C with `nstep`, hits one after the other on one core, against ours on one core.
+    """
+    point = operating_point(spindle, Condition(20.0))
+    test = replace(spindle.hammer, hits=1, hammer_nodes=(1,))
+    every, steps = sampling(test)
+    hits = [draw_hits(test, np.random.default_rng(0))]
+    data = mujoco.MjData(point.model)
+
+    def own() -> None:
+        mujoco.mj_resetDataKeyframe(point.model, data, 0)
+        mujoco.mj_step(point.model, data, nstep=steps)
+
+    def ours() -> None:
+        held, velocity = simulate(point.model, test, hits, steps)
+        estimate_of(test, point, acquire(test, held, velocity, every, np.random.default_rng(0)))
+
+    pairs = [(seconds(ours, 1), seconds(own, 1)) for _ in range(rounds)]
+    return median(p[0] for p in pairs), median(p[1] for p in pairs)
+
+
+def main() -> None:
+    spindle = load(SCENE)
+    grid = Table("what", "time", "asked", show_edge=False)
+    console = Console()
+
+    def row(what: str, value: str, asked: str = "") -> None:
+        grid.add_row(what, value, asked)
+
+    row("thermal finite elements from scratch, both parts", f"{cold_influence(spindle):.2f} s")
+    row("ring motions at a temperature, warm", f"{1e3 * seconds(lambda: expand(spindle, 47.0)):.2f} ms")
+    temperatures = [20.0, 30.0, 40.0, 50.0, 60.0]
+    row("stiffness table of five temperatures", f"{1e3 * seconds(lambda: stiffness_table(spindle, temperatures)):.2f} ms")
+    point = operating_point(spindle, Condition(40.0))
+    lines = np.arange(400.0, 3001.0)
+    linear = point.linear
+    row("linearisation of the MuJoCo model (M, C, K)", f"{1e3 * seconds(lambda: linearise(point.model), 20):.2f} ms")
+    row("assembly of M, C, K without MuJoCo", f"{1e3 * seconds(lambda: matrices(point.chain), 20):.2f} ms")
+    row("modes", f"{1e3 * seconds(lambda: modes(point.chain, linear), 20):.2f} ms")
+    row("exact FRFs, 14 x 2601 lines", f"{1e3 * seconds(lambda: point.frf(lines), 20):.2f} ms")
+
+    def condition() -> None:
+        found = operating_point(spindle, Condition(40.0))
+        own = matrices(found.chain)
+        modes(found.chain, own)
+
+    row("one condition: temperature to modes, warm", f"{1e3 * seconds(condition, 20):.2f} ms", "3 ms")
+    test = impact_tests([point])[0]
+    row("modal extraction of one test", f"{seconds(lambda: identify(test), 3):.2f} s")
+    ours, own = time_domain(spindle)
+    row("time domain, one hit: ours / MuJoCo's own stepping", f"{ours:.3f} / {own:.3f} s = {ours / own:.3f}", "1.15")
+    console.print(grid)
+
+
+if __name__ == "__main__":
+    main()
