@@ -17,6 +17,7 @@ from model.pair import NoEquilibrium
 from sim.effect import Effect
 
 STEP = 0.3  # of a prior standard deviation, for derivatives by nuisance parameters
+TRUST = 2.0  # prior standard deviations, the longest step of any parameter
 WORST = 1e12  # chi2 of a state that has no equilibrium
 
 
@@ -131,6 +132,7 @@ def fit(theory: Theory, about: Linear, effects: Sequence[Effect] = (), start: Se
         normal = white.T @ white + np.eye(len(scale))
         for _ in range(8):
             move = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), gradient) * scale
+            move /= max(1.0, float(np.max(np.abs(move / scale))) / TRUST)
             new_x, new_theta = x + move[: len(x)], np.clip(theta + move[len(x) :], low, high)
             new_m = model(new_x, new_theta)
             new = cost(new_m, new_x, new_theta)

@@ -156,9 +156,12 @@ def features_of(data: Data, predicted: Sequence[Predicted]) -> Array:
         elif f.what == "damping":
             value[k] = np.log(max(p.damping[i], 1e-9))
         else:
-            ratio = p.shape[i, f.channel] / p.shape[i, f.against]
-            part = np.log(max(abs(ratio), 1e-9)) if f.what == "amplitude" else float(np.angle(ratio * np.exp(-1j * data.value[k])) + data.value[k])
-            value[k] = part
+            size = np.maximum(np.abs(p.shape[i]).max() * 1e-6, np.abs(p.shape[i, [f.channel, f.against]]))
+            if f.what == "amplitude":
+                value[k] = np.log(size[0] / size[1])
+            else:  # the branch of the angle nearest to the measured one
+                turn = np.angle(p.shape[i, f.channel] * p.shape[i, f.against].conj() * np.exp(-1j * data.value[k]))
+                value[k] = data.value[k] + float(turn)
     return value
 
 

@@ -1,8 +1,8 @@
 """The Rerun log of a run: one `.rrd` with what was computed, and a blueprint that shows it at a glance.
 
-Rerun shows one timeline at a time, so everything that moves, moves on the timeline `frequency` (Hz, rounded to whole numbers): FRFs are
-series on it, bodies swing while its cursor sweeps. Charts over other axes are drawings that every timeline shows; the same
-numbers stand as series on `temperature` and `time`. `numbers/` holds the FRFs as computed, bit for bit (`sim.log_read`).
+Rerun shows one timeline at a time, so everything that moves, moves on the timeline `frequency` (Hz, rounded to whole numbers):
+FRFs are series on it, bodies swing while its cursor sweeps. Charts over other axes are drawings that every timeline shows; the
+same numbers stand as series on `temperature` and `time`. `numbers/` holds the FRFs as computed, bit for bit (`sim.log_read`).
 """
 
 from __future__ import annotations
@@ -20,17 +20,18 @@ from model.ball_row import Array
 from model.scene import BadInput
 from sim import log_drawing as drawing
 from sim.log_blueprint import CHARTS, at, blueprint, pair_path
-from sim.log_content import Pair, Peak, Shown, decibel, frf_of, one, shown, summary
+from sim.log_content import Pair, Peak, Shown, bearing_series, decibel, frf_of, one, shown, summary
 from sim.log_drawing import CYCLE, MM, Curve, heat
 from sim.log_read import APPLICATION, LogContents, describe, read_log
 from sim.operating import provenance
 from sim.run import Run
-from thermal.expansion import DeformedSection, expand, field
+from thermal.expansion import DeformedSection, field
 
 __all__ = ["LogContents", "describe", "read_log", "write_log"]
 
 SIDES = ((90, 200, 255), (255, 170, 80))  # lower and upper bearing
 MEASURED = ((120, 255, 140), (30, 190, 90))
+KEYS = 5  # temperatures named in the key, at most
 LIGHT = (235, 235, 235)
 
 
@@ -63,14 +64,14 @@ def _write(content: Shown, file: Path) -> None:
     run, spindle = content.run, content.run.spindle
     sections = [field(spindle, t) for t in content.temperatures]
     factor = drawing.exaggeration(sections, drawing.reach(spindle))
-    series = {b.name: bearing_series(content, b.name) for b in spindle.bearings}
+    series = {b.name: bearing_series(run, b.name) for b in spindle.bearings}
     recording = rr.RecordingStream(APPLICATION, send_properties=False)
     try:
-        quantities = [name for name, _ in series[spindle.bearings[0].name]]
-        recording.save(file, default_blueprint=blueprint(content, quantities, factor))
+        quantities = dict(series[spindle.bearings[0].name])
+        recording.save(file, default_blueprint=blueprint(content, list(quantities), factor))
         ends = (min(content.temperatures), max(content.temperatures))
         recording.send_recording_name(f"{spindle.name}, " + " to ".join(f"{t:g} C" for t in dict.fromkeys(ends)))
-        recording.send_property("run", rr.AnyValues(title=spindle.title, **provenance(spindle)))
+        recording.send_property("run", _values({"title": spindle.title, **provenance(spindle)}))
         log_numbers(recording, content)
         log_frfs(recording, content)
         log_peaks(recording, content)
@@ -98,7 +99,7 @@ def log_numbers(recording: rr.RecordingStream, content: Shown) -> None:
         for name, array in arrays.items():
             if array is not None:
                 flat = np.ascontiguousarray(array.reshape(pairs, -1).T).ravel()
-                columns += rr.AnyValues.columns(**{name: flat}).partition(np.full(len(frf.frequency), pairs))
+                columns += _column(name, flat).partition(np.full(len(frf.frequency), pairs))
         recording.send_columns(at("numbers", test.id), [_over_frequency(frf.frequency)], columns)
         about = rr.AnyValues(
             id=test.id,
@@ -111,7 +112,7 @@ def log_numbers(recording: rr.RecordingStream, content: Shown) -> None:
         )
         recording.log(at("numbers", test.id, "about"), about, static=True)
     names = Peak.__dataclass_fields__
-    peaks = rr.AnyValues(**{name: [getattr(p, name) for p in content.peaks] for name in names})
+    peaks = _values({name: [getattr(p, name) for p in content.peaks] for name in names})
     recording.log("numbers/peaks", peaks, static=True)
 
 
@@ -119,7 +120,7 @@ def log_frfs(recording: rr.RecordingStream, content: Shown) -> None:
     """Level, phase and coherence of every FRF for the eye."""
     for test in content.tests:
         frf, colour = frf_of(test), heat(test.temperature, content.temperatures)
-        look = rr.SeriesLines(colors=[colour], names=f"{test.temperature:g} °C", widths=1.5)
+        look = _line(colour, f"{test.temperature:g} °C", 1.5)
         for pair in ((r, h) for r in frf.response_nodes for h in frf.reference_nodes):
             value = one(frf.value, frf, pair)
             series = {"level": decibel(value), "phase": np.degrees(np.angle(value))}
@@ -132,11 +133,11 @@ def log_peaks(recording: rr.RecordingStream, content: Shown) -> None:
     """Identified peaks on the curves, a series for each mode; measured frequencies in rows at the bottom."""
     frfs = {t.id: frf_of(t) for t in content.tests}
     marks: dict[tuple[str, str], tuple[rr.SeriesPoints, list[Peak], float | None]] = {}
-    for mode, kind in enumerate((m.kind for m in content.modes), 1):
-        look = rr.SeriesPoints(colors=[LIGHT], markers="diamond", marker_sizes=4, names=f"mode {mode} {kind}, identified")
+    for mode, kind in enumerate(["none of the model's", *(m.kind for m in content.modes)]):
+        look = rr.SeriesPoints(colors=[LIGHT], markers="diamond", marker_sizes=4, names=f"{mode} {kind}, identified")
         own = [p for p in content.peaks if p.source == "identified" and p.mode == mode]
         marks["identified", f"mode {mode}"] = (look, own, None)
-    for k, ((source, test), own) in enumerate(_measured(content).items()):
+    for k, ((source, test), own) in enumerate(content.measured.items()):
         name = f"measured {own[0].temperature:g} °C ({source})"
         look = rr.SeriesPoints(colors=[MEASURED[k % 2]], markers="up", marker_sizes=5, names=name)
         marks["measured", f"{source} {test}"] = (look, own, content.level[0] + 2.0 + 4.0 * k)
@@ -148,42 +149,21 @@ def log_peaks(recording: rr.RecordingStream, content: Shown) -> None:
                 _series(recording, at(*pair_path(pair), "level", group, name), times, np.array(values), look)
 
 
-def _measured(content: Shown) -> dict[tuple[str, str], list[Peak]]:
-    """Measured peaks by campaign and test."""
-    found: dict[tuple[str, str], list[Peak]] = {}
-    for p in content.peaks:
-        if p.source not in ("computed", "identified"):
-            found.setdefault((p.source, p.test), []).append(p)
-    return found
-
-
 def _level(frf: Any, pair: Pair, frequency: float) -> float:
     return float(np.interp(frequency, frf.frequency, decibel(one(frf.value, frf, pair))))
 
 
 def log_key(recording: rr.RecordingStream, content: Shown) -> None:
-    """What the colours and marks of the FRF plots mean, and which peak is which mode: its names stand above the peaks."""
-    key = drawing.Drawing()
-    width, _ = CHARTS["key"]
-    words = [(f"{t:g} °C", tuple(heat(t, content.temperatures))) for t in content.temperatures]
-    words += [("◆ identified", LIGHT)]
-    measured = _measured(content).values()
-    words += [(f"▲ measured {own[0].temperature:g} °C", MEASURED[k % 2]) for k, own in enumerate(measured)]
-    place = 8.0
-    for text, colour in words:
-        key.label(place + 3.6 * len(text) + 5, 15.0, text, colour)
-        place += 7.2 * len(text) + 16
+    """What the colours and marks of the level plots mean, and the numbers of the modes above their peaks."""
+    some = np.unique(np.linspace(0, len(content.tests) - 1, KEYS).round().astype(int))
+    words = [(f"{t:g} °C", heat(t, content.temperatures)) for t in np.array(content.temperatures)[some]] + [
+        ("◆ identified", LIGHT)
+    ]
+    for k, own in enumerate(content.measured.values()):
+        words.append((f"▲ {'measured ' if k == 0 else ''}{own[0].temperature:g} °C", MEASURED[k % 2]))
     low, high = content.band
-    names: list[tuple[float, str, str]] = []
-    for i, m in enumerate(content.modes, 1):
-        x = 34 + (m.frequency - low) / (high - low) * (width - 34)
-        if names and x - names[-1][0] < 62 and names[-1][2] == m.kind:
-            names[-1] = (names[-1][0], f"{names[-1][1]} {i}", m.kind)
-        else:
-            names.append((x, f"{i}", m.kind))
-    for x, numbers, kind in names:
-        key.label(x, 45.0, f"{numbers} {kind}")
-    _draw(recording, "charts/key", key)
+    peaks = [(m.frequency - low) / (high - low) for m in content.modes]
+    _draw(recording, "charts/key", drawing.key(words, peaks, CHARTS["key"][0]))
 
 
 # ---------------------------------------------------------------- model, section, bearings
@@ -194,7 +174,7 @@ def log_motion(recording: rr.RecordingStream, content: Shown) -> None:
     point = content.run.steps[0].point
     frequency = np.arange(content.band[0], content.band[1] + 1, content.step)
     motions = {f"mode_{i}": drawing.mode_motion(point, m, len(frequency)) for i, m in enumerate(content.modes, 1)}
-    motions["sweep"] = drawing.sweep_motion(point, content.pairs[0][1], frequency)
+    motions["sweep"] = drawing.sweep_motion(point, content.pairs[0][1], frequency.astype(float))
     slow = rr.TimeColumn("slow motion", duration=np.arange(len(frequency)) / CYCLE)
     meshes = drawing.body_meshes(point.spindle)
     for name, motion in motions.items():
@@ -240,33 +220,16 @@ def log_section(
     recording.log("section", rr.AnyValues(displacement_is_drawn_times=factor), static=True)
 
 
-def bearing_series(content: Shown, name: str) -> dict[tuple[str, str], Array]:
-    """Quantities of one bearing over the temperatures, (temperatures,) by name and unit."""
-    states = [s.point.state.bearing(name) for s in content.run.steps]
-    motions = [expand(content.run.spindle, t)[name] for t in content.temperatures]
-    series = {
-        ("contact angle", "deg"): [np.degrees(s.contact_angle) for s in states],
-        ("deformation", "µm"): [1e6 * s.deformation for s in states],
-        ("ball force", "N"): [s.contact_force for s in states],
-        ("preload", "N"): [s.preload for s in states],
-        ("radial stiffness", "N/µm"): [1e-6 * s.radial_stiffness for s in states],
-        ("axial stiffness", "N/µm"): [1e-6 * s.axial_stiffness for s in states],
-        ("ring gap r", "µm"): [1e6 * (m.outer_r - m.inner_r) for m in motions],
-        ("ring gap z", "µm"): [1e6 * (m.outer_z - m.inner_z) for m in motions],
-    }
-    return {key: np.array(values) for key, values in series.items()}
-
-
 def log_bearings(recording: rr.RecordingStream, content: Shown, series: Mapping[str, Mapping[tuple[str, str], Array]]) -> None:
     """The bearing states as series over temperature, and as charts; a ring gap is the outer ring's thermal motion less the
     inner ring's."""
     panels: dict[tuple[str, str], list[Curve]] = {}
     for k, (bearing, own) in enumerate(series.items()):
         for (name, unit), values in own.items():
-            look = rr.SeriesLines(colors=[SIDES[k % 2]], names=f"{bearing}, {unit}")
+            look = _line(SIDES[k % 2], bearing)
             _series(recording, at("bearings", name, bearing), _over_temperature(content), values, look)
             panels.setdefault((name, unit), []).append(Curve(np.array(content.temperatures), values, np.array(SIDES[k % 2])))
-    _draw(recording, "charts/bearings", drawing.charts([(f"{n}, {u}", "°C", c) for (n, u), c in panels.items()], 2, 195, 92))
+    _draw(recording, "charts/bearings", drawing.charts([(f"{n}, {u}", "°C", c) for (n, u), c in panels.items()], 3, 130, 112))
 
 
 # ---------------------------------------------------------------- records
@@ -279,7 +242,7 @@ def log_records(recording: rr.RecordingStream, content: Shown) -> None:
     for step, test in zip(content.run.steps, content.tests, strict=True):
         record, colour = step.test.record, heat(test.temperature, content.temperatures)
         time = rr.TimeColumn("time", duration=record.time)
-        look = rr.SeriesLines(colors=[colour], names=f"{test.temperature:g} °C")
+        look = _line(colour, f"{test.temperature:g} °C")
         place = {node: i for i, node in enumerate(frf_of(test).response_nodes)}
         for h, hammer in enumerate(hammers):
             force, velocity = record.force[h, 0], 1e3 * record.velocity[h, 0]
@@ -291,7 +254,7 @@ def log_records(recording: rr.RecordingStream, content: Shown) -> None:
                 part = slice(int(np.searchsorted(record.time, end)) + 1)
                 curve = Curve(1e3 * record.time[part], values[part], colour)
                 panels.setdefault(f"{title} at {hammer}, {'N' if title == 'force' else 'mm/s'}", []).append(curve)
-    _draw(recording, "charts/records", drawing.charts([(title, "ms", c) for title, c in panels.items()], 2, 195, 100))
+    _draw(recording, "charts/records", drawing.charts([(title, "ms", c) for title, c in panels.items()], 2, 195, 84))
 
 
 # ---------------------------------------------------------------- columns
@@ -302,6 +265,20 @@ def _series(
 ) -> None:
     recording.log(entity, look, static=True)
     recording.send_columns(entity, [times], rr.Scalars.columns(scalars=values))
+
+
+def _line(colour: Any, name: str, width: float = 1.0) -> rr.SeriesLines:
+    """Without Rerun's aggregation, which averages neighbouring points and so lowers peaks."""
+    return rr.SeriesLines(colors=[colour], names=name, widths=width, aggregation_policy=rr.components.AggregationPolicy.Off)
+
+
+def _values(values: dict[str, Any]) -> rr.AnyValues:
+    return rr.AnyValues(**values)
+
+
+def _column(name: str, values: Array) -> rr.ComponentColumnList:
+    columns: dict[str, Any] = {name: values}
+    return rr.AnyValues.columns(**columns)
 
 
 def _over_frequency(frequency: Array) -> rr.TimeColumn:

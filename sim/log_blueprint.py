@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
@@ -10,7 +9,7 @@ from sim.log_content import Pair, Shown
 from sim.log_drawing import CYCLE, MM, reach
 
 DARK = (13, 13, 15)
-CHARTS = {"bearings": (390.0, 368.0), "records": (390.0, 200.0), "key": (560.0, 62.0)}
+CHARTS = {"bearings": (390.0, 336.0), "records": (390.0, 168.0), "key": (560.0, 62.0)}
 """Width and height of the drawings, about those of their views in a window of 1400 x 900."""
 
 
@@ -23,10 +22,11 @@ def pair_path(pair: Pair) -> tuple[str, str, str]:
     return "frf", f"hammer_{pair[1]}", f"response_{pair[0]}"
 
 
-def blueprint(shown: Shown, quantities: list[str], factor: float) -> rrb.Blueprint:
-    """`quantities`: the bearing series; `factor`: by which the section's displacements are enlarged."""
+def blueprint(shown: Shown, quantities: list[tuple[str, str]], factor: float) -> rrb.Blueprint:
+    """`quantities`: names and units of the bearing series; `factor`: by which the section's displacements are enlarged."""
     cold, hot = min(shown.temperatures), max(shown.temperatures)
-    section = f"Section at {cold:g} °C" + (f" (left), {hot:g} °C (right)" if hot > cold else "") + f", displacement × {factor:g}"
+    sides = f"{cold:g} °C left, {hot:g} °C right" if hot > cold else f"{cold:g} °C"
+    section = f"Section, {sides}, moved × {factor:g}"
     left = rrb.Vertical(
         rrb.Grid(*_model_views(shown), grid_columns=2), _section_view(shown, "compared", section), row_shares=[2.6, 1]
     )
@@ -35,7 +35,7 @@ def blueprint(shown: Shown, quantities: list[str], factor: float) -> rrb.Bluepri
         _chart("bearings", f"Bearings: {_sides(shown)}"),
         _chart("records", "First hits of the hammers"),
         rrb.TextDocumentView(origin="summary", name="Summary"),
-        row_shares=[3.9, 2.3, 2.6],
+        row_shares=[3.9, 2.1, 2.9],
     )
     return rrb.Blueprint(
         rrb.Tabs(
@@ -57,9 +57,9 @@ def _sides(shown: Shown) -> str:
 
 def _model_views(shown: Shown) -> list[rrb.View]:
     views = [(f"{i} {m.kind} {m.frequency:.0f} Hz", f"mode_{i}") for i, m in enumerate(shown.modes[:5], 1)]
-    views.append((f"Hammer at {shown.pairs[0][1]}, swept", "sweep"))
+    views.append((f"Sweep at {shown.pairs[0][1]}", "sweep"))
     r = MM * reach(shown.run.spindle)
-    eye = rrb.EyeControls3D(position=(1.55 * r, -1.2 * r, 1.25 * r), look_target=(0, 0, 0.15 * r), eye_up=(0, 0, 1))
+    eye = rrb.EyeControls3D(position=(1.8 * r, -1.4 * r, 1.35 * r), look_target=(0, 0, -0.08 * r), eye_up=(0, 0, 1))
     return [
         rrb.Spatial3DView(origin=at("model", entity), name=name, eye_controls=eye, line_grid=False, background=DARK)
         for name, entity in views
@@ -68,7 +68,8 @@ def _model_views(shown: Shown) -> list[rrb.View]:
 
 def _section_view(shown: Shown, which: str, name: str) -> rrb.View:
     r = MM * reach(shown.run.spindle)
-    eye = rrb.EyeControls3D(position=(0, -1.3 * r, 0.3 * r), look_target=(0, 0, 0.3 * r), eye_up=(0, 0, 1))
+    x = 0.0 if which == "compared" else 0.5 * r
+    eye = rrb.EyeControls3D(position=(x, -1.3 * r, 0.3 * r), look_target=(x, 0, 0.3 * r), eye_up=(0, 0, 1))
     return rrb.Spatial3DView(origin=at("section", which), name=name, eye_controls=eye, line_grid=False, background=DARK)
 
 
@@ -85,7 +86,7 @@ def _frf_views(shown: Shown, pair: Pair) -> rrb.Container:
     return rrb.Vertical(
         _plot(shown, f"{origin}/level", f"{label} level, dB re 1 (m/s)/N, over Hz", shown.level),
         _plot(shown, f"{origin}/phase", "phase, deg", (-185.0, 185.0)),
-        _plot(shown, f"{origin}/coherence", "coherence", (shown.coherence, 1.0 + 0.03 * (1.0 - shown.coherence))),
+        _plot(shown, f"{origin}/coherence", "coherence", (0.0, 1.03)),
         row_shares=[2.6, 1, 1],
         name=label + (" driving point" if pair[0] == pair[1] else ""),
     )
@@ -112,11 +113,12 @@ def _time_tab(shown: Shown) -> rrb.Container:
         for entity, name, end in series:
             ends = [rr.TimeRangeBoundary.absolute(seconds=t) for t in (0.0, end)]
             axis = rrb.TimeAxis(view_range=rr.TimeRange(*ends))
-            views.append(rrb.TimeSeriesView(origin=at("records", f"hammer {hammer}", entity), name=name, axis_x=axis))
+            origin = at("records", f"hammer {hammer}", entity)
+            views.append(rrb.TimeSeriesView(origin=origin, name=name, axis_x=axis, plot_legend=rrb.Corner2D.RightTop))
     return rrb.Grid(*views, grid_columns=1 + len(hammers), name="Records (choose the timeline time)")
 
 
-def _temperature_tab(shown: Shown, quantities: list[str], factor: float) -> rrb.Container:
+def _temperature_tab(shown: Shown, quantities: list[tuple[str, str]], factor: float) -> rrb.Container:
     views = [_section_view(shown, "by temperature", f"Deformed section, displacement × {factor:g}")]
-    views += [rrb.TimeSeriesView(origin=at("bearings", name), name=name) for name in quantities]
+    views += [rrb.TimeSeriesView(origin=at("bearings", name), name=f"{name}, {unit}, over °C") for name, unit in quantities]
     return rrb.Grid(*views, grid_columns=3, name="Bearings and section (choose the timeline temperature)")

@@ -17,6 +17,7 @@ from sim.frf import Frf
 from sim.operating import provenance
 from sim.run import Run, as_campaign
 from sim.shift import follow, match
+from thermal.expansion import expand
 
 Pair = tuple[int, int]  # response node, hammer node
 FRAMES = 900  # about, of the sweep through the band
@@ -44,12 +45,12 @@ def tests_of(run: Run) -> tuple[Test, ...]:
     return tests
 
 
-def followed_modes(run: Run) -> list[list[Mode]]:
-    """Modes in the band at the first temperature, and their partners at every temperature: [step][mode]."""
+def followed_modes(run: Run) -> list[list[Mode | None]]:
+    """Modes in the band at the first temperature, and their partners at every temperature: [step][mode], None without one."""
     first = run.steps[0].point
     count = sum(m.frequency <= run.spindle.hammer.band[1] for m in first.modes)
-    partners = [follow(first.linear.mass, first.modes, step.point.modes) for step in run.steps]
-    return [[step.point.modes[i] for i in row[:count]] for step, row in zip(run.steps, partners, strict=True)]
+    partners = [follow(first.linear.mass, first.modes, step.point.modes)[:count] for step in run.steps]
+    return [[step.point.modes[i] if i >= 0 else None for i in row] for step, row in zip(run.steps, partners, strict=True)]
 
 
 def peaks(run: Run) -> list[Peak]:
@@ -57,11 +58,10 @@ def peaks(run: Run) -> list[Peak]:
     found: list[Peak] = []
     modes = followed_modes(run)
     for step, test, own in zip(run.steps, tests_of(run), modes, strict=True):
-        number = {id(m): i for i, m in enumerate(own, 1)}
-        found += [
-            Peak("computed", test.id, test.temperature, i, m.kind, m.frequency, np.nan, m.damping_ratio)
-            for i, m in enumerate(own, 1)
-        ]
+        numbered = [(i, m) for i, m in enumerate(own, 1) if m is not None]
+        number = {id(m): i for i, m in numbered}
+        for i, m in numbered:
+            found.append(Peak("computed", test.id, test.temperature, i, m.kind, m.frequency, np.nan, m.damping_ratio))
         seen, partners = step.identified, match(step)
         for i, (f, sd, damping) in enumerate(zip(seen.frequency, seen.frequency_sd, seen.damping, strict=True)):
             mode = partners.get(i)
@@ -70,7 +70,7 @@ def peaks(run: Run) -> list[Peak]:
     for campaign in run.measured:
         name = campaign.folder.name if campaign.folder else "measured"
         for test in campaign.tests:
-            left = {kind: [i for i, m in enumerate(modes[0], 1) if m.kind == kind] for kind in {r.kind for r in test.modes}}
+            left = {kind: [i for i, m in enumerate(modes[0], 1) if m and m.kind == kind] for kind in {r.kind for r in test.modes}}
             for row in sorted(test.modes, key=lambda r: r.frequency):
                 i = left[row.kind].pop(0) if left[row.kind] else 0
                 damping = np.nan if row.damping_ratio is None else row.damping_ratio
@@ -81,17 +81,19 @@ def peaks(run: Run) -> list[Peak]:
 def summary(run: Run, found: Sequence[Peak]) -> str:
     """Markdown: the peaks of every temperature beside each other, the state of the bearings, and where it all comes from."""
     temperatures = sorted({p.temperature for p in found})
-    lines = [f"**{run.spindle.title}**", "", "Modal peaks, Hz: **computed** / identified / *measured*", ""]
-    lines += _table(found, [temperatures[0], temperatures[-1]] if len(temperatures) > 1 else temperatures)
-    if len(temperatures) > 2:
-        lines += ["", "All temperatures:", "", *_table(found, temperatures)]
-    lines += ["", "Bearings:", ""]
+    own = sorted(s.point.condition.temperature for s in run.steps)
+    ends = list(dict.fromkeys((own[0], own[-1])))
+    lines = ["Modal peaks, Hz: **computed** / identified / *measured*", "", *_table(found, ends)]
+    lines += ["", "All temperatures:", "", *_table(found, temperatures)] if temperatures != ends else []
+    named = [(f"{s.point.condition.temperature:g} °C", s) for s in run.steps]
+    lines += ["", f"**{run.spindle.title}**", "", "Bearings:", ""]
+    lines += [f"- {t}: {s.point.state.status}, preload {s.point.state.bearings[0].preload:.2f} N" for t, s in named]
+    lines += ["", "Identification:", "", *(f"- {t}: {s.identified.status}" for t, s in named)]
     lines += [
-        f"- {s.point.condition.temperature:g} °C: {s.point.state.status}, preload {s.point.state.bearings[0].preload:.2f} N"
-        for s in run.steps
+        f"- {p.temperature:g} °C: {p.frequency:.1f} Hz is none of the model's modes"
+        for p in found
+        if p.source == "identified" and not p.mode
     ]
-    lines += ["", "Identification:", ""]
-    lines += [f"- {s.point.condition.temperature:g} °C: {s.identified.status}" for s in run.steps]
     lines += ["", "Measured:", "", *(f"- {c.title}" for c in run.measured)] if run.measured else []
     lines += ["", "Made from:", "", *(f"- {name}: {text}" for name, text in provenance(run.spindle).items())]
     return "\n".join(lines) + "\n"
@@ -110,6 +112,27 @@ def _table(found: Sequence[Peak], temperatures: Sequence[float]) -> list[str]:
     return lines
 
 
+def bearing_series(run: Run, name: str) -> dict[tuple[str, str], Array]:
+    """Quantities of one bearing over the temperatures, (temperatures,) by name and unit; k is stiffness.
+
+    A ring gap is the outer ring's thermal motion less the inner ring's.
+    """
+    states = [s.point.state.bearing(name) for s in run.steps]
+    motions = [expand(run.spindle, s.point.condition.temperature)[name] for s in run.steps]
+    series = {
+        ("angle", "deg"): [np.degrees(s.contact_angle) for s in states],
+        ("deformation", "µm"): [1e6 * s.deformation for s in states],
+        ("ball force", "N"): [s.contact_force for s in states],
+        ("preload", "N"): [s.preload for s in states],
+        ("k radial", "N/µm"): [1e-6 * s.radial_stiffness for s in states],
+        ("k axial", "N/µm"): [1e-6 * s.axial_stiffness for s in states],
+        ("k tilt", "N m/rad"): [s.tilt_stiffness for s in states],
+        ("ring gap r", "µm"): [1e6 * (m.outer_r - m.inner_r) for m in motions],
+        ("ring gap z", "µm"): [1e6 * (m.outer_z - m.inner_z) for m in motions],
+    }
+    return {key: np.array(values) for key, values in series.items()}
+
+
 # ---------------------------------------------------------------- what is shown where
 
 
@@ -123,7 +146,6 @@ class Shown:
     modes: tuple[Mode, ...]  # in the band, at the first temperature
     pairs: tuple[Pair, ...]  # FRFs with views of their own, driving points first
     level: tuple[float, float]  # dB, limits of their plots
-    coherence: float  # lower limit of its plots
     band: tuple[int, int]  # Hz
     step: int  # Hz, between frames of the sweep
 
@@ -132,6 +154,15 @@ class Shown:
         """In C, of the tests."""
         return [t.temperature for t in self.tests]
 
+    @property
+    def measured(self) -> dict[tuple[str, str], list[Peak]]:
+        """Measured peaks by campaign and test."""
+        found: dict[tuple[str, str], list[Peak]] = {}
+        for p in self.peaks:
+            if p.source not in ("computed", "identified"):
+                found.setdefault((p.source, p.test), []).append(p)
+        return found
+
 
 def shown(run: Run) -> Shown:
     """What to show of a run."""
@@ -139,15 +170,13 @@ def shown(run: Run) -> Shown:
     pairs = _pairs(frf_of(tests[0]))
     low, high = run.spindle.hammer.band
     level = np.array([decibel(one(frf_of(t).value, frf_of(t), pair)) for t in tests for pair in pairs])
-    coherence = [one(c, frf_of(t), pair).min() for t in tests for pair in pairs if (c := frf_of(t).coherence) is not None]
     return Shown(
         run,
         tests,
         tuple(peaks(run)),
-        tuple(followed_modes(run)[0]),
+        tuple(m for m in followed_modes(run)[0] if m),
         pairs,
         (float(10 * np.floor(np.percentile(level, 0.5) / 10) - 10), float(10 * np.ceil(level.max() / 10))),
-        float(np.floor(10 * min(coherence, default=0.0) - 0.5) / 10),
         (int(np.floor(low)), int(np.ceil(high))),
         max(round((high - low) / FRAMES), 1),
     )

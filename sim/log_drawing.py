@@ -67,8 +67,10 @@ def mode_motion(point: OperatingPoint, mode: Mode, frames: int) -> ComplexArray:
 
 
 def sweep_motion(point: OperatingPoint, node: int, frequency: Array) -> ComplexArray:
-    """Motion (n, frames) under a force at `node` that sweeps `frequency` (frames,) Hz; its size is drawn as the square root, so that
-    the motion between resonances can be seen."""
+    """Motion (n, frames) under a force at `node` that sweeps `frequency` (frames,) Hz.
+
+    Its size is drawn as the square root, so that the motion between resonances can be seen.
+    """
     row = point_rows(point.spindle, point.chain, (node,))
     response = frf(point.linear, np.eye(len(point.linear.mass)), row, frequency, "mobility")[:, 0]
     size = largest_displacement(point, response)
@@ -120,7 +122,7 @@ def section_mesh(
     `shift` (m) is the rigid axial movement of the part, displaced by `factor` times like the rest.
     """
     materials = sorted({g.material for g in spindle.regions})
-    nodes = part.nodes + factor * (part.displacement + [0.0, shift])
+    nodes = part.nodes + factor * (part.displacement + np.array([0.0, shift]))
     corners, triangles = np.unique(part.region_of[:, None] * len(nodes) + part.triangles, return_inverse=True)
     r, z = MM * nodes[corners % len(nodes)].T
     shade = np.array([0.95 - 0.55 * materials.index(spindle.region(name).material) / len(materials) for name in part.regions])
@@ -140,7 +142,7 @@ def outlines(spindle: Spindle) -> list[Array]:
     turn = np.linspace(0, 2 * np.pi, 33)
     for b in spindle.bearings:
         circle = b.ball_diameter / 2 * np.stack([np.cos(turn), 0 * turn, np.sin(turn)], axis=1)
-        drawn.append(MM * (circle + [b.pitch_diameter / 2, -2e-4, b.z]))
+        drawn.append(MM * (circle + np.array([b.pitch_diameter / 2, -2e-4, b.z])))
     return drawn
 
 
@@ -157,7 +159,7 @@ class Drawing:
     labels: list[str] = field(default_factory=list)
     label_colours: list[Colours] = field(default_factory=list)
 
-    def label(self, x: float, y: float, text: str, colour: Sequence[int] = (200, 200, 200)) -> None:
+    def label(self, x: float, y: float, text: str, colour: Sequence[int] | Colours = (200, 200, 200)) -> None:
         """Text centred at (x, y)."""
         self.points.append((x, y - 13.0))
         self.labels.append(text)
@@ -172,25 +174,49 @@ class Curve:
 
 
 def charts(panels: Sequence[tuple[str, str, Sequence[Curve]]], columns: int, width: float, height: float) -> Drawing:
-    """Small charts in rows of `columns`, each of `width` and `height`: title, unit of x, curves. Axes end at round numbers, the only ones written."""
+    """Small charts in rows of `columns`, each of `width` and `height`: title, unit of x, curves.
+
+    Axes end at round numbers, the only ones written.
+    """
     drawing = Drawing()
     for k, (title, unit, curves) in enumerate(panels):
         left, top = (k % columns) * width, (k // columns) * height
-        box = (left + 48.0, top + 25.0, left + width - 12.0, top + height - 24.0)
+        box = (left + 42.0, top + 25.0, left + width - 12.0, top + height - 24.0)
         x, y = (_ticks(np.concatenate([getattr(c, axis) for c in curves])) for axis in ("x", "y"))
         drawing.label((box[0] + box[2]) / 2, top + 12.0, title, (255, 255, 255))
-        for value in y:
-            level = _place(value, y, box[3], box[1])
+        for tick in y:
+            level = _place(tick, y, box[3], box[1])
             _add(drawing, np.array([(box[0], level), (box[2], level)]), (60, 60, 66))
-        for value in x:
-            place = _place(value, x, box[0], box[2])
+        for tick in x:
+            place = _place(tick, x, box[0], box[2])
             _add(drawing, np.array([(place, box[1]), (place, box[3])]), (60, 60, 66))
-        for value, level in ((y[0], box[3] - 5.0), (y[-1], box[1] + 5.0)):
-            drawing.label(left + 24.0, level, f"{value:g}")
+        drawing.label(left + 20.0, box[3] - 5.0, f"{y[0]:g}")
+        drawing.label(left + 20.0, box[1] + 5.0, f"{y[-1]:g}")
         drawing.label(box[0], box[3] + 12.0, f"{x[0]:g}")
         drawing.label(box[2] - 12.0, box[3] + 12.0, f"{x[-1]:g} {unit}")
         for c in curves:
-            _add(drawing, np.stack([_place(c.x, x, box[0], box[2]), _place(c.y, y, box[3], box[1])], axis=1), c.colour)
+            strip = np.stack([_place(c.x, x, box[0], box[2]), _place(c.y, y, box[3], box[1])], axis=1)
+            _add(drawing, strip if len(strip) > 1 else strip + np.array([(-3.0, 0.0), (3.0, 0.0)]), c.colour)
+    return drawing
+
+
+def key(words: Sequence[tuple[str, Sequence[int] | Colours]], peaks: Sequence[float], width: float) -> Drawing:
+    """A row of coloured words, and below it the numbers of `peaks`, from 1, at their places (0 to 1) in a plot of `width`."""
+    drawing, left = Drawing(), 8.0
+    for text, colour in words:
+        half = 3.7 * len(text)
+        drawing.label(left + half, 15.0, text, colour)
+        left += 2 * half + 15
+    gutter, apart = 34.0, 24.0
+    groups: list[tuple[float, str]] = []
+    for i, peak in enumerate(peaks, 1):
+        x = gutter + peak * (width - gutter)
+        if groups and x - groups[-1][0] < apart:
+            groups[-1] = ((groups[-1][0] + x) / 2, f"{groups[-1][1]} {i}")
+        else:
+            groups.append((x, f"mode {i}" if i == 1 else f"{i}"))
+    for x, numbers in groups:
+        drawing.label(x, 45.0, numbers)
     return drawing
 
 
@@ -206,7 +232,10 @@ def _place(value: Array | float, ticks: Array, start: float, end: float) -> Arra
 def _ticks(values: Array) -> Array:
     """Two to four round numbers that span `values`."""
     low, high = float(values.min()), float(values.max())
-    span = max(high - low, 1e-3 * max(abs(high), abs(low))) or 1.0
+    if high - low < 1e-3 * max(abs(high), abs(low)) or high == low:
+        around = 0.05 * max(abs(high), abs(low)) or 1.0
+        low, high = low - around, high + around
+    span = high - low
     for step in _round_steps(span / 3):
         first, last = np.floor(low / step + 1e-9), np.ceil(high / step - 1e-9)
         last = max(last, first + 1)

@@ -98,21 +98,22 @@ def _values(columns: Columns, name: str) -> list[Any]:
 
 
 def _frf(columns: Columns, about: Columns) -> Frf:
-    """The FRFs of one test: every row holds one line of all (response, reference) pairs."""
+    """The FRFs of one test: every row holds one line of all (response, reference) pairs.
+
+    Rerun may have reordered rows that fall on the same whole number of Hz.
+    """
     responses, references = (tuple(_values(about, f"{role}_nodes")) for role in ("response", "reference"))
     frequency = _flat(columns, "frequency_Hz").to_numpy()
+    rising = np.argsort(frequency)
 
-    def array(name: str) -> np.ndarray | None:
-        if name not in columns:
-            return None
+    def array(name: str) -> np.ndarray:
         lines = _flat(columns, name).to_numpy().reshape(len(frequency), len(responses), len(references))
-        return np.ascontiguousarray(np.moveaxis(lines, 0, 2))
+        return np.ascontiguousarray(np.moveaxis(lines[rising], 0, 2))
 
     value = np.empty((len(responses), len(references), len(frequency)), complex)
     value.real, value.imag = array("real"), array("imaginary")
-    return Frf(
-        frequency, value, responses, references, _values(about, "quantity")[0], array("coherence"), array("standard_error")
-    )
+    others = [array(name) if name in columns else None for name in ("coherence", "standard_error")]
+    return Frf(frequency[rising], value, responses, references, _values(about, "quantity")[0], *others)
 
 
 def describe(contents: LogContents) -> str:
@@ -130,7 +131,8 @@ def describe(contents: LogContents) -> str:
     for test, frf in contents.frfs.items():
         step = frf.frequency[1] - frf.frequency[0]
         lines.append(
-            f"  FRFs of {test}: {frf.quantity}, responses {_nodes(frf.response_nodes)}, references {_nodes(frf.reference_nodes)}, "
+            f"  FRFs of {test}: {frf.quantity}, "
+            f"responses {_nodes(frf.response_nodes)}, references {_nodes(frf.reference_nodes)}, "
             f"{len(frf.frequency)} lines from {frf.frequency[0]:g} to {frf.frequency[-1]:g} Hz every {step:.4g} Hz"
         )
     for source, test in dict.fromkeys((p.source, p.test) for p in contents.peaks):

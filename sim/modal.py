@@ -20,7 +20,14 @@ from sim.poles import Complex, Fit, Lines, Real, believed, information, project,
 
 KINDS = {"receptance": 0, "mobility": 1, "accelerance": 2}
 FAINT = 4.0
-"""A mode is reported if its squared shape, weighted by its own information, exceeds this many times what the information criterion asks for."""
+"""A mode is reported if its squared shape, weighted by its information, exceeds this many times what the information criterion asks."""
+
+SPREAD = 0.3
+"""Natural logarithm of a frequency change between two conditions that speaks against a pair as much as shapes without likeness."""
+CLOSE = 0.03
+"""Fraction of the frequency below which modes are near enough to mix their shapes."""
+DEAR = 1.25
+"""Cost of a pair above which both modes rather stay alone: unlike shapes in unlike spaces cost 1.5."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,13 +73,15 @@ def scatter(frf: ArrayLike, window: int = 41) -> Real:
     """Standard deviation (n_resp, n_ref, n) seen in `frf` itself, without any model: from line to line.
 
     A line less the mean of its neighbours has the variance 3/2 sd^2, and the median of the modulus of complex noise is sd sqrt(ln 2). The
-    median over `window` lines, absolute and relative to the value, whichever is larger, passes over resonances narrower than half of it.
+    median over `window` lines passes over resonances narrower than half of it; there, what was found relative to the value counts if it is
+    larger, the value being cleared of noise first.
     """
     frf = np.asarray(frf)
     step = np.abs(frf[..., 1:-1] - (frf[..., :-2] + frf[..., 2:]) / 2) / np.sqrt(1.5 * np.log(2))
-    size = np.abs(frf)
-    absolute, relative = (median_filter(x, (1, 1, window), mode="nearest") for x in (step, step / size[..., 1:-1]))
-    return np.pad(np.maximum(absolute, relative * size[..., 1:-1]), ((0, 0), (0, 0), (1, 1)), mode="edge")
+    size = np.abs(frf[..., 1:-1])
+    absolute, relative = (median_filter(x, (1, 1, window), mode="nearest") for x in (step, step / size))
+    larger = relative * np.sqrt(np.maximum(size**2 - 4 * absolute**2, 0))
+    return np.pad(np.maximum(absolute, larger), ((0, 0), (0, 0), (1, 1)), mode="edge")
 
 
 def extract(
@@ -82,10 +91,12 @@ def extract(
     *,
     band: tuple[float, float] | None = None,
     kind: str = "mobility",
+    window_decay: float = 0.0,
 ) -> Modes:
     """Modes within `band` (Hz, all lines if None) of `frf` (n_resp, n_ref, n) at `frequency` (n,) Hz, with noise `frf_sd` of that shape.
 
-    Without `frf_sd` it is taken from the `scatter` of neighbouring lines, and the status says so. Lines at 0 Hz are left out. Not reported
+    Without `frf_sd` it is taken from the `scatter` of neighbouring lines, and the status says so. Lines at 0 Hz are left out. Records
+    under an exponential window exp(-window_decay t), 1/s, give H at s = i w + window_decay, and are taken so. Not reported
     are modes out of the band or with a damping that is not `BELIEVED`, not known better than to their half-width, or `FAINT`.
     Raises ValueError if shapes do not agree or numbers are unusable.
     """
@@ -104,7 +115,7 @@ def extract(
     if not (np.isfinite(frf).all() and np.isfinite(sd).all() and (sd > 0).all()):
         raise ValueError("the FRF must be finite and its noise finite and positive at every line")
     unit = 2 * np.pi * np.sqrt(frequency[0] * frequency[-1])
-    lines = Lines(2j * np.pi * frequency / unit, frf, np.sqrt(2) / sd, KINDS[kind])
+    lines = Lines((window_decay + 2j * np.pi * frequency) / unit, frf, np.sqrt(2) / sd, KINDS[kind])
 
     free, twice = merge(lines, search(lines))
     return _modes(*impose_rank_one(lines, free), twice, unit, given, frf.shape[:2])
@@ -122,8 +133,7 @@ def impose_rank_one(lines: Lines, free: Fit) -> tuple[Lines, Fit, bool]:
     if not first.any():
         return lines, free, True
     if min(responses, references) > 1:
-        for trial in (free, None):
-            trial = trial or split(lines, free)
+        for trial in (make() for make in (lambda: free, lambda: split(lines, free))):
             fit = refine(lines, start_rank_one(lines, trial), 1e-3)
             constraints = trial.unknowns - fit.unknowns
             accepted = (fit.chi2 - trial.chi2) / trial.scale() < constraints + 5 * np.sqrt(2 * constraints)
@@ -141,7 +151,7 @@ def merge(lines: Lines, free: Fit) -> tuple[Fit, list[tuple[complex, complex]]]:
     Such a pair is one mode that was not the same in all functions: it moved between the references, or is not linear. The spread is
     the standard deviation of two places that have the weights of their residues.
     """
-    spread = []
+    spread: list[tuple[complex, complex]] = []
     while True:
         shape = np.linalg.svd(free.residues.reshape(-1, *lines.frf.shape[:2]))[0][:, :, 0]
         pairs = np.argwhere(same_mode(lines, free.poles, shape, 0.8) & believed(lines, free.poles))
@@ -154,7 +164,7 @@ def merge(lines: Lines, free: Fit) -> tuple[Fit, list[tuple[complex, complex]]]:
 
 
 def same_mode(lines: Lines, poles: Complex, shape: Complex, alike: float) -> NDArray[np.bool_]:
-    """(m, m) which pairs of poles are closer than their half-width or a line, and whose shapes (m, n_resp) are `alike` by MAC; upper triangle."""
+    """(m, m), upper triangle: pairs of poles closer than their half-width or a line, with shapes (m, n_resp) that are `alike` by MAC."""
     width = np.maximum((poles.real[:, None] + poles.real) / -2, np.diff(lines.s.imag).min())
     return np.triu((np.abs(poles[:, None] - poles) < width) & (mac(shape, shape) > alike), 1)
 
@@ -220,18 +230,20 @@ def _modes(
     sd = np.sqrt(np.diag(spread))
     cost = 2 * (fit.shape.shape[1] + fit.participation.shape[1]) * np.log(lines.count)
     sure = (sd[:a] < damping * frequency) & (sd[a:] < damping / 2) & (weight > FAINT * cost)
+    moved = 0
     for pole, offset in twice:
         near = np.flatnonzero(np.abs(poles - pole) < -pole.real)
         if len(near) == 1:  # else the two turned out to be modes of different shape
             way = jacobian[:, [near[0], a + near[0]]] @ [offset.real, offset.imag]
             spread += np.outer(way, way)
+            moved += 1
     keep = np.flatnonzero(sure)[np.argsort(frequency[sure])]
     kept = np.append(keep, a + keep)
     chi2 = fit.chi2 / (lines.count - fit.unknowns)
     words = ["noise as given" if given else "noise estimated from neighbouring lines"]
     words += [f"chi-square {chi2:.3g} per degree of freedom" + (", errors enlarged by its root" if chi2 > 1 else "")]
     words += [] if rank_one else ["residues of rank one refused by the data, left free"]
-    words += [f"{len(twice)} pairs of poles with one shape merged, errors enlarged by their distance"] if twice else []
+    words += [f"{moved} modes seen at two places with one shape, errors enlarged by their distance"] if moved else []
     words += [f"{np.sum(~sure)} faint or uncertain poles not reported"] if not sure.all() else []
     edges = np.round(lines.s.imag[[0, -1]] * unit / (2 * np.pi), 6)
     return Modes(
@@ -254,19 +266,19 @@ def mac(a: ArrayLike, b: ArrayLike) -> Real:
 
     Allemang & Brown, Proc. 1st IMAC (1982) 110.
     """
-    a, b = (x / np.linalg.norm(x, axis=1, keepdims=True) for x in (np.asarray(a), np.asarray(b)))
-    return np.abs(a.conj() @ b.T) ** 2
+    first, second = (x / np.linalg.norm(x, axis=1, keepdims=True) for x in (np.asarray(a), np.asarray(b)))
+    return np.abs(first.conj() @ second.T) ** 2
 
 
-def pair(a: Modes, b: Modes, *, spread: float = 0.1, close: float = 0.03, limit: float = 1.0) -> NDArray[np.intp]:
+def pair(a: Modes, b: Modes) -> NDArray[np.intp]:
     """(p, 2) indices of the same mode in `a` and `b`, by shape and frequency, all pairs at once.
 
     See `match` for the cost; modes without a partner are left out.
     """
-    return match(a.frequency, a.shape, b.frequency, b.shape, spread=spread, close=close, limit=limit)
+    return match(a.frequency, a.shape, b.frequency, b.shape)
 
 
-def track(conditions: Sequence[Modes], *, spread: float = 0.1, close: float = 0.03, limit: float = 1.0) -> NDArray[np.intp]:
+def track(conditions: Sequence[Modes]) -> NDArray[np.intp]:
     """(conditions, tracks) index of each mode in each condition, -1 where it was not found.
 
     Every condition is paired with the last sight of each track, so neighbours in the list should be neighbours in nature.
@@ -275,7 +287,7 @@ def track(conditions: Sequence[Modes], *, spread: float = 0.1, close: float = 0.
     frequency, shape = np.zeros(0), np.zeros((0, conditions[0].shape.shape[1]), complex)
     for modes in conditions:
         row = np.full(len(frequency), -1)
-        pairs = match(frequency, shape, modes.frequency, modes.shape, spread=spread, close=close, limit=limit)
+        pairs = match(frequency, shape, modes.frequency, modes.shape)
         row[pairs[:, 0]] = pairs[:, 1]
         new = np.setdiff1d(np.arange(len(modes.frequency)), pairs[:, 1])
         table = np.pad(table, ((0, 0), (0, len(new))), constant_values=-1)
@@ -286,30 +298,28 @@ def track(conditions: Sequence[Modes], *, spread: float = 0.1, close: float = 0.
     return table
 
 
-def match(
-    frequency_a: Real, shape_a: Complex, frequency_b: Real, shape_b: Complex, *, spread: float, close: float, limit: float
-) -> NDArray[np.intp]:
-    """(p, 2) pairs of least total cost (1 - S) + (1 - MAC) / 2 + (ln(fb / fa) / spread)^2, none dearer than `limit`.
+def match(frequency_a: Real, shape_a: Complex, frequency_b: Real, shape_b: Complex) -> NDArray[np.intp]:
+    """(p, 2) pairs of least total cost (1 - MAC) + (1 - S) / 2 + (ln(fb / fa) / SPREAD)^2, none dearer than `DEAR`.
 
-    Shapes of modes closer than the fraction `close` turn within the space they span with the least change, or become complex where
+    Shapes of modes that are `CLOSE` turn within the space they span with the least change, or become complex where
     the rotor splits them; S is therefore the larger of two MACs with such a space: of a mode b with the space of the neighbours of a, and
     the reverse. Within the space, the single MAC decides if it can, else the order of frequencies.
     """
     one = mac(shape_a, shape_b)
-    space = np.maximum(_space_mac(frequency_a, shape_a, shape_b, close), _space_mac(frequency_b, shape_b, shape_a, close).T)
-    cost = (1 - space) + (1 - one) / 2 + (np.log(frequency_b / frequency_a[:, None]) / spread) ** 2
+    space = np.maximum(_space_mac(frequency_a, shape_a, shape_b), _space_mac(frequency_b, shape_b, shape_a).T)
+    cost = (1 - one) + (1 - space) / 2 + (np.log(frequency_b / frequency_a[:, None]) / SPREAD) ** 2
     na, nb = cost.shape
-    alone = np.full((na + nb, na + nb), limit / 2)  # one of a pair left alone
+    alone = np.full((na + nb, na + nb), DEAR / 2)  # each of the two left alone
     alone[:na, :nb], alone[na:, nb:] = cost, 0
     rows, columns = linear_sum_assignment(alone)
     paired = (rows < na) & (columns < nb)
     return np.stack([rows[paired], columns[paired]], 1)
 
 
-def _space_mac(frequency: Real, shape: Complex, others: Complex, close: float) -> Real:
+def _space_mac(frequency: Real, shape: Complex, others: Complex) -> Real:
     """(m, o) part of each of `others` (o, n) within the space of each mode's neighbours in frequency."""
     rows = []
     for f in frequency:
-        basis = np.linalg.qr(shape[np.abs(frequency / f - 1) < close].T)[0]
+        basis = np.linalg.qr(shape[np.abs(frequency / f - 1) < CLOSE].T)[0]
         rows.append((np.abs(basis.conj().T @ others.T) ** 2).sum(0) / (np.abs(others) ** 2).sum(1))
     return np.reshape(rows, (len(frequency), len(others)))

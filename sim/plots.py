@@ -10,6 +10,7 @@ import io
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
@@ -27,9 +28,14 @@ from thermal.expansion import DeformedSection, field
 INK, PALE = "#1b1c1d", "#84898f"
 TEMPERATURES = LinearSegmentedColormap.from_list("cold to hot", ["#2166ac", "#8073ac", "#c9371c"])
 BEARINGS = (("#a0741a", "o", "-"), ("#7a3d8f", "^", "--"), ("#2e7d6b", "s", ":"), ("#555f6b", "D", "-."))
-SOURCES = {"measured": (INK, "D", True), "published": (INK, "s", False), "computed": ("#1f8a70", "o", True), "identified": ("#1f8a70", "o", False)}
+SOURCES = {
+    "measured": (INK, "D", True),
+    "published": (INK, "s", False),
+    "computed": ("#1f8a70", "o", True),
+    "identified": ("#1f8a70", "o", False),
+}
 MATERIALS = ("#c9d6e2", "#8c9aa8", "#d9b36c", "#b98a9e", "#a8c3a0", "#e0cfc0")
-STYLE = {
+STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "thermospindle",
     "font.size": 8.5,
@@ -62,12 +68,12 @@ STYLE = {
 
 @dataclass(frozen=True)
 class Peaks:
-    """Natural frequencies (Hz) and their standard errors (None where not known) of one source at one temperature, by mode number."""
+    """Natural frequencies (Hz) with standard errors (NaN where not known) of one source at one temperature, by mode number."""
 
     source: str  # a key of SOURCES
     label: str
     temperature: float
-    value: Mapping[int, tuple[float, float | None]]
+    value: Mapping[int, tuple[float, float]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +108,7 @@ def svg(figure: Figure, key: str, description: str) -> str:
     view = re.search(r'viewBox="([^"]+)"', body)
     assert view is not None
     width = float(view.group(1).split()[2])
-    head = f'<svg viewBox="{view.group(1)}" style="max-width: {width / 11.5:.2f}rem" role="img" aria-label="{description}">'
+    head = f'<svg viewBox="{view.group(1)}" style="max-width: {width / 11:.2f}rem" role="img" aria-label="{description}">'
     return head + re.sub(r"\n\s*", "\n", body[body.index(">") + 1 :])
 
 
@@ -110,7 +116,9 @@ def svg(figure: Figure, key: str, description: str) -> str:
 
 
 @rc_context(STYLE)
-def trend(key: str, temperature: Sequence[float], curves: Mapping[str, Mapping[str, Sequence[float]]], label: str, from_zero: bool) -> str:
+def trend(
+    key: str, temperature: Sequence[float], curves: Mapping[str, Mapping[str, Sequence[float]]], label: str, from_zero: bool
+) -> str:
     """One quantity of every bearing over temperature, or several beside their names: values by name and by bearing."""
     figure = Figure(figsize=(3.55, 2.45))
     axes = figure.add_subplot()
@@ -123,7 +131,7 @@ def trend(key: str, temperature: Sequence[float], curves: Mapping[str, Mapping[s
     axes.set(xlabel="temperature, °C", ylabel=label)
     axes.margins(x=0.06, y=0.12)
     if from_zero:
-        axes.set_ylim(0, 1.15 * max(max(series) for values in curves.values() for series in values.values()))
+        axes.set_ylim(0, 1.15 * max(max(series) for values in curves.values() for series in values.values()) or 1.0)
     handles = axes.get_lines()[: len(next(iter(curves.values())))]
     axes.legend(handles=handles[::-1], loc="lower left" if from_zero else "best")
     return svg(figure, key, f"{label} over temperature")
@@ -162,17 +170,17 @@ def comparison(key: str, modes: Mapping[int, str], sources: Sequence[Peaks], col
         if measured and first:
             own = {m: first.value[m] for m in rows if m in first.value and m in measured.value}
             x = [f - measured.value[m][0] for m, (f, _) in own.items()]
-            panels[0].errorbar(x, [rows[m] + place for m in own], xerr=[np.nan if sd is None else 2 * sd for _, sd in own.values()], **look)
+            panels[0].errorbar(x, [rows[m] + place for m in own], xerr=[2 * sd for _, sd in own.values()], **look)
         if first and last:
             both = [m for m in rows if m in first.value and m in last.value]
             x = [last.value[m][0] - first.value[m][0] for m in both]
-            error = [2 * np.hypot(*(np.nan if p.value[m][1] is None else p.value[m][1] for p in (first, last))) for m in both]
+            error = [2 * np.hypot(first.value[m][1], last.value[m][1]) for m in both]
             panels[-1].errorbar(x, [rows[m] + place for m in both], xerr=error, **look)
     if measured:
         panels[0].set(title=f"Frequency at {cold:g} °C", xlabel="difference from the measured frequency, Hz")
     panels[-1].set(title=f"Shift from {cold:g} to {hot:g} °C", xlabel="shift, Hz")
-    handles, names = panels[-1].get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside upper right", ncols=len(names), handletextpad=0.3)
+    shown = {name: handle for axes in panels for handle, name in zip(*axes.get_legend_handles_labels(), strict=True)}
+    figure.legend(shown.values(), shown.keys(), loc="outside upper right", ncols=len(shown), handletextpad=0.3)
     return svg(figure, key, "frequencies and shifts of every mode by source")
 
 
@@ -202,7 +210,10 @@ def responses(key: str, panels: Mapping[str, Sequence[Curve]], peaks: Sequence[P
         below.set_ylabel("coherence", fontsize=7.5)
     rest[-1].set(xlabel="frequency, Hz", xlim=band)
     handles = [Line2D([], [], color=colour(t, every), lw=2.2, label=f"{t:g} °C") for t in every]
-    handles += [Line2D([], [], color=INK, lw=1.0, label="virtual test"), Line2D([], [], color=INK, lw=3.2, alpha=0.3, label="exact")]
+    handles += [
+        Line2D([], [], color=INK, lw=1.0, label="virtual test"),
+        Line2D([], [], color=INK, lw=3.2, alpha=0.3, label="exact"),
+    ]
     if any(c.style == "measured" for curves in panels.values() for c in curves):
         handles.append(Line2D([], [], color=INK, lw=0.9, ls=":", label="measured"))
     figure.legend(handles=handles, loc="outside upper right", ncols=len(handles))
@@ -217,8 +228,8 @@ def _strip(axes: Axes, peaks: Sequence[Peaks], labels: Sequence[str], every: Seq
         c = colour(p.temperature, every)
         share = every.index(p.temperature) / (len(every) - 1) - 0.5 if len(every) > 1 else 0.0
         y = -labels.index(p.label) - 0.42 * share
-        f = [f for f, _ in p.value.values()]
-        axes.plot(f, [y] * len(f), marker, color=c, mfc=c if filled else "none", ms=4, mew=0.9, ls="none")
+        marks = [f for f, _ in p.value.values()]
+        axes.plot(marks, [y] * len(marks), marker, color=c, mfc=c if filled else "none", ms=4, mew=0.9, ls="none")
     numbered = next((p for p in peaks if p.source == "computed"), None)
     for names, f in _grouped(numbered, 0.009 * (band[1] - band[0])) if numbered else ():
         axes.annotate(names, (f, 0.36), ha="center", va="bottom", fontsize=8)
@@ -248,7 +259,7 @@ def section(key: str, point: OperatingPoint) -> tuple[str, float]:
     spindle = point.spindle
     deformed = field(spindle, point.condition.temperature)
     carried = spindle.region(spindle.bearings[0].outer_ring).part  # the bearings move the part with the outer rings
-    moved = {p: d.displacement + [0.0, point.state.hub_movement * (p == carried)] for p, d in deformed.items()}
+    moved = {p: d.displacement + np.array([0.0, point.state.hub_movement * (p == carried)]) for p, d in deformed.items()}
     largest = max(float(np.hypot(*u.T).max()) for u in moved.values())
     extent = max(float(np.ptp(np.concatenate([d.nodes for d in deformed.values()]), axis=0).max()), 1e-9)
     scale = _round_down(0.06 * extent / largest) if largest > 0 else 1.0
@@ -256,7 +267,7 @@ def section(key: str, point: OperatingPoint) -> tuple[str, float]:
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
     _materials(left, spindle)
     left.set_title("Materials and bearings")
-    picture = None
+    picture: Any = None
     for part, d in deformed.items():
         size = np.hypot(*moved[part].T) * 1e6
         where = (d.nodes + scale * moved[part]) * 1e3

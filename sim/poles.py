@@ -34,6 +34,8 @@ DAMPING = (1e-5, 0.7)
 BELIEVED = (5e-5, 0.15)
 """Damping ratios of a mode; poles with others only clean the fit."""
 
+ROUNDING = 1e-9
+"""Part of its own weight by which a column must differ from the others to count: the square of what normal equations resolve."""
 TRIAL = 0.02
 """Damping ratio of trial poles and their distance as a fraction of their frequency."""
 APART = 5
@@ -42,16 +44,12 @@ APART = 5
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """A measured matrix: s (n,) imaginary, `frf` (n_resp, n_ref, n) complex, `weight` sqrt(2)/sd of the same shape, `power` k."""
+    """A measured matrix: s (n,) = i w (plus the decay of an exponential window), `frf` (n_resp, n_ref, n), `weight` sqrt(2)/sd, `power` k."""
 
     s: Complex
     frf: Complex
     weight: Real
     power: int
-
-    def every(self, step: int) -> Lines:
-        """Each `step`-th line only."""
-        return replace(self, s=self.s[::step], frf=self.frf[..., ::step], weight=self.weight[..., ::step])
 
     @property
     def count(self) -> int:
@@ -143,7 +141,8 @@ def information(lines: Lines, fit: Fit) -> tuple[Real, Real]:
     bound = np.r_[0:a, p : p + m, m : m + a, p + m : p + 2 * m]
     free = np.r_[a:m, m + a : p]
     cross = fit.gram[:, bound[:, None], free]
-    schur = fit.gram[:, bound[:, None], bound] - cross @ fit.inverse @ cross.transpose(0, 2, 1)
+    own = fit.gram[:, bound[:, None], bound]
+    schur = own - cross @ fit.inverse @ cross.transpose(0, 2, 1) + 100 * ROUNDING * own * np.eye(len(bound))
     gradient = ((lines.weight.reshape(-1, n) * fit.residual) @ fit.basis[:, bound].conj()).real
     transposed = tangent.transpose(0, 2, 1)
     return (transposed @ schur @ tangent).sum(0), (transposed @ gradient[..., None]).sum(0)[:, 0]
@@ -185,22 +184,22 @@ def believed(lines: Lines, poles: Complex) -> NDArray[np.bool_]:
     return inside & (damping >= BELIEVED[0]) & (damping <= BELIEVED[1])
 
 
-def search(lines: Lines, poles: Complex | None = None) -> Fit:
-    """Find the poles from nothing, or from `poles`, all residues free.
+def search(lines: Lines) -> Fit:
+    """Find the poles from nothing, all residues free.
 
     Where one more pole would lower chi-square most, poles are put and refined together with all others; they stay if the information
     criterion falls. Damping of the trial poles (2 %) is only a start, the refinement finds it.
     """
-    band = lines.s.imag[[0, -1]] * (1 / REACH, REACH)
-    grid = np.exp(np.arange(*np.log(band), TRIAL)) * np.exp(1j * np.arccos(-TRIAL))
-    fit = prune(lines, refine(lines, project(lines, np.zeros(0, complex) if poles is None else poles)))
+    low, high = np.log(lines.s.imag[[0, -1]] * (1 / REACH, REACH))
+    grid = np.exp(np.arange(low, high, TRIAL) + 1j * np.arccos(-TRIAL))
+    fit = project(lines, np.zeros(0, complex))
     for _ in range(40):
         curve = gain(lines, fit, grid)
         peaks = 1 + np.flatnonzero((curve[1:-1] >= curve[:-2]) & (curve[1:-1] > curve[2:]))
         peaks = peaks[np.argsort(-curve[peaks])]
         peaks = peaks[curve[peaks] > max(0.1 * curve.max(), 0.5 * price(lines) * fit.scale())]
-        peaks = [p for i, p in enumerate(peaks) if i == 0 or np.abs(peaks[:i] - p).min() > APART]
-        for new in [grid[peaks], grid[peaks[:1]]][: len(peaks)]:
+        apart = grid[[p for i, p in enumerate(peaks) if i == 0 or np.abs(peaks[:i] - p).min() > APART]]
+        for new in (apart, apart[:1])[: len(apart)]:
             trial = prune(lines, refine(lines, project(lines, np.append(fit.poles, new))))
             if better(lines, trial, fit):
                 fit = trial
@@ -233,7 +232,7 @@ def gain(lines: Lines, fit: Fit, candidates: Complex) -> Real:
     own = new.reshape(2, n, 2, c)
     own = np.einsum("xnac,xnbc->nabc", own, own).reshape(n, -1)
     own = (weight**2 @ own).reshape(-1, 2, 2, c).transpose(0, 3, 1, 2)
-    schur = own * (1 + 1e-9 * np.eye(2)) - cross @ fit.inverse[:, None] @ cross.transpose(0, 1, 3, 2)
+    schur = own * (1 + ROUNDING * np.eye(2)) - cross @ fit.inverse[:, None] @ cross.transpose(0, 1, 3, 2)
     return (slope * np.linalg.solve(schur, slope[..., None])[..., 0]).sum((0, 2))
 
 
@@ -311,5 +310,5 @@ def _pairs(lines: Lines, poles: Complex, order: int) -> Complex:
 def _inverse(gram: Real) -> Real:
     """Inverses of positive matrices (..., p, p), scaled to unit diagonal first."""
     size = np.sqrt(np.einsum("...ii->...i", gram))
-    scaled = gram / size[..., None] / size[..., None, :] + 1e-11 * np.eye(gram.shape[-1])
+    scaled = gram / size[..., None] / size[..., None, :] + ROUNDING * np.eye(gram.shape[-1])
     return np.linalg.inv(scaled) / size[..., None] / size[..., None, :]

@@ -1,4 +1,4 @@
-"""The report of a run: one HTML file that needs no network, with Figs. 8 to 12 and Table 2 of the paper and whatever was measured.
+"""The report of a run: one HTML file that needs no network. Figs. 8 to 12 and Table 2 of the paper, measured beside computed.
 
 It is a list of sections, (title, HTML); other modules add theirs through `extra_sections`. Numbers are prepared here, drawn in
 `sim.plots` and set in `report.html.j2`. No date is written: the same run gives the same file.
@@ -27,10 +27,10 @@ from model.modes import frf, group_energy, point_rows
 from model.pair import BearingState
 from model.scene import BadInput, content_hash, load
 from sim import plots
-from sim.campaign import ModeRow, Test
-from sim.operating import provenance
+from sim.campaign import Campaign, ModeRow, Test
+from sim.operating import OperatingPoint, operating_point, provenance
 from sim.plots import Curve, Peaks
-from sim.run import HIGHEST_MODE, Run, Step
+from sim.run import Run, Step
 from sim.shift import follow, match
 from thermal.expansion import influence
 from thermal.temperature import region_temperatures
@@ -40,6 +40,7 @@ Section = tuple[str, str]
 
 RPM = 2 * np.pi / 60
 SAME_TEMPERATURE = 0.5  # K within which a measurement counts as taken at a temperature of the run
+STRIDE = 10.0  # K, over which a mode can be followed by its shape
 CERTAIN = 2.0  # standard errors beyond which a difference is called one
 CLOSE = 0.05  # relative distance of neighbours whose splitting is compared
 PUBLISHED_COLUMNS = ("mode", "kind", "main_flexibility", "frequency_20C_Hz, frequency_60C_Hz, ...")
@@ -63,7 +64,7 @@ def html(run: Run, extra_sections: Sequence[Section] = ()) -> str:
     """The report as text; `extra_sections` stand between the results and the account of where they come from."""
     run = replace(run, steps=tuple(sorted(run.steps, key=_temperature)))
     every = [*results(run), *extra_sections, *background(run)]
-    return str(_page().page(run.spindle, _conditions(run), [(title, Markup(body)) for title, body in every]))  # type: ignore[attr-defined]
+    return str(_page().page(run.spindle, _conditions(run), [(title, Markup(body)) for title, body in every]))
 
 
 def results(run: Run) -> list[Section]:
@@ -71,17 +72,17 @@ def results(run: Run) -> list[Section]:
     page, table = _page(), compared(run)
     cold, hot = table.temperatures
     steps = [s for s in run.steps if _temperature(s) in (cold, hot)]
-    picture = plots.comparison("modes", table.labels(), table.peaks, cold, hot) if cold != hot else ""
+    picture = plots.comparison("modes", table.labels(), table.peaks, cold, hot) if cold != hot and table.rows else ""
     fig8 = plots.responses("frf", driving_points(run, steps), table.peaks, run.spindle.hammer.band)
     hottest = max(run.steps, key=lambda s: abs(_temperature(s) - run.spindle.reference_temperature)).point
     drawing, scale = plots.section("section", hottest)
     return [
-        ("In short", page.short(headlines(run, table), misses(table), table)),  # type: ignore[attr-defined]
-        ("Natural frequencies", page.frequencies(table, Markup(picture), table.sources())),  # type: ignore[attr-defined]
-        ("Frequency response", page.responses(Markup(fig8), run, steps, table)),  # type: ignore[attr-defined]
-        ("Bearings over temperature", page.bearings(bearing_figures(run), run)),  # type: ignore[attr-defined]
-        ("Thermal deformation", page.deformation(Markup(drawing), scale, hottest)),  # type: ignore[attr-defined]
-        ("All modes", page.modes([(s, match_back(s), in_band(s)) for s in run.steps], group_energy)),  # type: ignore[attr-defined]
+        ("In short", page.short(headlines(run, table), misses(table), calibration(run.spindle), table)),
+        ("Natural frequencies", page.frequencies(table, Markup(picture), table.sources())),
+        ("Frequency response", page.responses(Markup(fig8), run, steps, table)),
+        ("Bearings over temperature", page.bearings(bearing_figures(run), run)),
+        ("Thermal deformation", page.deformation(Markup(drawing), scale, hottest)),
+        ("All modes", page.modes([(s, identified(s), in_band(s)) for s in run.steps], group_energy)),
     ]
 
 
@@ -92,10 +93,10 @@ def background(run: Run) -> list[Section]:
     origins = Counter(p.origin for p in spindle.provenance.values())
     values, unchanged = values_of_file(spindle)
     return [
-        ("The virtual test", page.acquisition(run.steps[0].test)),  # type: ignore[attr-defined]
-        ("Finite element meshes", page.meshes(mesh, last.condition.temperature)),  # type: ignore[attr-defined]
-        ("Where the numbers come from", page.origins(spindle, origins, values, unchanged)),  # type: ignore[attr-defined]
-        ("Versions", page.versions(provenance(spindle))),  # type: ignore[attr-defined]
+        ("The virtual test", page.acquisition(run.steps[0].test)),
+        ("Finite element meshes", page.meshes(mesh, last.condition.temperature)),
+        ("Where the numbers come from", page.origins(spindle, origins, values, unchanged)),
+        ("Versions", page.versions(provenance(spindle))),
     ]
 
 
@@ -108,47 +109,70 @@ def measured_rows(run: Run) -> dict[str, dict[int, ModeRow]]:
     Measured modes come without shapes. So the k-th measured mode of a kind, in order of frequency, is taken for the k-th computed
     mode of this kind at the temperature of the run nearest to the test's; from there the computed mode is followed by its shape.
     A mode that the measurement missed would therefore shift the later ones of its kind by one place. Measured modes beyond
-    the computed ones of their kind, and tests at another speed, are left out.
+    the computed ones of their kind in the band, and tests at another speed, are left out.
     """
-    back = [{mode: first for first, mode in enumerate(row)} for row in followed(run)]
-    found: dict[str, dict[int, ModeRow]] = {}
-    for test in (t for campaign in run.measured for t in campaign.tests):
-        if not test.modes or not _same_speed(test, run):
-            continue
-        nearest = min(range(len(run.steps)), key=lambda k: abs(_temperature(run.steps[k]) - test.temperature))
-        kinds = [m.kind for m in run.steps[nearest].point.modes]
-        pairs = by_kind([(r.kind, r.frequency) for r in test.modes], kinds)
-        found[test.id] = {back[nearest][c]: test.modes[m] for m, c in pairs.items() if c in back[nearest]}
+    numbers = numbered(run)
+    return {name: row for campaign in run.measured for name, row in _rows_of(run, campaign, numbers).items()}
+
+
+def _rows_of(run: Run, campaign: Campaign, numbers: Sequence[Mapping[int, int]]) -> dict[str, dict[int, ModeRow]]:
+    """`measured_rows` of one campaign."""
+    found = {}
+    for test in (t for t in campaign.tests if t.modes and _same_speed(t, run)):
+        k = _nearest(run, test.temperature)
+        pairs = by_kind([(r.kind, r.frequency) for r in test.modes], [m.kind for m in run.steps[k].point.modes])
+        found[test.id] = {numbers[k][c] - 1: test.modes[m] for m, c in pairs.items() if c in numbers[k]}
     return found
 
 
 def by_kind(known: Sequence[tuple[str, float]], kinds: Sequence[str]) -> dict[int, int]:
-    """Index among computed modes, whose `kinds` stand in order of frequency, for the index of each `known` (kind, frequency):
-    the k-th of a kind is the k-th of this kind."""
-    pairs = {}
+    """Index among computed modes, whose `kinds` stand in order of frequency, by index of each `known` (kind, frequency): the
+    k-th of a kind is the k-th of this kind."""
+    pairs: dict[int, int] = {}
     for kind in dict.fromkeys(k for k, _ in known):
         own = sorted((i for i, (k, _) in enumerate(known) if k == kind), key=lambda i: known[i][1])
         pairs |= dict(zip(own, (i for i, k in enumerate(kinds) if k == kind), strict=False))
     return dict(sorted(pairs.items()))
 
 
-def followed(run: Run) -> list[list[int]]:
-    """Index at every step of each mode of the first step, followed by shape from step to step; -1 where it was lost."""
-    rows = [list(range(len(run.steps[0].point.modes)))]
+def numbered(run: Run) -> list[dict[int, int]]:
+    """At every step, the number of each mode by its index: modes in the band at the first step count from 1 in order of
+    frequency, and are followed from there by their shapes."""
+    rows = [{i: i + 1 for i in in_band(run.steps[0])}]
     for a, b in pairwise(s.point for s in run.steps):
-        partner = follow(a.linear.mass, a.modes, b.modes)
-        rows.append([-1 if i < 0 else partner[i] for i in rows[-1]])
+        numbers = rows[-1]
+        for here, there in pairwise(_path(a, b)):
+            partner = _partners(here, there)
+            numbers = {partner[i]: number for i, number in numbers.items() if i in partner}
+        rows.append(numbers)
     return rows
+
+
+def _partners(a: OperatingPoint, b: OperatingPoint) -> dict[int, int]:
+    """Index at `b` by index at `a` of every mode that goes on; axial modes stay axial."""
+    partner: dict[int, int] = {}
+    for axial in (True, False):
+        mine, theirs = ([i for i, m in enumerate(p.modes) if (m.kind == "axial") == axial] for p in (a, b))
+        if mine and theirs:
+            found = follow(a.linear.mass, [a.modes[i] for i in mine], [b.modes[j] for j in theirs])
+            partner |= {i: theirs[k] for i, k in zip(mine, found, strict=True) if k >= 0}
+    return partner
+
+
+def _path(a: OperatingPoint, b: OperatingPoint) -> list[OperatingPoint]:
+    """From one operating point to another in steps of at most `STRIDE`."""
+    count = int(np.ceil(abs(b.condition.temperature - a.condition.temperature) / STRIDE - 1e-9))
+    between = np.linspace(a.condition.temperature, b.condition.temperature, max(count, 1) + 1)[1:-1]
+    return [a, *(operating_point(a.spindle, replace(a.condition, temperature=float(t))) for t in between), b]
 
 
 def in_band(step: Step) -> list[int]:
     """Indices of the modes below the upper end of the scene's frequency band."""
-    highest = step.point.spindle.hammer.band[1] or HIGHEST_MODE
-    return [i for i, m in enumerate(step.point.modes) if m.frequency <= highest]
+    return [i for i, m in enumerate(step.point.modes) if m.frequency <= step.point.spindle.hammer.band[1]]
 
 
-def match_back(step: Step) -> dict[int, int]:
-    """Index of the identified mode by index of the computed one."""
+def identified(step: Step) -> dict[int, int]:
+    """Index of the identified mode by index of the computed one, paired by shape and frequency."""
     index = {id(m): i for i, m in enumerate(step.point.modes)}
     return {index[id(mode)]: i for i, mode in match(step).items()}
 
@@ -158,7 +182,7 @@ def match_back(step: Step) -> dict[int, int]:
 
 @dataclass(frozen=True)
 class Published:
-    """Somebody else's natural frequencies, from `published/<name>.csv` beside the scene.
+    """Somebody else's natural frequencies of the spindle at rest, from `published/<name>.csv` beside the scene.
 
     `frequency`: Hz by temperature (C), for every mode; `flexibility` is what the source names as its main flexibility, or empty.
     """
@@ -231,18 +255,17 @@ class Table:
         """The first source of a kind at a temperature."""
         return next((p for p in self.peaks if p.source == source and p.temperature == temperature), None)
 
-    def at(self, label: str, temperature: float, number: int) -> tuple[float, float | None] | None:
-        """Frequency and standard error (Hz)."""
+    def at(self, label: str, temperature: float, number: int) -> tuple[float, float] | None:
+        """Frequency and its standard error (Hz, NaN where not known)."""
         values = [p.value for p in self.peaks if p.label == label and p.temperature == temperature]
         return values[0].get(number) if values else None
 
-    def shift(self, label: str, number: int) -> tuple[float, float | None] | None:
+    def shift(self, label: str, number: int) -> tuple[float, float] | None:
         """Shift and its standard error (Hz) from the first to the second temperature; errors of the two are independent."""
         cold, hot = (self.at(label, t, number) for t in self.temperatures)
         if cold is None or hot is None or self.temperatures[0] == self.temperatures[1]:
             return None
-        known = cold[1] is not None and hot[1] is not None
-        return hot[0] - cold[0], float(np.hypot(cold[1], hot[1])) if known else None  # type: ignore[arg-type]
+        return hot[0] - cold[0], float(np.hypot(cold[1], hot[1]))
 
     def labels(self) -> dict[int, str]:
         """What the picture calls the modes: those that were measured or published, or all."""
@@ -251,50 +274,61 @@ class Table:
 
 
 def compared(run: Run) -> Table:
-    """Measured, published, computed and identified frequencies side by side."""
-    track = followed(run)
-    numbers = {i: i + 1 for i in in_band(run.steps[0])}
-    own = [_temperature(s) for s in run.steps]
-    raw: list[Peaks] = []
-    titles: dict[str, str] = {}
-    rows = measured_rows(run)
-    several = sum(any(t.modes for t in c.tests) for c in run.measured) > 1
-    for campaign in run.measured:
-        label = f"measured, {campaign.folder.name if campaign.folder else campaign.title}" if several else "measured"
-        for temperature in dict.fromkeys(t.temperature for t in campaign.tests if t.id in rows and t.modes):
-            repeats = [rows[t.id] for t in campaign.tests if t.temperature == temperature and t.id in rows]
-            titles[label] = f"{campaign.title}. {campaign.note}".strip()
-            raw.append(Peaks("measured", label, temperature, _averaged(repeats, numbers)))
-    papers = published(run.spindle)
+    """Measured, published, computed and identified frequencies side by side.
+
+    The temperatures are the outermost of the run at which something was measured or published, or its own if there are not two.
+    """
+    numbers, own = numbered(run), [_temperature(s) for s in run.steps]
+    papers = () if run.steps[0].point.condition.speed else published(run.spindle)
+    known = _measured_peaks(run, numbers)
     flexibility: dict[int, str] = {}
+    titles = {_label(run, c): f"{c.title}. {c.note}".strip() for c in run.measured if any(t.modes for t in c.tests)}
     for paper in papers:
         label = "published" if len(papers) == 1 else f"published, {paper.title}"
         titles[label] = f"{paper.title}. {paper.source}"
         for temperature, frequency in paper.frequency.items():
-            nearest = min(range(len(own)), key=lambda k: abs(own[k] - temperature))
-            back = {mode: first for first, mode in enumerate(track[nearest])}
-            pairs = by_kind(list(zip(paper.kinds, frequency, strict=True)), [m.kind for m in run.steps[nearest].point.modes])
-            mine = {numbers[back[c]]: p for p, c in pairs.items() if back.get(c) in numbers}
-            flexibility = {n: paper.flexibility[p] for n, p in mine.items()} | flexibility
-            raw.append(Peaks("published", label, temperature, {n: (frequency[p], None) for n, p in mine.items()}))
-    known = [p for p in raw if any(abs(p.temperature - t) <= SAME_TEMPERATURE for t in own)]
+            k = _nearest(run, temperature)
+            pairs = by_kind(list(zip(paper.kinds, frequency, strict=True)), [m.kind for m in run.steps[k].point.modes])
+            rows = {numbers[k][c]: i for i, c in pairs.items() if c in numbers[k]}
+            flexibility = {n: paper.flexibility[i] for n, i in rows.items()} | flexibility
+            known.append(Peaks("published", label, temperature, {n: (frequency[i], np.nan) for n, i in rows.items()}))
     common = [t for t in own if any(abs(p.temperature - t) <= SAME_TEMPERATURE for p in known)]
-    ends = common if len(set(common)) > 1 else own
-    cold, hot = min(ends), max(ends)
-    peaks = [replace(p, temperature=t) for t in dict.fromkeys((cold, hot)) for p in known if abs(p.temperature - t) <= SAME_TEMPERATURE]
-    peaks.sort(key=lambda p: list(titles).index(p.label))
-    chosen = {t: own.index(t) for t in dict.fromkeys((cold, hot))}
-    for t, k in chosen.items():
-        modes = run.steps[k].point.modes
-        peaks.append(Peaks("computed", "computed", t, {n: (modes[track[k][i]].frequency, None) for i, n in numbers.items() if track[k][i] >= 0}))
-    for t, k in chosen.items():
-        seen, back_to, sd = run.steps[k].identified, match_back(run.steps[k]), run.steps[k].identified.frequency_sd
-        pairs = {n: back_to[track[k][i]] for i, n in numbers.items() if track[k][i] in back_to}
-        peaks.append(Peaks("identified", "identified", t, {n: (float(seen.frequency[j]), float(sd[j])) for n, j in pairs.items()}))
-    shown = {p.label for p in peaks}
-    elsewhere = [f"{label} at {', '.join(f'{p.temperature:g}' for p in raw if p.label == label)} °C" for label in titles if label not in shown]
-    lines = tuple(_row(run.steps[0], i, n, flexibility.get(n, "")) for i, n in numbers.items())
-    return Table(lines, tuple(peaks), (cold, hot), titles, tuple(elsewhere))
+    ends = common if len(common) > 1 else own
+    peaks = []
+    for t in dict.fromkeys((min(ends), max(ends))):
+        step, at = run.steps[own.index(t)], numbers[own.index(t)]
+        modes, seen, pairs = step.point.modes, step.identified, identified(step)
+        exact = {n: (modes[i].frequency, np.nan) for i, n in at.items()}
+        found = {n: (float(seen.frequency[pairs[i]]), float(seen.frequency_sd[pairs[i]])) for i, n in at.items() if i in pairs}
+        peaks += [replace(p, temperature=t) for p in known if abs(p.temperature - t) <= SAME_TEMPERATURE]
+        peaks += [Peaks("computed", "computed", t, exact), Peaks("identified", "identified", t, found)]
+    peaks.sort(key=lambda p: list(plots.SOURCES).index(p.source))
+    missing = dict.fromkeys(p.label for p in known if p.label not in {q.label for q in peaks})
+    elsewhere = [f"{x} at {', '.join(f'{p.temperature:g}' for p in known if p.label == x)} °C" for x in missing]
+    lines = tuple(_row(run.steps[0], i, n, flexibility.get(n, "")) for i, n in numbers[0].items())
+    return Table(lines, tuple(peaks), (min(ends), max(ends)), titles, tuple(elsewhere))
+
+
+def _measured_peaks(run: Run, numbers: Sequence[Mapping[int, int]]) -> list[Peaks]:
+    """Measured frequencies by campaign and temperature; repeated tests give their mean."""
+    peaks = []
+    for campaign in run.measured:
+        rows = _rows_of(run, campaign, numbers)
+        tests = [t for t in campaign.tests if t.id in rows]
+        for temperature in dict.fromkeys(t.temperature for t in tests):
+            value: dict[int, tuple[float, float]] = {}
+            repeats = [rows[t.id] for t in tests if t.temperature == temperature]
+            for index in sorted({i for r in repeats for i in r}):
+                own = [r[index] for r in repeats if index in r]
+                error = float(np.sqrt(sum(r.frequency_sd**2 for r in own))) / len(own)
+                value[index + 1] = (float(np.mean([r.frequency for r in own])), error)
+            peaks.append(Peaks("measured", _label(run, campaign), temperature, value))
+    return peaks
+
+
+def _label(run: Run, campaign: Campaign) -> str:
+    several = sum(any(t.modes for t in c.tests) for c in run.measured) > 1
+    return f"measured, {campaign.folder.name if campaign.folder else campaign.title}" if several else "measured"
 
 
 def _row(step: Step, index: int, number: int, flexibility: str) -> Row:
@@ -304,101 +338,118 @@ def _row(step: Step, index: int, number: int, flexibility: str) -> Row:
     return Row(number, mode.kind, largest, shares[largest], shares.get("bearings", 0.0), flexibility)
 
 
-def _averaged(repeats: Sequence[Mapping[int, ModeRow]], numbers: Mapping[int, int]) -> dict[int, tuple[float, float | None]]:
-    """Mean frequency and its standard error over repeated tests, by mode number."""
-    answer: dict[int, tuple[float, float | None]] = {}
-    for index, number in numbers.items():
-        rows = [r[index] for r in repeats if index in r]
-        if rows:
-            error = float(np.sqrt(sum(r.frequency_sd**2 for r in rows)) / len(rows))
-            answer[number] = (float(np.mean([r.frequency for r in rows])), error)
-    return answer
-
-
 # ---------------------------------------------------------------- what a reader should see at once
 
 
 def headlines(run: Run, table: Table) -> list[tuple[str, str, str]]:
-    """(what, number, explanation): preload, bearing stiffness, and how far the modes of each kind of flexibility move."""
+    """(what, number, explanation): preload, bearing angle and stiffness, and how far the modes of each flexibility move."""
     cold, hot = table.temperatures
-    if cold == hot:
-        b = run.steps[0].point.state.bearings
-        return [("Preload", f"{b[0].preload:.1f} N", f"at {cold:g} °C")]
     first, last = (next(s.point.state for s in run.steps if _temperature(s) == t) for t in (cold, hot))
-    a, b = first.bearings[0], last.bearings[0]
-    cards = [("Preload", f"{a.preload:.1f} → {b.preload:.1f} N", f"{100 * b.preload / a.preload:.0f} % of it is left at {hot:g} °C")]
+    preload = [s.bearings[0].preload for s in (first, last)]
+    if cold == hot:
+        return [("Preload", f"{preload[0]:.1f} N", f"at {cold:g} °C")]
     pairs = list(zip(first.bearings, last.bearings, strict=True))[::-1]
+    angle = " / ".join(f"{np.degrees(b.contact_angle - a.contact_angle):+.2f}" for a, b in pairs)
+    radial = " / ".join(_change(a.radial_stiffness, b.radial_stiffness) for a, b in pairs)
+    axial = " / ".join(_change(a.axial_stiffness, b.axial_stiffness) for a, b in pairs)
     names = " / ".join(b.name for _, b in pairs) + " bearing"
-    turned = " / ".join(f"{np.degrees(b.contact_angle - a.contact_angle):+.2f}" for a, b in pairs)
-    radial, axial = (
-        " / ".join(f"{100 * (getattr(b, key) / getattr(a, key) - 1):+.0f}" for a, b in pairs) for key in ("radial_stiffness", "axial_stiffness")
-    )
-    cards.append(("Contact angle", f"{turned} degrees", f"{names}, from {cold:g} to {hot:g} °C"))
-    cards.append(("Radial bearing stiffness", f"{radial} %", f"{names}; axial {axial} %"))
-    groups: dict[str, list[Row]] = {}
+    cards = [
+        (
+            "Preload",
+            f"{preload[0]:.1f} → {preload[1]:.1f} N",
+            f"{100 * preload[1] / preload[0]:.0f} % of it is left at {hot:g} °C",
+        ),
+        ("Contact angle", f"{angle} degrees", f"{names}, from {cold:g} to {hot:g} °C"),
+        ("Radial bearing stiffness", radial, f"{names}; axial {axial}"),
+    ]
+    groups: dict[tuple[str, str], list[int]] = {}
     for row in table.rows:
-        groups.setdefault(row.published_flexibility or row.flexibility + " ", []).append(row)
-    for name, rows in groups.items():
-        moved = [(row.number, table.shift("computed", row.number)) for row in rows]
-        shifts = [f"{s[0]:+.1f}" for _, s in moved if s is not None]
-        by = "as published" if rows[0].published_flexibility else "by the model"
-        cards.append((f"Modes {_listed([n for n, _ in moved])}: {name.strip()}, {by}", ", ".join(shifts) + " Hz", f"computed shift from {cold:g} to {hot:g} °C"))
+        named = (row.published_flexibility, "as published") if row.published_flexibility else (row.flexibility, "by the model")
+        groups.setdefault(named, []).append(row.number)
+    for (name, by), numbers in groups.items():
+        shifts = ", ".join(f"{s[0]:+.1f}" for n in numbers if (s := table.shift("computed", n)))
+        modes = f"Mode{'s' if len(numbers) > 1 else ''} {_listed(numbers)}"
+        cards.append((f"{modes}: {name}, {by}", f"{shifts} Hz", f"computed shift from {cold:g} to {hot:g} °C"))
     return cards
+
+
+def _change(before: float, after: float) -> str:
+    return f"{100 * (after / before - 1):+.0f} %" if before else "from nothing"
 
 
 def misses(table: Table) -> list[str]:
     """Sentences on where the model does not meet the measurement, and on what else disagrees; every number is computed."""
-    says: list[str] = []
-    cold, hot = table.temperatures
-    rows = {r.number: r for r in table.rows}
-    own, measured, paper = (table.of(source, cold) for source in ("computed", "measured", "published"))
+    measured, own, paper = (table.of(source, table.temperatures[0]) for source in ("measured", "computed", "published"))
     if own is None:
-        return says
-    if measured is not None and measured.value:
-        off = {n: own.value[n][0] - f for n, (f, _) in measured.value.items() if n in own.value}
-        worst = max(off, key=lambda n: abs(off[n]))
-        f = measured.value[worst][0]
-        says.append(
-            f"The largest miss at {cold:g} °C is mode {worst} ({rows[worst].kind}): computed {own.value[worst][0]:.1f} Hz, measured {f:.1f} Hz, "
-            f"{abs(off[worst]):.1f} Hz or {100 * abs(off[worst]) / f:.1f} % too {'high' if off[worst] > 0 else 'low'}. "
-            f"Over all {len(off)} measured modes the difference runs from {min(off.values()):+.1f} to {max(off.values()):+.1f} Hz."
-        )
-        for a, b in pairwise(sorted(off, key=lambda n: measured.value[n][0])):
-            apart, mine = measured.value[b][0] - measured.value[a][0], own.value[b][0] - own.value[a][0]
-            if rows[a].kind == rows[b].kind and apart < CLOSE * f and abs(apart - mine) > CERTAIN * np.hypot(*(measured.value[n][1] or 0.0 for n in (a, b))):
-                says.append(f"Modes {a} and {b} ({rows[a].kind}) are measured {apart:.1f} Hz apart, computed {mine:.1f} Hz.")
-        says += _shift_misses(table, measured.label)
-    if paper is not None and measured is not None:
-        both = [n for n in paper.value if n in measured.value and n in own.value]
-        near = max((abs(paper.value[n][0] - own.value[n][0]) for n in both), default=0.0)
-        far = max((abs(paper.value[n][0] - measured.value[n][0]) for n in both), default=0.0)
-        if both:
+        return []
+    says: list[str] = []
+    if measured is not None and set(measured.value) & set(own.value):
+        says += [*_frequency_misses(table, measured, own), *_shift_misses(table, measured.label)]
+        if paper is not None and (both := [n for n in paper.value if n in measured.value and n in own.value]):
+            far, near = (max(abs(paper.value[n][0] - other.value[n][0]) for n in both) for other in (measured, own))
             says.append(
-                f"The published analysis misses the measurement too, by up to {far:.1f} Hz at {cold:g} °C; it differs from the model by at most "
-                f"{near:.1f} Hz" + (f", whose {calibrated} calibrated numbers were chosen to that end." if calibrated else ".")
+                f"The published analysis misses the measurement too, by up to {far:.1f} Hz at {own.temperature:g} °C; "
+                f"it differs from the model by at most {near:.1f} Hz."
             )
     for name in dict.fromkeys(r.published_flexibility for r in table.rows if r.published_flexibility):
         other = [r for r in table.rows if r.published_flexibility == name and r.flexibility.rstrip("s") not in name]
+        shares = (
+            f"mode {r.number}: {r.flexibility} {100 * r.share:.0f} %, bearings {100 * r.bearing_share:.0f} %" for r in other
+        )
         if other:
-            held = "; ".join(f"mode {r.number}: {r.flexibility} {100 * r.share:.0f} %, bearings {100 * r.bearing_share:.0f} %" for r in other)
-            says.append(f"The publication names “{name}” as the main flexibility where most of the model's strain energy sits elsewhere ({held}).")
+            says.append(
+                f"The publication names “{name}” as the main flexibility of modes for which most of the model's strain energy "
+                f"sits elsewhere ({'; '.join(shares)})."
+            )
     return says
+
+
+def _frequency_misses(table: Table, measured: Peaks, own: Peaks) -> Iterator[str]:
+    """The largest miss at the first temperature, and neighbours of one kind whose distance is missed."""
+    kinds = {r.number: r.kind for r in table.rows}
+    off = {n: own.value[n][0] - f for n, (f, _) in measured.value.items() if n in own.value}
+    worst = max(off, key=lambda n: abs(off[n]))
+    f, miss = measured.value[worst][0], off[worst]
+    yield (
+        f"The largest miss at {own.temperature:g} °C is mode {worst} ({kinds[worst]}): computed {own.value[worst][0]:.1f} Hz, "
+        f"measured {f:.1f} Hz, {abs(miss):.1f} Hz or {100 * abs(miss) / f:.1f} % too {'high' if miss > 0 else 'low'}. "
+        f"Over all {len(off)} measured modes the difference runs from {min(off.values()):+.1f} to {max(off.values()):+.1f} Hz."
+    )
+    for a, b in pairwise(sorted(off, key=lambda n: measured.value[n][0])):
+        apart, mine = (p.value[b][0] - p.value[a][0] for p in (measured, own))
+        error = np.hypot(measured.value[a][1], measured.value[b][1])
+        if kinds[a] == kinds[b] and apart < CLOSE * measured.value[a][0] and abs(apart - mine) > CERTAIN * error:
+            yield f"Modes {a} and {b} ({kinds[a]}) are measured {apart:.1f} Hz apart, computed {mine:.1f} Hz."
+
+
+def calibration(spindle: Spindle) -> str:
+    """A sentence on the scene's calibrated numbers, with the reason that the scene gives; empty if there are none."""
+    sources = Counter(p.source for p in spindle.provenance.values() if p.origin == "calibrated")
+    reasons = "; ".join(filter(None, sources))
+    return f"Agreement is partly made: {sources.total()} of the scene's numbers are calibrated ({reasons})." if sources else ""
 
 
 def _shift_misses(table: Table, label: str) -> Iterator[str]:
     """Sentences on shifts that differ by more than `CERTAIN` standard errors of the measured one."""
     cold, hot = table.temperatures
-    both = {r.number: (table.shift(label, r.number), table.shift("computed", r.number), r.kind) for r in table.rows}
-    sure = {n: (m, c[0], kind) for n, (m, c, kind) in both.items() if m and c and abs(m[0] - c[0]) > CERTAIN * (m[1] or 0.0)}
-    for n, (m, c, kind) in sure.items():
-        if m[0] * c < 0:
-            verbs = ("rises", "falls") if m[0] > 0 else ("falls", "rises")
-            error = f" ± {m[1]:.1f}" if m[1] else ""
-            yield f"From {cold:g} to {hot:g} °C mode {n} ({kind}) {verbs[0]} by {abs(m[0]):.1f}{error} Hz when measured and {verbs[1]} by {abs(c):.1f} Hz when computed."
-    for further, words in ((True, "further"), (False, "less")):
-        some = {n: f"mode {n}: {m[0]:+.1f} against {c:+.1f} Hz" for n, (m, c, _) in sure.items() if m[0] * c > 0 and (abs(m[0]) > abs(c)) == further}
-        if some:
-            yield f"Measured frequencies move {words} than computed ones in modes {_listed(list(some))} ({'; '.join(some.values())})."
+    sure = []
+    for row in table.rows:
+        measured, own = table.shift(label, row.number), table.shift("computed", row.number)
+        if measured and own and abs(measured[0] - own[0]) > CERTAIN * measured[1]:
+            sure.append((row.number, row.kind, *measured, own[0]))
+    for number, kind, value, error, own_value in sure:
+        if value * own_value < 0:
+            verbs = ("rises", "falls") if value > 0 else ("falls", "rises")
+            yield (
+                f"From {cold:g} to {hot:g} °C mode {number} ({kind}) {verbs[0]} by {abs(value):.1f} ± {error:.1f} Hz "
+                f"when measured and {verbs[1]} by {abs(own_value):.1f} Hz when computed."
+            )
+    for further, words in ((True, "further"), (False, "less far")):
+        same_way = [(n, m, c) for n, _, m, _, c in sure if m * c > 0 and (abs(m) > abs(c)) == further]
+        if same_way:
+            each = "; ".join(f"mode {n}: {m:+.1f} against {c:+.1f} Hz" for n, m, c in same_way)
+            modes = _listed([n for n, _, _ in same_way])
+            yield f"Measured frequencies move {words} than computed ones in modes {modes} ({each})."
 
 
 def _listed(numbers: Sequence[int]) -> str:
@@ -421,7 +472,8 @@ def driving_points(run: Run, steps: Sequence[Step]) -> dict[str, list[Curve]]:
             seen, decay = step.test.estimate.h1, step.test.estimate.window_decay
             lines = np.linspace(seen.frequency[0], seen.frequency[-1], 1600)
             row = point_rows(run.spindle, step.point.chain, (node,))
-            exact = frf(step.point.linear, row, row, lines - 1j * decay / (2 * np.pi), kind="mobility")[0, 0]
+            shifted = np.asarray(lines - 1j * decay / (2 * np.pi) if decay else lines)
+            exact = frf(step.point.linear, row, row, shifted, kind="mobility")[0, 0]
             curves.append(Curve("exact", _temperature(step), lines, exact))
             i, j = seen.response_nodes.index(node), seen.reference_nodes.index(node)
             coherence = None if seen.coherence is None else seen.coherence[i, j]
@@ -441,7 +493,9 @@ def _measured_curves(run: Run, step: Step, node: int) -> Iterator[Curve]:
             value = h.value[h.response_nodes.index(node), h.reference_nodes.index(node)]
             power = {"receptance": 1, "mobility": 0, "accelerance": -1}[h.quantity]
             used = h.frequency > 0
-            yield Curve("measured", _temperature(step), h.frequency[used], value[used] * (2j * np.pi * h.frequency[used]) ** power)
+            yield Curve(
+                "measured", _temperature(step), h.frequency[used], value[used] * (2j * np.pi * h.frequency[used]) ** power
+            )
 
 
 def bearing_figures(run: Run) -> list[tuple[str, Markup]]:
@@ -449,7 +503,12 @@ def bearing_figures(run: Run) -> list[tuple[str, Markup]]:
     temperature = [_temperature(s) for s in run.steps]
     figures: tuple[tuple[str, str, str, Mapping[str, Callable[[BearingState], float]]], ...] = (
         ("angle", "Fig. 9. Contact angle.", "contact angle, degrees", {"": lambda b: np.degrees(b.contact_angle)}),
-        ("deformation", "Fig. 10a. Deformation of one ball, both contacts.", "deformation, µm", {"": lambda b: b.deformation * 1e6}),
+        (
+            "deformation",
+            "Fig. 10a. Deformation of one ball, both contacts.",
+            "deformation, µm",
+            {"": lambda b: b.deformation * 1e6},
+        ),
         ("force", "Fig. 10b. Contact force of one ball.", "contact force, N", {"": lambda b: b.contact_force}),
         ("ball", "Fig. 10c. Stiffness of one ball.", "ball stiffness, N/µm", {"": lambda b: b.ball_stiffness * 1e-6}),
         ("preload", "Fig. 11. Preload, the axial force of a bearing.", "preload, N", {"": lambda b: b.preload}),
@@ -494,10 +553,14 @@ def values_of_file(spindle: Spindle) -> tuple[dict[str, Any], bool]:
 # ---------------------------------------------------------------- the page
 
 
-def _page() -> object:
+def _page() -> Any:
     """The macros of the template."""
     environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     environment.filters |= {"signed": _signed, "with_error": _with_error, "minus": _minus}
     environment.globals |= {"RPM": RPM, "degrees": np.degrees}
@@ -513,22 +576,26 @@ def _signed(value: float, digits: int = 1) -> str:
     return _minus(f"{value:+.{digits}f}")
 
 
-def _with_error(pair: tuple[float, float | None] | None, sign: bool = False, digits: int = 1) -> Markup:
+def _with_error(pair: tuple[float, float] | None, sign: bool = False, digits: int = 1) -> Markup:
     """A number with its standard error, to the error's first digit (two, if that is a one); an en dash for no number."""
     if pair is None:
         return Markup("–")
     value, error = pair
-    known = error is not None and np.isfinite(error) and error > 0
-    if known:
-        digits = int(np.clip(-np.floor(np.log10(error / 2)), 0, 5))
-    text = _minus(f"{value:{'+' if sign else ''}.{digits}f}")
-    return Markup(f"{text} <small>± {error:.{digits}f}</small>" if known else text)
+    if not 0 < error < np.inf:
+        return Markup(_minus(f"{value:{'+' if sign else ''}.{digits}f}"))
+    digits = int(np.clip(-np.floor(np.log10(error / 2)), 0, 5))
+    return Markup(_minus(f"{value:{'+' if sign else ''}.{digits}f}") + f" <small>± {error:.{digits}f}</small>")
 
 
 def _conditions(run: Run) -> str:
     temperatures = ", ".join(f"{_temperature(s):g}" for s in run.steps)
     speed = run.steps[0].point.condition.speed / RPM
     return f"{temperatures} °C, " + (f"{speed:.0f} rpm" if speed else "at rest")
+
+
+def _nearest(run: Run, temperature: float) -> int:
+    """Index of the step nearest to a temperature (C)."""
+    return min(range(len(run.steps)), key=lambda k: abs(_temperature(run.steps[k]) - temperature))
 
 
 def _temperature(step: Step) -> float:

@@ -11,7 +11,7 @@ FILES = [f for package in ORDER for f in sorted((ROOT / package).glob("**/*.py")
 ONLY_IN = {
     "skfem": lambda f: f.parts[0] == "thermal",
     "mujoco": lambda f: f == Path("model/mjcf.py") or f.parts[0] == "sim",
-    "rerun": lambda f: f == Path("sim/log.py"),
+    "rerun": lambda f: f.parts[0] == "sim" and f.name.startswith("log"),
     "pyuff": lambda f: f == Path("sim/uff.py"),
 }
 
