@@ -11,7 +11,7 @@ from model.ball_row import Array
 from model.machine import Condition
 from model.modes import ComplexArray
 from sim.campaign import Campaign, Test
-from sim.modal import extract, noise_model, without_window
+from sim.modal import extract, noise_model
 
 FREQUENCY_FLOOR = 3e-5  # relative: finite elements and bearing equilibrium of the model itself
 DAMPING_FLOOR = 3e-3  # relative
@@ -56,9 +56,9 @@ def _from_frf(campaign: Campaign, test: Test) -> Observation:
     sd = frf.sd
     if sd is None and campaign.noise is not None:
         sd = noise_model(frf.value, campaign.noise.of_value, campaign.noise.of_largest)
-    found = extract(frf.frequency, frf.value, sd, kind=frf.quantity)
-    if test.window_decay:
-        found = without_window(found, test.window_decay)
+    if sd is not None and not np.all(np.isfinite(sd)):
+        sd = None  # a single hit has no scatter
+    found = extract(frf.frequency, frf.value, sd, kind=frf.quantity, window_decay=test.window_decay)
     scale = np.concatenate([found.frequency, found.damping])
     covariance = found.covariance / np.outer(scale, scale)
     floor = np.concatenate([np.full(len(found.frequency), f) for f in (FREQUENCY_FLOOR, DAMPING_FLOOR)])

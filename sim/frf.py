@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -53,6 +53,7 @@ class Limits:
 
 
 LIMITS = Limits()
+SILENT = 0.02  # of the strongest answer to a hammer; below it symmetry forbids an answer, and noise alone has no coherence
 
 
 def check_frf(where: str | Path, frf: Frf, speed: float, limits: Limits = LIMITS) -> None:
@@ -67,7 +68,8 @@ def check_frf(where: str | Path, frf: Frf, speed: float, limits: Limits = LIMITS
             key, value = f"{where}: H({response},{reference})", frf.value[i, j]
             _check_gaps(key, frf.frequency, value)
             if frf.coherence is not None:
-                _check_coherence(key, frf.coherence[i, j], np.abs(value), limits)
+                answers = np.linalg.norm(value) > SILENT * np.linalg.norm(frf.value[:, j], axis=-1).max()
+                _check_coherence(key, frf.coherence[i, j], np.abs(value), limits if answers else replace(limits, coherence=0.0))
             if frf.sd is not None and not np.all(frf.sd[i, j] > 0):
                 raise BadInput(f"{key}: standard error = {frf.sd[i, j].min():g}: must be positive on every line")
             _check_direction_of_time(key, value)

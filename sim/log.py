@@ -170,7 +170,7 @@ def log_key(recording: rr.RecordingStream, content: Shown) -> None:
 
 
 def log_motion(recording: rr.RecordingStream, content: Shown) -> None:
-    """Mode shapes, and the answer to a force that sweeps the band, at the first temperature; on two timelines at once."""
+    """Mode shapes, and the answer to a swept force, at the first temperature; on two timelines at once, at rest on the others."""
     point = content.run.steps[0].point
     frequency = np.arange(content.band[0], content.band[1] + 1, content.step)
     motions = {f"mode_{i}": drawing.mode_motion(point, m, len(frequency)) for i, m in enumerate(content.modes, 1)}
@@ -178,14 +178,14 @@ def log_motion(recording: rr.RecordingStream, content: Shown) -> None:
     slow = rr.TimeColumn("slow motion", duration=np.arange(len(frequency)) / CYCLE)
     meshes = drawing.body_meshes(point.spindle)
     for name, motion in motions.items():
-        for body, (place, turn) in drawing.poses(point, motion).items():
+        for body, (translation, turn) in drawing.poses(point, motion).items():
             if body in meshes:
-                moves = rr.Transform3D.columns(translation=place, quaternion=turn)
+                moves = rr.Transform3D.columns(translation=translation, quaternion=turn)
                 recording.send_columns(at("model", name, body), [rr.TimeColumn("frequency", sequence=frequency), slow], moves)
             for mesh in meshes.get(body, []):
                 vertices, triangles, normals = mesh.shaded()
                 shape = rr.Mesh3D(
-                    vertex_positions=MM * (vertices - [0.0, 0.0, point.chain.body(body).z]),
+                    vertex_positions=MM * vertices,
                     triangle_indices=triangles,
                     vertex_normals=normals,
                     albedo_factor=(255 * np.array(mesh.rgba)).astype(np.uint8),

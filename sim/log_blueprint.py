@@ -68,8 +68,8 @@ def _model_views(shown: Shown) -> list[rrb.View]:
 
 def _section_view(shown: Shown, which: str, name: str) -> rrb.View:
     r = MM * reach(shown.run.spindle)
-    x = 0.0 if which == "compared" else 0.5 * r
-    eye = rrb.EyeControls3D(position=(x, -1.3 * r, 0.3 * r), look_target=(x, 0, 0.3 * r), eye_up=(0, 0, 1))
+    x, away = (0.0, 1.3 * r) if which == "compared" else (0.5 * r, 2.2 * r)  # one half in a tall view
+    eye = rrb.EyeControls3D(position=(x, -away, 0.3 * r), look_target=(x, 0, 0.3 * r), eye_up=(0, 0, 1))
     return rrb.Spatial3DView(origin=at("section", which), name=name, eye_controls=eye, line_grid=False, background=DARK)
 
 
@@ -119,6 +119,7 @@ def _time_tab(shown: Shown) -> rrb.Container:
 
 
 def _temperature_tab(shown: Shown, quantities: list[tuple[str, str]], factor: float) -> rrb.Container:
-    views = [_section_view(shown, "by temperature", f"Deformed section, displacement × {factor:g}")]
-    views += [rrb.TimeSeriesView(origin=at("bearings", name), name=f"{name}, {unit}, over °C") for name, unit in quantities]
-    return rrb.Grid(*views, grid_columns=3, name="Bearings and section (choose the timeline temperature)")
+    section = _section_view(shown, "by temperature", f"Deformed section, displacement × {factor:g}")
+    views = [rrb.TimeSeriesView(origin=at("bearings", name), name=f"{name}, {unit}, over °C") for name, unit in quantities]
+    name = "Bearings and section (choose the timeline temperature)"
+    return rrb.Horizontal(section, rrb.Grid(*views, grid_columns=3), column_shares=[1, 2], name=name)

@@ -86,19 +86,24 @@ def _turning(frames: int) -> ComplexArray:
 
 
 def poses(point: OperatingPoint, motion: ComplexArray) -> dict[str, tuple[Array, Array]]:
-    """Places (frames, 3) mm and quaternions (frames, 4) x, y, z, w of every body when the MuJoCo model takes the real part of
-    `motion` (n, frames)."""
+    """How every body moves from rest when the MuJoCo model takes the real part of `motion` (n, frames).
+
+    Translations (frames, 3) mm and quaternions (frames, 4) x, y, z, w, for points in world coordinates at rest.
+    """
     model = point.model
     data = mujoco.MjData(model)
     address = [model.joint(f"{body}.{move}").qposadr[0] for body, move in point.linear.dofs]
-    places, turns = [], []
+    mujoco.mj_kinematics(model, data)
+    rest = data.xpos.copy()
+    translations, turns = [], []
     for frame in motion.real.T:
         data.qpos[address] = frame
         mujoco.mj_kinematics(model, data)
-        places.append(MM * data.xpos)
+        turned = np.einsum("bij,bj->bi", data.xmat.reshape(-1, 3, 3), rest)
+        translations.append(MM * (data.xpos - turned))
         turns.append(np.roll(data.xquat, -1, axis=1))
-    place, turn = np.array(places), np.array(turns)
-    return {b.name: (place[:, i], turn[:, i]) for b in point.chain.bodies for i in [model.body(b.name).id]}
+    translation, turn = np.array(translations), np.array(turns)
+    return {b.name: (translation[:, i], turn[:, i]) for b in point.chain.bodies for i in [model.body(b.name).id]}
 
 
 # ---------------------------------------------------------------- the deformed section

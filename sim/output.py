@@ -16,6 +16,7 @@ from model import mjcf
 from model.modes import Mode, group_energy
 from model.table import StiffnessTable, write_table
 from sim.campaign import Campaign, write_campaign
+from sim.comparison import measured_rows, numbered
 from sim.log import LogContents, write_log
 from sim.operating import OperatingPoint, provenance, stiffness_table
 from sim.report import write_report
@@ -241,18 +242,23 @@ def show_run(console: Console, run: Run, out: Path) -> None:
     )  # fmt: skip
     first, last = run.steps[0], run.steps[-1]
     highest = run.spindle.hammer.band[1]
-    from sim.report import measured_rows
-
     beside = measured_rows(run)
-    for i, mode in enumerate(m for m in first.point.modes if m.frequency <= highest):
+    numbers = numbered(run)
+    for number, mode in enumerate((m for m in first.point.modes if m.frequency <= highest), 1):
         cells = []
-        for step in run.steps:
-            identified = {id(v): k for k, v in match(step).items()}.get(id(step.point.modes[i]))
-            seen = "-" if identified is None else f"{step.identified.frequency[identified]:.1f}"
-            cells.append(f"{step.point.modes[i].frequency:.1f} / {seen}")
+        for step, of_step in zip(run.steps, numbers, strict=True):
+            index = next((i for i, n in of_step.items() if n == number), None)
+            if index is None:
+                cells.append("-")
+                continue
+            own = step.point.modes[index]
+            peaks = {id(v): k for k, v in match(step).items()}
+            seen = f"{step.identified.frequency[peaks[id(own)]]:.1f}" if id(own) in peaks else "-"
+            cells.append(f"{own.frequency:.1f} / {seen}")
+        end = next((last.point.modes[i].frequency for i, n in numbers[-1].items() if n == number), np.nan)
         group = max(group_energy(first.point.chain, mode).items(), key=lambda item: item[1])[0]
-        shift = last.point.modes[i].frequency - mode.frequency
-        seen = [f"{beside[t.id][i].frequency:.0f}" if i in beside.get(t.id, {}) else "" for _, t in measured]
-        grid.add_row(str(i + 1), mode.kind, group, *cells, f"{shift:+.1f}", *seen)
+        measured_here = [beside.get(t.id, {}).get(number - 1) for _, t in measured]
+        seen_here = [f"{row.frequency:.0f}" if row else "" for row in measured_here]
+        grid.add_row(str(number), mode.kind, group, *cells, f"{end - mode.frequency:+.1f}", *seen_here)
     console.print(grid)
     console.print(f"\n{out}: report.html, run.rrd, table.csv, modes.csv, spindle_*.xml, campaign/", highlight=False)

@@ -116,9 +116,7 @@ def svg(figure: Figure, key: str, description: str) -> str:
 
 
 @rc_context(STYLE)
-def trend(
-    key: str, temperature: Sequence[float], curves: Mapping[str, Mapping[str, Sequence[float]]], label: str, from_zero: bool
-) -> str:
+def trend(key: str, temperature: Sequence[float], curves: Mapping[str, Mapping[str, Sequence[float]]], label: str, from_zero: bool) -> str:
     """One quantity of every bearing over temperature, or several beside their names: values by name and by bearing."""
     figure = Figure(figsize=(3.55, 2.45))
     axes = figure.add_subplot()

@@ -44,7 +44,7 @@ APART = 5
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """A measured matrix: s (n,) = i w (plus the decay of an exponential window), `frf` (n_resp, n_ref, n), `weight` sqrt(2)/sd, `power` k."""
+    """A measured matrix: s (n,) = i w (plus an exponential window's decay), `frf` (n_resp, n_ref, n), `weight` sqrt(2)/sd, `power` k."""
 
     s: Complex
     frf: Complex

@@ -6,14 +6,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from model.machine import Condition, Spindle
 from sim.campaign import Campaign, Test, read_campaign
 from sim.impact import ImpactTest, impact_tests
 from sim.modal import Modes, extract
 from sim.operating import OperatingPoint, operating_point
-
-HIGHEST_MODE = 3000.0  # Hz, of tables and pictures when the scene's band does not say
-
 
 @dataclass(frozen=True, eq=False)
 class Step:
@@ -57,7 +56,8 @@ def run(
 def identify(test: ImpactTest) -> Modes:
     """Modes of an impact test, with the damping of its exponential window taken out."""
     frf = test.estimate.h1
-    return extract(frf.frequency, frf.value, frf.sd, kind=frf.quantity, window_decay=test.estimate.window_decay)
+    sd = frf.sd if frf.sd is not None and np.all(np.isfinite(frf.sd)) else None  # a single hit has no scatter
+    return extract(frf.frequency, frf.value, sd, kind=frf.quantity, window_decay=test.estimate.window_decay)
 
 
 def measured_campaigns(spindle: Spindle) -> tuple[Campaign, ...]:
@@ -70,7 +70,7 @@ def as_campaign(run: Run, title: str) -> Campaign:
     """The run's virtual tests in the form of a measured campaign."""
     tests = tuple(
         Test(
-            id=f"T{step.point.condition.temperature:g}_n{step.point.condition.speed * 30 / 3.141592653589793:.0f}",
+            id=f"T{step.point.condition.temperature:g}_n{step.point.condition.speed * 30 / np.pi:.0f}",
             temperature=step.point.condition.temperature,
             speed=step.point.condition.speed,
             level=run.spindle.hammer.level,

@@ -185,10 +185,10 @@ def test_bodies_of_the_mujoco_model_move_as_the_mode_says(run: Run, mode: int) -
     largest = 0.0
     for body, (place, turn) in log_drawing.poses(point, motion).items():
         for mesh in log_drawing.body_meshes(run.spindle).get(body, []):
-            local = 1e3 * (mesh.vertices - [0.0, 0.0, point.chain.body(body).z])
+            rest = 1e3 * mesh.vertices
             q, w = turn[:, None, :3], turn[:, None, 3:]
-            rotated = local + 2 * np.cross(q, np.cross(q, local) + w * local)
-            moved = rotated + place[:, None] - 1e3 * mesh.vertices
+            rotated = rest + 2 * np.cross(q, np.cross(q, rest) + w * rest)
+            moved = rotated + place[:, None] - rest
             largest = max(largest, float(np.linalg.norm(moved, axis=2).max()))
             if point.modes[mode].kind == "axial" and body != "base":
                 assert np.abs(moved[..., 2]).max() > 5 * np.abs(moved[..., :2]).max()

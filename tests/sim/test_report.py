@@ -16,21 +16,19 @@ from model.modes import group_energy
 from model.scene import BadInput, content_hash, load
 from sim import plots
 from sim.campaign import Campaign, ModeRow, Test
-from sim.impact import impact_tests
-from sim.modal import extract
-from sim.operating import operating_point
-from sim.report import (
-    background,
+from sim.comparison import (
     by_kind,
     compared,
-    html,
     measured_rows,
     misses,
     numbered,
     published,
     read_published,
-    write_report,
 )
+from sim.impact import impact_tests
+from sim.modal import extract
+from sim.operating import operating_point
+from sim.report import background, html, write_report
 from sim.run import Run, Step, measured_campaigns
 
 SCENE = Path(__file__).parents[2] / "scenes" / "hdd_2003"
@@ -341,9 +339,7 @@ def test_modes_are_followed_over_a_long_way():
 def test_a_perfect_measurement_misses_nothing(run: Run):
     """Sentences come from the numbers: with the model's own frequencies as measurement, no shift or split is complained about."""
     rows = [
-        ModeRow(f"t{k}", i + 1, m.kind, m.frequency, 0.5)
-        for k, step in enumerate(run.steps)
-        for i, m in enumerate(step.point.modes[:7])
+        ModeRow(f"t{k}", i + 1, m.kind, m.frequency, 0.5) for k, step in enumerate(run.steps) for i, m in enumerate(step.point.modes[:7])
     ]
     tests = tuple(Test(f"t{k}", t, 0.0, modes=tuple(r for r in rows if r.test == f"t{k}")) for k, t in enumerate((20.0, 60.0)))
     said = misses(compared(Run(replace(run.spindle, file=None), run.steps, (Campaign("self", "", "mobility", (), tests),))))

@@ -1,0 +1,84 @@
+"""The motor's magnet pulls the hub: an axial bias on the bearings, and a negative stiffness across the spindle."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from model.machine import Condition, Spindle
+from model.rotor_base import Element, RotorBase
+from sim.effect import Effect, Parameter, Values
+
+
+def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
+    pull = values["pull"]
+    if pull == 0.0:
+        return spindle
+    return replace(spindle, pair=replace(spindle.pair, axial_bias=spindle.pair.axial_bias - pull))
+
+
+def chain(spindle: Spindle, condition: Condition, values: Values, chain: RotorBase) -> RotorBase:
+    stiffness = abs(values["pull"]) * values["radial_ratio"] * 1e3
+    if stiffness == 0.0:
+        return chain
+    across = np.diag([-stiffness, -stiffness, 0.0, 0.0, 0.0])
+    structure = spindle.structure
+    element = Element("magnet", "motor", stator_body(spindle), structure.outer_body, magnet_height(spindle), across, np.zeros((5, 5)))
+    return replace(chain, elements=(*chain.elements, element))
+
+
+def stator_body(spindle: Spindle) -> str:
+    """The body on which the inner body stands: the stator is fixed there."""
+    structure = spindle.structure
+    return next((j.bodies[0] for j in structure.joints if j.bodies[1] == structure.inner_body), structure.inner_body)
+
+
+def magnet_height(spindle: Spindle) -> float:
+    """Mean height (m) of the rotating regions in which the motor's loss is made; the turning body's own without any."""
+    names = {name for source in spindle.thermal.sources for name in source.regions}
+    heights = [np.mean(g.z) for g in spindle.regions if g.name in names and g.part == "rotating"]
+    return float(np.mean(heights)) if heights else spindle.structure.body(spindle.structure.outer_body).z
+
+
+EFFECT = Effect(
+    name="magnetic_pull",
+    title="Magnetic pull of the motor on the hub",
+    equation=(
+        "axial force on the hub F_z = -pull in the pair's equilibrium (Jang et al. 2003, Eq. 8); between stator and hub "
+        "K = diag(-k, -k, 0, 0, 0) at the magnet's height, k = radial_ratio |pull|: the pull grows as the gap closes"
+    ),
+    parameters=(
+        Parameter(
+            "pull",
+            "N",
+            neutral=0.0,
+            typical=3.0,
+            prior_sd=2.0,
+            limits=(-10.0, 10.0),
+            meaning="axial magnetic force on the hub, positive downward",
+            source="assumed: disk-drive motors set their magnet off the stator's middle for some newtons of axial bias",
+        ),
+        Parameter(
+            "radial_ratio",
+            "1/mm",
+            neutral=10.0,
+            typical=10.0,
+            prior_sd=5.0,
+            limits=(0.0, 200.0),
+            meaning="negative radial stiffness over axial pull",
+            source="assumed: air-gap field energy changing over a gap of some tenths of a millimetre, several times the axial pull",
+        ),
+    ),
+    sees=(
+        "lower and upper bearing differ in preload by the pull, so their stiffness moves apart while its mean hardly changes; "
+        "rocking modes fall slightly by the negative stiffness"
+    ),
+    resembles=("preload_loss", "bearing_misalignment"),
+    valid=(
+        "rigidly preloaded pairs (a spring-loaded pair takes the bias on one ring's stop and the model leaves it out); hub centred "
+        "in the stator; the stator moves with the body the shaft stands on"
+    ),
+    spindle=spindle,
+    chain=chain,
+)
