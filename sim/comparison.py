@@ -209,7 +209,7 @@ def compared(run: Run) -> Table:
 
     The temperatures are the outermost of the run at which something was measured or published, or its own if there are not two.
     """
-    numbers, own = numbered(run), [temperature(s) for s in run.steps]
+    numbers, own = numbered(run), [temperature_of(s) for s in run.steps]
     papers = () if run.steps[0].point.condition.speed else published(run.spindle)
     known = _measured_peaks(run, numbers)
     flexibility: dict[int, str] = {}
@@ -275,7 +275,7 @@ def _row(step: Step, index: int, number: int, flexibility: str) -> Row:
 def headlines(run: Run, table: Table) -> list[tuple[str, str, str]]:
     """(what, number, explanation): preload, bearing angle and stiffness, and how far the modes of each flexibility move."""
     cold, hot = table.temperatures
-    first, last = (next(s.point.state for s in run.steps if temperature(s) == t) for t in (cold, hot))
+    first, last = (next(s.point.state for s in run.steps if temperature_of(s) == t) for t in (cold, hot))
     preload = [s.bearings[0].preload for s in (first, last)]
     if cold == hot:
         return [("Preload", f"{preload[0]:.1f} N", f"at {cold:g} °C")]
@@ -387,10 +387,10 @@ def _listed(numbers: Sequence[int]) -> str:
 
 def nearest(run: Run, temperature: float) -> int:
     """Index of the step nearest to a temperature (C)."""
-    return min(range(len(run.steps)), key=lambda k: abs(temperature(run.steps[k]) - temperature))
+    return min(range(len(run.steps)), key=lambda k: abs(temperature_of(run.steps[k]) - temperature))
 
 
-def temperature(step: Step) -> float:
+def temperature_of(step: Step) -> float:
     return step.point.condition.temperature
 
 

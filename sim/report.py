@@ -35,7 +35,7 @@ from sim.comparison import (
     misses,
     same_speed,
     signed,
-    temperature,
+    temperature_of,
     with_error,
 )
 from sim.operating import provenance
@@ -66,7 +66,7 @@ def write_report(run: Run, path: Path, extra_sections: Sequence[Section] = ()) -
 
 def html(run: Run, extra_sections: Sequence[Section] = ()) -> str:
     """The report as text; `extra_sections` stand between the results and the account of where they come from."""
-    run = replace(run, steps=tuple(sorted(run.steps, key=temperature)))
+    run = replace(run, steps=tuple(sorted(run.steps, key=temperature_of)))
     every = [*results(run), *extra_sections, *background(run)]
     return str(_page().page(run.spindle, _conditions(run), [(title, Markup(body)) for title, body in every]))
 
@@ -75,10 +75,10 @@ def results(run: Run) -> list[Section]:
     """What the model says, beside what was measured and published."""
     page, table = _page(), compared(run)
     cold, hot = table.temperatures
-    steps = [s for s in run.steps if temperature(s) in (cold, hot)]
+    steps = [s for s in run.steps if temperature_of(s) in (cold, hot)]
     picture = plots.comparison("modes", table.labels(), table.peaks, cold, hot) if cold != hot and table.rows else ""
     fig8 = plots.responses("frf", driving_points(run, steps), table.peaks, run.spindle.hammer.band)
-    hottest = max(run.steps, key=lambda s: abs(temperature(s) - run.spindle.reference_temperature)).point
+    hottest = max(run.steps, key=lambda s: abs(temperature_of(s) - run.spindle.reference_temperature)).point
     drawing, scale = plots.section("section", hottest)
     return [
         ("In short", page.short(headlines(run, table), misses(table), calibration(run.spindle), table)),
@@ -122,10 +122,10 @@ def driving_points(run: Run, steps: Sequence[Step]) -> dict[str, list[Curve]]:
             row = point_rows(run.spindle, step.point.chain, (node,))
             shifted = np.asarray(lines - 1j * decay / (2 * np.pi) if decay else lines)
             exact = frf(step.point.linear, row, row, shifted, kind="mobility")[0, 0]
-            curves.append(Curve("exact", temperature(step), lines, exact))
+            curves.append(Curve("exact", temperature_of(step), lines, exact))
             i, j = seen.response_nodes.index(node), seen.reference_nodes.index(node)
             coherence = None if seen.coherence is None else seen.coherence[i, j]
-            curves.append(Curve("test", temperature(step), seen.frequency, seen.value[i, j], coherence))
+            curves.append(Curve("test", temperature_of(step), seen.frequency, seen.value[i, j], coherence))
             curves += _measured_curves(run, step, node)
         axis = "xyz"[int(np.argmax(np.abs(point.direction)))]
         panels[f"{letter}) struck and measured on the {point.body}: point {node} ({point.name}), along {axis}"] = curves
@@ -134,19 +134,19 @@ def driving_points(run: Run, steps: Sequence[Step]) -> dict[str, list[Curve]]:
 
 def _measured_curves(run: Run, step: Step, node: int) -> Iterator[Curve]:
     for test in (t for c in run.measured for t in c.tests if t.frf is not None):
-        near = abs(test.temperature - temperature(step)) <= SAME_TEMPERATURE and same_speed(test, run)
+        near = abs(test.temperature - temperature_of(step)) <= SAME_TEMPERATURE and same_speed(test, run)
         if near and node in test.frf.response_nodes and node in test.frf.reference_nodes:  # type: ignore[union-attr]
             h = test.frf
             assert h is not None
             value = h.value[h.response_nodes.index(node), h.reference_nodes.index(node)]
             power = {"receptance": 1, "mobility": 0, "accelerance": -1}[h.quantity]
             used = h.frequency > 0
-            yield Curve("measured", temperature(step), h.frequency[used], value[used] * (2j * np.pi * h.frequency[used]) ** power)
+            yield Curve("measured", temperature_of(step), h.frequency[used], value[used] * (2j * np.pi * h.frequency[used]) ** power)
 
 
 def bearing_figures(run: Run) -> list[tuple[str, Markup]]:
     """Figs. 9 to 12: (caption, SVG)."""
-    temperature = [temperature(s) for s in run.steps]
+    temperature = [temperature_of(s) for s in run.steps]
     figures: tuple[tuple[str, str, str, Mapping[str, Callable[[BearingState], float]]], ...] = (
         ("angle", "Fig. 9. Contact angle.", "contact angle, degrees", {"": lambda b: np.degrees(b.contact_angle)}),
         (
@@ -214,6 +214,6 @@ def _page() -> Any:
 
 
 def _conditions(run: Run) -> str:
-    temperatures = ", ".join(f"{temperature(s):g}" for s in run.steps)
+    temperatures = ", ".join(f"{temperature_of(s):g}" for s in run.steps)
     speed = run.steps[0].point.condition.speed / RPM
     return f"{temperatures} °C, " + (f"{speed:.0f} rpm" if speed else "at rest")

@@ -10,9 +10,9 @@ from sim.effects.loose_inserts import blend
 
 CERAMIC = Material(
     "silicon nitride",
-    youngs_modulus=Law((), (310e9,)),
+    youngs_modulus=Law((20.0,), (310e9,)),
     poisson_ratio=0.27,
-    thermal_expansion=Law((), (3.2e-6,)),
+    thermal_expansion=Law((20.0,), (3.2e-6,)),
     density=3200.0,
     conductivity=30.0,
     heat_capacity=800.0,

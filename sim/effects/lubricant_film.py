@@ -33,16 +33,20 @@ def films(spindle: Spindle, b: Bearing, speed: float, temperature: float, pressu
     )
     viscosity = OIL_DENSITY * spindle.thermal.friction.viscosity(temperature)
     gamma = b.ball_diameter * np.cos(b.contact_angle) / b.pitch_diameter
-    entrainment = abs(speed) * b.pitch_diameter / 4 * (1 - gamma**2)
     load = spindle.pair.preload / (b.balls * np.sin(b.contact_angle))
     found = []
     for conformity, inner in ((b.inner_conformity, True), (b.outer_conformity, False)):
         contact = race_contact(b.ball_diameter, conformity, b.pitch_diameter, b.contact_angle, inner, ball, ring)
         radius = b.ball_diameter / 2 * (1 - gamma if inner else 1 + gamma)
-        found.append(
-            central_film(radius, contact.effective_modulus, contact.ellipticity, viscosity, entrainment, pressure_viscosity, load)
-        )
+        solid = radius, contact.effective_modulus, contact.ellipticity
+        found.append(central_film(*solid, viscosity, entrainment(b, speed), pressure_viscosity, load))
     return found[0], found[1]
+
+
+def entrainment(b: Bearing, speed: float) -> float:
+    """Mean velocity (m/s) of the two surfaces in either contact when the rings turn at `speed` (rad/s) against each other."""
+    gamma = b.ball_diameter * np.cos(b.contact_angle) / b.pitch_diameter
+    return float(abs(speed) * b.pitch_diameter / 4 * (1 - gamma**2))
 
 
 def central_film(
