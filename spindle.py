@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: more threads only wait for each other; set before numpy loads
+
 import argparse
 import json
 import sys
@@ -22,6 +26,7 @@ from sim import output
 from sim.folder import MARK, whole_folder
 
 RPM = 2 * np.pi / 60
+WIDTH = 110  # columns that the tables need; a narrower terminal wraps lines rather than lose digits
 TEMPERATURES = [20.0, 30.0, 40.0, 50.0, 60.0]
 
 Answer = tuple[dict[str, Any], Callable[[Console], None]]
@@ -36,7 +41,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.json:
             print(json.dumps(answer))
         else:
-            show(Console())
+            console = Console()
+            console.width = max(console.width, WIDTH)
+            show(console)
     except (BadInput, OutsideRange, NoEquilibrium) as error:
         print(f"spindle: {error}", file=sys.stderr)
         return 2

@@ -106,7 +106,7 @@ def screen(theory: Theory, about: Linear, catalogue: Sequence[Effect]) -> list[S
             continue
         expected = float(direction @ rest) / size**2
         found.append(Signature(effect, size, expected, 1 / size, reach * float(np.sqrt(2 * CLEAR)) / size, direction))
-    return sorted(found, key=lambda s: -(s.expected * s.visibility) ** 2)
+    return sorted(found, key=lambda s: -((s.expected * s.visibility) ** 2))
 
 
 def starts(effect: Effect, expected: float) -> list[list[float]]:

@@ -74,7 +74,7 @@ def _channels(theory: Theory) -> int:
 
 def _one_test(theory: Theory, x0: Array, i: int, step: float) -> Array:
     """Derivative by the temperature of one test, which moves the features of that test only."""
-    from diagnosis.theory import Data, features_of, predict  # noqa: F401
+    from diagnosis.theory import Data, features_of, predict
 
     data = theory.data
     first = next(k for k, name in enumerate(theory.names) if name.startswith("temperature of"))
@@ -155,7 +155,9 @@ def fit(theory: Theory, about: Linear, effects: Sequence[Effect] = (), start: Se
     everything = np.concatenate([x, theta])
     sizes = [e.parameters[0] for e in effects]
     size_values = [everything[index[e.name][e.parameters[0].name]] for e in effects]
-    at_limit = any(v <= p.limits[0] + 1e-6 * p.prior_sd or v >= p.limits[1] - 1e-6 * p.prior_sd for v, p in zip(size_values, sizes, strict=True))
+    at_limit = any(
+        v <= p.limits[0] + 1e-6 * p.prior_sd or v >= p.limits[1] - 1e-6 * p.prior_sd for v, p in zip(size_values, sizes, strict=True)
+    )
     return Fit(
         tuple(effects),
         {e: {p: float(everything[i]) for p, i in row.items()} for e, row in index.items()},

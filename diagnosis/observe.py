@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from model.ball_row import Array
-from model.machine import Condition
+from model.machine import Condition, Spindle
 from model.modes import ComplexArray
-from sim.campaign import Campaign, Test
+from sim.campaign import Campaign, Noise, Test
 from sim.modal import extract, noise_model
 
 FREQUENCY_FLOOR = 3e-5  # relative: finite elements and bearing equilibrium of the model itself
@@ -36,11 +36,15 @@ class Observation:
     kind: tuple[str, ...] | None
 
 
-def observe(campaign: Campaign, progress: Callable[[str], None] = lambda done: None) -> list[Observation]:
-    """Mode tables of all tests; FRFs are turned into modes first, with the standard errors of the extraction."""
+def observe(campaign: Campaign, spindle: Spindle, progress: Callable[[str], None] = lambda done: None) -> list[Observation]:
+    """Mode tables of all tests; FRFs are turned into modes first, with the standard errors of the extraction.
+
+    A test without standard errors has the noise its campaign states, or else that of the scene's measuring accuracy.
+    """
+    noise = campaign.noise or Noise(spindle.hammer.noise_of_value, spindle.hammer.noise_of_largest)
     observations = []
     for test in campaign.tests:
-        observations.append(_from_frf(campaign, test) if test.frf is not None else _from_table(test))
+        observations.append(_from_frf(test, noise) if test.frf is not None else _from_table(test))
         progress(f"{test.id}: {len(observations[-1].frequency)} modes")
     return observations
 
@@ -50,14 +54,12 @@ def condition_of(test: Test) -> Condition:
     return Condition(test.temperature, test.speed, test.level or 0.0, soak)
 
 
-def _from_frf(campaign: Campaign, test: Test) -> Observation:
+def _from_frf(test: Test, noise: Noise) -> Observation:
     frf = test.frf
     assert frf is not None
     sd = frf.sd
-    if sd is None and campaign.noise is not None:
-        sd = noise_model(frf.value, campaign.noise.of_value, campaign.noise.of_largest)
-    if sd is not None and not np.all(np.isfinite(sd)):
-        sd = None  # a single hit has no scatter
+    if sd is None or not np.all(np.isfinite(sd)):  # a single hit has no scatter
+        sd = noise_model(frf.value, noise.of_value, noise.of_largest)
     found = extract(frf.frequency, frf.value, sd, kind=frf.quantity, window_decay=test.window_decay)
     scale = np.concatenate([found.frequency, found.damping])
     covariance = found.covariance / np.outer(scale, scale)
@@ -79,7 +81,9 @@ def _from_table(test: Test) -> Observation:
     frequency = np.array([r.frequency for r in rows])
     damping = np.array([np.nan if r.damping_ratio is None else r.damping_ratio for r in rows])
     sd_f = np.array([r.frequency_sd for r in rows]) / frequency
-    sd_z = np.array([np.inf if r.damping_ratio_sd is None or r.damping_ratio is None else r.damping_ratio_sd / r.damping_ratio for r in rows])
+    sd_z = np.array(
+        [np.inf if r.damping_ratio_sd is None or r.damping_ratio is None else r.damping_ratio_sd / r.damping_ratio for r in rows]
+    )
     variance = np.concatenate([sd_f**2 + FREQUENCY_FLOOR**2, sd_z**2 + DAMPING_FLOOR**2])
     kinds = tuple(r.kind for r in rows)
     return Observation(test, condition_of(test), frequency, damping, np.diag(variance), None, None, kinds)

@@ -28,9 +28,7 @@ AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1), "tilt_x": (1, 0, 0), "ti
 CARRIER_SHARE = 1e-9  # of the turning body's inertia, left on the carrier because MuJoCo wants every moving body to have some
 
 
-def spec(
-    spindle: Spindle, state: PairState, element: str = "linear", looks: bool = False, chain: RotorBase | None = None
-) -> mujoco.MjSpec:
+def spec(spindle: Spindle, state: PairState, element: str = "linear", looks: bool = False, chain: RotorBase | None = None) -> mujoco.MjSpec:
     """The MuJoCo specification of a spindle at one operating point, with keyframe "loaded" (turning at its speed).
 
     `chain` is the spindle's own at `state` by default. `looks` adds what a person wants to see (`model.look`) and changes nothing that moves.
@@ -60,10 +58,8 @@ def chain_spec(chain: RotorBase, step: float, stiff: tuple[str, ...] | None = No
     out.option.disableflags = int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_CONTACT)
     _add_bodies(out, chain)
     for e in chain.elements:
-        rows = element_rows(chain, e)
-        if stiff is None or e.name in stiff:
-            add_quadratic(out, f"{e.name}.stiffness", e.stiffness, rows, chain, "stiffness")
-        add_quadratic(out, f"{e.name}.damping", e.damping, rows, chain, "damping")
+        stiffness = e.stiffness if stiff is None or e.name in stiff else np.zeros((5, 5))
+        add_matrices(out, e.name, stiffness, e.damping, element_rows(chain, e), chain)
     spin = [chain.speed if name.endswith(".spin") else 0.0 for name in joint_names(chain)]
     out.add_key(name="loaded", qpos=np.zeros(len(spin)), qvel=spin)
     return out
@@ -102,18 +98,25 @@ def _add_bodies(out: mujoco.MjSpec, chain: RotorBase) -> None:
             inner.add_joint(name=f"{body.name}.spin", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1])
 
 
-def add_quadratic(out: mujoco.MjSpec, name: str, matrix: Array, rows: Array, chain: RotorBase, kind: str) -> None:
-    """Fixed tendons that make `matrix` (m, m) between the motions `rows` (m, n); `kind` is stiffness or damping.
+def add_matrices(out: mujoco.MjSpec, name: str, stiffness: Array, damping: Array, rows: Array, chain: RotorBase) -> None:
+    """Fixed tendons that make `stiffness` and `damping` (m, m) between the motions `rows` (m, n).
 
+    One tendon carries both along each eigenvector where they share them, as with proportional damping; else each has its own.
     Tilts are scaled by 1 cm before the eigenvalue problem so that N/m and N m/rad stand at like size.
     """
     scale = np.where(np.max(np.abs(rows[:, _slides(chain)]), axis=1, initial=0.0) > 0, 1.0, 100.0)
-    value, vector = np.linalg.eigh((matrix + matrix.T) / 2 * np.outer(scale, scale))
-    coefficients = vector.T @ (rows / scale[:, None])
-    for i, (size, row) in enumerate(zip(value, coefficients, strict=True)):
-        if abs(size) > 1e-14 * np.max(np.abs(value), initial=0.0):
-            tendon = out.add_tendon(name=f"{name}{i}", **{kind: [size, 0, 0]})
-            _wrap(tendon, chain, row)
+    rows = rows / scale[:, None]
+    k, c = ((m + m.T) / 2 * np.outer(scale, scale) for m in (stiffness, damping))
+    value, vector = np.linalg.eigh(k if k.any() else c)
+    along = vector.T @ c @ vector
+    if np.abs(along - np.diag(np.diag(along))).max() > 1e-12 * np.abs(along).max():
+        add_matrices(out, f"{name}.damping", np.zeros_like(c), c, rows, chain)
+        along = np.zeros_like(c)
+    sizes = {"stiffness": value if k.any() else np.zeros(len(value)), "damping": np.diag(along)}
+    for i, row in enumerate(vector.T @ rows):
+        present = {kind: [size[i], 0, 0] for kind, size in sizes.items() if abs(size[i]) > 1e-14 * np.abs(size).max(initial=0.0)}
+        if present:
+            _wrap(out.add_tendon(name=f"{name}{i}", **present), chain, row)
 
 
 def _slides(chain: RotorBase) -> list[int]:
@@ -142,7 +145,7 @@ def _add_balls(out: mujoco.MjSpec, chain: RotorBase, bearing: BearingState, elem
     rows = element_rows(chain, element)
     wanted = (rows.T @ element.stiffness @ rows)[np.ix_(both, both)]
     remainder = wanted - tangent(springs, chain.body(element.a).z, chain.body(element.b).z)
-    add_quadratic(out, f"{bearing.name}.remainder", remainder, np.eye(len(chain.dofs))[both], chain, "stiffness")
+    add_matrices(out, f"{bearing.name}.remainder", remainder, np.zeros_like(remainder), np.eye(len(chain.dofs))[both], chain)
 
 
 def _add_points(out: mujoco.MjSpec, spindle: Spindle, chain: RotorBase) -> None:

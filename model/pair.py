@@ -8,7 +8,7 @@ every row's axial force rises monotonically with the hub's movement, so the root
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -84,7 +84,9 @@ def solve(spindle: Spindle, condition: Condition, motions: Mapping[str, RingMoti
     senses = SENSE[spindle.pair.arrangement]
     rows = [row_at(spindle, b, s, motions[b.name], condition.speed) for b, s in zip(spindle.bearings, senses, strict=True)]
     if spindle.pair.preload_kind == "spring" and spindle.pair.arrangement != "tandem":
-        moves = [_movement_for(row, s * spindle.pair.preload) for row, s in zip(rows, senses, strict=True)]
+        # the spring sits at the upper bearing; the lower one locates the shaft and takes the bias
+        biases = (spindle.pair.axial_bias, 0.0)
+        moves = [_movement_for(r, s * spindle.pair.preload + bias) for r, s, bias in zip(rows, senses, biases, strict=True)]
     else:
         external = sum(senses) * spindle.pair.preload + spindle.pair.axial_bias  # a tandem pair carries both shares together
         moves = [_balance(rows, external)] * len(rows)
@@ -169,21 +171,29 @@ def _axial_force(row: BallRow, movement: float) -> float:
 
 def _balance(rows: list[BallRow], external: float) -> float:
     """Hub movement at which the axial forces of all rows add up to `external`: Jang et al. 2003, Eq. (8)."""
-    return _root(lambda h: sum(_axial_force(row, h) for row in rows) - external, "the pair")
+    return _root(rows, lambda rows, h: sum(_axial_force(row, h) for row in rows) - external)
 
 
 def _movement_for(row: BallRow, force: float) -> float:
     """Movement of one outer ring under a constant axial force."""
-    return _root(lambda h: _axial_force(row, h) - force, "a spring-loaded row")
+    return _root([row], lambda rows, h: _axial_force(rows[0], h) - force)
 
 
-def _root(imbalance, what: str) -> float:
-    reach = 1e-6
-    for _ in range(12):
-        if imbalance(-reach) <= 0 <= imbalance(reach):
-            return float(brentq(imbalance, -reach, reach, xtol=1e-17, rtol=1e-14))
-        reach *= 2
-    raise NoEquilibrium(f"{what} finds no axial equilibrium within {reach * 1e3:.1f} mm of hub movement")
+def _root(rows: list[BallRow], imbalance: Callable[[list[BallRow], float], float]) -> float:
+    """The movement without imbalance, by bracketing; balls with inertia are bracketed about the answer of balls without."""
+    massless = [replace(row, inertia=None) for row in rows]
+    start = _bracketed(lambda h: imbalance(massless, h), 0.0, 1e-6)
+    if all(row.inertia is None for row in rows):
+        return start
+    return _bracketed(lambda h: imbalance(rows, h), start, 1e-9)
+
+
+def _bracketed(imbalance: Callable[[float], float], start: float, reach: float) -> float:
+    while reach < 5e-3:
+        if imbalance(start - reach) <= 0 <= imbalance(start + reach):
+            return float(brentq(imbalance, start - reach, start + reach, xtol=1e-17, rtol=1e-14))
+        reach *= 4
+    raise NoEquilibrium(f"the bearings find no axial equilibrium within {reach * 1e3:.1f} mm of hub movement")
 
 
 def _state(spindle: Spindle, b: Bearing, row: BallRow, stiffness_sense: int) -> BearingState:

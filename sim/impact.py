@@ -7,8 +7,10 @@ controls held over a step: the force channel is that of the held force, so no ha
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
+from typing import TypeVar
 
 import mujoco
 import numpy as np
@@ -21,6 +23,8 @@ from model.scene import BadInput
 from sim.estimate import Estimate, Windows, estimate
 from sim.hammer import Hit, draw_hits, force, pulse_duration
 from sim.operating import OperatingPoint
+
+T = TypeVar("T")
 
 MARGIN = 64  # samples of quiet simulated past the record, so that the anti-alias filter ends outside it
 
@@ -47,24 +51,40 @@ class ImpactTest:
 
 
 def impact_tests(
-    points: Sequence[OperatingPoint], settings: HammerTest | None = None, element: str = "linear", seed: int = 0, noise: bool = True
+    points: Sequence[OperatingPoint],
+    settings: HammerTest | None = None,
+    element: str = "linear",
+    seed: int = 0,
+    noise: bool = True,
+    progress: Callable[[str], None] = lambda done: None,
 ) -> list[ImpactTest]:
-    """Impact tests at several operating points of one spindle, all hits of all of them side by side on all cores.
+    """Impact tests at several operating points of one spindle, with as many hits side by side as there are cores.
 
     `settings` default to the scene's. `element` is a bearing element of `model.mjcf`. The same seed gives the same test.
+    `progress` is told when a point is done.
     """
     test = settings or points[0].spindle.hammer
     every, steps = sampling(test)
     for point in points:
         check_step(point, test.step)
-    hits = [[draw_hits(test, np.random.default_rng([seed, i, node])) for node in test.hammer_nodes] for i in range(len(points))]
-    models = [p.model if element == "linear" else p.spec(element).compile() for p in points]
+    at_once = max(1, (os.cpu_count() or 1) // (test.hits * len(test.hammer_nodes)))
     results = []
-    for i, (point, model) in enumerate(zip(points, models, strict=True)):
-        force_held, velocity = simulate(model, test, hits[i], steps)
-        record = acquire(test, force_held, velocity, every, np.random.default_rng([seed, i]) if noise else None)
-        results.append(ImpactTest(point, test, element, record, estimate_of(test, point, record)))
+    for batch in batched(enumerate(points), at_once):
+        hits = [[draw_hits(test, np.random.default_rng([seed, i, node])) for node in test.hammer_nodes] for i, _ in batch]
+        models = [p.model if element == "linear" else p.spec(element).compile() for _, p in batch]
+        simulated = simulate(models, test, hits, steps)
+        for (i, point), (held, velocity) in zip(batch, simulated, strict=True):
+            record = acquire(test, held, velocity, every, np.random.default_rng([seed, i]) if noise else None)
+            results.append(ImpactTest(point, test, element, record, estimate_of(test, point, record)))
+            progress(f"{point.condition.temperature:g} C: {held.shape[0] * held.shape[1]} hits simulated")
     return results
+
+
+def batched(items: Iterable[T], size: int) -> Iterator[list[T]]:
+    """Lists of up to `size` items, in order."""
+    iterator = iter(items)
+    while batch := list(islice(iterator, size)):
+        yield batch
 
 
 def sampling(test: HammerTest) -> tuple[int, int]:
@@ -87,22 +107,36 @@ def check_step(point: OperatingPoint, step: float) -> None:
         )
 
 
-def simulate(model: mujoco.MjModel, test: HammerTest, hits: Sequence[Sequence[Hit]], steps: int) -> tuple[Array, Array]:
-    """Held force (references, hits, steps) and velocity (references, hits, responses, steps) of every hit, simulated in C."""
-    held = np.array([[force(hit, test.step, steps) for hit in row] for row in hits])
-    references, count = held.shape[:2]
-    control = np.zeros((references * count, steps, model.nu))
+def simulate(
+    models: Sequence[mujoco.MjModel], test: HammerTest, hits: Sequence[Sequence[Sequence[Hit]]], steps: int
+) -> list[tuple[Array, Array]]:
+    """Held force (references, hits, steps) and velocity (references, hits, responses, steps) of every model's hits, all at once in C.
+
+    `hits[model][reference]` are the hits on one hammer node.
+    """
+    held = np.array([[[force(hit, test.step, steps) for hit in row] for row in own] for own in hits])
+    count, references, repeats = held.shape[:3]
+    control = np.zeros((count, references, repeats, steps, models[0].nu))
     for r, node in enumerate(test.hammer_nodes):
-        control[r * count : (r + 1) * count, :, model.actuator(f"hammer{node}").id] = held[r]
-    threads = os.cpu_count() or 1
-    data = [mujoco.MjData(model) for _ in range(threads)]
-    start = data[0]
-    mujoco.mj_resetDataKeyframe(model, start, model.key("loaded").id)
-    state = np.empty(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS))
-    mujoco.mj_getState(model, start, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+        control[:, r, :, :, models[0].actuator(f"hammer{node}").id] = held[:, r]
+    state = np.array([loaded_state(model) for model in models])
+    threads = min(os.cpu_count() or 1, count * references * repeats)
+    many = [model for model in models for _ in range(references * repeats)]
     with Rollout(nthread=threads) as pool:
-        _, sensors = pool.rollout(model, data, state[None], control)
-    return held, np.moveaxis(sensors.reshape(references, count, steps, -1), 3, 2)
+        data = [mujoco.MjData(models[0]) for _ in range(threads)]
+        start = np.repeat(state, references * repeats, axis=0)
+        _, sensors = pool.rollout(many, data, start, control.reshape(len(many), steps, -1))
+    velocity = np.moveaxis(sensors.reshape(count, references, repeats, steps, -1), 4, 3)
+    return list(zip(held, velocity, strict=True))
+
+
+def loaded_state(model: mujoco.MjModel) -> Array:
+    """MuJoCo's full physics state of the keyframe "loaded"."""
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("loaded").id)
+    state = np.empty(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS))
+    mujoco.mj_getState(model, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+    return state
 
 
 def acquire(test: HammerTest, held: Array, velocity: Array, every: int, random: np.random.Generator | None) -> Record:
@@ -119,25 +153,25 @@ def acquire(test: HammerTest, held: Array, velocity: Array, every: int, random: 
     sampled_force = resample_poly(applied, 1, every, axis=-1)[..., :samples]
     sampled_velocity = resample_poly(velocity, 1, every, axis=-1)[..., :samples]
     if random is not None:
-        sampled_force, sampled_velocity = _with_noise(test, sampled_force, sampled_velocity, random)
+        sampled_velocity = _with_noise(test, sampled_velocity, random)
     return Record(np.arange(samples) / test.sample_rate, sampled_force, sampled_velocity)
 
 
-def _with_noise(test: HammerTest, force: Array, velocity: Array, random: np.random.Generator) -> tuple[Array, Array]:
-    """White sensor noise of a size that leaves the scene's noise on the averaged FRF.
+def _with_noise(test: HammerTest, velocity: Array, random: np.random.Generator) -> Array:
+    """Vibrometer noise of a size that leaves the scene's noise on the FRF averaged over all hits, independent line by line.
 
-    Noise of the force channel moves every line in proportion to its value, noise of the vibrometer by the same amount
-    everywhere; each is set so that the mean of all hits has the relative size asked for (at mid-band, and at the largest line).
+    One part is white, relative to the largest line of a hammer; the other is proportional to the line itself (speckle, scatter of the
+    hit), made by shaping random numbers with the spectrum of the record. The force channel is taken as quiet: behind its window a
+    hammer's noise is far below both.
     """
-    hits, n = force.shape[1:]
+    hits, n = velocity.shape[1], velocity.shape[-1]
+    spectrum = np.abs(np.fft.rfft(velocity))
     frequency = np.fft.rfftfreq(n, 1 / test.sample_rate)
     band = (frequency >= test.band[0]) & (frequency <= test.band[1])
-    spectrum = np.abs(np.fft.rfft(force))[..., band].mean(axis=(1, 2), keepdims=True)
-    largest = np.abs(np.fft.rfft(velocity))[..., band].max(axis=(1, 2, 3), keepdims=True)
-    size = np.sqrt(hits / n)
-    pulse = round((pulse_duration(test) + 1e-3) * test.sample_rate) + 1  # the force window leaves this much noise in
-    noisy_force = force + test.noise_of_value * spectrum * np.sqrt(hits / pulse) * random.standard_normal(force.shape)
-    return noisy_force, velocity + test.noise_of_largest * largest * size * random.standard_normal(velocity.shape)
+    largest = spectrum[..., band].max(axis=(1, 2, 3), keepdims=True)
+    size = np.sqrt(test.noise_of_value**2 * spectrum**2 + test.noise_of_largest**2 * largest**2) * np.sqrt(hits / 2)
+    noise = size * (random.standard_normal(spectrum.shape) + 1j * random.standard_normal(spectrum.shape))
+    return velocity + np.fft.irfft(noise, n)
 
 
 def estimate_of(test: HammerTest, point: OperatingPoint, record: Record) -> Estimate:
@@ -146,4 +180,3 @@ def estimate_of(test: HammerTest, point: OperatingPoint, record: Record) -> Esti
     windows = Windows(pulse_duration(test) + 1e-3, float(decay))
     nodes = tuple(p.node for p in point.spindle.points)
     return estimate(record.time, record.force, record.velocity, windows, test.band, nodes, test.hammer_nodes)
-

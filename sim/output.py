@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
@@ -177,9 +178,10 @@ def write_frf_tables(contents: LogContents, folder: Path) -> None:
 
 
 def _grid(title: str, *columns: str) -> Table:
-    grid = Table(title=title, title_justify="left", title_style="bold", show_edge=False, pad_edge=False)
+    grid = Table(title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
     for column in columns:
-        grid.add_column(column, justify="right" if column not in ("bearing", "kind", "main flexibility", "whirl") else "left")
+        words = column in ("bearing", "kind", "main flexibility", "whirl")
+        grid.add_column(column, justify="left" if words else "right", no_wrap=True)
     return grid
 
 
@@ -234,31 +236,30 @@ def show_run(console: Console, run: Run, out: Path) -> None:
     temperatures = [s.point.condition.temperature for s in run.steps]
     show_table(console, stiffness_table(run.spindle, temperatures, [run.steps[0].point.condition.speed]))
     console.print()
-    measured = [(c, t) for c in run.measured for t in c.tests if t.modes]
-    grid = _grid(
-        "Modal peaks, Hz: the model's own / identified from the virtual hammer test",
-        "mode", "kind", "main flexibility", *(f"{t:g} C" for t in temperatures), "shift",
-        *(f"measured {t.temperature:g} C" for _, t in measured),
-    )  # fmt: skip
-    first, last = run.steps[0], run.steps[-1]
     highest = run.spindle.hammer.band[1]
-    beside = measured_rows(run)
-    numbers = numbered(run)
-    for number, mode in enumerate((m for m in first.point.modes if m.frequency <= highest), 1):
-        cells = []
-        for step, of_step in zip(run.steps, numbers, strict=True):
-            index = next((i for i, n in of_step.items() if n == number), None)
-            if index is None:
-                cells.append("-")
-                continue
-            own = step.point.modes[index]
-            peaks = {id(v): k for k, v in match(step).items()}
-            seen = f"{step.identified.frequency[peaks[id(own)]]:.1f}" if id(own) in peaks else "-"
-            cells.append(f"{own.frequency:.1f} / {seen}")
-        end = next((last.point.modes[i].frequency for i, n in numbers[-1].items() if n == number), np.nan)
-        group = max(group_energy(first.point.chain, mode).items(), key=lambda item: item[1])[0]
-        measured_here = [beside.get(t.id, {}).get(number - 1) for _, t in measured]
-        seen_here = [f"{row.frequency:.0f}" if row else "" for row in measured_here]
-        grid.add_row(str(number), mode.kind, group, *cells, f"{end - mode.frequency:+.1f}", *seen_here)
-    console.print(grid)
+    numbers, beside = numbered(run), measured_rows(run)
+    measured = [t for c in run.measured for t in c.tests if t.id in beside]
+    own = _grid(
+        "Natural frequencies of the model, Hz, and what was measured",
+        "mode", "kind", "main flexibility", *(f"{t:g} C" for t in temperatures), "shift",
+        *(f"measured {t.temperature:g} C" for t in measured),
+    )  # fmt: skip
+    peaks = _grid("Modal peaks of the virtual hammer test, Hz +- standard error", "mode", *(f"{t:g} C" for t in temperatures))
+    first = run.steps[0].point
+    for number, mode in enumerate((m for m in first.modes if m.frequency <= highest), 1):
+        followed = [next((i for i, n in of_step.items() if n == number), None) for of_step in numbers]
+        found = [None if i is None else step.point.modes[i] for i, step in zip(followed, run.steps, strict=True)]
+        frequency = ["-" if m is None else f"{m.frequency:.1f}" for m in found]
+        shift = "-" if found[-1] is None else f"{found[-1].frequency - mode.frequency:+.1f}"
+        group = max(group_energy(first.chain, mode).items(), key=lambda item: item[1])[0]
+        rows = [beside[t.id].get(number - 1) for t in measured]
+        own.add_row(str(number), mode.kind, group, *frequency, shift, *(f"{row.frequency:.0f}" if row else "" for row in rows))
+        seen = []
+        for m, step in zip(found, run.steps, strict=True):
+            k = next((k for k, v in match(step).items() if v is m), None)
+            seen.append("-" if k is None else f"{step.identified.frequency[k]:.2f} +- {step.identified.frequency_sd[k]:.2f}")
+        peaks.add_row(str(number), *seen)
+    console.print(own)
+    console.print()
+    console.print(peaks)
     console.print(f"\n{out}: report.html, run.rrd, table.csv, modes.csv, spindle_*.xml, campaign/", highlight=False)

@@ -7,11 +7,11 @@ Anal. 10 (1973) 413; Inverse Problems 19 (2003) R1, in Kaufman's form, BIT 15 (1
 
 k = 0, 1, 2 for receptance, mobility, accelerance; u are real and stand for what lies far outside the band. Complex noise e of every line
 is independent with E|e|^2 = sd^2. Within the matrix, R_r = shape_r participation_r^T where this is imposed (any mode of a linear system
-that is not a multiple root, gyroscopic or not: Peeters et al., Shock and Vibration 11 (2004) 395, Eq. 12), otherwise free.
+that is not a multiple root, gyroscopic or not: Peeters et al., Shock and Vibration 11 (2004) 395), otherwise free.
 
 Poles are added and dropped by the Bayesian information criterion (Schwarz, Ann. Stat. 6 (1978) 461). Candidates come from the residual
-itself (matching pursuit), not from a polynomial fit of high order (pLSCF, Peeters et al. 2004) or AAA (Nakatsukasa et al., SIAM J. Sci.
-Comput. 40 (2018) A1494): these return false poles too, which must be told from true ones, and were not better starts.
+itself (matching pursuit). A polynomial fit of high order (pLSCF, Peeters et al. 2004) or AAA (Nakatsukasa et al., SIAM J. Sci. Comput. 40
+(2018) A1494) would be other starts; they have not been compared here.
 Lines are scaled, s = i w / scale, by the caller; poles here are in that unit.
 """
 

@@ -14,6 +14,7 @@ from sim.impact import ImpactTest, impact_tests
 from sim.modal import Modes, extract
 from sim.operating import OperatingPoint, operating_point
 
+
 @dataclass(frozen=True, eq=False)
 class Step:
     """Everything at one temperature."""
@@ -41,15 +42,16 @@ def run(
     progress: Callable[[str], None] = lambda done: None,
 ) -> Run:
     """Run the chain at every temperature (C); `progress` is told in words what has been done."""
-    steps = []
+    points = []
     for temperature in temperatures:
-        point = operating_point(spindle, Condition(temperature, speed))
-        progress(f"{temperature:g} C: {point.state.status}, preload {point.state.bearings[0].preload:.2f} N")
-        test = impact_tests([point], element=element, seed=seed)[0]
-        progress(f"{temperature:g} C: {spindle.hammer.hits} hits on {len(spindle.hammer.hammer_nodes)} points simulated")
-        identified = identify(test)
-        progress(f"{temperature:g} C: {len(identified.frequency)} modes identified")
-        steps.append(Step(point, test, identified))
+        points.append(operating_point(spindle, Condition(temperature, speed)))
+        preload = points[-1].state.bearings[0].preload
+        progress(f"{temperature:g} C: {points[-1].state.status}, preload {preload:.2f} N")
+    tests = impact_tests(points, element=element, seed=seed, progress=progress)
+    steps = []
+    for test in tests:
+        steps.append(Step(test.point, test, identify(test)))
+        progress(f"{test.point.condition.temperature:g} C: {len(steps[-1].identified.frequency)} modes identified")
     return Run(spindle, tuple(steps), measured_campaigns(spindle))
 
 

@@ -6,6 +6,9 @@ Ratios are the medians of alternating runs, so that a busy machine slows both si
 from __future__ import annotations
 
 import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import tempfile
 import time
 from collections.abc import Callable
@@ -76,7 +79,7 @@ def time_domain(spindle: Spindle, rounds: int = 5) -> tuple[float, float]:
         mujoco.mj_step(point.model, data, nstep=steps)
 
     def ours() -> None:
-        held, velocity = simulate(point.model, test, hits, steps)
+        [(held, velocity)] = simulate([point.model], test, [hits], steps)
         estimate_of(test, point, acquire(test, held, velocity, every, np.random.default_rng(0)))
 
     pairs = [(seconds(ours, 1), seconds(own, 1)) for _ in range(rounds)]

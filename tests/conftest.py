@@ -1,5 +1,9 @@
 """Fixtures that every test may use."""
 
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does, before numpy loads
+
 from pathlib import Path
 
 import pytest

@@ -43,6 +43,8 @@ def temperatures(spindle: Spindle, condition: Condition, values: Values, by_regi
         return by_region
     unit = unit_rise(spindle)
     rise = heat(spindle, condition, unit) @ unit.region
+    outer = [unit.regions.index(b.outer_ring) for b in spindle.bearings]
+    rise = rise - (1 - values["common_share"]) * rise[outer].mean()
     return by_region | {name: by_region[name] + scale * float(dt) for name, dt in zip(unit.regions, rise, strict=True)}
 
 
@@ -87,7 +89,8 @@ EFFECT = Effect(
     name="thermal_gradient",
     title="Bearing friction heats the running spindle, the shaft and inner rings most",
     equation=(
-        "T_region = T + scale sum_b G_region,b H_b with K G = (1 W in bearing b), K the steady conduction and convection matrix; "
+        "T_region = T + scale (R_region - (1 - common_share) mean R_outer rings), R = sum_b G_region,b H_b with "
+        "K G = (1 W in bearing b), K the steady conduction and convection matrix; "
         "H_b = (M0 + M1) speed at the lubricant's temperature T + sum_c G_bc H_c; "
         "M0 = 1e-7 f0 (nu n)^(2/3) d_m^3, M1 = f1 P1 d_m (Palmgren; Harris, Rolling Bearing Analysis, 4th ed. 2001, ch. 14)"
     ),
@@ -102,10 +105,23 @@ EFFECT = Effect(
             meaning="temperature rise by bearing friction in units of the one computed from the scene's Palmgren and cooling data",
             source="Palmgren's f0 spreads by about 2 for greased bearings (Harris 2001, Table 14.4); convection is known no better",
         ),
+        Parameter(
+            "common_share",
+            "1",
+            neutral=0.0,
+            typical=0.0,
+            prior_sd=0.5,
+            limits=(0.0, 1.0),
+            meaning=(
+                "share of the outer rings' own rise that a test's temperature leaves out: 0 the test tells the hub's temperature, "
+                "1 that of the air far from it"
+            ),
+            source="a matter of where the thermometer sits; 0 keeps what is a gradient",
+        ),
     ),
     sees=(
-        "only at speed: inner rings run hotter than outer ones, which loads the bearings again, so bearing modes fall less with "
-        "speed than the model's, more so in a cold chamber where the grease is stiff"
+        "only at speed: inner rings run hotter than outer ones, which loads the bearings again, so bearing modes rise with speed "
+        "beside their split, most in a cold chamber where the grease is stiff; a common rise (common_share) takes most of it back"
     ),
     resembles=("lubricant_film", "ring_growth", "ball_inertia", "soak_lag"),
     valid=(

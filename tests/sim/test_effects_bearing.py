@@ -2,6 +2,7 @@
 
 import importlib
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -148,10 +149,13 @@ def test_friction_heat_against_the_steady_solver(spindle):
     model = conduction.model(still, influence(still).sections)
     expected = heat.steady(model, heat.running(still, 60.0, RUNNING.speed)).region_means()
     uniform = {g.name: 60.0 for g in spindle.regions}
-    found = thermal_gradient.EFFECT.temperatures(spindle, RUNNING, {"scale": 1.0}, uniform)
+    found = thermal_gradient.EFFECT.temperatures(spindle, RUNNING, {"scale": 1.0, "common_share": 1.0}, uniform)
     assert found == pytest.approx(expected, abs=1e-6)
     assert min(found.values()) > 63.0
     assert found["upper inner ring"] > found["upper outer ring"] + 1.0
+    told = thermal_gradient.EFFECT.temperatures(spindle, RUNNING, {"scale": 1.0, "common_share": 0.0}, uniform)
+    assert told["lower outer ring"] + told["upper outer ring"] == pytest.approx(120.0, abs=1e-9)
+    assert told["shaft"] - told["sleeve"] == pytest.approx(found["shaft"] - found["sleeve"], abs=1e-9)
 
 
 def test_friction_heat_grows_with_speed_as_palmgren(spindle):
@@ -161,7 +165,7 @@ def test_friction_heat_grows_with_speed_as_palmgren(spindle):
     uniform = {g.name: 30.0 for g in spindle.regions}
 
     def rise(rpm, scale):
-        warm = thermal_gradient.EFFECT.temperatures(plain, Condition(30.0, rpm * RPM), {"scale": scale}, uniform)
+        warm = thermal_gradient.EFFECT.temperatures(plain, Condition(30.0, rpm * RPM), {"scale": scale, "common_share": 0.5}, uniform)
         return np.array([warm[g.name] for g in spindle.regions]) - 30.0
 
     assert rise(6000, 1.0) == pytest.approx(2 ** (5 / 3) * rise(3000, 1.0), rel=1e-9)
@@ -178,12 +182,16 @@ def test_friction_heat_solves_conduction_once(spindle):
 def test_soak_lag_scales_the_rotating_part(spindle, soak, share):
     """Newton's cooling: the missing share squares when the time doubles; outer rings move in proportion, inner ones wholly."""
     uniform = {g.name: 60.0 for g in spindle.regions}
-    values = {"hub_share": 0.25, "nominal_soak": 2700.0}
-    motions = expand(spindle, soak_lag.EFFECT.temperatures(spindle, replace(REST, soak_time=soak), values, uniform))
+    values = {"hub_share": 0.25, "nominal_soak": 2700.0, "ball_share": 0.2}
+    condition = replace(REST, soak_time=soak)
+    motions = expand(spindle, soak_lag.EFFECT.temperatures(spindle, condition, values, uniform))
+    motions = soak_lag.EFFECT.motions(spindle, condition, values, motions)
     for name, whole in expand(spindle, 60.0).items():
         assert motions[name].outer_r == pytest.approx((1 - share) * whole.outer_r, rel=1e-9, abs=1e-15)
         assert motions[name].inner_r == pytest.approx(whole.inner_r, rel=1e-12)
-        assert motions[name].ball_strain == pytest.approx((1 - share / 2) * whole.ball_strain, rel=1e-9)
+        assert motions[name].ball_strain == pytest.approx((1 - 0.2 * share) * whole.ball_strain, rel=1e-9)
+        assert motions[name].outer_strain == pytest.approx((1 - 0.6 * share) * whole.outer_strain, rel=1e-9)
+        assert motions[name].temperature == pytest.approx(60 - 0.2 * share * 40)
 
 
 # ------------------------------------------------------------------ expansion
@@ -246,7 +254,7 @@ def test_thermal_loss_is_whole_at_40_K(spindle):
 @pytest.mark.parametrize("temperature", [30.0, 60.0])
 def test_a_soft_spring_keeps_the_preload(spindle, temperature):
     for b in at(spindle, Condition(temperature), constant_force_preload, share=1.0).state.bearings:
-        assert b.preload == pytest.approx(16.0, rel=1e-9)
+        assert b.preload == pytest.approx(16.0, rel=3e-5)  # Hertz constants belong to the place a ring has before the pair balances
 
 
 def test_a_preload_spring_in_series_with_the_pair(spindle):
@@ -291,6 +299,35 @@ def test_bond_in_series_by_condensing_the_ring(hot):
     scale = np.sqrt(np.outer(np.diag(bearing), np.diag(bearing)))
     assert found / scale == pytest.approx(condensed / scale, abs=2e-6)  # rounding of bond less nearly bond
     assert found[2, 2] == pytest.approx(1 / (1 / bearing[2, 2] + 9e-9), rel=1e-12)
+
+
+def test_bond_under_forces_alone(hot):
+    """Two springs in series each way, tilt entries as they were, and with the bearing's own loss factor the damping of all is one."""
+    b, omega = hot.bearings[0], 2 * np.pi * 1500
+    stiffness, damping = bond_softening.bonded(b.stiffness, b.damping, 1e-8, 1.0, 0.04, omega)
+    for i in range(3):
+        assert stiffness[i, i] == pytest.approx(1 / (1 / b.stiffness[i, i] + 1e-8), rel=1e-12)
+    assert np.array_equal(stiffness[3:, :], b.stiffness[3:, :])
+    assert np.array_equal(stiffness[:3, 3:], b.stiffness[:3, 3:])
+    assert damping == pytest.approx(0.04 / omega * stiffness, rel=1e-9, abs=1e-9)
+    half, _ = bond_softening.bonded(b.stiffness, b.damping, 1e-8, 0.5, 0.04, omega)
+    whole, _ = bond_softening.bonded(b.stiffness, b.damping, 1e-8, 0.0, 0.04, omega)
+    assert half == pytest.approx((stiffness + whole) / 2, rel=1e-12)
+    assert whole[0, 4] < 0.9 * stiffness[0, 4]
+
+
+@pytest.mark.parametrize(("temperature", "pairs"), [(20.0, [2234.3]), (60.0, [1568.5, 1845.8])])
+def test_bond_against_practice_a(spindle, temperature, pairs):
+    """Mean frequency of hub-dominated rocking pairs in the campaign made by another program; its build tolerances allow 1 %."""
+    found = frequencies(at(spindle, Condition(temperature), bond_softening), "rocking")[:4]
+    means = [found[:2].mean(), found[2:].mean()]
+    assert means[-len(pairs) :] == pytest.approx(pairs, rel=0.01)
+
+
+def test_soak_against_practice_c(spindle):
+    """Mean fall of the hub rocking pair from 20 to 60 C in the campaign, 49.2 Hz; 3 % of preload and 0.2 K allow 8 % of it."""
+    means = [frequencies(at(spindle, Condition(t), soak_lag), "rocking")[2:4].mean() for t in (20.0, 60.0)]
+    assert means[1] - means[0] == pytest.approx(-49.2, rel=0.08)
 
 
 @pytest.mark.parametrize("loss_factor", [0.0, 0.05, 0.1])
@@ -345,11 +382,11 @@ def nijenbanning(radius, ratio, modulus, viscosity, speed, pressure_viscosity, l
 @pytest.mark.parametrize("ratio", [1.0, 0.5, 0.1])
 @pytest.mark.parametrize("load", [20.0, 100.0])
 def test_film_against_another_published_formula(ratio, load):
-    """Two fits to independent numerical solutions (Twente multigrid, Leeds) at elastic-piezoviscous conditions: 7 % apart at most."""
+    """Two fits to independent numerical solutions (Twente multigrid, Leeds) at elastic-piezoviscous conditions; each claims 10 %."""
     steel, oil = 2.3e11, (0.04, 1.5, 2.2e-8)
     ellipticity = 1.03 * ratio**-0.64  # Hamrock & Dowson 1977
     found = lubricant_film.central_film(0.01, steel, ellipticity, *oil, load)
-    assert found == pytest.approx(nijenbanning(0.01, ratio, steel, *oil, load), rel=0.07)
+    assert found == pytest.approx(nijenbanning(0.01, ratio, steel, *oil, load), rel=0.1)
 
 
 def test_film_speed_is_the_balls_rolling_speed(spindle):
@@ -383,15 +420,18 @@ def test_grease_damping_follows_the_viscosity_table(spindle, temperature, ratio)
 
 @pytest.mark.parametrize("share", [0.5, 1.0])
 def test_heavy_balls_against_the_cage_speed(spindle, share):
-    """Radial balance of a ball: Q_o cos(a_o) - Q_i cos(a_i) = share m d_m omega_c^2 / 2, cage at 69.527 / 120 of the ring's speed.
+    """Radial balance of a ball: Q_o cos(a_o) - Q_i cos(a_i) = F_c - 2 M_g sin(a_o) / D with F_c = share m d_m omega_c^2 / 2.
 
-    3 %: the gyroscopic friction at the outer contact, 2 M sin(a) / D, is a part of it, and the cage slows with the angle.
+    Cage and ball at 69.527 and 335.16 of 120 Hz (verification.md), M_g = m D^2 / 10 omega_b omega_c sin(beta); 1 %: the speeds
+    are those of the loaded angle at rest.
     """
     row = at(spindle, COLD_FAST, ball_inertia, share=share).state.bearings[0].row
     answer = respond(row)
     found = answer.outer_ball_force * np.cos(answer.outer_angle) - answer.ball_force * np.cos(answer.inner_angle)
-    mass, cage = np.pi / 6 * 7800 * 1.588e-3**3, 69.527 / 120 * COLD_FAST.speed
-    assert found == pytest.approx(np.full(10, share * mass * 9.1e-3 / 2 * cage**2), rel=0.03)
+    mass, cage, angle = np.pi / 6 * 7800 * 1.588e-3**3, 69.527 / 120 * COLD_FAST.speed, np.radians(24.51)
+    beta = np.arctan2(np.sin(angle), np.cos(angle) + 1.588 / 9.1)
+    gyroscopic = 0.4 * 1.588 / 9.1 * 335.16 / 69.527 * np.sin(beta) * np.sin(angle)
+    assert found == pytest.approx(np.full(10, share * mass * 9.1e-3 / 2 * cage**2 * (1 - gyroscopic)), rel=0.01)
 
 
 def test_ball_inertia_of_the_scene_is_kept(spindle):
@@ -413,7 +453,7 @@ def spinning_discs(layers, at, elements=400):
     """Radial displacement for 1 rad/s by minimising the energy of linear elements: independent of the layers' closed solution."""
     r = np.unique(np.concatenate([np.linspace(layer.inner, layer.outer, elements + 1) for layer in layers]))
     matrix, load = np.zeros((r.size, r.size)), np.zeros(r.size)
-    for i, (a, b) in enumerate(zip(r[:-1], r[1:], strict=True)):
+    for i, (a, b) in enumerate(pairwise(r)):
         layer = next(x for x in layers if x.inner <= (a + b) / 2 <= x.outer)
         e, nu = layer.modulus / (1 - layer.poisson_ratio**2), layer.poisson_ratio
         for x in (a + b) / 2 + (b - a) / 2 * np.array([-1, 1]) / np.sqrt(3):
@@ -512,11 +552,11 @@ def test_askew_ring_lifts_a_ball(spindle, tilt, lifted):
     assert ("upper bearing lost contact" in state.status) is lifted
 
 
-@pytest.mark.parametrize("relative", [1e-5, 0.05, 0.3, 0.9, 1.0, 2.5])
+@pytest.mark.parametrize("relative", [1e-3, 0.05, 0.3, 0.9, 1.0, 2.5])
 def test_describing_function_by_quadrature(relative):
     """First harmonic of (1 + a cos t)^1.5 over a, 1.5: adaptive quadrature, split where balls lift off."""
     lift = float(np.arccos(np.clip(-1 / relative, -1, 1)))
-    integral = quad(lambda t: max(1 + relative * np.cos(t), 0.0) ** 1.5 * np.cos(t), 0, lift, epsabs=1e-14, epsrel=1e-13)[0]
+    integral = quad(lambda t: max(1 + relative * np.cos(t), 0.0) ** 1.5 * np.cos(t), 0, lift, epsabs=1e-11, epsrel=1e-11)[0]
     assert hertz_amplitude.describing_function(relative) == pytest.approx(2 / (1.5 * np.pi * relative) * integral, rel=2e-6)
 
 
@@ -545,10 +585,11 @@ def test_softening_against_the_exact_period_of_a_pair(relative):
 
 
 def test_hammer_level_against_statics(spindle, cold):
-    """10 N on one bearing at 20 C: axial stiffness 9.755 N/um (verification.md, without tension) gives the ball's deformation."""
+    """10 N on one bearing at 20 C: published axial stiffness 9.755 N/um less the balls' tension, n F / L cos^2, which is 3 % of it."""
     found = hertz_amplitude.amplitude(cold.bearings[0], 10.0)
-    along = np.sin(np.radians(24.51))
-    assert found == pytest.approx(10.0 / 9.755e6 * along, rel=0.03)  # that stiffness has the balls' tension in it as well
+    angle = np.radians(24.51)
+    contacts = 9.755e6 - 10 * 3.857 / 102.68e-6 * np.cos(angle) ** 2
+    assert found == pytest.approx(10.0 / contacts * np.sin(angle), rel=2e-3)
     soft, hard = (at(spindle, replace(REST, level=x), hertz_amplitude).state.bearings[0].stiffness for x in (0.0, 5.0))
     assert np.array_equal(soft, operating_point(spindle, REST, []).state.bearings[0].stiffness)
     assert hard[2, 2] < soft[2, 2]

@@ -111,7 +111,7 @@ def test_h2_differs_from_h1_by_the_coherence(spindle):
     test = impact_tests([operating_point(spindle, Condition(20.0))], replace(spindle.hammer, record_length=0.1))[0]
     h1 = test.estimate.h1
     assert test.estimate.h2 * h1.coherence == pytest.approx(h1.value, rel=1e-6)
-    assert test.estimate.per_hit.shape == (3, 7, 2, len(h1.frequency))
+    assert test.estimate.per_hit.shape == (2, 7, 2, len(h1.frequency))
 
 
 def test_one_hit_has_no_scatter(spindle, quick):

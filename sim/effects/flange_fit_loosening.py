@@ -1,0 +1,81 @@
+"""The flange grows away from the shaft when warm: interference goes, and with it contact stiffness."""
+
+from __future__ import annotations
+
+from model.machine import Condition, Region, Spindle
+from sim.effect import Effect, Parameter, Values
+from sim.effects.mount_compliance import role, with_stiffness
+
+LOOSE = 0.02
+"""Share of the contact stiffness that a fit without interference keeps: its screws or adhesive, and dirt."""
+
+
+def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
+    share = values["contact_share"]
+    if share == 0.0:
+        return spindle
+    remaining = max(1 - opening(spindle, condition.temperature) / (values["interference"] * 1e-6), LOOSE)
+    factor = 1 / (1 - share + share / remaining)
+    return with_stiffness(spindle, {j.name: factor for j in spindle.structure.joints if role(spindle, j) == "flange"})
+
+
+def opening(spindle: Spindle, temperature: float) -> float:
+    """Diametral interference (m) lost between reference and `temperature`: bore growth less shaft growth; 0 without such a fit."""
+    found = fit(spindle)
+    if found is None:
+        return 0.0
+    inside, outside = (
+        spindle.materials[g.material].thermal_strain(temperature, spindle.reference_temperature) for g in found
+    )
+    return 2 * found[0].r[1] * (outside - inside)
+
+
+def fit(spindle: Spindle) -> tuple[Region, Region] | None:
+    """The standing body's region (inside) and the support's (outside) that share the longest cylinder face, if any do."""
+    structure = spindle.structure
+    standing = structure.body(structure.inner_body if spindle.pair.turning_ring == "outer" else structure.outer_body)
+    made_of = {name for b in structure.bodies for name in b.regions}
+    supports = [g for g in spindle.regions if g.name not in made_of]
+    pairs = [(g, s) for g in map(spindle.region, standing.regions) for s in supports if abs(g.r[1] - s.r[0]) < 1e-9]
+    return max((p for p in pairs if _length(p) > 0), key=_length, default=None)
+
+
+def _length(pair: tuple[Region, Region]) -> float:
+    return min(g.z[1] for g in pair) - max(g.z[0] for g in pair)
+
+
+EFFECT = Effect(
+    name="flange_fit_loosening",
+    title="The flange loosens on the shaft as it expands",
+    equation=(
+        "k(T) = k / (1 - c + c / rho), rho = 1 - d (eps_flange - eps_shaft) / interference, c = contact_share; pressure of a press "
+        "fit is proportional to its interference (Lame; Timoshenko & Goodier 1970, art. 28), contact stiffness of rough faces to "
+        "pressure (Greenwood & Williamson, Proc. R. Soc. A 295 (1966) 300-319); near rho = 0 the joint gives way"
+    ),
+    parameters=(
+        Parameter(
+            "contact_share",
+            "1",
+            neutral=0.0,
+            typical=0.1,
+            prior_sd=0.1,
+            limits=(0.0, 0.9),
+            meaning="share of the flange joint's compliance at the reference temperature that is that of the fit's contact",
+            source="joints make up a tenth to half of a structure's compliance (Ito, Modular Design for Machine Tools, 2008, ch. 5)",
+        ),
+        Parameter(
+            "interference",
+            "um",
+            neutral=7.0,
+            typical=7.0,
+            prior_sd=3.0,
+            limits=(2.5, 60.0),
+            meaning="interference on the diameter at the reference temperature; the fit is loose when expansion has used it up",
+            source="a light press fit on 5 mm: H7/p6 to H7/s6, 0 to 27 um (ISO 286-2)",
+        ),
+    ),
+    sees="modes that strain the flange fall with temperature, more and more towards the fit's end, at any speed alike; rise when cold",
+    resembles=("modulus_softening", "mount_compliance", "plate_prestress", "support_anisotropy"),
+    valid="a shaft of smaller expansion in a flange of greater; no slip; screws and adhesive keep 2 % of the contact's stiffness",
+    spindle=spindle,
+)

@@ -1,0 +1,41 @@
+"""The exponential window's damping was not taken out of the FRFs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from model.machine import Condition, Spindle
+from model.rotor_base import RotorBase
+from sim.effect import Effect, Measurement, Parameter, Values
+
+
+def measurement(spindle: Spindle, condition: Condition, values: Values, chain: RotorBase, measurement: Measurement) -> Measurement:
+    if values["decay"] == 0.0:
+        return measurement
+    return replace(measurement, decay=measurement.decay + values["decay"])
+
+
+EFFECT = Effect(
+    name="window_damping",
+    title="Damping added by an exponential window",
+    equation=(
+        "w(t) = exp(-decay t): every pole moves to lambda - decay, H(i omega) -> H(i omega + decay); damping ratio up by decay / omega_r, "
+        "damped frequencies stay (Fladung & Rost, Mech. Systems Signal Processing 11 (1997) 51-59)"
+    ),
+    parameters=(
+        Parameter(
+            "decay",
+            "1/s",
+            neutral=0.0,
+            typical=8.0,
+            prior_sd=6.0,
+            limits=(-20.0, 100.0),
+            meaning="decay rate of a window that was applied and not corrected; negative: corrected though there was none",
+            source="a window that ends at 10 % after the usual 0.3 s record: ln(10) / 0.3 s = 7.7 1/s",
+        ),
+    ),
+    sees="all modes more damped by the same rate, the low modes most in ratio; at every temperature and speed",
+    resembles=("grease_damping", "channel_delay"),
+    valid="window over the whole record, the same in all tests; force unwindowed or short",
+    measurement=measurement,
+)
