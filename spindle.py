@@ -198,7 +198,6 @@ def _modes(options: argparse.Namespace) -> Answer:
 
 
 def _impact(options: argparse.Namespace) -> Answer:
-    result = None
     options.temperatures = [options.temperature]
     for result, _ in _whole_chain(options, extra=0):
         answer = output.impact_json(result.steps[0])

@@ -64,7 +64,7 @@ def poles(linear: Matrices) -> Poles:
     return Poles(value, vectors[:n], left)
 
 
-def frf(linear: Matrices, response: Array, reference: Array, frequency: Array, kind: str = "receptance") -> ComplexArray:
+def frf(linear: Matrices, response: Array, reference: Array, frequency: Array | ComplexArray, kind: str = "receptance") -> ComplexArray:
     """Exact FRF (n_resp, n_ref, n_freq) between response rows (n_resp, n) and force rows (n_ref, n) at `frequency` (Hz).
 
     `kind`: receptance m/N, mobility (m/s)/N, accelerance (m/s2)/N.

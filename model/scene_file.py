@@ -286,9 +286,8 @@ class Point(Table):
 
 def axis_vector(direction: str) -> tuple[float, float, float]:
     """Unit vector of a signed axis like '+Z'."""
-    vector = np.zeros(3)
-    vector["XYZ".index(direction[1])] = 1.0 if direction[0] == "+" else -1.0
-    return tuple(vector.tolist())
+    x, y, z = ((1.0 if direction[0] == "+" else -1.0) if axis == direction[1] else 0.0 for axis in "XYZ")
+    return x, y, z
 
 
 class Measuring(Table):

@@ -78,7 +78,7 @@ class OperatingPoint:
     def frf(self, frequency: Array) -> ComplexArray:
         """Exact mobility (n_resp, n_ref, n) of the linear model at `frequency` (Hz), as the measuring chain shows it."""
         m = self.measurement
-        s = frequency - 1j * m.decay / (2 * np.pi)
+        s: ComplexArray = np.asarray(frequency - 1j * m.decay / (2 * np.pi), complex)
         value = frf(self.linear, m.response_rows, m.reference_rows, s, "mobility")
         return value * (m.gain[:, None] * np.exp(-2j * np.pi * frequency * m.delay[:, None]))[:, None, :]
 

@@ -180,7 +180,7 @@ def write_frf_tables(contents: LogContents, folder: Path) -> None:
 def _grid(title: str, *columns: str) -> Table:
     grid = Table(title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
     for column in columns:
-        words = column in ("bearing", "kind", "main flexibility", "whirl")
+        words = column in ("bearing", "kind", "main\nflexibility", "whirl")
         grid.add_column(column, justify="left" if words else "right", no_wrap=True)
     return grid
 
@@ -188,7 +188,7 @@ def _grid(title: str, *columns: str) -> Table:
 def show_table(console: Console, table: StiffnessTable) -> None:
     grid = _grid(
         "Bearing state",
-        "T, C", "rpm", "bearing", "angle, deg", "deform., um", "ball force, N", "ball k, N/um", "preload, N", "k_RR, N/um", "k_AA, N/um",
+        "T\nC", "speed\nrpm", "bearing", "angle\ndeg", "deform.\num", "ball force\nN", "ball k\nN/um", "preload\nN", "k_RR\nN/um", "k_AA\nN/um",
     )  # fmt: skip
     scale = (1, 1, 1, 1e-6, 1, 1e-6, 1e-6)
     digits = (2, 3, 3, 3, 2, 2, 3)
@@ -208,7 +208,7 @@ def show_modes(console: Console, answer: dict[str, Any], point: OperatingPoint) 
     groups = list(answer["modes"][0]["energy"]) if answer["modes"] else []
     grid = _grid(
         f"Modes at {answer['temperature_C']:g} C, {answer['speed_rpm']:g} rpm (bearings {answer['status']})",
-        "mode", "f, Hz", "damping, %", "kind", "whirl", *(f"{g}, %" for g in groups),
+        "mode", "f\nHz", "damping\n%", "kind", "whirl", *(f"{g}\n%" for g in groups),
     )  # fmt: skip
     for i, m in enumerate(answer["modes"], 1):
         shares = [f"{100 * m['energy'][g]:.1f}" for g in groups]
@@ -221,7 +221,7 @@ def show_impact(console: Console, step: Step) -> None:
     condition = step.point.condition
     grid = _grid(
         f"Impact test at {condition.temperature:g} C, {condition.speed / RPM:g} rpm: identified modes beside the model's own",
-        "f, Hz", "+-", "damping, %", "+-", "model f, Hz", "model damping, %",
+        "f\nHz", "+-", "damping\n%", "+-", "model f\nHz", "model damping\n%",
     )  # fmt: skip
     m = step.identified
     pairs = match(step)
@@ -241,8 +241,8 @@ def show_run(console: Console, run: Run, out: Path) -> None:
     measured = [t for c in run.measured for t in c.tests if t.id in beside]
     own = _grid(
         "Natural frequencies of the model, Hz, and what was measured",
-        "mode", "kind", "main flexibility", *(f"{t:g} C" for t in temperatures), "shift",
-        *(f"measured {t.temperature:g} C" for t in measured),
+        "mode", "kind", "main\nflexibility", *(f"{t:g} C" for t in temperatures), "shift",
+        *(f"measured\n{t.temperature:g} C" for t in measured),
     )  # fmt: skip
     peaks = _grid("Modal peaks of the virtual hammer test, Hz +- standard error", "mode", *(f"{t:g} C" for t in temperatures))
     first = run.steps[0].point

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from model.machine import Condition, Spindle
 from model.modes import Mode, modes, point_rows
 from model.rotor_base import matrices
 from model.scene import load
-from model.tolerance import toleranced
+from model.tolerance import Toleranced, toleranced
 from sim.operating import operating_point
 from sim.run import Step
 
@@ -47,17 +48,21 @@ def frequency_shift(scene: str | Path | Spindle, mode: int, from_C: float, to_C:
         return np.array([ends[0][mode - 1].frequency, ends[1][partner].frequency])
 
     start, end = frequencies(spindle)
-    step = 0.5
-    changes = [p.sd * _slope(lambda x, p=p: frequencies(p.apply(spindle, x)), step * p.sd) for p in toleranced(spindle)]
+
+    def spread(sd: float, change: Callable[[float], Array]) -> Array:
+        """Change of both frequencies for one standard deviation, by a central difference over half of it each way."""
+        return change(0.5 * sd) - change(-0.5 * sd)
+
+    changes = [spread(p.sd, partial(_built, frequencies, spindle, p)) for p in toleranced(spindle)]
     kelvin = spindle.tolerances.temperature
-    for cold, hot in ((1, 0), (0, 1)):
-        changes.append(kelvin * _slope(lambda x, c=cold, h=hot: frequencies(spindle, from_C + c * x, to_C + h * x), step * kelvin))
+    changes.append(spread(kelvin, lambda x: frequencies(spindle, cold=from_C + x)))
+    changes.append(spread(kelvin, lambda x: frequencies(spindle, hot=to_C + x)))
     variance = sum((c[1] - c[0]) ** 2 for c in changes) + 2 * FREQUENCY_FLOOR**2
     return Shift(float(end - start), float(np.sqrt(variance)), float(start), float(end))
 
 
-def _slope(function: Callable[[float], Array], step: float) -> Array:
-    return (function(step) - function(-step)) / (2 * step)
+def _built(frequencies: Callable[[Spindle], Array], spindle: Spindle, parameter: Toleranced, x: float) -> Array:
+    return frequencies(parameter.apply(spindle, x))
 
 
 def follow(mass: Array, first: Sequence[Mode], then: Sequence[Mode], width: float = 0.1) -> list[int]:

@@ -129,7 +129,9 @@ def test_nothing_is_left_of_a_stopped_run(monkeypatch, capsys, short_scene, tmp_
 
 def test_people_see_tables(capsys, short_scene):
     assert main(["table", str(SCENE), "--temperatures", "20", "60"]) == 0
-    assert "24.510" in capsys.readouterr().out
+    text = capsys.readouterr().out
+    assert "24.51" in text
+    assert "…" not in text
     assert main(["modes", str(SCENE)]) == 0
     text = capsys.readouterr().out
     assert "1002.07" in text

@@ -7,8 +7,73 @@ from collections.abc import Mapping
 from model.machine import Spindle
 from model.scene import BadInput
 from sim.effect import Effect, Values
+from sim.effects import (
+    added_disk,
+    ball_inertia,
+    ball_material,
+    bearing_misalignment,
+    bond_softening,
+    channel_delay,
+    clearance_opening,
+    constant_force_preload,
+    expansion_mismatch,
+    flange_fit_loosening,
+    grease_damping,
+    hammer_position,
+    hertz_amplitude,
+    hub_flexibility,
+    loose_inserts,
+    lubricant_film,
+    magnetic_pull,
+    modulus_softening,
+    mount_compliance,
+    plate_prestress,
+    preload_loss,
+    ring_growth,
+    sensor_gain,
+    sensor_mass,
+    shaft_bending,
+    soak_lag,
+    support_anisotropy,
+    thermal_gradient,
+    window_damping,
+)
 
-CATALOGUE: tuple[Effect, ...] = ()
+CATALOGUE: tuple[Effect, ...] = (
+    # temperature and expansion
+    thermal_gradient.EFFECT,
+    soak_lag.EFFECT,
+    expansion_mismatch.EFFECT,
+    loose_inserts.EFFECT,
+    # bearings
+    preload_loss.EFFECT,
+    constant_force_preload.EFFECT,
+    clearance_opening.EFFECT,
+    bond_softening.EFFECT,
+    ball_material.EFFECT,
+    lubricant_film.EFFECT,
+    grease_damping.EFFECT,
+    ball_inertia.EFFECT,
+    ring_growth.EFFECT,
+    magnetic_pull.EFFECT,
+    bearing_misalignment.EFFECT,
+    hertz_amplitude.EFFECT,
+    # structure
+    modulus_softening.EFFECT,
+    flange_fit_loosening.EFFECT,
+    mount_compliance.EFFECT,
+    plate_prestress.EFFECT,
+    support_anisotropy.EFFECT,
+    shaft_bending.EFFECT,
+    hub_flexibility.EFFECT,
+    added_disk.EFFECT,
+    sensor_mass.EFFECT,
+    # the measuring chain
+    sensor_gain.EFFECT,
+    channel_delay.EFFECT,
+    window_damping.EFFECT,
+    hammer_position.EFFECT,
+)
 
 
 def by_name(name: str, catalogue: tuple[Effect, ...] = CATALOGUE) -> Effect:

@@ -33,9 +33,7 @@ def compliance(temperature: float, values: Values) -> float:
     return float(values["hot_compliance"] * 1e-9 / (1 + (values["cold_ratio"] - 1) * glassy))
 
 
-def bonded(
-    stiffness: Array, damping: Array, give: float, coupling_kept: float, loss_factor: float, omega: float
-) -> tuple[Array, Array]:
+def bonded(stiffness: Array, damping: Array, give: float, coupling_kept: float, loss_factor: float, omega: float) -> tuple[Array, Array]:
     """Stiffness and damping (5, 5) of a bearing on a bond of compliance `give` (m/N); between the two conventions, linearly."""
     whole = in_series(stiffness, damping, give * HELD, loss_factor, omega)
     forces = np.diag(np.diag(stiffness)[:3]), np.diag(np.diag(damping)[:3])

@@ -24,9 +24,7 @@ def opening(spindle: Spindle, temperature: float) -> float:
     found = fit(spindle)
     if found is None:
         return 0.0
-    inside, outside = (
-        spindle.materials[g.material].thermal_strain(temperature, spindle.reference_temperature) for g in found
-    )
+    inside, outside = (spindle.materials[g.material].thermal_strain(temperature, spindle.reference_temperature) for g in found)
     return 2 * found[0].r[1] * (outside - inside)
 
 

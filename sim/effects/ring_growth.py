@@ -50,8 +50,7 @@ def unit_growth(spindle: Spindle, b: Bearing) -> float:
     race = ring.r[0] if spindle.pair.turning_ring == "outer" else ring.r[1]
     regions = tuple(g for g in spindle.regions if g.part == ring.part)
     constants = tuple(
-        (m.youngs_modulus(spindle.reference_temperature), m.poisson_ratio, m.density)
-        for m in (_material(spindle, g) for g in regions)
+        (m.youngs_modulus(spindle.reference_temperature), m.poisson_ratio, m.density) for m in (_material(spindle, g) for g in regions)
     )
     return _growth(regions, constants, ring, race)
 
@@ -65,9 +64,7 @@ def _growth(regions: tuple[Region, ...], constants: tuple[tuple[float, float, fl
     return displacement(layers(regions, constants, ring, race), race)
 
 
-def layers(
-    regions: Sequence[Region], constants: Sequence[tuple[float, float, float]], ring: Region, race: float
-) -> tuple[Layer, ...]:
+def layers(regions: Sequence[Region], constants: Sequence[tuple[float, float, float]], ring: Region, race: float) -> tuple[Layer, ...]:
     """The stack that turns with `ring`: what of its part lies at the ring's height, without gaps, from inside to outside."""
     of = {g.name: c for g, c in zip(regions, constants, strict=True)}
     height = ring.z[1] - ring.z[0]

@@ -19,9 +19,7 @@ def chain(spindle: Spindle, condition: Condition, values: Values, chain: RotorBa
         return chain
     direction = np.radians(values["direction"])
     by_role = {"flange": split, "plate": values["plate_share"] * split}
-    uneven = {
-        j.name: unevenness(by_role[role(spindle, j)], direction) for j in spindle.structure.joints if role(spindle, j) in by_role
-    }
+    uneven = {j.name: unevenness(by_role[role(spindle, j)], direction) for j in spindle.structure.joints if role(spindle, j) in by_role}
     elements = tuple(
         replace(e, stiffness=uneven[e.name] @ e.stiffness @ uneven[e.name], damping=uneven[e.name] @ e.damping @ uneven[e.name])
         if e.name in uneven

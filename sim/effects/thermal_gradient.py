@@ -57,8 +57,9 @@ def heat(spindle: Spindle, condition: Condition, unit: UnitRise) -> Array:
     made = np.zeros(len(spindle.bearings))
     for _ in range(100):
         warm = condition.temperature + made @ unit.bearing
-        last, made = made, np.array(
-            [friction.heat(law, b, condition.speed, float(t), load) for b, t in zip(spindle.bearings, warm, strict=True)]
+        last, made = (
+            made,
+            np.array([friction.heat(law, b, condition.speed, float(t), load) for b, t in zip(spindle.bearings, warm, strict=True)]),
         )
         if np.abs((made - last) @ unit.bearing).max() < 1e-9:
             return made

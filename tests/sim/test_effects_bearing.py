@@ -598,4 +598,3 @@ def test_hammer_level_against_statics(spindle, cold):
 def test_every_module_is_named_after_its_effect():
     for module in MODULES:
         assert importlib.import_module(f"sim.effects.{module.EFFECT.name}") is module
-
