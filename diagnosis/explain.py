@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 from scipy.stats import chi2 as chi_squared
@@ -16,7 +15,8 @@ from model.ball_row import Array
 from model.pair import NoEquilibrium
 from sim.effect import Effect
 
-SINGLES, PAIRED = 6, 4  # effects refitted after screening, and of those combined in pairs
+SINGLES, PAIRED = 5, 3  # effects refitted after the rough fits, and effects tried beside the best
+NEAR = 60.0  # ln evidence within which a fit is polished
 CLEAR = 12.0  # ln evidence by which an explanation must lead the model without it: calibrated on campaigns with none
 AHEAD = 5.0  # ln evidence by which it must lead every rival to be identified
 MISFIT = 1e-4  # probability below which a misfit is not chance
@@ -155,29 +155,79 @@ def explain(
     progress(f"tolerances fitted: misfit {base.misfit:.0f} for {len(theory.data.value)} numbers")
     signatures = screen(theory, about, catalogue)
     progress(f"{len(signatures)} effects screened")
-    tasks = [((s.effect,), start) for s in signatures if s.visibility > 0 for start in starts(s.effect, s.expected)]
-    fits = _best(_all(theory, about, tasks, 4, workers))
-    order = sorted(fits.values(), key=lambda f: -f.evidence)[:SINGLES]
-    tasks = [(f.effects, [f.values[e.name][p.name] for e in f.effects for p in e.parameters]) for f in order]
-    fits |= _best(_all(theory, about, tasks, 15, workers))
-    progress("promising effects refitted")
-    order = sorted((f for f in fits.values()), key=lambda f: -f.evidence)
-    tasks = []
-    for a, b in combinations(order[:PAIRED], 2):
-        effects = (*a.effects, *b.effects)
-        begin = [f.values[e.name][p.name] for f in (a, b) for e in f.effects for p in e.parameters]
-        tasks.append((effects, begin))
-    fits |= _best(_all(theory, about, tasks, 12, workers))
-    progress("pairs refitted")
+    quiet = chi_squared.sf(base.misfit, len(theory.data.value)) > 0.01
+    if quiet and all((s.expected * s.visibility) ** 2 < CLEAR for s in signatures):
+        promising: list[Task] = [((s.effect,), s.effect.typical_list()) for s in signatures[:3]]
+    else:
+        tasks = [((s.effect,), start) for s in signatures if s.visibility > 1 for start in starts(s.effect, s.expected)]
+        rough = _best(_all(theory, about, [(*task, None) for task in tasks], False, workers))
+        promising = [_again(f) for f in sorted(rough.values(), key=lambda f: -f.evidence)[:SINGLES]]
+        progress(f"{len(tasks)} rough fits made")
+    fits = _best(_all(theory, about, [(*task, None) for task in promising], True, workers))
+    progress("promising effects refitted with all tolerances free")
+    best = max(fits.values(), key=lambda f: f.evidence)
+    if best.evidence - base.evidence > CLEAR:
+        close = [f for f in fits.values() if best.evidence - f.evidence < NEAR]
+        fits |= _best([*close, *_all(theory, about, [(*_again(f), f.nuisance) for f in close], True, workers)])
+        best = max(fits.values(), key=lambda f: f.evidence)
+        seconds = [e for e, gain in added_gain(theory, best, catalogue)[:PAIRED] if gain > 2 * AHEAD]
+        tasks = [(*_again(best, e), None) for e in seconds]
+        pairs = _best(_all(theory, about, tasks, True, workers))
+        near = [f for f in pairs.values() if abs(best.evidence - f.evidence) < NEAR]
+        fits |= pairs | _best([*near, *_all(theory, about, [(*_again(f), f.nuisance) for f in near], True, workers)])
+        progress(f"{len(tasks)} pairs fitted")
     return _verdict(theory, base, list(fits.values()), signatures)
 
 
-def _all(theory: Theory, about: Linear, tasks: list[tuple[tuple[Effect, ...], list[float]]], steps: int, workers: int) -> list[Fit]:
+Task = tuple[tuple[Effect, ...], list[float]]
+"""Effects to fit, and a start value for every parameter of theirs."""
+
+
+def _all(
+    theory: Theory, about: Linear, tasks: list[tuple[tuple[Effect, ...], list[float], Array | None]], thorough: bool, workers: int
+) -> list[Fit]:
+    """Fits of all tasks (effects, start, nuisance start), side by side."""
     if workers < 2 or len(tasks) < 2:
-        return [fit(theory, about, effects, start, steps) for effects, start in tasks]
+        return [fit(theory, about, effects, start, thorough, nuisance) for effects, start, nuisance in tasks]
     with ProcessPoolExecutor(workers) as pool:
-        jobs = [pool.submit(fit, theory, about, effects, start, steps) for effects, start in tasks]
+        jobs = [pool.submit(fit, theory, about, effects, start, thorough, nuisance) for effects, start, nuisance in tasks]
         return [job.result() for job in jobs]
+
+
+def _again(found: Fit, more: Effect | None = None) -> Task:
+    """The effects of a fit from where it came to rest, and one more at a small size."""
+    values = [found.values[e.name][p.name] for e in found.effects for p in e.parameters]
+    if more is None:
+        return found.effects, values
+    main = more.parameters[0]
+    return (*found.effects, more), [*values, main.neutral + 0.2 * (main.typical - main.neutral), *more.typical_list()[1:]]
+
+
+def added_gain(theory: Theory, found: Fit, catalogue: Sequence[Effect]) -> list[tuple[Effect, float]]:
+    """By how much chi2 would fall if one more effect joined a fit, to first order with everything refitted; largest first."""
+    whiten = theory.data.whiten
+    widths = np.concatenate([theory.sd, [p.prior_sd for e in found.effects for p in e.parameters]])
+    a = whiten @ (found.jacobian * widths)
+    factor = np.linalg.cholesky(np.eye(len(a)) + a @ a.T)
+    present = [(e, found.values[e.name]) for e in found.effects]
+    here = theory.data.value - found.residual
+    prior = np.concatenate([found.nuisance / theory.sd, np.zeros(len(widths) - len(theory.sd))])
+    rest = np.linalg.solve(factor, whiten @ found.residual + a @ prior)
+    gains = []
+    for effect in catalogue:
+        if effect in found.effects:
+            continue
+        main = effect.parameters[0]
+        small = effect.typical() | {main.name: main.neutral + 0.1 * (main.typical - main.neutral)}
+        try:
+            moved = theory.features(found.nuisance, [*present, (effect, small)]) - here
+        except NoEquilibrium:
+            continue
+        direction = np.linalg.solve(factor, whiten @ moved)
+        size = float(direction @ direction)
+        if size > 0:
+            gains.append((effect, float(direction @ rest) ** 2 / size))
+    return sorted(gains, key=lambda g: -g[1])
 
 
 def _best(fits: Sequence[Fit]) -> dict[tuple[str, ...], Fit]:

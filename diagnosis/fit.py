@@ -11,13 +11,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.theory import Theory
+from diagnosis.theory import Applied, Theory
 from model.ball_row import Array
 from model.pair import NoEquilibrium
 from sim.effect import Effect
 
 STEP = 0.3  # of a prior standard deviation, for derivatives by nuisance parameters
 TRUST = 2.0  # prior standard deviations, the longest step of any parameter
+TEMPERS = (300.0, 30.0, 3.0, 1.0)  # factors on the data's errors, in turn
+ROUGH = 4  # steps at each temper of a fit that is not thorough
+RENEWALS = 6  # of the derivative at the last temper
+ENOUGH = 0.1  # fall of chi2 below which renewing derivatives has done its work
 WORST = 1e12  # chi2 of a state that has no equilibrium
 
 
@@ -52,54 +56,54 @@ class Fit:
 
 
 def linearise(theory: Theory) -> Linear:
-    """Central differences about the nominal spindle; gains are exact."""
-    x0 = np.zeros(len(theory.sd))
-    value = theory.features(x0)
+    """Features and their derivative about the nominal spindle without effects."""
+    x = np.zeros(len(theory.sd))
+    return Linear(theory.features(x), derivative(theory, x, ()))
+
+
+def derivative(theory: Theory, x: Array, effects: Applied) -> Array:
+    """Derivative (n, p) of the features by the nuisance parameters: central differences; gains are exact.
+
+    The temperature error of a test moves the features of that test only, so one difference of that test is enough.
+    """
     columns = []
-    for i, sd in enumerate(theory.sd):
-        step = np.zeros(len(x0))
+    for i, (name, sd) in enumerate(zip(theory.names, theory.sd, strict=True)):
+        step = np.zeros(len(x))
         step[i] = STEP * sd
-        if theory.names[i].startswith("gain"):
-            columns.append(theory.gains((step / step[i])[-_channels(theory) :]))
-        elif theory.names[i].startswith("temperature of"):
-            columns.append(_one_test(theory, x0, i, step[i]))
+        if name.startswith("gain"):
+            columns.append(theory.gains(np.eye(len(x))[i]))
         else:
-            columns.append((theory.features(x0 + step) - theory.features(x0 - step)) / (2 * step[i]))
-    return Linear(value, np.array(columns).T)
+            test = theory.test_of(i)
+            ends = [theory.features(x + sign * step, effects, only=test) for sign in (1, -1)]
+            columns.append((ends[0] - ends[1]) / (2 * step[i]))
+    return np.nan_to_num(np.array(columns).T)
 
 
-def _channels(theory: Theory) -> int:
-    return sum(name.startswith("gain") for name in theory.names)
+def fit(
+    theory: Theory,
+    about: Linear,
+    effects: Sequence[Effect] = (),
+    start: Sequence[float] | None = None,
+    thorough: bool = True,
+    nuisance: Array | None = None,
+    steps: int = 8,
+) -> Fit:
+    """Best nuisance and effect parameters from one start (the effects' typical values by default).
 
-
-def _one_test(theory: Theory, x0: Array, i: int, step: float) -> Array:
-    """Derivative by the temperature of one test, which moves the features of that test only."""
-    from diagnosis.theory import Data, features_of, predict
-
-    data = theory.data
-    first = next(k for k, name in enumerate(theory.names) if name.startswith("temperature of"))
-    test = i - first
-    o = data.observations[test]
-    mine = [k for k, f in enumerate(data.features) if f.test == test]
-    from dataclasses import replace
-
-    only = Data((o,), tuple(replace(data.features[k], test=0) for k in mine), data.value[mine], data.whiten, data.sd[mine])
-    ends = [features_of(only, [predict(theory.spindle, o, (), sign * step)]) for sign in (1, -1)]
-    column = np.zeros(len(data.features))
-    column[mine] = (ends[0] - ends[1]) / (2 * step)
-    return column
-
-
-def fit(theory: Theory, about: Linear, effects: Sequence[Effect] = (), start: Sequence[float] | None = None, steps: int = 12) -> Fit:
-    """Best nuisance and effect parameters from one start (the effects' typical values by default)."""
+    The data are tempered: their errors are first taken much larger than they are, so that effects find their size while tolerances
+    stay where they are believed, then smaller down to the truth. A thorough fit takes the derivative by nuisance parameters anew
+    at every temper and goes on at the last until chi2 rests; else that of the nominal spindle serves, the last tempers are left
+    out, and chi2 and evidence are those of the tempered data: good for ranking only. With `nuisance` values from an earlier fit only the
+    last temper is gone through.
+    """
     data = theory.data
     rows = [p for e in effects for p in e.parameters]
     low, high = (np.array([p.limits[i] for p in rows]) for i in (0, 1))
     width = np.array([p.prior_sd for p in rows])
-    middle = np.array([p.neutral for p in rows])
-    middle[[i for i, p in enumerate(rows) if p.neutral == p.typical]] = np.array([p.typical for p in rows if p.neutral == p.typical])
+    sizes = {id(e.parameters[0]) for e in effects}
+    middle = np.array([p.neutral if id(p) in sizes else p.typical for p in rows])
     theta = np.array([p.typical for p in rows] if start is None else start, float)
-    x = np.zeros(len(theory.sd))
+    x = np.zeros(len(theory.sd)) if nuisance is None else nuisance.copy()
     scale = np.concatenate([theory.sd, width])
 
     def applied(t: Array) -> list[tuple[Effect, dict[str, float]]]:
@@ -112,40 +116,49 @@ def fit(theory: Theory, about: Linear, effects: Sequence[Effect] = (), start: Se
         except NoEquilibrium:
             return np.full(len(data.value), np.nan)
 
-    def cost(m: Array, x: Array, t: Array) -> float:
+    def cost(m: Array, x: Array, t: Array, temper: float) -> float:
         if not np.all(np.isfinite(m)):
             return WORST
-        return float(np.sum((data.whiten @ (data.value - m)) ** 2) + np.sum((x / theory.sd) ** 2) + np.sum(((t - middle) / width) ** 2))
+        misfit = float(np.sum((data.whiten @ (data.value - m)) ** 2))
+        return misfit / temper**2 + float(np.sum((x / theory.sd) ** 2) + np.sum(((t - middle) / width) ** 2))
 
     m = model(x, theta)
-    current, damping = cost(m, x, theta), 1e-3
-    by_theta = np.zeros((len(data.value), len(rows)))
-    for _ in range(steps):
-        for j, w in enumerate(width):
-            h = 0.02 * w if theta[j] + 0.02 * w <= high[j] else -0.02 * w
-            moved = theta.copy()
-            moved[j] += h
-            by_theta[:, j] = (model(x, moved) - m) / h
-        jacobian = np.nan_to_num(np.hstack([about.by_nuisance, by_theta]))
-        white = data.whiten @ jacobian * scale
-        gradient = white.T @ (data.whiten @ (data.value - m)) - np.concatenate([x, theta - middle]) / scale
-        normal = white.T @ white + np.eye(len(scale))
-        for _ in range(8):
-            move = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), gradient) * scale
-            move /= max(1.0, float(np.max(np.abs(move / scale))) / TRUST)
-            new_x, new_theta = x + move[: len(x)], np.clip(theta + move[len(x) :], low, high)
-            new_m = model(new_x, new_theta)
-            new = cost(new_m, new_x, new_theta)
-            if new <= current:
+    by_theta, by_nuisance = np.zeros((len(data.value), len(rows))), about.by_nuisance
+    tempers = TEMPERS[:2] if not thorough else (*(TEMPERS if nuisance is None else ()), *[1.0] * RENEWALS)
+    for temper in tempers:
+        if thorough and (effects or temper < TEMPERS[0]):
+            by_nuisance = derivative(theory, x, applied(theta))
+        current, damping = cost(m, x, theta, temper), 1e-3
+        before = current
+        for _ in range(steps if thorough else ROUGH):
+            for j, w in enumerate(width):
+                h = 0.02 * w if theta[j] + 0.02 * w <= high[j] else -0.02 * w
+                moved = theta.copy()
+                moved[j] += h
+                by_theta[:, j] = np.nan_to_num((model(x, moved) - m) / h)
+            white = data.whiten @ np.hstack([by_nuisance, by_theta]) * scale / temper
+            gradient = white.T @ (data.whiten @ (data.value - np.nan_to_num(m))) / temper - np.concatenate([x, theta - middle]) / scale
+            normal = white.T @ white + np.eye(len(scale))
+            for _ in range(8):
+                move = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), gradient) * scale
+                move /= max(1.0, float(np.max(np.abs(move / scale))) / TRUST)
+                new_x, new_theta = x + move[: len(x)], np.clip(theta + move[len(x) :], low, high)
+                new_m = model(new_x, new_theta)
+                new = cost(new_m, new_x, new_theta, temper)
+                if new <= current:
+                    break
+                damping = max(damping * 6, 1e-3)
+            else:
                 break
-            damping = max(damping * 6, 1e-3)
-        else:
+            fell = current - new
+            x, theta, m, current, damping = new_x, new_theta, new_m, new, damping / 5
+            if fell < max(1e-3, 1e-3 * current):
+                break
+        if temper == 1.0 and before - current < ENOUGH:
             break
-        fell = current - new
-        x, theta, m, current, damping = new_x, new_theta, new_m, new, damping / 5
-        if fell < 1e-3:
-            break
-    white = data.whiten @ np.nan_to_num(np.hstack([about.by_nuisance, by_theta])) * scale
+    temper = 1.0 if thorough else TEMPERS[1]
+    current = cost(m, x, theta, temper)
+    white = data.whiten @ np.hstack([by_nuisance, by_theta]) * scale / temper
     normal = white.T @ white + np.eye(len(scale))
     covariance = np.linalg.inv(normal) * np.outer(scale, scale)
     sd = np.sqrt(np.diag(covariance))
@@ -169,6 +182,6 @@ def fit(theory: Theory, about: Linear, effects: Sequence[Effect] = (), start: Se
         float(np.sum((data.whiten @ residual) ** 2)),
         current,
         -0.5 * current - 0.5 * float(np.linalg.slogdet(normal)[1]),
-        np.hstack([about.by_nuisance, by_theta]),
+        np.hstack([by_nuisance, by_theta]),
         at_limit,
     )

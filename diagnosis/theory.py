@@ -7,7 +7,7 @@ out; their frequencies are not.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -145,11 +145,13 @@ def _in_order(o: Observation, p: Predicted, partner: Array) -> Array:
     return partner
 
 
-def features_of(data: Data, predicted: Sequence[Predicted]) -> Array:
-    """The predicted values (n,) of all features."""
-    value = np.empty(len(data.features))
-    pairs = [pair(o, p) for o, p in zip(data.observations, predicted, strict=True)]
+def features_of(data: Data, predicted: Mapping[int, Predicted]) -> Array:
+    """The predicted values (n,) of all features; zero for tests without a prediction."""
+    value = np.zeros(len(data.features))
+    pairs = {t: pair(data.observations[t], p) for t, p in predicted.items()}
     for k, f in enumerate(data.features):
+        if f.test not in predicted:
+            continue
         p, i = predicted[f.test], pairs[f.test][f.mode]
         if f.what == "frequency":
             value[k] = np.log(p.frequency[i])
@@ -174,8 +176,17 @@ class Theory:
     names: tuple[str, ...]
     sd: Array
 
-    def features(self, x: Array, effects: Applied = ()) -> Array:
-        """Predicted features (n,) for nuisance values x (len(names),) and effects."""
+    def test_of(self, i: int) -> int | None:
+        """The test whose temperature nuisance parameter `i` is; None for a parameter of all tests."""
+        first = len(self.names) - len(self.data.observations) - self.channels
+        return i - first if 0 <= i - first < len(self.data.observations) else None
+
+    @property
+    def channels(self) -> int:
+        return sum(name.startswith("gain") for name in self.names)
+
+    def features(self, x: Array, effects: Applied = (), only: int | None = None) -> Array:
+        """Predicted features (n,) for nuisance values x (len(names),) and effects; zero for other tests than `only`, if given."""
         build = toleranced(self.spindle)
         spindle = self.spindle
         for parameter, value in zip(build, x, strict=False):
@@ -183,11 +194,13 @@ class Theory:
                 spindle = parameter.apply(spindle, float(value))
         tests = len(self.data.observations)
         warmer = x[len(build) : len(build) + tests]
-        predicted = [predict(spindle, o, effects, float(w)) for o, w in zip(self.data.observations, warmer, strict=True)]
-        return features_of(self.data, predicted) + self.gains(x[len(build) + tests :])
+        wanted = range(tests) if only is None else [only]
+        predicted = {t: predict(spindle, self.data.observations[t], effects, float(warmer[t])) for t in wanted}
+        return features_of(self.data, predicted) + self.gains(x)
 
-    def gains(self, gain: Array) -> Array:
-        """What channel gains (relative) add to the amplitude features."""
+    def gains(self, x: Array) -> Array:
+        """What the channel gains in x (relative) add to the amplitude features."""
+        gain = x[len(x) - self.channels :]
         added = np.zeros(len(self.data.features))
         for k, f in enumerate(self.data.features):
             if f.what == "amplitude":

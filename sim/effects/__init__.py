@@ -98,7 +98,7 @@ def checked(effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
 
 def of_scene(spindle: Spindle) -> list[tuple[Effect, Values]]:
     """The effects a scene adds, with all their values, in order."""
-    found = []
+    found: list[tuple[Effect, Values]] = []
     for addition in spindle.effects:
         effect = by_name(addition.effect)
         found.append((effect, checked(effect, addition.values)))

@@ -59,7 +59,7 @@ EFFECT = Effect(
             prior_sd=5.0,
             limits=(0.0, 100.0),
             meaning="radius of the full thin disk of the same polar inertia",
-            source="a hub of 25 mm diameter, that of the 95 mm platters' bore (ANSI X3.112)",
+            source="a hub of 25 mm diameter, the bore of 95 mm platters",
         ),
         Parameter(
             "height",

@@ -59,7 +59,7 @@ EFFECT = Effect(
             prior_sd=0.1,
             limits=(0.0, 0.9),
             meaning="share of the flange joint's compliance at the reference temperature that is that of the fit's contact",
-            source="joints make up a tenth to half of a structure's compliance (Ito, Modular Design for Machine Tools, 2008, ch. 5)",
+            source="assumed: a tenth; joints are known to make up anything to half of a machine structure's compliance",
         ),
         Parameter(
             "interference",
@@ -74,6 +74,9 @@ EFFECT = Effect(
     ),
     sees="modes that strain the flange fall with temperature, more and more towards the fit's end, at any speed alike; rise when cold",
     resembles=("modulus_softening", "mount_compliance", "plate_prestress", "support_anisotropy"),
-    valid="a shaft of smaller expansion in a flange of greater; no slip; screws and adhesive keep 2 % of the contact's stiffness",
+    valid=(
+        "a section that draws both, of unlike expansion (nothing changes otherwise); no slip; without interference, screws and adhesive "
+        "keep 2 % of the contact's stiffness"
+    ),
     spindle=spindle,
 )

@@ -39,7 +39,8 @@ EFFECT = Effect(
     title="The hammer hits beside its node",
     equation=(
         "force row b(p) -> b(p + offset (cos(direction) e_1 + sin(direction) e_2)), e_1 radial (z for hits across the axis), "
-        "e_2 tangential: an axial hit at radius r gives force 1 and moments r e_tangential; H_ij = sum_r phi_ir b_j phi_r / (i omega - lambda_r)"
+        "e_2 tangential: an axial hit at radius r gives force 1 and the moment r across it; "
+        "residues A_r = phi_r (b^T phi_r), poles lambda_r as before"
     ),
     parameters=(
         Parameter(

@@ -13,7 +13,7 @@ RISE = 40.0
 
 def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
     added = compliance(spindle, condition, values)
-    if added == 0.0:
+    if added == 0.0 or values["compliance"] == 0.0:
         return spindle
     return with_stiffness(spindle, {j.name: 1 / (1 + added) for j in spindle.structure.joints if role(spindle, j) == "mount"})
 
@@ -21,7 +21,7 @@ def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
 def compliance(spindle: Spindle, condition: Condition, values: Values) -> float:
     """Compliance added at a condition, in units of the mount's own."""
     warm, share = (condition.temperature - spindle.reference_temperature) / RISE, values["thermal_share"]
-    return float(values["compliance"] * (1 - share + share * warm))
+    return float((1 + values["compliance"]) ** (1 - share + share * warm)) - 1
 
 
 def role(spindle: Spindle, joint: Joint) -> str:
@@ -39,20 +39,20 @@ def with_stiffness(spindle: Spindle, factor: dict[str, float], tilt: dict[str, f
     The damping ratio stays, so that damping follows stiffness.
     """
     tilt = factor if tilt is None else tilt
-    joints = tuple(
-        replace(j, stiffness=(*(factor[j.name] * k for k in j.stiffness[:3]), *(tilt[j.name] * k for k in j.stiffness[3:])))
-        if j.name in factor
-        else j
-        for j in spindle.structure.joints
-    )
+    joints = tuple(_scaled(j, factor[j.name], tilt[j.name]) if j.name in factor else j for j in spindle.structure.joints)
     return replace(spindle, structure=replace(spindle.structure, joints=joints))
+
+
+def _scaled(joint: Joint, factor: float, tilt: float) -> Joint:
+    x, y, z, tilt_x, tilt_y = joint.stiffness
+    return replace(joint, stiffness=(factor * x, factor * y, factor * z, tilt * tilt_x, tilt * tilt_y))
 
 
 EFFECT = Effect(
     name="mount_compliance",
     title="Added compliance under the base, at all temperatures or when warm",
     equation=(
-        "1/k(T) = (1/k) (1 + compliance (1 - w + w (T - T_ref) / 40 K)), w = thermal_share: springs in series; "
+        "1/k(T) = (1/k) (1 + compliance)^(1 - w + w (T - T_ref) / 40 K), w = thermal_share: springs in series (w = 0); "
         "for small values d ln k / dT = -compliance w / 40 K"
     ),
     parameters=(
@@ -62,7 +62,7 @@ EFFECT = Effect(
             neutral=0.0,
             typical=0.05,
             prior_sd=0.05,
-            limits=(-0.6, 5.0),
+            limits=(-0.8, 5.0),
             meaning="compliance added 40 K above the reference temperature over the mount's own; negative stiffens",
             source="assumed: screwed feet and gaskets add some percent to a machine's footing; polymers soften by 0.5 %/K and more",
         ),
@@ -79,6 +79,6 @@ EFFECT = Effect(
     ),
     sees="modes of the base on its mount move, in proportion to their strain energy there; bearing modes hardly, at any speed alike",
     resembles=("plate_prestress", "modulus_softening", "sensor_mass", "flange_fit_loosening"),
-    valid="added part without mass and with the mount's own loss factor; 1 + added compliance must stay positive (within 100 K)",
+    valid="added part without mass and with the mount's own loss factor",
     spindle=spindle,
 )

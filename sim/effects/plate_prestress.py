@@ -23,7 +23,7 @@ EFFECT = Effect(
         "k = k_0 (1 + N / N_cr), N in-plane force per length (tension positive), N / N_cr = stiffening (T - T_ref) / 40 K for axial "
         "motion and tilt_share times that for tilts; clamped disc N_cr = 14.68 D / a^2, with one nodal diameter 26.37 D / a^2, "
         "D = E t^3 / 12 (1 - nu^2), held at its rim N = E t Delta_alpha Delta_T / (1 - nu) "
-        "(Timoshenko & Gere, Theory of Elastic Stability, 1961, 8.2 and 9.8)"
+        "(Timoshenko & Gere, Theory of Elastic Stability, 1961)"
     ),
     parameters=(
         Parameter(
@@ -32,7 +32,7 @@ EFFECT = Effect(
             neutral=0.0,
             typical=0.03,
             prior_sd=0.02,
-            limits=(-0.4, 0.4),
+            limits=(-0.3, 0.3),
             meaning="relative change of the plate's axial stiffness 40 K above the reference: tension positive, compression negative",
             source=(
                 "3 mm of aluminium, 30 mm in radius, fully held over 40 K: N / N_cr = 0.10 by the formulas; a third of it where "
@@ -45,7 +45,7 @@ EFFECT = Effect(
             neutral=0.56,
             typical=0.56,
             prior_sd=0.2,
-            limits=(0.0, 2.0),
+            limits=(0.0, 1.2),
             meaning="relative change of the plate's tilt stiffness over that of its axial one",
             source="14.68 / 26.37: buckling loads of a clamped disc without and with one nodal diameter",
         ),

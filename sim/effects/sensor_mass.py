@@ -36,7 +36,7 @@ EFFECT = Effect(
     equation=(
         "m -> m + sum mass, I_x -> I_x + sum mass (y^2 + z^2), I_y -> I_y + sum mass (x^2 + z^2), I_z -> I_z + sum mass (x^2 + y^2) about "
         "the common centre of mass; on a turning body x^2, y^2 -> (x^2 + y^2) / 2; "
-        "d ln f = -mass |phi(point)|^2 / (2 modal mass) (Rayleigh; Ewins, Modal Testing, 2000, 3.3)"
+        "d ln f = -mass |phi(point)|^2 / (2 modal mass) (Rayleigh; Ewins, Modal Testing, 2000)"
     ),
     parameters=(
         Parameter(

@@ -47,7 +47,7 @@ EFFECT = Effect(
     equation=(
         "K -> S K S, S = R diag(sqrt(1 + s/2), sqrt(1 - s/2), 1, sqrt(1 - s/2), sqrt(1 + s/2)) R^T: bending stiffness in the plane "
         "at `direction` times 1 + s/2, in the plane across times 1 - s/2; s = split at the flange, plate_share split at the plate "
-        "(split of forward and backward modes by anisotropic supports: Genta, Dynamics of Rotating Systems, 2005, ch. 5)"
+        "(split of forward and backward modes by anisotropic supports: Genta, Dynamics of Rotating Systems, 2005)"
     ),
     parameters=(
         Parameter(

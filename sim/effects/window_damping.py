@@ -20,7 +20,7 @@ EFFECT = Effect(
     title="Damping added by an exponential window",
     equation=(
         "w(t) = exp(-decay t): every pole moves to lambda - decay, H(i omega) -> H(i omega + decay); damping ratio up by decay / omega_r, "
-        "damped frequencies stay (Fladung & Rost, Mech. Systems Signal Processing 11 (1997) 51-59)"
+        "damped frequencies stay (Fladung & Rost, Mech. Systems Signal Processing 11, 1997)"
     ),
     parameters=(
         Parameter(
