@@ -3,7 +3,7 @@ PYTHON ?= python3
 SPINDLE = .venv/bin/spindle
 READY = .venv/ready
 
-.PHONY: demo test lint bench clean
+.PHONY: demo test lint bench blind clean
 
 demo: $(READY)
 	$(SPINDLE) run scenes/hdd_2003 --out out/hdd_2003
@@ -14,6 +14,9 @@ test: $(READY) lint
 lint: $(READY)
 	.venv/bin/ruff check .
 	.venv/bin/mypy
+
+blind: $(READY)
+	.venv/bin/python -m tests.blind
 
 bench: $(READY)
 	.venv/bin/python -m tests.bench

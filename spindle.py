@@ -8,21 +8,28 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: more threa
 
 import argparse
 import json
+import shutil
 import sys
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
 
 from model.ball_row import NoEquilibrium
 from model.machine import Condition, HammerTest, OutsideRange, Spindle
 from model.mjcf import ELEMENTS
-from model.scene import BadInput, load
+from model.scene import BadInput, load, scene_path
 from sim import output
+from sim.campaign_file import toml
+from sim.effect import Effect
+from sim.effects import CATALOGUE, by_name, checked
 from sim.folder import MARK, whole_folder
 
 RPM = 2 * np.pi / 60
@@ -82,6 +89,16 @@ def _count(text: str) -> int:
     return value
 
 
+def _setting(text: str) -> tuple[str, float]:
+    name, equals, value = text.partition("=")
+    if not (name and equals):
+        raise argparse.ArgumentTypeError(f"{text!r} is not of the form name=value")
+    try:
+        return name, _number(value)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r}: {value!r} is not a number") from None
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="spindle", description="From temperature to modal peaks of a ball-bearing spindle.")
     verbs = parser.add_subparsers(required=True, metavar="VERB", parser_class=_Parser)
@@ -89,7 +106,8 @@ def _parser() -> argparse.ArgumentParser:
     def verb(name: str, run: Callable[[argparse.Namespace], Answer], text: str, what: str = "SCENE") -> argparse.ArgumentParser:
         added = verbs.add_parser(name, help=text, description=text)
         added.set_defaults(verb=run)
-        added.add_argument("target", metavar=what, type=Path)
+        if what:
+            added.add_argument("target", metavar=what, type=Path)
         added.add_argument("--json", action="store_true", help="one JSON object on standard output, nothing else")
         added.add_argument("--out", type=Path, metavar="DIR", help="folder to write, whole or not at all")
         return added
@@ -129,6 +147,16 @@ def _parser() -> argparse.ArgumentParser:
     report = verb("report", _report, "the HTML report of the whole chain")
     several(report)
     hammer(report)
+    against = verb("compare", _compare, "a campaign beside the scene: modes, dampings, shapes and FRFs, and one number for the whole")
+    against.add_argument("campaign", metavar="CAMPAIGN", type=Path)
+    missing = verb("diagnose", _diagnose, "which physics the scene lacks to explain a campaign")
+    missing.add_argument("campaign", metavar="CAMPAIGN", type=Path)
+    effects = verb("effects", _effects, "the catalogue of physical effects, or one of them explained", what="")
+    effects.add_argument("name", metavar="NAME", nargs="?")
+    add = verb("add", _add, "a new scene with one more effect")
+    add.add_argument("effect", metavar="EFFECT")
+    add.add_argument("--set", type=_setting, nargs="+", action="extend", default=[], metavar="NAME=VALUE", help="parameter values (typical ones by default)")
+    add.add_argument("--from", dest="diagnosis", type=Path, metavar="DIAGNOSIS.json", help="take fitted values from the answer of diagnose --json")
     verb("inspect", _inspect, "what a Rerun log of spindle holds, and its FRFs as numbers", "FILE.rrd")
     return parser
 
@@ -144,19 +172,21 @@ def _hammer_settings(spindle: Spindle, options: argparse.Namespace) -> Spindle:
 # ---------------------------------------------------------------- verbs
 
 
+@contextmanager
+def _progress(steps: int) -> Iterator[Callable[[str], None]]:
+    """A function that takes what has been done, and moves a bar of so many steps on standard error."""
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("starting", total=steps)
+        yield lambda done: bar.update(task, advance=1, description=done)
+
+
 def _whole_chain(options: argparse.Namespace, extra: int):
     """The run that `run`, `report` and `simulate` share, with a progress bar on standard error."""
     from sim.run import run
 
     spindle = _hammer_settings(load(options.target), options)
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    bar = Progress(*columns, console=Console(stderr=True), transient=True)
-    task = bar.add_task("starting", total=3 * len(options.temperatures) + extra)
-
-    def progress(done: str) -> None:
-        bar.update(task, advance=1, description=done)
-
-    with bar:
+    with _progress(3 * len(options.temperatures) + extra) as progress:
         result = run(spindle, options.temperatures, options.speed * RPM, options.element, options.seed, progress)
         yield result, progress
 
@@ -241,6 +271,156 @@ def _inspect(options: argparse.Namespace) -> Answer:
             output.write_frf_tables(contents, folder)
             _mark(folder, options, {"log": str(options.target)})
     return answer, lambda console: console.print(describe(contents), markup=False, highlight=False)
+
+
+def _compare(options: argparse.Namespace) -> Answer:
+    from diagnosis.compare import compare, comparison_json, show_comparison
+    from sim.campaign import read_campaign
+
+    spindle, campaign = load(options.target), read_campaign(options.campaign)
+    with _progress(2 * len(campaign.tests)) as progress:
+        comparison = compare(spindle, campaign, progress=progress)
+    answer = comparison_json(comparison)
+    _write_answer(options, answer, "comparison.json")
+    return answer, lambda console: show_comparison(console, comparison)
+
+
+def _diagnose(options: argparse.Namespace) -> Answer:
+    from diagnosis.verdict import diagnose_verb
+
+    return diagnose_verb(options)
+
+
+# ---------------------------------------------------------------- effects
+
+
+def _effects(options: argparse.Namespace) -> Answer:
+    if options.name is None:
+        answer: dict[str, Any] = {"effects": [_summary(e) for e in CATALOGUE]}
+        _write_answer(options, answer, "effects.json")
+        return answer, lambda console: _show_effects(console)
+    effect = by_name(options.name)
+    keys = ("name", "title", "equation", "sees", "valid")
+    answer = {k: getattr(effect, k) for k in keys} | {
+        "resembles": list(effect.resembles),
+        "parameters": [asdict(p) for p in effect.parameters],
+    }
+    _write_answer(options, answer, "effect.json")
+    return answer, lambda console: _show_effect(console, effect)
+
+
+def _summary(effect: Effect) -> dict[str, Any]:
+    main = effect.parameters[0]
+    told = {"parameter": main.name, "unit": main.unit, "neutral": main.neutral, "typical": main.typical}
+    return {"name": effect.name, "title": effect.title} | told
+
+
+def _show_effects(console: Console) -> None:
+    grid = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
+    for column in ("effect", "what it is", "main parameter", "typical", "unit"):
+        grid.add_column(column, justify="right" if column == "typical" else "left")
+    for e in map(_summary, CATALOGUE):
+        grid.add_row(e["name"], e["title"], e["parameter"], f"{e['typical']:g}", e["unit"])
+    console.print(grid)
+    console.print("spindle effects NAME explains one; spindle add SCENE NAME --out NEW_SCENE adds it.", highlight=False)
+
+
+def _show_effect(console: Console, effect: Effect) -> None:
+    def tell(what: str, text: str) -> None:
+        console.print(f"\n{what}:", style="bold")
+        console.print(text, markup=False, highlight=False)
+
+    console.print(f"{effect.name}: {effect.title}", style="bold", highlight=False)
+    tell("Equation", effect.equation)
+    console.print("\nParameters:", style="bold")
+    grid = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
+    for column in ("name", "unit", "neutral", "typical", "prior s.d.", "limits"):
+        grid.add_column(column, justify="left" if column in ("name", "unit") else "right")
+    for p in effect.parameters:
+        grid.add_row(p.name, p.unit, f"{p.neutral:g}", f"{p.typical:g}", f"{p.prior_sd:g}", f"{p.limits[0]:g} to {p.limits[1]:g}")
+    console.print(grid)
+    for p in effect.parameters:
+        console.print(f"{p.name}: {p.meaning}. Source: {p.source}.", markup=False, highlight=False)
+    tell("What one sees", effect.sees)
+    tell("What it resembles", ", ".join(effect.resembles))
+    tell("Where it is valid", effect.valid)
+
+
+def _add(options: argparse.Namespace) -> Answer:
+    if options.out is None:
+        raise BadInput("--out: add needs the folder of the new scene")
+    effect, file, out = by_name(options.effect), scene_path(options.target), options.out
+    here, there = file.parent.resolve(), out.resolve()
+    if here == there or here in there.parents or there in here.parents:
+        raise BadInput(f"--out {out}: the new scene may neither be, hold nor lie inside the folder of {file}")
+    if any(a.effect == effect.name for a in load(file).effects):
+        raise BadInput(f"{file}: effects.{effect.name}: is there already; change its values there, or add to the scene it was added to")
+    fitted = _fitted(effect, options.diagnosis) if options.diagnosis else {}
+    values = checked(effect, effect.typical() | fitted | dict(options.set))
+    told = {"typical of the catalogue": [n for n in values if n not in fitted], f"fitted, from {options.diagnosis}": list(fitted)}
+    by_hand = [name for name, _ in options.set]
+    told = {what: [n for n in names if n not in by_hand] for what, names in told.items()} | {"set by hand": list(dict.fromkeys(by_hand))}
+    source = "; ".join(f"{what}: {', '.join(names)}" for what, names in told.items() if names)
+    origin = "calibrated" if fitted else "assumed"
+    with whole_folder(out) as folder:
+        text = file.read_text(encoding="utf-8").rstrip("\n") + "\n\n" + _effect_table(effect, values, origin, source)
+        (folder / "spindle.toml").write_text(text, encoding="utf-8")
+        for name in ("measured", "published"):
+            if (file.parent / name).is_dir():
+                shutil.copytree(file.parent / name, folder / name)
+        try:
+            load(folder)
+        except BadInput as error:
+            raise BadInput(str(error).replace(str(folder), str(out))) from None
+        answer = {"scene": str(out), "effect": effect.name, "values": values, "origin": origin, "source": source}
+        _mark(folder, options, answer)
+    units = {p.name: p.unit for p in effect.parameters}
+    said = ", ".join(f"{name} = {value:g} {units[name]}".removesuffix(" 1") for name, value in values.items())
+    return answer, lambda console: console.print(f"{out}: {effect.name} added ({origin}): {said}", highlight=False, markup=False)
+
+
+def _effect_table(effect: Effect, values: dict[str, float], origin: str, source: str) -> str:
+    head = {"name": effect.name, "origin": origin, "source": source}
+    lines = [f"# {effect.title}", "[[effects]]", *(f"{k} = {toml(v)}" for k, v in head.items()), "", "[effects.values]"]
+    lines += [f"{p.name} = {toml(float(values[p.name]))}  # {'' if p.unit == '1' else p.unit + ': '}{p.meaning}" for p in effect.parameters]
+    return "\n".join(lines) + "\n"
+
+
+def _fitted(effect: Effect, file: Path) -> dict[str, float]:
+    """Values of an effect in the first candidate of a diagnosis that has it, from `<effect>.<parameter>` or `<parameter>`."""
+    try:
+        diagnosis = json.loads(file.read_text(encoding="utf-8"))
+        candidates = [(list(c["effects"]), dict(c["parameters"])) for c in diagnosis["candidates"]]
+    except OSError as error:
+        raise BadInput(f"--from {file}: cannot be read: {error.strerror}") from None
+    except (ValueError, KeyError, TypeError):
+        raise BadInput(f"--from {file}: is not an answer of spindle diagnose --json, with candidates of effects and parameters") from None
+    parameters = next((p for effects, p in candidates if effect.name in effects), None)
+    if parameters is None:
+        named = ", ".join(dict.fromkeys(str(e) for effects, _ in candidates for e in effects)) or "none"
+        raise BadInput(f"--from {file}: no candidate has effect {effect.name}; its candidates are {named}")
+    found = {}
+    for name in effect.neutral():
+        row = parameters.get(f"{effect.name}.{name}", parameters.get(name))
+        if row is not None:
+            value = row.get("value") if isinstance(row, dict) else row
+            if not isinstance(value, int | float) or isinstance(value, bool):
+                raise BadInput(f"--from {file}: {effect.name}.{name}.value = {value!r}: must be a number")
+            found[name] = float(value)
+    if not found:
+        raise BadInput(f"--from {file}: its candidate has no value for {effect.name}; its parameters are {', '.join(effect.neutral())}")
+    return found
+
+
+# ---------------------------------------------------------------- output folders
+
+
+def _write_answer(options: argparse.Namespace, answer: dict[str, Any], name: str) -> None:
+    """The JSON answer as a file of the output folder, if one is wanted."""
+    if options.out:
+        with whole_folder(options.out) as folder:
+            (folder / name).write_text(json.dumps(answer, indent=1), encoding="utf-8")
+            _mark(folder, options, answer)
 
 
 def _mark(folder: Path, options: argparse.Namespace, answer: dict[str, Any]) -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import Any
 
 import numpy as np
@@ -33,6 +33,7 @@ from sim.operating import operating_point
 RPM = 2 * np.pi / 60
 BELIEVABLE = 0.08  # relative frequency error up to which two modes are taken for the same
 POWER = dict(zip(TO_POWER, (-1, 0, 1), strict=True))  # of i omega, from mobility to the other quantities
+UNLIKE = 3.0  # what another kind costs in pairing, in units of a fully different shape
 SILENT = 1e-6  # of the largest FRF of the test; smaller computed ones are forbidden by symmetry and have no shape to compare
 
 
@@ -112,7 +113,7 @@ def compare(
         bodies = [b.name for b in spindle.structure.bodies]
         if point.body not in bodies:
             raise BadInput(
-                f"{campaign.folder}: points.{point.node}.body = {point.body!r}: "
+                f"{campaign.folder or campaign.title}: points.{point.node}.body = {point.body!r}: "
                 f"no body of scene {spindle.name}; allowed are {', '.join(bodies)}"
             )
     observed = observe(campaign, spindle, progress) if observations is None else observations
@@ -121,15 +122,17 @@ def compare(
     numbers = numbered(observed, predicted)
     scatter = _repeat_variance(observed, chosen)
     tests = []
-    pairs: list[tuple[ComplexArray, ComplexArray]] = []
+    nodes = next((o.test.frf.response_nodes for o in observed if o.test.frf is not None), ())
+    pairs: list[tuple[ComplexArray, ComplexArray]] = []  # at these points
     for o, p, partner, number, extra in zip(observed, predicted, chosen, numbers, scatter, strict=True):
         tests.append(_test(spindle, campaign, o, p, partner, number, extra))
-        pairs += [(o.shape[i], expected) for i, expected in _expected_shapes(o, p, partner).items() if o.shape is not None]
+        if o.shape is not None and o.test.frf is not None and o.test.frf.response_nodes == nodes:
+            pairs += [(o.shape[i], expected) for i, expected in _expected_shapes(o, p, partner).items()]
         progress(f"{o.test.id}: compared")
     pulls = [x for t in tests for m in t.modes for x in (m.pull, m.damping_pull) if x is not None]
     pulls += [x for t in tests for x in t.missing_pull]
     rms = float(np.sqrt(np.mean(np.square(pulls)))) if pulls else float("inf")
-    comac = _comac(_response_nodes(observed), pairs)
+    comac = _comac(nodes, pairs)
     return Comparison(spindle.name, campaign.title, tuple(tests), comac, _crossings(observed, predicted, numbers), rms)
 
 
@@ -161,7 +164,7 @@ def partners(o: Observation, p: Predicted) -> Array:
     """
     distance = np.abs(np.log(o.frequency[:, None] / p.frequency)) / FAR
     if o.shape is None:
-        unlike = 3.0 * (np.array(o.kind)[:, None] != np.array(p.kind))
+        unlike = UNLIKE * (np.array(o.kind)[:, None] != np.array(p.kind))
     else:
         unlike = 1 - np.abs(_unit(o.shape).conj() @ _unit(p.shape).T) ** 2
     partner = np.full(len(o.frequency), -1)
@@ -170,9 +173,9 @@ def partners(o: Observation, p: Predicted) -> Array:
     radial = [i for i, j in enumerate(partner) if j >= 0 and p.kind[j] != "axial"]
     logs = np.log(o.frequency[radial])
     for group in np.split(np.array(radial, int), np.flatnonzero(np.diff(logs) > ALONE) + 1):
-        partner[group] = sorted(partner[group], key=lambda j: p.frequency[j])
+        partner[group] = partner[group][np.argsort(p.frequency[partner[group]])]
     far = np.abs(p.frequency[partner] / o.frequency - 1) > BELIEVABLE
-    return np.where(far, -1, partner)
+    return np.where(far | (partner < 0), -1, partner)
 
 
 def _unit(shape: ComplexArray) -> ComplexArray:
@@ -194,11 +197,17 @@ def numbered(observed: Sequence[Observation], predicted: Sequence[Predicted]) ->
         near = min(found, key=lambda s: abs(state[s][0] - state[t][0]) + abs(state[s][1] - state[t][1]))
         a, b = predicted[near], predicted[t]
         unit = [_unit(p.shape) for p in (a, b)]
-        cost = np.square(np.log(a.frequency[:, None] / b.frequency) / FAR)
+        cost = np.abs(np.log(a.frequency[:, None] / b.frequency)) / FAR
         if unit[0].shape[1] == unit[1].shape[1]:
             cost = cost + 1 - np.abs(unit[0].conj() @ unit[1].T) ** 2
-        cost = cost + np.array([[float((x == "axial") != (y == "axial")) for y in b.kind] for x in a.kind])
-        followed = {int(j): found[near][int(i)] for i, j in zip(*linear_sum_assignment(cost), strict=True)}
+        cost = cost + UNLIKE * np.array([[(x == "axial") != (y == "axial") for y in b.kind] for x in a.kind])
+        partner = {int(j): int(i) for i, j in zip(*linear_sum_assignment(cost), strict=True)}
+        radial = [j for j in sorted(partner) if b.kind[j] != "axial"]
+        for j, k in pairwise(radial):  # a close pair that stays one keeps its order
+            i, h = partner[j], partner[k]
+            if i > h and a.frequency[i] < (1 + ALONE) * a.frequency[h] and b.frequency[k] < (1 + ALONE) * b.frequency[j]:
+                partner[j], partner[k] = h, i
+        followed = {j: found[near][i] for j, i in partner.items()}
         following = max(max(f.values(), default=0) for f in found.values())
         for j in range(len(b.frequency)):
             if j not in followed:
@@ -304,7 +313,7 @@ def _expected_shapes(o: Observation, p: Predicted, partner: Array) -> dict[int, 
 def likeness(a: ComplexArray, b: ComplexArray) -> float | None:
     """|a^H b|^2 / (|a|^2 |b|^2): the MAC of two shapes, the FRAC of two FRFs; None where one of them is zero."""
     size = float(np.vdot(a, a).real * np.vdot(b, b).real)
-    return float(min(1.0, abs(np.vdot(a, b)) ** 2 / size)) if size > 0 else None
+    return min(1.0, float(abs(np.vdot(a, b)) ** 2) / size) if size > 0 else None
 
 
 def frac(spindle: Spindle, o: Observation, measured: Frf) -> dict[tuple[int, int], float | None]:
@@ -320,14 +329,9 @@ def frac(spindle: Spindle, o: Observation, measured: Frf) -> dict[tuple[int, int
     }
 
 
-def _response_nodes(observed: Sequence[Observation]) -> tuple[int, ...]:
-    """Nodes of the first test with shapes; COMAC is over tests of these points."""
-    return next((o.test.frf.response_nodes for o in observed if o.test.frf is not None), ())
-
-
 def _comac(nodes: Sequence[int], pairs: Sequence[tuple[ComplexArray, ComplexArray]]) -> dict[int, float | None]:
     """COMAC of every point over all paired modes of all tests: (sum |a b|)^2 / (sum |a|^2 sum |b|^2), shapes of unit length."""
-    units = [(np.abs(a) / np.linalg.norm(a), np.abs(b) / np.linalg.norm(b)) for a, b in pairs if len(a) == len(nodes) and b.any()]
+    units = [(np.abs(a) / np.linalg.norm(a), np.abs(b) / np.linalg.norm(b)) for a, b in pairs if b.any()]
     if not units:
         return {}
     a, b = (np.array([u[k] for u in units]) for k in (0, 1))
@@ -414,14 +418,16 @@ def show_comparison(console: Console, c: Comparison) -> None:
         for node, comac in c.comac.items():
             cells = []
             for r in references:
-                values = [v for t in c.tests if (v := t.frac.get((node, r))) is not None]
-                cells.append(f"{min(values):.3f}" if values else "-")
+                known = [v for t in c.tests if (v := t.frac.get((node, r))) is not None]
+                cells.append(f"{min(known):.3f}" if known else "-")
             points.add_row(str(node), "-" if comac is None else f"{comac:.4f}", *cells)
         console.print(points)
 
 
 def _grid(title: str, *columns: str) -> Table:
-    grid = Table(title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, show_edge=False, pad_edge=False, collapse_padding=True)
+    grid = Table(
+        title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, show_edge=False, pad_edge=False, collapse_padding=True
+    )
     for column in columns:
-        grid.add_column(column, justify="left" if column in ("test", "kind") else "right", no_wrap=True)
+        grid.add_column(column, justify="left" if column in ("test", "kind") else "right", no_wrap=column != "test", overflow="fold")
     return grid

@@ -38,6 +38,11 @@ class Signature:
     smallest: float
     direction: Array  # (n,) whitened, projected
 
+    @property
+    def gain(self) -> float:
+        """Fall of chi2 that the effect promises, to first order."""
+        return (self.expected * self.visibility) ** 2
+
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
@@ -70,43 +75,45 @@ class Diagnosis:
         return self.candidates[0] if self.candidates else None
 
 
-def projector(theory: Theory, about: Linear) -> tuple[Array, Array]:
-    """Whitened data derivative by nuisance in prior units, A (n, p), and the Cholesky factor of I + A A^T (n, n).
+def left_over(theory: Theory, found: Fit) -> tuple[Array, Array]:
+    """What a fit leaves of the data, and the Cholesky factor that takes tolerances and fitted parameters out of any whitened vector.
 
-    Solving with the factor marginalises the tolerances out of a whitened residual: its squared length is the chi2 left after they
-    have been fitted with their priors.
+    The squared length of `solve(factor, W v)` is the chi2 of v that is left after everything has been refitted with its priors, to first
+    order about the fit. Returns the whitened, projected residual (n,) and the factor (n, n).
     """
-    a = theory.data.whiten @ (about.by_nuisance * theory.sd)
-    return a, np.linalg.cholesky(np.eye(len(a)) + a @ a.T)
+    widths = np.concatenate([theory.sd, [p.prior_sd for e in found.effects for p in e.parameters]])
+    a = theory.data.whiten @ (found.jacobian * widths)
+    factor = np.linalg.cholesky(np.eye(len(a)) + a @ a.T)
+    prior = np.concatenate([found.nuisance / theory.sd, np.zeros(len(widths) - len(theory.sd))])
+    return np.linalg.solve(factor, theory.data.whiten @ found.residual + a @ prior), factor
 
 
-def screen(theory: Theory, about: Linear, catalogue: Sequence[Effect]) -> list[Signature]:
-    """Finite signature of every effect, projected off the tolerances; the most telling first."""
-    _, factor = projector(theory, about)
-    whiten = theory.data.whiten
+def screen(theory: Theory, found: Fit, catalogue: Sequence[Effect], share: float = 1.0) -> list[Signature]:
+    """Finite signature of every effect beside those of a fit, projected off the tolerances; the most telling first.
 
-    def left(vector: Array) -> Array:
-        return np.linalg.solve(factor, whiten @ vector)
-
-    rest = left(theory.data.value - about.value)
-    found = []
-    nothing = np.zeros(len(theory.sd))
+    `share` of the typical size is tried.
+    """
+    rest, factor = left_over(theory, found)
+    present = [(e, found.values[e.name]) for e in found.effects]
+    here = theory.data.value - found.residual
+    signatures = []
     for effect in catalogue:
-        values = effect.typical()
+        if effect in found.effects:
+            continue
+        main = effect.parameters[0]
+        size = main.neutral + share * (main.typical - main.neutral)
         try:
-            moved = theory.features(nothing, [(effect, values)]) - about.value
+            moved = theory.features(found.nuisance, [*present, (effect, effect.typical() | {main.name: size})]) - here
         except NoEquilibrium:
             continue
-        direction = left(moved)
-        size = float(np.linalg.norm(direction))
-        main = effect.parameters[0]
-        reach = abs(main.typical - main.neutral)
-        if size == 0.0:
-            found.append(Signature(effect, 0.0, 0.0, np.inf, np.inf, direction))
+        direction = np.linalg.solve(factor, theory.data.whiten @ moved) / share
+        visible = float(np.linalg.norm(direction))
+        if visible < 1e-6:
+            signatures.append(Signature(effect, 0.0, 0.0, np.inf, np.inf, direction))
             continue
-        expected = float(direction @ rest) / size**2
-        found.append(Signature(effect, size, expected, 1 / size, reach * float(np.sqrt(2 * CLEAR)) / size, direction))
-    return sorted(found, key=lambda s: -((s.expected * s.visibility) ** 2))
+        smallest = abs(main.typical - main.neutral) * float(np.sqrt(2 * CLEAR)) / visible
+        signatures.append(Signature(effect, visible, float(direction @ rest) / visible**2, 1 / visible, smallest, direction))
+    return sorted(signatures, key=lambda s: -s.gain)
 
 
 def starts(effect: Effect, expected: float) -> list[list[float]]:
@@ -153,10 +160,10 @@ def explain(
     about = linearise(theory)
     base = fit(theory, about)
     progress(f"tolerances fitted: misfit {base.misfit:.0f} for {len(theory.data.value)} numbers")
-    signatures = screen(theory, about, catalogue)
+    signatures = screen(theory, base, catalogue)
     progress(f"{len(signatures)} effects screened")
     quiet = chi_squared.sf(base.misfit, len(theory.data.value)) > 0.01
-    if quiet and all((s.expected * s.visibility) ** 2 < CLEAR for s in signatures):
+    if quiet and all(s.gain < CLEAR for s in signatures):
         promising: list[Task] = [((s.effect,), s.effect.typical_list()) for s in signatures[:3]]
     else:
         tasks = [((s.effect,), start) for s in signatures if s.visibility > 1 for start in starts(s.effect, s.expected)]
@@ -170,7 +177,7 @@ def explain(
         close = [f for f in fits.values() if best.evidence - f.evidence < NEAR]
         fits |= _best([*close, *_all(theory, about, [(*_again(f), f.nuisance) for f in close], True, workers)])
         best = max(fits.values(), key=lambda f: f.evidence)
-        seconds = [e for e, gain in added_gain(theory, best, catalogue)[:PAIRED] if gain > 2 * AHEAD]
+        seconds = [s.effect for s in screen(theory, best, catalogue, 0.1)[:PAIRED] if s.gain > 2 * AHEAD]
         tasks = [(*_again(best, e), None) for e in seconds]
         pairs = _best(_all(theory, about, tasks, True, workers))
         near = [f for f in pairs.values() if abs(best.evidence - f.evidence) < NEAR]
@@ -201,33 +208,6 @@ def _again(found: Fit, more: Effect | None = None) -> Task:
         return found.effects, values
     main = more.parameters[0]
     return (*found.effects, more), [*values, main.neutral + 0.2 * (main.typical - main.neutral), *more.typical_list()[1:]]
-
-
-def added_gain(theory: Theory, found: Fit, catalogue: Sequence[Effect]) -> list[tuple[Effect, float]]:
-    """By how much chi2 would fall if one more effect joined a fit, to first order with everything refitted; largest first."""
-    whiten = theory.data.whiten
-    widths = np.concatenate([theory.sd, [p.prior_sd for e in found.effects for p in e.parameters]])
-    a = whiten @ (found.jacobian * widths)
-    factor = np.linalg.cholesky(np.eye(len(a)) + a @ a.T)
-    present = [(e, found.values[e.name]) for e in found.effects]
-    here = theory.data.value - found.residual
-    prior = np.concatenate([found.nuisance / theory.sd, np.zeros(len(widths) - len(theory.sd))])
-    rest = np.linalg.solve(factor, whiten @ found.residual + a @ prior)
-    gains = []
-    for effect in catalogue:
-        if effect in found.effects:
-            continue
-        main = effect.parameters[0]
-        small = effect.typical() | {main.name: main.neutral + 0.1 * (main.typical - main.neutral)}
-        try:
-            moved = theory.features(found.nuisance, [*present, (effect, small)]) - here
-        except NoEquilibrium:
-            continue
-        direction = np.linalg.solve(factor, whiten @ moved)
-        size = float(direction @ direction)
-        if size > 0:
-            gains.append((effect, float(direction @ rest) ** 2 / size))
-    return sorted(gains, key=lambda g: -g[1])
 
 
 def _best(fits: Sequence[Fit]) -> dict[tuple[str, ...], Fit]:

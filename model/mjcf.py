@@ -79,7 +79,7 @@ def _add_bodies(out: mujoco.MjSpec, chain: RotorBase) -> None:
         small = max(1e-3 * body.mass * 0.01**2, 1e-12)  # an inertia for directions that no joint turns
         inertia = [max(i, small) for i in body.inertia]
         inertia[2] = min(max(inertia[2], abs(inertia[0] - inertia[1])), inertia[0] + inertia[1])
-        share = CARRIER_SHARE if body.turns else 1.0
+        share = max(CARRIER_SHARE, 2e-15 / min(body.mass, *inertia)) if body.turns else 1.0  # MuJoCo refuses anything below 1e-15
         outer = out.worldbody.add_body(
             name=f"{body.name} carrier" if body.turns else body.name,
             pos=[0, 0, body.z],

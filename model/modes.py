@@ -131,7 +131,9 @@ def _kind(linear: Matrices, kinetic: Array) -> str:
 
 def _whirl(chain: RotorBase, shape: ComplexArray) -> str:
     """Sense in which the turning body's axis circulates: tilt_y a quarter period behind tilt_x is forward for +z speed."""
-    turning = next(b for b in chain.bodies if b.turns)
+    turning = next((b for b in chain.bodies if b.turns), None)
+    if turning is None:
+        return "none"
     tilt = motion_rows(chain, turning.name, (0.0, 0.0, turning.z))[3:] @ shape
     circulation = -float(np.imag(np.conj(tilt[0]) * tilt[1])) * np.sign(chain.speed)
     if abs(circulation) < 0.02 * float(np.sum(np.abs(tilt) ** 2)):

@@ -20,6 +20,7 @@ from scipy.signal import resample_poly
 from model.ball_row import Array
 from model.machine import HammerTest
 from model.scene import BadInput
+from sim.effect import Measurement
 from sim.estimate import Estimate, Windows, estimate
 from sim.hammer import Hit, draw_hits, force, pulse_duration
 from sim.operating import OperatingPoint
@@ -74,7 +75,8 @@ def impact_tests(
         models = [p.model if element == "linear" else p.spec(element).compile() for _, p in batch]
         simulated = simulate(models, test, hits, steps)
         for (i, point), (held, velocity) in zip(batch, simulated, strict=True):
-            record = acquire(test, held, velocity, every, np.random.default_rng([seed, i]) if noise else None)
+            random = np.random.default_rng([seed, i]) if noise else None
+            record = acquire(test, held, velocity, every, random, point.measurement)
             results.append(ImpactTest(point, test, element, record, estimate_of(test, point, record)))
             progress(f"{point.condition.temperature:g} C: {held.shape[0] * held.shape[1]} hits simulated")
     return results
@@ -139,8 +141,15 @@ def loaded_state(model: mujoco.MjModel) -> Array:
     return state
 
 
-def acquire(test: HammerTest, held: Array, velocity: Array, every: int, random: np.random.Generator | None) -> Record:
-    """Anti-alias filter, sampling and sensor noise.
+def acquire(
+    test: HammerTest,
+    held: Array,
+    velocity: Array,
+    every: int,
+    random: np.random.Generator | None,
+    measurement: Measurement | None = None,
+) -> Record:
+    """Anti-alias filter, sampling, what the measuring chain does to the channels (gain, delay, a window nobody noted), sensor noise.
 
     Velocity sensors read at the start of a step, the force is held from there to the next: half a step apart, which an exact
     shift in frequency takes out. The same linear-phase filter runs over both channels.
@@ -152,6 +161,12 @@ def acquire(test: HammerTest, held: Array, velocity: Array, every: int, random: 
     samples = round(test.record_length * test.sample_rate)
     sampled_force = resample_poly(applied, 1, every, axis=-1)[..., :samples]
     sampled_velocity = resample_poly(velocity, 1, every, axis=-1)[..., :samples]
+    if measurement is not None:
+        spectrum = np.fft.rfft(sampled_velocity)
+        late = np.exp(-2j * np.pi * np.fft.rfftfreq(samples, 1 / test.sample_rate) * measurement.delay[:, None])
+        sampled_velocity = np.fft.irfft(spectrum * measurement.gain[:, None] * late, samples)
+        window = np.exp(-measurement.decay * np.arange(samples) / test.sample_rate)
+        sampled_force, sampled_velocity = sampled_force * window, sampled_velocity * window
     if random is not None:
         sampled_velocity = _with_noise(test, sampled_velocity, random)
     return Record(np.arange(samples) / test.sample_rate, sampled_force, sampled_velocity)

@@ -1,0 +1,151 @@
+"""`spindle diagnose`: the diagnosis of a campaign, as JSON and for people."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+from diagnosis.explain import Candidate, Diagnosis, explain
+from diagnosis.locate import Change, locate
+from diagnosis.next_test import NextTest, next_tests
+from diagnosis.observe import observe
+from diagnosis.theory import Theory, data_of, theory
+from model.machine import Spindle
+from sim.campaign import Campaign
+from sim.effect import Effect
+from sim.effects import CATALOGUE
+
+RPM = 2 * np.pi / 60
+SHOWN = 12  # candidates
+
+
+def diagnose(
+    spindle: Spindle, campaign: Campaign, catalogue: tuple[Effect, ...] = CATALOGUE, progress: Callable[[str], None] = lambda done: None
+) -> tuple[Diagnosis, Theory, list[Change], list[NextTest]]:
+    """The diagnosis of a campaign, where the model fails without any catalogue, and the tests that would decide."""
+    observations = observe(campaign, spindle, progress)
+    about = theory(spindle, data_of(observations))
+    found = explain(about, catalogue, os.cpu_count() or 1, progress)
+    places = locate(about) if found.verdict != "none" else []
+    alive = [c for c in found.candidates if found.candidates[0].delta_evidence - c.delta_evidence < 20][:4]
+    tests = next_tests(about, alive) if found.verdict in ("ambiguous", "two effects", "unexplained") else []
+    return found, about, places, tests
+
+
+def diagnosis_json(found: Diagnosis, about: Theory, places: list[Change], tests: list[NextTest]) -> dict[str, Any]:
+    n = len(about.data.value)
+    best = found.best
+    accepted = best is not None and found.verdict not in ("none", "unexplained")
+    before = float(np.sqrt(found.base.misfit / n))
+    return {
+        "verdict": found.verdict,
+        "effects": list(found.effects),
+        "reason": found.reason,
+        "candidates": [_candidate(c) for c in found.candidates[:SHOWN]],
+        "invisible": sorted(s.effect.name for s in found.signatures if s.visibility < 1.0),
+        "detectable": {s.effect.name: s.smallest for s in found.signatures if np.isfinite(s.smallest)},
+        "error": {
+            "before": before,
+            "after": float(np.sqrt(best.fit.misfit / n)) if accepted and best else before,
+            "held_out_before": found.held_out_before,
+            "held_out_after": found.held_out_after if accepted else found.held_out_before,
+        },
+        "where": [
+            {
+                "element": c.element,
+                "change": [
+                    {"temperature_C": t, "speed_rpm": s / RPM, "relative": v, "sd": e}
+                    for (t, s), v, e in zip(c.conditions, c.change, c.sd, strict=True)
+                ],
+                "with": c.pattern,
+                "removes": c.removes,
+            }
+            for c in places
+        ],
+        "next_test": [
+            {
+                "condition": {"temperature_C": t.temperature, "speed_rpm": t.speed_rpm},
+                "separates": list(t.separates),
+                "odds": t.odds,
+                "repeats": t.repeats,
+                "predicted_Hz": dict(zip(t.separates, map(list, t.predictions), strict=True)),
+            }
+            for t in tests
+        ],
+        "tolerances": {name: {"value": float(v), "sd": float(s), "prior_sd": float(p)} for name, v, s, p in _tolerances(found, about)},
+    }
+
+
+def _candidate(c: Candidate) -> dict[str, Any]:
+    units = {f"{e.name}.{p.name}": p.unit for e in c.fit.effects for p in e.parameters}
+    return {
+        "effects": list(c.effects),
+        "delta_evidence": c.delta_evidence,
+        "probability": c.probability,
+        "held_out_error_ratio": c.held_out_ratio,
+        "parameters": {
+            f"{e}.{p}": {"value": v, "sd": c.fit.sd[e][p], "unit": units[f"{e}.{p}"]}
+            for e, row in c.fit.values.items()
+            for p, v in row.items()
+        },
+        "believable": c.believable,
+    }
+
+
+def _tolerances(found: Diagnosis, about: Theory):
+    fit = found.best.fit if found.best and found.effects else found.base
+    return zip(about.names, fit.nuisance, fit.nuisance_sd, about.sd, strict=True)
+
+
+def show_diagnosis(console: Console, answer: dict[str, Any], places: list[Change]) -> None:
+    named = f": {', '.join(answer['effects'])}" if answer["effects"] else ""
+    console.print(f"[bold]{answer['verdict']}{named}[/bold]")
+    console.print(answer["reason"])
+    error = answer["error"]
+    console.print(
+        f"rms pull {error['before']:.2f} -> {error['after']:.2f}; on left-out conditions {error['held_out_before']:.2f} -> {error['held_out_after']:.2f}"
+    )
+    console.print("\nBest explanations (ln evidence over the model without effects):")
+    for c in answer["candidates"][:5]:
+        values = ", ".join(f"{k.split('.')[1]} {v['value']:.4g} +- {v['sd']:.2g} {v['unit']}" for k, v in c["parameters"].items())
+        console.print(
+            f"  {' + '.join(c['effects'])}: {c['delta_evidence']:+.1f}, probability {c['probability']:.3f}; {values}", highlight=False
+        )
+    if places:
+        console.print("\nWithout any catalogue:")
+        for change in places[:3]:
+            console.print(f"  {change.words()}; it goes with {change.pattern}", highlight=False)
+    for t in answer["next_test"]:
+        where = f"{t['condition']['temperature_C']:g} C, {t['condition']['speed_rpm']:g} rpm"
+        console.print(f"\nA test at {where} would separate {t['separates'][0]} from {t['separates'][1]} with odds of {t['odds']:.3g} to 1")
+    if answer["verdict"] == "none":
+        small = sorted(answer["detectable"].items())
+        console.print("\nSmallest size these data would have shown: " + ", ".join(f"{k} {v:.2g}" for k, v in small), highlight=False)
+        console.print(f"Not visible in these data at a typical size: {', '.join(answer['invisible']) or 'nothing'}")
+
+
+def diagnose_verb(options: argparse.Namespace) -> tuple[dict[str, Any], Callable[[Console], None]]:
+    """`spindle diagnose SCENE CAMPAIGN`: `options` has target, campaign, out."""
+    import json
+
+    from model.scene import load
+    from sim.campaign import read_campaign
+    from sim.folder import MARK, whole_folder
+
+    spindle, campaign = load(options.target), read_campaign(options.campaign)
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("extracting modes")
+        found, about, places, tests = diagnose(spindle, campaign, progress=lambda done: bar.update(task, description=done))
+    answer = diagnosis_json(found, about, places, tests)
+    if options.out:
+        with whole_folder(options.out) as folder:
+            (folder / "diagnosis.json").write_text(json.dumps(answer, indent=1), encoding="utf-8")
+            (folder / MARK).write_text(json.dumps({"scene": str(options.target), "campaign": str(options.campaign)}), encoding="utf-8")
+    return answer, lambda console: show_diagnosis(console, answer, places)

@@ -1,0 +1,264 @@
+"""Measurement beside model: errors with their signs and sizes, partners through large misfits, missing and extra modes, MAC, FRAC, COMAC."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from diagnosis.compare import BELIEVABLE, compare, comparison_json, likeness, numbered, partners
+from diagnosis.observe import DAMPING_FLOOR, FREQUENCY_FLOOR, Observation, observe
+from diagnosis.theory import Predicted
+from model.machine import Addition, Condition
+from model.scene import BadInput
+from sim.campaign import Campaign, ModeRow, Noise, Test, read_campaign
+from sim.effects import by_name
+from sim.frf import Frf
+from sim.operating import operating_point
+from sim.run import as_campaign, run
+from tests.conftest import SCENE
+
+SHARED = Path(__file__).parents[3] / "shared" / "practice"
+LINES = np.arange(400.0, 3000.0, 2.0)
+NOISE = Noise(0.004, 0.0002)
+
+
+def shared(name):
+    path = SHARED / name
+    if not path.exists():
+        pytest.skip("../shared is not here")
+    return read_campaign(path)
+
+
+def exact(spindle, temperatures, quantity="mobility", seed=0, repeats=1, nodes=None):
+    """A campaign of the model's exact FRFs with noise as `NOISE` states it."""
+    random, tests = np.random.default_rng(seed), []
+    power = ("receptance", "mobility", "accelerance").index(quantity) - 1
+    points = spindle.points if nodes is None else tuple(spindle.point(n) for n in nodes)
+    rows = [spindle.points.index(p) for p in points]
+    for temperature in temperatures:
+        point = operating_point(spindle, Condition(temperature, 0.0))
+        value = point.frf(LINES)[rows] * (2j * np.pi * LINES) ** power
+        sd = np.hypot(NOISE.of_value * np.abs(value), NOISE.of_largest * np.abs(value).max(axis=(0, 2), keepdims=True))
+        for repeat in range(1, repeats + 1):
+            error = sd * (random.standard_normal((2, *value.shape)) / np.sqrt(2))
+            frf = Frf(LINES, value + error[0] + 1j * error[1], tuple(p.node for p in points), spindle.hammer.hammer_nodes, quantity, sd=sd)
+            tests.append(Test(f"T{temperature:g}r{repeat}", temperature, 0.0, repeat=repeat, frf=frf))
+    return Campaign("exact FRFs", spindle.name, quantity, spindle.points, tuple(tests), NOISE)
+
+
+@pytest.fixture(scope="module")
+def clean(spindle):
+    campaign = exact(spindle, (20.0, 60.0))
+    return campaign, observe(campaign, spindle)
+
+
+@pytest.fixture(scope="module")
+def itself(spindle, clean):
+    return compare(spindle, *clean)
+
+
+def test_a_scene_beside_its_own_virtual_tests(spindle):
+    """In MuJoCo's time domain; the floors hold more than the estimator errs, so the pull is below one but not nothing."""
+    short = replace(spindle, hammer=replace(spindle.hammer, record_length=0.1, hits=2))
+    found = compare(short, as_campaign(run(short, [20.0, 60.0]), "virtual tests"))
+    assert 0.1 < found.rms_pull < 1.3
+    for test in found.tests:
+        assert len(test.modes) == 7
+        assert test.missing == test.extra == ()
+
+
+def test_a_scene_beside_its_own_frfs(itself):
+    assert 0.1 < itself.rms_pull < 1.3
+    assert itself.crossings == ()
+    for test in itself.tests:
+        assert [m.number for m in test.modes] == [1, 2, 3, 4, 5, 6, 7]
+        assert min(m.mac for m in test.modes) > 0.999
+        assert min(v for v in test.frac.values() if v is not None) > 0.999
+    assert min(itself.comac.values()) > 0.999
+
+
+def test_standard_errors_are_never_below_the_floor(itself):
+    for mode in (m for t in itself.tests for m in t.modes):
+        assert mode.sd >= FREQUENCY_FLOOR * mode.measured
+        assert mode.damping_sd >= DAMPING_FLOOR * mode.damping_measured
+
+
+def test_symmetry_leaves_silent_channels_without_frac(itself):
+    """The hub's sides do not answer to a blow in the plane across: noise against zero is no likeness."""
+    assert [k for k, v in itself.tests[0].frac.items() if v is None] == [(3, 6), (4, 1)]
+
+
+@pytest.mark.parametrize("quantity", ["receptance", "accelerance"])
+def test_frac_converts_the_quantity(spindle, quantity):
+    found = compare(spindle, exact(spindle, (40.0,), quantity))
+    assert min(v for v in found.tests[0].frac.values() if v is not None) > 0.999
+    assert found.rms_pull < 1.3
+
+
+def test_a_window_left_in_the_frfs_is_no_misfit(spindle):
+    """An exponential window of 60 1/s nearly triples the first mode's decay; both the modes and FRAC must know."""
+    campaign = exact(spindle, (20.0,))
+    point, (test,) = operating_point(spindle, Condition(20.0)), campaign.tests
+    shift = point.frf(LINES - 60j / (2 * np.pi)) - point.frf(LINES)
+    windowed = replace(test, window_decay=60.0, frf=replace(test.frf, value=test.frf.value + shift))
+    found = compare(spindle, replace(campaign, tests=(windowed,)))
+    assert min(v for v in found.tests[0].frac.values() if v is not None) > 0.998  # noise as before, on smaller peaks
+    assert found.rms_pull < 1.5
+    untold = compare(spindle, replace(campaign, tests=(replace(windowed, window_decay=0.0),)))
+    assert min(v for v in untold.tests[0].frac.values() if v is not None) < 0.99
+
+
+@pytest.mark.parametrize("nodes", [(7, 6, 4, 3, 1), (7, 5, 4, 3, 2)], ids=["another order", "hammers apart from responses"])
+def test_points_of_the_campaign(spindle, nodes):
+    found = compare(spindle, exact(spindle, (20.0,), nodes=nodes))
+    assert tuple(found.comac) == nodes
+    assert set(found.tests[0].frac) == {(n, r) for n in nodes for r in (1, 6)}
+    assert min(m.mac for m in found.tests[0].modes) > 0.999
+    assert min(v for v in found.tests[0].frac.values() if v is not None) > 0.999
+
+
+def test_a_changed_scene_pulls(spindle, clean, itself):
+    """5 % of preload moves the bearing modes, whose stiffness goes with its cube root, by some 0.8 %, and the base's by little."""
+    lower = replace(spindle, pair=replace(spindle.pair, preload=0.95 * spindle.pair.preload))
+    found = compare(lower, *clean)
+    assert found.rms_pull > 30 * itself.rms_pull
+    errors = {m.number: 100 * m.error / m.measured for m in found.tests[0].modes}
+    assert errors[6] == pytest.approx(-0.8, abs=0.3)
+    assert abs(errors[1]) < 0.05
+
+
+def test_the_scenes_own_effects_are_in_the_model(spindle, clean):
+    bonded = replace(spindle, effects=(Addition("bond_softening", by_name("bond_softening").typical()),))
+    campaign = exact(bonded, (60.0,))
+    assert compare(bonded, campaign).rms_pull < 1.3
+    assert compare(spindle, campaign).rms_pull > 100
+
+
+def test_a_wrong_channel_shows_in_mac_and_comac(spindle, clean):
+    campaign, _ = clean
+    wrong = []
+    for test in campaign.tests:
+        value = test.frf.value.copy()
+        value[6] *= 0.3  # node 7, the base, read with a wrong sensitivity
+        wrong.append(replace(test, frf=replace(test.frf, value=value, sd=test.frf.sd)))
+    found = compare(spindle, replace(campaign, tests=tuple(wrong)))
+    assert min(m.mac for m in found.tests[0].modes) < 0.995
+    assert found.rms_pull < 1.3  # frequencies and dampings do not care
+    assert min(v for v in found.tests[0].frac.values() if v is not None) > 0.999  # nor does FRAC, blind to a scale
+
+
+def test_repeats_that_scatter_widen_the_standard_errors(spindle):
+    rows = [(f"r{i}", 1002.0 + d) for i, d in enumerate((-3.0, 0.0, 3.0))]
+    tests = tuple(Test(name, 20.0, 0.0, repeat=i, modes=(ModeRow(name, 1, "axial", f, 0.1),)) for i, (name, f) in enumerate(rows, 1))
+    campaign = Campaign("repeats", spindle.name, "mobility", spindle.points, tests)
+    found = [t.modes[0].sd for t in compare(spindle, campaign).tests]
+    assert found == pytest.approx([3.0] * 3, rel=0.01)  # standard deviation of -3, 0, 3
+    alone = compare(spindle, replace(campaign, tests=tests[:1])).tests[0].modes[0].sd
+    assert alone == pytest.approx(np.hypot(0.1, FREQUENCY_FLOOR * 999.0))
+
+
+# ---------------------------------------------------------------- tables, missing and extra modes
+
+
+def table(spindle, temperature, *rows, sd=1.0):
+    modes = tuple(ModeRow("t", i, kind, f, sd, 0.01, 0.001) for i, (kind, f) in enumerate(rows, 1))
+    return Campaign("table", spindle.name, "mobility", spindle.points, (Test("t", temperature, 0.0, modes=modes),))
+
+
+JANG = [("T20", (-21, -7, 57, 33, -58)), ("T60", (-26, -8, 61, 39, -53))]
+
+
+@pytest.mark.parametrize(("test", "errors"), JANG, ids=[t for t, _ in JANG])
+def test_the_papers_measured_table(spindle, test, errors):
+    """Computed - measured of Jang et al. (2003), Table 2, in whole Hz; one standard error is 1 Hz there."""
+    campaign = read_campaign(SCENE / "measured" / "jang_2003")
+    found = {t.test.id: t for t in compare(spindle, campaign).tests}[test]
+    assert [round(m.error) for m in found.modes] == list(errors)
+    assert [m.pull for m in found.modes] == pytest.approx([m.error for m in found.modes], rel=2e-3)
+    assert all(m.damping_pull is None and m.mac is None for m in found.modes)
+    assert found.missing == ()
+    assert len(found.extra) == 2  # the bearing modes, which the paper does not print
+
+
+def test_missing_and_extra_modes(spindle):
+    found = compare(spindle, table(spindle, 20.0, ("axial", 1002.0), ("axial", 1300.0), ("rocking", 1795.0), ("rocking", 1821.0))).tests[0]
+    assert [round(m.computed) for m in found.modes] == [1002, 1795, 1821]
+    assert found.missing == (1300.0,)
+    assert found.extra == pytest.approx([1545.0, 2009.9, 2389.6, 2398.1], abs=0.1)
+
+
+def test_a_missing_mode_counts_as_the_largest_believable_error(spindle):
+    near = compare(spindle, table(spindle, 20.0, ("axial", 1002.07 / 1.079)))
+    lost = compare(spindle, table(spindle, 20.0, ("axial", 1002.07 / 1.2)))
+    assert near.tests[0].missing == ()
+    assert lost.tests[0].missing == (1002.07 / 1.2,)
+    assert lost.tests[0].modes == ()
+    assert lost.rms_pull == pytest.approx(BELIEVABLE * 1002.07 / 1.2, rel=2e-3)  # in standard errors of 1 Hz
+
+
+def test_damping_error_in_standard_errors(spindle):
+    mode = compare(spindle, table(spindle, 20.0, ("axial", 1002.07))).tests[0].modes[0]
+    assert mode.damping_pull == pytest.approx((mode.damping_computed - 0.01) / np.hypot(0.001, DAMPING_FLOOR * 0.01))
+    assert mode.damping_computed == pytest.approx(0.00539, abs=1e-5)
+
+
+def test_partners_cross_where_shapes_do(spindle):
+    """The axial mode keeps its partner while rocking modes 10 % off pass it."""
+    shape = np.array([[1, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], complex)
+    test = Test("t", 20.0, 0.0)
+    o = Observation(test, Condition(20.0), np.array([1840.0, 1855.0, 2000.0]), np.full(3, 0.01), np.eye(6), shape[[1, 2, 0]], shape.real, None)
+    p = Predicted(np.array([1998.0, 2050.0, 2060.0]), np.full(3, 0.01), shape, ("axial", "rocking", "rocking"))
+    assert partners(o, p).tolist() == [-1, -1, 0]
+    nearer = replace(p, frequency=np.array([1998.0, 1900.0, 1890.0]))
+    assert partners(o, nearer).tolist() == [2, 1, 0]  # in order of frequency: shapes of a close pair turn in their plane
+
+
+def test_numbers_follow_shapes_through_a_crossing():
+    shape = np.eye(2, dtype=complex)
+    kinds = (("axial", "rocking"), ("rocking", "axial"))
+    empty = np.zeros(0)
+    observed = [Observation(Test("t", t, 0.0), Condition(t), empty, empty, np.zeros((0, 0)), None, None, ()) for t in (20.0, 30.0)]
+    predicted = [Predicted(np.array([990.0, 1000.0 + 5 * k]), np.full(2, 0.01), shape[[k, 1 - k]], kinds[k]) for k in (0, 1)]
+    assert numbered(observed, predicted) == [{0: 1, 1: 2}, {0: 2, 1: 1}]
+
+
+def test_unknown_bodies_are_refused(spindle):
+    campaign = table(spindle, 20.0, ("axial", 1002.0))
+    point = replace(spindle.points[0], body="lid")
+    with pytest.raises(BadInput, match=r"points\.1\.body = 'lid'.*allowed are"):
+        compare(spindle, replace(campaign, points=(point,)))
+
+
+def test_likeness():
+    a = np.array([1.0, 2j, 0.5])
+    assert likeness(a, (3 - 4j) * a) == pytest.approx(1.0)
+    assert likeness(np.array([1.0, 0j]), np.array([0j, 1.0])) == 0.0
+    assert likeness(a, 0 * a) is None
+
+
+# ---------------------------------------------------------------- practice campaigns
+
+
+def test_practice_b_is_within_tolerances(spindle):
+    campaign = shared("practice_b")
+    found = compare(spindle, replace(campaign, tests=tuple(t for t in campaign.tests if t.id in ("T20_n0", "T60_n0", "T60_n7200"))))
+    for test in found.tests:
+        assert test.missing == test.extra == ()
+        assert max(abs(m.error / m.measured) for m in test.modes) < 0.02
+        assert min(m.mac for m in test.modes) > 0.97
+    answer = comparison_json(found)
+    assert answer["rms_pull"] > 10  # tolerances are not in the standard errors
+    assert set(answer["tests"][0]) == {"id", "temperature_C", "speed_rpm", "modes", "missing_Hz", "extra_Hz", "frac"}
+
+
+def test_practice_a_falls_at_the_transition(spindle):
+    campaign = shared("practice_a")
+    chosen = tuple(t for t in campaign.tests if t.id in ("T20_n0", "T60_n0"))
+    cold, hot = compare(spindle, replace(campaign, tests=chosen)).tests
+    assert cold.missing == ()
+    assert len(hot.missing) == 4  # rocking modes more than 8 % below the computed ones
+    assert [m.kind for m in hot.modes] == ["axial"] * 3
+    assert min(m.mac for m in hot.modes) > 0.999

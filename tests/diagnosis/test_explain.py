@@ -1,0 +1,136 @@
+"""The diagnosis on campaigns with a known answer: mode tables drawn from the model with random tolerances, noise and a hidden effect."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from diagnosis.explain import explain
+from diagnosis.fit import fit, linearise
+from diagnosis.locate import elements, locate
+from diagnosis.observe import DAMPING_FLOOR, FREQUENCY_FLOOR, Observation, observe
+from diagnosis.theory import Theory, data_of, predict, theory
+from diagnosis.verdict import diagnosis_json
+from model.machine import Condition
+from model.tolerance import toleranced
+from sim.campaign import Test, read_campaign
+from sim.effects import CATALOGUE, by_name
+from tests.conftest import ROOT
+
+PRACTICE = ROOT.parent / "shared" / "practice"
+CONDITIONS = [(20.0, 0.0), (40.0, 0.0), (60.0, 0.0), (40.0, 754.0)]
+
+
+def hidden(spindle, effects, seed: int) -> list[Observation]:
+    """Observations of a spindle drawn from its tolerances, with effects that the diagnosis is not told of."""
+    random = np.random.default_rng(seed)
+    built = spindle
+    for parameter in toleranced(spindle):
+        built = parameter.apply(built, parameter.sd * random.standard_normal())
+    nodes = len(spindle.points)
+    gain = 1 + spindle.tolerances.gain * random.standard_normal(nodes)
+    observations = []
+    for temperature, speed in CONDITIONS:
+        test = Test(f"T{temperature:g}_n{speed:.0f}", temperature, speed)
+        blank = Observation(test, Condition(temperature, speed), np.ones(1), np.ones(1), np.eye(2), None, None, None)
+        p = predict(built, blank, effects, spindle.tolerances.temperature * random.standard_normal())
+        inside = (p.frequency > 400) & (p.frequency < 3000)
+        f, z, shape = p.frequency[inside], p.damping[inside], p.shape[inside] * gain
+        sd = np.concatenate([np.full(len(f), 2e-5), np.full(len(f), 1e-3)])
+        noise = sd * random.standard_normal(2 * len(f))
+        floor = np.concatenate([np.full(len(f), FREQUENCY_FLOOR), np.full(len(f), DAMPING_FLOOR)])
+        shape = shape / shape[np.arange(len(f)), np.argmax(np.abs(shape), axis=1)][:, None]
+        grain = 1e-3 * (random.standard_normal(shape.shape) + 1j * random.standard_normal(shape.shape))
+        observations.append(
+            replace(
+                blank,
+                frequency=f * np.exp(noise[: len(f)]),
+                damping=z * np.exp(noise[len(f) :]),
+                covariance=np.diag(sd**2 + floor**2),
+                shape=shape + grain,
+                shape_sd=np.full(shape.shape, 1.4e-3),
+            )
+        )
+    return observations
+
+
+def theory_of(spindle, observations) -> Theory:
+    return theory(spindle, data_of(observations))
+
+
+RIVALS = tuple(by_name(n) for n in ("soak_lag", "preload_loss", "plate_prestress", "flange_fit_loosening", "grease_damping"))
+HIDDEN = [("soak_lag", {"hub_share": 0.2}), ("plate_prestress", {"stiffening": -0.03}), ("grease_damping", {"viscous_share": 0.5})]
+
+
+@pytest.mark.parametrize(("name", "values"), HIDDEN, ids=[h[0] for h in HIDDEN])
+def test_a_hidden_effect_is_named(spindle, name, values):
+    """Named, its size found within five standard errors or 10 %, and the error on left-out conditions falls threefold."""
+    effect = by_name(name)
+    found = explain(theory_of(spindle, hidden(spindle, [(effect, effect.typical() | values)], 1)), RIVALS, workers=1)
+    assert found.verdict == "identified"
+    assert found.effects == (name,)
+    size, true = effect.parameters[0].name, next(iter(values.values()))
+    sd = found.best.fit.sd[name][size]
+    assert found.best.fit.values[name][size] == pytest.approx(true, abs=max(5 * sd, 0.1 * abs(true)))
+    assert found.held_out_after < found.held_out_before / 3
+
+
+@pytest.mark.parametrize("seed", [2, 3, 4])
+def test_nothing_is_named_where_nothing_is_hidden(spindle, seed):
+    about = theory_of(spindle, hidden(spindle, [], seed))
+    found = explain(about, RIVALS, workers=1)
+    assert found.verdict == "none"
+    assert found.effects == ()
+    answer = diagnosis_json(found, about, [], [])
+    assert set(answer["detectable"]) <= {e.name for e in RIVALS}
+    assert answer["error"]["before"] < 1.5
+
+
+def test_an_effect_outside_the_catalogue_is_not_called_by_another_name(spindle):
+    """The plate's tilt stiffness about one axis falls 20 % at rest only: nothing listed does that."""
+    outside = next(e for e in elements(spindle) if e.name == "plate tilt x stiffness")
+
+    def at_rest_only(s, condition, values):
+        return outside.spindle(s, condition, values) if condition.speed == 0 else s
+
+    strange = replace(outside, spindle=at_rest_only)
+    about = theory_of(spindle, hidden(spindle, [(strange, {"change": -0.2})], 5))
+    found = explain(about, RIVALS, workers=1)
+    assert found.verdict == "unexplained"
+    assert found.effects == ()
+
+
+def test_free_form_finds_the_place(spindle):
+    """Both bearings' stiffness falls with temperature: the first elements named are bearings, and they must fall more when hot."""
+    loss = by_name("preload_loss")
+    about = theory_of(spindle, hidden(spindle, [(loss, {"loss": 0.25, "thermal_share": 1.0})], 6))
+    first = locate(about)[0]
+    assert "bearing radial" in first.element or "hub inertia" in first.element
+    where = {c: v for c, v in zip(first.conditions, first.change, strict=True)}
+    assert abs(where[60.0, 0.0]) > abs(where[20.0, 0.0]) + 0.05
+
+
+def test_tolerances_are_found_and_not_taken_for_physics(spindle):
+    """A preload 2.5 sd low is absorbed by the tolerance on preload."""
+    preload = next(p for p in toleranced(spindle) if p.name == "preload")
+    about = theory_of(spindle, hidden(preload.apply(spindle, -0.075), [], 7))
+    about = replace(about, spindle=spindle)
+    found = fit(about, linearise(about))
+    index = about.names.index("preload")
+    assert found.nuisance[index] < -0.03
+    assert found.misfit < 1.5 * len(about.data.value)
+
+
+PRACTISED = [("practice_a", "identified", "bond_softening"), ("practice_b", "none", None), ("practice_c", "identified", "soak_lag")]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("campaign", "verdict", "effect"), PRACTISED, ids=[p[0] for p in PRACTISED])
+def test_practice_campaigns(spindle, campaign, verdict, effect):
+    """Campaigns of a separate program, with its own finite elements, bearings and matrices; skipped where they are absent."""
+    if not PRACTICE.is_dir():
+        pytest.skip("no practice campaigns beside the project")
+    observations = observe(read_campaign(PRACTICE / campaign), spindle)
+    found = explain(theory_of(spindle, observations), CATALOGUE)
+    assert found.verdict == verdict
+    assert found.effects == (() if effect is None else (effect,))
