@@ -20,7 +20,7 @@ from rich.table import Table
 from scipy.optimize import linear_sum_assignment
 
 from diagnosis.observe import Observation, observe
-from diagnosis.theory import ALONE, FAR, Predicted, predict
+from diagnosis.theory import ALONE, FAR, UNLIKE, Predicted, pair, predict
 from model.ball_row import Array
 from model.machine import Spindle
 from model.modes import ComplexArray
@@ -33,7 +33,6 @@ from sim.operating import operating_point
 RPM = 2 * np.pi / 60
 BELIEVABLE = 0.08  # relative frequency error up to which two modes are taken for the same
 POWER = dict(zip(TO_POWER, (-1, 0, 1), strict=True))  # of i omega, from mobility to the other quantities
-UNLIKE = 3.0  # what another kind costs in pairing, in units of a fully different shape
 SILENT = 1e-6  # of the largest FRF of the test; smaller computed ones are forbidden by symmetry and have no shape to compare
 
 
@@ -156,24 +155,8 @@ def _as_measured(spindle: Spindle, campaign: Campaign, o: Observation) -> Predic
 
 
 def partners(o: Observation, p: Predicted) -> Array:
-    """Index of the computed partner of every measured mode, -1 where none is within `BELIEVABLE`.
-
-    The assignment costs unlikeness of shape (of kind, without shapes) and distance in ln frequency over `FAR`. Distance counts by its
-    size, not its square as in `theory.pair`, which is for fits that are nearly right: where some modes are far off, squares would
-    rather move all of them by one place. Rocking modes closer than `ALONE` turn in their plane and keep their order.
-    """
-    distance = np.abs(np.log(o.frequency[:, None] / p.frequency)) / FAR
-    if o.shape is None:
-        unlike = UNLIKE * (np.array(o.kind)[:, None] != np.array(p.kind))
-    else:
-        unlike = 1 - np.abs(_unit(o.shape).conj() @ _unit(p.shape).T) ** 2
-    partner = np.full(len(o.frequency), -1)
-    rows, columns = linear_sum_assignment(distance + unlike)
-    partner[rows] = columns
-    radial = [i for i, j in enumerate(partner) if j >= 0 and p.kind[j] != "axial"]
-    logs = np.log(o.frequency[radial])
-    for group in np.split(np.array(radial, int), np.flatnonzero(np.diff(logs) > ALONE) + 1):
-        partner[group] = partner[group][np.argsort(p.frequency[partner[group]])]
+    """Index of the computed partner of every measured mode, -1 where none is within `BELIEVABLE`."""
+    partner = pair(o, p)
     far = np.abs(p.frequency[partner] / o.frequency - 1) > BELIEVABLE
     return np.where(far | (partner < 0), -1, partner)
 

@@ -38,7 +38,7 @@ class Fit:
     """A model fitted to the data.
 
     `values[effect][parameter]` and `sd` likewise; `evidence` is the log of the Laplace approximation; `misfit` the chi2 of the data alone,
-    `chi2` with priors; `pull` (n,) residuals over their standard errors; `jacobian` (n, p + q) about the optimum.
+    `chi2` with priors; `pull` (n,) computed less measured over the standard errors; `jacobian` (n, p + q) about the optimum.
     """
 
     effects: tuple[Effect, ...]
@@ -178,7 +178,7 @@ def fit(
         x,
         sd[: len(x)],
         residual,
-        residual / data.sd,
+        -residual / data.sd,
         float(np.sum((data.whiten @ residual) ** 2)),
         current,
         -0.5 * current - 0.5 * float(np.linalg.slogdet(normal)[1]),

@@ -25,6 +25,7 @@ from sim.operating import operating_point
 ALONE = 0.03  # relative distance to the next mode from which a shape is used
 SMALL = 0.05  # of the largest channel; smaller shape components are left out
 FAR = 0.08  # ln frequency that costs as much as a fully different shape in pairing
+UNLIKE = 3.0  # cost of a different kind, where only kinds are known
 
 Applied = Sequence[tuple[Effect, Values]]
 
@@ -119,30 +120,28 @@ def predict(spindle: Spindle, observation: Observation, effects: Applied, warmer
 
 
 def pair(o: Observation, p: Predicted) -> Array:
-    """Index into the predicted modes of the partner of every observed one, by shape (or kind) and frequency."""
-    distance = np.log(o.frequency[:, None] / p.frequency[None, :]) / FAR
+    """Index into the predicted modes of the partner of every observed one; -1 where there are too few.
+
+    The assignment costs unlikeness of shape (of kind, without shapes) and distance in ln frequency over `FAR`, by its size: where some
+    modes are far off, squares would rather move all of them by one place. Modes closer than `ALONE` that are not axial turn in their
+    plane and keep their order.
+    """
+    distance = np.abs(np.log(o.frequency[:, None] / p.frequency[None, :])) / FAR
     if o.shape is not None:
-        a = o.shape / np.linalg.norm(o.shape, axis=1, keepdims=True)
-        b = p.shape / np.maximum(np.linalg.norm(p.shape, axis=1, keepdims=True), 1e-300)
-        unlike = 1 - np.abs(a.conj() @ b.T) ** 2
+        unlike = 1 - np.abs(_unit(o.shape).conj() @ _unit(p.shape).T) ** 2
     else:
-        unlike = 3.0 * (np.array(o.kind)[:, None] != np.array(p.kind)[None, :])
-    rows, columns = linear_sum_assignment(distance**2 + unlike)
+        unlike = UNLIKE * (np.array(o.kind)[:, None] != np.array(p.kind)[None, :])
     partner = np.full(len(o.frequency), -1)
+    rows, columns = linear_sum_assignment(distance + unlike)
     partner[rows] = columns
-    return _in_order(o, p, partner)
-
-
-def _in_order(o: Observation, p: Predicted, partner: Array) -> Array:
-    """Partners of observed modes closer than ALONE in order of frequency: their shapes decide nothing."""
-    start = 0
-    logs = np.log(o.frequency)
-    for i in range(1, len(logs) + 1):
-        if i == len(logs) or logs[i] - logs[i - 1] > ALONE:
-            group = partner[start:i]
-            partner[start:i] = group[np.argsort(p.frequency[group])]
-            start = i
+    radial = [i for i, j in enumerate(partner) if j >= 0 and p.kind[j] != "axial"]
+    for group in np.split(np.array(radial, int), np.flatnonzero(np.diff(np.log(o.frequency[radial])) > ALONE) + 1):
+        partner[group] = partner[group][np.argsort(p.frequency[partner[group]])]
     return partner
+
+
+def _unit(shape: ComplexArray) -> ComplexArray:
+    return shape / np.maximum(np.linalg.norm(shape, axis=1, keepdims=True), 1e-300)
 
 
 def features_of(data: Data, predicted: Mapping[int, Predicted]) -> Array:
