@@ -106,7 +106,7 @@ def screen(theory: Theory, found: Fit, catalogue: Sequence[Effect], share: float
             moved = theory.features(found.nuisance, [*present, (effect, effect.typical() | {main.name: size})]) - here
         except NoEquilibrium:
             continue
-        direction = np.linalg.solve(factor, theory.data.whiten @ moved) / share
+        direction: Array = np.asarray(np.linalg.solve(factor, theory.data.whiten @ moved) / share, float)
         visible = float(np.linalg.norm(direction))
         if visible < 1e-6:
             signatures.append(Signature(effect, 0.0, 0.0, np.inf, np.inf, direction))
@@ -166,7 +166,7 @@ def explain(
     if quiet and all(s.gain < CLEAR for s in signatures):
         promising: list[Task] = [((s.effect,), s.effect.typical_list()) for s in signatures[:3]]
     else:
-        tasks = [((s.effect,), start) for s in signatures if s.visibility > 1 for start in starts(s.effect, s.expected)]
+        tasks: list[Task] = [((s.effect,), start) for s in signatures if s.visibility > 1 for start in starts(s.effect, s.expected)]
         rough = _best(_all(theory, about, [(*task, None) for task in tasks], False, workers))
         promising = [_again(f) for f in sorted(rough.values(), key=lambda f: -f.evidence)[:SINGLES]]
         progress(f"{len(tasks)} rough fits made")
@@ -178,11 +178,10 @@ def explain(
         fits |= _best([*close, *_all(theory, about, [(*_again(f), f.nuisance) for f in close], True, workers)])
         best = max(fits.values(), key=lambda f: f.evidence)
         seconds = [s.effect for s in screen(theory, best, catalogue, 0.1)[:PAIRED] if s.gain > 2 * AHEAD]
-        tasks = [(*_again(best, e), None) for e in seconds]
-        pairs = _best(_all(theory, about, tasks, True, workers))
+        pairs = _best(_all(theory, about, [(*_again(best, e), None) for e in seconds], True, workers))
         near = [f for f in pairs.values() if abs(best.evidence - f.evidence) < NEAR]
         fits |= pairs | _best([*near, *_all(theory, about, [(*_again(f), f.nuisance) for f in near], True, workers)])
-        progress(f"{len(tasks)} pairs fitted")
+        progress(f"{len(pairs)} pairs fitted")
     return _verdict(theory, base, list(fits.values()), signatures)
 
 

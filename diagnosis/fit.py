@@ -166,10 +166,10 @@ def fit(
     numbers = iter(range(len(x), len(x) + len(rows)))
     index = {e.name: {p.name: next(numbers) for p in e.parameters} for e in effects}
     everything = np.concatenate([x, theta])
-    sizes = [e.parameters[0] for e in effects]
+    main = [e.parameters[0] for e in effects]
     size_values = [everything[index[e.name][e.parameters[0].name]] for e in effects]
     at_limit = any(
-        v <= p.limits[0] + 1e-6 * p.prior_sd or v >= p.limits[1] - 1e-6 * p.prior_sd for v, p in zip(size_values, sizes, strict=True)
+        v <= p.limits[0] + 1e-6 * p.prior_sd or v >= p.limits[1] - 1e-6 * p.prior_sd for v, p in zip(size_values, main, strict=True)
     )
     return Fit(
         tuple(effects),

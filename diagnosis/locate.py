@@ -119,7 +119,9 @@ def locate(theory: Theory, most: int = 5) -> list[Change]:
         sd = np.sqrt(np.diag(np.linalg.inv(normal)))
         removes = 1 - (float(left @ left) + float(change @ change) / FREE**2) / total
         changes.append(
-            Change(element.name, conditions, tuple(map(float, change)), tuple(map(float, sd)), float(removes), _pattern(conditions, change, sd))
+            Change(
+                element.name, conditions, tuple(map(float, change)), tuple(map(float, sd)), float(removes), _pattern(conditions, change, sd)
+            )
         )
     return sorted(changes, key=lambda c: -c.removes)[:most]
 

@@ -115,7 +115,7 @@ def predict(spindle: Spindle, observation: Observation, effects: Applied, warmer
     chain = point.measurement
     pole = np.array([m.pole for m in found]) - chain.decay
     seen = chain.gain * np.exp(-1j * np.abs(pole[:, None]) * chain.delay)
-    shape = np.array([m.shape for m in found]) @ chain.response_rows.T * seen
+    shape = np.asarray(np.array([m.shape for m in found]) @ chain.response_rows.T * seen, complex)
     return Predicted(np.abs(pole) / (2 * np.pi), -pole.real / np.abs(pole), shape, tuple(m.kind for m in found))
 
 
