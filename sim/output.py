@@ -257,7 +257,7 @@ def show_run(console: Console, run: Run, out: Path) -> None:
         seen = []
         for m, step in zip(found, run.steps, strict=True):
             k = next((k for k, v in match(step).items() if v is m), None)
-            seen.append("-" if k is None else f"{step.identified.frequency[k]:.2f} +- {step.identified.frequency_sd[k]:.2f}")
+            seen.append("-" if k is None else f"{step.identified.frequency[k]:.2f} +- {step.identified.frequency_sd[k]:.3f}")
         peaks.add_row(str(number), *seen)
     console.print(own)
     console.print()

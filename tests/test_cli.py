@@ -274,7 +274,10 @@ NOT_ADDED = [
     (["bond_softening", "--set", "transition=nan"], "nan"),
     (["bond_softening", "--from", "nowhere.json"], "nowhere.json: cannot be read"),
     (["bond_softening", "--from", str(SCENE / "spindle.toml")], "is not an answer of spindle diagnose"),
-    (["ring_growth", "--from", "DIAGNOSIS"], "no candidate has effect ring_growth; its candidates are soak_lag, preload_loss, bond_softening"),
+    (
+        ["ring_growth", "--from", "DIAGNOSIS"],
+        "no candidate has effect ring_growth; its candidates are soak_lag, preload_loss, bond_softening",
+    ),
 ]
 
 

@@ -209,7 +209,9 @@ def test_partners_cross_where_shapes_do(spindle):
     """The axial mode keeps its partner while rocking modes 10 % off pass it."""
     shape = np.array([[1, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], complex)
     test = Test("t", 20.0, 0.0)
-    o = Observation(test, Condition(20.0), np.array([1840.0, 1855.0, 2000.0]), np.full(3, 0.01), np.eye(6), shape[[1, 2, 0]], shape.real, None)
+    o = Observation(
+        test, Condition(20.0), np.array([1840.0, 1855.0, 2000.0]), np.full(3, 0.01), np.eye(6), shape[[1, 2, 0]], shape.real, None
+    )
     p = Predicted(np.array([1998.0, 2050.0, 2060.0]), np.full(3, 0.01), shape, ("axial", "rocking", "rocking"))
     assert partners(o, p).tolist() == [-1, -1, 0]
     nearer = replace(p, frequency=np.array([1998.0, 1900.0, 1890.0]))

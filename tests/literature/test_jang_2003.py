@@ -77,7 +77,10 @@ TRENDS = [
     ("fig-10c-larger-in-the-lower", lambda u, lo: np.all(lo["ball_stiffness_N_per_m"][1:] > u["ball_stiffness_N_per_m"][1:])),
     ("fig-11-preload-falls-almost-to-half", lambda u, lo: rising(-u["preload_N"]) and 0.45 < u["preload_N"][-1] / 16 < 0.55),
     ("fig-11-preload-is-that-of-both", lambda u, lo: np.allclose(u["preload_N"], lo["preload_N"], rtol=1e-9)),
-    ("fig-12-radial-falls-faster", lambda u, lo: all(rising(b["axial_stiffness_N_per_m"] / b["radial_stiffness_N_per_m"]) for b in (u, lo))),
+    (
+        "fig-12-radial-falls-faster",
+        lambda u, lo: all(rising(b["axial_stiffness_N_per_m"] / b["radial_stiffness_N_per_m"]) for b in (u, lo)),
+    ),
     ("fig-12-both-fall", lambda u, lo: all(rising(-b[f"{d}_stiffness_N_per_m"]) for b in (u, lo) for d in ("radial", "axial"))),
 ]
 

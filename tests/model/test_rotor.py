@@ -37,7 +37,9 @@ def by_mujoco(chain: RotorBase):
 
 
 @pytest.mark.parametrize("path", [matrices, by_mujoco], ids=["matrices", "mujoco"])
-@pytest.mark.parametrize(("make", "rpm", "expected"), [(tilting_rotor, *c) for c in TILTING] + [(rotor_on_bearings, *c) for c in TWO_BEARINGS])
+@pytest.mark.parametrize(
+    ("make", "rpm", "expected"), [(tilting_rotor, *c) for c in TILTING] + [(rotor_on_bearings, *c) for c in TWO_BEARINGS]
+)
 def test_gyroscopic_closed_forms(path, make, rpm, expected):
     """Natural frequencies of verification.md, 1e-5: the printed digits."""
     chain = make(rpm * RPM)

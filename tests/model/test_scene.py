@@ -52,7 +52,12 @@ REFUSED = [
     ("tandem", lambda r: r["bearing_pair"].update(arrangement="tandem"), "bearing_pair", "preload_kind must be spring"),
     ("joint-end", lambda r: named(r["structure"]["joints"], "mount").update(between=["ground", "bas"]), "'bas' is no body", "allowed are"),
     ("body-twice", lambda r: named(r["structure"]["bodies"], "seat").update(name="base"), "'base' is taken", "must differ"),
-    ("no-inertia", lambda r: named(r["structure"]["bodies"], "seat").pop("tilt_inertia_kg_m2"), "structure.bodies.seat", "needs tilt_inertia"),
+    (
+        "no-inertia",
+        lambda r: named(r["structure"]["bodies"], "seat").pop("tilt_inertia_kg_m2"),
+        "structure.bodies.seat",
+        "needs tilt_inertia",
+    ),
     ("two-turn", lambda r: named(r["structure"]["bodies"], "shaft").update(turns=True), "structure.bodies", "exactly the body 'hub'"),
     ("direction", lambda r: r["measuring"]["points"][0].update(direction="up"), "measuring.points.1.direction = 'up'", "+X -X"),
     ("long-name", lambda r: r["measuring"]["points"][0].update(name="a name too long"), "measuring.points.1.name", "at most 10"),

@@ -200,9 +200,7 @@ def test_transforms_of_one_cycle_repeat_over_the_band(run: Run, logged: dict[str
     place = column(logged, "/model/mode_1/hub", "Transform3D:translation")[:, 0]
     frequency = column(logged, "/model/mode_1/hub", "frequency")
     assert (frequency[0], frequency[-1], len(place)) == (400, 2998, 867)
-    np.testing.assert_allclose(
-        place[: log_drawing.CYCLE], place[log_drawing.CYCLE : 2 * log_drawing.CYCLE], atol=1e-5
-    )  # float32, mm
+    np.testing.assert_allclose(place[: log_drawing.CYCLE], place[log_drawing.CYCLE : 2 * log_drawing.CYCLE], atol=1e-5)  # float32, mm
     assert np.ptp(place[: log_drawing.CYCLE, 2]) > 1.0
 
 
