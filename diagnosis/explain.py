@@ -15,7 +15,7 @@ from model.ball_row import Array
 from model.pair import NoEquilibrium
 from sim.effect import Effect
 
-SINGLES, PAIRED = 5, 3  # effects refitted after the rough fits, and effects tried beside the best
+SINGLES, PAIRED = 4, 3  # effects refitted after the rough fits, and effects tried beside the best
 NEAR = 60.0  # ln evidence within which a fit is polished
 CLEAR = 12.0  # ln evidence by which an explanation must lead the model without it: calibrated on campaigns with none
 AHEAD = 5.0  # ln evidence by which it must lead every rival to be identified

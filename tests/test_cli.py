@@ -71,6 +71,14 @@ def test_simulate_writes_a_campaign_that_reads(capsys, short_scene, tmp_path):
     assert campaign.tests[1].frf.sd is not None
 
 
+def test_the_campaign_that_ships_is_of_this_scene(capsys):
+    """scenes/hdd_2003/virtual: the model's own tests, so that compare finds nothing but noise."""
+    found = answer(capsys, "compare", SCENE, SCENE / "virtual" / "soak_20_60", "--json")
+    assert [t["temperature_C"] for t in found["tests"]] == [20, 60]
+    assert all(len(t["modes"]) == 7 and not t["missing_Hz"] for t in found["tests"])
+    assert found["rms_pull"] < 1.5
+
+
 def test_run_and_inspect(capsys, short_scene, tmp_path):
     out = tmp_path / "run"
     found = answer(capsys, "run", short_scene, "--temperatures", 20, 60, "--out", out, "--json")
