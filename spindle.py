@@ -8,7 +8,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: more threa
 
 import argparse
 import json
-import shutil
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -17,19 +16,16 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-from rich.table import Table
 
+from diagnosis.catalogue import show_effect, show_effects, summary
 from model.ball_row import NoEquilibrium
 from model.machine import Condition, HammerTest, OutsideRange, Spindle
 from model.mjcf import ELEMENTS
-from model.scene import BadInput, load, scene_path
+from model.scene import BadInput, load
 from sim import output
-from sim.campaign_file import toml
-from sim.effect import Effect
-from sim.effects import CATALOGUE, by_name, checked
+from sim.effects import CATALOGUE, by_name
 from sim.folder import MARK, whole_folder
 
 RPM = 2 * np.pi / 60
@@ -155,8 +151,18 @@ def _parser() -> argparse.ArgumentParser:
     effects.add_argument("name", metavar="NAME", nargs="?")
     add = verb("add", _add, "a new scene with one more effect")
     add.add_argument("effect", metavar="EFFECT")
-    add.add_argument("--set", type=_setting, nargs="+", action="extend", default=[], metavar="NAME=VALUE", help="parameter values (typical ones by default)")
-    add.add_argument("--from", dest="diagnosis", type=Path, metavar="DIAGNOSIS.json", help="take fitted values from the answer of diagnose --json")
+    add.add_argument(
+        "--set",
+        type=_setting,
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="NAME=VALUE",
+        help="parameter values (typical ones by default)",
+    )
+    add.add_argument(
+        "--from", dest="diagnosis", type=Path, metavar="DIAGNOSIS.json", help="take fitted values from the answer of diagnose --json"
+    )
     verb("inspect", _inspect, "what a Rerun log of spindle holds, and its FRFs as numbers", "FILE.rrd")
     return parser
 
@@ -296,9 +302,9 @@ def _diagnose(options: argparse.Namespace) -> Answer:
 
 def _effects(options: argparse.Namespace) -> Answer:
     if options.name is None:
-        answer: dict[str, Any] = {"effects": [_summary(e) for e in CATALOGUE]}
+        answer: dict[str, Any] = {"effects": [summary(e) for e in CATALOGUE]}
         _write_answer(options, answer, "effects.json")
-        return answer, lambda console: _show_effects(console)
+        return answer, lambda console: show_effects(console)
     effect = by_name(options.name)
     keys = ("name", "title", "equation", "sees", "valid")
     answer = {k: getattr(effect, k) for k in keys} | {
@@ -306,110 +312,20 @@ def _effects(options: argparse.Namespace) -> Answer:
         "parameters": [asdict(p) for p in effect.parameters],
     }
     _write_answer(options, answer, "effect.json")
-    return answer, lambda console: _show_effect(console, effect)
-
-
-def _summary(effect: Effect) -> dict[str, Any]:
-    main = effect.parameters[0]
-    told = {"parameter": main.name, "unit": main.unit, "neutral": main.neutral, "typical": main.typical}
-    return {"name": effect.name, "title": effect.title} | told
-
-
-def _show_effects(console: Console) -> None:
-    grid = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
-    for column in ("effect", "what it is", "main parameter", "typical", "unit"):
-        grid.add_column(column, justify="right" if column == "typical" else "left")
-    for e in map(_summary, CATALOGUE):
-        grid.add_row(e["name"], e["title"], e["parameter"], f"{e['typical']:g}", e["unit"])
-    console.print(grid)
-    console.print("spindle effects NAME explains one; spindle add SCENE NAME --out NEW_SCENE adds it.", highlight=False)
-
-
-def _show_effect(console: Console, effect: Effect) -> None:
-    def tell(what: str, text: str) -> None:
-        console.print(f"\n{what}:", style="bold")
-        console.print(text, markup=False, highlight=False)
-
-    console.print(f"{effect.name}: {effect.title}", style="bold", highlight=False)
-    tell("Equation", effect.equation)
-    console.print("\nParameters:", style="bold")
-    grid = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
-    for column in ("name", "unit", "neutral", "typical", "prior s.d.", "limits"):
-        grid.add_column(column, justify="left" if column in ("name", "unit") else "right")
-    for p in effect.parameters:
-        grid.add_row(p.name, p.unit, f"{p.neutral:g}", f"{p.typical:g}", f"{p.prior_sd:g}", f"{p.limits[0]:g} to {p.limits[1]:g}")
-    console.print(grid)
-    for p in effect.parameters:
-        console.print(f"{p.name}: {p.meaning}. Source: {p.source}.", markup=False, highlight=False)
-    tell("What one sees", effect.sees)
-    tell("What it resembles", ", ".join(effect.resembles))
-    tell("Where it is valid", effect.valid)
+    return answer, lambda console: show_effect(console, effect)
 
 
 def _add(options: argparse.Namespace) -> Answer:
+    from diagnosis.add import check_place, new_scene
+
     if options.out is None:
         raise BadInput("--out: add needs the folder of the new scene")
-    effect, file, out = by_name(options.effect), scene_path(options.target), options.out
-    here, there = file.parent.resolve(), out.resolve()
-    if here == there or here in there.parents or there in here.parents:
-        raise BadInput(f"--out {out}: the new scene may neither be, hold nor lie inside the folder of {file}")
-    if any(a.effect == effect.name for a in load(file).effects):
-        raise BadInput(f"{file}: effects.{effect.name}: is there already; change its values there, or add to the scene it was added to")
-    fitted = _fitted(effect, options.diagnosis) if options.diagnosis else {}
-    values = checked(effect, effect.typical() | fitted | dict(options.set))
-    told = {"typical of the catalogue": [n for n in values if n not in fitted], f"fitted, from {options.diagnosis}": list(fitted)}
-    by_hand = [name for name, _ in options.set]
-    told = {what: [n for n in names if n not in by_hand] for what, names in told.items()} | {"set by hand": list(dict.fromkeys(by_hand))}
-    source = "; ".join(f"{what}: {', '.join(names)}" for what, names in told.items() if names)
-    origin = "calibrated" if fitted else "assumed"
-    with whole_folder(out) as folder:
-        text = file.read_text(encoding="utf-8").rstrip("\n") + "\n\n" + _effect_table(effect, values, origin, source)
-        (folder / "spindle.toml").write_text(text, encoding="utf-8")
-        for name in ("measured", "published"):
-            if (file.parent / name).is_dir():
-                shutil.copytree(file.parent / name, folder / name)
-        try:
-            load(folder)
-        except BadInput as error:
-            raise BadInput(str(error).replace(str(folder), str(out))) from None
-        answer = {"scene": str(out), "effect": effect.name, "values": values, "origin": origin, "source": source}
+    check_place(options.target, options.out)
+    with whole_folder(options.out) as folder:
+        added = new_scene(options.target, options.effect, options.set, options.diagnosis, folder, options.out)
+        answer = {"scene": str(options.out), **asdict(added)}
         _mark(folder, options, answer)
-    units = {p.name: p.unit for p in effect.parameters}
-    said = ", ".join(f"{name} = {value:g} {units[name]}".removesuffix(" 1") for name, value in values.items())
-    return answer, lambda console: console.print(f"{out}: {effect.name} added ({origin}): {said}", highlight=False, markup=False)
-
-
-def _effect_table(effect: Effect, values: dict[str, float], origin: str, source: str) -> str:
-    head = {"name": effect.name, "origin": origin, "source": source}
-    lines = [f"# {effect.title}", "[[effects]]", *(f"{k} = {toml(v)}" for k, v in head.items()), "", "[effects.values]"]
-    lines += [f"{p.name} = {toml(float(values[p.name]))}  # {'' if p.unit == '1' else p.unit + ': '}{p.meaning}" for p in effect.parameters]
-    return "\n".join(lines) + "\n"
-
-
-def _fitted(effect: Effect, file: Path) -> dict[str, float]:
-    """Values of an effect in the first candidate of a diagnosis that has it, from `<effect>.<parameter>` or `<parameter>`."""
-    try:
-        diagnosis = json.loads(file.read_text(encoding="utf-8"))
-        candidates = [(list(c["effects"]), dict(c["parameters"])) for c in diagnosis["candidates"]]
-    except OSError as error:
-        raise BadInput(f"--from {file}: cannot be read: {error.strerror}") from None
-    except (ValueError, KeyError, TypeError):
-        raise BadInput(f"--from {file}: is not an answer of spindle diagnose --json, with candidates of effects and parameters") from None
-    parameters = next((p for effects, p in candidates if effect.name in effects), None)
-    if parameters is None:
-        named = ", ".join(dict.fromkeys(str(e) for effects, _ in candidates for e in effects)) or "none"
-        raise BadInput(f"--from {file}: no candidate has effect {effect.name}; its candidates are {named}")
-    found = {}
-    for name in effect.neutral():
-        row = parameters.get(f"{effect.name}.{name}", parameters.get(name))
-        if row is not None:
-            value = row.get("value") if isinstance(row, dict) else row
-            if not isinstance(value, int | float) or isinstance(value, bool):
-                raise BadInput(f"--from {file}: {effect.name}.{name}.value = {value!r}: must be a number")
-            found[name] = float(value)
-    if not found:
-        raise BadInput(f"--from {file}: its candidate has no value for {effect.name}; its parameters are {', '.join(effect.neutral())}")
-    return found
+    return answer, lambda console: console.print(f"{options.out}: {added.words()}", highlight=False, markup=False)
 
 
 # ---------------------------------------------------------------- output folders

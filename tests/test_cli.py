@@ -312,7 +312,7 @@ def test_an_effect_is_added_once(capsys, tmp_path):
 
 
 def test_nothing_is_left_of_a_scene_that_does_not_load(capsys, monkeypatch, tmp_path):
-    monkeypatch.setattr("spindle._effect_table", lambda *_: "[[effects]]\nname = 3\n")
+    monkeypatch.setattr("diagnosis.add._effect_table", lambda *_: "[[effects]]\nname = 3\n")
     assert main(["add", str(SCENE), "ring_growth", "--out", str(tmp_path / "new")]) == 2
     assert f"{tmp_path / 'new' / 'spindle.toml'}: " in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
