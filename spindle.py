@@ -65,7 +65,10 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _number(text: str) -> float:
-    value = float(text)
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
     if not np.isfinite(value):
         raise argparse.ArgumentTypeError(f"{text} is not a finite number")
     return value
@@ -79,8 +82,7 @@ def _temperature(text: str) -> float:
 
 
 def _count(text: str) -> int:
-    value = int(text)
-    if value < 1:
+    if not text.isdigit() or (value := int(text)) < 1:
         raise argparse.ArgumentTypeError(f"{text} is not a count of one or more")
     return value
 

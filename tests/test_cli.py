@@ -99,7 +99,7 @@ def test_run_and_inspect(capsys, short_scene, tmp_path):
 BAD = [
     (["modes", "nowhere"], "no scene there"),
     (["modes", SCENE, "--temperature", "-300"], "below absolute zero"),
-    (["modes", SCENE, "--temperature", "warm"], "warm"),
+    (["modes", SCENE, "--temperature", "warm"], "'warm' is not a number"),
     (["modes", SCENE, "--speed", "nan"], "not a finite number"),
     (["impact", SCENE, "--element", "magic"], "magic"),
     (["impact", SCENE, "--hits", "0"], "count of one or more"),
