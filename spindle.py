@@ -294,9 +294,15 @@ def _compare(options: argparse.Namespace) -> Answer:
 
 
 def _diagnose(options: argparse.Namespace) -> Answer:
-    from diagnosis.verdict import diagnose_verb
+    from diagnosis.verdict import diagnose, diagnosis_json, show_diagnosis
+    from sim.campaign import read_campaign
 
-    return diagnose_verb(options)
+    spindle, campaign = load(options.target), read_campaign(options.campaign)
+    with _progress(len(campaign.tests) + 5) as progress:
+        found, about, places, tests = diagnose(spindle, campaign, progress=progress)
+    answer = diagnosis_json(found, about, places, tests)
+    _write_answer(options, answer, "diagnosis.json")
+    return answer, lambda console: show_diagnosis(console, answer, places)
 
 
 # ---------------------------------------------------------------- effects

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2 as chi_squared
 
-from diagnosis.fit import Fit, Linear, fit, linearise
+from diagnosis.fit import Fit, fit, linearise
 from diagnosis.theory import Theory
 from model.ball_row import Array
 from model.pair import NoEquilibrium
@@ -190,7 +190,7 @@ Task = tuple[tuple[Effect, ...], list[float]]
 
 
 def _all(
-    theory: Theory, about: Linear, tasks: list[tuple[tuple[Effect, ...], list[float], Array | None]], thorough: bool, workers: int
+    theory: Theory, about: Array, tasks: list[tuple[tuple[Effect, ...], list[float], Array | None]], thorough: bool, workers: int
 ) -> list[Fit]:
     """Fits of all tasks (effects, start, nuisance start), side by side."""
     if workers < 2 or len(tasks) < 2:

@@ -26,19 +26,11 @@ WORST = 1e12  # chi2 of a state that has no equilibrium
 
 
 @dataclass(frozen=True, eq=False)
-class Linear:
-    """Predictions about a point: value (n,) and derivative (n, p) by the nuisance parameters."""
-
-    value: Array
-    by_nuisance: Array
-
-
-@dataclass(frozen=True, eq=False)
 class Fit:
     """A model fitted to the data.
 
     `values[effect][parameter]` and `sd` likewise; `evidence` is the log of the Laplace approximation; `misfit` the chi2 of the data alone,
-    `chi2` with priors; `pull` (n,) computed less measured over the standard errors; `jacobian` (n, p + q) about the optimum.
+    `chi2` with priors; `jacobian` (n, p + q) about the optimum.
     """
 
     effects: tuple[Effect, ...]
@@ -47,7 +39,6 @@ class Fit:
     nuisance: Array
     nuisance_sd: Array
     residual: Array
-    pull: Array
     misfit: float
     chi2: float
     evidence: float
@@ -55,10 +46,9 @@ class Fit:
     at_limit: bool
 
 
-def linearise(theory: Theory) -> Linear:
-    """Features and their derivative about the nominal spindle without effects."""
-    x = np.zeros(len(theory.sd))
-    return Linear(theory.features(x), derivative(theory, x, ()))
+def linearise(theory: Theory) -> Array:
+    """Derivative (n, p) of the features by the nuisance parameters at the nominal spindle without effects."""
+    return derivative(theory, np.zeros(len(theory.sd)), ())
 
 
 def derivative(theory: Theory, x: Array, effects: Applied) -> Array:
@@ -81,7 +71,7 @@ def derivative(theory: Theory, x: Array, effects: Applied) -> Array:
 
 def fit(
     theory: Theory,
-    about: Linear,
+    about: Array,
     effects: Sequence[Effect] = (),
     start: Sequence[float] | None = None,
     thorough: bool = True,
@@ -123,7 +113,7 @@ def fit(
         return misfit / temper**2 + float(np.sum((x / theory.sd) ** 2) + np.sum(((t - middle) / width) ** 2))
 
     m = model(x, theta)
-    by_theta, by_nuisance = np.zeros((len(data.value), len(rows))), about.by_nuisance
+    by_theta, by_nuisance = np.zeros((len(data.value), len(rows))), about
     tempers = TEMPERS[:2] if not thorough else (*(TEMPERS if nuisance is None else ()), *[1.0] * RENEWALS)
     for temper in tempers:
         if thorough and (effects or temper < TEMPERS[0]):
@@ -178,7 +168,6 @@ def fit(
         x,
         sd[: len(x)],
         residual,
-        -residual / data.sd,
         float(np.sum((data.whiten @ residual) ** 2)),
         current,
         -0.5 * current - 0.5 * float(np.linalg.slogdet(normal)[1]),

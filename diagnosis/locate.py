@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.stats import chi2 as chi_squared
 
-from diagnosis.fit import derivative
+from diagnosis.fit import linearise
 from diagnosis.theory import Data, Theory
 from model.ball_row import Array
 from model.machine import Condition, Spindle
@@ -100,7 +100,7 @@ def locate(theory: Theory, most: int = 5) -> list[Change]:
     theory = replace(theory, data=data)
     nothing = np.zeros(len(theory.sd))
     here = theory.features(nothing)
-    tolerances = data.whiten @ (derivative(theory, nothing, ()) * theory.sd)
+    tolerances = data.whiten @ (linearise(theory) * theory.sd)
     residual = data.whiten @ (data.value - here)
     temper = _temper(tolerances, residual)
     factor = np.linalg.cholesky(np.eye(len(residual)) + tolerances @ tolerances.T / temper**2) * temper

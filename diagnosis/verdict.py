@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from diagnosis.explain import Candidate, Diagnosis, explain
 from diagnosis.locate import Change, locate
@@ -128,24 +126,3 @@ def show_diagnosis(console: Console, answer: dict[str, Any], places: list[Change
         small = sorted(answer["detectable"].items())
         console.print("\nSmallest size these data would have shown: " + ", ".join(f"{k} {v:.2g}" for k, v in small), highlight=False)
         console.print(f"Not visible in these data at a typical size: {', '.join(answer['invisible']) or 'nothing'}")
-
-
-def diagnose_verb(options: argparse.Namespace) -> tuple[dict[str, Any], Callable[[Console], None]]:
-    """`spindle diagnose SCENE CAMPAIGN`: `options` has target, campaign, out."""
-    import json
-
-    from model.scene import load
-    from sim.campaign import read_campaign
-    from sim.folder import MARK, whole_folder
-
-    spindle, campaign = load(options.target), read_campaign(options.campaign)
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("extracting modes")
-        found, about, places, tests = diagnose(spindle, campaign, progress=lambda done: bar.update(task, description=done))
-    answer = diagnosis_json(found, about, places, tests)
-    if options.out:
-        with whole_folder(options.out) as folder:
-            (folder / "diagnosis.json").write_text(json.dumps(answer, indent=1), encoding="utf-8")
-            (folder / MARK).write_text(json.dumps({"scene": str(options.target), "campaign": str(options.campaign)}), encoding="utf-8")
-    return answer, lambda console: show_diagnosis(console, answer, places)
