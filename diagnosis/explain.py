@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from multiprocessing import get_context
 
 import numpy as np
 from scipy.stats import chi2 as chi_squared
@@ -193,11 +194,37 @@ def _all(
     theory: Theory, about: Array, tasks: list[tuple[tuple[Effect, ...], list[float], Array | None]], thorough: bool, workers: int
 ) -> list[Fit]:
     """Fits of all tasks (effects, start, nuisance start), side by side."""
+    work = Work(theory, about, tuple(tasks), thorough)
     if workers < 2 or len(tasks) < 2:
-        return [fit(theory, about, effects, start, thorough, nuisance) for effects, start, nuisance in tasks]
-    with ProcessPoolExecutor(workers) as pool:
-        jobs = [pool.submit(fit, theory, about, effects, start, thorough, nuisance) for effects, start, nuisance in tasks]
-        return [job.result() for job in jobs]
+        return [work.fit(i) for i in range(len(tasks))]
+    with ProcessPoolExecutor(workers, get_context("fork"), _take, (work,)) as pool:
+        found = pool.map(_done, range(len(tasks)))
+        return [replace(f, effects=task[0]) for f, task in zip(found, tasks, strict=True)]
+
+
+@dataclass(frozen=True, eq=False)
+class Work:
+    """Fits to be made by several processes, which get them by being forked: effects, of users too, need not be picklable."""
+
+    theory: Theory
+    about: Array
+    tasks: tuple[tuple[tuple[Effect, ...], list[float], Array | None], ...]
+    thorough: bool
+
+    def fit(self, i: int) -> Fit:
+        effects, start, nuisance = self.tasks[i]
+        return fit(self.theory, self.about, effects, start, self.thorough, nuisance)
+
+
+_work: list[Work] = []  # of a forked process: what it was given
+
+
+def _take(work: Work) -> None:
+    _work[:] = [work]
+
+
+def _done(i: int) -> Fit:
+    return replace(_work[0].fit(i), effects=())
 
 
 def _again(found: Fit, more: Effect | None = None) -> Task:

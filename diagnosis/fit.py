@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.theory import Applied, Theory
+from diagnosis.sensitivity import derivative
+from diagnosis.theory import Theory
 from model.ball_row import Array
 from model.pair import NoEquilibrium
 from sim.effect import Effect
 
-STEP = 0.3  # of a prior standard deviation, for derivatives by nuisance parameters
 TRUST = 2.0  # prior standard deviations, the longest step of any parameter
 TEMPERS = (300.0, 30.0, 3.0, 1.0)  # factors on the data's errors, in turn
 ROUGH = 4  # steps at each temper of a fit that is not thorough
@@ -49,24 +49,6 @@ class Fit:
 def linearise(theory: Theory) -> Array:
     """Derivative (n, p) of the features by the nuisance parameters at the nominal spindle without effects."""
     return derivative(theory, np.zeros(len(theory.sd)), ())
-
-
-def derivative(theory: Theory, x: Array, effects: Applied) -> Array:
-    """Derivative (n, p) of the features by the nuisance parameters: central differences; gains are exact.
-
-    The temperature error of a test moves the features of that test only, so one difference of that test is enough.
-    """
-    columns = []
-    for i, (name, sd) in enumerate(zip(theory.names, theory.sd, strict=True)):
-        step = np.zeros(len(x))
-        step[i] = STEP * sd
-        if name.startswith("gain"):
-            columns.append(theory.gains(np.eye(len(x))[i]))
-        else:
-            test = theory.test_of(i)
-            ends = [theory.features(x + sign * step, effects, only=test) for sign in (1, -1)]
-            columns.append((ends[0] - ends[1]) / (2 * step[i]))
-    return np.nan_to_num(np.array(columns).T)
 
 
 def fit(

@@ -9,35 +9,49 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from diagnosis.observe import SHAPE_FLOOR, Observation
 from model.ball_row import Array
 from model.machine import Spindle
-from model.modes import ComplexArray, modes
-from model.rotor_base import matrices
-from model.tolerance import toleranced
+from model.modes import ComplexArray, Poles, kinds, oscillating, poles
+from model.rotor_base import Matrices, matrices
+from model.tolerance import Toleranced, toleranced
 from sim.effect import Effect, Values
-from sim.operating import operating_point
+from sim.operating import OperatingPoint, operating_point
 
 ALONE = 0.03  # relative distance to the next mode from which a shape is used
 SMALL = 0.05  # of the largest channel; smaller shape components are left out
 FAR = 0.08  # ln frequency that costs as much as a fully different shape in pairing
 UNLIKE = 3.0  # cost of a different kind, where only kinds are known
 
+WHAT = ("frequency", "damping", "amplitude", "phase")
+
 Applied = Sequence[tuple[Effect, Values]]
+Index = NDArray[np.int_]
 
 
 @dataclass(frozen=True, eq=False)
 class Predicted:
-    """Modes of one condition: frequency (k,) Hz, damping (k,), shape (k, n_resp) at the measuring points, kinds."""
+    """Modes of one condition: pole (k,) rad/s and shape (k, n_resp) as the measuring points see them, kinds."""
 
-    frequency: Array
-    damping: Array
+    pole: ComplexArray
     shape: ComplexArray
     kind: tuple[str, ...]
+
+    @property
+    def frequency(self) -> Array:
+        """Undamped frequencies (k,), Hz."""
+        return np.abs(self.pole) / (2 * np.pi)
+
+    @property
+    def damping(self) -> Array:
+        """Damping ratios (k,)."""
+        return np.asarray(-self.pole.real / np.abs(self.pole), float)
 
 
 @dataclass(frozen=True)
@@ -46,9 +60,36 @@ class Feature:
 
     test: int
     mode: int
-    what: str  # frequency, damping, amplitude or phase
+    what: str  # one of WHAT
     channel: int = -1
     against: int = -1
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Indices of one test's features among all, by what they are, with the mode, channel and reference channel of each."""
+
+    frequency: Index
+    mode_of_frequency: Index
+    damping: Index
+    mode_of_damping: Index
+    amplitude: Index
+    phase: Index
+    mode_of_shape: Index
+    channel: Index
+    against: Index
+
+
+def _rows(features: Sequence[Feature], test: int) -> Rows:
+    own = {what: [i for i, f in enumerate(features) if f.test == test and f.what == what] for what in WHAT}
+
+    def index(what: str, key: str | None = None) -> Index:
+        return np.array([getattr(features[i], key) if key else i for i in own[what]], int)
+
+    return Rows(
+        index("frequency"), index("frequency", "mode"), index("damping"), index("damping", "mode"), index("amplitude"), index("phase"),
+        index("amplitude", "mode"), index("amplitude", "channel"), index("amplitude", "against"),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +101,11 @@ class Data:
     value: Array  # (n,)
     whiten: Array  # (n, n), block lower triangular
     sd: Array  # (n,)
+
+    @cached_property
+    def rows(self) -> dict[int, Rows]:
+        """Where the features of every test stand."""
+        return {t: _rows(self.features, t) for t in range(len(self.observations))}
 
 
 def data_of(observations: Sequence[Observation]) -> Data:
@@ -107,16 +153,35 @@ def _usable(o: Observation) -> list[tuple[int, int, int]]:
     return found
 
 
-def predict(spindle: Spindle, observation: Observation, effects: Applied, warmer: float = 0.0) -> Predicted:
-    """Modes at the condition of an observation, `warmer` kelvin above what its thermometer said, as the measuring chain shows them."""
+@dataclass(frozen=True, eq=False)
+class Linearised:
+    """The linear model at the condition of a test, its poles, and which of them (k) lie in the band of the test."""
+
+    point: OperatingPoint
+    matrices: Matrices
+    poles: Poles
+    found: list[int]
+
+
+def linearised(spindle: Spindle, observation: Observation, effects: Applied, warmer: float = 0.0) -> Linearised:
+    """The model at the condition of an observation, `warmer` kelvin above what its thermometer said."""
     condition = replace(observation.condition, temperature=observation.condition.temperature + warmer)
     point = operating_point(spindle, condition, effects)
-    found = modes(point.chain, matrices(point.chain), highest=1.5 * spindle.hammer.band[1])
-    chain = point.measurement
-    pole = np.array([m.pole for m in found]) - chain.decay
+    linear = matrices(point.chain)
+    found = poles(linear)
+    return Linearised(point, linear, found, oscillating(found, 1.5 * spindle.hammer.band[1]))
+
+
+def predicted(at: Linearised) -> Predicted:
+    """Modes as the measuring chain shows them."""
+    chain = at.point.measurement
+    pole, right = at.poles.value[at.found] - chain.decay, at.poles.right[:, at.found]
     seen = chain.gain * np.exp(-1j * np.abs(pole[:, None]) * chain.delay)
-    shape = np.asarray(np.array([m.shape for m in found]) @ chain.response_rows.T * seen, complex)
-    return Predicted(np.abs(pole) / (2 * np.pi), -pole.real / np.abs(pole), shape, tuple(m.kind for m in found))
+    return Predicted(pole, (chain.response_rows @ right).T * seen, kinds(at.matrices, right))
+
+
+def predict(spindle: Spindle, observation: Observation, effects: Applied, warmer: float = 0.0) -> Predicted:
+    return predicted(linearised(spindle, observation, effects, warmer))
 
 
 def pair(o: Observation, p: Predicted) -> Array:
@@ -144,26 +209,27 @@ def _unit(shape: ComplexArray) -> ComplexArray:
     return shape / np.maximum(np.linalg.norm(shape, axis=1, keepdims=True), 1e-300)
 
 
-def features_of(data: Data, predicted: Mapping[int, Predicted]) -> Array:
+def features_of(data: Data, at: Mapping[int, Predicted]) -> Array:
     """The predicted values (n,) of all features; zero for tests without a prediction."""
     value = np.zeros(len(data.features))
-    pairs = {t: pair(data.observations[t], p) for t, p in predicted.items()}
-    for k, f in enumerate(data.features):
-        if f.test not in predicted:
-            continue
-        p, i = predicted[f.test], pairs[f.test][f.mode]
-        if f.what == "frequency":
-            value[k] = np.log(p.frequency[i])
-        elif f.what == "damping":
-            value[k] = np.log(max(p.damping[i], 1e-9))
-        else:
-            size = np.maximum(np.abs(p.shape[i]).max() * 1e-6, np.abs(p.shape[i, [f.channel, f.against]]))
-            if f.what == "amplitude":
-                value[k] = np.log(size[0] / size[1])
-            else:  # the branch of the angle nearest to the measured one
-                turn = np.angle(p.shape[i, f.channel] * p.shape[i, f.against].conj() * np.exp(-1j * data.value[k]))
-                value[k] = data.value[k] + float(turn)
+    for t, p in at.items():
+        partner = pair(data.observations[t], p)
+        own = data.rows[t]
+        value[own.frequency] = np.log(p.frequency[partner[own.mode_of_frequency]])
+        value[own.damping] = np.log(np.maximum(p.damping[partner[own.mode_of_damping]], 1e-9))
+        if len(own.amplitude):
+            size = np.abs(p.shape).max(axis=1, keepdims=True) * 1e-6
+            shape = np.where(np.abs(p.shape) < size, size, p.shape)[partner[own.mode_of_shape]]
+            ratio = _of(shape, own.channel) / _of(shape, own.against)
+            value[own.amplitude] = np.log(np.abs(ratio))
+            measured = data.value[own.phase]  # the branch of the angle nearest to the measured one
+            value[own.phase] = measured + np.angle(ratio * np.exp(-1j * measured))
     return value
+
+
+def _of(shape: ComplexArray, channel: NDArray[np.int_]) -> ComplexArray:
+    """The components (m,) of shapes (m, n_resp) at one channel each."""
+    return np.asarray(np.take_along_axis(shape, channel[:, None], axis=1)[:, 0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,36 +241,46 @@ class Theory:
     names: tuple[str, ...]
     sd: Array
 
-    def test_of(self, i: int) -> int | None:
-        """The test whose temperature nuisance parameter `i` is; None for a parameter of all tests."""
-        first = len(self.names) - len(self.data.observations) - self.channels
-        return i - first if 0 <= i - first < len(self.data.observations) else None
-
     @property
     def channels(self) -> int:
         return sum(name.startswith("gain") for name in self.names)
 
     def features(self, x: Array, effects: Applied = (), only: int | None = None) -> Array:
         """Predicted features (n,) for nuisance values x (len(names),) and effects; zero for other tests than `only`, if given."""
-        build = toleranced(self.spindle)
+        spindle, warmer = self.built(x), self.warmer(x)
+        wanted = range(len(self.data.observations)) if only is None else [only]
+        return features_of(self.data, {t: predict(spindle, self.data.observations[t], effects, warmer[t]) for t in wanted}) + self.gains(x)
+
+    @cached_property
+    def build(self) -> list[Toleranced]:
+        """The toleranced parameters of the spindle, the first of the nuisance parameters."""
+        return toleranced(self.spindle)
+
+    def built(self, x: Array) -> Spindle:
+        """The spindle with its build tolerances at x."""
         spindle = self.spindle
-        for parameter, value in zip(build, x, strict=False):
+        for parameter, value in zip(self.build, x, strict=False):
             if value != 0.0:
                 spindle = parameter.apply(spindle, float(value))
-        tests = len(self.data.observations)
-        warmer = x[len(build) : len(build) + tests]
-        wanted = range(tests) if only is None else [only]
-        predicted = {t: predict(spindle, self.data.observations[t], effects, float(warmer[t])) for t in wanted}
-        return features_of(self.data, predicted) + self.gains(x)
+        return spindle
+
+    def warmer(self, x: Array) -> list[float]:
+        """By how much (K) every test is warmer than its thermometer said."""
+        first = len(self.build)
+        return [float(v) for v in x[first : first + len(self.data.observations)]]
 
     def gains(self, x: Array) -> Array:
         """What the channel gains in x (relative) add to the amplitude features."""
-        gain = x[len(x) - self.channels :]
-        added = np.zeros(len(self.data.features))
-        for k, f in enumerate(self.data.features):
-            if f.what == "amplitude":
-                added[k] = gain[f.channel] - gain[f.against]
-        return added
+        return self.by_gain @ x[len(x) - self.channels :]
+
+    @cached_property
+    def by_gain(self) -> Array:
+        """Derivative (n, channels) of the features by the channel gains: exact, for they are multiplied."""
+        found = np.zeros((len(self.data.features), self.channels))
+        for own in self.data.rows.values():
+            found[own.amplitude, own.channel] += 1.0
+            found[own.amplitude, own.against] -= 1.0
+        return found
 
 
 def theory(spindle: Spindle, data: Data) -> Theory:

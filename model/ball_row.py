@@ -11,7 +11,8 @@ contact angles differ (Jones 1960; Harris 1991, Eqs. 9.9-9.25, outer-race contro
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,7 +63,7 @@ class BallRow:
     arm: float
     inertia: BallInertia | None = None
 
-    @property
+    @cached_property
     def constant(self) -> float:
         """Load-deflection constant of both contacts in series (N/m^1.5)."""
         return in_series(self.inner_constant, self.outer_constant)
@@ -264,7 +265,7 @@ def displacement_under(row: BallRow, load: Array) -> Array:
     Raises `NoEquilibrium` when the row cannot carry the load.
     """
     load = np.asarray(load, float)
-    massless = BallRow(**{**row.__dict__, "inertia": None})
+    massless = replace(row, inertia=None)
     unit = 1e-6 / np.array([1, 1, 1, row.arm, row.arm])
     work = 1e-6 * max(float(np.linalg.norm(load * unit)) / 1e-6, 1e-6)
 

@@ -7,6 +7,7 @@ Lubrication* (1981), ch. 3; only the ellipticity equation is solved numerically,
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.optimize import brentq
@@ -50,6 +51,7 @@ def ellipticity(curvature_difference: float) -> float:
     return float(np.exp(brentq(lambda log_k: difference(log_k) - curvature_difference, nearly_round, 17.0, xtol=1e-14, rtol=1e-14)))
 
 
+@lru_cache(maxsize=4096)
 def point_contact(
     ball_diameter: float, rolling_curvature: float, groove_curvature: float, ball: tuple[float, float], race: tuple[float, float]
 ) -> Contact:

@@ -94,19 +94,18 @@ def modes(chain: RotorBase, linear: Matrices | None = None, highest: float = np.
     """Oscillating modes below `highest` (Hz) in order of frequency; `linear` defaults to the chain's own matrices."""
     linear = linear or matrices(chain)
     p = poles(linear)
-    found = [i for i in range(len(p.value)) if p.value[i].imag > 1e-6 and abs(p.value[i]) < 2 * np.pi * highest]
-    found.sort(key=lambda i: abs(p.value[i]))
+    found = oscillating(p, highest)
     shapes = p.right[:, found]
     shapes = shapes / shapes[np.argmax(np.abs(shapes), axis=0), np.arange(len(found))]
     strain = np.array([_quadratic(element_rows(chain, e) @ shapes, e.stiffness) for e in chain.elements])
     strain = strain / strain.sum(axis=0)
-    kinetic = np.diag(linear.mass)[:, None] * np.abs(shapes) ** 2
+    kind = kinds(linear, shapes)
     return [
         Mode(
             frequency=float(abs(p.value[i]) / (2 * np.pi)),
             damping_ratio=float(-p.value[i].real / abs(p.value[i])),
-            kind=(kind := _kind(linear, kinetic[:, m])),
-            whirl="none" if kind == "axial" else _whirl(chain, shapes[:, m]),
+            kind=kind[m],
+            whirl="none" if kind[m] == "axial" else _whirl(chain, shapes[:, m]),
             energy={e.name: float(share) for e, share in zip(chain.elements, strain[:, m], strict=True)},
             shape=shapes[:, m],
             pole=complex(p.value[i]),
@@ -115,18 +114,24 @@ def modes(chain: RotorBase, linear: Matrices | None = None, highest: float = np.
     ]
 
 
+def oscillating(p: Poles, highest: float = np.inf) -> list[int]:
+    """Indices of the oscillating poles below `highest` (Hz), one of each conjugate pair, in order of frequency."""
+    size = np.abs(p.value)
+    order = np.argsort(size, kind="stable")
+    return [int(i) for i in order if p.value[i].imag > 1e-6 and size[i] < 2 * np.pi * highest]
+
+
 def _quadratic(vectors: ComplexArray, matrix: Array) -> Array:
     return np.real(np.sum(vectors.conj() * (matrix @ vectors), axis=0))
 
 
-def _kind(linear: Matrices, kinetic: Array) -> str:
-    """Axial when most kinetic energy is along z, else rocking when most of the rest is in tilts, else lateral."""
-    share = {move: 0.0 for move in MOVES}
-    for energy, (_, move) in zip(kinetic, linear.dofs, strict=True):
-        share[move] += float(energy)
-    if share["z"] > 0.5 * sum(share.values()):
-        return "axial"
-    return "rocking" if share["tilt_x"] + share["tilt_y"] > share["x"] + share["y"] else "lateral"
+def kinds(linear: Matrices, shapes: ComplexArray) -> tuple[str, ...]:
+    """Kind of every shape (n, m): axial when most kinetic energy is along z, else rocking when most of the rest is in tilts, else lateral."""
+    kinetic = np.diag(linear.mass)[:, None] * np.abs(shapes) ** 2
+    share = {move: kinetic[[i for i, (_, own) in enumerate(linear.dofs) if own == move]].sum(axis=0) for move in MOVES}
+    axial = share["z"] > 0.5 * kinetic.sum(axis=0)
+    rocking = share["tilt_x"] + share["tilt_y"] > share["x"] + share["y"]
+    return tuple("axial" if a else "rocking" if r else "lateral" for a, r in zip(axial, rocking, strict=True))
 
 
 def _whirl(chain: RotorBase, shape: ComplexArray) -> str:

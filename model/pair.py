@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from math import hypot
 
 import numpy as np
 from scipy.optimize import brentq
@@ -161,12 +162,12 @@ def _ball_inertia(spindle: Spindle, b: Bearing, speed: float) -> BallInertia | N
 
 def _axial_force(row: BallRow, movement: float) -> float:
     """Axial force (N) needed on the outer ring when it has moved by `movement` (m); rises with it."""
-    moved = replace(row, axial=row.axial + movement)
     if row.inertia is None:
-        length = float(np.hypot(moved.radial, moved.axial))
+        axial = row.axial + movement
+        length = hypot(row.radial, axial)
         deformation = max(length - row.unloaded_distance, 0.0)
-        return row.balls * row.constant * deformation**1.5 * moved.axial / length
-    return float(respond(moved).force[2])
+        return row.balls * row.constant * deformation**1.5 * axial / length
+    return float(respond(replace(row, axial=row.axial + movement)).force[2])
 
 
 def _balance(rows: list[BallRow], external: float) -> float:

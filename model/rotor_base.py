@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -31,16 +32,25 @@ class Element:
     damping: Array
 
 
+Layout = tuple[tuple[str, float, tuple[str, ...]], ...]
+"""Name, height and moves of every body."""
+
+
 @dataclass(frozen=True)
 class RotorBase:
     bodies: tuple[Body, ...]
     elements: tuple[Element, ...]
     speed: float  # rad/s
 
-    @property
+    @cached_property
     def dofs(self) -> tuple[tuple[str, str], ...]:
         """(body, move) of every degree of freedom, in order."""
         return tuple((b.name, move) for b in self.bodies for move in b.moves)
+
+    @cached_property
+    def layout(self) -> Layout:
+        """What the motion of points depends on."""
+        return tuple((b.name, b.z, b.moves) for b in self.bodies)
 
     def body(self, name: str) -> Body:
         return next(b for b in self.bodies if b.name == name)
@@ -74,24 +84,36 @@ def joint_element(structure: Structure, index: int) -> Element:
 
 
 def motion_rows(chain: RotorBase, name: str, position: Sequence[float]) -> Array:
-    """Rows (5, n) that give the displacement and tilt of the material point of a body at `position` (3,)."""
-    rows = np.zeros((5, sum(len(b.moves) for b in chain.bodies)))
+    """Rows (5, n) that give the displacement and tilt of the material point of a body at `position` (3,); read only."""
+    return _motion_rows(chain.layout, name, (position[0], position[1], position[2]))
+
+
+@lru_cache(maxsize=1024)
+def _motion_rows(layout: Layout, name: str, position: tuple[float, float, float]) -> Array:
+    rows = np.zeros((5, sum(len(moves) for _, _, moves in layout)))
     start = 0
-    for body in chain.bodies:
-        if body.name == name:
-            x, y, z = position[0], position[1], position[2] - body.z
+    for body, height, moves in layout:
+        if body == name:
+            x, y, z = position[0], position[1], position[2] - height
             lever = np.eye(5)  # displacement from a unit motion: tilt x (p - centre)
             lever[1:3, 3] = -z, y
             lever[[0, 2], 4] = z, -x
-            rows[:, start : start + len(body.moves)] = lever[:, [MOVES.index(m) for m in body.moves]]
-        start += len(body.moves)
+            rows[:, start : start + len(moves)] = lever[:, [MOVES.index(m) for m in moves]]
+        start += len(moves)
+    rows.flags.writeable = False
     return rows
 
 
 def element_rows(chain: RotorBase, element: Element) -> Array:
-    """Rows (5, n) of the relative motion an element resists."""
-    at = (0.0, 0.0, element.z)
-    return motion_rows(chain, element.b, at) - motion_rows(chain, element.a, at)
+    """Rows (5, n) of the relative motion an element resists; read only."""
+    return _element_rows(chain.layout, element.a, element.b, element.z)
+
+
+@lru_cache(maxsize=1024)
+def _element_rows(layout: Layout, a: str, b: str, z: float) -> Array:
+    rows = _motion_rows(layout, b, (0.0, 0.0, z)) - _motion_rows(layout, a, (0.0, 0.0, z))
+    rows.flags.writeable = False
+    return rows
 
 
 def point_row(chain: RotorBase, point: Point) -> Array:
