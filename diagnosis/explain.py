@@ -83,10 +83,10 @@ def left_over(theory: Theory, found: Fit) -> tuple[Array, Array]:
     order about the fit. Returns the whitened, projected residual (n,) and the factor (n, n).
     """
     widths = np.concatenate([theory.sd, [p.prior_sd for e in found.effects for p in e.parameters]])
-    a = theory.data.whiten @ (found.jacobian * widths)
+    a = found.whiten @ (found.jacobian * widths)
     factor = np.linalg.cholesky(np.eye(len(a)) + a @ a.T)
     prior = np.concatenate([found.nuisance / theory.sd, np.zeros(len(widths) - len(theory.sd))])
-    return np.linalg.solve(factor, theory.data.whiten @ found.residual + a @ prior), factor
+    return np.linalg.solve(factor, found.whiten @ found.residual + a @ prior), factor
 
 
 def screen(theory: Theory, found: Fit, catalogue: Sequence[Effect], share: float = 1.0) -> list[Signature]:
@@ -107,7 +107,7 @@ def screen(theory: Theory, found: Fit, catalogue: Sequence[Effect], share: float
             moved = theory.features(found.nuisance, [*present, (effect, effect.typical() | {main.name: size})]) - here
         except NoEquilibrium:
             continue
-        direction: Array = np.asarray(np.linalg.solve(factor, theory.data.whiten @ moved) / share, float)
+        direction: Array = np.asarray(np.linalg.solve(factor, found.whiten @ moved) / share, float)
         visible = float(np.linalg.norm(direction))
         if visible < 1e-6:
             signatures.append(Signature(effect, 0.0, 0.0, np.inf, np.inf, direction))
@@ -131,21 +131,21 @@ def held_out(theory: Theory, result: Fit) -> tuple[float, int]:
     """Sum of squares and number of whitened residuals of conditions left out one after the other, each predicted from all others.
 
     About the optimum the model is linear in its parameters, so leaving a condition out is algebra: minimise without its rows, then look.
+    The prediction is rated by the errors of the data and of the parameters, without errors of form.
     """
     data = theory.data
-    conditions = [(o.condition.temperature, o.condition.speed) for o in data.observations]
-    white = data.whiten @ result.jacobian
-    residual = data.whiten @ result.residual
+    temperatures = [o.condition.temperature for o in data.observations]
     widths = np.concatenate([theory.sd, [p.prior_sd for e in result.effects for p in e.parameters]])
+    fitted, rated = (w @ (result.jacobian * widths) for w in (result.whiten, data.whiten))
+    residual, rated_residual = result.whiten @ result.residual, data.whiten @ result.residual
+    offset = np.concatenate([result.nuisance / theory.sd, np.zeros(len(widths) - len(theory.sd))])
     total, count = 0.0, 0
-    for leave in sorted({c[0] for c in conditions}):
-        out = np.array([conditions[f.test][0] == leave for f in data.features])
-        a = white[~out] * widths
-        offset = np.concatenate([result.nuisance / theory.sd, np.zeros(len(widths) - len(theory.sd))])
-        normal = a.T @ a + np.eye(len(widths))
-        step = np.linalg.solve(normal, a.T @ residual[~out] - offset)
-        left = residual[out] - (white[out] * widths) @ step
-        spread = np.eye(out.sum()) + (white[out] * widths) @ np.linalg.solve(normal, (white[out] * widths).T)
+    for leave in sorted(set(temperatures)):
+        out = np.array([temperatures[f.test] == leave for f in data.features])
+        normal = fitted[~out].T @ fitted[~out] + np.eye(len(widths))
+        step = np.linalg.solve(normal, fitted[~out].T @ residual[~out] - offset)
+        left = rated_residual[out] - rated[out] @ step
+        spread = np.eye(out.sum()) + rated[out] @ np.linalg.solve(normal, rated[out].T)
         total += float(left @ np.linalg.solve(spread, left))
         count += int(out.sum())
     return total, count

@@ -1,7 +1,9 @@
-"""Fitting nuisance parameters and effects to the data: Gauss-Newton with priors, Laplace evidence, held-out conditions.
+"""Fitting nuisance parameters and effects to the data: Gauss-Newton with priors, and its Laplace evidence.
 
-chi2 = |W (y - m(x, theta))|^2 + |x / sd|^2 + |(theta - neutral) / prior|^2 ; the derivative by nuisance parameters is taken once, at the
-nominal spindle, and again at the end; that by effect parameters at every step.
+chi2 = |W (y - m(x, theta))|^2 + |x / sd|^2 + |(theta - neutral) / prior|^2, W^T W the inverse of the covariance of the data and of the
+effects' own errors of form, each a share of what the effect does to a feature: model discrepancy after Kennedy & O'Hagan (2001),
+*J. R. Statist. Soc. B* 63, 425, with the scale known. Without it the smallest difference between two people's formulas for one effect would
+refute both, wherever the effect is a thousand times larger than the errors of measurement.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.sensitivity import derivative
-from diagnosis.theory import Theory
+from diagnosis.theory import Theory, whitening
 from model.ball_row import Array
 from model.pair import NoEquilibrium
 from sim.effect import Effect
@@ -29,8 +31,8 @@ WORST = 1e12  # chi2 of a state that has no equilibrium
 class Fit:
     """A model fitted to the data.
 
-    `values[effect][parameter]` and `sd` likewise; `evidence` is the log of the Laplace approximation; `misfit` the chi2 of the data alone,
-    `chi2` with priors; `jacobian` (n, p + q) about the optimum.
+    `values[effect][parameter]` and `sd` likewise; `evidence` is the log of the Laplace approximation; `misfit` the chi2 of the data alone
+    by their own errors, `chi2` with errors of form and priors; `whiten` (n, n) with errors of form; `jacobian` (n, p + q) about the optimum.
     """
 
     effects: tuple[Effect, ...]
@@ -42,6 +44,7 @@ class Fit:
     misfit: float
     chi2: float
     evidence: float
+    whiten: Array
     jacobian: Array
     at_limit: bool
 
@@ -88,11 +91,18 @@ def fit(
         except NoEquilibrium:
             return np.full(len(data.value), np.nan)
 
-    def cost(m: Array, x: Array, t: Array, temper: float) -> float:
+    def cost(m: Array, x: Array, t: Array) -> float:
         if not np.all(np.isfinite(m)):
             return WORST
-        misfit = float(np.sum((data.whiten @ (data.value - m)) ** 2))
-        return misfit / temper**2 + float(np.sum((x / theory.sd) ** 2) + np.sum(((t - middle) / width) ** 2))
+        return float(np.sum((whiten @ (data.value - m)) ** 2) + np.sum((x / theory.sd) ** 2) + np.sum(((t - middle) / width) ** 2))
+
+    def with_form_errors(m: Array, x: Array, t: Array, temper: float) -> Array:
+        present = applied(t)
+        more = np.zeros(len(m))
+        for one in present:
+            rest = theory.features(x, [other for other in present if other is not one])
+            more += (one[0].form_error * np.nan_to_num(m - rest)) ** 2
+        return whitening(data.blocks, more, temper)
 
     m = model(x, theta)
     by_theta, by_nuisance = np.zeros((len(data.value), len(rows))), about
@@ -100,7 +110,8 @@ def fit(
     for temper in tempers:
         if thorough and (effects or temper < TEMPERS[0]):
             by_nuisance = derivative(theory, x, applied(theta))
-        current, damping = cost(m, x, theta, temper), 1e-3
+        whiten = with_form_errors(m, x, theta, temper)
+        current, damping = cost(m, x, theta), 1e-3
         before = current
         for _ in range(steps if thorough else ROUGH):
             for j, w in enumerate(width):
@@ -108,15 +119,15 @@ def fit(
                 moved = theta.copy()
                 moved[j] += h
                 by_theta[:, j] = np.nan_to_num((model(x, moved) - m) / h)
-            white = data.whiten @ np.hstack([by_nuisance, by_theta]) * scale / temper
-            gradient = white.T @ (data.whiten @ (data.value - np.nan_to_num(m))) / temper - np.concatenate([x, theta - middle]) / scale
+            white = whiten @ np.hstack([by_nuisance, by_theta]) * scale
+            gradient = white.T @ (whiten @ (data.value - np.nan_to_num(m))) - np.concatenate([x, theta - middle]) / scale
             normal = white.T @ white + np.eye(len(scale))
             for _ in range(8):
                 move = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), gradient) * scale
                 move /= max(1.0, float(np.max(np.abs(move / scale))) / TRUST)
                 new_x, new_theta = x + move[: len(x)], np.clip(theta + move[len(x) :], low, high)
                 new_m = model(new_x, new_theta)
-                new = cost(new_m, new_x, new_theta, temper)
+                new = cost(new_m, new_x, new_theta)
                 if new <= current:
                     break
                 damping = max(damping * 6, 1e-3)
@@ -128,9 +139,9 @@ def fit(
                 break
         if temper == 1.0 and before - current < ENOUGH:
             break
-    temper = 1.0 if thorough else TEMPERS[1]
-    current = cost(m, x, theta, temper)
-    white = data.whiten @ np.hstack([by_nuisance, by_theta]) * scale / temper
+    whiten = with_form_errors(m, x, theta, 1.0 if thorough else TEMPERS[1])
+    current = cost(m, x, theta)
+    white = whiten @ np.hstack([by_nuisance, by_theta]) * scale
     normal = white.T @ white + np.eye(len(scale))
     covariance = np.linalg.inv(normal) * np.outer(scale, scale)
     sd = np.sqrt(np.diag(covariance))
@@ -152,7 +163,8 @@ def fit(
         residual,
         float(np.sum((data.whiten @ residual) ** 2)),
         current,
-        -0.5 * current - 0.5 * float(np.linalg.slogdet(normal)[1]),
+        -0.5 * current - 0.5 * float(np.linalg.slogdet(normal)[1]) + float(np.sum(np.log(np.diag(whiten) / np.diag(data.whiten)))),
+        whiten,
         np.hstack([by_nuisance, by_theta]),
         at_limit,
     )

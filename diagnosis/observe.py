@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from model.ball_row import Array
 from model.machine import Condition, Spindle
 from model.modes import ComplexArray
 from sim.campaign import Campaign, Noise, Test
-from sim.modal import extract, noise_model
+from sim.modal import extract, mac, noise_model
 
 FREQUENCY_FLOOR = 3e-5  # relative: finite elements and bearing equilibrium of the model itself
 DAMPING_FLOOR = 3e-3  # relative
 SHAPE_FLOOR = 3e-3  # relative, of a shape ratio
+UNCERTAIN = 3e-3  # relative error of a frequency from which a pole says nothing
+SAME = 0.15  # ln frequency within which two tests may show the same mode
+ALIKE = 0.5  # MAC above which they do
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +27,9 @@ class Observation:
     """Modes of one test in order of frequency; m modes, n_resp channels.
 
     `covariance` (2m, 2m) of [ln frequency, ln damping]; damping not measured is NaN with infinite variance. `shape` (m, n_resp) and
-    `shape_sd` are relative to the largest component, None for a table of modes, which says the `kind` of each mode instead.
+    `shape_sd` are relative to the largest component; `residue` (m, n_ref) is that of the receptance between each reference and the
+    channel with the largest component, `residue_sd` (m,) relative. They are None for a table of modes, which says the `kind` of each
+    mode instead.
     """
 
     test: Test
@@ -33,6 +39,8 @@ class Observation:
     covariance: Array
     shape: ComplexArray | None
     shape_sd: Array | None
+    residue: ComplexArray | None
+    residue_sd: Array | None
     kind: tuple[str, ...] | None
 
 
@@ -46,7 +54,39 @@ def observe(campaign: Campaign, spindle: Spindle, progress: Callable[[str], None
     for test in campaign.tests:
         observations.append(_from_frf(test, noise) if test.frf is not None else _from_table(test))
         progress(f"{test.id}: {len(observations[-1].frequency)} modes")
-    return observations
+    return [_repeated(o, [other for other in observations if other is not o]) for o in observations]
+
+
+def _repeated(o: Observation, others: list[Observation]) -> Observation:
+    """Without the modes that no other test shows anything like: a pole of the noise appears once, a mode of the machine again.
+
+    Less than three tests with shapes are taken as they are.
+    """
+    shapes = [(other.frequency, other.shape) for other in others if other.shape is not None]
+    if o.shape is None or len(shapes) < 2:
+        return o
+    again = np.zeros(len(o.frequency), bool)
+    for frequency, shape in shapes:
+        near = np.abs(np.log(o.frequency[:, None] / frequency)) < SAME
+        again |= (near & (mac(o.shape, shape) > ALIKE)).any(axis=1)
+    return _only(o, again)
+
+
+def _only(o: Observation, kept: NDArray[np.bool_]) -> Observation:
+    """Some of the modes of a test that has shapes."""
+    if o.shape is None or o.shape_sd is None or o.residue is None or o.residue_sd is None:
+        raise ValueError("a table of modes has no shapes")
+    both = np.concatenate([kept, kept])
+    return replace(
+        o,
+        frequency=o.frequency[kept],
+        damping=o.damping[kept],
+        covariance=o.covariance[np.ix_(both, both)],
+        shape=o.shape[kept],
+        shape_sd=o.shape_sd[kept],
+        residue=o.residue[kept],
+        residue_sd=o.residue_sd[kept],
+    )
 
 
 def condition_of(test: Test) -> Condition:
@@ -63,8 +103,10 @@ def _from_frf(test: Test, noise: Noise) -> Observation:
     found = extract(frf.frequency, frf.value, sd, kind=frf.quantity, window_decay=test.window_decay)
     scale = np.concatenate([found.frequency, found.damping])
     covariance = found.covariance / np.outer(scale, scale)
+    largest = np.argmax(np.abs(found.shape), axis=1)
+    residue = found.residues[np.arange(len(largest)), largest]
     floor = np.concatenate([np.full(len(found.frequency), f) for f in (FREQUENCY_FLOOR, DAMPING_FLOOR)])
-    return Observation(
+    o = Observation(
         test,
         condition_of(test),
         found.frequency,
@@ -72,8 +114,11 @@ def _from_frf(test: Test, noise: Noise) -> Observation:
         covariance + np.diag(floor**2),
         found.shape,
         found.shape_sd,
+        residue,
+        np.hypot(np.sqrt(2 * np.diag(covariance)[len(found.frequency) :]), SHAPE_FLOOR),
         None,
     )
+    return _only(o, np.sqrt(np.diag(covariance)[: len(found.frequency)]) < UNCERTAIN)
 
 
 def _from_table(test: Test) -> Observation:
@@ -86,4 +131,4 @@ def _from_table(test: Test) -> Observation:
     )
     variance = np.concatenate([sd_f**2 + FREQUENCY_FLOOR**2, sd_z**2 + DAMPING_FLOOR**2])
     kinds = tuple(r.kind for r in rows)
-    return Observation(test, condition_of(test), frequency, damping, np.diag(variance), None, None, kinds)
+    return Observation(test, condition_of(test), frequency, damping, np.diag(variance), None, None, None, None, kinds)

@@ -1,7 +1,7 @@
 """What the model predicts of a campaign: the same features as observed, for any tolerances and effects.
 
-Features of a test, one block each: ln frequency and ln damping of every paired mode, and ln ratios (amplitude, phase) of the shape of
-modes that stand alone to their largest channel. Close modes turn in their plane at the slightest asymmetry, so their shapes are left
+Features of a test, one block each: ln frequency and ln damping of every paired mode, and of modes that stand alone ln ratios (amplitude,
+phase) of the shape to its largest channel, and the residue there for every reference (size, turn). Close modes turn in their plane at the slightest asymmetry, so their shapes are left
 out; their frequencies are not.
 """
 
@@ -29,7 +29,7 @@ SMALL = 0.05  # of the largest channel; smaller shape components are left out
 FAR = 0.08  # ln frequency that costs as much as a fully different shape in pairing
 UNLIKE = 3.0  # cost of a different kind, where only kinds are known
 
-WHAT = ("frequency", "damping", "amplitude", "phase")
+WHAT = ("frequency", "damping", "amplitude", "phase", "size", "turn")
 
 Applied = Sequence[tuple[Effect, Values]]
 Index = NDArray[np.int_]
@@ -37,10 +37,14 @@ Index = NDArray[np.int_]
 
 @dataclass(frozen=True, eq=False)
 class Predicted:
-    """Modes of one condition: pole (k,) rad/s and shape (k, n_resp) as the measuring points see them, kinds."""
+    """Modes of one condition: pole (k,) rad/s, shape (k, n_resp) and participation (k, n_ref) as the measuring points see them, kinds.
+
+    The residue of the receptance is shape times participation.
+    """
 
     pole: ComplexArray
     shape: ComplexArray
+    participation: ComplexArray
     kind: tuple[str, ...]
 
     @property
@@ -60,7 +64,7 @@ class Feature:
 
     test: int
     mode: int
-    what: str  # one of WHAT
+    what: str  # one of WHAT: amplitude and phase of channel / against; size and turn of the residue channel, reference `against`
     channel: int = -1
     against: int = -1
 
@@ -78,6 +82,11 @@ class Rows:
     mode_of_shape: Index
     channel: Index
     against: Index
+    size: Index
+    turn: Index
+    mode_of_residue: Index
+    channel_of_residue: Index
+    reference: Index
 
 
 def _rows(features: Sequence[Feature], test: int) -> Rows:
@@ -88,7 +97,8 @@ def _rows(features: Sequence[Feature], test: int) -> Rows:
 
     return Rows(
         index("frequency"), index("frequency", "mode"), index("damping"), index("damping", "mode"), index("amplitude"), index("phase"),
-        index("amplitude", "mode"), index("amplitude", "channel"), index("amplitude", "against"),
+        index("amplitude", "mode"), index("amplitude", "channel"), index("amplitude", "against"), index("size"), index("turn"),
+        index("size", "mode"), index("size", "channel"), index("size", "against"),
     )  # fmt: skip
 
 
@@ -99,6 +109,7 @@ class Data:
     observations: tuple[Observation, ...]
     features: tuple[Feature, ...]
     value: Array  # (n,)
+    blocks: tuple[Array, ...]  # covariance, block by block
     whiten: Array  # (n, n), block lower triangular
     sd: Array  # (n,)
 
@@ -128,29 +139,52 @@ def data_of(observations: Sequence[Observation]) -> Data:
                 features += [Feature(t, i, what, channel, largest) for what in ("amplitude", "phase")]
                 values += [float(ratio.real), float(ratio.imag)]
                 blocks += [np.array([[sd**2]]), np.array([[sd**2]])]
-    n = len(values)
-    whiten, sd = np.zeros((n, n)), np.zeros(n)
+        if o.shape is not None and o.residue is not None and o.residue_sd is not None:
+            for i, channel, reference in _sized(o):
+                features += [Feature(t, i, what, channel, reference) for what in ("size", "turn")]
+                values += [float(np.log(abs(o.residue[i, reference]))), float(np.angle(o.residue[i, reference]))]
+                blocks += [np.array([[o.residue_sd[i] ** 2]])] * 2
+    sd = np.sqrt(np.concatenate([np.diag(block) for block in blocks]))
+    return Data(tuple(observations), tuple(features), np.array(values), tuple(blocks), whitening(blocks, np.zeros(len(sd))), sd)
+
+
+def whitening(blocks: Sequence[Array], more: Array, enlarged: float = 1.0) -> Array:
+    """W (n, n), lower triangular, with W^T W the inverse of the covariance: `blocks`, errors `enlarged` so many times, and variances
+    `more` (n,)."""
+    result = np.zeros((len(more), len(more)))
     start = 0
     for block in blocks:
         stop = start + len(block)
-        whiten[start:stop, start:stop] = np.linalg.inv(np.linalg.cholesky(block))
-        sd[start:stop] = np.sqrt(np.diag(block))
+        if len(block) == 1:
+            result[start, start] = (enlarged**2 * block[0, 0] + more[start]) ** -0.5
+        else:
+            own = enlarged**2 * block + np.diag(more[start:stop])
+            result[start:stop, start:stop] = np.linalg.inv(np.linalg.cholesky(own))
         start = stop
-    return Data(tuple(observations), tuple(features), np.array(values), whiten, sd)
+    return result
+
+
+def _alone(o: Observation) -> list[int]:
+    """Modes whose shapes do not turn with those of a neighbour."""
+    logs = np.log(o.frequency)
+    return [i for i in range(len(logs)) if np.min(np.abs(np.delete(logs, i) - logs[i]), initial=np.inf) > ALONE]
 
 
 def _usable(o: Observation) -> list[tuple[int, int, int]]:
     """(mode, largest channel, channel) of the shape ratios worth comparing."""
     assert o.shape is not None
-    found = []
-    logs = np.log(o.frequency)
-    for i in range(len(logs)):
-        distance = np.min(np.abs(np.delete(logs, i) - logs[i])) if len(logs) > 1 else np.inf
-        size = np.abs(o.shape[i])
-        largest = int(np.argmax(size))
-        if distance > ALONE:
-            found += [(i, largest, c) for c in range(len(size)) if c != largest and size[c] > SMALL * size[largest]]
-    return found
+    size = np.abs(o.shape)
+    largest = [int(i) for i in np.argmax(size, axis=1)]
+    channels = range(size.shape[1])
+    return [(i, largest[i], c) for i in _alone(o) for c in channels if c != largest[i] and size[i, c] > SMALL * size[i, largest[i]]]
+
+
+def _sized(o: Observation) -> list[tuple[int, int, int]]:
+    """(mode, largest channel, reference) of the residues worth comparing."""
+    assert o.shape is not None
+    assert o.residue is not None
+    size, largest = np.abs(o.residue), np.argmax(np.abs(o.shape), axis=1)
+    return [(i, int(largest[i]), r) for i in _alone(o) for r in range(size.shape[1]) if size[i, r] > SMALL * size[i].max()]
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +211,8 @@ def predicted(at: Linearised) -> Predicted:
     chain = at.point.measurement
     pole, right = at.poles.value[at.found] - chain.decay, at.poles.right[:, at.found]
     seen = chain.gain * np.exp(-1j * np.abs(pole[:, None]) * chain.delay)
-    return Predicted(pole, (chain.response_rows @ right).T * seen, kinds(at.matrices, right))
+    participation = at.poles.left[at.found] @ chain.reference_rows.T * (1 + chain.decay / pole[:, None])
+    return Predicted(pole, (chain.response_rows @ right).T * seen, participation, kinds(at.matrices, right))
 
 
 def predict(spindle: Spindle, observation: Observation, effects: Applied, warmer: float = 0.0) -> Predicted:
@@ -224,6 +259,12 @@ def features_of(data: Data, at: Mapping[int, Predicted]) -> Array:
             value[own.amplitude] = np.log(np.abs(ratio))
             measured = data.value[own.phase]  # the branch of the angle nearest to the measured one
             value[own.phase] = measured + np.angle(ratio * np.exp(-1j * measured))
+        if len(own.size):
+            mode = partner[own.mode_of_residue]
+            residue = _of(p.shape[mode], own.channel_of_residue) * _of(p.participation[mode], own.reference)
+            value[own.size] = np.log(np.maximum(np.abs(residue), 1e-300))
+            measured = data.value[own.turn]
+            value[own.turn] = measured + np.angle(residue * np.exp(-1j * measured))
     return value
 
 
@@ -280,14 +321,14 @@ class Theory:
         for own in self.data.rows.values():
             found[own.amplitude, own.channel] += 1.0
             found[own.amplitude, own.against] -= 1.0
+            found[own.size, own.channel_of_residue] += 1.0
         return found
 
 
 def theory(spindle: Spindle, data: Data) -> Theory:
     """The nuisance parameters: build tolerances, temperature error of every test, gain of every channel."""
     build = toleranced(spindle)
-    channels = max((f.channel for f in data.features), default=-1) + 1
-    channels = max([channels, *(f.against + 1 for f in data.features)])
+    channels = max((o.shape.shape[1] for o in data.observations if o.shape is not None), default=0)
     t = spindle.tolerances
     names = [p.name for p in build]
     names += [f"temperature of {o.test.id}" for o in data.observations]

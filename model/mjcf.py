@@ -42,6 +42,8 @@ def spec(spindle: Spindle, state: PairState, element: str = "linear", looks: boo
     for e in chain.elements:
         if e.name in balls:
             _add_balls(out, chain, balls[e.name], e)
+    if balls:
+        _add_dead_loads(out)
     _add_points(out, spindle, chain)
     if looks:
         dress(out, spindle, state)
@@ -146,6 +148,20 @@ def _add_balls(out: mujoco.MjSpec, chain: RotorBase, bearing: BearingState, elem
     wanted = (rows.T @ element.stiffness @ rows)[np.ix_(both, both)]
     remainder = wanted - tangent(springs, chain.body(element.a).z, chain.body(element.b).z)
     add_matrices(out, f"{bearing.name}.remainder", remainder, np.zeros_like(remainder), np.eye(len(chain.dofs))[both], chain)
+
+
+def _add_dead_loads(out: mujoco.MjSpec) -> None:
+    """Constant forces that hold the loaded balls where they are: a magnet's pull or a preload spring, which the linear model need not know."""
+    model = out.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    largest = max(abs(model.tendon_stiffness @ np.abs(data.ten_length)), 1e-3)
+    for i, force in enumerate(data.qfrc_passive):
+        if abs(force) > 1e-9 * largest:
+            name = model.joint(model.dof_jntid[i]).name
+            load = out.add_actuator(name=f"dead load {name}", trntype=mujoco.mjtTrn.mjTRN_JOINT, target=name)
+            load.biastype = mujoco.mjtBias.mjBIAS_AFFINE
+            load.gainprm[0], load.biasprm[0] = 0.0, -force
 
 
 def _add_points(out: mujoco.MjSpec, spindle: Spindle, chain: RotorBase) -> None:

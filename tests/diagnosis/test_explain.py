@@ -32,23 +32,29 @@ def hidden(spindle, effects, seed: int) -> list[Observation]:
     observations = []
     for temperature, speed in CONDITIONS:
         test = Test(f"T{temperature:g}_n{speed:.0f}", temperature, speed)
-        blank = Observation(test, Condition(temperature, speed), np.ones(1), np.ones(1), np.eye(2), None, None, None)
+        blank = Observation(test, Condition(temperature, speed), np.ones(1), np.ones(1), np.eye(2), None, None, None, None, None)
         p = predict(built, blank, effects, spindle.tolerances.temperature * random.standard_normal())
         inside = (p.frequency > 400) & (p.frequency < 3000)
         f, z, shape = p.frequency[inside], p.damping[inside], p.shape[inside] * gain
         sd = np.concatenate([np.full(len(f), 2e-5), np.full(len(f), 1e-3)])
         noise = sd * random.standard_normal(2 * len(f))
         floor = np.concatenate([np.full(len(f), FREQUENCY_FLOOR), np.full(len(f), DAMPING_FLOOR)])
-        shape = shape / shape[np.arange(len(f)), np.argmax(np.abs(shape), axis=1)][:, None]
-        grain = 1e-3 * (random.standard_normal(shape.shape) + 1j * random.standard_normal(shape.shape))
+        largest = shape[np.arange(len(f)), np.argmax(np.abs(shape), axis=1)][:, None]
+        residue = largest * p.participation[inside]
+
+        def grain(like):
+            return 1e-3 * (random.standard_normal(like.shape) + 1j * random.standard_normal(like.shape))
+
         observations.append(
             replace(
                 blank,
                 frequency=f * np.exp(noise[: len(f)]),
                 damping=z * np.exp(noise[len(f) :]),
                 covariance=np.diag(sd**2 + floor**2),
-                shape=shape + grain,
+                shape=shape / largest + grain(shape),
                 shape_sd=np.full(shape.shape, 1.4e-3),
+                residue=residue * (1 + grain(residue)),
+                residue_sd=np.full(len(f), 3e-3),
             )
         )
     return observations
@@ -58,10 +64,11 @@ def theory_of(spindle, observations) -> Theory:
     return theory(spindle, data_of(observations))
 
 
-RIVALS = tuple(by_name(n) for n in ("soak_lag", "preload_loss", "plate_prestress", "grease_damping"))
+RIVALS = tuple(by_name(n) for n in ("soak_lag", "preload_loss", "plate_prestress", "grease_damping", "hammer_position"))
 HIDDEN = [
     pytest.param("soak_lag", {"hub_share": 0.2}, id="soak_lag"),
     pytest.param("plate_prestress", {"stiffening": -0.03}, id="plate_prestress", marks=pytest.mark.slow),
+    pytest.param("hammer_position", {"offset": 2.0}, id="hammer_position"),
     pytest.param("grease_damping", {"viscous_share": 0.5}, id="grease_damping", marks=pytest.mark.slow),
 ]
 

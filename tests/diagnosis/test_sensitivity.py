@@ -1,0 +1,25 @@
+"""Derivatives by tolerances against differences of the whole model."""
+
+import numpy as np
+import pytest
+
+from diagnosis.sensitivity import derivative
+from sim.effects import by_name
+from tests.diagnosis.test_explain import hidden, theory_of
+
+
+@pytest.mark.parametrize("name", [None, "shaft_bending", "channel_delay", "window_damping", "thermal_gradient", "added_disk"])
+def test_derivatives_are_those_of_the_features(spindle, name):
+    """To 1e-4 of the largest change by one standard deviation, away from the nominal spindle, with effects on every step of the chain."""
+    effects = [] if name is None else [(by_name(name), by_name(name).typical())]
+    about = theory_of(spindle, hidden(spindle, effects, 11))
+    x = 0.7 * about.sd * np.random.default_rng(3).standard_normal(len(about.sd))
+    found = derivative(about, x, effects) * about.sd
+    columns = []
+    for i, sd in enumerate(about.sd):
+        step = np.zeros(len(x))
+        step[i] = 0.02 * sd
+        columns.append((about.features(x + step, effects) - about.features(x - step, effects)) / 0.04)
+    expected = np.array(columns).T
+    assert np.abs(expected).max() > 0.01
+    np.testing.assert_allclose(found, expected, atol=1e-4 * np.abs(expected).max())
