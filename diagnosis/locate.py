@@ -53,6 +53,25 @@ def elements(spindle: Spindle) -> list[Effect]:
     return found
 
 
+def free_form(spindle: Spindle, change: Change) -> list[tuple[Effect, Values]]:
+    """The element of a change as an effect that does it at every condition: linear in temperature between those of the nearest speed."""
+    element = next(e for e in elements(spindle) if e.name == change.element)
+    speeds = sorted({speed for _, speed in change.conditions})
+
+    def size(condition: Condition) -> dict[str, float]:
+        speed = min(speeds, key=lambda s: abs(s - abs(condition.speed)))
+        known = sorted((t, c) for (t, s), c in zip(change.conditions, change.change, strict=True) if s == speed)
+        temperature, changes = zip(*known, strict=True)
+        return {"change": float(np.interp(condition.temperature, temperature, changes))}
+
+    hooks = {
+        key: (lambda s, condition, values, *state, hook=hook: hook(s, condition, size(condition), *state))
+        for key in ("spindle", "pair")
+        if (hook := getattr(element, key))
+    }
+    return [(replace(element, **hooks), {"change": 0.0})]
+
+
 def _change(name: str) -> Parameter:
     return Parameter("change", "1", 0.0, 0.1, FREE, (-0.95, 5.0), f"relative change of the {name}", "free form")
 

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from diagnosis.explain import Candidate, Diagnosis, explain
 from diagnosis.locate import Change, locate
-from diagnosis.next_test import NextTest, next_tests
+from diagnosis.next_test import NextTest, Plan, explanations, next_tests
 from diagnosis.observe import observe
 from diagnosis.theory import Theory, data_of, theory
 from model.machine import Spindle
@@ -31,8 +31,8 @@ def diagnose(
     about = theory(spindle, data_of(observations))
     found = explain(about, catalogue, os.cpu_count() or 1, progress)
     places = locate(about) if found.verdict != "none" else []
-    alive = [c for c in found.candidates if found.candidates[0].delta_evidence - c.delta_evidence < 20][:4]
-    tests = next_tests(about, alive) if found.verdict in ("ambiguous", "two effects", "unexplained") else []
+    tests = [] if found.verdict == "none" else next_tests(about, explanations(about, found, places))
+    progress("next tests weighed")
     return found, about, places, tests
 
 
@@ -68,16 +68,40 @@ def diagnosis_json(found: Diagnosis, about: Theory, places: list[Change], tests:
         ],
         "next_test": [
             {
-                "condition": {"temperature_C": t.temperature, "speed_rpm": t.speed_rpm},
+                "condition": _plan(t.plan),
                 "separates": list(t.separates),
                 "odds": t.odds,
                 "repeats": t.repeats,
-                "predicted_Hz": dict(zip(t.separates, map(list, t.predictions), strict=True)),
+                "predicted": {
+                    name: [{"frequency_Hz": f, "sd_Hz": sd} for f, sd in rows]
+                    for name, rows in zip(t.separates, t.predictions, strict=True)
+                },
             }
             for t in tests
         ],
         "tolerances": {name: {"value": float(v), "sd": float(s), "prior_sd": float(p)} for name, v, s, p in _tolerances(found, about)},
     }
+
+
+def _plan(plan: Plan) -> dict[str, Any]:
+    told: dict[str, Any] = {"temperature_C": plan.condition.temperature, "speed_rpm": plan.condition.speed / RPM}
+    if plan.condition.level:
+        told["level_N"] = plan.condition.level
+    if plan.mass:
+        told |= {"added_mass_g": plan.mass, "on": plan.on}
+    if plan.point is not None:
+        told["point"] = {"body": plan.point.body, "position_mm": [1e3 * v for v in plan.point.position], "direction": plan.point.direction}
+    return told
+
+
+def _plan_words(told: dict[str, Any]) -> str:
+    words = f"at {told['temperature_C']:g} C, {told['speed_rpm']:.0f} rpm"
+    words += f", hit with {told['level_N']:g} N" if "level_N" in told else ""
+    words += f", with {told['added_mass_g']:g} g on the {told['on']}" if "added_mass_g" in told else ""
+    if "point" in told:
+        x, y, z = told["point"]["position_mm"]
+        words += f", looking along x at the {told['point']['body']} ({x:g}, {y:g}, {z:g}) mm too"
+    return words
 
 
 def _candidate(c: Candidate) -> dict[str, Any]:
@@ -120,9 +144,24 @@ def show_diagnosis(console: Console, answer: dict[str, Any], places: list[Change
         for change in places[:3]:
             console.print(f"  {change.words()}; it goes with {change.pattern}", highlight=False)
     for t in answer["next_test"]:
-        where = f"{t['condition']['temperature_C']:g} C, {t['condition']['speed_rpm']:g} rpm"
-        console.print(f"\nA test at {where} would separate {t['separates'][0]} from {t['separates'][1]} with odds of {t['odds']:.3g} to 1")
+        first, second = t["separates"]
+        times = "" if t["repeats"] == 1 else f", {t['repeats']} times for 100 to 1"
+        console.print(
+            f"\nA test {_plan_words(t['condition'])} would separate {first} from {second} with odds of {t['odds']:.3g} to 1{times}; they predict:",
+            highlight=False,
+        )
+        for name, rows in t["predicted"].items():
+            console.print(f"  {name}: {_frequencies(rows)} Hz", highlight=False)
+    for o in answer.get("predictions", []):
+        console.print(
+            f"\nPredicted earlier by {o['explanation']} for {o['test']}: {o['verdict']}, {o['rms']:.2g} standard errors rms over {o['modes']} modes",
+            highlight=False,
+        )
     if answer["verdict"] == "none":
         small = sorted(answer["detectable"].items())
         console.print("\nSmallest size these data would have shown: " + ", ".join(f"{k} {v:.2g}" for k, v in small), highlight=False)
         console.print(f"Not visible in these data at a typical size: {', '.join(answer['invisible']) or 'nothing'}")
+
+
+def _frequencies(rows: list[dict[str, float]]) -> str:
+    return ", ".join(f"{r['frequency_Hz']:.1f} +- {r['sd_Hz']:.1f}" for r in rows)
