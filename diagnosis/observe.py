@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import repeat
+from multiprocessing import get_context
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,17 +48,33 @@ class Observation:
     kind: tuple[str, ...] | None
 
 
-def observe(campaign: Campaign, spindle: Spindle, progress: Callable[[str], None] = lambda done: None) -> list[Observation]:
+def observe(
+    campaign: Campaign, spindle: Spindle, progress: Callable[[str], None] = lambda done: None, workers: int = 1
+) -> list[Observation]:
     """Mode tables of all tests; FRFs are turned into modes first, with the standard errors of the extraction.
 
     A test without standard errors has the noise its campaign states, or else that of the scene's measuring accuracy.
     """
     noise = campaign.noise or Noise(spindle.hammer.noise_of_value, spindle.hammer.noise_of_largest)
     observations = []
-    for test in campaign.tests:
-        observations.append(_from_frf(test, noise) if test.frf is not None else _from_table(test))
-        progress(f"{test.id}: {len(observations[-1].frequency)} modes")
+    with _mapping(min(workers, len(campaign.tests))) as mapped:
+        for o in mapped(_observed, campaign.tests, repeat(noise)):
+            observations.append(o)
+            progress(f"{o.test.id}: {len(o.frequency)} modes")
     return [_repeated(o, [other for other in observations if other is not o]) for o in observations]
+
+
+@contextmanager
+def _mapping(workers: int) -> Iterator[Callable[..., Iterator[Observation]]]:
+    if workers < 2:
+        yield map
+    else:
+        with ProcessPoolExecutor(workers, get_context("fork")) as pool:
+            yield pool.map
+
+
+def _observed(test: Test, noise: Noise) -> Observation:
+    return _from_frf(test, noise) if test.frf is not None else _from_table(test)
 
 
 def _repeated(o: Observation, others: list[Observation]) -> Observation:

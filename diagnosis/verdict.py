@@ -27,7 +27,7 @@ def diagnose(
     spindle: Spindle, campaign: Campaign, catalogue: tuple[Effect, ...] = CATALOGUE, progress: Callable[[str], None] = lambda done: None
 ) -> tuple[Diagnosis, Theory, list[Change], list[NextTest]]:
     """The diagnosis of a campaign, where the model fails without any catalogue, and the tests that would decide."""
-    observations = observe(campaign, spindle, progress)
+    observations = observe(campaign, spindle, progress, os.cpu_count() or 1)
     about = theory(spindle, data_of(observations))
     found = explain(about, catalogue, os.cpu_count() or 1, progress)
     places = locate(about) if found.verdict != "none" else []
@@ -45,6 +45,7 @@ def diagnosis_json(found: Diagnosis, about: Theory, places: list[Change], tests:
         "verdict": found.verdict,
         "effects": list(found.effects),
         "reason": found.reason,
+        "would_change": would_change(found, places, tests),
         "candidates": [_candidate(c) for c in found.candidates[:SHOWN]],
         "invisible": sorted(s.effect.name for s in found.signatures if s.visibility < 1.0),
         "detectable": {s.effect.name: s.smallest for s in found.signatures if np.isfinite(s.smallest)},
@@ -81,6 +82,26 @@ def diagnosis_json(found: Diagnosis, about: Theory, places: list[Change], tests:
         ],
         "tolerances": {name: {"value": float(v), "sd": float(s), "prior_sd": float(p)} for name, v, s, p in _tolerances(found, about)},
     }
+
+
+def would_change(found: Diagnosis, places: list[Change], tests: list[NextTest]) -> str:
+    """What would make this verdict another one, in a sentence or two."""
+    test = ""
+    if tests:
+        told, (first, second) = _plan_words(_plan(tests[0].plan)), tests[0].separates
+        test = f" A test {told} tells {first} from {second}."
+    if found.verdict == "none":
+        return "An effect larger than these data could have hidden would change that; how large that is, is listed for each."
+    if found.verdict == "unexplained":
+        place = f", which would have to change the {places[0].element} ({places[0].pattern})" if places else ""
+        return f"An effect that the catalogue does not hold would change that{place}.{test}"
+    rivals = [c for c in found.candidates if set(c.effects) - set(found.effects)]
+    rival = (
+        f"{' + '.join(rivals[0].effects)}, {rivals[0].delta_evidence - found.candidates[0].delta_evidence:.0f} in ln evidence"
+        if rivals
+        else "none"
+    )
+    return f"Data that the next best explanation ({rival}) predicts better would change that.{test}"
 
 
 def _plan(plan: Plan) -> dict[str, Any]:
@@ -128,7 +149,8 @@ def _tolerances(found: Diagnosis, about: Theory):
 def show_diagnosis(console: Console, answer: dict[str, Any], places: list[Change]) -> None:
     named = f": {', '.join(answer['effects'])}" if answer["effects"] else ""
     console.print(f"[bold]{answer['verdict']}{named}[/bold]")
-    console.print(answer["reason"])
+    console.print(answer["reason"], highlight=False)
+    console.print(answer["would_change"], highlight=False)
     error = answer["error"]
     console.print(
         f"rms pull {error['before']:.2f} -> {error['after']:.2f}; on left-out conditions {error['held_out_before']:.2f} -> {error['held_out_after']:.2f}"
