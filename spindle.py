@@ -23,14 +23,16 @@ from diagnosis.catalogue import show_effect, show_effects, summary
 from model.ball_row import NoEquilibrium
 from model.machine import Condition, HammerTest, OutsideRange, Spindle
 from model.mjcf import ELEMENTS
-from model.scene import BadInput, load
+from model.scene import BadInput, content_hash, load
 from sim import output
-from sim.effects import CATALOGUE, by_name
+from sim.effect import Effect
+from sim.effects import by_name
 from sim.folder import MARK, whole_folder
 
 RPM = 2 * np.pi / 60
 WIDTH = 110  # columns that the tables need; a narrower terminal wraps lines rather than lose digits
 TEMPERATURES = [20.0, 30.0, 40.0, 50.0, 60.0]
+NOMINAL_RPM = 7200.0  # of running verbs, unless they are told another speed
 
 Answer = tuple[dict[str, Any], Callable[[Console], None]]
 """What a verb returns: its JSON object, and a function that prints the same for a person."""
@@ -108,6 +110,11 @@ def _parser() -> argparse.ArgumentParser:
             added.add_argument("target", metavar=what, type=Path)
         added.add_argument("--json", action="store_true", help="one JSON object on standard output, nothing else")
         added.add_argument("--out", type=Path, metavar="DIR", help="folder to write, whole or not at all")
+        if what != "FILE.rrd":
+            added.add_argument(
+                "--effect", dest="effect_files", type=Path, action="append", default=[], metavar="FILE.py",
+                help="a file with an effect of your own, beside those of the catalogue; may be given again",
+            )  # fmt: skip
         return added
 
     def several(added: argparse.ArgumentParser) -> None:
@@ -125,6 +132,9 @@ def _parser() -> argparse.ArgumentParser:
         added.add_argument("--hits", type=_count, help="hits on each hammer point (the scene's by default)")
         added.add_argument("--level", type=_number, metavar="N", help="peak force of the hammer (the scene's by default)")
         added.add_argument("--seed", type=int, default=0, help="of hammer scatter and sensor noise")
+
+    def held_out(added: argparse.ArgumentParser, text: str) -> None:
+        added.add_argument("--held-out", nargs="+", action="extend", default=[], metavar="TEST", help=text)
 
     chain = verb("run", _run, "the whole chain: tables, model, virtual tests, modal peaks, report and Rerun log")
     several(chain)
@@ -147,12 +157,19 @@ def _parser() -> argparse.ArgumentParser:
     hammer(report)
     against = verb("compare", _compare, "a campaign beside the scene: modes, dampings, shapes and FRFs, and one number for the whole")
     against.add_argument("campaign", metavar="CAMPAIGN", type=Path)
+    against.add_argument("--before", type=Path, metavar="SCENE", help="the scene as it was, to see whether the error fell")
+    held_out(against, "tests that the scene was not fitted to (by default those that its build table does not list)")
     missing = verb("diagnose", _diagnose, "which physics the scene lacks to explain a campaign")
     missing.add_argument("campaign", metavar="CAMPAIGN", type=Path)
+    held_out(missing, "tests to leave out, so that `compare` can show what is predicted of them")
+    missing.add_argument("--predictions", type=Path, metavar="DIAGNOSIS.json", help="an earlier diagnosis: did what it predicted come true?")
+    rungs = verb("ladder", _ladder, "model forms, tolerances and effects taken in one after the other, and the error at every step")
+    rungs.add_argument("campaign", metavar="CAMPAIGN", type=Path)
+    rungs.add_argument("--effects", nargs="+", metavar="NAME", help="effects to add, in this order (those that diagnose names by default)")
     effects = verb("effects", _effects, "the catalogue of physical effects, or one of them explained", what="")
     effects.add_argument("name", metavar="NAME", nargs="?")
-    add = verb("add", _add, "a new scene with one more effect")
-    add.add_argument("effect", metavar="EFFECT")
+    add = verb("add", _add, "a new scene with one more effect, or with several that were fitted together")
+    add.add_argument("effect", metavar="EFFECT", nargs="+")
     add.add_argument(
         "--set",
         type=_setting,
@@ -160,11 +177,31 @@ def _parser() -> argparse.ArgumentParser:
         action="extend",
         default=[],
         metavar="NAME=VALUE",
-        help="parameter values (typical ones by default)",
+        help="parameter values (typical ones by default); EFFECT.NAME where several effects have one of that name",
     )
     add.add_argument(
-        "--from", dest="diagnosis", type=Path, metavar="DIAGNOSIS.json", help="take fitted values from the answer of diagnose --json"
+        "--from", dest="diagnosis", type=Path, metavar="DIAGNOSIS.json", help="take fitted values and build tolerances from the answer of diagnose --json"
     )
+    running = verb("runout", _runout, "repeatable and nonrepeatable runout of the turning spindle, and the lines it is made of")
+    one(running)
+    running.add_argument("--speed", type=_number, required=True, metavar="RPM")
+    running.add_argument("--seconds", type=_number, metavar="S", help="length of the record (by default half a second to a second)")
+    running.add_argument("--seed", type=int, help="draw plausible imperfections instead of the scene's")
+    running.add_argument("--element", choices=ELEMENTS, default="linear", help="bearing element of the time simulation")
+    running.add_argument(
+        "--path", choices=("simulated", "linear"), default="simulated", help="a run in MuJoCo, or the exact harmonic answer of the linear model"
+    )
+    warmup = verb("warmup", _warmup, "from cold start (or into a chamber soak): temperatures, preload, friction and frequencies over time")
+    one(warmup)
+    warmup.add_argument("--speed", type=_number, metavar="RPM", help="7200 by default, 0 for a soak")
+    warmup.add_argument("--minutes", type=_number, metavar="M", help="eight time constants by default")
+    warmup.add_argument("--soak", type=_temperature, metavar="C", help="chamber at another temperature than the spindle's at the start")
+    resonance = verb("map", _map, "natural frequencies against every bearing and unbalance line, over temperature and speed")
+    one(resonance)
+    resonance.add_argument("--speed", type=_number, default=NOMINAL_RPM, metavar="RPM", help="the nominal speed")
+    resonance.add_argument("--temperatures", type=_temperature, nargs="+", metavar="C", help="20 to 60 C in 21 steps by default")
+    resonance.add_argument("--speeds", type=_number, nargs="+", metavar="RPM", help="0 to twice the nominal speed in 41 steps by default")
+    resonance.add_argument("--multiples", type=_count, default=3, metavar="K", help="of the number of balls, and even ball orders")
     verb("inspect", _inspect, "what a Rerun log of spindle holds, and its FRFs as numbers", "FILE.rrd")
     return parser
 
@@ -180,6 +217,17 @@ def _hammer_settings(spindle: Spindle, options: argparse.Namespace) -> Spindle:
 # ---------------------------------------------------------------- verbs
 
 
+def _equipped(options: argparse.Namespace, scene: Path | None = None) -> tuple[Spindle, tuple[Effect, ...]]:
+    """The scene of a verb with its effects found, a user's own (--effect) among them; and every effect there is."""
+    from sim.effect_rules import equipped
+
+    return equipped(load(scene or options.target), options.effect_files)
+
+
+def _scene(options: argparse.Namespace) -> Spindle:
+    return _equipped(options)[0]
+
+
 @contextmanager
 def _progress(steps: int) -> Iterator[Callable[[str], None]]:
     """A function that takes what has been done, and moves a bar of so many steps on standard error."""
@@ -193,7 +241,7 @@ def _whole_chain(options: argparse.Namespace, extra: int):
     """The run that `run`, `report` and `simulate` share, with a progress bar on standard error."""
     from sim.run import run
 
-    spindle = _hammer_settings(load(options.target), options)
+    spindle = _hammer_settings(_scene(options), options)
     with _progress(3 * len(options.temperatures) + extra) as progress:
         result = run(spindle, options.temperatures, options.speed * RPM, options.element, options.seed, progress)
         yield result, progress
@@ -213,7 +261,7 @@ def _table(options: argparse.Namespace) -> Answer:
     from model.table import write_table
     from sim.operating import stiffness_table
 
-    table = stiffness_table(load(options.target), options.temperatures, [s * RPM for s in options.speeds])
+    table = stiffness_table(_scene(options), options.temperatures, [s * RPM for s in options.speeds])
     answer = output.table_json(table)
     if options.out:
         with whole_folder(options.out) as folder:
@@ -225,7 +273,7 @@ def _table(options: argparse.Namespace) -> Answer:
 def _modes(options: argparse.Namespace) -> Answer:
     from sim.operating import operating_point
 
-    spindle = load(options.target)
+    spindle = _scene(options)
     point = operating_point(spindle, Condition(options.temperature, options.speed * RPM))
     answer = output.modes_json(point, options.highest or spindle.hammer.band[1])
     if options.out:
@@ -270,9 +318,22 @@ def _report(options: argparse.Namespace) -> Answer:
 
 
 def _inspect(options: argparse.Namespace) -> Answer:
-    from sim.log import describe, read_log
+    from sim import log_map_read as resonance
+    from sim import log_runout_read as turning
+    from sim.log_read import contents_of, describe, open_log
 
-    contents = read_log(options.target)
+    opened = open_log(options.target)
+    if resonance.is_map(opened):
+        grid = resonance.map_contents(opened)
+        answer = resonance.map_contents_json(grid)
+        _write_answer(options, answer, "contents.json")
+        return answer, lambda console: console.print(resonance.describe_map(grid), markup=False, highlight=False)
+    if turning.is_runout(opened):
+        record = turning.runout_contents(opened)
+        answer = turning.runout_contents_json(record)
+        _write_answer(options, answer, "contents.json")
+        return answer, lambda console: console.print(turning.describe_runout(record), markup=False, highlight=False)
+    contents = contents_of(opened)
     answer = output.log_json(contents)
     if options.out:
         with whole_folder(options.out) as folder:
@@ -282,38 +343,139 @@ def _inspect(options: argparse.Namespace) -> Answer:
 
 
 def _compare(options: argparse.Namespace) -> Answer:
-    from diagnosis.compare import compare, comparison_json, show_comparison
+    from diagnosis.before_after import BeforeAfter, held_out, show_before_after
+    from diagnosis.compare import compare
+    from diagnosis.compare_report import write_comparison
+    from diagnosis.compare_words import comparison_json, show_comparison
+    from diagnosis.observe import observe
     from sim.campaign import read_campaign
 
-    spindle, campaign = load(options.target), read_campaign(options.campaign)
-    with _progress(2 * len(campaign.tests)) as progress:
-        comparison = compare(spindle, campaign, progress=progress)
+    spindle, campaign = _scene(options), read_campaign(options.campaign)
+    before = _equipped(options, options.before)[0] if options.before else None
+    unseen = held_out(spindle, campaign, options.held_out)
+    with _progress((3 if before else 2) * len(campaign.tests)) as progress:
+        observed = observe(campaign, spindle, progress)
+        comparison = compare(spindle, campaign, observed, progress)
+        both = BeforeAfter(compare(before, campaign, observed, progress) if before else comparison, comparison, unseen)
     answer = comparison_json(comparison)
-    _write_answer(options, answer, "comparison.json")
-    return answer, lambda console: show_comparison(console, comparison)
+    if before:
+        answer |= {"error": both.errors(), "held_out": list(unseen)}
+    _write_answer(options, answer, "comparison.json", lambda folder: write_comparison(comparison, spindle, folder))
+
+    def show(console: Console) -> None:
+        show_comparison(console, comparison)
+        if before:
+            show_before_after(console, both)
+
+    return answer, show
 
 
 def _diagnose(options: argparse.Namespace) -> Answer:
+    from diagnosis.before_after import without
+    from diagnosis.prediction import outcomes
     from diagnosis.verdict import diagnose, diagnosis_json, show_diagnosis
     from sim.campaign import read_campaign
 
-    spindle, campaign = load(options.target), read_campaign(options.campaign)
+    (spindle, catalogue), campaign = _equipped(options), without(read_campaign(options.campaign), options.held_out)
     with _progress(len(campaign.tests) + 5) as progress:
-        found, about, places, tests = diagnose(spindle, campaign, progress=progress)
-    answer = diagnosis_json(found, about, places, tests)
+        found, about, places, tests = diagnose(spindle, campaign, catalogue, progress)
+    came = outcomes(options.predictions, about.data.observations) if options.predictions else []
+    answer = diagnosis_json(found, about, places, tests) | {"campaign": campaign.title, "scene_hash": content_hash(spindle)}
+    answer |= {"predictions": [asdict(o) for o in came]} if options.predictions else {}
     _write_answer(options, answer, "diagnosis.json")
     return answer, lambda console: show_diagnosis(console, answer, places)
+
+
+def _runout(options: argparse.Namespace) -> Answer:
+    from model.imperfections import drawn
+    from sim.operating import operating_point
+    from sim.runout import runout, with_imperfections
+    from sim.runout_output import runout_json, show_runout, write_runout
+
+    spindle = _scene(options)
+    if options.seed is not None:
+        spindle = with_imperfections(spindle, drawn(spindle, options.seed))
+    with _progress(5) as progress:
+        point = operating_point(spindle, Condition(options.temperature, options.speed * RPM))
+        found = runout(point, options.seconds, options.element, options.path)
+        progress("record analysed")
+        answer = runout_json(found, options.path, options.element, options.seed)
+        if options.out:
+            with whole_folder(options.out) as folder:
+                write_runout(found, spindle, answer, folder, progress)
+                _mark(folder, options, answer)
+    return answer, lambda console: show_runout(console, answer)
+
+
+# ---------------------------------------------------------------- running: heat and resonance
+
+
+def _warmup(options: argparse.Namespace) -> Answer:
+    from sim.warmup import warm_up
+    from sim.warmup_output import show_warmup, warmup_json, write_warmup
+
+    if options.minutes is not None and options.minutes <= 0:
+        raise BadInput(f"--minutes {options.minutes:g}: a warm-up lasts longer than nothing; name a positive number")
+    spindle = _scene(options)
+    speed = (0.0 if options.soak is not None else NOMINAL_RPM) if options.speed is None else options.speed
+    duration = None if options.minutes is None else 60 * options.minutes
+    with _progress(3) as progress:
+        warmup = warm_up(spindle, speed * RPM, options.temperature, options.soak, duration, progress=progress)
+    answer = warmup_json(warmup)
+    if options.out:
+        with whole_folder(options.out) as folder:
+            write_warmup(warmup, folder)
+            _mark(folder, options, answer)
+    return answer, lambda console: show_warmup(console, warmup)
+
+
+def _ladder(options: argparse.Namespace) -> Answer:
+    from diagnosis.ladder import ladder
+    from diagnosis.ladder_report import growing, ladder_json, show_ladder, write_ladder
+    from sim.campaign import read_campaign
+
+    (spindle, catalogue), campaign = _equipped(options), read_campaign(options.campaign)
+    chosen = None if options.effects is None else [by_name(name, catalogue) for name in options.effects]
+    with growing(Console(stderr=True, width=WIDTH)) as live:
+        found = ladder(spindle, campaign, chosen, catalogue, live.rung, live.progress)
+    answer = ladder_json(found)
+    _write_answer(options, answer, "ladder.json", lambda folder: write_ladder(found, folder))
+    return answer, lambda console: show_ladder(console, found)
+
+
+def _map(options: argparse.Namespace) -> Answer:
+    from sim.log_map import write_map_log
+    from sim.resonance import resonance_map
+    from sim.resonance_output import map_json, show_map, write_map
+
+    spindle, nominal = _scene(options), Condition(options.temperature, options.speed * RPM)
+    if options.speed <= 0:
+        raise BadInput(f"--speed {options.speed:g}: the nominal speed of a map must be positive")
+    temperatures = options.temperatures or np.linspace(TEMPERATURES[0], TEMPERATURES[-1], 21).tolist()
+    speeds = np.array(options.speeds or np.linspace(0, 2 * options.speed, 41)) * RPM
+    with _progress(3) as progress:
+        found = resonance_map(spindle, temperatures, speeds.tolist(), nominal, options.multiples, progress=progress)
+    answer = map_json(found)
+    if options.out:
+        with whole_folder(options.out) as folder:
+            write_map(found, folder)
+            write_map_log(found, folder / "map.rrd")
+            _mark(folder, options, answer)
+    return answer, lambda console: show_map(console, found)
 
 
 # ---------------------------------------------------------------- effects
 
 
 def _effects(options: argparse.Namespace) -> Answer:
+    from sim.effect_rules import catalogue
+
+    known = catalogue(options.effect_files)
     if options.name is None:
-        answer: dict[str, Any] = {"effects": [summary(e) for e in CATALOGUE]}
+        answer: dict[str, Any] = {"effects": [summary(e) for e in known]}
         _write_answer(options, answer, "effects.json")
-        return answer, lambda console: show_effects(console)
-    effect = by_name(options.name)
+        return answer, lambda console: show_effects(console, known)
+    effect = by_name(options.name, known)
     keys = ("name", "title", "equation", "sees", "valid")
     answer = {k: getattr(effect, k) for k in keys} | {
         "resembles": list(effect.resembles),
@@ -329,8 +491,9 @@ def _add(options: argparse.Namespace) -> Answer:
     if options.out is None:
         raise BadInput("--out: add needs the folder of the new scene")
     check_place(options.target, options.out)
+    catalogue = _equipped(options)[1]
     with whole_folder(options.out) as folder:
-        added = new_scene(options.target, options.effect, options.set, options.diagnosis, folder, options.out)
+        added = new_scene(options.target, options.effect, options.set, options.diagnosis, folder, options.out, catalogue)
         answer = {"scene": str(options.out), **asdict(added)}
         _mark(folder, options, answer)
     return answer, lambda console: console.print(f"{options.out}: {added.words()}", highlight=False, markup=False)
@@ -339,17 +502,20 @@ def _add(options: argparse.Namespace) -> Answer:
 # ---------------------------------------------------------------- output folders
 
 
-def _write_answer(options: argparse.Namespace, answer: dict[str, Any], name: str) -> None:
-    """The JSON answer as a file of the output folder, if one is wanted."""
+def _write_answer(
+    options: argparse.Namespace, answer: dict[str, Any], name: str, more: Callable[[Path], None] = lambda folder: None
+) -> None:
+    """The JSON answer as a file of the output folder, if one is wanted, beside what `more` writes there."""
     if options.out:
         with whole_folder(options.out) as folder:
             (folder / name).write_text(json.dumps(answer, indent=1), encoding="utf-8")
+            more(folder)
             _mark(folder, options, answer)
 
 
 def _mark(folder: Path, options: argparse.Namespace, answer: dict[str, Any]) -> None:
     told = {k: str(v) if isinstance(v, Path) else v for k, v in vars(options).items() if k != "verb"}
-    (folder / MARK).write_text(json.dumps({"options": told, "answer": answer}, indent=1), encoding="utf-8")
+    (folder / MARK).write_text(json.dumps({"options": told, "answer": answer}, indent=1, default=str), encoding="utf-8")
 
 
 if __name__ == "__main__":

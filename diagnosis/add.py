@@ -1,32 +1,65 @@
-"""A new scene: an old one with one more effect, its values typical, fitted by a diagnosis, or set by hand."""
+"""A new scene: an old one with more effects, their values typical, fitted by a diagnosis, or set by hand.
+
+From a diagnosis come the build tolerances too that were fitted beside those effects: the scene's `build` table. Temperature errors and
+channel gains belong to the tests they were fitted to and not to the spindle, so they stay behind; `compare` has them in its errors.
+"""
 
 from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Sequence
+import tomllib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from model.scene import BadInput, load, scene_path
+from model.machine import Spindle
+from model.scene import BadInput, content_hash, load, scene_path
 from sim.campaign_file import toml
 from sim.effect import Effect
-from sim.effects import by_name, checked
+from sim.effect_file import OwnEffect
+from sim.effects import CATALOGUE, by_name, checked, resolved
+
+OF_TEST, OF_CHANNEL = "temperature of ", "gain of channel "  # nuisance parameters that are not the spindle's
 
 
 @dataclass(frozen=True)
 class Added:
-    """The effect a scene was given; `origin` and `source` are what its table in the new file says."""
+    """An effect the scene was given; `origin` and `source` are what its table in the new file says."""
 
     effect: str
     values: dict[str, float]
+    units: dict[str, str]
     origin: str
     source: str
 
     def words(self) -> str:
-        units = {p.name: p.unit for p in by_name(self.effect).parameters}
-        said = ", ".join(f"{name} = {value:g} {units[name]}".removesuffix(" 1") for name, value in self.values.items())
+        said = ", ".join(f"{name} = {value:g} {self.units[name]}".removesuffix(" 1") for name, value in self.values.items())
         return f"{self.effect} added ({self.origin}): {said}"
+
+
+@dataclass(frozen=True)
+class NewScene:
+    """What was written: the effects, the relative build deviations (empty: the drawing's own), and a word on these."""
+
+    added: tuple[Added, ...]
+    build: dict[str, float]
+    note: str
+
+    def words(self) -> str:
+        return "\n".join([*(a.words() for a in self.added), *([self.note] if self.note else [])])
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What `add` takes of an answer of `diagnose --json`: candidates as (effects, parameters), and the tolerances fitted beside `best`."""
+
+    candidates: tuple[tuple[tuple[str, ...], Mapping[str, Any]], ...]
+    best: tuple[str, ...]  # empty: no effect was taken for true, and the tolerances are those fitted without any
+    build: dict[str, float]
+    tests: tuple[str, ...]
+    scene_hash: str | None
 
 
 def check_place(target: Path, out: Path) -> None:
@@ -37,31 +70,76 @@ def check_place(target: Path, out: Path) -> None:
         raise BadInput(f"--out {out}: the new scene may neither be, hold nor lie inside the folder of {file}")
 
 
-def new_scene(target: Path, name: str, by_hand: Sequence[tuple[str, float]], diagnosis: Path | None, folder: Path, out: Path) -> Added:
-    """Write the scene of `target` with effect `name` into `folder`, which will stand at `out`; `BadInput` for what cannot be.
+def new_scene(
+    target: Path,
+    names: Sequence[str],
+    by_hand: Sequence[tuple[str, float]],
+    diagnosis: Path | None,
+    folder: Path,
+    out: Path,
+    catalogue: Sequence[Effect] = CATALOGUE,
+) -> NewScene:
+    """Write the scene of `target` with the effects `names` into `folder`, which will stand at `out`; `BadInput` for what cannot be.
 
     Values are typical, unless fitted in the file `diagnosis`, unless set `by_hand`. The new scene is loaded before it is accepted.
     """
-    effect, file = by_name(name), scene_path(target)
-    if any(a.effect == effect.name for a in load(file).effects):
-        raise BadInput(f"{file}: effects.{effect.name}: is there already; change its values there, or add to the scene it was added to")
-    fitted = fitted_values(effect, diagnosis) if diagnosis else {}
-    values = checked(effect, effect.typical() | fitted | dict(by_hand))
-    told = {"typical of the catalogue": [n for n in values if n not in fitted], f"fitted, from {diagnosis}": list(fitted)}
-    hand = [name for name, _ in by_hand]
-    told = {what: [n for n in names if n not in hand] for what, names in told.items()} | {"set by hand": list(dict.fromkeys(hand))}
-    source = "; ".join(f"{what}: {', '.join(names)}" for what, names in told.items() if names)
-    origin = "calibrated" if fitted else "assumed"
-    text = file.read_text(encoding="utf-8").rstrip("\n") + "\n\n" + _effect_table(effect, values, origin, source)
+    effects, file = [by_name(name, catalogue) for name in dict.fromkeys(names)], scene_path(target)
+    old = load(file)
+    for effect in effects:
+        if any(a.effect == effect.name for a in old.effects):
+            raise BadInput(f"{file}: effects.{effect.name}: is there already; change its values there, or add to the scene it was added to")
+    fitted: dict[str, dict[str, float]] = {}
+    build: dict[str, float] = {}
+    note = ""
+    answer = read_answer(diagnosis) if diagnosis else None
+    if answer and diagnosis:
+        fitted = fitted_values(effects, answer, diagnosis)
+        build, note = _build_of(effects, answer, diagnosis, old, file)
+    hand = _by_effect(effects, by_hand)
+    added = tuple(_added(e, fitted.get(e.name, {}), hand[e.name], diagnosis) for e in effects)
+    text = file.read_text(encoding="utf-8")
+    if build and answer:
+        text = _without_build(text).rstrip("\n") + "\n\n" + _build_table(build, answer.tests, diagnosis)
+    for effect, row in zip(effects, added, strict=True):
+        text = text.rstrip("\n") + "\n\n" + _effect_table(effect, row.values, row.origin, row.source)
     (folder / "spindle.toml").write_text(text, encoding="utf-8")
     for part in ("measured", "published"):
         if (file.parent / part).is_dir():
             shutil.copytree(file.parent / part, folder / part)
     try:
-        load(folder)
+        resolved(load(folder), catalogue)
     except BadInput as error:
         raise BadInput(str(error).replace(str(folder), str(out))) from None
-    return Added(effect.name, values, origin, source)
+    return NewScene(added, build, note)
+
+
+def _added(effect: Effect, fitted: Mapping[str, float], by_hand: Mapping[str, float], diagnosis: Path | None) -> Added:
+    values = checked(effect, effect.typical() | dict(fitted) | dict(by_hand))
+    told = {
+        "typical of the catalogue": [n for n in values if n not in fitted and n not in by_hand],
+        f"fitted, from {diagnosis}": [n for n in fitted if n not in by_hand],
+        "set by hand": list(by_hand),
+    }
+    source = "; ".join(f"{what}: {', '.join(names)}" for what, names in told.items() if names)
+    if isinstance(effect, OwnEffect):
+        source += f"; the effect is not of the catalogue but of {effect.where}"
+    units = {p.name: p.unit for p in effect.parameters}
+    return Added(effect.name, values, units, "calibrated" if fitted else "assumed", source)
+
+
+def _by_effect(effects: Sequence[Effect], by_hand: Sequence[tuple[str, float]]) -> dict[str, dict[str, float]]:
+    """Values set by hand for each effect, from `<parameter>` or `<effect>.<parameter>`."""
+    found: dict[str, dict[str, float]] = {e.name: {} for e in effects}
+    for key, value in by_hand:
+        effect, dot, name = key.rpartition(".")
+        owners = [e.name for e in effects if e.name == effect] if dot else [e.name for e in effects if name in e.neutral()]
+        if not owners and len(effects) == 1 and not dot:
+            owners = [effects[0].name]  # `checked` says what is allowed
+        if len(owners) != 1:
+            allowed = ", ".join(f"{e.name}.{p}" for e in effects for p in e.neutral())
+            raise BadInput(f"--set {key}={value:g}: names {'no' if not owners else 'more than one'} parameter; allowed are {allowed}")
+        found[owners[0]][name] = value
+    return found
 
 
 def _effect_table(effect: Effect, values: dict[str, float], origin: str, source: str) -> str:
@@ -71,27 +149,94 @@ def _effect_table(effect: Effect, values: dict[str, float], origin: str, source:
     return "\n".join(lines) + "\n"
 
 
-def fitted_values(effect: Effect, file: Path) -> dict[str, float]:
-    """Values of an effect in the first candidate of a diagnosis that has it, from `<effect>.<parameter>` or `<parameter>`."""
+# ---------------------------------------------------------------- what a diagnosis found
+
+
+def read_answer(file: Path) -> Answer:
+    """The file of an answer of `spindle diagnose --json`; `BadInput` for another."""
     try:
-        diagnosis = json.loads(file.read_text(encoding="utf-8"))
-        candidates = [(list(c["effects"]), dict(c["parameters"])) for c in diagnosis["candidates"]]
+        raw = json.loads(file.read_text(encoding="utf-8"))
+        candidates = tuple((tuple(c["effects"]), dict(c["parameters"])) for c in raw["candidates"])
+        tolerances = {name: float(row["value"]) for name, row in raw.get("tolerances", {}).items()}
+        best = candidates[0][0] if candidates and raw.get("effects") else ()
+        scene_hash = raw.get("scene_hash")
     except OSError as error:
         raise BadInput(f"--from {file}: cannot be read: {error.strerror}") from None
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, AttributeError):
         raise BadInput(f"--from {file}: is not an answer of spindle diagnose --json, with candidates of effects and parameters") from None
-    parameters = next((p for effects, p in candidates if effect.name in effects), None)
+    build = {name: float(f"{v:.8g}") for name, v in tolerances.items() if not name.startswith((OF_TEST, OF_CHANNEL))}
+    tests = tuple(name.removeprefix(OF_TEST) for name in tolerances if name.startswith(OF_TEST))
+    return Answer(candidates, best, build, tests, scene_hash)
+
+
+def fitted_values(effects: Sequence[Effect], answer: Answer, file: Path) -> dict[str, dict[str, float]]:
+    """Values of effects in the first candidate that has them all, from `<effect>.<parameter>` or, alone, `<parameter>`."""
+    names = [e.name for e in effects]
+    parameters = next((p for own, p in answer.candidates if set(names) <= set(own)), None)
     if parameters is None:
-        named = ", ".join(dict.fromkeys(str(e) for effects, _ in candidates for e in effects)) or "none"
-        raise BadInput(f"--from {file}: no candidate has effect {effect.name}; its candidates are {named}")
-    found = {}
-    for name in effect.neutral():
-        row = parameters.get(f"{effect.name}.{name}", parameters.get(name))
-        if row is not None:
-            value = row.get("value") if isinstance(row, dict) else row
-            if not isinstance(value, int | float) or isinstance(value, bool):
-                raise BadInput(f"--from {file}: {effect.name}.{name}.value = {value!r}: must be a number")
-            found[name] = float(value)
-    if not found:
-        raise BadInput(f"--from {file}: its candidate has no value for {effect.name}; its parameters are {', '.join(effect.neutral())}")
+        told = dict.fromkeys(" + ".join(own) if len(names) > 1 else e for own, _ in answer.candidates for e in own)
+        raise BadInput(
+            f"--from {file}: no candidate has effect{'s' * (len(names) > 1)} {' and '.join(names)}; its candidates are "
+            f"{', '.join(told) or 'none'}"
+        )
+    found: dict[str, dict[str, float]] = {}
+    for effect in effects:
+        found[effect.name] = {}
+        for name in effect.neutral():
+            row = parameters.get(f"{effect.name}.{name}", parameters.get(name) if len(effects) == 1 else None)
+            if row is not None:
+                value = row.get("value") if isinstance(row, dict) else row
+                if not isinstance(value, int | float) or isinstance(value, bool):
+                    raise BadInput(f"--from {file}: {effect.name}.{name}.value = {value!r}: must be a number")
+                found[effect.name][name] = float(value)
+        if not found[effect.name]:
+            raise BadInput(f"--from {file}: its candidate has no value for {effect.name}; its parameters are {', '.join(effect.neutral())}")
     return found
+
+
+def _build_of(effects: Sequence[Effect], answer: Answer, diagnosis: Path, old: Spindle, file: Path) -> tuple[dict[str, float], str]:
+    """Deviations of the new scene, none where it keeps those it has, and a word on them.
+
+    A diagnosis of a scene that has deviations already found more of them, relative to those; one of the scene before (the second
+    effect of a pair, added after the first) found the same.
+    """
+    names = {e.name for e in effects}
+    if not answer.build:
+        return {}, f"{diagnosis} holds no tolerances: the build is the drawing's"
+    if not names <= set(answer.best):
+        beside = " + ".join(answer.best) or "no effect"
+        return {}, f"the tolerances of {diagnosis} were fitted beside {beside} and do not go with {' + '.join(sorted(names))}: left out"
+    missing = set(answer.best) - names - {a.effect for a in old.effects}
+    note = f"{len(answer.build)} build tolerances as fitted beside {' + '.join(answer.best)}"
+    if missing:
+        note += f", of which {' + '.join(sorted(missing))} is not in the scene yet"
+    if old.build is None:
+        return dict(answer.build), note
+    if old.build.deviations == answer.build:
+        return {}, note
+    if answer.scene_hash != content_hash(old):
+        raise BadInput(f"{file}: build: holds the tolerances of another diagnosis than {diagnosis}; add to the scene that was diagnosed")
+    both = {**old.build.deviations, **answer.build}
+    return {n: (1 + old.build.deviations.get(n, 0.0)) * (1 + answer.build.get(n, 0.0)) - 1 for n in both}, note
+
+
+def _build_table(build: Mapping[str, float], tests: Sequence[str], diagnosis: Path | None) -> str:
+    lines = ["# How the built spindle differs from its drawing: relative deviations, already fitted", "[build]", 'origin = "calibrated"']
+    lines += [f"source = {toml(f'fitted, from {diagnosis}')}", f"tests = {toml(list(tests))}", "", "[build.deviations]"]
+    return "\n".join([*lines, *(f"{toml(name)} = {toml(float(value))}" for name, value in build.items())]) + "\n"
+
+
+def _without_build(text: str) -> str:
+    """The text of a scene file without the table that `_build_table` wrote; `BadInput` for one written otherwise."""
+    if "build" not in tomllib.loads(text):
+        return text
+    lines = text.splitlines()
+    start = next((i for i, line in enumerate(lines) if line.strip() == "[build]"), None)
+    stop = next((i for i, line in enumerate(lines) if line.strip() == "[build.deviations]"), None)
+    if start is None or stop is None or start > stop:
+        raise BadInput("build: is not written as the tables [build] and [build.deviations]; write it so, or take it out")
+    while stop + 1 < len(lines) and not lines[stop + 1].lstrip().startswith(("[", "#")):
+        stop += 1
+    if start and lines[start - 1].startswith("# How the built spindle"):
+        start -= 1
+    return "\n".join([*lines[:start], *lines[stop + 1 :]]) + "\n"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from rich.box import SIMPLE_HEAD
@@ -9,7 +10,6 @@ from rich.console import Console
 from rich.table import Table
 
 from sim.effect import Effect
-from sim.effects import CATALOGUE
 
 
 def summary(effect: Effect) -> dict[str, Any]:
@@ -18,11 +18,11 @@ def summary(effect: Effect) -> dict[str, Any]:
     return {"name": effect.name, "title": effect.title} | told
 
 
-def show_effects(console: Console) -> None:
+def show_effects(console: Console, catalogue: Sequence[Effect]) -> None:
     grid = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
     for column in ("effect", "what it is", "main parameter", "typical", "unit"):
         grid.add_column(column, justify="right" if column == "typical" else "left")
-    for e in map(summary, CATALOGUE):
+    for e in map(summary, catalogue):
         grid.add_row(e["name"], e["title"], e["parameter"], f"{e['typical']:g}", e["unit"])
     console.print(grid)
     console.print("spindle effects NAME explains one; spindle add SCENE NAME --out NEW_SCENE adds it.", highlight=False)

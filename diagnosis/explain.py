@@ -157,7 +157,8 @@ def explain(
     workers: int = 2,
     progress: Callable[[str], None] = lambda done: None,
 ) -> Diagnosis:
-    """The whole diagnosis of one campaign."""
+    """The whole diagnosis of one campaign; effects that the scene has already are left as they are."""
+    catalogue = [e for e in catalogue if e.name not in {present.name for present, _ in theory.present}]
     about = linearise(theory)
     base = fit(theory, about)
     progress(f"tolerances fitted: misfit {base.misfit:.0f} for {len(theory.data.value)} numbers")

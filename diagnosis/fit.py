@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.sensitivity import derivative
-from diagnosis.theory import Theory, whitening
+from diagnosis.theory import WHAT, Data, Theory, whitening
 from model.ball_row import Array
 from model.pair import NoEquilibrium
 from sim.effect import Effect
@@ -24,6 +24,8 @@ TEMPERS = (300.0, 30.0, 3.0, 1.0)  # factors on the data's errors, in turn
 ROUGH = 4  # steps at each temper of a fit that is not thorough
 RENEWALS = 6  # of the derivative at the last temper
 ENOUGH = 0.1  # fall of chi2 below which renewing derivatives has done its work
+ASIDE = 0.3  # share of the error of form that falls on features which an effect does not move
+SHARES = (0.1, 0.3, 1.0)  # of the form errors an effect states, all equally likely beforehand
 WORST = 1e12  # chi2 of a state that has no equilibrium
 
 
@@ -52,6 +54,39 @@ class Fit:
 def linearise(theory: Theory) -> Array:
     """Derivative (n, p) of the features by the nuisance parameters at the nominal spindle without effects."""
     return derivative(theory, np.zeros(len(theory.sd)), ())
+
+
+def form_variance(data: Data, effect: Effect, moved: Array) -> Array:
+    """Variance (n,) by which an effect may miss what it does to the features, `moved` (n,).
+
+    Besides its share of each movement there is one of the rms movement of all features of that kind in the test: a wrong law also moves
+    what the right one leaves alone.
+    """
+    variance = np.zeros(len(moved))
+    for rows in data.rows.values():
+        for what in WHAT:
+            own = getattr(rows, what)
+            error = effect.damping_form_error if what == "damping" else effect.form_error
+            if len(own):
+                variance[own] = error**2 * (moved[own] ** 2 + ASIDE**2 * np.mean(moved[own] ** 2))
+    return variance
+
+
+def likeliest(data: Data, residual: Array, more: Array, enlarged: float) -> Array:
+    """The whitening matrix with the shares of the form errors `more` that make the residual likeliest: a law may be better than feared.
+
+    What is said of damping is taken to be as bad as it is feared to be: a law right for most tests and wrong at a peak of losses would
+    otherwise be refuted by that.
+    """
+    if not more.any():
+        return whitening(data.blocks, more, enlarged)
+    damping = np.concatenate([rows.damping for rows in data.rows.values()])
+    tried = []
+    for own in SHARES:
+        share = np.full(len(more), own)
+        share[damping] = 1.0
+        tried.append(whitening(data.blocks, share**2 * more, enlarged))
+    return max(tried, key=lambda w: float(np.sum(np.log(np.diag(w))) - 0.5 * np.sum((w @ residual) ** 2)))
 
 
 def fit(
@@ -101,8 +136,8 @@ def fit(
         more = np.zeros(len(m))
         for one in present:
             rest = theory.features(x, [other for other in present if other is not one])
-            more += (one[0].form_error * np.nan_to_num(m - rest)) ** 2
-        return whitening(data.blocks, more, temper)
+            more += form_variance(data, one[0], np.nan_to_num(m - rest))
+        return likeliest(data, data.value - np.nan_to_num(m), more, temper)
 
     m = model(x, theta)
     by_theta, by_nuisance = np.zeros((len(data.value), len(rows))), about

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -64,12 +65,10 @@ def free_form(spindle: Spindle, change: Change) -> list[tuple[Effect, Values]]:
         temperature, changes = zip(*known, strict=True)
         return {"change": float(np.interp(condition.temperature, temperature, changes))}
 
-    hooks = {
-        key: (lambda s, condition, values, *state, hook=hook: hook(s, condition, size(condition), *state))
-        for key in ("spindle", "pair")
-        if (hook := getattr(element, key))
-    }
-    return [(replace(element, **hooks), {"change": 0.0})]
+    def following(hook: Callable[..., Any] | None) -> Callable[..., Any] | None:
+        return None if hook is None else lambda s, condition, values, *state: hook(s, condition, size(condition), *state)
+
+    return [(replace(element, spindle=following(element.spindle), pair=following(element.pair)), {"change": 0.0})]
 
 
 def _change(name: str) -> Parameter:

@@ -142,7 +142,7 @@ def _theory_there(about: Theory, plan: Plan, a: Explanation) -> Theory:
         Test("planned", plan.condition.temperature, plan.condition.speed), plan.condition, np.ones(1), np.ones(1), np.eye(2),
         None, None, None, None, ("axial",),
     )  # fmt: skip
-    p = predict(replace(about, spindle=spindle).built(a.nuisance), blank, _applied(plan, a))
+    p = predict(replace(about, spindle=spindle).built(a.nuisance), blank, [*about.present, *_applied(plan, a)])
     low, high = spindle.hammer.band
     seen = np.flatnonzero((p.frequency > low) & (p.frequency < high))
     typical = np.sqrt(np.median(np.diag(like.covariance)[: len(like.frequency)]))

@@ -22,8 +22,8 @@ FREQUENCY_FLOOR = 3e-5  # relative: finite elements and bearing equilibrium of t
 DAMPING_FLOOR = 3e-3  # relative
 SHAPE_FLOOR = 3e-3  # relative, of a shape ratio
 UNCERTAIN = 3e-3  # relative error of a frequency from which a pole says nothing
-SAME = 0.15  # ln frequency within which two tests may show the same mode
-ALIKE = 0.5  # MAC above which they do
+SAME = 0.3  # ln frequency within which two tests may show the same mode
+ALIKE = 0.3  # MAC above which they do
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,6 +26,7 @@ STEP = 0.03  # of a prior standard deviation, for differences of the matrices
 
 def derivative(theory: Theory, x: Array, effects: Applied) -> Array:
     """Derivative (n, p) of all features by the nuisance parameters at nuisance values `x` (p,) beside `effects`."""
+    effects = [*theory.present, *effects]
     n, build = len(theory.data.features), len(theory.build)
     spindle, warmer = theory.built(x), theory.warmer(x)
     steps = STEP * theory.sd[:build]
@@ -56,6 +57,7 @@ def _filler(theory: Theory, t: int, at: Linearised, result: Array) -> Callable[[
     """A function that writes the rows of test `t` into a column of `result`, from the points at two ends `apart`."""
     seen: Predicted = predicted(at)
     partner, own = pair(theory.data.observations[t], seen), theory.data.rows[t]
+    lost = theory.data.of_modes(t, np.flatnonzero(partner < 0))
     every, right, left = at.poles.value, at.poles.right, at.poles.left
     found, chain = at.found, at.point.measurement
     inverse = np.linalg.inv(at.matrices.mass)
@@ -86,6 +88,7 @@ def _filler(theory: Theory, t: int, at: Linearised, result: Array) -> Callable[[
             by_part = (-mixed[found] @ seen_left - left[found] @ (mass @ inverse @ chain.reference_rows.T - by_hit.T)) / part
             total = by_shape[mode, own.channel_of_residue] + by_part[mode, own.reference]
             result[own.size, column], result[own.turn, column] = total.real, total.imag
+        result[lost, column] = 0.0
 
     return fill
 

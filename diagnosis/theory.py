@@ -22,12 +22,15 @@ from model.modes import ComplexArray, Poles, kinds, oscillating, poles
 from model.rotor_base import Matrices, matrices
 from model.tolerance import Toleranced, toleranced
 from sim.effect import Effect, Values
+from sim.effects import of_scene
 from sim.operating import OperatingPoint, operating_point
 
 ALONE = 0.03  # relative distance to the next mode from which a shape is used
 SMALL = 0.05  # of the largest channel; smaller shape components are left out
 FAR = 0.08  # ln frequency that costs as much as a fully different shape in pairing
 UNLIKE = 3.0  # cost of a different kind, where only kinds are known
+STRANGE = 4.0  # cost of a pair from which an observed mode rather has no partner
+WITHOUT = 30.0  # standard errors by which the frequency of such a mode is missed, whatever the parameters
 
 WHAT = ("frequency", "damping", "amplitude", "phase", "size", "turn")
 
@@ -117,6 +120,12 @@ class Data:
     def rows(self) -> dict[int, Rows]:
         """Where the features of every test stand."""
         return {t: _rows(self.features, t) for t in range(len(self.observations))}
+
+    def of_modes(self, test: int, modes: Index) -> Index:
+        """Where the features of some modes of a test stand."""
+        if not len(modes):
+            return np.zeros(0, int)
+        return np.array([i for i, f in enumerate(self.features) if f.test == test and f.mode in modes], int)
 
 
 def data_of(observations: Sequence[Observation]) -> Data:
@@ -220,7 +229,7 @@ def predict(spindle: Spindle, observation: Observation, effects: Applied, warmer
 
 
 def pair(o: Observation, p: Predicted) -> Array:
-    """Index into the predicted modes of the partner of every observed one; -1 where there are too few.
+    """Index into the predicted modes of the partner of every observed one; -1 where none is left or like it.
 
     The assignment costs unlikeness of shape (of kind, without shapes) and distance in ln frequency over `FAR`, by its size: where some
     modes are far off, squares would rather move all of them by one place. Modes closer than `ALONE` that are not axial turn in their
@@ -231,9 +240,10 @@ def pair(o: Observation, p: Predicted) -> Array:
         unlike = 1 - np.abs(_unit(o.shape).conj() @ _unit(p.shape).T) ** 2
     else:
         unlike = UNLIKE * (np.array(o.kind)[:, None] != np.array(p.kind)[None, :])
+    cost = distance + unlike
     partner = np.full(len(o.frequency), -1)
-    rows, columns = linear_sum_assignment(distance + unlike)
-    partner[rows] = columns
+    rows, columns = linear_sum_assignment(np.hstack([cost, np.full((len(cost), len(cost)), STRANGE)]))
+    partner[rows] = np.where(columns < cost.shape[1], columns, -1)
     radial = [i for i, j in enumerate(partner) if j >= 0 and p.kind[j] != "axial"]
     for group in np.split(np.array(radial, int), np.flatnonzero(np.diff(np.log(o.frequency[radial])) > ALONE) + 1):
         partner[group] = partner[group][np.argsort(p.frequency[partner[group]])]
@@ -250,7 +260,7 @@ def features_of(data: Data, at: Mapping[int, Predicted]) -> Array:
     for t, p in at.items():
         partner = pair(data.observations[t], p)
         own = data.rows[t]
-        value[own.frequency] = np.log(p.frequency[partner[own.mode_of_frequency]])
+        value[own.frequency] = np.log(p.frequency[partner[own.mode_of_frequency]])  # modes without a partner are put right below
         value[own.damping] = np.log(np.maximum(p.damping[partner[own.mode_of_damping]], 1e-9))
         if len(own.amplitude):
             size = np.abs(p.shape).max(axis=1, keepdims=True) * 1e-6
@@ -265,6 +275,10 @@ def features_of(data: Data, at: Mapping[int, Predicted]) -> Array:
             value[own.size] = np.log(np.maximum(np.abs(residue), 1e-300))
             measured = data.value[own.turn]
             value[own.turn] = measured + np.angle(residue * np.exp(-1j * measured))
+        lost = data.of_modes(t, np.flatnonzero(partner < 0))
+        value[lost] = data.value[lost]
+        missed = np.intersect1d(lost, own.frequency)
+        value[missed] += WITHOUT * data.sd[missed]
     return value
 
 
@@ -282,6 +296,11 @@ class Theory:
     names: tuple[str, ...]
     sd: Array
 
+    @cached_property
+    def present(self) -> Applied:
+        """The effects that the scene has already; those asked about come after them."""
+        return tuple(of_scene(self.spindle))
+
     @property
     def channels(self) -> int:
         return sum(name.startswith("gain") for name in self.names)
@@ -290,7 +309,8 @@ class Theory:
         """Predicted features (n,) for nuisance values x (len(names),) and effects; zero for other tests than `only`, if given."""
         spindle, warmer = self.built(x), self.warmer(x)
         wanted = range(len(self.data.observations)) if only is None else [only]
-        return features_of(self.data, {t: predict(spindle, self.data.observations[t], effects, warmer[t]) for t in wanted}) + self.gains(x)
+        every = [*self.present, *effects]
+        return features_of(self.data, {t: predict(spindle, self.data.observations[t], every, warmer[t]) for t in wanted}) + self.gains(x)
 
     @cached_property
     def build(self) -> list[Toleranced]:

@@ -16,6 +16,8 @@ look           cut-away meshes of the section, colours, and the visual part of t
 mjcf           the same chain as a MuJoCo model: linear or ball-by-ball bearings, hammers, vibrometers
 tolerance      the toleranced build parameters of a spindle
 modes          modes and exact FRFs of M, C, K
+imperfections  unbalance, waviness, ball sizes, cage unbalance: given, measured or drawn from a seed
+kinematics     cage and ball speeds, and the lines at which a running spindle is excited
 =============  ===================================================================================================
 
 Axes: z is the spindle axis, up; r is radial; the tilts are right-handed rotations about x and y.

@@ -8,8 +8,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+
+from model.imperfections import Imperfections
 
 PARTS = ("stationary", "rotating")
 MOVES = ("x", "y", "z", "tilt_x", "tilt_y")
@@ -252,10 +255,25 @@ class Provenance:
 
 @dataclass(frozen=True)
 class Addition:
-    """A physical effect that a scene adds to the base model: its name in the catalogue and its parameter values (their units)."""
+    """A physical effect that a scene adds to the base model: its name and its parameter values (their units).
+
+    `definition` is the effect itself where it is not one of the catalogue (`sim.effects.resolved` puts it there).
+    """
 
     effect: str
     values: Mapping[str, float]
+    definition: Any = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True)
+class Build:
+    """How a built spindle differs from its drawing, fitted to tests; the numbers of the spindle that holds it are the built ones.
+
+    `deviations` are relative, by name of the toleranced parameter (`model.tolerance`); `tests` the ids of the tests they were fitted to.
+    """
+
+    deviations: Mapping[str, float]
+    tests: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -273,6 +291,8 @@ class Spindle:
     thermal: Thermal
     tolerances: Tolerances
     effects: tuple[Addition, ...] = ()
+    build: Build | None = None
+    imperfections: Imperfections = field(default_factory=Imperfections)
     provenance: Mapping[str, Provenance] = field(default_factory=dict, repr=False)  # by dotted key of the file
     file: Path | None = field(default=None, compare=False)
 

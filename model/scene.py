@@ -19,9 +19,12 @@ import numpy as np
 from pydantic import ValidationError
 
 from model import scene_file
+from model.ball_row import NoEquilibrium
 from model.hertz import in_series, race_contact
+from model.imperfections import GRADES, drawn
 from model.machine import Bearing, Provenance, Region, Spindle
 from model.section import cells, mass_properties
+from model.tolerance import toleranced
 
 
 class BadInput(ValueError):
@@ -61,7 +64,11 @@ def build(raw: dict[str, Any], file: Path) -> Spindle:
     _check_section(file, spindle)
     _check_bearings(file, spindle)
     _check_structure(file, spindle)
-    return _with_section_inertia(spindle)
+    spindle = _as_built(file, _with_section_inertia(spindle))
+    own = form.imperfections
+    if own.seed is not None and own.grade is not None:
+        spindle = replace(spindle, imperfections=drawn(spindle, own.seed, GRADES[own.grade]))
+    return spindle
 
 
 def content_hash(spindle: Spindle) -> str:
@@ -69,6 +76,8 @@ def content_hash(spindle: Spindle) -> str:
     content = asdict(spindle)
     for key in ("name", "title", "file", "provenance"):
         content.pop(key)
+    for addition in content["effects"]:
+        addition.pop("definition")
     return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()[:12]
 
 
@@ -268,3 +277,22 @@ def _with_section_inertia(spindle: Spindle) -> Spindle:
         bodies.append(body)
     structure = replace(spindle.structure, bodies=tuple(bodies))
     return replace(spindle, structure=structure)
+
+
+def _as_built(file: Path, spindle: Spindle) -> Spindle:
+    """The spindle with the deviations of its `build` table in its numbers."""
+    if spindle.build is None:
+        return spindle
+    parameters = {p.name: p for p in toleranced(spindle)}
+    for name in spindle.build.deviations:
+        if name not in parameters:
+            raise BadInput(f"{file}: build.deviations.{name}: is no toleranced parameter; allowed are {', '.join(parameters)}")
+    built = spindle
+    for name, parameter in parameters.items():
+        deviation = spindle.build.deviations.get(name, 0.0)
+        if deviation != 0.0:
+            try:
+                built = parameter.apply(built, deviation)
+            except (ValueError, NoEquilibrium) as error:
+                raise BadInput(f"{file}: build.deviations.{name} = {deviation:g}: gives no spindle: {error}") from None
+    return built

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
+from model import imperfections as i
 from model import machine as m
 
 MM, RPM = 1e-3, 2 * np.pi / 60
@@ -352,6 +353,115 @@ class Effect(Table):
     values: dict[str, Finite] = {}
 
 
+class Build(Table):
+    deviations: dict[str, Annotated[float, Field(gt=-0.5, lt=1.0)]] = Field(min_length=1)
+    tests: list[str] = []
+
+    def build(self) -> m.Build:
+        return m.Build(dict(self.deviations), tuple(self.tests))
+
+
+class Waves(Table):
+    """Waves of a race, column by column, or its measured profile at equal steps of azimuth."""
+
+    order: list[Annotated[int, Field(ge=1)]] = []
+    amplitude_nm: list[NotNegative] = []
+    phase_deg: list[Finite] = []
+    profile_nm: list[Finite] = []
+    highest_order: Annotated[int, Field(ge=1)] | None = None
+
+    @model_validator(mode="after")
+    def _one_form(self) -> Waves:
+        if bool(self.profile_nm) != (self.highest_order is not None) or (self.profile_nm and self.order):
+            raise ValueError("a race has either order, amplitude_nm and phase_deg, or profile_nm and highest_order")
+        if self.highest_order and 2 * self.highest_order >= len(self.profile_nm):
+            raise ValueError(f"highest_order = {self.highest_order}: must be below half of the {len(self.profile_nm)} values of profile_nm")
+        if not len(self.order) == len(self.amplitude_nm) == len(self.phase_deg) == len(set(self.order)):
+            raise ValueError("order, amplitude_nm and phase_deg must have one entry each for every order, which stands once")
+        return self
+
+    def waves(self) -> tuple[i.Wave, ...]:
+        if self.highest_order:
+            return i.waves(1e-9 * np.array(self.profile_nm), self.highest_order)
+        return tuple(map(_wave, self.order, self.amplitude_nm, self.phase_deg))
+
+
+class BallWave(Table):
+    """A wave of one order on every ball."""
+
+    order: Annotated[int, Field(ge=1)]
+    amplitude_nm: list[NotNegative]
+    phase_deg: list[Finite]
+
+
+def _wave(order: int, amplitude_nm: float, phase_deg: float) -> i.Wave:
+    return i.Wave(order, amplitude_nm * 1e-9, float(np.radians(phase_deg)))
+
+
+class RowImperfections(Table):
+    inner_radial: Waves | None = None
+    inner_axial: Waves | None = None
+    outer_radial: Waves | None = None
+    outer_axial: Waves | None = None
+    ball_diameter_nm: list[Finite] = []
+    ball_waves: list[BallWave] = []
+    cage_unbalance_g_mm: NotNegative = 0.0
+    cage_phase_deg: Finite = 0.0
+
+    def check(self, balls: int) -> None:
+        """Raises ValueError for a list that does not hold one value for every ball."""
+        for key, values in (
+            ("ball_diameter_nm", self.ball_diameter_nm),
+            *((f"ball_waves.{n}.{key}", getattr(w, key)) for n, w in enumerate(self.ball_waves) for key in ("amplitude_nm", "phase_deg")),
+        ):
+            if len(values) != balls and (values or key != "ball_diameter_nm"):
+                raise ValueError(f"{key}: has {len(values)} values; allowed is one for each of the {balls} balls")
+
+    def row(self, balls: int) -> i.RowImperfections:
+        races = [w.waves() if w else () for w in (self.inner_radial, self.inner_axial, self.outer_radial, self.outer_axial)]
+        of_ball = [tuple(_wave(w.order, w.amplitude_nm[j], w.phase_deg[j]) for w in self.ball_waves) for j in range(balls)]
+        return i.RowImperfections(
+            races[0],
+            races[1],
+            races[2],
+            races[3],
+            tuple(d * 1e-9 for d in self.ball_diameter_nm),
+            tuple(of_ball) if self.ball_waves else (),
+            self.cage_unbalance_g_mm * 1e-6,
+            float(np.radians(self.cage_phase_deg)),
+        )
+
+
+class Imperfections(Table):
+    """Numbers, or `seed` and `grade` alone for a plausible draw."""
+
+    seed: Annotated[int, Field(ge=0)] | None = None
+    grade: Literal["high precision", "precision", "ordinary"] | None = None
+    unbalance_g_mm: NotNegative = 0.0
+    unbalance_z_mm: Finite = 0.0
+    unbalance_phase_deg: Finite = 0.0
+    couple_unbalance_g_mm2: NotNegative = 0.0
+    couple_phase_deg: Finite = 0.0
+    bearings: dict[str, RowImperfections] = {}
+
+    @model_validator(mode="after")
+    def _drawn_or_given(self) -> Imperfections:
+        others = sorted(self.model_fields_set - {"seed", "grade", "origin", "source", "origins"})
+        if (self.seed is None) != (self.grade is None) or (self.seed is not None and others):
+            raise ValueError(f"seed and grade stand together and alone; beside them: {', '.join(others) or 'nothing, but one is missing'}")
+        return self
+
+    def imperfections(self, balls: Mapping[str, int]) -> i.Imperfections:
+        return i.Imperfections(
+            self.unbalance_g_mm * 1e-6,
+            self.unbalance_z_mm * MM,
+            float(np.radians(self.unbalance_phase_deg)),
+            self.couple_unbalance_g_mm2 * 1e-9,
+            float(np.radians(self.couple_phase_deg)),
+            {name: row.row(balls[name]) for name, row in self.bearings.items()},
+        )
+
+
 class Scene(Table):
     title: Name
     reference_temperature_C: Finite
@@ -366,12 +476,25 @@ class Scene(Table):
     hammer_test: HammerTest
     tolerances: Tolerances
     effects: list[Effect] = []
+    build: Build | None = None
+    imperfections: Imperfections = Imperfections()
 
     @model_validator(mode="after")
     def _rows_exist(self) -> Scene:
         for name, bearing in self.bearings.items():
             if bearing.row not in self.ball_rows:
                 raise ValueError(f"bearings.{name}.row = {bearing.row!r}: allowed are {', '.join(self.ball_rows)}")
+        return self
+
+    @model_validator(mode="after")
+    def _imperfections_fit_the_bearings(self) -> Scene:
+        for name, row in self.imperfections.bearings.items():
+            if name not in self.bearings:
+                raise ValueError(f"imperfections.bearings.{name}: names no bearing; allowed are {', '.join(self.bearings)}")
+            try:
+                row.check(self.ball_rows[self.bearings[name].row].balls)
+            except ValueError as error:
+                raise ValueError(f"imperfections.bearings.{name}.{error}") from None
         return self
 
     def spindle(self, name: str, file: Path, provenance: dict[str, m.Provenance]) -> m.Spindle:
@@ -390,6 +513,8 @@ class Scene(Table):
             self.thermal.thermal(),
             self.tolerances.tolerances(),
             tuple(m.Addition(e.name, dict(e.values)) for e in self.effects),
+            self.build.build() if self.build else None,
+            self.imperfections.imperfections({b.name: b.balls for b in bearings}),
             provenance,
             file,
         )

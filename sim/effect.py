@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from model.ball_row import Array
+from model.imperfections import Imperfections
 from model.machine import Condition, RingMotion, Spindle
 from model.pair import PairState
 from model.rotor_base import RotorBase
@@ -59,7 +60,11 @@ class Effect:
     `motions(spindle, condition, values, by_bearing)` thermal and other ring motions;
     `pair(spindle, condition, values, state)` bearing states;
     `chain(spindle, condition, values, chain)` bodies and elements;
+    `imperfections(spindle, condition, values, imperfections)` what excites the running spindle;
     `measurement(spindle, condition, values, chain, measurement)` the measuring chain.
+
+    `form_error` is the share of its own size by which the formula may be wrong, `damping_form_error` the same for what it does to damping:
+    nobody's law of a bond or a film is exact to a percent, and a law of its losses is worth far less.
     """
 
     name: str
@@ -74,7 +79,10 @@ class Effect:
     motions: Callable[[Spindle, Condition, Values, dict[str, RingMotion]], dict[str, RingMotion]] | None = None
     pair: Callable[[Spindle, Condition, Values, PairState], PairState] | None = None
     chain: Callable[[Spindle, Condition, Values, RotorBase], RotorBase] | None = None
+    imperfections: Callable[[Spindle, Condition, Values, Imperfections], Imperfections] | None = None
     measurement: Callable[[Spindle, Condition, Values, RotorBase, Measurement], Measurement] | None = None
+    form_error: float = 0.05
+    damping_form_error: float = 0.5
 
     def neutral(self) -> dict[str, float]:
         return {p.name: p.neutral for p in self.parameters}
@@ -85,3 +93,15 @@ class Effect:
     def typical_list(self) -> list[float]:
         """Typical values in the order of the parameters."""
         return [p.typical for p in self.parameters]
+
+
+HOOKS: Mapping[str, type] = {
+    "spindle": Spindle,
+    "temperatures": dict,
+    "motions": dict,
+    "pair": PairState,
+    "chain": RotorBase,
+    "imperfections": Imperfections,
+    "measurement": Measurement,
+}
+"""What each function of an effect returns; the dicts keep the keys that they are given."""

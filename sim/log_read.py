@@ -37,8 +37,21 @@ class LogContents:
     frfs: Mapping[str, Frf]  # by test
 
 
-def read_log(path: Path) -> LogContents:
-    """What is in a log. Raises `BadInput`, one sentence that names the file, for anything but a whole log of ours."""
+@dataclass(frozen=True)
+class Opened:
+    """A log as it stands in its file: values by entity and component, and the number of rows by entity."""
+
+    path: Path
+    application: str
+    recording: str
+    blueprint: bool
+    columns: Mapping[str, Columns]
+    rows: Mapping[str, int]
+    timelines: tuple[str, ...]
+
+
+def open_log(path: Path) -> Opened:
+    """Everything in a log. Raises `BadInput`, one sentence that names the file, for anything but a log of ours."""
     path = Path(path)
     if not path.is_file():
         raise BadInput(f"{path}: no such file")
@@ -50,9 +63,9 @@ def read_log(path: Path) -> LogContents:
             ours = [r for r in recordings if r.application_id == APPLICATION]
             if recordings and not ours:
                 raise BadInput(f"{path}: is a recording of {recordings[0].application_id!r}, not of {APPLICATION!r}")
-            batches = (
-                [(c.entity_path, c.timeline_names, c.to_record_batch()) for c in reader.stream(store=ours[0])] if ours else []
-            )
+            if not ours:
+                raise BadInput(f"{path}: is not a whole log of {APPLICATION}: its recording is missing")
+            batches = [(c.entity_path, c.timeline_names, c.to_record_batch()) for c in reader.stream(store=ours[0])]
     except (RuntimeError, ValueError, OSError) as error:
         if isinstance(error, BadInput):
             raise
@@ -64,28 +77,38 @@ def read_log(path: Path) -> LogContents:
         for name, column in zip(batch.schema.names, batch.columns, strict=True):
             if name not in timelines:
                 columns.setdefault(entity, {}).setdefault(name, []).append(column)
+    every = tuple(sorted({t for _, timelines, _ in batches for t in timelines}))
+    return Opened(path, ours[0].application_id, ours[0].recording_id, bool(blueprints), columns, dict(sorted(rows.items())), every)
+
+
+def read_log(path: Path) -> LogContents:
+    """What is in the log of a run. Raises `BadInput`, one sentence that names the file, for anything but a whole one of ours."""
+    return contents_of(open_log(path))
+
+
+def contents_of(log: Opened) -> LogContents:
+    """What is in an opened log of a run. Raises `BadInput` where something is missing."""
+    columns = log.columns
     try:
         about = columns["/__properties/run"]
         peaks = columns["/numbers/peaks"]
-        tests = {
-            e.removesuffix("/about"): own for e, own in columns.items() if e.startswith("/numbers/") and e.endswith("/about")
-        }
+        tests = {e.removesuffix("/about"): own for e, own in columns.items() if e.startswith("/numbers/") and e.endswith("/about")}
         order = sorted(tests, key=lambda e: int(_values(tests[e], "order")[0]))
         return LogContents(
-            path=path,
-            application=ours[0].application_id,
-            recording=ours[0].recording_id,
-            blueprint=bool(blueprints),
+            path=log.path,
+            application=log.application,
+            recording=log.recording,
+            blueprint=log.blueprint,
             scene=_values(about, "scene")[0],
             title=_values(about, "title")[0],
-            entities=dict(sorted(rows.items())),
-            timelines=tuple(sorted({t for _, timelines, _ in batches for t in timelines})),
+            entities=log.rows,
+            timelines=log.timelines,
             temperatures=tuple(_values(tests[e], "temperature_C")[0] for e in order),
             peaks=tuple(Peak(*row) for row in zip(*(_values(peaks, name) for name in Peak.__dataclass_fields__), strict=True)),
             frfs={_values(tests[e], "id")[0]: _frf(columns[e], tests[e]) for e in order},
         )
     except (KeyError, IndexError) as error:
-        raise BadInput(f"{path}: is not a whole log of {APPLICATION}: {error} is missing") from None
+        raise BadInput(f"{log.path}: is not a whole log of {APPLICATION}: {error} is missing") from None
 
 
 def _flat(columns: Columns, name: str) -> Any:

@@ -14,6 +14,7 @@ from scipy.optimize import brentq
 
 from model import mjcf
 from model.ball_row import Array
+from model.imperfections import Imperfections
 from model.machine import Condition, Spindle
 from model.modes import ComplexArray, Mode, frf, modes, point_rows
 from model.pair import PairState, solve
@@ -56,6 +57,15 @@ class OperatingPoint:
                 chain = effect.measurement(self.spindle, self.condition, values, self.chain, chain)
         return chain
 
+    @cached_property
+    def imperfections(self) -> Imperfections:
+        """What the running spindle is excited by: the scene's imperfections, and those of effects."""
+        found = self.spindle.imperfections
+        for effect, values in self.effects:
+            if effect.imperfections:
+                found = effect.imperfections(self.spindle, self.condition, values, found)
+        return found
+
     def spec(self, element: str = "linear", looks: bool = False) -> mujoco.MjSpec:
         """The MuJoCo specification of this point."""
         return mjcf.spec(self.spindle, self.state, element, looks, self.chain)
@@ -91,9 +101,7 @@ def operating_point(
     `effects` are the scene's by default.
     """
     present = tuple(of_scene(spindle) if effects is None else effects)
-    for effect, values in present:
-        if effect.spindle:
-            spindle = effect.spindle(spindle, condition, values)
+    spindle = drawing(spindle, condition, present)
     temperatures: float | dict[str, float] = condition.temperature
     if any(effect.temperatures for effect, _ in present):
         temperatures = {g.name: condition.temperature for g in spindle.regions}
@@ -109,6 +117,14 @@ def operating_point(
         if effect.pair:
             state = effect.pair(spindle, condition, values, state)
     return OperatingPoint(spindle, condition, state, present)
+
+
+def drawing(spindle: Spindle, condition: Condition, effects: Sequence[tuple[Effect, Values]]) -> Spindle:
+    """The drawing as effects leave it at a condition."""
+    for effect, values in effects:
+        if effect.spindle:
+            spindle = effect.spindle(spindle, condition, values)
+    return spindle
 
 
 def stiffness_table(spindle: Spindle, temperatures: Sequence[float], speeds: Sequence[float] = (0.0,)) -> StiffnessTable:

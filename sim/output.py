@@ -17,8 +17,8 @@ from model import mjcf
 from model.modes import Mode, group_energy
 from model.table import StiffnessTable, write_table
 from sim.campaign import Campaign, write_campaign
-from sim.comparison import measured_rows, numbered
 from sim.log import LogContents, write_log
+from sim.mode_numbers import measured_rows, numbered
 from sim.operating import OperatingPoint, provenance, stiffness_table
 from sim.report import write_report
 from sim.run import Run, Step, as_campaign

@@ -24,23 +24,13 @@ from model.modes import frf, group_energy, point_rows
 from model.pair import BearingState
 from model.scene import content_hash, load
 from sim import plots
-from sim.comparison import (
-    SAME_TEMPERATURE,
-    calibration,
-    compared,
-    headlines,
-    identified,
-    in_band,
-    minus,
-    misses,
-    same_speed,
-    signed,
-    temperature_of,
-    with_error,
-)
+from sim.comparison import SAME_TEMPERATURE, compared
+from sim.headlines import calibration, headlines, misses
+from sim.mode_numbers import identified, in_band, same_speed, temperature_of
 from sim.operating import provenance
 from sim.plots import Curve
 from sim.run import Run, Step
+from sim.typeset import minus, signed, with_error
 from thermal.expansion import influence
 from thermal.temperature import region_temperatures
 
@@ -68,7 +58,12 @@ def html(run: Run, extra_sections: Sequence[Section] = ()) -> str:
     """The report as text; `extra_sections` stand between the results and the account of where they come from."""
     run = replace(run, steps=tuple(sorted(run.steps, key=temperature_of)))
     every = [*results(run), *extra_sections, *background(run)]
-    return str(_page().page(run.spindle, _conditions(run), [(title, Markup(body)) for title, body in every]))
+    return page(run.spindle, _conditions(run), every)
+
+
+def page(spindle: Spindle, conditions: str, sections: Sequence[Section]) -> str:
+    """A page of the report's look with any sections, at `conditions` in words."""
+    return str(_page().page(spindle, conditions, [(title, Markup(body)) for title, body in sections]))
 
 
 def results(run: Run) -> list[Section]:

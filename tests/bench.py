@@ -31,7 +31,10 @@ from model.scene import load
 from sim.hammer import draw_hits
 from sim.impact import acquire, estimate_of, impact_tests, sampling, simulate
 from sim.operating import operating_point, stiffness_table
+from sim.resonance import resonance_map
 from sim.run import identify
+from sim.running import run_spindle, running_model
+from sim.warmup import warm_up
 from thermal.expansion import expand
 
 SCENE = Path(__file__).parents[1] / "scenes" / "hdd_2003"
@@ -88,6 +91,22 @@ def time_domain(spindle: Spindle, rounds: int = 5) -> tuple[float, float]:
     return median(p[0] for p in pairs), median(p[1] for p in pairs)
 
 
+def running(spindle: Spindle, rounds: int = 3) -> tuple[float, float]:
+    """One second of the spindle running at 7200 rpm with all imperfections of the scene, start to record, and MuJoCo's own stepping of the
+    same model through as many steps without any force but the unbalance that is in it, both on one core, seconds.
+    """
+    point = operating_point(spindle, Condition(40.0, 7200 * np.pi / 30))
+    model, steps = running_model(point), round(1 / spindle.hammer.step)
+    data = mujoco.MjData(model)
+
+    def own() -> None:
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+        mujoco.mj_step(model, data, nstep=steps)
+
+    pairs = [(seconds(lambda: run_spindle([point], 1.0, 10000.0), 1), seconds(own, 1)) for _ in range(rounds)]
+    return median(p[0] for p in pairs), median(p[1] for p in pairs)
+
+
 def main() -> None:
     spindle = load(SCENE)
     grid = Table("what", "time", "asked", show_edge=False)
@@ -118,6 +137,13 @@ def main() -> None:
     row("modal extraction of one test", f"{seconds(lambda: identify(test), 3):.2f} s")
     ours, own = time_domain(spindle)
     row("time domain, one hit: ours / MuJoCo's own stepping", f"{ours:.3f} / {own:.3f} s = {ours / own:.3f}", "1.15")
+    ours, own = running(spindle)
+    row("1 s of running spindle, waviness: ours / MuJoCo's own stepping", f"{ours:.2f} / {own:.2f} s = {ours / own:.2f}", "3")
+    grid_t, grid_s, nominal = np.linspace(20, 60, 20), np.linspace(0, 1508, 40), Condition(20.0, 754.0)
+    row(
+        "resonance map, 20 temperatures x 40 speeds", f"{seconds(lambda: resonance_map(spindle, grid_t, grid_s, nominal), 3):.2f} s", "10 s"
+    )
+    row("warm-up, coupled, to the steady state", f"{seconds(lambda: warm_up(spindle, 754.0, 20.0), 1):.2f} s")
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
         command = [sys.executable, "-m", "spindle", "run", str(SCENE), "--out", f"{folder}/run", "--json"]

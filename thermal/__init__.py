@@ -12,6 +12,7 @@ friction     bearing friction torque and heat
 temperature  temperature fields, region means, free thermal strain
 conduction   the discrete heat equation of both parts, coupled through bearings and air gaps
 heat         steady and transient temperature, heat flows
+reading      region means and ring motions of many temperature fields on one mesh, quickly
 expansion    the front: `influence`, `expand` (ring motions), `field` (the deformed section)
 ===========  =====================================================================================================
 

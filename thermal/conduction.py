@@ -3,12 +3,14 @@
 C dT/dt + K T = motor loss + bearing friction + film x air temperature. K couples the parts: by rank one through each bearing,
 its conductance times the difference of the two mean raceway temperatures, and point by point at equal height (or radius)
 across air gaps. Half of a bearing's friction heat enters each raceway face, motor loss the volume of its regions, both evenly.
+Chamber air reaches neither the raceways nor those parts of exposed faces that look at each other across a gap.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import block_diag, coo_array, csr_array, diags_array
@@ -57,9 +59,14 @@ class HeatModel:
     motor: np.ndarray  # (sources, nodes)
     bearing: np.ndarray  # (bearings, nodes)
 
-    @property
+    @cached_property
     def conductance(self) -> csr_array:
         return self.conduction + self.convection + self.exchange
+
+    @cached_property
+    def lumped_capacity(self) -> np.ndarray:
+        """Heat capacity (nodes,) in J/K: weights of the stored heat, and of the mean temperature."""
+        return np.asarray(self.capacity.sum(axis=1)).ravel()
 
     def field(self, nodal: np.ndarray) -> TemperatureField:
         """Temperatures (nodes,) of the model as a field of both parts."""
@@ -83,19 +90,28 @@ def model(spindle: Spindle, sections: Mapping[str, PartMesh]) -> HeatModel:
     size = int(ends[-1])
     inside = [_conduction(spindle, sections[part], basis) for part, basis in bases.items()]
     films = [_film(spindle, section) for section in sections.values()]
+    convection: csr_array = csr_array(block_diag([matrix for matrix, _ in films]))
+    film = np.concatenate([load for _, load in films])
     faces = [_raceways(spindle, bearing, sections, spans) for bearing in spindle.bearings]
     through = [spindle.thermal.friction.conductance * _square(outer - inner) for inner, outer in faces]
-    across = [_gap(spindle, gap, sections, spans) for gap in spindle.thermal.gaps]
+    across: list[csr_array] = []
+    hidden: list[GapFace] = []
+    for gap in spindle.thermal.gaps:
+        exchange, faces_of_gap = _gap(spindle, gap, sections, spans)
+        across.append(exchange)
+        hidden += faces_of_gap
+    for matrix, load in (_film_behind(spindle, face) for face in _apart(hidden)):
+        convection, film = convection - matrix, film - load
     sources = [np.concatenate([_volume(s, h.regions) for s in sections.values()]) for h in spindle.thermal.sources]
     return HeatModel(
         spindle,
         dict(sections),
         spans,
         conduction=csr_array(block_diag([k for k, _ in inside])),
-        convection=csr_array(block_diag([matrix for matrix, _ in films])),
+        convection=csr_array(convection),
         exchange=csr_array(sum([*through, *across], start=csr_array((size, size)))),
         capacity=csr_array(block_diag([c for _, c in inside])),
-        film=np.concatenate([load for _, load in films]),
+        film=film,
         motor=np.array([s / s.sum() for s in sources]).reshape(-1, size),
         bearing=np.array([(inner + outer) / 2 for inner, outer in faces]).reshape(-1, size),
     )
@@ -114,11 +130,13 @@ def _conduction(spindle: Spindle, section: PartMesh, basis: Basis) -> tuple[csr_
 
 
 def _film(spindle: Spindle, section: PartMesh) -> tuple[csr_array, np.ndarray]:
-    """Convection matrix (W/K) of one part and its load (W) for air 1 K above zero."""
+    """Convection matrix (W/K) of one part and its load (W) for air 1 K above zero, as if there were no air gaps."""
     size = Basis(section.mesh, element(section.mesh)).N
+    rings = [(spindle.region(b.inner_ring), 1) for b in spindle.bearings] + [(spindle.region(b.outer_ring), 0) for b in spindle.bearings]
+    races = [section.side(g.name, 0, g.r[side]) for g, side in rings if g.part == section.part]
     matrix, load = csr_array((size, size)), np.zeros(size)
     for c in spindle.thermal.convections:
-        if (facets := section.exposed(c.regions)).size:
+        if (facets := np.setdiff1d(section.exposed(c.regions), np.concatenate([[], *races]).astype(int))).size:
             matrix = matrix + 2 * np.pi * mass.assemble(_face(section, facets), coefficient=c.coefficient)
             load += 2 * np.pi * supply.assemble(_face(section, facets), coefficient=c.coefficient)
     return matrix, load
@@ -154,8 +172,39 @@ def _volume(section: PartMesh, regions: Sequence[str]) -> np.ndarray:
     return 2 * np.pi * supply.assemble(Basis(section.mesh, element(section.mesh), intorder=4, elements=own), coefficient=1.0)
 
 
-def _gap(spindle: Spindle, gap: AirGap, sections: Mapping[str, PartMesh], spans: Mapping[str, slice]) -> csr_array:
-    """Exchange across an air gap: P^T W P, P the temperature difference at points of the first face, W = h dA.
+@dataclass(frozen=True, eq=False)
+class GapFace:
+    """The part of a region's face that looks across a gap: `rows` (points, nodes) read temperatures there, `area` (points,) in m2.
+
+    `line` is the axis (0 for r, 1 for z) and position (m) of the face, `stretches` (stretches, 2) the ends in the other coordinate.
+    """
+
+    region: str
+    line: tuple[int, float]
+    stretches: np.ndarray
+    rows: csr_array
+    area: np.ndarray
+
+
+def _film_behind(spindle: Spindle, face: GapFace) -> tuple[csr_array, np.ndarray]:
+    """Convection matrix and load of a gap's face, which chamber air does not reach."""
+    film = sum(c.coefficient for c in spindle.thermal.convections if face.region in c.regions)
+    return csr_array(face.rows.T @ diags_array(film * face.area) @ face.rows), film * face.area @ face.rows
+
+
+def _apart(faces: Sequence[GapFace]) -> Sequence[GapFace]:
+    """The faces themselves; ValueError where two gaps claim the same stretch of one, whose air would count twice."""
+    for i, a in enumerate(faces):
+        for b in (b for b in faces[:i] if (b.region, b.line) == (a.region, a.line)):
+            if np.any((a.stretches[:, None, 0] < b.stretches[:, 1]) & (b.stretches[:, 0] < a.stretches[:, None, 1])):
+                raise ValueError(f"air gap: two gaps share a stretch of the face of {a.region!r}")
+    return faces
+
+
+def _gap(
+    spindle: Spindle, gap: AirGap, sections: Mapping[str, PartMesh], spans: Mapping[str, slice]
+) -> tuple[csr_array, tuple[GapFace, GapFace]]:
+    """Exchange across an air gap, P^T W P, P the temperature difference at points of the first face, W = h dA; and its two faces.
 
     The points are Gauss points between neighbouring nodes of either face, so the integral is exact. ValueError where the
     regions do not face each other.
@@ -172,8 +221,9 @@ def _gap(spindle: Spindle, gap: AirGap, sections: Mapping[str, PartMesh], spans:
     abscissa, weight = np.polynomial.legendre.leggauss(GAUSS)
     width = np.diff(knots)[:, None]
     position = (knots[:-1, None] + width * (abscissa + 1) / 2).ravel()
-    r = position if along == 0 else _near_side(first, second, 0)
-    area = 2 * np.pi * r * (width * weight / 2).ravel()
+    sides = (_near_side(first, second, across), _near_side(second, first, across))
+    length = (width * weight / 2).ravel()
+    areas = [2 * np.pi * (position if along == 0 else side) * length for side in sides]
     size = max(span.stop for span in spans.values())
     (here, on_first), (there, on_second) = (
         _on_line(sections[g.part], spans[g.part].start, facets, along, position, size)
@@ -182,8 +232,14 @@ def _gap(spindle: Spindle, gap: AirGap, sections: Mapping[str, PartMesh], spans:
     facing = on_first & on_second
     if not facing.any():
         raise ValueError(f"air gap: no exposed faces of {first.name!r} and {second.name!r} face each other")
-    difference = here - there
-    return csr_array(difference.T @ diags_array(gap.coefficient * area * facing) @ difference)
+    difference = (here - there)[facing]
+    exchange = csr_array(difference.T @ diags_array(gap.coefficient * areas[0][facing]) @ difference)
+    stretches = np.column_stack([knots[:-1], knots[1:]])[facing.reshape(-1, GAUSS).all(axis=1)]
+    one, other = (
+        GapFace(g.name, (across, side), stretches, csr_array(rows[facing]), area[facing])
+        for g, side, rows, area in zip((first, second), sides, (here, there), areas, strict=True)
+    )
+    return exchange, (one, other)
 
 
 def _facing(section: PartMesh, g: Region, other: Region, axis: int) -> np.ndarray:

@@ -1,7 +1,8 @@
 """Temperature of the running spindle: steady, in time, and where the heat goes.
 
 Bearing friction depends on the lubricant's temperature, so it is found together with the temperature: the heat equation is
-linear but for one heat flow a bearing, which leaves one scalar equation a bearing.
+linear but for one heat flow a bearing, which leaves one scalar equation a bearing. Where what drives the heat follows the
+temperature in turn (bearing loads), `march` and `settled` repeat this until both agree.
 """
 
 from __future__ import annotations
@@ -12,9 +13,10 @@ from functools import lru_cache
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.sparse import csc_array
-from scipy.sparse.linalg import SuperLU, splu
+from scipy.sparse import csc_array, csr_array
+from scipy.sparse.linalg import SuperLU, eigsh, splu
 
+from model.ball_row import NoEquilibrium
 from model.machine import Spindle
 from thermal import friction
 from thermal.conduction import HeatModel
@@ -25,6 +27,19 @@ GAMMA = 2 - np.sqrt(2)
 
 WEIGHTS = np.array([1 / (2 * (2 - GAMMA)), 1 / (2 * (2 - GAMMA)), (1 - GAMMA) / (2 - GAMMA)])
 """With which the flows at the start, the stage and the end of a step add up to the heat of the step."""
+
+ERROR_WEIGHTS = WEIGHTS - np.array([(1 - WEIGHTS[0]) / 3, (3 * WEIGHTS[0] + 1) / 3, GAMMA / 6])
+"""With which the same flows estimate the error of a step, by the embedded third-order formula: Hosea, Shampine, *Appl. Numer. Math.*
+20 (1996) 21-37."""
+
+RUNAWAY = 1000.0  # C, past any bearing's end; a search that gets there has none
+ALIKE = 1e-8  # relative change of the bearing loads at which they and the temperature agree
+Drive = Callable[[float, np.ndarray], "Running"]
+"""What drives the temperature at a time (s) and nodal temperatures (C)."""
+
+
+class NotSettled(NoEquilibrium):
+    """Bearing loads and the temperature that follows from them find no common value."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +67,15 @@ class HeatFlows:
 
 
 @dataclass(frozen=True, eq=False)
+class Step:
+    """One time step: temperature (nodes,) at its end, heat (J) as the scheme adds it, estimated error (K, the largest)."""
+
+    end: np.ndarray
+    heat: HeatFlows
+    error: float
+
+
+@dataclass(frozen=True, eq=False)
 class History:
     """Temperatures (times, nodes) of a model at `times` (s), and the heat (J) of every step, added as the time scheme does."""
 
@@ -76,9 +100,15 @@ def running(spindle: Spindle, air: float, speed: float, loads: Mapping[str, floa
 
 def steady(model: HeatModel, drive: Running) -> TemperatureField:
     """The steady temperature. ValueError without convection; OutsideRange where the viscosity law does not reach."""
+    return settled(model, lambda _: drive)
+
+
+def settled(model: HeatModel, drive: Callable[[np.ndarray], Running]) -> TemperatureField:
+    """The steady temperature under loads that follow it: raises as `steady`, and NotSettled where the two do not meet."""
     if not model.film.any():
         raise ValueError("a spindle without convection has no steady temperature")
-    return model.field(_solve(model, 0.0, _outer_load(model, drive), drive))
+    start = np.full(model.film.size, drive(np.zeros(model.film.size)).air)
+    return model.field(_agreed(model, 0.0, np.zeros(model.film.size), start, drive)[0])
 
 
 def transient(
@@ -95,20 +125,95 @@ def transient(
     steps = np.diff(moments)
     if moments.ndim != 1 or np.any(steps <= 0):
         raise ValueError("times must rise")
-    at = drive if callable(drive) else lambda _: drive
     nodal, heat = [model.nodal(start)], []
-    conductance = model.conductance
-    for begin, step in zip(moments[:-1], steps, strict=True):
-        last, (old, mid, new) = nodal[-1], (at(begin), at(begin + GAMMA * step), at(begin + step))
-        h = float(f"{GAMMA / 2 * step:.12e}")  # equal steps share their factors in spite of rounding
-        load = _outer_load(model, old) + friction_heat(model, last, old) @ model.bearing
-        known = model.capacity @ last + h * (load - conductance @ last)
-        stage = _solve(model, h, known + h * _outer_load(model, mid), mid)
-        known = model.capacity @ (stage - (1 - GAMMA) ** 2 * last) / (GAMMA * (2 - GAMMA))
-        nodal.append(_solve(model, h, known + h * _outer_load(model, new), new))
-        parts = [_values(flows(model, x, d)) for x, d in ((last, old), (stage, mid), (nodal[-1], new))]
-        heat.append(HeatFlows(*(float(x) for x in step * WEIGHTS @ parts)))
+    for begin, length in zip(moments[:-1], steps, strict=True):
+        done = step(model, (lambda t, _: drive(t)) if callable(drive) else (lambda *_: drive), begin, length, nodal[-1])
+        nodal.append(done.end)
+        heat.append(done.heat)
     return History(model, moments, np.array(nodal), tuple(heat))
+
+
+def march(
+    model: HeatModel, drive: Drive, start: float | TemperatureField, end: float, tolerance: float, longest: float = np.inf
+) -> History:
+    """Temperatures from time 0 to `end` (s) by TR-BDF2 steps, each with an estimated error of at most `tolerance` (K).
+
+    Steps double or halve, so few matrices are factorised, and are at most `longest` (s). Raises NotSettled where temperature and drive find no agreement, OutsideRange
+    where the viscosity law does not reach.
+    """
+    times, nodal, heat = [0.0], [model.nodal(start)], []
+    length = end / 2**14
+    while times[-1] < end * (1 - 1e-9):
+        length = min(length, end - times[-1])
+        done = step(model, drive, times[-1], length, nodal[-1])
+        if done.error > tolerance and length > end * 1e-9:
+            length /= 2
+            continue
+        times.append(times[-1] + length)
+        nodal.append(done.end)
+        heat.append(done.heat)
+        if done.error < tolerance / 10 and 2 * length <= longest:  # twice the step makes eight times the error
+            length *= 2
+    return History(model, np.array(times), np.array(nodal), tuple(heat))
+
+
+def step(model: HeatModel, drive: Drive, begin: float, length: float, last: np.ndarray) -> Step:
+    """One TR-BDF2 step from temperatures `last` (nodes,) at time `begin`."""
+    h = float(f"{GAMMA / 2 * length:.12e}")  # equal steps share their factors in spite of rounding
+    old = drive(begin, last)
+    rates = [_rate(model, last, old)]
+    known = model.capacity @ last + h * rates[0]
+    stage, mid = _agreed(model, h, known, last, lambda x: drive(begin + GAMMA * length, x))
+    known = model.capacity @ (stage - (1 - GAMMA) ** 2 * last) / (GAMMA * (2 - GAMMA))
+    end, new = _agreed(model, h, known, stage, lambda x: drive(begin + length, x))
+    rates += [_rate(model, stage, mid), _rate(model, end, new)]
+    error = _factors(model, h)[0].solve(length * ERROR_WEIGHTS @ np.array(rates))  # filtered: stiff parts do not count
+    parts = [_values(flows(model, x, d)) for x, d in ((last, old), (stage, mid), (end, new))]
+    return Step(end, HeatFlows(*(float(x) for x in length * WEIGHTS @ parts)), float(np.abs(error).max()))
+
+
+def slowest(model: HeatModel, temperature: TemperatureField, drive: Running) -> float:
+    """Time constant (s) of the slowest decay about a steady temperature: 1 / the smallest eigenvalue of (K - dH/dT) against C.
+
+    Friction H falls as the lubricant warms, at the loads of `drive`. Inverse iteration on the sparse factors of K.
+    """
+    nodal, change = model.nodal(temperature), 0.01
+    slope = [friction_heat(model, nodal + sign * change, drive) for sign in (0.5, -0.5)]
+    fall = (slope[0] - slope[1]) / change
+    feedback = sum(
+        (-f * csr_array(csr_array(b[:, None]) @ csr_array(b[None, :])) for f, b in zip(fall, model.bearing, strict=True)),
+        csr_array(model.conductance.shape),
+    )
+    value = eigsh(
+        csc_array(model.conductance + feedback), k=1, M=csc_array(model.capacity), sigma=0.0, v0=model.film, return_eigenvectors=False
+    )
+    return float(1 / value[0])
+
+
+def _rate(model: HeatModel, nodal: np.ndarray, drive: Running) -> np.ndarray:
+    """C dT/dt (nodes,) in W."""
+    return _outer_load(model, drive) + friction_heat(model, nodal, drive) @ model.bearing - model.conductance @ nodal
+
+
+def _agreed(
+    model: HeatModel, h: float, known: np.ndarray, guess: np.ndarray, drive: Callable[[np.ndarray], Running]
+) -> tuple[np.ndarray, Running]:
+    """The solution (C + h K) T = known + h heat (K T = known + heat for h = 0) and the drive that belongs to it: of `drive`, the loads
+    may follow the temperature, and are repeated until they stay; air and speed may not."""
+    factors, response = _factors(model, h)
+    last = drive(guess)
+    cold = factors.solve(known + (h or 1.0) * _outer_load(model, last))  # without friction
+    if not last.speed or not model.spindle.bearings:
+        return cold, last
+    for _ in range(60):
+        nodal = cold + _bearing_heat(model, model.bearing @ cold, response @ model.bearing.T, last) @ response
+        if np.abs(nodal).max() > RUNAWAY:
+            break
+        now = drive(nodal)
+        if all(abs(now.loads[b] - load) <= ALIKE * (abs(load) + 1e-3) for b, load in last.loads.items()):
+            return nodal, last
+        last = now
+    raise NotSettled("bearing loads and temperature do not settle: each load heats the bearing to a larger one")
 
 
 def flows(model: HeatModel, temperature: np.ndarray | TemperatureField, drive: Running) -> HeatFlows:
@@ -151,16 +256,6 @@ def _factors(model: HeatModel, h: float) -> tuple[SuperLU, np.ndarray]:
     matrix = model.capacity + h * model.conductance if h else model.conductance
     factors = splu(csc_array(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     return factors, (h or 1.0) * factors.solve(np.ascontiguousarray(model.bearing.T)).T
-
-
-def _solve(model: HeatModel, h: float, known: np.ndarray, drive: Running) -> np.ndarray:
-    """Solution of (C + h K) T = known + h friction(T), or of K T = known + friction(T) for h = 0."""
-    factors, response = _factors(model, h)
-    nodal = factors.solve(known)
-    if not drive.speed or not model.spindle.bearings:
-        return nodal
-    heat = _bearing_heat(model, model.bearing @ nodal, response @ model.bearing.T, drive)
-    return nodal + heat @ response
 
 
 def _bearing_heat(model: HeatModel, cold: np.ndarray, gain: np.ndarray, drive: Running) -> np.ndarray:

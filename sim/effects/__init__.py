@@ -1,12 +1,15 @@
-"""The catalogue of effects: one file each, one line here."""
+"""The catalogue of effects: one file each, one line here; and the effects of a scene, found in it or among a user's own."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
 
 from model.machine import Spindle
 from model.scene import BadInput
 from sim.effect import Effect, Values
+from sim.effect_file import OwnEffect, effect_of, installed
 from sim.effects import (
     added_disk,
     ball_inertia,
@@ -76,7 +79,7 @@ CATALOGUE: tuple[Effect, ...] = (
 )
 
 
-def by_name(name: str, catalogue: tuple[Effect, ...] = CATALOGUE) -> Effect:
+def by_name(name: str, catalogue: Sequence[Effect] = CATALOGUE) -> Effect:
     """The effect called `name`; `BadInput` for an unknown one."""
     for effect in catalogue:
         if effect.name == name:
@@ -96,10 +99,48 @@ def checked(effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
     return effect.neutral() | dict(values)
 
 
+def own_effects(files: Sequence[Path] = ()) -> tuple[OwnEffect, ...]:
+    """A user's effects: the installed ones, then those of `files`; `BadInput` for a name that is taken."""
+    found = [*installed(), *[effect_of(file) for file in files]]
+    taken = {e.name: "the catalogue" for e in CATALOGUE}
+    for effect in found:
+        where = effect.where
+        if effect.name in taken:
+            raise BadInput(f"{where}: effect {effect.name!r}: the name is taken by {taken[effect.name]}; names of effects must differ")
+        taken[effect.name] = where
+    return tuple(found)
+
+
+def resolved(spindle: Spindle, catalogue: Sequence[Effect]) -> Spindle:
+    """The spindle with the effects its scene names, found in `catalogue`, in it; `BadInput` for one that is not there.
+
+    What takes a spindle from here on needs no catalogue.
+    """
+    known = {e.name: e for e in catalogue}
+    additions = []
+    for addition in spindle.effects:
+        effect = known.get(addition.effect)
+        if effect is None:
+            raise BadInput(_not_known(spindle, addition.effect, catalogue))
+        checked(effect, addition.values)
+        additions.append(replace(addition, definition=effect))
+    return replace(spindle, effects=tuple(additions))
+
+
 def of_scene(spindle: Spindle) -> list[tuple[Effect, Values]]:
-    """The effects a scene adds, with all their values, in order."""
+    """The effects a scene adds, with all their values, in order; those that `resolved` did not put there are of the catalogue."""
     found: list[tuple[Effect, Values]] = []
     for addition in spindle.effects:
-        effect = by_name(addition.effect)
+        effect = addition.definition or next((e for e in CATALOGUE if e.name == addition.effect), None)
+        effect = effect or next((e for e in installed() if e.name == addition.effect), None)
+        if effect is None:
+            raise BadInput(_not_known(spindle, addition.effect, (*CATALOGUE, *installed())))
         found.append((effect, checked(effect, addition.values)))
     return found
+
+
+def _not_known(spindle: Spindle, name: str, catalogue: Sequence[Effect]) -> str:
+    return (
+        f"{spindle.file or spindle.name}: effects.{name}: is not in the catalogue; an effect of your own needs its file "
+        f"(--effect FILE.py) or to be installed; known are {', '.join(e.name for e in catalogue)}"
+    )

@@ -20,7 +20,7 @@ EFFECT = Effect(
     title="Centrifugal force and gyroscopic moment of the balls",
     equation=(
         "Q_i and Q_o balance with F_c = m d_m omega_c^2 / 2 and M_g = J omega_b omega_c sin(beta) on every ball, outer-race control "
-        "(Jones 1960; Harris, Rolling Bearing Analysis, 3rd ed. 1991, Eqs. 9.9-9.25)"
+        "(Jones 1960; Harris, Rolling Bearing Analysis, 3rd ed. 1991, ch. 9)"
     ),
     parameters=(
         Parameter(

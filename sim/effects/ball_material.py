@@ -17,7 +17,7 @@ CERAMIC = Material(
     conductivity=30.0,
     heat_capacity=800.0,
 )
-"""Hot-pressed silicon nitride for rolling elements: Harris, Rolling Bearing Analysis, 4th ed. (2001), ch. 16."""
+"""Hot-pressed silicon nitride for rolling elements: Harris, *Rolling Bearing Analysis*, 4th ed. (2001); makers of balls give the same."""
 
 NAME = "balls of mixed material"
 
@@ -56,7 +56,7 @@ EFFECT = Effect(
     title="Ceramic (silicon nitride) balls instead of steel",
     equation=(
         "E, nu, alpha, rho of the balls = (1 - share) steel + share Si3N4 (310 GPa, 0.27, 3.2e-6/K, 3200 kg/m3); "
-        "Hertz constant K ~ 2 / ((1 - nu_b^2)/E_b + (1 - nu_r^2)/E_r); ball growth alpha D (T - T_ref), Jang et al. 2003, Eq. (3)"
+        "Hertz constant K ~ 2 / ((1 - nu_b^2)/E_b + (1 - nu_r^2)/E_r); ball growth alpha D (T - T_ref), Jang et al. 2003, Eqs. (3), (5)"
     ),
     parameters=(
         Parameter(
@@ -68,7 +68,7 @@ EFFECT = Effect(
             limits=(0.0, 1.0),
             meaning="share of the way from the drawing's ball material to silicon nitride; 1 is a hybrid bearing",
             source=(
-                "0 or 1 as built, constants from Harris 2001, ch. 16; the typical value is what a small rigid pair bears over 40 K "
+                "0 or 1 as built, constants from Harris 2001; the typical value is what a small rigid pair bears over 40 K "
                 "without unloading"
             ),
         ),

@@ -119,7 +119,7 @@ EFFECT = Effect(
             prior_sd=0.03,
             limits=(0.0, 1.5),
             meaning="loss factor of the bond, its dissipation over its elastic force; 0.04 is the bearings' own, twice 0.020",
-            source="0.02 glassy to above 0.5 in the transition (Nashif, Jones, Henderson, Vibration Damping, 1985, ch. 3)",
+            source="0.02 glassy to above 0.5 in the transition (Nashif, Jones, Henderson, Vibration Damping, 1985)",
         ),
         Parameter(
             "coupling_kept",

@@ -42,7 +42,7 @@ EFFECT = Effect(
             prior_sd=0.4,
             limits=(0.0, 1.0),
             meaning="share of the ring movement for constant force that a ring makes; 0 fixed, 1 a soft spring without friction",
-            source="both kinds are built (Harris 2001, 9.4: spring and position preloading); friction in the seat leaves shares between",
+            source="both kinds are built (Harris, Rolling Bearing Analysis, 2001); friction in the seat leaves shares between",
         ),
     ),
     sees="bearing modes hardly fall with temperature and hardly change with speed; the contact angle still rises",

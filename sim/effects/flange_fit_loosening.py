@@ -47,8 +47,8 @@ EFFECT = Effect(
     title="The flange loosens on the shaft as it expands",
     equation=(
         "k(T) = k / (1 - c + c / rho), rho = 1 - d (eps_flange - eps_shaft) / interference, c = contact_share; pressure of a press "
-        "fit is proportional to its interference (Lame; Timoshenko & Goodier 1970, art. 28), contact stiffness of rough faces to "
-        "pressure (Greenwood & Williamson, Proc. R. Soc. A 295 (1966) 300-319); near rho = 0 the joint gives way"
+        "fit is proportional to its interference (Lame; Timoshenko & Goodier, Theory of Elasticity, 1970), contact stiffness of rough "
+        "faces to pressure (Greenwood & Williamson, Contact of nominally flat surfaces, 1966); near rho = 0 the joint gives way"
     ),
     parameters=(
         Parameter(

@@ -34,7 +34,7 @@ EFFECT = Effect(
             meaning="share of the bearings' damping at the reference temperature that is proportional to viscosity",
             source=(
                 "measured bearing damping grows less than viscosity does: squeeze film and grease share it with friction "
-                "(Dietl, Wensing, van Nijen, Proc. IMechE J 214 (2000) 43-51)"
+                "(Dietl, Wensing, van Nijen, Rolling bearing damping for dynamic analysis of multi-body systems, 2000)"
             ),
         ),
     ),
@@ -42,4 +42,5 @@ EFFECT = Effect(
     resembles=("bond_softening",),
     valid="within the viscosity table; at chamber temperature, so without the bearings' own heat",
     pair=pair,
+    damping_form_error=0.1,
 )

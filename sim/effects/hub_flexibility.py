@@ -44,7 +44,7 @@ EFFECT = Effect(
     equation=(
         "I_rim theta_r'' + G_rim theta_r' + k (theta_r - theta_h) = 0, k = 1 / compliance, I_rim = rim_share I_p / 2 about a diameter and "
         "rim_share I_p about the axis, taken off the hub; below resonance the hub's inertia grows: "
-        "I(w) = I_h + I_rim / (1 - w^2 I_rim / k); annular web k = E t^3 / alpha (Roark, Formulas for Stress and Strain, 1989, Table 24)"
+        "I(w) = I_h + I_rim / (1 - w^2 I_rim / k); annular web k = E t^3 / alpha (Roark & Young, Formulas for Stress and Strain, 1989)"
     ),
     parameters=(
         Parameter(

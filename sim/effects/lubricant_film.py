@@ -10,7 +10,7 @@ from model.hertz import race_contact
 from model.machine import Bearing, Condition, RingMotion, Spindle
 from sim.effect import Effect, Parameter, Values
 
-OIL_DENSITY = 890.0  # kg/m3, mineral oil at 15 C (Harris 2001, ch. 12); turns kinematic into dynamic viscosity
+OIL_DENSITY = 890.0  # kg/m3, mineral oil at 15 C (Harris, *Rolling Bearing Analysis*, 2001); turns kinematic into dynamic viscosity
 
 
 def motions(spindle: Spindle, condition: Condition, values: Values, by_bearing: dict[str, RingMotion]) -> dict[str, RingMotion]:
@@ -52,7 +52,7 @@ def entrainment(b: Bearing, speed: float) -> float:
 def central_film(
     radius: float, modulus: float, ellipticity: float, viscosity: float, speed: float, pressure_viscosity: float, load: float
 ) -> float:
-    """Central film thickness (m): Hamrock & Dowson, ASME J. Lubrication Technology 99 (1977) 264-276.
+    """Central film thickness (m): Hamrock & Dowson, Isothermal elastohydrodynamic lubrication of point contacts, part III, 1977.
 
     `radius` along rolling (m), `modulus` E' = 2 / sum (1 - nu^2)/E (Pa), `viscosity` (Pa s), `speed` mean of the surfaces'
     (m/s), `pressure_viscosity` (1/Pa), `load` (N).
@@ -79,7 +79,7 @@ EFFECT = Effect(
             prior_sd=0.3,
             limits=(0.0, 1.5),
             meaning="film thickness in units of the fully flooded one of the scene's viscosity",
-            source="grease starves its contacts to about 0.3 to 0.7 of flooded (Lugt, Grease Lubrication in Rolling Bearings, 2013, ch. 9)",
+            source="grease starves its contacts to about 0.3 to 0.7 of flooded (Lugt, Grease Lubrication in Rolling Bearings, 2013)",
         ),
         Parameter(
             "pressure_viscosity",
@@ -89,7 +89,7 @@ EFFECT = Effect(
             prior_sd=4.0,
             limits=(5.0, 45.0),
             meaning="pressure-viscosity coefficient of the oil",
-            source="mineral oils 18 to 26 per GPa (Hamrock & Dowson, Ball Bearing Lubrication, 1981, ch. 4)",
+            source="mineral oils 18 to 26 per GPa (Hamrock & Dowson, Ball Bearing Lubrication, 1981)",
         ),
     ),
     sees=(

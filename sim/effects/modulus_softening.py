@@ -162,7 +162,7 @@ EFFECT = Effect(
     title="Elastic moduli fall with temperature",
     equation=(
         "E(T) = E (1 - scale 22 eps(T)), eps the material's own thermal strain: d ln E / dT = -22 alpha, aluminium -5.1e-4/K, steel "
-        "-2.5e-4/K (Anderson, Phys. Rev. 144 (1966) 553: on -d ln K / d ln V); joint stiffness ~ E of the support, Hertz "
+        "-2.5e-4/K (Anderson, Phys. Rev. 144, 1966: on -d ln K / d ln V); joint stiffness ~ E of the support, Hertz "
         "K ~ 2 / ((1 - nu_b^2)/E_b + (1 - nu_r^2)/E_r); ring motions by thermo-elastic influence of the softened section"
     ),
     parameters=(

@@ -38,7 +38,7 @@ EFFECT = Effect(
             prior_sd=0.10,
             limits=(-0.5, 0.8),
             meaning="share of the drawing's preload that is lost 40 K above the reference temperature; negative is a gain",
-            source="assumed: embedding and adhesive creep take 5 to 20 % of a clamping force (VDI 2230-1, 2015, 5.4.2, for joints)",
+            source="assumed: embedding and adhesive creep take 5 to 20 % of a clamping force (VDI 2230-1, 2015, for bolted joints)",
         ),
         Parameter(
             "thermal_share",

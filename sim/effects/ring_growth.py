@@ -1,6 +1,6 @@
 """The turning ring and what is round it grow by their own centrifugal force.
 
-Rotating discs in plane stress, one inside the other: Timoshenko & Goodier, *Theory of Elasticity*, 3rd ed. (1970), art. 32. In
+Rotating discs in plane stress, one inside the other: Timoshenko & Goodier, *Theory of Elasticity*, 3rd ed. (1970). In
 each layer u = A r + B / r - (1 - nu^2) rho omega^2 r^3 / (8 E); u and the radial force (stress times height) pass from layer to
 layer, and the innermost and outermost faces are free.
 """
@@ -129,7 +129,7 @@ EFFECT = Effect(
     title="Centrifugal growth of the turning ring and hub",
     equation=(
         "u = A r + B / r - (1 - nu^2) rho omega^2 r^3 / (8 E) in each layer at the ring's height, u and radial force continuous, "
-        "free inside and outside (Timoshenko & Goodier 1970, art. 32); raceway radius grows by scale u(race); a single ring: "
+        "free inside and outside (Timoshenko & Goodier 1970); raceway radius grows by scale u(race); a single ring: "
         "u(a) = rho omega^2 a ((3 + nu) b^2 + (1 - nu) a^2) / (4 E)"
     ),
     parameters=(

@@ -110,7 +110,7 @@ def pieces(spindle: Spindle, temperature: float) -> list[Piece]:
 
 
 def shear_factor(bore: float, poisson: float) -> float:
-    """Timoshenko's shear factor of a tube of radius ratio `bore`: Cowper, J. Applied Mechanics 33 (1966) 335-340, Table 1."""
+    """Shear factor of a tube of radius ratio `bore`: Cowper, The shear coefficient in Timoshenko's beam theory, J. Appl. Mech., 1966."""
     m = (1 + bore**2) ** 2
     return 6 * (1 + poisson) * m / ((7 + 6 * poisson) * m + (20 + 12 * poisson) * bore**2)
 

@@ -93,7 +93,7 @@ EFFECT = Effect(
         "T_region = T + scale (R_region - (1 - common_share) mean R_outer rings), R = sum_b G_region,b H_b with "
         "K G = (1 W in bearing b), K the steady conduction and convection matrix; "
         "H_b = (M0 + M1) speed at the lubricant's temperature T + sum_c G_bc H_c; "
-        "M0 = 1e-7 f0 (nu n)^(2/3) d_m^3, M1 = f1 P1 d_m (Palmgren; Harris, Rolling Bearing Analysis, 4th ed. 2001, ch. 14)"
+        "M0 = 1e-7 f0 (nu n)^(2/3) d_m^3, M1 = f1 P1 d_m (Palmgren; Harris, Rolling Bearing Analysis, 4th ed. 2001)"
     ),
     parameters=(
         Parameter(
@@ -104,7 +104,7 @@ EFFECT = Effect(
             prior_sd=0.7,
             limits=(0.0, 4.0),
             meaning="temperature rise by bearing friction in units of the one computed from the scene's Palmgren and cooling data",
-            source="Palmgren's f0 spreads by about 2 for greased bearings (Harris 2001, Table 14.4); convection is known no better",
+            source="Palmgren's f0 spreads by about 2 for greased bearings (Harris 2001); convection is known no better",
         ),
         Parameter(
             "common_share",

@@ -20,7 +20,7 @@ EFFECT = Effect(
     title="Damping added by an exponential window",
     equation=(
         "w(t) = exp(-decay t): every pole moves to lambda - decay, H(i omega) -> H(i omega + decay); damping ratio up by decay / omega_r, "
-        "damped frequencies stay (Fladung & Rost, Mech. Systems Signal Processing 11, 1997)"
+        "damped frequencies stay (Fladung & Rost, Application and correction of the exponential window for FRFs, 1997)"
     ),
     parameters=(
         Parameter(
@@ -38,4 +38,5 @@ EFFECT = Effect(
     resembles=("grease_damping", "channel_delay"),
     valid="window over the whole record, the same in all tests; force unwindowed or short",
     measurement=measurement,
+    damping_form_error=0.1,
 )

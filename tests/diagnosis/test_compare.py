@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagnosis.compare import BELIEVABLE, compare, comparison_json, likeness, numbered, partners
-from diagnosis.observe import DAMPING_FLOOR, FREQUENCY_FLOOR, Observation, observe
-from diagnosis.theory import Predicted
+from diagnosis.compare import compare
+from diagnosis.compare_words import comparison_json
+from diagnosis.observe import DAMPING_FLOOR, FREQUENCY_FLOOR, observe
+from diagnosis.partners import BELIEVABLE, numbered, partners
+from diagnosis.theory import Predicted, predict
 from model.machine import Addition, Condition
 from model.scene import BadInput
 from sim.campaign import Campaign, ModeRow, Noise, Test, read_campaign
@@ -28,7 +30,7 @@ NOISE = Noise(0.004, 0.0002)
 def shared(name):
     path = SHARED / name
     if not path.exists():
-        pytest.skip("../shared is not here")
+        pytest.skip("no practice campaigns beside the project")
     return read_campaign(path)
 
 
@@ -50,6 +52,12 @@ def exact(spindle, temperatures, quantity="mobility", seed=0, repeats=1, nodes=N
 
 
 @pytest.fixture(scope="module")
+def certain(spindle):
+    """The spindle in a chamber whose temperature is known exactly: without the error that all modes of a test share."""
+    return replace(spindle, tolerances=replace(spindle.tolerances, temperature=0.0))
+
+
+@pytest.fixture(scope="module")
 def clean(spindle):
     campaign = exact(spindle, (20.0, 60.0))
     return campaign, observe(campaign, spindle)
@@ -63,7 +71,7 @@ def itself(spindle, clean):
 def test_a_scene_beside_its_own_virtual_tests(spindle):
     """In MuJoCo's time domain; the floors hold more than the estimator errs, so the pull is below one but not nothing."""
     short = replace(spindle, hammer=replace(spindle.hammer, record_length=0.1, hits=2))
-    found = compare(short, as_campaign(run(short, [20.0, 60.0]), "virtual tests"))
+    found = compare(short, as_campaign(run(short, [60.0]), "virtual tests"))
     assert 0.1 < found.rms_pull < 1.3
     for test in found.tests:
         assert len(test.modes) == 7
@@ -84,6 +92,16 @@ def test_standard_errors_are_never_below_the_floor(itself):
     for mode in (m for t in itself.tests for m in t.modes):
         assert mode.sd >= FREQUENCY_FLOOR * mode.measured
         assert mode.damping_sd >= DAMPING_FLOOR * mode.damping_measured
+
+
+def test_standard_errors_grow_with_those_of_the_lines(spindle, clean):
+    """Lines said to be ten times less certain: the estimator's variance is a hundredfold, beside a floor that stays."""
+    campaign, observed = clean
+    tests = tuple(replace(t, frf=replace(t.frf, sd=10 * t.frf.sd)) for t in campaign.tests[:1])
+    (rough,) = observe(replace(campaign, tests=tests), spindle)
+    floor = np.repeat([FREQUENCY_FLOOR**2, DAMPING_FLOOR**2], 7)
+    ratio = (np.diag(rough.covariance) - floor) / (np.diag(observed[0].covariance) - floor)
+    assert ratio == pytest.approx(np.full(14, 100.0), rel=0.1)
 
 
 def test_symmetry_leaves_silent_channels_without_frac(itself):
@@ -124,7 +142,7 @@ def test_a_changed_scene_pulls(spindle, clean, itself):
     """5 % of preload moves the bearing modes, whose stiffness goes with its cube root, by some 0.8 %, and the base's by little."""
     lower = replace(spindle, pair=replace(spindle.pair, preload=0.95 * spindle.pair.preload))
     found = compare(lower, *clean)
-    assert found.rms_pull > 30 * itself.rms_pull
+    assert found.rms_pull > 20 * itself.rms_pull  # the error of the temperature explains part of it
     errors = {m.number: 100 * m.error / m.measured for m in found.tests[0].modes}
     assert errors[6] == pytest.approx(-0.8, abs=0.3)
     assert abs(errors[1]) < 0.05
@@ -150,14 +168,31 @@ def test_a_wrong_channel_shows_in_mac_and_comac(spindle, clean):
     assert min(v for v in found.tests[0].frac.values() if v is not None) > 0.999  # nor does FRAC, blind to a scale
 
 
-def test_repeats_that_scatter_widen_the_standard_errors(spindle):
+def test_repeats_that_scatter_widen_the_standard_errors(certain):
     rows = [(f"r{i}", 1002.0 + d) for i, d in enumerate((-3.0, 0.0, 3.0))]
     tests = tuple(Test(name, 20.0, 0.0, repeat=i, modes=(ModeRow(name, 1, "axial", f, 0.1),)) for i, (name, f) in enumerate(rows, 1))
-    campaign = Campaign("repeats", spindle.name, "mobility", spindle.points, tests)
-    found = [t.modes[0].sd for t in compare(spindle, campaign).tests]
+    campaign = Campaign("repeats", certain.name, "mobility", certain.points, tests)
+    found = [t.modes[0].sd for t in compare(certain, campaign).tests]
     assert found == pytest.approx([3.0] * 3, rel=0.01)  # standard deviation of -3, 0, 3
-    alone = compare(spindle, replace(campaign, tests=tests[:1])).tests[0].modes[0].sd
+    alone = compare(certain, replace(campaign, tests=tests[:1])).tests[0].modes[0].sd
     assert alone == pytest.approx(np.hypot(0.1, FREQUENCY_FLOOR * 999.0))
+
+
+def test_repeat_scatter_is_pooled_and_holds_for_tests_made_once(certain):
+    """Pairs 2 and 4 Hz apart have variances of 2 and 8 Hz2, 5 Hz2 together, one degree of freedom each."""
+    rows = [("a", 20.0, 1001.0), ("b", 20.0, 1003.0), ("c", 60.0, 998.0), ("d", 60.0, 1002.0), ("e", 40.0, 1001.0)]
+    tests = tuple(Test(name, t, 0.0, modes=(ModeRow(name, 1, "axial", f, 0.1),)) for name, t, f in rows)
+    campaign = Campaign("repeats", certain.name, "mobility", certain.points, tests)
+    found = [t.modes[0].sd for t in compare(certain, campaign).tests]
+    assert found == pytest.approx([np.sqrt(5.0)] * 5, rel=5e-3)
+
+
+def test_the_error_of_the_temperature_is_in_the_standard_errors(spindle, certain):
+    """At 60 C a bearing mode falls by some 0.4 % a kelvin: half a kelvin is more than its standard error; the base hardly moves."""
+    campaign = table(spindle, 60.0, ("axial", 1000.3), ("rocking", 1771.4), ("rocking", 1800.3), ("rocking", 2050.4), sd=0.1)
+    (some,), (none,) = (compare(s, campaign).tests for s in (spindle, certain))
+    assert some.modes[0].sd == pytest.approx(none.modes[0].sd, rel=0.1)
+    assert some.modes[3].sd > 10 * none.modes[3].sd
 
 
 # ---------------------------------------------------------------- tables, missing and extra modes
@@ -172,12 +207,13 @@ JANG = [("T20", (-21, -7, 57, 33, -58)), ("T60", (-26, -8, 61, 39, -53))]
 
 
 @pytest.mark.parametrize(("test", "errors"), JANG, ids=[t for t, _ in JANG])
-def test_the_papers_measured_table(spindle, test, errors):
+def test_the_papers_measured_table(certain, test, errors):
     """Computed - measured of Jang et al. (2003), Table 2, in whole Hz; one standard error is 1 Hz there."""
     campaign = read_campaign(SCENE / "measured" / "jang_2003")
-    found = {t.test.id: t for t in compare(spindle, campaign).tests}[test]
+    found = {t.test.id: t for t in compare(certain, campaign).tests}[test]
     assert [round(m.error) for m in found.modes] == list(errors)
-    assert [m.pull for m in found.modes] == pytest.approx([m.error for m in found.modes], rel=2e-3)
+    # 0.2 K of the test's temperature adds up to 0.26 Hz to that: the rocking modes fall by 1.3 Hz/K at 60 C
+    assert [m.pull for m in found.modes] == pytest.approx([m.error for m in found.modes], rel=4e-2)
     assert all(m.damping_pull is None and m.mac is None for m in found.modes)
     assert found.missing == ()
     assert len(found.extra) == 2  # the bearing modes, which the paper does not print
@@ -205,25 +241,39 @@ def test_damping_error_in_standard_errors(spindle):
     assert mode.damping_computed == pytest.approx(0.00539, abs=1e-5)
 
 
+def at(*frequency):
+    """Poles of one percent damping at frequencies (Hz)."""
+    return 2 * np.pi * np.array(frequency) * (-0.01 + 1j * np.sqrt(1 - 0.01**2))
+
+
+def nothing(spindle, test):
+    """An observation of no modes."""
+    return observe(Campaign("nothing", spindle.name, "mobility", (), (test,)), spindle)[0]
+
+
+def computed(spindle, o, pole, shape, kind) -> Predicted:
+    """Modes as if the model had these."""
+    return replace(predict(spindle, o, ()), pole=pole, shape=shape, kind=kind)
+
+
 def test_partners_cross_where_shapes_do(spindle):
     """The axial mode keeps its partner while rocking modes 10 % off pass it."""
     shape = np.array([[1, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], complex)
     test = Test("t", 20.0, 0.0)
-    o = Observation(
-        test, Condition(20.0), np.array([1840.0, 1855.0, 2000.0]), np.full(3, 0.01), np.eye(6), shape[[1, 2, 0]], shape.real, None
+    o = replace(
+        nothing(spindle, test), frequency=np.array([1840.0, 1855.0, 2000.0]), damping=np.full(3, 0.01), shape=shape[[1, 2, 0]], kind=None
     )
-    p = Predicted(np.array([1998.0, 2050.0, 2060.0]), np.full(3, 0.01), shape, ("axial", "rocking", "rocking"))
+    p = computed(spindle, o, at(1998.0, 2050.0, 2060.0), shape, ("axial", "rocking", "rocking"))
     assert partners(o, p).tolist() == [-1, -1, 0]
-    nearer = replace(p, frequency=np.array([1998.0, 1900.0, 1890.0]))
+    nearer = replace(p, pole=at(1998.0, 1900.0, 1890.0))
     assert partners(o, nearer).tolist() == [2, 1, 0]  # in order of frequency: shapes of a close pair turn in their plane
 
 
-def test_numbers_follow_shapes_through_a_crossing():
+def test_numbers_follow_shapes_through_a_crossing(spindle):
     shape = np.eye(2, dtype=complex)
     kinds = (("axial", "rocking"), ("rocking", "axial"))
-    empty = np.zeros(0)
-    observed = [Observation(Test("t", t, 0.0), Condition(t), empty, empty, np.zeros((0, 0)), None, None, ()) for t in (20.0, 30.0)]
-    predicted = [Predicted(np.array([990.0, 1000.0 + 5 * k]), np.full(2, 0.01), shape[[k, 1 - k]], kinds[k]) for k in (0, 1)]
+    observed = [nothing(spindle, Test("t", t, 0.0)) for t in (20.0, 30.0)]
+    predicted = [computed(spindle, o, at(990.0, 1000.0 + 5 * k), shape[[k, 1 - k]], kinds[k]) for k, o in enumerate(observed)]
     assert numbered(observed, predicted) == [{0: 1, 1: 2}, {0: 2, 1: 1}]
 
 
@@ -234,11 +284,83 @@ def test_unknown_bodies_are_refused(spindle):
         compare(spindle, replace(campaign, points=(point,)))
 
 
-def test_likeness():
-    a = np.array([1.0, 2j, 0.5])
-    assert likeness(a, (3 - 4j) * a) == pytest.approx(1.0)
-    assert likeness(np.array([1.0, 0j]), np.array([0j, 1.0])) == 0.0
-    assert likeness(a, 0 * a) is None
+def without(o, i):
+    """An observation that missed a mode."""
+    keep = np.delete(np.arange(len(o.frequency)), i)
+    both = np.concatenate([keep, keep + len(o.frequency)])
+    rows = {k: None if (v := getattr(o, k)) is None else v[keep] for k in ("shape", "shape_sd", "residue", "residue_sd")}
+    return replace(o, frequency=o.frequency[keep], damping=o.damping[keep], covariance=o.covariance[np.ix_(both, both)], **rows)
+
+
+def with_false(o, frequency):
+    """An observation with a pole more: noise, that is a random shape, where no mode is."""
+    random = np.random.default_rng(3)
+    m, at = len(o.frequency), int(np.searchsorted(o.frequency, frequency))
+    shape = random.standard_normal(o.shape.shape[1]) + 1j * random.standard_normal(o.shape.shape[1])
+    order = np.insert(np.arange(m), at, m)
+    both = np.concatenate([order, order + m + 1])
+    covariance = np.diag(np.full(2 * m + 2, 1e-6))
+    old = np.concatenate([np.arange(m), np.arange(m) + m + 1])
+    covariance[np.ix_(old, old)] = o.covariance
+    rows = {"shape": [*o.shape, shape / abs(shape).max()], "shape_sd": [*o.shape_sd, o.shape_sd[0]]}
+    rows |= {"residue": [*o.residue, o.residue[0]], "residue_sd": [*o.residue_sd, o.residue_sd[0]]}
+    return replace(
+        o,
+        frequency=np.append(o.frequency, frequency)[order],
+        damping=np.append(o.damping, 0.002)[order],
+        covariance=covariance[np.ix_(both, both)],
+        **{k: np.array(v)[order] for k, v in rows.items()},
+    )
+
+
+@pytest.mark.parametrize("mode", range(7))
+def test_a_mode_that_was_missed_is_extra_and_moves_no_other(spindle, clean, itself, mode):
+    campaign, observed = clean
+    found = compare(spindle, campaign, [without(observed[0], mode), observed[1]]).tests[0]
+    lost = itself.tests[0].modes[mode]
+    assert found.missing == ()
+    assert found.extra == (pytest.approx(lost.computed),)
+    assert [m.number for m in found.modes] == [n for n in range(1, 8) if n != lost.number]
+
+
+@pytest.mark.parametrize("frequency", [700.0, 1270.0, 2180.0, 2700.0])
+def test_a_false_pole_is_told_and_moves_no_other(spindle, clean, itself, frequency):
+    campaign, observed = clean
+    found = compare(spindle, campaign, [with_false(observed[0], frequency), observed[1]])
+    assert found.tests[0].missing == (frequency,)
+    assert found.tests[0].extra == ()
+    assert [m.number for m in found.tests[0].modes] == [1, 2, 3, 4, 5, 6, 7]
+    assert [m.error for m in found.tests[0].modes] == pytest.approx([m.error for m in itself.tests[0].modes])
+    assert comparison_json(found)["tests"][0]["missing_Hz"] == [frequency]
+
+
+def test_a_false_pole_beside_a_mode_takes_no_partner_from_it(spindle, clean, itself):
+    """Seven computed modes for eight poles: the one with the random shape is left over, or further modes are told as its partners."""
+    campaign, observed = clean
+    found = compare(spindle, campaign, [with_false(observed[0], 1010.0), observed[1]]).tests[0]
+    assert found.modes[0].measured == itself.tests[0].modes[0].measured
+    assert 1010.0 in found.missing
+
+
+def test_a_test_without_any_mode(spindle, clean):
+    campaign, observed = clean
+    empty = observed[0]
+    while len(empty.frequency):
+        empty = without(empty, 0)
+    found = compare(spindle, campaign, [empty, observed[1]])
+    assert found.tests[0].modes == found.tests[0].missing == ()
+    assert len(found.tests[0].extra) == 7
+    assert 0.1 < found.rms_pull < 1.3
+    nothing_at_all = compare(spindle, replace(campaign, tests=campaign.tests[:1]), [empty])
+    assert nothing_at_all.rms_pull == np.inf
+    assert comparison_json(nothing_at_all)["rms_pull"] is None
+
+
+def test_more_modes_measured_than_computed(spindle):
+    rows = [("axial", 1002.0 + 10 * k) for k in range(30)]
+    found = compare(spindle, table(spindle, 20.0, *rows)).tests[0]
+    assert len(found.modes) + len(found.missing) == 30
+    assert len(found.missing) >= 27  # three axial modes are computed
 
 
 # ---------------------------------------------------------------- practice campaigns
@@ -253,7 +375,17 @@ def test_practice_b_is_within_tolerances(spindle):
         assert min(m.mac for m in test.modes) > 0.97
     answer = comparison_json(found)
     assert answer["rms_pull"] > 10  # tolerances are not in the standard errors
-    assert set(answer["tests"][0]) == {"id", "temperature_C", "speed_rpm", "modes", "missing_Hz", "extra_Hz", "frac"}
+    assert set(answer["tests"][0]) == {
+        "id",
+        "temperature_C",
+        "speed_rpm",
+        "modes",
+        "missing_Hz",
+        "extra_Hz",
+        "frac",
+        "correlation",
+        "bands",
+    }
 
 
 def test_practice_a_falls_at_the_transition(spindle):

@@ -151,8 +151,8 @@ def test_friction_heat_against_the_steady_solver(spindle):
     uniform = {g.name: 60.0 for g in spindle.regions}
     found = thermal_gradient.EFFECT.temperatures(spindle, RUNNING, {"scale": 1.0, "common_share": 1.0}, uniform)
     assert found == pytest.approx(expected, abs=1e-6)
-    assert min(found.values()) > 63.0
-    assert found["upper inner ring"] > found["upper outer ring"] + 1.0
+    assert min(found.values()) > 61.5
+    assert found["upper inner ring"] > found["upper outer ring"] + 0.5
     told = thermal_gradient.EFFECT.temperatures(spindle, RUNNING, {"scale": 1.0, "common_share": 0.0}, uniform)
     assert told["lower outer ring"] + told["upper outer ring"] == pytest.approx(120.0, abs=1e-9)
     assert told["shaft"] - told["sleeve"] == pytest.approx(found["shaft"] - found["sleeve"], abs=1e-9)
@@ -399,16 +399,16 @@ def test_film_speed_is_the_balls_rolling_speed(spindle):
 
 
 def test_film_shortens_the_unloaded_distance(spindle):
-    """By scale (h_i + h_o); worked by hand at 60 C, 7200 rpm: U 4.49e-10, G 5029, W 3.8e-5, factor of k 0.99: h_i 0.176 um (2 %)."""
+    """By scale (h_i + h_o); worked by hand at 60 C, 7200 rpm: U 1.29e-10, G 5029, W 3.8e-5, factor of k 0.99: h_i 0.0763 um (2 %)."""
     inner, outer = lubricant_film.films(spindle, spindle.bearings[0], RUNNING.speed, 60.0, 2.2e-8)
-    assert inner == pytest.approx(0.176e-6, rel=0.02)
+    assert inner == pytest.approx(0.0763e-6, rel=0.02)
     assert 1.1 < outer / inner < 1.2  # (R_o / R_i)^(1 - 0.67 + 2 0.067), R_o / R_i = (1 + gamma) / (1 - gamma)
     point, plain = at(spindle, RUNNING, lubricant_film, scale=0.5), operating_point(spindle, RUNNING, [])
     change = [p.state.bearings[0].row.unloaded_distance for p in (plain, point)]
     assert change[0] - change[1] == pytest.approx((inner + outer) / 2, rel=1e-3)  # the film's temperature is the rings'
 
 
-@pytest.mark.parametrize(("temperature", "ratio"), [(20.0, 1.0), (40.0, 100 / 260), (60.0, 46 / 260)])
+@pytest.mark.parametrize(("temperature", "ratio"), [(20.0, 1.0), (40.0, 26.0 / 63.1), (60.0, 13.2 / 63.1)])
 def test_grease_damping_follows_the_viscosity_table(spindle, temperature, ratio):
     point, plain = (f(spindle, Condition(temperature)) for f in (
         lambda s, c: at(s, c, grease_damping, viscous_share=0.4), lambda s, c: operating_point(s, c, [])))  # fmt: skip
@@ -466,7 +466,7 @@ def spinning_discs(layers, at, elements=400):
 
 
 def test_spinning_ring_closed_form():
-    """Timoshenko & Goodier, art. 32, at the bore; a ring cut into layers is the same ring; a thin hoop grows rho r^3 / E."""
+    """Timoshenko & Goodier at the bore; a ring cut into layers is the same ring; a thin hoop grows rho r^3 / E."""
     e, nu, rho = STEEL
     a, b = 5.349e-3, 12.5e-3
     bore = rho * a / (4 * e) * ((3 + nu) * b**2 + (1 - nu) * a**2)
@@ -477,7 +477,7 @@ def test_spinning_ring_closed_form():
 
 
 def test_spinning_solid_disc_closed_form():
-    """u(b) = rho b^3 (1 - nu) / (4 E), art. 32: what a turning shaft with its inner ring does."""
+    """u(b) = rho b^3 (1 - nu) / (4 E): what a turning shaft with its inner ring does."""
     e, nu, rho = STEEL
     solid = stack((0.0, 2.5e-3, STEEL), (2.5e-3, 3.752e-3, STEEL))
     assert ring_growth.displacement(solid, 3.752e-3) == pytest.approx(rho * 3.752e-3**3 * (1 - nu) / (4 * e), rel=1e-12)

@@ -16,18 +16,13 @@ from model.modes import group_energy
 from model.scene import BadInput, content_hash, load
 from sim import plots
 from sim.campaign import Campaign, ModeRow, Test
-from sim.comparison import (
-    by_kind,
-    compared,
-    measured_rows,
-    misses,
-    numbered,
-    published,
-    read_published,
-)
+from sim.comparison import compared
+from sim.headlines import misses
 from sim.impact import impact_tests
 from sim.modal import extract
+from sim.mode_numbers import by_kind, measured_rows, numbered
 from sim.operating import operating_point
+from sim.published import published, read_published
 from sim.report import background, html, write_report
 from sim.run import Run, Step, measured_campaigns
 

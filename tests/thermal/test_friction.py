@@ -43,4 +43,28 @@ def test_heat_is_torque_times_speed_and_zero_at_rest(spindle):
 
 def test_viscosity_outside_its_table_is_refused(spindle):
     with pytest.raises(OutsideRange):
-        torque(spindle.thermal.friction, spindle.bearings[0], 700.0, 120.0, 16.0)
+        torque(spindle.thermal.friction, spindle.bearings[0], 700.0, 121.0, 16.0)
+
+
+def test_grease_of_the_reference_spindle_follows_astm_d341(spindle):
+    """log10 log10 (nu + 0.7) is linear in log10 (T / K) through 26 mm2/s at 40 C and 5.1 at 100 C."""
+    law = spindle.thermal.friction.viscosity
+    celsius, found = np.array(law.temperature), np.array(law.value) * 1e6
+    ends = np.log10(np.log10(np.array([26.0, 5.1]) + 0.7))
+    slope = (ends[1] - ends[0]) / np.log10(373.15 / 313.15)
+    expected = 10 ** 10 ** (ends[0] + slope * np.log10((celsius + 273.15) / 313.15)) - 0.7
+    assert found == pytest.approx(expected, rel=5e-3)
+
+
+@pytest.mark.parametrize("temperature", [20.0, 40.0, 60.0])
+def test_torque_beside_the_skf_model(spindle, temperature):
+    """The manufacturer's model of 2004 (SKF Rolling bearings catalogue, angular contact, pure axial load) for the same bearing and
+    grease: M = phi_ish phi_rs G_rr (nu n)^0.6 + mu_sl G_sl. Two empirical laws; Palmgren's is the larger, by less than a factor of two."""
+    law, load, rpm, mean = spindle.thermal.friction, 16.0, 7200.0, 9.1
+    nu = law.viscosity(temperature) * 1e6
+    rolling = 5.03e-7 * mean**1.97 * (1.90e-12 * mean**4 * rpm**2 + 1.97 * load) ** 0.54 * (nu * rpm) ** 0.6
+    sliding = 1.30e-2 * mean**0.26 * ((1.91e-12 * mean**4 * rpm**2) ** (4 / 3) + 0.68 * load ** (4 / 3))
+    shear = 1 / (1 + 1.84e-9 * (rpm * mean) ** 1.28 * nu**0.64)
+    starved = np.exp(-6e-8 * nu * rpm * (5 + 13) * np.sqrt(4.4 / (2 * (13 - 5))))
+    skf = shear * starved * rolling + 0.05 * sliding
+    assert 1.0 < 1e3 * torque(law, spindle.bearings[0], rpm * RPM, temperature, load) / skf < 2.0

@@ -143,12 +143,12 @@ def two_rings(spindle, conductance=0.0, gaps=()):
 
 
 def test_all_heat_passes_the_bearing(spindle):
-    """2 W through 0.25 W/K: 8 K between the raceways; the film carries them at 2 W / (50 W/m2K x surface)."""
+    """2 W through 0.25 W/K: 8 K between the raceways; the film carries them at 2 W / (50 W/m2K x surface without raceway)."""
     model = two_rings(spindle, conductance=0.25)
     drive = heat.running(model.spindle, 25.0, 100.0)
     field = heat.steady(model, drive)
     means = field.region_means()
-    surface = 2 * np.pi * (15e-3 * 7e-3 + (9e-3**2 - 6e-3**2))
+    surface = 2 * np.pi * (9e-3 * 7e-3 + (9e-3**2 - 6e-3**2))
     assert means["inner"] - means["outer"] == pytest.approx(8.0, rel=1e-3)
     assert means["outer"] - 25.0 == pytest.approx(2.0 / (50 * surface), rel=1e-3)
     assert heat.flows(model, field, drive).crossing == pytest.approx(-2.0, rel=1e-9)
@@ -159,6 +159,26 @@ def test_all_heat_passes_the_air_gap(spindle):
     model = two_rings(spindle, gaps=(AirGap(("inner", "outer"), 500.0),))
     means = heat.steady(model, heat.running(model.spindle, 25.0, 100.0)).region_means()
     assert means["inner"] - means["outer"] == pytest.approx(2.0 / (500 * 2 * np.pi * 4e-3 * 4e-3), rel=1e-3)
+
+
+@pytest.mark.parametrize("film", [50.0, 80.0])
+def test_chamber_air_does_not_reach_into_a_gap(spindle, film):
+    """Both rings with a film, no bearing: each loses the stretch z = 2 to 6 mm of its facing side, at its own radius."""
+    own = replace(two_rings(spindle).spindle, bearings=())
+    convections = tuple(Convection((name,), film) for name in ("inner", "outer"))
+    own = replace(own, thermal=replace(own.thermal, convections=convections, gaps=(AirGap(("inner", "outer"), 500.0),)))
+    model = conduction.model(own, {part: section_mesh(own, part, 0.7e-3) for part in PARTS})
+    inner = (2e-3 + 4e-3) * 6e-3 + (4e-3**2 - 2e-3**2) - 4e-3 * 4e-3
+    outer = (6e-3 + 9e-3) * 7e-3 + (9e-3**2 - 6e-3**2) - 6e-3 * 4e-3
+    for part, area in zip(PARTS, (inner, outer), strict=True):
+        assert model.film[model.spans[part]].sum() == pytest.approx(film * 2 * np.pi * area, rel=1e-9)
+    assert model.convection @ np.ones(model.film.size) == pytest.approx(model.film, abs=1e-12)
+
+
+def test_two_gaps_may_not_share_a_face(spindle):
+    twice = (AirGap(("inner", "outer"), 500.0), AirGap(("outer", "inner"), 100.0))
+    with pytest.raises(ValueError, match="two gaps share"):
+        two_rings(spindle, gaps=twice)
 
 
 def test_gap_couples_equal_heights(spindle):
@@ -201,7 +221,7 @@ def test_balance_of_heat_steady(spindle, reference):
     nodal = reference.nodal(field)
     made = heat.friction_heat(reference, nodal, drive)
     cold = heat.friction_heat(reference, np.full(nodal.size, 25.0), drive)
-    assert np.all(made < 0.8 * cold)
+    assert np.all(made < 0.85 * cold)
     source = reference.film * 25.0 + heat.motor_heat(reference, drive) @ reference.motor + made @ reference.bearing
     assert reference.conductance @ nodal == pytest.approx(source, abs=1e-9)
 
@@ -240,13 +260,13 @@ def test_mesh_of_the_influence_is_fine_enough_for_heat(spindle):
 
 @pytest.mark.parametrize("load", [0.0, 200.0])
 def test_load_and_speed_drive_friction(spindle, reference, load):
-    """Twenty times the speed overheats the grease, and is refused; load adds f1 P1 d_m times speed."""
+    """Forty times the speed overheats the grease, and is refused; load adds f1 P1 d_m times speed."""
     with pytest.raises(OutsideRange):
-        heat.steady(reference, heat.running(spindle, 25.0, 20 * 7200 * RPM))
+        heat.steady(reference, heat.running(spindle, 25.0, 40 * 7200 * RPM))
     nodal = np.full(reference.film.size, 40.0)
     drive = heat.running(spindle, 25.0, 754.0, {b.name: load for b in spindle.bearings})
     base = heat.friction_heat(reference, nodal, heat.running(spindle, 25.0, 754.0, {b.name: 0.0 for b in spindle.bearings}))
-    assert heat.friction_heat(reference, nodal, drive) - base == pytest.approx(0.0013 * load * 9.1e-3 * 754, abs=1e-12)
+    assert heat.friction_heat(reference, nodal, drive) - base == pytest.approx(0.0003 * load * 9.1e-3 * 754, abs=1e-12)
 
 
 def test_without_convection_there_is_no_steady_state(spindle):

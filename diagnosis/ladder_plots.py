@@ -1,0 +1,171 @@
+"""Pictures of the ladder: the error on every rung, and the pull map (mode x test) of the first rung and of the top."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import SymLogNorm
+from matplotlib.figure import Figure
+
+from diagnosis.ladder import Ladder
+from diagnosis.observe import Observation
+from diagnosis.rung import Rung
+from model.ball_row import Array
+from sim.plots import INK, PALE, STYLE, svg
+
+RPM = 2 * np.pi / 60
+ERROR, HELD_OUT = "#b3402a", "#2166ac"
+LINEAR = 3.0  # standard errors up to which the colours of a pull map are linear
+SMALLEST = 30.0  # standard errors that the colours span at least
+
+
+@dataclass(frozen=True, eq=False)
+class PullMap:
+    """(computed - measured) / standard error by mode (row) and test (column), NaN where not measured; `damping` None without any."""
+
+    modes: list[str]
+    tests: list[str]
+    frequency: Array
+    damping: Array | None
+
+
+def pull_map(found: Ladder, rung: Rung) -> PullMap:
+    """The pulls of all modes that have a number, tests in order of speed and temperature."""
+    data = found.theory.data
+    order = sorted(range(len(data.observations)), key=lambda t: _place(data.observations[t]))
+    column = {t: k for k, t in enumerate(order)}
+    row = {number: k for k, number in enumerate(found.kinds)}
+    maps = {what: np.full((len(row), len(order)), np.nan) for what in ("frequency", "damping")}
+    for k, f in enumerate(data.features):
+        if f.what in maps and found.mode[k]:
+            maps[f.what][row[int(found.mode[k])], column[f.test]] = -rung.residual[k] / data.sd[k]
+    damping = maps["damping"] if np.isfinite(maps["damping"]).any() else None
+    return PullMap(
+        [f"{n} {kind}" for n, kind in found.kinds.items()], _tests([data.observations[t] for t in order]), maps["frequency"], damping
+    )
+
+
+def _place(o: Observation) -> tuple[float, float, str]:
+    return abs(o.condition.speed), o.condition.temperature, o.test.id
+
+
+def _tests(observations: list[Observation]) -> list[str]:
+    """Temperature, and speed where there are several; the id of the test where that says too little."""
+    speeds = {o.condition.speed for o in observations}
+    told = [f"{o.condition.temperature:g} °C" + (f", {o.condition.speed / RPM:.0f} rpm" if len(speeds) > 1 else "") for o in observations]
+    return told if len(set(told)) == len(told) else [o.test.id for o in observations]
+
+
+def figure(found: Ladder) -> Figure:
+    first, last = (pull_map(found, r) for r in (found.rungs[0], found.top))
+    rows = 1 if first.damping is None else 2
+    tall = 0.32 * len(first.modes) + 0.75
+    drawn = Figure(figsize=(10.0, 3.1 + rows * tall))
+    parts: Any = drawn.subfigures(2, 1, height_ratios=[3.1, rows * tall])
+    _errors(parts[0].subplots(), found)
+    _maps(parts[1], [(found.rungs[0].name, first), (found.top.name, last)], rows)
+    return drawn
+
+
+def _errors(axes: Axes, found: Ladder) -> None:
+    place = np.arange(len(found.rungs))
+    for values, colour, marker, label, up in (
+        ([r.held_out for r in found.rungs], HELD_OUT, "s", "left-out temperatures", True),
+        ([r.error for r in found.rungs], ERROR, "o", "all data", False),
+    ):
+        axes.plot(place, values, color=colour, marker=marker, label=label, zorder=3)
+        for x, r in enumerate(found.rungs):
+            if up and r.fitted is None:
+                continue  # both are the same there, written once
+            above = up if r.held_out != r.error else not up
+            if r.held_out < r.error:
+                above = not up
+            shift = (0, 7) if above or r.fitted is None else (0, -14)
+            axes.annotate(
+                _short(values[x]), (x, values[x]), xytext=shift, textcoords="offset points", ha="center", color=colour, fontsize=8
+            )
+    axes.axhline(1.0, color=PALE, lw=0.9, ls="--", zorder=1, label="errors of the data")
+    axes.set_yscale("log")
+    low = min(1.0, *(min(r.error, r.held_out) for r in found.rungs))
+    high = max(max(r.error, r.held_out) for r in found.rungs)
+    span = max(np.log10(high / low), 0.5)
+    axes.set_ylim(low / 10 ** (0.16 * span), high * 10 ** (0.16 * span))
+    axes.set_xlim(-0.5, len(place) - 0.5)
+    axes.set_xticks(place, [_broken(r.name) for r in found.rungs])
+    axes.set_ylabel("rms pull, standard errors")
+    axes.set_title("The error on every rung")
+    axes.legend(loc="upper right")
+    axes.grid(visible=False, axis="x")
+
+
+def _broken(name: str) -> str:
+    """A name on lines short enough to stand beside its neighbours."""
+    lines = [""]
+    for word in name.replace("_", "_ ").replace(": ", ": ").split(" "):
+        joint = "" if not lines[-1] or lines[-1].endswith("_") else " "
+        if len(lines[-1]) + len(word) > 12 and lines[-1] not in ("", "+"):
+            lines.append(word)
+        else:
+            lines[-1] += joint + word
+    return "\n".join(lines)
+
+
+def _maps(part: Any, rungs: list[tuple[str, PullMap]], rows: int) -> None:
+    largest = max(SMALLEST, *(float(np.nanmax(np.abs(m.frequency))) for _, m in rungs))
+    norm = SymLogNorm(LINEAR, vmin=-largest, vmax=largest)
+    grid = part.subplots(rows, 2, squeeze=False)
+    for k, (name, pulls) in enumerate(rungs):
+        for i, (what, values) in enumerate((("frequencies", pulls.frequency), ("damping ratios", pulls.damping))[:rows]):
+            assert values is not None
+            axes = grid[i][k]
+            axes.imshow(values, cmap="RdBu_r", norm=norm, aspect="auto")
+            for (y, x), v in np.ndenumerate(values):
+                if np.isfinite(v):
+                    deep = abs(float(norm(v)) - 0.5) > 0.3
+                    axes.text(x, y, _signed(float(v)), ha="center", va="center", fontsize=7.5, color="white" if deep else INK)
+            axes.set_xticks(range(len(pulls.tests)), [t.replace(", ", "\n").removesuffix(" rpm") for t in pulls.tests], fontsize=7.5)
+            axes.set_yticks(range(len(pulls.modes)), pulls.modes if k == 0 else [])
+            axes.set_title(f"{name}: {what}")
+            if i == rows - 1 and any(t.endswith(" rpm") for t in pulls.tests):
+                axes.set_xlabel("temperature, and below it speed in rpm")
+            axes.grid(visible=False)
+            axes.tick_params(length=0)
+        grid[0][0].set_ylabel("mode")
+    decades = [10.0**k for k in range(1, 7) if 10.0**k <= largest]
+    ticks = [*(-d for d in reversed(decades)), -LINEAR, 0.0, LINEAR, *decades]
+    bar = part.colorbar(ScalarMappable(norm, "RdBu_r"), ax=grid, shrink=0.9, pad=0.01, ticks=ticks, format="{x:g}")
+    bar.minorticks_off()
+    bar.set_label("pull, (computed − measured) / s.e.")
+
+
+def _short(value: float) -> str:
+    return f"{value:.0f}" if value >= 99.5 else (f"{value:.1f}" if value >= 9.95 else f"{value:.2f}")
+
+
+def _signed(value: float) -> str:
+    if abs(value) < 0.05:
+        return "0.0"
+    text = f"{value:+.1f}" if abs(value) < 9.95 else (f"{value:+.0f}" if abs(value) < 9999.5 else f"{value:+.0e}".replace("e+0", "e"))
+    return text.replace("-", "−")
+
+
+def picture(found: Ladder) -> str:
+    """The figure as an SVG element for a page."""
+    with rc_context(STYLE):
+        return svg(figure(found), "ladder", "Error on every rung of the ladder, and pull maps of the first and the last")
+
+
+def write(found: Ladder, path: Path) -> None:
+    """The figure as a file of its own, by its ending (.svg or .png), on white."""
+    with rc_context({**STYLE, "figure.facecolor": "white", "savefig.facecolor": "white"}):
+        buffer = io.BytesIO()
+        metadata = {"Date": None} if path.suffix == ".svg" else None
+        figure(found).savefig(buffer, format=path.suffix[1:], dpi=130, metadata=metadata)
+    path.write_bytes(buffer.getvalue())

@@ -1,0 +1,28 @@
+"""Numbers as a page shows them: true minus signs, signs, standard errors to their own digit."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+from markupsafe import Markup
+
+
+def minus(text: str) -> str:
+    """A true minus before digits, and units kept on the line of their number."""
+    return re.sub(r"(?<=\d) (?=(%|Hz|N|°C)\b|%)", "\u00a0", re.sub(r"(?<![\w-])-(?=\d)", "−", text))
+
+
+def signed(value: float, digits: int = 1) -> str:
+    return minus(f"{value:+.{digits}f}")
+
+
+def with_error(pair: tuple[float, float] | None, sign: bool = False, digits: int = 1) -> Markup:
+    """A number with its standard error, to the error's first digit (two, if that is a one); an en dash for no number."""
+    if pair is None:
+        return Markup("–")
+    value, error = pair
+    if not 0 < error < np.inf:
+        return Markup(minus(f"{value:{'+' if sign else ''}.{digits}f}"))
+    digits = int(np.clip(-np.floor(np.log10(error / 2)), 0, 5))
+    return Markup(minus(f"{value:{'+' if sign else ''}.{digits}f}") + f" <small>± {error:.{digits}f}</small>")

@@ -1,0 +1,183 @@
+"""Warm-up: losses heat the running spindle, its rings move, and preload, stiffness and natural frequencies drift with them.
+
+The heat equation of the section (`thermal.heat`) and the axial equilibrium of the bearings (`model.pair`) are solved together at every
+stage of every time step: Palmgren's friction depends on the lubricant's temperature and on the preload, the preload on the temperature
+of the whole section. Spin-up takes seconds and is left out: the speed stands from time zero. A chamber soak is the same with air at
+another temperature than the spindle's.
+
+Effects of the scene act as at any operating point, with the mean temperature of the spindle (weighted with heat capacity) as the
+condition's; those that prescribe region temperatures are left out whole, since region temperatures are what is computed here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from model.ball_row import Array
+from model.machine import Condition, OutsideRange, Spindle
+from model.modes import Mode, modes
+from model.pair import solve
+from model.rotor_base import matrices
+from model.scene import BadInput
+from sim.effect import Effect, Values
+from sim.effects import of_scene
+from sim.operating import OperatingPoint, drawing
+from sim.shift import follow
+from thermal import conduction, heat
+from thermal.influence import influence
+from thermal.reading import Reading, reading
+
+TOLERANCE = 0.01  # K, estimated error of one time step
+TIME_CONSTANTS = 8.0  # of the slowest decay that a warm-up lasts by default: the rest is 0.03 %
+STEPS = 48  # at least, over a warm-up of that length
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """The spindle at one moment: region and bearing temperatures (C), friction heat (W) by bearing, and the operating point."""
+
+    temperatures: Mapping[str, float]
+    bearing_temperatures: Mapping[str, float]
+    friction: Mapping[str, float]
+    point: OperatingPoint
+
+    @property
+    def preload(self) -> dict[str, float]:
+        return {b.name: b.preload for b in self.point.state.bearings}
+
+
+@dataclass(frozen=True, eq=False)
+class Warmup:
+    """A warm-up from `start` (C) in air of `air` (C) at `speed` (rad/s).
+
+    `moments` stand at `history.times` (s); `frequencies` (times, modes) in Hz follow the modes of the first moment by their shape, NaN
+    where one has been lost; `steady` is the end of all times, `steady_frequencies` (modes,) its modes; `time_constant` (s) of the
+    slowest decay about it. `left_out` names effects whose region temperatures are computed here instead.
+    """
+
+    spindle: Spindle
+    start: float
+    air: float
+    speed: float
+    history: heat.History
+    moments: tuple[Moment, ...]
+    modes: tuple[Mode, ...]
+    frequencies: Array
+    steady: Moment
+    steady_frequencies: Array
+    time_constant: float
+    left_out: tuple[str, ...]
+
+    @property
+    def times(self) -> Array:
+        return self.history.times
+
+
+def warm_up(
+    spindle: Spindle,
+    speed: float,
+    start: float,
+    air: float | None = None,
+    duration: float | None = None,
+    tolerance: float = TOLERANCE,
+    highest: float | None = None,
+    progress: Callable[[str], None] = lambda done: None,
+) -> Warmup:
+    """From a uniform temperature `start` (C) at `speed` (rad/s) in `air` (C, as the start by default) for `duration` (s).
+
+    `duration` is `TIME_CONSTANTS` slowest decays by default; modes up to `highest` (Hz, the scene's band by default) are followed.
+    BadInput for a spindle without convection or a duration that is not positive; OutsideRange where a law does not reach; NoEquilibrium
+    where preload and friction drive each other up without end.
+    """
+    if duration is not None and not duration > 0:
+        raise BadInput(f"duration {duration:g} s: a warm-up needs a positive one")
+    air = start if air is None else air
+    effects = tuple((effect, values) for effect, values in of_scene(spindle) if not effect.temperatures)
+    left_out = tuple(effect.name for effect, _ in of_scene(spindle) if effect.temperatures)
+    drawn = drawing(spindle, Condition(start, speed), effects)
+    model = conduction.model(drawn, influence(drawn).sections)
+    if not model.film.any():
+        raise BadInput(f"{spindle.file or spindle.name}: thermal.convection: cools no face, so the spindle would heat up without end")
+    machine = _Machine(spindle, speed, effects, reading(model))
+
+    def drive(_: float, nodal: Array) -> heat.Running:
+        return heat.Running(air, speed, {b.name: b.preload for b in machine.point(nodal).state.bearings})
+
+    try:
+        field = heat.settled(model, lambda nodal: drive(0.0, nodal))
+    except OutsideRange as error:
+        where = f"{spindle.file or spindle.name}: from {start:g} C in air of {air:g} C at {speed * 30 / np.pi:g} rpm"
+        raise OutsideRange(f"{where} the grease or a material is asked for a temperature that its law does not reach: {error}") from None
+    final = model.nodal(field)
+    constant = heat.slowest(model, field, drive(0.0, final))
+    progress(f"steady state, time constant {constant:.0f} s")
+    whole = TIME_CONSTANTS * constant
+    history = heat.march(model, drive, start, duration or whole, tolerance, whole / STEPS)
+    progress(f"temperatures in {len(history.times) - 1} steps")
+    moments = tuple(machine.moment(nodal) for nodal in history.nodal)
+    steady = machine.moment(final)
+    top = spindle.hammer.band[1] if highest is None else highest
+    first = tuple(m for m in modes(moments[0].point.chain) if m.frequency <= top)
+    followed = _followed(first, [*moments, steady])
+    progress("natural frequencies")
+    return Warmup(spindle, start, air, speed, history, moments, first, followed[:-1], steady, followed[-1], constant, left_out)
+
+
+@dataclass(frozen=True, eq=False)
+class _Machine:
+    """A spindle at a speed, asked for its operating point at nodal temperatures of one heat model."""
+
+    spindle: Spindle
+    speed: float
+    effects: tuple[tuple[Effect, Values], ...]
+    read: Reading
+
+    def point(self, nodal: Array) -> OperatingPoint:
+        capacity = self.read.model.lumped_capacity
+        condition = Condition(float(capacity @ nodal / capacity.sum()), self.speed)
+        spindle = drawing(self.spindle, condition, self.effects)
+        motions = self.read.motions(spindle, nodal)
+        for effect, values in self.effects:
+            if effect.motions:
+                motions = effect.motions(spindle, condition, values, motions)
+        state = solve(spindle, condition, motions)
+        for effect, values in self.effects:
+            if effect.pair:
+                state = effect.pair(spindle, condition, values, state)
+        return OperatingPoint(spindle, condition, state, self.effects)
+
+    def moment(self, nodal: Array) -> Moment:
+        model, point = self.read.model, self.point(nodal)
+        names = [b.name for b in model.spindle.bearings]
+        loads = {b.name: b.preload for b in point.state.bearings}
+        friction = heat.friction_heat(model, nodal, heat.Running(0.0, self.speed, loads))
+        return Moment(
+            self.read.region_means(nodal),
+            dict(zip(names, (model.bearing @ nodal).tolist(), strict=True)),
+            dict(zip(names, friction.tolist(), strict=True)),
+            point,
+        )
+
+
+def _followed(first: tuple[Mode, ...], moments: list[Moment]) -> Array:
+    """Frequencies (moments, modes) of the modes `first`, each followed by its shape from moment to moment."""
+    frequency = np.full((len(moments), len(first)), np.nan)
+    last: dict[int, Mode] = dict(enumerate(first))
+    for row, moment in zip(frequency, moments, strict=True):
+        chain = moment.point.chain
+        found = modes(chain)
+        partners = follow(matrices(chain).mass, list(last.values()), found)
+        last = {k: found[p] for k, p in zip(last, partners, strict=True) if p >= 0}
+        for k, mode in last.items():
+            row[k] = mode.frequency
+    return frequency
+
+
+def energy(warmup: Warmup) -> dict[str, float]:
+    """Heat (J) of the whole warm-up: motor and friction in, convection out, and what the metal has stored, read from its temperature."""
+    model, nodal = warmup.history.model, warmup.history.nodal
+    sums = {name: float(sum(getattr(h, name) for h in warmup.history.heat)) for name in ("motor", "friction", "convection")}
+    return sums | {"stored": float(model.lumped_capacity @ (nodal[-1] - nodal[0]))}

@@ -1,0 +1,328 @@
+"""Hidden effects simulated by somebody else (`tests.variants`), and a scorecard of what the diagnosis says of them.
+
+`tests.blind` asks whether the diagnosis survives another path of measuring; this asks whether it survives another engineer's physics, and
+effects that are in no catalogue. Campaigns are like measured ones: build tolerances, temperatures 0.2 K off, channel gains 1 % off, noise on
+every line of exact linear FRFs from 400 to 3000 Hz, no standard errors told. Each is made and diagnosed in a process of its own, and kept as a
+line of out/blind/variants.jsonl, so that the study can be stopped and goes on where it was:
+
+    python -m tests.blind_variants [--effects soak_lag outside/cable ..] [--none N] [--pairs N] [--seeds K] [--sizes 0 1] [--workers W]
+
+`--score` prints the table of what is there; `--shifts` what every variant does to the modes, without any diagnosis.
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import argparse
+import json
+import time
+import traceback
+from collections import Counter
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Column, Table
+from scipy.optimize import linear_sum_assignment
+
+from diagnosis.explain import CLEAR, Candidate, explain, screen
+from diagnosis.observe import observe
+from diagnosis.theory import data_of, theory
+from model.machine import Condition, Spindle
+from model.modes import oscillating, poles
+from model.rotor_base import matrices
+from model.scene import load
+from model.tolerance import toleranced
+from sim.campaign import Campaign, Test
+from sim.effects import CATALOGUE
+from sim.frf import Frf
+from sim.operating import operating_point
+from tests.variants import PLAN, VARIANTS, Variant, by_name
+
+ROOT = Path(__file__).parents[1]
+SCENE = ROOT / "scenes" / "hdd_2003"
+RESULTS = ROOT / "out" / "blind" / "variants.jsonl"
+FREQUENCY = np.arange(400.0, 3001.0)
+RPM = np.pi / 30
+KINDS = ("right", "identified", "in the set", "half", "wrong", "missed", "false alarm")
+
+
+def campaign(spindle: Spindle, hidden: Sequence[tuple[Variant, float]], seed: int) -> Campaign:
+    """A campaign with hidden variants of the given sizes (their units); the seed draws tolerances, noise, and tests left out in a third."""
+    random = np.random.default_rng([seed, 29])
+    built = spindle
+    for parameter in toleranced(spindle):
+        built = parameter.apply(built, parameter.sd * random.standard_normal())
+    effects = [(v.effect, {"size": size}) for v, size in hidden]
+    gain = 1 + spindle.tolerances.gain * random.standard_normal(len(spindle.points))
+    plan = next((v.plan for v, _ in hidden if v.plan is not PLAN), PLAN)
+    dropped = left_out(seed, len(plan))
+    tests = []
+    for k, (temperature, rpm, level, soak) in enumerate(plan):
+        if k in dropped:
+            continue
+        true = temperature + spindle.tolerances.temperature * random.standard_normal()
+        condition = Condition(true, rpm * RPM, level or 0.0, np.inf if soak is None else soak)
+        value = operating_point(built, condition, effects).frf(FREQUENCY)
+        for v, size in hidden:
+            if v.record is not None:
+                value = v.record(size, true, FREQUENCY, value)
+        measured = noisy(value, spindle, random) * gain[:, None, None]
+        frf = Frf(FREQUENCY, measured, tuple(p.node for p in spindle.points), spindle.hammer.hammer_nodes, "mobility")
+        tests.append(Test(f"T{temperature:g}_n{rpm:g}_{k}", temperature, rpm * RPM, level, soak, frf=frf))
+    return Campaign(f"variant {seed}", spindle.name, "mobility", spindle.points, tuple(tests))
+
+
+def left_out(seed: int, tests: int) -> set[int]:
+    """Which tests of a plan were not made: one to three of them in a third of the campaigns."""
+    random = np.random.default_rng([seed, 41])
+    return set(random.choice(tests, random.integers(1, 4), replace=False).tolist()) if random.random() < 1 / 3 else set()
+
+
+def noisy(value: np.ndarray, spindle: Spindle, random: np.random.Generator) -> np.ndarray:
+    """Two independent complex errors on every line: relative to the value, and to the largest answer to that hammer; E |error|^2 = sd^2."""
+    own, common = (random.standard_normal((2, *value.shape)) / np.sqrt(2) for _ in range(2))
+    largest = np.abs(value).max(axis=(0, 2), keepdims=True)
+    of_value = spindle.hammer.noise_of_value * np.abs(value) * (own[0] + 1j * own[1])
+    return value + of_value + spindle.hammer.noise_of_largest * largest * (common[0] + 1j * common[1])
+
+
+@dataclass(frozen=True)
+class Job:
+    """One campaign: variants by name, their shares between just visible (0) and large (1), and the seed."""
+
+    variants: tuple[str, ...]
+    shares: tuple[float, ...]
+    seed: int
+
+    @property
+    def key(self) -> str:
+        return json.dumps([self.variants, self.shares, self.seed])
+
+
+def judge(job: Job) -> dict[str, Any]:
+    """Make and diagnose one campaign."""
+    start = time.perf_counter()
+    spindle = load(SCENE)
+    variants = [by_name(name) for name in job.variants]
+    sizes = [v.size(share) for v, share in zip(variants, job.shares, strict=True)]
+    made = campaign(spindle, list(zip(variants, sizes, strict=True)), job.seed)
+    about = theory(spindle, data_of(observe(made, spindle)))
+    found = explain(about, CATALOGUE, 1)
+    best, n = found.best, len(about.data.value)
+    told = {s.effect.name: s.visibility for s in screen(about, found.base, [v.of_size(s) for v, s in zip(variants, sizes, strict=True)])}
+    return {
+        **asdict(job),
+        "truth": [list(v.truth) for v in variants],
+        "size": sizes,
+        # None where only the instruments' record shows the variant; as many sizes as these data could just have shown
+        "over_smallest": [None if v.record else told.get(v.name, 0.0) / float(np.sqrt(2 * CLEAR)) for v in variants],
+        "tests": [t.id for t in made.tests],
+        "verdict": found.verdict,
+        "effects": list(found.effects),
+        "reason": found.reason,
+        "candidates": [_candidate(c) for c in found.candidates[:5]],
+        "rms_pull": [float(np.sqrt(m / n)) for m in (found.base.misfit, best.fit.misfit if best else found.base.misfit)],
+        "held_out": [found.held_out_before, found.held_out_after],
+        "numbers": n,
+        "seconds": time.perf_counter() - start,
+    }
+
+
+def _candidate(c: Candidate) -> dict[str, Any]:
+    return {
+        "effects": list(c.effects),
+        "delta_evidence": c.delta_evidence,
+        "probability": c.probability,
+        "held_out_ratio": c.held_out_ratio,
+        "believable": c.believable,
+        "values": c.fit.values,
+    }
+
+
+# ---------------------------------------------------------------- the score
+
+
+def outcome(row: dict[str, Any]) -> str:
+    """right: nothing named where nothing (or nothing in the catalogue) was hidden; half: one of two effects named, and nothing else."""
+    verdict, named = row["verdict"], set(row["effects"])
+    if not row["variants"]:
+        return "right" if verdict == "none" else "false alarm"
+    if verdict == "none":
+        return "missed"
+    if not all(row["truth"]):
+        return "right" if verdict == "unexplained" else "wrong"
+    if verdict == "unexplained":
+        return "missed"
+    there = [any(name in named for name in names) for names in row["truth"]]
+    all_true = named <= {name for names in row["truth"] for name in names}
+    if all(there):
+        return "identified" if all_true and verdict != "ambiguous" else "in the set"
+    return "half" if any(there) and all_true else "wrong"
+
+
+def show(console: Console, rows: list[dict[str, Any]]) -> None:
+    grid = Table("hidden", "share", "x smallest", "outcome", "verdict", "pull", "held out", "best (ln evidence)")
+    for row in sorted(rows, key=lambda r: (r["variants"], r["shares"], r["seed"])):
+        first = row["candidates"][0] if row["candidates"] else None
+        grid.add_row(
+            "\n".join(row["variants"]) or "nothing",
+            "\n".join(f"{s:.2f}" for s in row["shares"]),
+            "\n".join("-" if s is None else f"{s:.1f}" for s in row["over_smallest"]),
+            outcome(row),
+            " ".join([row["verdict"], *row["effects"]]),
+            "{:.2f} > {:.2f}".format(*row["rms_pull"]),
+            "{:.2f} > {:.2f}".format(*row["held_out"]),
+            f"{' + '.join(first['effects'])} {first['delta_evidence']:.0f}" if first else "",
+        )
+    console.print(grid)
+    table = Table("hidden effect", *KINDS)
+    for key in sorted({family(r) for r in rows}):
+        count = Counter(outcome(r) for r in rows if family(r) == key)
+        table.add_row(key, *(str(count[k] or "") for k in KINDS))
+    total = Counter(map(outcome, rows))
+    table.add_row("all", *(str(total[k] or "") for k in KINDS))
+    console.print(table)
+    inside = [r for r in rows if r["variants"] and all(r["truth"])]
+    share(console, "false alarms where nothing is hidden", ("false alarm",), [r for r in rows if not r["variants"]])
+    visible = [r for r in inside if all((s or 0) >= 2 for s in r["over_smallest"])]
+    share(console, "truth in the verdict at twice the smallest detectable size or more", ("identified", "in the set"), visible)
+    share(console, "wrong there", ("wrong",), visible)
+    share(console, "wrong at any size", ("wrong",), inside)
+    outside = [r for r in rows if r["variants"] and not all(r["truth"])]
+    share(console, "outside effects called something of the catalogue", ("wrong",), outside)
+    share(console, "outside effects called identified", ("identified",), outside, lambda r: r["verdict"])
+    share(console, "error on left-out conditions at least threefold down where rightly identified", ("yes",),
+          [r for r in inside if outcome(r) == "identified"], lambda r: "yes" if r["held_out"][1] < r["held_out"][0] / 3 else "no")  # fmt: skip
+    reliability = Table("stated probability", "campaigns", "came true")
+    for low, high in ((0, 0.5), (0.5, 0.9), (0.9, 0.99), (0.99, 1.01)):
+        said = [r for r in inside if r["verdict"] != "none" and r["candidates"] and low <= r["candidates"][0]["probability"] < high]
+        if said:
+            true = sum(all(set(names) & set(r["candidates"][0]["effects"]) for names in r["truth"]) for r in said)
+            reliability.add_row(f"{low:g} to {min(high, 1):g}", str(len(said)), f"{true / len(said):.2f}")
+    console.print(reliability)
+
+
+def family(row: dict[str, Any]) -> str:
+    return " + ".join("outside" if v.startswith("outside/") else v.split("/")[0] for v in row["variants"]) or "nothing"
+
+
+def share(console: Console, what: str, kinds: tuple[str, ...], rows: list[dict[str, Any]], of=outcome) -> None:
+    if rows:
+        console.print(f"{what}: {sum(of(r) in kinds for r in rows)} of {len(rows)}")
+
+
+# ---------------------------------------------------------------- what variants do, without a diagnosis
+
+
+def shifts(console: Console, spindle: Spindle, wanted: Sequence[Variant]) -> None:
+    """Largest change of frequency, damping (percent) and FRF (share of its norm) by every variant, just visible and large."""
+    grid = Table(Column("variant", no_wrap=True), "size", "unit", "frequency %", "damping %", "FRF %")
+    lines = FREQUENCY[::10]
+    for v in wanted:
+        for size in (0.0, v.visible, v.large):
+            largest = np.zeros(3)
+            for temperature, rpm, level, soak in v.plan:
+                condition = Condition(temperature, rpm * RPM, level or 0.0, np.inf if soak is None else soak)
+                seen = []
+                for applied in ([], [(v.effect, {"size": size})]):
+                    point = operating_point(spindle, condition, applied)
+                    found = poles(matrices(point.chain))
+                    value = found.value[oscillating(found, 3000.0)]
+                    frf = point.frf(lines)
+                    if applied and v.record is not None:
+                        frf = v.record(size, temperature, lines, frf)
+                    seen.append((value, frf, point.measurement.decay))
+                (a, frf_a, _), (b, frf_b, decay) = seen
+                b = b[linear_sum_assignment(np.abs(a[:, None] - b))[1]] - decay
+                zeta = [-p.real / np.abs(p) for p in (a, b)]
+                change = [np.abs(b.imag / a.imag - 1).max(), np.abs(zeta[1] / zeta[0] - 1).max()]
+                largest = np.maximum(largest, 100 * np.array([*change, np.linalg.norm(frf_b - frf_a) / np.linalg.norm(frf_a)]))
+            if size == 0.0:
+                if largest.max() > 1e-6:
+                    raise ValueError(f"variant {v.name} changes something at size 0: {largest}")
+            else:
+                grid.add_row(v.name, f"{size:g}", v.effect.parameters[0].unit, *(f"{x:.3f}" for x in largest))
+    console.print(grid)
+
+
+# ---------------------------------------------------------------- the study
+
+
+def jobs(options: argparse.Namespace, wanted: Sequence[Variant]) -> list[Job]:
+    """Sizes not told are drawn by the seed, evenly between just visible and large."""
+    found = [Job((), (), seed) for seed in range(options.none)]
+    for k in range(options.seeds):
+        for i, v in enumerate(VARIANTS):
+            seed = 1000 * (k + 1) + i
+            drawn = [round(float(np.random.default_rng([seed, 31]).random()), 3)]
+            found += [Job((v.name,), (s,), seed) for s in options.sizes or drawn if v in wanted]
+    named = [v for v in wanted if v.truth]
+    for k in range(options.pairs):
+        random = np.random.default_rng([k, 37])
+        one, two = (named[i] for i in random.choice(len(named), 2, replace=False))
+        if set(one.truth).isdisjoint(two.truth) and (one.plan is PLAN or two.plan is PLAN):
+            found.append(Job((one.name, two.name), tuple(round(float(s), 3) for s in random.uniform(0.4, 1.0, 2)), 900_000 + k))
+    return found
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--effects", nargs="+", default=[], help="names of effects or variants, or outside; all by default")
+    parser.add_argument("--none", type=int, default=6, help="campaigns with nothing hidden")
+    parser.add_argument("--pairs", type=int, default=0, help="campaigns with two variants (some draws are left out)")
+    parser.add_argument("--seeds", type=int, default=1, help="campaigns of every variant")
+    parser.add_argument("--sizes", type=float, nargs="+", default=[], help="0 just visible to 1 large; drawn by default")
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--limit", type=int, default=10**9, help="stop after so many new campaigns")
+    parser.add_argument("--score", action="store_true")
+    parser.add_argument("--shifts", action="store_true")
+    options = parser.parse_args()
+    console = Console(stderr=True)
+    unknown = [e for e in options.effects if not any(e in (v.name, v.name.split("/")[0]) for v in VARIANTS)]
+    if unknown:
+        parser.error(f"--effects {' '.join(unknown)}: no such effect or variant")
+    wanted = [v for v in VARIANTS if not options.effects or {v.name, v.name.split("/")[0]} & set(options.effects)]
+    if options.shifts:
+        shifts(Console(), load(SCENE), wanted)
+        return 0
+    RESULTS.parent.mkdir(parents=True, exist_ok=True)
+    rows = [json.loads(line) for line in RESULTS.read_text().splitlines()] if RESULTS.exists() else []
+    done = {Job(tuple(r["variants"]), tuple(r["shares"]), r["seed"]).key for r in rows}
+    open_jobs = [] if options.score else [j for j in jobs(options, wanted) if j.key not in done][: options.limit]
+    failed = 0
+    with ProcessPoolExecutor(options.workers, get_context("spawn"), max_tasks_per_child=1) as pool:
+        running = {pool.submit(judge, job): job for job in open_jobs}
+        try:
+            for future in as_completed(running):
+                try:
+                    row = future.result()
+                except Exception:
+                    failed += 1
+                    console.print(f"{running[future]}: failed\n{traceback.format_exc()}", markup=False)
+                    continue
+                rows.append(row)
+                with RESULTS.open("a") as file:
+                    file.write(json.dumps(row) + "\n")
+                hidden = " + ".join(f"{v} {s:.3g}" for v, s in zip(row["variants"], row["size"], strict=True)) or "nothing"
+                console.print(
+                    f"{hidden}: {outcome(row)} ({row['verdict']} {' '.join(row['effects'])}; {row['seconds']:.0f} s)", highlight=False
+                )
+        except KeyboardInterrupt:
+            pool.shutdown(cancel_futures=True)  # campaigns under way come to their end, but are not kept
+            return 130
+    if rows:
+        show(Console(width=200), rows)
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

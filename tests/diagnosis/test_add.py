@@ -1,0 +1,226 @@
+"""What a diagnosis fitted goes into the new scene: effects of a pair, build tolerances; and compare shows whether that paid."""
+
+import json
+import tomllib
+
+import pytest
+
+from diagnosis.before_after import held_out, without
+from model.machine import Condition
+from model.scene import BadInput, build, content_hash, load
+from model.tolerance import toleranced
+from sim.campaign import Campaign, ModeRow, Test
+from sim.effects import of_scene
+from sim.operating import operating_point
+from spindle import main
+from tests.conftest import ROOT, SCENE
+
+PRACTICE = ROOT.parent / "shared" / "practice"
+PAIR = {"preload_loss.loss": 0.2, "added_disk.mass": 1.5, "added_disk.height": 2.0}
+TOLERANCES = {"mount axial stiffness": 0.012, "preload": -0.03, "hub inertia": 0.004, "bearing damping": 0.1}
+OTHERS = {"temperature of T20": -0.3, "temperature of T60": 0.1, "gain of channel 1": 0.01}
+
+
+def row(value):
+    return {"value": value, "sd": 0.1, "prior_sd": 1.0, "unit": "1"}
+
+
+def answer(effects=("preload_loss", "added_disk"), tolerances=TOLERANCES, **more):
+    """An answer of diagnose, with what add takes of it."""
+    pair = {"effects": ["preload_loss", "added_disk"], "parameters": {k: row(v) for k, v in PAIR.items()}}
+    alone = {"effects": ["soak_lag"], "parameters": {"soak_lag.hub_share": row(0.1)}}
+    fitted = {name: row(value) for name, value in {**tolerances, **OTHERS}.items()}
+    return {"verdict": "two effects", "effects": list(effects), "candidates": [pair, alone], "tolerances": fitted} | more
+
+
+@pytest.fixture
+def add(capsys, tmp_path):
+    """A function that adds to a scene under the name `out` from an answer of diagnose; gives what is printed, or the error."""
+
+    def run(out, *effects, of=SCENE, found=None, options=()):
+        file = tmp_path / "diagnosis.json"
+        file.write_text(json.dumps(answer() if found is None else found))
+        code = main(["add", str(of), *effects, "--from", str(file), "--out", str(tmp_path / out), "--json", *options])
+        captured = capsys.readouterr()
+        assert code == (0 if captured.out else 2)
+        return json.loads(captured.out) if code == 0 else captured.err
+
+    return run
+
+
+# ---------------------------------------------------------------- effects
+
+
+def test_a_pair_comes_with_both_its_values(add, tmp_path):
+    found = add("pair", "preload_loss", "added_disk")
+    assert [a["effect"] for a in found["added"]] == ["preload_loss", "added_disk"]
+    values = [dict(v) for _, v in of_scene(load(tmp_path / "pair"))]
+    assert values[0]["loss"] == 0.2
+    assert values[1] == {"mass": 1.5, "outer_radius": 12.5, "height": 2.0}
+
+
+def test_one_after_the_other_is_the_pair(add, tmp_path):
+    one = add("one", "preload_loss")
+    assert "of which added_disk is not in the scene yet" in one["note"]
+    assert one["build"] == TOLERANCES
+    two = add("two", "added_disk", of=tmp_path / "one")
+    assert two["build"] == {}  # is there already
+    add("pair", "preload_loss", "added_disk")
+    assert content_hash(load(tmp_path / "two")) == content_hash(load(tmp_path / "pair"))
+
+
+def test_values_by_hand_go_to_their_effect(add, tmp_path):
+    add("a", "preload_loss", "added_disk", options=["--set", "preload_loss.loss=0.1", "mass=3"])
+    values = {e.name: v for e, v in of_scene(load(tmp_path / "a"))}
+    assert (values["preload_loss"]["loss"], values["added_disk"]["mass"]) == (0.1, 3.0)
+    said = add("b", "preload_loss", "added_disk", options=["--set", "warmth=1"])
+    assert "--set warmth=1: names no parameter; allowed are preload_loss.loss" in said
+    said = add("b", "grease_damping", "soak_lag", found=answer())
+    assert "no candidate has effects grease_damping and soak_lag; its candidates are preload_loss + added_disk, soak_lag" in said
+
+
+# ---------------------------------------------------------------- build tolerances
+
+
+def test_build_tolerances_are_in_the_numbers_of_the_scene(spindle, add, tmp_path):
+    """Each toleranced parameter applied by `model.tolerance`, and looked at directly; those of tests and channels stay behind."""
+    add("built", "preload_loss", "added_disk")
+    built, expected = load(tmp_path / "built"), spindle
+    for parameter in toleranced(spindle):
+        expected = parameter.apply(expected, TOLERANCES.get(parameter.name, 0.0))
+    assert built.structure == expected.structure
+    assert built.bearings == expected.bearings
+    assert built.pair.preload == pytest.approx(16.0 * 0.97)
+    mounts = [s.structure.joints[0].stiffness[2] for s in (built, spindle)]
+    assert mounts[0] == pytest.approx(1.012 * mounts[1], rel=1e-12)
+    assert built.build.deviations == TOLERANCES
+    assert built.build.tests == ("T20", "T60")
+    assert built.provenance["build.deviations.preload"].origin == "calibrated"
+    assert "diagnosis.json" in built.provenance["build.deviations.preload"].source
+
+
+NOT_THEIRS = [
+    ({"effects": []}, "were fitted beside no effect and do not go with preload_loss: left out"),
+    ({"candidates": [{"effects": ["preload_loss"], "parameters": {"loss": row(0.2)}}], "effects": ["preload_loss"], "tolerances": {}}, "holds no tolerances"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("change", "note"), NOT_THEIRS, ids=["none", "bare"])
+def test_tolerances_of_another_explanation_are_left_out(add, tmp_path, change, note):
+    assert note in add("new", "preload_loss", found=answer() | change)["note"]
+    assert load(tmp_path / "new").build is None
+
+
+def test_tolerances_of_the_best_explanation_do_not_go_with_the_second(add, tmp_path):
+    assert "fitted beside preload_loss + added_disk and do not go with soak_lag" in add("new", "soak_lag")["note"]
+    assert load(tmp_path / "new").build is None
+
+
+def test_a_second_diagnosis_adds_to_the_first(add, tmp_path):
+    """Its deviations are relative to the built scene it is of: (1 + a)(1 + b) - 1; that of yet another scene is refused."""
+    add("one", "preload_loss", "added_disk")
+    second = {
+        "effects": ["soak_lag"],
+        "candidates": answer()["candidates"][1:],
+        "tolerances": {k: row(v) for k, v in {"preload": 0.02, "hub mass": 0.001, **OTHERS}.items()},
+    }
+    said = add("two", "soak_lag", of=tmp_path / "one", found=second)
+    assert "spindle.toml: build: holds the tolerances of another diagnosis" in said
+    add("two", "soak_lag", of=tmp_path / "one", found=second | {"scene_hash": content_hash(load(tmp_path / "one"))})
+    built = load(tmp_path / "two")
+    assert built.build.deviations == pytest.approx(TOLERANCES | {"preload": 0.97 * 1.02 - 1, "hub mass": 0.001})
+    assert built.pair.preload == pytest.approx(16.0 * 0.97 * 1.02)
+    assert [a.effect for a in built.effects] == ["preload_loss", "added_disk", "soak_lag"]
+    assert (tmp_path / "two" / "spindle.toml").read_text().count("[build]") == 1
+
+
+REFUSED = [
+    ("unknown", {"lid stiffness": 0.1}, "build.deviations.lid stiffness: is no toleranced parameter; allowed are mount axial stiffness"),
+    ("large", {"preload": 2.0}, "build.deviations.preload = 2.0: input should be less than 1"),
+    ("words", {"preload": "much"}, "build.deviations.preload = 'much': input should be a valid number"),
+    ("empty", {}, "build.deviations"),
+]
+
+
+@pytest.mark.parametrize(("deviations", "said"), [r[1:] for r in REFUSED], ids=[r[0] for r in REFUSED])
+def test_a_build_table_that_cannot_be_is_refused(deviations, said):
+    file = SCENE / "spindle.toml"
+    raw = tomllib.loads(file.read_text(encoding="utf-8"))
+    raw["build"] = {"origin": "calibrated", "source": "test", "deviations": deviations}
+    with pytest.raises(BadInput) as error:
+        build(raw, file)
+    assert str(error.value).startswith(f"{file}: ")
+    assert said in str(error.value)
+
+
+# ---------------------------------------------------------------- before and after
+
+
+def tables(spindle, temperatures):
+    """A campaign of mode tables, exact of `spindle`."""
+    tests = []
+    for t in temperatures:
+        modes = [m for m in operating_point(spindle, Condition(t)).modes if m.frequency < 2600]
+        rows = tuple(ModeRow(f"T{t:g}", i, m.kind, m.frequency, 0.1, m.damping_ratio, 1e-5) for i, m in enumerate(modes, 1))
+        tests.append(Test(f"T{t:g}", t, 0.0, modes=rows))
+    return Campaign("tables", spindle.name, "mobility", spindle.points, tuple(tests))
+
+
+@pytest.fixture
+def written(monkeypatch):
+    """A function that makes a campaign what the command line reads."""
+    return lambda campaign: monkeypatch.setattr("sim.campaign.read_campaign", lambda folder: campaign)
+
+
+def test_compare_shows_before_and_after(capsys, add, written, tmp_path):
+    add("new", "preload_loss", "added_disk")
+    written(tables(load(tmp_path / "new"), (20.0, 40.0, 60.0)))
+    arguments = ["compare", str(tmp_path / "new"), "campaign", "--before", str(SCENE)]
+    assert main([*arguments, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["held_out"] == ["T40"]  # the diagnosis had T20 and T60
+    error = found["error"]
+    assert set(error) == {f"{w}{t}" for w in ("", "fitted_", "held_out_") for t in ("before", "after")}
+    for which in ("", "fitted_", "held_out_"):
+        assert error[f"{which}before"] > 50
+        assert error[f"{which}after"] < 1e-3
+    assert error["after"] == pytest.approx(found["rms_pull"], abs=1e-9)
+    assert 3 * error["before"] ** 2 == pytest.approx(2 * error["fitted_before"] ** 2 + error["held_out_before"] ** 2)
+    assert main(arguments) == 0
+    text = capsys.readouterr().out
+    assert "held-out tests" in text
+    assert "held out: T40" in text
+    assert main([*arguments, "--held-out", "T20"]) == 2
+    assert "--held-out T20:" in capsys.readouterr().err
+
+
+def test_held_out_tests_have_names(spindle):
+    campaign = tables(spindle, (20.0, 40.0))
+    assert [t.id for t in without(campaign, ["T40"]).tests] == ["T20"]
+    assert without(campaign, []) == campaign
+    assert held_out(spindle, campaign, ()) == ()
+    assert held_out(spindle, campaign, ("T40",)) == ("T40",)
+    for call in (lambda: without(campaign, ["T50"]), lambda: held_out(spindle, campaign, ["T50"])):
+        with pytest.raises(BadInput, match="--held-out T50: is no test of the campaign; allowed are T20, T40"):
+            call()
+    with pytest.raises(BadInput, match="every test"):
+        without(campaign, ["T20", "T40"])
+
+
+@pytest.mark.slow
+def test_practice_a_with_tests_that_the_diagnosis_never_saw(capsys, tmp_path):
+    """A campaign of a separate program; skipped where it is absent."""
+    if not PRACTICE.is_dir():
+        pytest.skip("no practice campaigns beside the project")
+    campaign, hidden = str(PRACTICE / "practice_a"), ["T30_n0", "T60_n7200"]
+    assert main(["diagnose", str(SCENE), campaign, "--held-out", *hidden, "--out", str(tmp_path / "d"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["effects"] == ["bond_softening"]
+    found = str(tmp_path / "d" / "diagnosis.json")
+    assert main(["add", str(SCENE), "bond_softening", "--from", found, "--out", str(tmp_path / "new"), "--json"]) == 0
+    capsys.readouterr()
+    assert main(["compare", str(tmp_path / "new"), campaign, "--before", str(SCENE), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["held_out"] == hidden
+    assert answer["error"]["before"] > 300
+    assert answer["error"]["fitted_after"] < 1.5
+    assert answer["error"]["held_out_after"] < 3

@@ -1,0 +1,351 @@
+"""Model forms against first principles and published numbers; the ladder on campaigns whose truth is known."""
+
+import json
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from rerun.chunk import RrdReader
+
+from diagnosis.explain import CLEAR
+from diagnosis.fit import fit, linearise
+from diagnosis.forms import FIXED_STIFFNESS, FORMS, RADIAL_EXPANSION, pinned
+from diagnosis.ladder import TOLERANCES, ladder, named_by
+from diagnosis.ladder_log import response, shown
+from diagnosis.ladder_plots import pull_map
+from diagnosis.ladder_report import ladder_json, section, write_ladder
+from diagnosis.ladder_words import sentences
+from diagnosis.observe import FREQUENCY_FLOOR, observe
+from diagnosis.rung import as_drawn, determined, frequencies
+from diagnosis.theory import data_of, theory
+from model.machine import Addition, Condition
+from model.pair import reference_motion, solve
+from model.scene import BadInput
+from sim.campaign import Campaign, ModeRow, Test, read_campaign
+from sim.effects import by_name
+from sim.log_ladder import LINEAR, pull_colours
+from sim.log_read import read_log
+from sim.operating import operating_point
+from spindle import main
+from tests.conftest import SCENE
+
+VIRTUAL = SCENE / "virtual" / "soak_20_60"
+RPM = np.pi / 30
+SD = 0.05  # Hz
+
+
+def tables(spindle, effects, temperatures=(20.0, 60.0), seed=0) -> Campaign:
+    """A campaign of mode tables made by MuJoCo's linearised model, with errors drawn at random."""
+    random = np.random.default_rng(seed)
+    tests = []
+    for t in temperatures:
+        found = operating_point(spindle, Condition(t), effects).modes
+        modes = [m for m in found if 400 < m.frequency < 3000]
+        rows = [ModeRow(f"T{t:g}", i, m.kind, m.frequency + SD * random.standard_normal(), SD) for i, m in enumerate(modes, 1)]
+        tests.append(Test(f"T{t:g}", t, 0.0, modes=tuple(rows)))
+    return Campaign("made up", spindle.name, "mobility", (), tuple(tests))
+
+
+def about(spindle, campaign):
+    return theory(spindle, data_of(observe(campaign, spindle)))
+
+
+# ---------------------------------------------------------------- forms
+
+
+@pytest.mark.parametrize("speed", [0.0, 7200 * RPM], ids=["at rest", "7200 rpm"])
+@pytest.mark.parametrize("temperature", [-10.0, 20.0, 47.0, 60.0])
+def test_fixed_stiffness_is_that_of_the_reference_temperature(spindle, temperature, speed):
+    reference = operating_point(spindle, Condition(20.0, speed), ())
+    point = operating_point(spindle, Condition(temperature, speed), FORMS[0].applied)
+    for fixed, expected in zip(point.state.bearings, reference.state.bearings, strict=True):
+        assert np.array_equal(fixed.stiffness, expected.stiffness)
+        assert np.array_equal(fixed.damping, expected.damping)
+        assert fixed.preload == expected.preload
+
+
+OUTWARD = [(0.2, 12.06), (0.4, 8.51), (0.6, 5.39), (0.8, 2.78), (1.0, 0.82)]
+
+
+@pytest.mark.parametrize(("outward_um", "preload"), OUTWARD)
+def test_outer_race_moved_outward_at_fixed_axial_position(spindle, outward_um, preload):
+    """Computed outside this project. Only the upper ring moves, so the balanced hub goes somewhere else, and the held one does not."""
+    still = reference_motion(20.0)
+    state = solve(spindle, Condition(20.0), {"lower": still, "upper": replace(still, outer_r=1e-6 * outward_um)})
+    held = RADIAL_EXPANSION.pair(spindle, Condition(20.0), {"share": 1.0}, state)
+    assert held.bearing("upper").preload == pytest.approx(preload, rel=2e-3, abs=5e-3)  # printed to 0.01 N
+    assert held.bearing("lower").preload == pytest.approx(spindle.pair.preload, rel=1e-9)
+    assert state.bearing("upper").preload == pytest.approx(state.bearing("lower").preload, rel=1e-9)
+    assert state.bearing("upper").preload > 1.02 * preload
+
+
+def test_radial_expansion_keeps_the_axial_distance_and_grows_radially(spindle):
+    """The forces of the two rows no longer balance, and a row that lost contact has no stiffness."""
+    full = operating_point(spindle, Condition(60.0), ()).state
+    cold = operating_point(spindle, Condition(20.0), ()).state
+    held = operating_point(spindle, Condition(60.0), FORMS[1].applied).state
+    for name in ("lower", "upper"):
+        assert held.bearing(name).row.axial == pytest.approx(cold.bearing(name).row.axial, rel=1e-12)
+        assert held.bearing(name).row.radial == full.bearing(name).row.radial
+    assert held.hub_movement == 0.0
+    assert held.bearing("lower").preload > held.bearing("upper").preload + 1.0
+    assert held.status == "upper bearing lost contact"
+    assert not held.bearing("upper").stiffness.any()
+
+
+def test_radial_expansion_at_the_reference_is_the_reference(spindle):
+    one, other = (operating_point(spindle, Condition(20.0), f.applied).state for f in FORMS[1:])
+    for a, b in zip(one.bearings, other.bearings, strict=True):
+        assert a.stiffness == pytest.approx(b.stiffness, rel=1e-9)
+        assert a.damping == pytest.approx(b.damping, rel=1e-9)
+        assert a.contact_force == pytest.approx(b.contact_force, rel=1e-9)
+
+
+def test_axial_equilibrium_is_the_model_itself(spindle):
+    assert FORMS[2].applied == ()
+    plain = operating_point(spindle, Condition(55.0), ()).state
+    for effect in (FIXED_STIFFNESS, RADIAL_EXPANSION):
+        neutral = operating_point(spindle, Condition(55.0), [(effect, effect.neutral())]).state
+        assert all(np.array_equal(a.stiffness, b.stiffness) for a, b in zip(neutral.bearings, plain.bearings, strict=True))
+
+
+@pytest.mark.parametrize("effect", [FIXED_STIFFNESS, RADIAL_EXPANSION], ids=lambda e: e.name)
+def test_a_share_lies_between_the_forms(spindle, effect):
+    preload = [operating_point(spindle, Condition(40.0), [(effect, {"share": s})]).state.bearing("upper").preload for s in (0, 0.5, 1)]
+    assert min(preload[0], preload[2]) < preload[1] < max(preload[0], preload[2])
+
+
+def test_pinned_effect_costs_nothing_and_acts_in_full(spindle):
+    campaign = tables(spindle, ())
+    th = about(spindle, campaign)
+    slopes = linearise(th)
+    plain = fit(th, slopes)
+    neutral = fit(th, slopes, [pinned(FIXED_STIFFNESS, {"share": 0.0})])
+    assert neutral.evidence == pytest.approx(plain.evidence, abs=1e-3)
+    held = pinned(FIXED_STIFFNESS, {"share": 1.0})
+    x = np.zeros(len(th.sd))
+    assert np.array_equal(th.features(x, [(held, held.typical())]), th.features(x, FORMS[0].applied))
+
+
+@pytest.mark.parametrize("true", FORMS[::2], ids=lambda f: f.name)
+def test_the_form_that_made_the_data_leads(spindle, true):
+    """With all tolerances free, either way round: the comparison has no favourite."""
+    found = ladder(spindle, tables(spindle, true.applied), ())
+    ranked = sorted(found.forms, key=lambda f: -f[3])
+    assert ranked[0][0] == true.name
+    assert ranked[0][3] > ranked[1][3] + CLEAR
+    assert ranked[0][1] < 1.5
+
+
+# ---------------------------------------------------------------- climbing
+
+
+@pytest.fixture(scope="module")
+def lagging(spindle):
+    """Tables of a hub that follows the chamber by 80 %, climbed with the right effect and then a wrong one."""
+    soak = by_name("soak_lag")
+    campaign = tables(spindle, [(soak, soak.neutral() | {"hub_share": 0.2})])
+    seen = []
+    found = ladder(spindle, campaign, [soak, by_name("constant_force_preload")], seen=lambda r: seen.append(r.name))
+    assert seen == [r.name for r in found.rungs]
+    return found
+
+
+def test_the_error_falls_with_the_right_effect(lagging):
+    below, right = lagging.rung(TOLERANCES), lagging.rung("+ soak_lag")
+    assert right.effects == ("soak_lag",)
+    assert right.evidence > below.evidence + CLEAR
+    assert right.error < 1.2
+    assert right.held_out < below.held_out / 3
+    value, sd = right.values["soak_lag"]["hub_share"]
+    assert value == pytest.approx(0.2, abs=max(5 * sd, 0.02))
+    assert abs(right.stretch) < 1.0
+
+
+def test_the_error_does_not_fall_with_a_wrong_effect(lagging):
+    right, wrong = lagging.rung("+ soak_lag"), lagging.rung("+ constant_force_preload")
+    assert wrong.above == "+ soak_lag"
+    assert wrong.effects == ("soak_lag", "constant_force_preload")
+    assert wrong.evidence < right.evidence + 2
+    assert wrong.error > 0.7 * right.error
+    assert any("constant_force_preload is not" in s for s in sentences(lagging))
+
+
+def test_rungs_as_drawn_are_what_mujoco_says(spindle, lagging):
+    """Errors in Hz against the modes of MuJoCo's linearised models, which the ladder does not use."""
+    for name, form in zip(("fixed stiffness", "axial equilibrium"), FORMS[::2], strict=True):
+        off, shifts = [], []
+        for test in lagging.campaign.tests:
+            own = [
+                m.frequency for m in operating_point(spindle, Condition(test.temperature), form.applied).modes if 400 < m.frequency < 3000
+            ]
+            off.append(np.array(own) - [r.frequency for r in test.modes])
+            shifts.append(off[-1] - off[0])
+        rung = lagging.rung(name)
+        assert rung.rms_Hz == pytest.approx(np.sqrt(np.mean(np.square(off))), rel=1e-5)
+        assert rung.rms_shift_Hz == pytest.approx(np.sqrt(np.mean(np.square(shifts[1:]))), rel=1e-4)
+        assert rung.held_out == rung.error
+        assert rung.evidence == pytest.approx(-0.5 * rung.error**2 * len(rung.residual))
+
+
+def test_pulls_are_errors_over_standard_errors(lagging):
+    rung = lagging.rungs[0]
+    pulls = pull_map(lagging, rung)
+    measured, computed = frequencies(lagging.theory, rung.residual)
+    assert pulls.damping is None
+    assert pulls.frequency.shape == (7, 2)
+    sd = np.hypot(SD, FREQUENCY_FLOOR * measured)
+    assert pulls.frequency[:, 0] == pytest.approx(((computed - measured) / sd)[:7], rel=1e-3)  # errors are logarithms
+    assert np.sqrt(np.mean(pulls.frequency**2)) == pytest.approx(rung.error, rel=1e-9)
+
+
+def test_data_decide_no_more_than_there_are_of_them(lagging):
+    best = lagging.top.fitted
+    assert 1 < determined(lagging.theory, best) < min(14, len(lagging.theory.sd))
+
+
+def test_effects_of_the_scene_stand_on_every_rung(spindle):
+    """A scene that has the effect already: nothing is missing, and it cannot be added again."""
+    values = {"hub_share": 0.2}
+    soak = by_name("soak_lag")
+    equipped = replace(spindle, effects=(Addition("soak_lag", soak.neutral() | values),))
+    campaign = tables(spindle, [(soak, soak.neutral() | values)])
+    found = ladder(equipped, campaign, ())
+    assert found.rung("axial equilibrium").error < 2
+    assert found.rung(TOLERANCES).effects == ()
+    assert as_drawn(about(spindle, campaign), "without it", ()).error > 100
+    with pytest.raises(BadInput, match=r"--effects soak_lag: is in scene hdd_2003 already"):
+        ladder(equipped, campaign, [soak])
+    with pytest.raises(BadInput, match=r"--effects soak_lag: is named twice"):
+        ladder(spindle, campaign, [soak, soak])
+
+
+def candidate(evidence, *names):
+    effects = tuple(by_name(n) for n in names)
+    return SimpleNamespace(effects=names, delta_evidence=evidence, fit=SimpleNamespace(effects=effects))
+
+
+VERDICTS = [
+    ("none", [candidate(3, "soak_lag")], []),
+    ("identified", [candidate(90, "soak_lag"), candidate(20, "preload_loss")], [("+ soak_lag", TOLERANCES)]),
+    (
+        "two effects",
+        [candidate(90, "soak_lag", "added_disk"), candidate(50, "added_disk"), candidate(20, "soak_lag")],
+        [("+ added_disk", TOLERANCES), ("+ soak_lag", "+ added_disk")],
+    ),
+    (
+        "ambiguous",
+        [candidate(90, "soak_lag"), candidate(88, "preload_loss"), candidate(20, "added_disk")],
+        [("or soak_lag", TOLERANCES), ("or preload_loss", TOLERANCES)],
+    ),
+    (
+        "unexplained",
+        [candidate(9, "soak_lag"), candidate(1, "added_disk")],
+        [("nearest: soak_lag", TOLERANCES), ("nearest: added_disk", TOLERANCES)],
+    ),
+]
+
+
+@pytest.mark.parametrize(("verdict", "candidates", "rungs"), VERDICTS, ids=[v[0] for v in VERDICTS])
+def test_rungs_that_a_diagnosis_asks_for(verdict, candidates, rungs):
+    assert [(name, on) for name, _, on in named_by(SimpleNamespace(verdict=verdict, candidates=candidates))] == rungs
+
+
+# ---------------------------------------------------------------- telling it
+
+
+@pytest.fixture(scope="module")
+def virtual(spindle):
+    """The scene's small virtual campaign (MuJoCo in the time domain, hammer tests), without an effect in it."""
+    return ladder(spindle, read_campaign(VIRTUAL), [by_name("ring_growth")])
+
+
+def test_computed_responses_lie_on_those_of_the_time_domain(virtual):
+    rung = virtual.rung("axial equilibrium")
+    for t, o in enumerate(virtual.theory.data.observations):
+        measured, computed = o.test.frf.value, response(virtual, rung, t)
+        band = (o.test.frf.frequency > 600) & (o.test.frf.frequency < 2800)
+        off = np.abs(computed - measured)[:, :, band].mean(axis=2) / np.abs(measured)[:, :, band].mean(axis=2)
+        assert np.max(off[[0, 5], [0, 1]]) < 0.02  # driving points
+        fixed = response(virtual, virtual.rungs[0], t)
+        if o.condition.temperature > 50:
+            assert np.mean(np.abs(fixed - measured)[0, 0, band]) > 10 * np.mean(np.abs(computed - measured)[0, 0, band])
+
+
+def test_log_moves_on_the_timeline_rung(virtual, tmp_path):
+    write_ladder(virtual, tmp_path)
+    reader = RrdReader(tmp_path / "ladder.rrd")
+    assert reader.blueprints()
+    rows, series = {}, {}
+    for c in reader.stream(store=reader.recordings()[0]):
+        for timeline in c.timeline_names:
+            rows[timeline, c.entity_path] = rows.get((timeline, c.entity_path), 0) + c.to_record_batch().num_rows
+        batch = c.to_record_batch()
+        if c.entity_path.startswith("/frf") and "Scalars:scalars" in batch.schema.names:
+            series[c.entity_path] = batch.column("Scalars:scalars").flatten().to_numpy()
+    n = len(virtual.rungs)
+    for entity in (
+        "/charts/pulls/map",
+        "/charts/pulls/labels",
+        "/charts/responses/lines",
+        "/charts/error/lines",
+        "/rung",
+        r"/error/all\ data",
+    ):
+        assert rows["rung", entity] == n
+    contents = read_log(tmp_path / "ladder.rrd")
+    assert contents.scene == "hdd_2003"
+    peaks = [p.frequency for p in contents.peaks if (p.source, p.test) == ("measured", "T20_n0")]
+    assert peaks == pytest.approx(virtual.theory.data.observations[0].frequency, rel=1e-12)
+    level = shown(virtual).rungs[0].levels[0]
+    measured = series[r"/frf/T20_n0/H\(1\,1\)/measured"]
+    assert np.array_equal(measured, level.measured)
+    assert sum(k.startswith(r"/frf/T20_n0/H\(1\,1\)/") for k in series) == n + 1
+
+
+def test_pull_colours_follow_sign_and_size():
+    colours = pull_colours(np.array([-300.0, -LINEAR, 0.0, LINEAR, 300.0, np.nan]), 300.0).astype(int)
+    red_less_blue = colours[:, 0] - colours[:, 2]
+    assert red_less_blue[0] < red_less_blue[1] < -10
+    assert 10 < red_less_blue[3] < red_less_blue[4]
+    assert np.array_equal(colours[2], colours[5])
+
+
+def test_picture_and_report_section_name_every_rung(virtual, tmp_path):
+    title, html = section(virtual)
+    assert title.startswith("The ladder")
+    for r in virtual.rungs:
+        assert f"<td class=left>{r.name}</td>" in html
+    for s in sentences(virtual):
+        assert s.replace("'", "&#x27;").replace(">", "&gt;") in html
+    assert html.count("<svg") == 1
+    assert "as drawn" in html
+
+
+def test_json_of_the_command(capsys, tmp_path):
+    out = tmp_path / "climbed"
+    campaign = str(SCENE / "measured" / "jang_2003")
+    assert main(["ladder", str(SCENE), campaign, "--effects", "expansion_mismatch", "--json", "--out", str(out)]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert [r["name"] for r in answer["rungs"]] == [
+        "fixed stiffness",
+        "radial expansion only",
+        "axial equilibrium",
+        TOLERANCES,
+        "+ expansion_mismatch",
+    ]
+    assert answer["rungs"][-1]["effects"] == ["expansion_mismatch"]
+    assert set(answer["rungs"][0]) >= {"name", "effects", "error", "held_out", "rms_Hz", "rms_percent", "evidence"}
+    assert answer["rungs"][-1]["parameters"]["expansion_mismatch.hub_expansion"]["unit"] == "1"
+    assert {f.name for f in out.iterdir()} >= {"ladder.json", "ladder.svg", "ladder.rrd", "report.html"}
+    assert json.loads((out / "ladder.json").read_text()) == answer
+
+
+def test_unknown_effect_is_refused_by_name(capsys):
+    assert main(["ladder", str(SCENE), str(SCENE / "measured" / "jang_2003"), "--effects", "rust"]) == 2
+    assert "rust" in capsys.readouterr().err
+
+
+def test_same_answer_without_out_folder(virtual):
+    assert json.loads(json.dumps(ladder_json(virtual)))["top"] == "+ ring_growth"

@@ -1,0 +1,249 @@
+"""Warm-up: coupled and converged, balanced in heat, steady in the end; a chamber soak against Newton's law of a lumped body."""
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from model.machine import Addition, Condition, Friction, Law
+from model.pair import solve
+from model.scene import BadInput
+from sim import warmup as module
+from sim.operating import operating_point
+from sim.warmup import energy, warm_up
+from sim.warmup_output import rows, warmup_json, warmup_section
+from spindle import main
+from thermal import conduction, heat
+from thermal.expansion import expand, influence
+from thermal.reading import reading
+
+RPM = 2 * np.pi / 60
+SPEED = 7200 * RPM
+SCENE = Path(__file__).parents[2] / "scenes" / "hdd_2003"
+
+
+@pytest.fixture(scope="module")
+def warm(spindle):
+    return warm_up(spindle, SPEED, 20.0)
+
+
+@pytest.fixture(scope="module")
+def model(spindle):
+    return conduction.model(spindle, influence(spindle).sections)
+
+
+# ------------------------------------------------------------------ reading many fields
+
+
+def test_reading_is_expand(spindle, model):
+    """Ring motions and region means as the front of `thermal` gives them, of a field that is uneven everywhere."""
+    field = heat.steady(model, heat.running(spindle, 35.0, 2 * SPEED))
+    read = reading(model)
+    assert read.region_means(model.nodal(field)) == pytest.approx(field.region_means(), rel=1e-12)
+    for name, motion in expand(spindle, field).items():
+        found = read.motions(spindle, model.nodal(field))[name]
+        assert np.array(list(vars(found).values())) == pytest.approx(np.array(list(vars(motion).values())), rel=1e-9, abs=1e-18)
+
+
+def test_reading_with_an_expansion_law(spindle, model):
+    """Laws that vary with temperature are integrated at every point, as `expand` does."""
+    aluminium = replace(spindle.materials["aluminium"], thermal_expansion=Law((0.0, 30.0, 100.0), (22e-6, 23e-6, 25e-6)))
+    changed = replace(spindle, materials={**spindle.materials, "aluminium": aluminium})
+    field = heat.steady(model, heat.running(spindle, 35.0, 2 * SPEED))
+    found, expected = reading(model).motions(changed, model.nodal(field)), expand(changed, field)
+    assert [m.outer_r for m in found.values()] == pytest.approx([m.outer_r for m in expected.values()], rel=1e-9)
+    assert [m.outer_r for m in found.values()] != pytest.approx([m.outer_r for m in expand(spindle, field).values()], rel=1e-3)
+
+
+# ------------------------------------------------------------------ steps in time
+
+
+def test_error_estimate_is_third_order_and_holds(spindle, model):
+    """The estimate falls by eight for half a step; and it bounds the true error of the step (against sixteen short ones) within a factor."""
+    drive = heat.running(spindle, 20.0, SPEED)
+    smooth = heat.transient(model, drive, 20.0, np.linspace(0, 120, 31)).nodal[-1]
+    steps = [heat.step(model, lambda *_: drive, 0.0, length, smooth) for length in (8.0, 4.0)]
+    assert steps[0].error / steps[1].error == pytest.approx(8.0, rel=0.2)
+    fine = heat.transient(model, drive, model.field(smooth), np.linspace(0, 8, 17)).nodal[-1]
+    true = np.abs(steps[0].end - fine).max()
+    assert 0.3 * true < steps[0].error < 10 * true
+
+
+def test_slowest_decay(spindle, model):
+    """The time constant of the linearised equation is that of the transient's tail, friction's fall by temperature included."""
+    drive = heat.running(spindle, 20.0, SPEED)
+    field = heat.steady(model, drive)
+    found, end = heat.slowest(model, field, drive), model.nodal(field)
+    near = model.field(end + (model.nodal(heat.steady(model, heat.running(spindle, 21.0, SPEED))) - end))
+    tail = heat.transient(model, drive, near, np.linspace(0, 8 * found, 81)).nodal - end
+    rate = np.log(np.abs(tail[70]).max() / np.abs(tail[80]).max()) / found
+    assert 1 / rate == pytest.approx(found, rel=1e-3)
+    still = heat.slowest(model, model.field(np.full(end.size, 20.0)), heat.running(spindle, 20.0, 0.0))
+    assert found < 0.95 * still  # friction that falls as it warms shortens it
+
+
+# ------------------------------------------------------------------ the whole warm-up
+
+
+def test_energy_is_conserved_at_every_step(warm):
+    """Motor loss and friction less convection is what the metal stores, in every step and in the whole."""
+    stored = np.diff(warm.history.nodal @ warm.history.model.lumped_capacity)
+    assert [h.stored for h in warm.history.heat] == pytest.approx(stored, abs=1e-9 * stored.max())
+    total = energy(warm)
+    assert total["motor"] == pytest.approx(0.5 * warm.times[-1], rel=1e-9)
+    assert total["motor"] + total["friction"] - total["convection"] == pytest.approx(total["stored"], rel=1e-8)
+    made = np.array([sum(m.friction.values()) for m in warm.moments])
+    assert np.trapezoid(made, warm.times) == pytest.approx(total["friction"], rel=1e-3)
+
+
+def test_end_is_the_fixed_point_of_the_steady_problem(spindle, warm, model):
+    """The last moment is the steady state; and that one answers itself: friction at its preload makes its temperature, its temperature
+    its preload, by solvers that know nothing of each other."""
+    last, steady = warm.moments[-1], warm.steady
+    for name, t in steady.temperatures.items():
+        assert last.temperatures[name] == pytest.approx(t, abs=2e-3 * (t - 20.0) + 1e-3)
+    assert warm.frequencies[-1] == pytest.approx(warm.steady_frequencies, abs=0.1)
+    field = heat.steady(model, heat.running(spindle, 20.0, SPEED, steady.preload))
+    assert field.region_means() == pytest.approx(dict(steady.temperatures), abs=1e-6)
+    state = solve(spindle, Condition(20.0, SPEED), expand(spindle, field))
+    assert [b.preload for b in state.bearings] == pytest.approx(list(steady.preload.values()), rel=1e-6)
+
+
+def test_halving_the_steps_quarters_the_change(spindle, warm, model):
+    """Second order in time of the coupled problem, from a smooth start, seen in the preload."""
+    read = reading(model)
+    effects = module._Machine(spindle, SPEED, (), read)
+
+    def drive(_, nodal):
+        return heat.Running(20.0, SPEED, {b.name: b.preload for b in effects.point(nodal).state.bearings})
+
+    start = warm.history.nodal[np.searchsorted(warm.times, 20.0)]
+    preload = []
+    for count in (4, 8, 16):
+        nodal = start
+        for k in range(count):
+            nodal = heat.step(model, drive, 160.0 * k / count, 160.0 / count, nodal).end
+        preload.append(effects.point(nodal).state.bearings[0].preload)
+    assert (preload[0] - preload[1]) / (preload[1] - preload[2]) == pytest.approx(4.0, abs=1.0)
+
+
+def test_preload_drives_friction(spindle):
+    """With friction from load alone, each moment's heat is f1 P d_m omega of its own preload, and the preload moves by a tenth."""
+    loaded = replace(spindle.thermal.friction, f0=0.0, f1=0.01)
+    own = replace(spindle, thermal=replace(spindle.thermal, friction=loaded))
+    warm = warm_up(own, SPEED, 20.0, duration=300.0, tolerance=0.2)
+    for moment in warm.moments:
+        for name, made in moment.friction.items():
+            assert made == pytest.approx(0.01 * moment.preload[name] * 9.1e-3 * SPEED, rel=1e-7)
+    assert min(m.preload["lower"] for m in warm.moments) < 0.9 * max(m.preload["lower"] for m in warm.moments)
+
+
+def test_preload_falls_and_modes_with_it(warm):
+    """The rings warm first and load the pair; then the aluminium hub outgrows the steel shaft and unloads it."""
+    preload = np.array([m.preload["lower"] for m in warm.moments])
+    assert preload[0] == pytest.approx(16.0, rel=1e-6)
+    assert preload.max() > 16.2
+    assert np.argmax(preload) < np.argmin(preload)
+    assert preload[-1] < 15.0
+    kinds = [m.kind for m in warm.modes]
+    shift = warm.frequencies[-1] - warm.frequencies[0]
+    assert np.all(shift[[k for k, kind in enumerate(kinds) if kind == "rocking"]] < -1.0)
+    assert np.isfinite(warm.frequencies).all()
+
+
+def test_soak_of_a_good_conductor_is_newtons_law(spindle):
+    """Conductivity a million times higher and bearings that pass any heat: one lump, T = air + (T0 - air) exp(-hA t / C)."""
+    materials = {name: replace(m, conductivity=1e6) for name, m in spindle.materials.items()}
+    perfect = replace(spindle.thermal.friction, conductance=1e5)
+    own = replace(spindle, materials=materials, thermal=replace(spindle.thermal, friction=perfect))
+    warm = warm_up(own, 0.0, 20.0, air=60.0)
+    model = warm.history.model
+    rate = model.film.sum() / model.lumped_capacity.sum()
+    assert warm.time_constant == pytest.approx(1 / rate, rel=1e-4)
+    expected = 60.0 - 40.0 * np.exp(-rate * warm.times)
+    for name in ("base disc", "shaft", "hub plate", "upper outer ring"):
+        found = [m.temperatures[name] for m in warm.moments]
+        assert found == pytest.approx(expected, abs=0.05)
+    assert energy(warm)["friction"] == 0.0
+
+
+def test_long_soak_is_the_chamber_test(spindle):
+    """At rest for ever in a chamber at 60 C: the operating point of a soaked spindle, modes included."""
+    first = warm_up(spindle, 0.0, 20.0, air=60.0, duration=200.0, tolerance=0.2)
+    soaked = operating_point(spindle, Condition(60.0))
+    assert list(first.steady.preload.values()) == pytest.approx([b.preload for b in soaked.state.bearings], rel=1e-6)
+    assert first.steady_frequencies == pytest.approx([m.frequency for m in soaked.modes[: len(first.modes)]], abs=0.05)
+    middle = first.moments[int(np.searchsorted(first.times, first.time_constant))].temperatures
+    assert middle["sleeve"] > middle["base disc"] + 2.0  # parts lag behind each other
+
+
+def test_a_spindle_that_cannot_cool_is_refused(spindle):
+    with pytest.raises(BadInput, match="convection"):
+        warm_up(replace(spindle, thermal=replace(spindle.thermal, convections=())), SPEED, 20.0)
+    with pytest.raises(BadInput, match="duration"):
+        warm_up(spindle, SPEED, 20.0, duration=0.0)
+
+
+def test_thermal_runaway_is_told(spindle):
+    """A hub of steel under a load friction ten thousand times too high: warmer inner rings load the pair, which warms them."""
+    hot = Friction(0.0, 0.3, Law((20.0,), (1e-5,)), spindle.thermal.friction.conductance)
+    steel = {name: replace(m, thermal_expansion=spindle.materials["steel"].thermal_expansion) for name, m in spindle.materials.items()}
+    own = replace(spindle, materials=steel, thermal=replace(spindle.thermal, friction=hot))
+    with pytest.raises(heat.NotSettled, match="settle"):
+        warm_up(own, SPEED, 20.0)
+
+
+def test_answer_as_json_and_rows(warm):
+    answer = warmup_json(warm)
+    count = len(answer["time_s"])
+    assert count == len(answer["preload_N"]) == len(answer["friction_W"]) == len(answer["frequencies_Hz"])
+    assert all(len(series) == count for series in answer["temperature_C"].values())
+    assert set(answer["temperature_C"]) == {g.name for g in warm.spindle.regions}
+    assert answer["frequencies_Hz"][0] == pytest.approx(
+        [m.frequency for m in operating_point(warm.spindle, Condition(20.0, SPEED)).modes[:7]]
+    )
+    assert answer["time_constant_s"] == warm.time_constant
+    header, body = rows(warm)
+    assert len(body) == count
+    assert all(len(line) == len(header) for line in body)
+    assert header[0] == "time_s"
+    title, html = warmup_section(warm)
+    assert title == "Warm-up"
+    assert html.count("<svg") == 1
+    assert "161 s" in html
+
+
+def test_soak_from_the_command_line(tmp_path, capsys):
+    scene, out = str(SCENE), tmp_path / "out"
+    assert main(["warmup", scene, "--minutes", "0.5", "--json", "--out", str(out), "--soak", "60"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["time_s"][-1] == pytest.approx(30.0)
+    assert (answer["speed_rpm"], answer["air_C"]) == (0.0, 60.0)
+    assert answer["steady"]["preload_N"] == pytest.approx(8.002, abs=0.01)
+    assert {p.name for p in out.iterdir()} >= {"warmup.csv", "warmup.png"}
+    with (out / "warmup.csv").open() as file:
+        assert file.readline().startswith("# scene hdd_2003")
+        table = list(csv.DictReader(file))
+    assert [float(row["preload of lower bearing_N"]) for row in table] == answer["preload_N"]
+
+
+def test_warmups_that_are_refused(capsys):
+    assert main(["warmup", str(SCENE), "--minutes", "0"]) == 2
+    assert "--minutes 0" in capsys.readouterr().err
+    assert main(["warmup", str(SCENE), "--speed", "300000"]) == 2
+    assert "300000 rpm" in capsys.readouterr().err
+
+
+def test_effects_act_but_for_those_that_prescribe_temperatures(spindle):
+    """The film loads the pair as at any operating point; a soak lag, which is a temperature told, is named and does nothing."""
+    told = (Addition("soak_lag", {"hub_share": 0.2, "ball_share": 0.5, "nominal_soak": 3600.0}), Addition("lubricant_film", {"scale": 0.5}))
+    plain, both, film = (
+        warm_up(replace(spindle, effects=effects), SPEED, 20.0, duration=1.0, tolerance=1.0) for effects in ((), told, told[1:])
+    )
+    assert both.left_out == ("soak_lag",)
+    assert (plain.left_out, film.left_out) == ((), ())
+    assert both.steady.preload == film.steady.preload
+    assert film.steady.preload["lower"] > plain.steady.preload["lower"] + 1.0
