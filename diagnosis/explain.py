@@ -20,6 +20,7 @@ SINGLES, PAIRED = 4, 3  # effects refitted after the rough fits, and effects tri
 NEAR = 60.0  # ln evidence within which a fit is polished
 CLEAR = 12.0  # ln evidence by which an explanation must lead the model without it: calibrated on campaigns with none
 AHEAD = 5.0  # ln evidence by which it must lead every rival to be identified
+OF_ALL = 0.01  # share of its ln evidence by which it must lead, where that is more: laws are not exact
 MISFIT = 1e-4  # probability below which a misfit is not chance
 FALLS = 1 / 3  # held-out error ratio that counts as a clear fall
 
@@ -127,17 +128,18 @@ def starts(effect: Effect, expected: float) -> list[list[float]]:
     return [[s, *rest] for s in sorted(set(inside)) if s != main.neutral]
 
 
-def held_out(theory: Theory, result: Fit) -> tuple[float, int]:
+def held_out(theory: Theory, result: Fit, rating: Array | None = None) -> tuple[float, int]:
     """Sum of squares and number of whitened residuals of conditions left out one after the other, each predicted from all others.
 
     About the optimum the model is linear in its parameters, so leaving a condition out is algebra: minimise without its rows, then look.
-    The prediction is rated by the errors of the data and of the parameters, without errors of form.
+    The prediction is rated by the errors of its parameters and by those that `rating` (n, n) whitens, the data's own by default.
     """
+    rating = theory.data.whiten if rating is None else rating
     data = theory.data
     temperatures = [o.condition.temperature for o in data.observations]
     widths = np.concatenate([theory.sd, [p.prior_sd for e in result.effects for p in e.parameters]])
-    fitted, rated = (w @ (result.jacobian * widths) for w in (result.whiten, data.whiten))
-    residual, rated_residual = result.whiten @ result.residual, data.whiten @ result.residual
+    fitted, rated = (w @ (result.jacobian * widths) for w in (result.whiten, rating))
+    residual, rated_residual = result.whiten @ result.residual, rating @ result.residual
     offset = np.concatenate([result.nuisance / theory.sd, np.zeros(len(widths) - len(theory.sd))])
     total, count = 0.0, 0
     for leave in sorted(set(temperatures)):
@@ -256,8 +258,8 @@ def _verdict(theory: Theory, base: Fit, fits: list[Fit], signatures: list[Signat
     weights /= weights.sum()
     candidates = []
     for f, w in zip(fits, weights[1:], strict=True):
-        after, _ = held_out(theory, f)
-        ratio = float(np.sqrt(after / before))
+        # both rated alike, with what the effect's own law may miss
+        ratio = float(np.sqrt(held_out(theory, f, f.whiten)[0] / held_out(theory, base, f.whiten)[0]))
         candidates.append(Candidate(f, f.evidence - base.evidence, float(w), ratio, not f.at_limit))
     candidates.sort(key=lambda c: -c.delta_evidence)
     best = candidates[0]
@@ -273,17 +275,27 @@ def _verdict(theory: Theory, base: Fit, fits: list[Fit], signatures: list[Signat
     if chi_squared.sf(best.fit.chi2, n) < MISFIT or best.delta_evidence < CLEAR:
         return answer("unexplained", (), f"The model is rejected (misfit {base.misfit:.0f} for {n} numbers), and even with "
                       f"{' + '.join(best.effects)} a misfit of {best.fit.misfit:.0f} is left.")  # fmt: skip
-    rivals = [c for c in candidates if best.delta_evidence - c.delta_evidence < AHEAD]
+    ahead = max(AHEAD, OF_ALL * best.delta_evidence)
+    rivals = [c for c in candidates if best.delta_evidence - c.delta_evidence < ahead]
     singles = [c for c in rivals if len(c.effects) == 1]
     if singles:  # a pair must beat its own members clearly to be needed
         rivals = singles
     names = sorted({name for c in rivals for name in c.effects})
     if len(rivals) == 1 and len(rivals[0].effects) == 1 and rivals[0].believable and rivals[0].held_out_ratio < FALLS:
         c = rivals[0]
-        return answer("identified", c.effects, f"{c.effects[0]} leads every other explanation by more than {AHEAD:g} in ln evidence; "
+        return answer("identified", c.effects, f"{c.effects[0]} leads every other explanation by more than {ahead:.0f} in ln evidence; "
                       f"the error on left-out conditions falls to {100 * c.held_out_ratio:.0f} %.")  # fmt: skip
     if len(rivals) == 1 and len(rivals[0].effects) == 2:
         c = rivals[0]
         return answer("two effects", c.effects, f"{c.effects[0]} and {c.effects[1]} are both needed: dropping either costs more than "
-                      f"{AHEAD:g} in ln evidence.")  # fmt: skip
-    return answer("ambiguous", names, f"{', '.join(names)} explain the data within {AHEAD:g} in ln evidence of each other.")
+                      f"{ahead:.0f} in ln evidence.")  # fmt: skip
+    if len(rivals) == 1:
+        second = next((c for c in candidates if len(c.effects) == 1 and c is not rivals[0] and c.delta_evidence > CLEAR), None)
+        names = sorted({*names, *(second.effects if second else ())})
+        why = (
+            "is not believable"
+            if not rivals[0].believable
+            else f"leaves {100 * rivals[0].held_out_ratio:.0f} % of the error on left-out conditions"
+        )
+        return answer("ambiguous", names, f"{' + '.join(rivals[0].effects)} leads by more than {ahead:.0f} in ln evidence but {why}.")
+    return answer("ambiguous", names, f"{', '.join(names)} explain the data within {ahead:.0f} in ln evidence of each other.")

@@ -26,6 +26,7 @@ RENEWALS = 6  # of the derivative at the last temper
 ENOUGH = 0.1  # fall of chi2 below which renewing derivatives has done its work
 ASIDE = 0.3  # share of the error of form that falls on features which an effect does not move
 SHARES = (0.1, 0.3, 1.0)  # of the form errors an effect states, all equally likely beforehand
+LOSS = 0.05  # loss factor that an effect on stiffness may bring unasked
 WORST = 1e12  # chi2 of a state that has no equilibrium
 
 
@@ -60,7 +61,8 @@ def form_variance(data: Data, effect: Effect, moved: Array) -> Array:
     """Variance (n,) by which an effect may miss what it does to the features, `moved` (n,).
 
     Besides its share of each movement there is one of the rms movement of all features of that kind in the test: a wrong law also moves
-    what the right one leaves alone.
+    what the right one leaves alone. And what changes stiffness also dissipates, more or less: a loss factor `LOSS` of that part of the
+    strain energy, 2 |d ln f|, is a damping ratio of LOSS |d ln f|.
     """
     variance = np.zeros(len(moved))
     for rows in data.rows.values():
@@ -69,6 +71,9 @@ def form_variance(data: Data, effect: Effect, moved: Array) -> Array:
             error = effect.damping_form_error if what == "damping" else effect.form_error
             if len(own):
                 variance[own] = error**2 * (moved[own] ** 2 + ASIDE**2 * np.mean(moved[own] ** 2))
+        frequency = dict(zip(rows.mode_of_frequency.tolist(), moved[rows.frequency].tolist(), strict=True))
+        shift = np.array([frequency.get(mode, 0.0) for mode in rows.mode_of_damping.tolist()])
+        variance[rows.damping] += (2 * effect.damping_form_error * LOSS * shift / np.exp(data.value[rows.damping])) ** 2
     return variance
 
 

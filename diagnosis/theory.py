@@ -29,6 +29,7 @@ ALONE = 0.03  # relative distance to the next mode from which a shape is used
 SMALL = 0.05  # of the largest channel; smaller shape components are left out
 FAR = 0.08  # ln frequency that costs as much as a fully different shape in pairing
 UNLIKE = 3.0  # cost of a different kind, where only kinds are known
+TOLD = 0.3  # 1 - MAC with its partner below which a close mode is told by its shape
 STRANGE = 4.0  # cost of a pair from which an observed mode rather has no partner
 WITHOUT = 30.0  # standard errors by which the frequency of such a mode is missed, whatever the parameters
 
@@ -233,7 +234,7 @@ def pair(o: Observation, p: Predicted) -> Array:
 
     The assignment costs unlikeness of shape (of kind, without shapes) and distance in ln frequency over `FAR`, by its size: where some
     modes are far off, squares would rather move all of them by one place. Modes closer than `ALONE` that are not axial turn in their
-    plane and keep their order.
+    plane and keep their order, unless their shapes all tell them apart: those may cross.
     """
     distance = np.abs(np.log(o.frequency[:, None] / p.frequency[None, :])) / FAR
     if o.shape is not None:
@@ -246,6 +247,8 @@ def pair(o: Observation, p: Predicted) -> Array:
     partner[rows] = np.where(columns < cost.shape[1], columns, -1)
     radial = [i for i, j in enumerate(partner) if j >= 0 and p.kind[j] != "axial"]
     for group in np.split(np.array(radial, int), np.flatnonzero(np.diff(np.log(o.frequency[radial])) > ALONE) + 1):
+        if o.shape is not None and np.all(unlike[group, partner[group]] < TOLD):
+            continue
         partner[group] = partner[group][np.argsort(p.frequency[partner[group]])]
     return partner
 

@@ -24,7 +24,8 @@ class Parameter:
     """One parameter of an effect: a readable row.
 
     `typical` is a plausible size where the effect is present; `prior_sd` the width of what one believes before measuring, about
-    `neutral`; values outside `limits` are not physical.
+    `neutral`; values outside `limits` are not physical. A parameter that counts or names something has `choices`: no other values mean
+    anything, and a fit tries them one by one.
     """
 
     name: str
@@ -35,6 +36,7 @@ class Parameter:
     limits: tuple[float, float]
     meaning: str
     source: str
+    choices: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

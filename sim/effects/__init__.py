@@ -14,8 +14,11 @@ from sim.effects import (
     added_disk,
     ball_inertia,
     ball_material,
+    ball_size,
+    ball_waviness,
     bearing_misalignment,
     bond_softening,
+    cage_unbalance,
     channel_delay,
     clearance_opening,
     constant_force_preload,
@@ -32,6 +35,7 @@ from sim.effects import (
     mount_compliance,
     plate_prestress,
     preload_loss,
+    race_waviness,
     ring_growth,
     sensor_gain,
     sensor_mass,
@@ -39,6 +43,7 @@ from sim.effects import (
     soak_lag,
     support_anisotropy,
     thermal_gradient,
+    unbalance,
     window_damping,
 )
 
@@ -71,6 +76,12 @@ CATALOGUE: tuple[Effect, ...] = (
     hub_flexibility.EFFECT,
     added_disk.EFFECT,
     sensor_mass.EFFECT,
+    # what excites a running spindle
+    unbalance.EFFECT,
+    race_waviness.EFFECT,
+    ball_size.EFFECT,
+    ball_waviness.EFFECT,
+    cage_unbalance.EFFECT,
     # the measuring chain
     sensor_gain.EFFECT,
     channel_delay.EFFECT,
