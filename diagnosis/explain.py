@@ -30,20 +30,18 @@ class Signature:
     """What an effect at its typical values does to the features, as far as tolerances cannot do the same.
 
     `visibility`: its size in standard errors, after projection; `expected`: multiple of the typical size that would explain the misfit
-    best, with `expected_sd`; `smallest`: size of the main parameter (its unit) these data could show at `CLEAR`.
+    best, with `expected_sd`, where the other parameters are `others`; `smallest`: size of the main parameter (its unit) these data could
+    show at `CLEAR`; `gain`: fall of chi2 that the effect promises, to first order.
     """
 
     effect: Effect
+    others: dict[str, float]
     visibility: float
     expected: float
     expected_sd: float
     smallest: float
     direction: Array  # (n,) whitened, projected
-
-    @property
-    def gain(self) -> float:
-        """Fall of chi2 that the effect promises, to first order."""
-        return (self.expected * self.visibility) ** 2
+    gain: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +91,8 @@ def left_over(theory: Theory, found: Fit) -> tuple[Array, Array]:
 def screen(theory: Theory, found: Fit, catalogue: Sequence[Effect], share: float = 1.0) -> list[Signature]:
     """Finite signature of every effect beside those of a fit, projected off the tolerances; the most telling first.
 
-    `share` of the typical size is tried.
+    `share` of the typical size is tried, with the other parameters at their typical values and one by one a prior width off them: that
+    which explains most counts.
     """
     rest, factor = left_over(theory, found)
     present = [(e, found.values[e.name]) for e in found.effects]
@@ -104,28 +103,46 @@ def screen(theory: Theory, found: Fit, catalogue: Sequence[Effect], share: float
             continue
         main = effect.parameters[0]
         size = main.neutral + share * (main.typical - main.neutral)
-        try:
-            moved = theory.features(found.nuisance, [*present, (effect, effect.typical() | {main.name: size})]) - here
-        except NoEquilibrium:
-            continue
-        direction: Array = np.asarray(np.linalg.solve(factor, found.whiten @ moved) / share, float)
-        visible = float(np.linalg.norm(direction))
-        if visible < 1e-6:
-            signatures.append(Signature(effect, 0.0, 0.0, np.inf, np.inf, direction))
-            continue
-        smallest = abs(main.typical - main.neutral) * float(np.sqrt(2 * CLEAR)) / visible
-        signatures.append(Signature(effect, visible, float(direction @ rest) / visible**2, 1 / visible, smallest, direction))
+        tried = []
+        for others in variations(effect):
+            try:
+                moved = theory.features(found.nuisance, [*present, (effect, others | {main.name: size})]) - here
+            except NoEquilibrium:
+                continue
+            direction: Array = np.asarray(np.linalg.solve(factor, found.whiten @ moved) / share, float)
+            visible = float(np.linalg.norm(direction))
+            if visible < 1e-6:
+                tried.append(Signature(effect, others, 0.0, 0.0, np.inf, np.inf, direction, 0.0))
+                continue
+            smallest = abs(main.typical - main.neutral) * float(np.sqrt(2 * CLEAR)) / visible
+            expected = float(direction @ rest) / visible**2
+            tried.append(Signature(effect, others, visible, expected, 1 / visible, smallest, direction, (expected * visible) ** 2))
+        if tried:
+            best = max(tried, key=lambda s: s.gain)
+            # what the data could show is said of the typical effect, whichever variation fits them
+            signatures.append(replace(best, visibility=tried[0].visibility, smallest=tried[0].smallest))
     return sorted(signatures, key=lambda s: -s.gain)
 
 
-def starts(effect: Effect, expected: float) -> list[list[float]]:
-    """Start values of a fit: typical, and the size the linear screening expects, both inside the limits."""
+def variations(effect: Effect) -> list[dict[str, float]]:
+    """Typical values, and one after the other every parameter but the first a prior width up and down, inside its limits."""
+    typical = effect.typical()
+    found = [typical]
+    for p in effect.parameters[1:]:
+        ends = {float(np.clip(p.typical + sign * p.prior_sd, *p.limits)) for sign in (1, -1)} - {p.typical}
+        found += [typical | {p.name: end} for end in sorted(ends)]
+    return found
+
+
+def starts(signature: Signature) -> list[list[float]]:
+    """Start values of a fit: typical, and the size the linear screening expects with the parameters it did so, all inside the limits."""
+    effect = signature.effect
     main = effect.parameters[0]
-    rest = [p.typical for p in effect.parameters[1:]]
-    sizes = {main.typical, main.neutral + expected * (main.typical - main.neutral)}
-    sizes.add(main.neutral - (main.typical - main.neutral))
-    inside = [float(np.clip(s, *main.limits)) for s in sizes]
-    return [[s, *rest] for s in sorted(set(inside)) if s != main.neutral]
+    reach = main.typical - main.neutral
+    wanted = [(main.typical, effect.typical()), (main.neutral - reach, effect.typical())]
+    wanted.append((main.neutral + signature.expected * reach, signature.others))
+    found = {(float(np.clip(size, *main.limits)), *[others[p.name] for p in effect.parameters[1:]]) for size, others in wanted}
+    return [list(start) for start in sorted(found) if start[0] != main.neutral]
 
 
 def held_out(theory: Theory, result: Fit, rating: Array | None = None) -> tuple[float, int]:
@@ -166,11 +183,12 @@ def explain(
     progress(f"tolerances fitted: misfit {base.misfit:.0f} for {len(theory.data.value)} numbers")
     signatures = screen(theory, base, catalogue)
     progress(f"{len(signatures)} effects screened")
-    quiet = chi_squared.sf(base.misfit, len(theory.data.value)) > 0.01
+    strain = base.chi2 - base.misfit  # tolerances far from their nominal values tell of something too
+    quiet = min(chi_squared.sf(base.misfit, len(theory.data.value)), chi_squared.sf(strain, len(theory.sd))) > 0.01
     if quiet and all(s.gain < CLEAR for s in signatures):
         promising: list[Task] = [((s.effect,), s.effect.typical_list()) for s in signatures[:3]]
     else:
-        tasks: list[Task] = [((s.effect,), start) for s in signatures if s.visibility > 1 for start in starts(s.effect, s.expected)]
+        tasks: list[Task] = [((s.effect,), start) for s in signatures if s.visibility > 1 or s.gain > CLEAR for start in starts(s)]
         rough = _best(_all(theory, about, [(*task, None) for task in tasks], False, workers))
         promising = [_again(f) for f in sorted(rough.values(), key=lambda f: -f.evidence)[:SINGLES]]
         progress(f"{len(tasks)} rough fits made")

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -25,7 +26,7 @@ ROUGH = 4  # steps at each temper of a fit that is not thorough
 RENEWALS = 6  # of the derivative at the last temper
 ENOUGH = 0.1  # fall of chi2 below which renewing derivatives has done its work
 ASIDE = 0.3  # share of the error of form that falls on features which an effect does not move
-SHARES = (0.1, 0.3, 1.0)  # of the form errors an effect states, all equally likely beforehand
+SHARES = (0.0, 0.1, 0.3, 1.0)  # of the form errors an effect states, all equally likely beforehand
 LOSS = 0.05  # loss factor that an effect on stiffness may bring unasked
 WORST = 1e12  # chi2 of a state that has no equilibrium
 
@@ -80,16 +81,16 @@ def form_variance(data: Data, effect: Effect, moved: Array) -> Array:
 def likeliest(data: Data, residual: Array, more: Array, enlarged: float) -> Array:
     """The whitening matrix with the shares of the form errors `more` that make the residual likeliest: a law may be better than feared.
 
-    What is said of damping is taken to be as bad as it is feared to be: a law right for most tests and wrong at a peak of losses would
-    otherwise be refuted by that.
+    What is said of damping is taken to be right or as bad as it is feared to be: a law right for most tests and wrong at a peak of losses
+    would otherwise be refuted by that.
     """
     if not more.any():
         return whitening(data.blocks, more, enlarged)
     damping = np.concatenate([rows.damping for rows in data.rows.values()])
     tried = []
-    for own in SHARES:
+    for own, losses in product(SHARES, (0.0, 1.0)):
         share = np.full(len(more), own)
-        share[damping] = 1.0
+        share[damping] = losses
         tried.append(whitening(data.blocks, share**2 * more, enlarged))
     return max(tried, key=lambda w: float(np.sum(np.log(np.diag(w))) - 0.5 * np.sum((w @ residual) ** 2)))
 

@@ -158,7 +158,7 @@ def added(about: Theory, slopes: Array, below: Both, effect: Effect) -> Both:
     fits = [fit(about, slopes, effects, [*before, *small], True, granted.nuisance)]
     rough = []
     for signature in screen(about, granted, (effect,), SMALL):
-        for start in starts(effect, signature.expected):
+        for start in starts(signature):
             try:
                 rough.append(fit(about, slopes, effects, [*before, *start], False))
             except NoEquilibrium:
