@@ -17,6 +17,7 @@ from model.pair import NoEquilibrium
 from sim.effect import Effect
 
 SINGLES, PAIRED = 4, 3  # effects refitted after the rough fits, and effects tried beside the best
+CLOSE = 3.0  # root of chi2 a number, priors included, up to which tolerances alone come close to the data
 NEAR = 60.0  # ln evidence within which a fit is polished
 CLEAR = 12.0  # ln evidence by which an explanation must lead the model without it: calibrated on campaigns with none
 AHEAD = 5.0  # ln evidence by which it must lead every rival to be identified
@@ -189,7 +190,10 @@ def explain(
         promising: list[Task] = [((s.effect,), s.effect.typical_list()) for s in signatures[:3]]
     else:
         tasks: list[Task] = [((s.effect,), start) for s in signatures if s.visibility > 1 or s.gain > CLEAR for start in starts(s)]
-        rough = _best(_all(theory, about, [(*task, None) for task in tasks], False, workers))
+        # where tolerances explain most, a rough fit starts from theirs; where they do not, they have been dragged off by what is missing
+        near = base.chi2 < CLOSE**2 * len(theory.data.value)
+        slopes, first = (base.jacobian, base.nuisance) if near else (about, None)
+        rough = _best(_all(theory, slopes, [(*task, first) for task in tasks], False, workers))
         promising = [_again(f) for f in sorted(rough.values(), key=lambda f: -f.evidence)[:SINGLES]]
         progress(f"{len(tasks)} rough fits made")
     fits = _best(_all(theory, about, [(*task, None) for task in promising], True, workers))

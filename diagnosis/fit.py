@@ -108,9 +108,9 @@ def fit(
 
     The data are tempered: their errors are first taken much larger than they are, so that effects find their size while tolerances
     stay where they are believed, then smaller down to the truth. A thorough fit takes the derivative by nuisance parameters anew
-    at every temper and goes on at the last until chi2 rests; else that of the nominal spindle serves, the last tempers are left
-    out, and chi2 and evidence are those of the tempered data: good for ranking only. With `nuisance` values from an earlier fit only the
-    last temper is gone through.
+    at every temper and goes on at the last until chi2 rests; else `about` serves, the last tempers are left out, and chi2 and evidence are
+    those of the tempered data: good for ranking only. With `nuisance` values from an earlier fit only the last temper is gone through;
+    a fit that is not thorough then stands on `about` being the derivative there.
     """
     data = theory.data
     rows = [p for e in effects for p in e.parameters]
@@ -147,7 +147,8 @@ def fit(
 
     m = model(x, theta)
     by_theta, by_nuisance = np.zeros((len(data.value), len(rows))), about
-    tempers = TEMPERS[:2] if not thorough else (*(TEMPERS if nuisance is None else ()), *[1.0] * RENEWALS)
+    first = TEMPERS if nuisance is None else (1.0,)
+    tempers = (*first, *[1.0] * (RENEWALS - (nuisance is not None))) if thorough else first[:2]
     for temper in tempers:
         if thorough and (effects or temper < TEMPERS[0]):
             by_nuisance = derivative(theory, x, applied(theta))
@@ -180,7 +181,7 @@ def fit(
                 break
         if temper == 1.0 and before - current < ENOUGH:
             break
-    whiten = with_form_errors(m, x, theta, 1.0 if thorough else TEMPERS[1])
+    whiten = with_form_errors(m, x, theta, 1.0 if thorough else tempers[-1])
     current = cost(m, x, theta)
     white = whiten @ np.hstack([by_nuisance, by_theta]) * scale
     normal = white.T @ white + np.eye(len(scale))
