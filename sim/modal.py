@@ -117,8 +117,20 @@ def extract(
     unit = 2 * np.pi * np.sqrt(frequency[0] * frequency[-1])
     lines = Lines((window_decay + 2j * np.pi * frequency) / unit, frf, np.sqrt(2) / sd, KINDS[kind])
 
-    free, twice = merge(lines, search(lines))
-    return _modes(*impose_rank_one(lines, free), twice, unit, given, frf.shape[:2])
+    return _modes(*_accepted(lines, search(lines)), unit, given, frf.shape[:2])
+
+
+def _accepted(lines: Lines, found: Fit) -> tuple[Lines, Fit, bool, list[tuple[complex, complex]]]:
+    """The poles found as modes: as they are where the data accept them so, else those at one place with one shape merged.
+
+    The free residues of two modes nearly at one place are mixed, and look alike before rank one is imposed on them.
+    """
+    free, twice = merge(lines, found)
+    if twice and min(lines.frf.shape[:2]) > 1:  # else any residues are of rank one
+        as_found = impose_rank_one(lines, found)
+        if as_found[2]:
+            return *as_found, []
+    return *impose_rank_one(lines, free), twice
 
 
 def impose_rank_one(lines: Lines, free: Fit) -> tuple[Lines, Fit, bool]:
