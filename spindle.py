@@ -25,6 +25,7 @@ from model.machine import Condition, HammerTest, OutsideRange, Spindle
 from model.mjcf import ELEMENTS
 from model.scene import BadInput, content_hash, load
 from sim import output
+from sim.campaign import Campaign
 from sim.effect import Effect
 from sim.effects import by_name
 from sim.folder import MARK, whole_folder
@@ -152,7 +153,11 @@ def _parser() -> argparse.ArgumentParser:
     simulate = verb("simulate", _simulate, "virtual tests as a campaign folder, in the same form as measured ones")
     several(simulate)
     hammer(simulate)
-    report = verb("report", _report, "the HTML report of the whole chain")
+    simulate.add_argument("--runout", action="store_true", help="the turning spindle seen by probes on its hub, instead of hammer tests")
+    simulate.add_argument("--speeds", type=_number, nargs="+", metavar="RPM", help="of runout tests, each at every temperature (three up to 7200 by default)")
+    simulate.add_argument("--seconds", type=_number, default=0.6, metavar="S", help="length of a runout record")
+    simulate.add_argument("--noise-nm", type=_number, default=1.0, metavar="NM", help="rms noise of a runout probe")
+    report = verb("report", _report, "the HTML report: the whole chain, the turning spindle, warm-up, resonances, and a ladder on what was measured")
     several(report)
     hammer(report)
     against = verb("compare", _compare, "a campaign beside the scene: modes, dampings, shapes and FRFs, and one number for the whole")
@@ -232,7 +237,8 @@ def _scene(options: argparse.Namespace) -> Spindle:
 def _progress(steps: int) -> Iterator[Callable[[str], None]]:
     """A function that takes what has been done, and moves a bar of so many steps on standard error."""
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("starting", total=steps)
         yield lambda done: bar.update(task, advance=1, description=done)
 
@@ -297,6 +303,12 @@ def _impact(options: argparse.Namespace) -> Answer:
 def _simulate(options: argparse.Namespace) -> Answer:
     if options.out is None:
         raise BadInput("--out: simulate needs the campaign folder to write")
+    if options.out.exists() and (not options.out.is_dir() or any(options.out.iterdir())):
+        raise BadInput(f"--out {options.out}: is not empty; a campaign is written to a new or empty folder")
+    if options.runout:
+        return _simulate_runout(options)
+    if options.speeds is not None:
+        raise BadInput("--speeds: is for --runout; hammer tests take one --speed")
     for result, _ in _whole_chain(options, extra=0):
         output.write_campaign_of(result, options.out)
         tests = [t.id for t in output.campaign_of(result).tests]
@@ -304,16 +316,38 @@ def _simulate(options: argparse.Namespace) -> Answer:
     return answer, lambda console: console.print(f"{options.out}: {len(tests)} tests: {', '.join(tests)}")
 
 
+def _simulate_runout(options: argparse.Namespace) -> Answer:
+    from sim.campaign import write_campaign
+    from sim.campaign_simulated import runout_campaign
+
+    for name in ("seconds", "noise_nm"):
+        if getattr(options, name) <= 0:
+            raise BadInput(f"--{name.replace('_', '-')} {getattr(options, name):g}: must be positive")
+    speeds = options.speeds or ([options.speed] if options.speed else [NOMINAL_RPM / 2, 0.75 * NOMINAL_RPM, NOMINAL_RPM])
+    conditions = [Condition(t, s * RPM) for t in options.temperatures for s in speeds]
+    with _progress(int(options.seconds / 0.05) + 2) as progress:
+        campaign = runout_campaign(
+            _scene(options), conditions, options.seconds, options.element, options.seed, 1e-9 * options.noise_nm, progress=progress
+        )
+    write_campaign(campaign, options.out)
+    tests = [t.id for t in campaign.tests]
+    answer = {"campaign": str(options.out), "tests": tests}
+    return answer, lambda console: console.print(f"{options.out}: {len(tests)} runout tests: {', '.join(tests)}")
+
+
 def _report(options: argparse.Namespace) -> Answer:
+    from diagnosis import whole_report
     from sim.report import write_report
 
-    out = options.out or Path("out") / load(options.target).name
+    out = options.out or Path("out") / f"{load(options.target).name}_report"  # a run's folder is left alone
+    turning, catalogue = abs(options.speed or NOMINAL_RPM) * RPM, _equipped(options)[1]
     with whole_folder(out) as folder:
-        for result, progress in _whole_chain(options, extra=1):
-            write_report(result, folder / "report.html")
-            progress("report written")
-            answer = {"report": str(out / "report.html")}
-            _mark(folder, options, answer)
+        [(result, _)] = _whole_chain(options, extra=0)
+        with _progress(whole_report.steps(result)) as progress:
+            more = list(whole_report.more_sections(result, turning, catalogue, progress))
+            write_report(result, folder / "report.html", more)
+        answer = {"report": str(out / "report.html"), "added": [title for title, _ in more]}
+        _mark(folder, options, answer)
     return answer, lambda console: console.print(f"{out / 'report.html'}")
 
 
@@ -348,11 +382,18 @@ def _compare(options: argparse.Namespace) -> Answer:
     from diagnosis.compare_report import write_comparison
     from diagnosis.compare_words import comparison_json, show_comparison
     from diagnosis.observe import observe
+    from diagnosis.runout_lines import modal_tests
     from sim.campaign import read_campaign
 
-    spindle, campaign = _scene(options), read_campaign(options.campaign)
+    spindle, whole = _scene(options), read_campaign(options.campaign)
     before = _equipped(options, options.before)[0] if options.before else None
-    unseen = held_out(spindle, campaign, options.held_out)
+    unseen = held_out(spindle, whole, options.held_out)
+    turning = _compare_runout(spindle, before, whole, unseen)
+    campaign = modal_tests(whole)
+    if turning and not campaign.tests:
+        told = {"spindle": spindle.name, "campaign": whole.title, **turning[0]}
+        _write_answer(options, told, "comparison.json")
+        return told, turning[1]
     with _progress((3 if before else 2) * len(campaign.tests)) as progress:
         observed = observe(campaign, spindle, progress)
         comparison = compare(spindle, campaign, observed, progress)
@@ -360,30 +401,83 @@ def _compare(options: argparse.Namespace) -> Answer:
     answer = comparison_json(comparison)
     if before:
         answer |= {"error": both.errors(), "held_out": list(unseen)}
+    answer |= {"runout": turning[0]} if turning else {}
     _write_answer(options, answer, "comparison.json", lambda folder: write_comparison(comparison, spindle, folder))
 
     def show(console: Console) -> None:
         show_comparison(console, comparison)
         if before:
             show_before_after(console, both)
+        if turning:
+            turning[1](console)
+
+    return answer, show
+
+
+def _compare_runout(spindle: Spindle, before: Spindle | None, campaign: Campaign, unseen: Sequence[str]) -> Answer | None:
+    """The runout tests of a campaign beside the scene, None where it has none; with `before` the errors of both scenes."""
+    from diagnosis.runout_compare import compare_runout, errors_of, runout_comparison_json, show_errors, show_runout_comparison
+
+    if not any(test.runout for test in campaign.tests):
+        return None
+    with _progress(len(campaign.tests) * (2 if before else 1)) as progress:
+        found = compare_runout(spindle, campaign, progress)
+        earlier = compare_runout(before, campaign, progress) if before else None
+    answer = runout_comparison_json(found)
+    errors = errors_of(earlier, found, unseen) if earlier else None
+    if errors:
+        answer |= {"error": errors, "held_out": list(unseen)}
+
+    def show(console: Console) -> None:
+        show_runout_comparison(console, found)
+        if errors:
+            show_errors(console, errors)
 
     return answer, show
 
 
 def _diagnose(options: argparse.Namespace) -> Answer:
     from diagnosis.before_after import without
+    from diagnosis.diagnosis_report import write_diagnosis
     from diagnosis.prediction import outcomes
+    from diagnosis.runout_lines import modal_tests
     from diagnosis.verdict import diagnose, diagnosis_json, show_diagnosis
     from sim.campaign import read_campaign
 
-    (spindle, catalogue), campaign = _equipped(options), without(read_campaign(options.campaign), options.held_out)
+    (spindle, catalogue), whole = _equipped(options), without(read_campaign(options.campaign), options.held_out)
+    turning = _diagnose_runout(spindle, catalogue, whole)
+    campaign = modal_tests(whole)
+    if turning and not campaign.tests:
+        told = turning[0] | {"campaign": whole.title, "scene_hash": content_hash(spindle)}
+        _write_answer(options, told, "diagnosis.json")
+        return told, turning[1]
     with _progress(len(campaign.tests) + 5) as progress:
-        found, about, places, tests = diagnose(spindle, campaign, catalogue, progress)
+        found, about, places, tests, m = diagnose(spindle, campaign, catalogue, progress)
     came = outcomes(options.predictions, about.data.observations) if options.predictions else []
-    answer = diagnosis_json(found, about, places, tests) | {"campaign": campaign.title, "scene_hash": content_hash(spindle)}
+    answer = diagnosis_json(found, about, places, tests, m) | {"campaign": campaign.title, "scene_hash": content_hash(spindle)}
     answer |= {"predictions": [asdict(o) for o in came]} if options.predictions else {}
-    _write_answer(options, answer, "diagnosis.json")
-    return answer, lambda console: show_diagnosis(console, answer, places)
+    answer |= {"runout": turning[0]} if turning else {}
+    _write_answer(options, answer, "diagnosis.json", lambda folder: write_diagnosis(found, about, m, answer, folder))
+
+    def show(console: Console) -> None:
+        show_diagnosis(console, answer)
+        if turning:
+            turning[1](console)
+
+    return answer, show
+
+
+def _diagnose_runout(spindle: Spindle, catalogue: tuple[Effect, ...], campaign: Campaign) -> Answer | None:
+    """The diagnosis of the runout tests of a campaign; None where it has none."""
+    from diagnosis.runout import diagnose_runout
+    from diagnosis.runout_words import runout_diagnosis_json, show_runout_diagnosis
+
+    tests = sum(test.runout is not None for test in campaign.tests)
+    if not tests:
+        return None
+    with _progress(tests + 2) as progress:
+        answer = runout_diagnosis_json(diagnose_runout(spindle, campaign, catalogue, progress), catalogue)
+    return answer, lambda console: show_runout_diagnosis(console, answer)
 
 
 def _runout(options: argparse.Namespace) -> Answer:

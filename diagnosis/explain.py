@@ -185,16 +185,21 @@ def explain(
     signatures = screen(theory, base, catalogue)
     progress(f"{len(signatures)} effects screened")
     strain = base.chi2 - base.misfit  # tolerances far from their nominal values tell of something too
-    quiet = min(chi_squared.sf(base.misfit, len(theory.data.value)), chi_squared.sf(strain, len(theory.sd))) > 0.01
+    strained = chi_squared.sf(strain, len(theory.sd)) < 0.01
+    quiet = chi_squared.sf(base.misfit, len(theory.data.value)) > 0.01 and not strained
     if quiet and all(s.gain < CLEAR for s in signatures):
         promising: list[Task] = [((s.effect,), s.effect.typical_list()) for s in signatures[:3]]
     else:
         tasks: list[Task] = [((s.effect,), start) for s in signatures if s.visibility > 1 or s.gain > CLEAR for start in starts(s)]
-        # where tolerances explain most, a rough fit starts from theirs; where they do not, they have been dragged off by what is missing
-        near = base.chi2 < CLOSE**2 * len(theory.data.value)
-        slopes, first = (base.jacobian, base.nuisance) if near else (about, None)
-        rough = _best(_all(theory, slopes, [(*task, first) for task in tasks], False, workers))
-        promising = [_again(f) for f in sorted(rough.values(), key=lambda f: -f.evidence)[:SINGLES]]
+        # where tolerances explain most, rough fits start from theirs; where they do not, or are strained, they have been dragged off by
+        # what is missing, and rough fits start from the drawing
+        comes_close = base.chi2 < CLOSE**2 * len(theory.data.value)
+        ways: list[tuple[Array, Array | None]] = [(base.jacobian, base.nuisance)] if comes_close else []
+        ways += [(about, None)] if not comes_close or strained else []
+        promising = []
+        for slopes, first in ways:
+            rough = _best(_all(theory, slopes, [(*task, first) for task in tasks], False, workers))
+            promising += [_again(f) for f in sorted(rough.values(), key=lambda f: -f.evidence)[:SINGLES]]
         progress(f"{len(tasks)} rough fits made")
     fits = _best(_all(theory, about, [(*task, None) for task in promising], True, workers))
     progress("promising effects refitted with all tolerances free")
@@ -205,8 +210,8 @@ def explain(
         best = max(fits.values(), key=lambda f: f.evidence)
         seconds = [s.effect for s in screen(theory, best, catalogue, 0.1)[:PAIRED] if s.gain > 2 * AHEAD]
         pairs = _best(_all(theory, about, [(*_again(best, e), None) for e in seconds], True, workers))
-        near = [f for f in pairs.values() if abs(best.evidence - f.evidence) < NEAR]
-        fits |= pairs | _best([*near, *_all(theory, about, [(*_again(f), f.nuisance) for f in near], True, workers)])
+        level = [f for f in pairs.values() if abs(best.evidence - f.evidence) < NEAR]
+        fits |= pairs | _best([*level, *_all(theory, about, [(*_again(f), f.nuisance) for f in level], True, workers)])
         progress(f"{len(pairs)} pairs fitted")
     return _verdict(theory, base, list(fits.values()), signatures)
 

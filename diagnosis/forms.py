@@ -17,9 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from model.ball_row import respond
 from model.machine import Bearing, Condition, RingMotion, Spindle
-from model.pair import BearingState, PairState, reference_deformation, reference_motion
+from model.pair import BearingState, PairState, bearing_state, contact_status, reference_deformation, reference_motion
 from sim.effect import Effect, Parameter, Values
 
 
@@ -55,30 +54,14 @@ def _held_axially(spindle: Spindle, condition: Condition, values: Values, state:
     if share == 0.0:
         return state
     bearings = tuple(_held(spindle, spindle.bearing(b.name), b, share) for b in state.bearings)
-    loose = [b.name for b in bearings if not b.in_contact]
-    status = "in contact" if not loose else f"{' and '.join(loose)} bearing lost contact"
-    return PairState(state.condition, bearings, (1 - share) * state.hub_movement, status)
+    return PairState(state.condition, bearings, (1 - share) * state.hub_movement, contact_status(bearings))
 
 
 def _held(spindle: Spindle, drawing: Bearing, b: BearingState, share: float) -> BearingState:
     """The bearing with its groove centres' axial distance brought back to the reference state's by `share`."""
     reference = (drawing.unloaded_distance + reference_deformation(spindle, drawing)) * np.sin(drawing.contact_angle)
     row = replace(b.row, axial=float((1 - share) * b.row.axial + share * np.copysign(reference, b.row.axial)))
-    answer = respond(row)
-    deformation = float(answer.deformation[0])
-    return replace(
-        b,
-        contact_angle=float(answer.inner_angle[0]),
-        outer_contact_angle=float(answer.outer_angle[0]),
-        deformation=deformation,
-        contact_force=float(answer.ball_force[0]),
-        ball_stiffness=1.5 * row.constant * max(deformation, 0.0) ** 0.5,
-        preload=abs(float(answer.force[2])),
-        stiffness=answer.tangent,
-        damping=drawing.damping_ratio / (np.pi * spindle.structure.damping_frequency) * answer.tangent,
-        row=row,
-        in_contact=bool(answer.in_contact.all()),
-    )
+    return bearing_state(spindle, drawing, row)
 
 
 def _share(meaning: str) -> tuple[Parameter, ...]:

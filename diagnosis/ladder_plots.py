@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from matplotlib.figure import Figure
 from diagnosis.ladder import Ladder
 from diagnosis.observe import Observation
 from diagnosis.rung import Rung
+from diagnosis.theory import Data
 from model.ball_row import Array
 from sim.plots import INK, PALE, STYLE, svg
 
@@ -37,19 +39,21 @@ class PullMap:
 
 
 def pull_map(found: Ladder, rung: Rung) -> PullMap:
-    """The pulls of all modes that have a number, tests in order of speed and temperature."""
-    data = found.theory.data
+    """The pulls of a rung."""
+    return pulls(found.theory.data, found.mode, found.kinds, rung.residual)
+
+
+def pulls(data: Data, mode: np.ndarray, kinds: Mapping[int, str], residual: Array) -> PullMap:
+    """The pulls of all modes that have a number, tests in order of speed and temperature; `mode` (n,) is zero where there is none."""
     order = sorted(range(len(data.observations)), key=lambda t: _place(data.observations[t]))
     column = {t: k for k, t in enumerate(order)}
-    row = {number: k for k, number in enumerate(found.kinds)}
+    row = {number: k for k, number in enumerate(kinds)}
     maps = {what: np.full((len(row), len(order)), np.nan) for what in ("frequency", "damping")}
     for k, f in enumerate(data.features):
-        if f.what in maps and found.mode[k]:
-            maps[f.what][row[int(found.mode[k])], column[f.test]] = -rung.residual[k] / data.sd[k]
+        if f.what in maps and mode[k]:
+            maps[f.what][row[int(mode[k])], column[f.test]] = -residual[k] / data.sd[k]
     damping = maps["damping"] if np.isfinite(maps["damping"]).any() else None
-    return PullMap(
-        [f"{n} {kind}" for n, kind in found.kinds.items()], _tests([data.observations[t] for t in order]), maps["frequency"], damping
-    )
+    return PullMap([f"{n} {kind}" for n, kind in kinds.items()], _tests([data.observations[t] for t in order]), maps["frequency"], damping)
 
 
 def _place(o: Observation) -> tuple[float, float, str]:
@@ -70,7 +74,7 @@ def figure(found: Ladder) -> Figure:
     drawn = Figure(figsize=(10.0, 3.1 + rows * tall))
     parts: Any = drawn.subfigures(2, 1, height_ratios=[3.1, rows * tall])
     _errors(parts[0].subplots(), found)
-    _maps(parts[1], [(found.rungs[0].name, first), (found.top.name, last)], rows)
+    draw_maps(parts[1], [(found.rungs[0].name, first), (found.top.name, last)])
     return drawn
 
 
@@ -117,10 +121,12 @@ def _broken(name: str) -> str:
     return "\n".join(lines)
 
 
-def _maps(part: Any, rungs: list[tuple[str, PullMap]], rows: int) -> None:
+def draw_maps(part: Any, rungs: Sequence[tuple[str, PullMap]]) -> None:
+    """Pull maps beside each other in a figure or a part of one, each below its name; dampings below frequencies."""
+    rows = 1 if rungs[0][1].damping is None else 2
     largest = max(SMALLEST, *(float(np.nanmax(np.abs(m.frequency))) for _, m in rungs))
     norm = SymLogNorm(LINEAR, vmin=-largest, vmax=largest)
-    grid = part.subplots(rows, 2, squeeze=False)
+    grid = part.subplots(rows, len(rungs), squeeze=False)
     for k, (name, pulls) in enumerate(rungs):
         for i, (what, values) in enumerate((("frequencies", pulls.frequency), ("damping ratios", pulls.damping))[:rows]):
             assert values is not None

@@ -20,6 +20,7 @@ from diagnosis.ladder import Ladder
 from diagnosis.ladder_plots import PullMap, pull_map
 from diagnosis.ladder_words import evidence, sentences
 from diagnosis.rung import Rung
+from sim.typeset import prose
 
 COLUMNS = ("rung", "error\ns.e.", "held out\ns.e.", "error\nHz", "error\n%", "of shifts\nHz", "tolerances\ns.d.", "ln evidence")
 LEGEND = (
@@ -129,7 +130,7 @@ def section(found: Ladder) -> tuple[str, str]:
     """Title and HTML for `sim.report.write_report`."""
     head = "".join(f"<th{' class=left' if k == 0 else ''}>{escape(c).replace(chr(10), '<br>')}</th>" for k, c in enumerate(COLUMNS))
     body = "".join(
-        "<tr>" + "".join(f"<td{' class=left' if k == 0 else ''}>{escape(c)}</td>" for k, c in enumerate(cells(r))) + "</tr>"
+        "<tr>" + "".join(f"<td{' class=left' if k == 0 else ''}>{prose(c)}</td>" for k, c in enumerate(cells(r))) + "</tr>"
         for r in found.rungs
     )
     grid = (
@@ -137,7 +138,7 @@ def section(found: Ladder) -> tuple[str, str]:
     )
     figure = f'<figure class="chart wide">{ladder_plots.picture(found)}<figcaption>Above: the error on every rung, of all data and of each '
     figure += f"temperature predicted from the others. Below: pulls of every mode in every test on the first rung and on '{escape(found.top.name)}'.</figcaption></figure>"
-    words = "".join(f"<p>{escape(s)}</p>" for s in sentences(found))
+    words = "".join(f"<p>{prose(s)}</p>" for s in sentences(found))
     return f"The ladder: {found.campaign.title}", figure + grid + words
 
 

@@ -120,7 +120,7 @@ def locate(theory: Theory, most: int = 5) -> list[Change]:
     here = theory.features(nothing)
     tolerances = data.whiten @ (linearise(theory) * theory.sd)
     residual = data.whiten @ (data.value - here)
-    temper = _temper(tolerances, residual)
+    temper = enlarged(tolerances, residual)
     factor = np.linalg.cholesky(np.eye(len(residual)) + tolerances @ tolerances.T / temper**2) * temper
     rest = np.linalg.solve(factor, residual)
     where = [(o.condition.temperature, o.condition.speed) for o in data.observations]
@@ -156,12 +156,13 @@ def poles_only(data: Data) -> Data:
     )
 
 
-def _temper(tolerances: Array, residual: Array) -> float:
-    """Factor on the errors at which the chi2 left by the tolerances is one a number; one where it is less anyway."""
+def enlarged(tolerances: Array, white: Array) -> float:
+    """Factor on the errors at which the chi2 (n,) left by the tolerances (n, p) is one a number; one where it is less anyway."""
+    value, vector = np.linalg.eigh(tolerances @ tolerances.T)
+    squares = (vector.T @ white) ** 2
 
     def excess(log_t: float) -> float:
-        t2 = np.exp(2 * log_t)
-        return float(residual @ np.linalg.solve(t2 * np.eye(len(residual)) + tolerances @ tolerances.T, residual)) / len(residual) - 1
+        return float(np.mean(squares / (np.exp(2 * log_t) + np.maximum(value, 0.0)))) - 1
 
     return 1.0 if excess(0.0) <= 0 else float(np.exp(brentq(excess, 0.0, 30.0, xtol=1e-3)))
 

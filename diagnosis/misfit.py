@@ -11,11 +11,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import brentq
 from scipy.stats import chi2 as chi_squared
 
 from diagnosis.fit import Fit
-from diagnosis.locate import FREE, SMALL, Change, elements, poles_only
+from diagnosis.locate import FREE, SMALL, Change, elements, enlarged, poles_only
 from diagnosis.patterns import Chosen, Shape, choose, choose_for, f_test, shapes
 from diagnosis.sensitivity import derivative
 from diagnosis.shares import Modes, Share, modes_at, shares
@@ -141,7 +140,7 @@ def frame(theory: Theory, base: Fit) -> Frame:
         slope = derivative(theory, x, ())
         residual = data.value - theory.features(x) + slope @ x
         tolerances = data.whiten @ (slope * theory.sd)
-        temper = _temper(tolerances, data.whiten @ residual)
+        temper = enlarged(tolerances, data.whiten @ residual)
         normal = tolerances.T @ tolerances / temper**2 + np.eye(len(x))
         if not fits:
             x = theory.sd * np.linalg.solve(normal, tolerances.T @ (data.whiten @ residual)) / temper**2
@@ -150,17 +149,6 @@ def frame(theory: Theory, base: Fit) -> Frame:
     conditions = {o.condition: None for o in data.observations}
     order = sorted(conditions, key=lambda c: (c.speed, c.temperature, c.level, c.soak_time))
     return Frame(theory, x, residual, slope, factor, temper, tuple(order))
-
-
-def _temper(tolerances: Array, white: Array) -> float:
-    """Factor on the errors at which the chi2 (n,) left by the tolerances (n, p) is one a number; one where it is less anyway."""
-    value, vector = np.linalg.eigh(tolerances @ tolerances.T)
-    squares = (vector.T @ white) ** 2
-
-    def excess(log_t: float) -> float:
-        return float(np.mean(squares / (np.exp(2 * log_t) + np.maximum(value, 0.0)))) - 1
-
-    return 1.0 if excess(0.0) <= 0 else float(np.exp(brentq(excess, 0.0, 30.0, xtol=1e-3)))
 
 
 # ---------------------------------------------------------------- what it grows with

@@ -67,16 +67,14 @@ def condition_json(c: Condition) -> dict[str, Any]:
 
 
 def words(m: Misfit) -> list[str]:
-    """Sentences: how large the misfit is and where it sits, what it grows with, and what would have to change."""
+    """Sentences: what would have to change, without any catalogue; then how large the misfit is, where it sits, and what it grows with."""
     if not m.rejected:
         return [f"The tolerances explain the data (chi2 {m.chi2:.0f} for {m.count} numbers): nothing has to change."]
-    told = [f"With all tolerances fitted a chi2 of {m.chi2:.0f} is left for {m.count} numbers: {_largest(m)}."]
-    told += [grows(g) for g in m.growth]
-    if m.places:
-        told.append(must_change(m.places[0], m.places[1:]))
+    told = [must_change(m.places[0], m.places[1:])] if m.places else []
     if m.drift and m.drift[0].needed and not (m.places and m.places[0].names == m.drift[0].names):
         told.append(f"Of the toleranced parameters alone, {_lower(must_change(m.drift[0], m.drift[1:]))}")
-    return told
+    told.append(f"With all tolerances fitted a chi2 of {m.chi2:.0f} is left for {m.count} numbers: {_largest(m)}.")
+    return told + [grows(g) for g in m.growth]
 
 
 def _largest(m: Misfit) -> str:

@@ -11,6 +11,8 @@ from rich.console import Console
 
 from diagnosis.explain import Candidate, Diagnosis, explain
 from diagnosis.locate import Change, locate
+from diagnosis.misfit import Misfit, misfit
+from diagnosis.misfit_words import misfit_json
 from diagnosis.next_test import NextTest, Plan, explanations, next_tests
 from diagnosis.observe import observe
 from diagnosis.theory import Theory, data_of, theory
@@ -25,18 +27,18 @@ SHOWN = 12  # candidates
 
 def diagnose(
     spindle: Spindle, campaign: Campaign, catalogue: tuple[Effect, ...] = CATALOGUE, progress: Callable[[str], None] = lambda done: None
-) -> tuple[Diagnosis, Theory, list[Change], list[NextTest]]:
-    """The diagnosis of a campaign, where the model fails without any catalogue, and the tests that would decide."""
+) -> tuple[Diagnosis, Theory, list[Change], list[NextTest], Misfit]:
+    """The diagnosis of a campaign, where the model fails without any catalogue, the tests that would decide, and the misfit itself."""
     observations = observe(campaign, spindle, progress, os.cpu_count() or 1)
     about = theory(spindle, data_of(observations))
     found = explain(about, catalogue, os.cpu_count() or 1, progress)
     places = locate(about) if found.verdict != "none" else []
     tests = [] if found.verdict == "none" else next_tests(about, explanations(about, found, places))
     progress("next tests weighed")
-    return found, about, places, tests
+    return found, about, places, tests, misfit(about, found.base, places)
 
 
-def diagnosis_json(found: Diagnosis, about: Theory, places: list[Change], tests: list[NextTest]) -> dict[str, Any]:
+def diagnosis_json(found: Diagnosis, about: Theory, places: list[Change], tests: list[NextTest], m: Misfit) -> dict[str, Any]:
     n = len(about.data.value)
     best = found.best
     accepted = best is not None and found.verdict not in ("none", "unexplained")
@@ -80,6 +82,7 @@ def diagnosis_json(found: Diagnosis, about: Theory, places: list[Change], tests:
             }
             for t in tests
         ],
+        "misfit": misfit_json(m),
         "tolerances": {name: {"value": float(v), "sd": float(s), "prior_sd": float(p)} for name, v, s, p in _tolerances(found, about)},
     }
 
@@ -88,7 +91,7 @@ def would_change(found: Diagnosis, places: list[Change], tests: list[NextTest]) 
     """What would make this verdict another one, in a sentence or two."""
     test = ""
     if tests:
-        told, (first, second) = _plan_words(_plan(tests[0].plan)), tests[0].separates
+        told, (first, second) = plan_words(_plan(tests[0].plan)), tests[0].separates
         test = f" A test {told} tells {first} from {second}."
     if found.verdict == "none":
         return "An effect larger than these data could have hidden would change that; how large that is, is listed for each."
@@ -115,7 +118,7 @@ def _plan(plan: Plan) -> dict[str, Any]:
     return told
 
 
-def _plan_words(told: dict[str, Any]) -> str:
+def plan_words(told: dict[str, Any]) -> str:
     words = f"at {told['temperature_C']:g} C, {told['speed_rpm']:.0f} rpm"
     words += f", hit with {told['level_N']:g} N" if "level_N" in told else ""
     words += f", with {told['added_mass_g']:g} g on the {told['on']}" if "added_mass_g" in told else ""
@@ -146,7 +149,7 @@ def _tolerances(found: Diagnosis, about: Theory):
     return zip(about.names, fit.nuisance, fit.nuisance_sd, about.sd, strict=True)
 
 
-def show_diagnosis(console: Console, answer: dict[str, Any], places: list[Change]) -> None:
+def show_diagnosis(console: Console, answer: dict[str, Any]) -> None:
     named = f": {', '.join(answer['effects'])}" if answer["effects"] else ""
     console.print(f"[bold]{answer['verdict']}{named}[/bold]")
     console.print(answer["reason"], highlight=False)
@@ -157,19 +160,19 @@ def show_diagnosis(console: Console, answer: dict[str, Any], places: list[Change
     )
     console.print("\nBest explanations (ln evidence over the model without effects):")
     for c in answer["candidates"][:5]:
-        values = ", ".join(f"{k.split('.')[1]} {v['value']:.4g} +- {v['sd']:.2g} {v['unit']}" for k, v in c["parameters"].items())
+        values = ", ".join(f"{k.split('.')[1]} {v['value']:.4g} +- {v['sd']:.2g}{_unit(v['unit'])}" for k, v in c["parameters"].items())
         console.print(
             f"  {' + '.join(c['effects'])}: {c['delta_evidence']:+.1f}, probability {c['probability']:.3f}; {values}", highlight=False
         )
-    if places:
+    if answer["misfit"]["rejected"]:
         console.print("\nWithout any catalogue:")
-        for change in places[:3]:
-            console.print(f"  {change.words()}; it goes with {change.pattern}", highlight=False)
+        for sentence in answer["misfit"]["words"]:
+            console.print(f"  {sentence}", highlight=False, markup=False)
     for t in answer["next_test"]:
         first, second = t["separates"]
         times = "" if t["repeats"] == 1 else f", {t['repeats']} times for 100 to 1"
         console.print(
-            f"\nA test {_plan_words(t['condition'])} would separate {first} from {second} with odds of {t['odds']:.3g} to 1{times}; they predict:",
+            f"\nA test {plan_words(t['condition'])} would separate {first} from {second} with odds of {t['odds']:.3g} to 1{times}; they predict:",
             highlight=False,
         )
         for name, rows in t["predicted"].items():
@@ -183,6 +186,10 @@ def show_diagnosis(console: Console, answer: dict[str, Any], places: list[Change
         small = sorted(answer["detectable"].items())
         console.print("\nSmallest size these data would have shown: " + ", ".join(f"{k} {v:.2g}" for k, v in small), highlight=False)
         console.print(f"Not visible in these data at a typical size: {', '.join(answer['invisible']) or 'nothing'}")
+
+
+def _unit(unit: str) -> str:
+    return "" if unit == "1" else f" {unit}"
 
 
 def _frequencies(rows: list[dict[str, float]]) -> str:

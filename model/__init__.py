@@ -4,9 +4,13 @@ Imports none of the other packages. Modules, in the order of the calculation:
 
 =============  ===================================================================================================
 machine        frozen definitions: spindle, materials, bearings, structure, points, condition
-scene          reads and checks `spindle.toml`; scene_file holds the file's form, units and ranges
+file_table     what tables of files that people write have in common: numbers, laws, the first thing wrong in words
+scene_file     the form of `spindle.toml`: keys, units, ranges; its tables are scene_section, scene_bearings,
+               scene_structure, scene_thermal, scene_measuring and scene_imperfections
+scene          reads and checks a scene by that form
 section        the axisymmetric section: who owns which rectangle, mass and inertia
 hertz          point contact with exact elliptic integrals
+heavy_ball     one ball with centrifugal force and gyroscopic moment between its races
 ball_row       one ball row under any load: forces, contact loss, exact 5x5 tangent stiffness
 pair           axial equilibrium of the two rows against the thermal motion of their rings
 table          bearing stiffness over temperature and speed, as CSV

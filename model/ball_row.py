@@ -5,42 +5,23 @@ K deformation**1.5 beyond the unloaded distance and none below (Jones 1960; Harr
 psi_j in its own r-z plane; the outer ring's displacement relative to the inner, (x, y, z, tilt_x, tilt_y), moves the outer
 centre there by u_r = x cos + y sin and u_z = z + arm (tilt_x sin - tilt_y cos). Forces are those needed on the outer ring.
 
-With ball inertia the ball centre is an unknown of its own: centrifugal force and gyroscopic moment make the inner and outer
-contact angles differ (Jones 1960; Harris 1991, Eqs. 9.9-9.25, outer-race control).
+With ball inertia the ball centre is an unknown of its own (`model.heavy_ball`).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import hypot, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize, root
 
+from model.heavy_ball import LEAST_STRETCH, Balance, BallInertia, HeavyBall, NoEquilibrium, settled
 from model.hertz import in_series
 
 Array = NDArray[np.float64]
-
-
-class NoEquilibrium(RuntimeError):
-    """A bearing equilibrium was not found; the message says which and how far off it stayed."""
-
-
-@dataclass(frozen=True)
-class BallInertia:
-    """What makes a ball heavy at speed; `share` scales centrifugal force and gyroscopic moment (0 none, 1 full)."""
-
-    diameter: float
-    pitch_diameter: float
-    density: float
-    inner_speed: float  # rad/s
-    outer_speed: float
-    share: float = 1.0
-
-    @property
-    def mass(self) -> float:
-        return np.pi / 6 * self.density * self.diameter**3
 
 
 @dataclass(frozen=True)
@@ -116,10 +97,7 @@ def respond(row: BallRow, displacement: Array | None = None) -> RowForce:
     """Force and tangent stiffness at a displacement (5,) of the outer ring relative to the inner; centred rings by default."""
     u = np.zeros(5) if displacement is None else np.asarray(displacement, float)
     line = centre_line(row, u)
-    if row.inertia is None or row.inertia.share == 0.0:
-        local = _massless(row, line)
-    else:
-        local = _with_inertia(row, line)
+    local = _with_inertia(row, line) if _heavy(row) else _massless(row, line)
     force, stiffness, inner, outer, inner_angle, outer_angle, deformation = local
     b = kinematics(row)
     return RowForce(
@@ -131,6 +109,20 @@ def respond(row: BallRow, displacement: Array | None = None) -> RowForce:
         outer_angle,
         deformation,
     )
+
+
+def centred_axial_force(row: BallRow, movement: float = 0.0) -> float:
+    """Axial force (N) needed on the outer ring of a row with centred rings when it has moved by `movement` (m), as `respond` has it."""
+    axial = row.axial + movement
+    if _heavy(row):
+        return row.balls * _settled(row, np.array([[-row.radial, axial]]))[0].on_outer[1]
+    length = hypot(row.radial, axial)
+    deformation = max(length - row.unloaded_distance, 0.0)
+    return row.balls * row.constant * deformation**1.5 * axial / length
+
+
+def _heavy(row: BallRow) -> bool:
+    return row.inertia is not None and row.inertia.share != 0.0
 
 
 def _massless(row: BallRow, line: Array) -> tuple[Array, ...]:
@@ -147,111 +139,24 @@ def _massless(row: BallRow, line: Array) -> tuple[Array, ...]:
     return force[:, None] * e, stiffness, force, force, angle, angle, deformation
 
 
-# ---------------------------------------------------------------- balls with inertia
-
-
 def _with_inertia(row: BallRow, line: Array) -> tuple[Array, ...]:
-    """As `_massless`, with each ball's centre found by damped Newton and condensed out of the stiffness."""
-    centre = _ball_centres(row, line)
-    residual_by, force_by = _derivatives(row, centre, line)
-    follow = -np.linalg.solve(residual_by[:, :, :2], residual_by[:, :, 2:])  # d centre / d line
-    stiffness = force_by[:, :, 2:] + force_by[:, :, :2] @ follow
-    _, force, inner, outer, inner_angle, outer_angle, deformation = _ball_forces(row, centre, line)
-    return force, stiffness, inner, outer, inner_angle, outer_angle, deformation
+    """As `_massless`, with the centre of every ball an unknown of its own; balls on the same line, as of centred rings, are one."""
+    balances = _settled(row, line)
+    stiffness = {id(b): np.reshape(b.stiffness(), (2, 2)) for b in balances}
+    told = np.array([(*b.on_outer, b.inner, b.outer, b.inner_angle, b.outer_angle, b.deformation) for b in balances]).T
+    return told[:2].T, np.array([stiffness[id(b)] for b in balances]), *told[2:]
 
 
-def _ball_centres(row: BallRow, line: Array) -> Array:
-    """Ball centres (balls, 2) measured from the inner groove centre, where the forces on each ball balance.
-
-    The energy of the two contacts less the work of the centrifugal force is convex, so a Newton step that is halved until the
-    residual falls finds its minimum; the gyroscopic friction is a small addition.
-    """
-    share = (row.inner_constant / row.outer_constant) ** (2 / 3)
-    length = np.linalg.norm(line, axis=1, keepdims=True)
-    stretch = np.maximum(length - row.unloaded_distance, 0.02e-6)
-    inner = stretch / (1 + share)
-    centre = line / length * (row.inner_length + inner)
-    scale = 1e-12 * row.constant * np.max(stretch) ** 1.5
-    residual = _ball_forces(row, centre, line)[0]
-    for _ in range(100):
-        worst = np.linalg.norm(residual, axis=1)
-        if np.all(worst < scale):
-            return centre
-        jacobian = _derivatives(row, centre, line)[0][:, :, :2]
-        jacobian = jacobian - 1e-9 * row.constant * np.sqrt(np.max(stretch)) * np.eye(2)
-        step = -np.linalg.solve(jacobian, residual[:, :, None])[:, :, 0]
-        step *= np.minimum(1.0, 2e-6 / np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-30))
-        factor = np.ones(row.balls)
-        for _ in range(30):
-            trial = centre + factor[:, None] * step
-            trial_residual = _ball_forces(row, trial, line)[0]
-            worse = np.linalg.norm(trial_residual, axis=1) > worst + scale
-            if not worse.any():
-                break
-            factor[worse] *= 0.5
-        centre, residual = trial, trial_residual
-    raise NoEquilibrium(f"ball centres did not settle; the largest residual is {np.max(np.linalg.norm(residual, axis=1)):.2g} N")
-
-
-def _derivatives(row: BallRow, centre: Array, line: Array) -> tuple[Array, Array]:
-    """Exact Jacobians (balls, 2, 4) of ball residual and outer-ring force by centre and line, by complex steps."""
-    h = 1e-20
-    residual_by, force_by = np.empty((row.balls, 2, 4)), np.empty((row.balls, 2, 4))
-    for column in range(4):
-        moved = np.concatenate([centre, line], axis=1).astype(complex)
-        moved[:, column] += 1j * h
-        residual, force, *_ = _ball_forces(row, moved[:, :2], moved[:, 2:])
-        residual_by[:, :, column], force_by[:, :, column] = residual.imag / h, force.imag / h
-    return residual_by, force_by
-
-
-def _ball_forces(row: BallRow, centre: NDArray, line: NDArray) -> tuple[NDArray, ...]:
-    """Resultant on each ball (balls, 2) and force on the outer ring (balls, 2); accepts complex steps."""
-    inertia = row.inertia
-    assert inertia is not None
-    inner_length, inner_away = _polar(centre)
-    outer_length, outer_away = _polar(line - centre)
-    inner_stretch, outer_stretch = inner_length - row.inner_length, outer_length - row.outer_length
-    inner = row.inner_constant * _pressed(inner_stretch) ** 1.5
-    outer = row.outer_constant * _pressed(outer_stretch) ** 1.5
-    cos_outer, sin_outer = -outer_away[:, 0], outer_away[:, 1]
-    centrifugal, moment = _ball_inertia_loads(inertia, cos_outer, sin_outer)
-    # outer-race control: the friction that turns the ball's angular momentum acts at the outer contact, 2 M / D across it
-    across = np.stack([sin_outer, cos_outer], 1)
-    friction = -(2 * moment / inertia.diameter)[:, None] * across * np.where(outer.real > 0, 1.0, 0.0)[:, None]
-    on_outer = outer[:, None] * outer_away + friction
-    radial = np.stack([centrifugal, np.zeros_like(centrifugal)], 1)
-    resultant = -inner[:, None] * inner_away + on_outer + radial
-    angles = [np.arctan2(np.abs(away[:, 1].real), -away[:, 0].real) for away in (inner_away, outer_away)]
-    return resultant, on_outer, inner, outer, angles[0], angles[1], (inner_stretch + outer_stretch)
-
-
-def _ball_inertia_loads(inertia: BallInertia, cos_outer: NDArray, sin_outer: NDArray) -> tuple[NDArray, NDArray]:
-    """Centrifugal force (N) and rate of turn of angular momentum (N m about the direction of travel) of each ball.
-
-    Kinematics after Harris 1991, ch. 8 (rolling at both races, outer-race control: tan beta = sin a / (cos a + gamma), inner
-    angle taken equal to the outer). A ball spinning with `spin` about an axis at beta to z while it orbits with `cage` has
-    dH/dt = cage z x H = J spin cage sin(beta) about the direction of travel.
-    """
-    gamma = inertia.diameter / inertia.pitch_diameter
-    cage = (inertia.inner_speed * (1 - gamma * cos_outer) + inertia.outer_speed * (1 + gamma * cos_outer)) / 2
-    relative = inertia.outer_speed - inertia.inner_speed
-    beta_length = np.sqrt(sin_outer**2 + (cos_outer + gamma) ** 2)
-    sin_beta, cos_beta = sin_outer / beta_length, (cos_outer + gamma) / beta_length
-    rolling = cos_outer * cos_beta + sin_outer * sin_beta
-    spin = relative / (rolling * (gamma / (1 + gamma * cos_outer) + gamma / (1 - gamma * cos_outer)))
-    polar = inertia.mass * inertia.diameter**2 / 10
-    centrifugal = inertia.share * inertia.mass * inertia.pitch_diameter / 2 * cage**2
-    return centrifugal, inertia.share * polar * spin * cage * sin_beta
-
-
-def _polar(vector: NDArray) -> tuple[NDArray, NDArray]:
-    length = np.sqrt(vector[:, 0] ** 2 + vector[:, 1] ** 2)
-    return length, vector / length[:, None]
-
-
-def _pressed(stretch: NDArray) -> NDArray:
-    return np.where(stretch.real > 0, stretch, 0.0)
+def _settled(row: BallRow, line: Array) -> list[Balance]:
+    """The balance of every ball, (balls,), at `line` (balls, 2)."""
+    assert row.inertia is not None
+    ball = HeavyBall(row.inner_length, row.outer_length, row.inner_constant, row.outer_constant, row.inertia)
+    lines = [(r, z) for r, z in line.tolist()]
+    different = dict.fromkeys(lines)
+    stretch = max(LEAST_STRETCH, max(hypot(r, z) for r, z in different) - row.unloaded_distance)
+    tolerance, least = 1e-12 * row.constant * stretch**1.5, 1e-9 * row.constant * sqrt(stretch)
+    found = {at: settled(ball, at, tolerance, least) for at in different}
+    return [found[at] for at in lines]
 
 
 # ---------------------------------------------------------------- loads

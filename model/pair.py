@@ -10,12 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from math import hypot
 
 import numpy as np
 from scipy.optimize import brentq
 
-from model.ball_row import Array, BallInertia, BallRow, NoEquilibrium, RowForce, respond
+from model.ball_row import Array, BallInertia, BallRow, NoEquilibrium, RowForce, centred_axial_force, respond
 from model.hertz import in_series, race_contact
 from model.machine import Bearing, Condition, RingMotion, Spindle
 
@@ -95,9 +94,13 @@ def solve(spindle: Spindle, condition: Condition, motions: Mapping[str, RingMoti
         _state(spindle, b, replace(row, axial=row.axial + h), k)
         for b, row, h, k in zip(spindle.bearings, rows, moves, SENSE[spindle.pair.stiffness_arrangement], strict=True)
     )
-    loose = [b.name for b in states if not b.in_contact]
-    status = "in contact" if not loose else f"{' and '.join(loose)} bearing lost contact"
-    return PairState(condition, states, float(np.mean(moves)), status)
+    return PairState(condition, states, float(np.mean(moves)), contact_status(states))
+
+
+def contact_status(bearings: tuple[BearingState, ...]) -> str:
+    """The status of a pair: that all bearings are in contact, or which of them is not."""
+    loose = [b.name for b in bearings if not b.in_contact]
+    return "in contact" if not loose else f"{' and '.join(loose)} bearing lost contact"
 
 
 def row_at(spindle: Spindle, b: Bearing, sense: int, motion: RingMotion, speed: float) -> BallRow:
@@ -160,24 +163,14 @@ def _ball_inertia(spindle: Spindle, b: Bearing, speed: float) -> BallInertia | N
     return BallInertia(b.ball_diameter, b.pitch_diameter, density, inner, outer, spindle.pair.ball_inertia)
 
 
-def _axial_force(row: BallRow, movement: float) -> float:
-    """Axial force (N) needed on the outer ring when it has moved by `movement` (m); rises with it."""
-    if row.inertia is None:
-        axial = row.axial + movement
-        length = hypot(row.radial, axial)
-        deformation = max(length - row.unloaded_distance, 0.0)
-        return row.balls * row.constant * deformation**1.5 * axial / length
-    return float(respond(replace(row, axial=row.axial + movement)).force[2])
-
-
 def _balance(rows: list[BallRow], external: float) -> float:
     """Hub movement at which the axial forces of all rows add up to `external`: Jang et al. 2003, Eq. (8)."""
-    return _root(rows, lambda rows, h: sum(_axial_force(row, h) for row in rows) - external)
+    return _root(rows, lambda rows, h: sum(centred_axial_force(row, h) for row in rows) - external)
 
 
 def _movement_for(row: BallRow, force: float) -> float:
     """Movement of one outer ring under a constant axial force."""
-    return _root([row], lambda rows, h: _axial_force(rows[0], h) - force)
+    return _root([row], lambda rows, h: centred_axial_force(rows[0], h) - force)
 
 
 def _root(rows: list[BallRow], imbalance: Callable[[list[BallRow], float], float]) -> float:
@@ -198,7 +191,11 @@ def _bracketed(imbalance: Callable[[float], float], start: float, reach: float) 
 
 
 def _state(spindle: Spindle, b: Bearing, row: BallRow, stiffness_sense: int) -> BearingState:
-    row = replace(row, axial=stiffness_sense * abs(row.axial))
+    return bearing_state(spindle, b, replace(row, axial=stiffness_sense * abs(row.axial)))
+
+
+def bearing_state(spindle: Spindle, b: Bearing, row: BallRow) -> BearingState:
+    """What bearing `b` is with its balls as in `row`, centred rings at their loaded position."""
     answer: RowForce = respond(row)
     zeta, omega = b.damping_ratio, 2 * np.pi * spindle.structure.damping_frequency
     deformation = float(answer.deformation[0])

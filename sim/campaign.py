@@ -1,4 +1,4 @@
-"""Campaigns of modal tests, measured or virtual: a folder with `campaign.toml` and, a test, a UFF file of FRFs or rows of modes.
+"""Campaigns of tests, measured or virtual: a folder with `campaign.toml` and, a test, a UFF file of FRFs, rows of modes, or runout.
 
 `read_campaign` refuses what cannot be used, `write_campaign` writes a folder whole or not at all, in the same form. Units are in
 the keys of the file and SI in the dataclasses; temperatures are C, angular speeds rad/s, natural frequencies Hz.
@@ -21,6 +21,7 @@ from model.machine import Point
 from model.scene import BadInput
 from model.scene_file import MM, RPM, first_error
 from sim.campaign_file import MODE_COLUMNS, ModeTable, checked, in_unit, toml
+from sim.campaign_runout import RunoutRecord, read_runout, same, write_runout
 from sim.frf import LIMITS, Frf, Limits, check_frf
 from sim.uff import axis_number, read_frf, write_frf
 
@@ -51,7 +52,7 @@ class Noise:
 
 @dataclass(frozen=True)
 class Test:
-    """One modal test in one operating condition."""
+    """One test in one operating condition: of modes, of runout, or both."""
 
     __test__ = False  # not one of pytest's
 
@@ -65,13 +66,14 @@ class Test:
     frf: Frf | None = None
     modes: tuple[ModeRow, ...] = ()
     window_decay: float = 0.0  # 1/s, damping that an exponential window exp(-decay t) has left in the FRFs
+    runout: RunoutRecord | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True)
 class Campaign:
     title: str
     spindle: str  # name of the scene
-    quantity: str  # receptance, mobility or accelerance
+    quantity: str  # receptance, mobility or accelerance; displacement where there is runout alone
     points: tuple[Point, ...]
     tests: tuple[Test, ...]
     noise: Noise | None = None
@@ -100,11 +102,14 @@ def read_campaign(folder: Path, limits: Limits = LIMITS) -> Campaign:
         speed, soak = t.speed_rpm * RPM, None if t.soak_time_min is None else t.soak_time_min * MINUTE
         frf = read_frf(folder / t.frf, table.quantity, points) if t.frf else None
         modes = tuple(row for row in rows if row.test == t.id)
-        if frf is None and not modes:
-            raise BadInput(f"{file}: tests.{t.id}: has neither frf nor rows in a table of modes; one of them is needed")
+        if frf is None and not modes and not t.runout:
+            raise BadInput(f"{file}: tests.{t.id}: has neither frf nor rows in a table of modes nor runout; one of them is needed")
+        runout = read_runout(folder / t.runout, points, speed, t.spectrum_window) if t.runout else None
         if frf is not None:
             check_frf(folder / str(t.frf), frf, speed, limits)
-        tests.append(Test(t.id, t.temperature_C, speed, t.hammer_level_N, soak, t.repeat, t.conditions, frf, modes, t.window_decay_1_per_s))
+        tests.append(
+            Test(t.id, t.temperature_C, speed, t.hammer_level_N, soak, t.repeat, t.conditions, frf, modes, t.window_decay_1_per_s, runout)
+        )
     noise = Noise(table.noise.of_value, table.noise.of_largest) if table.noise else None
     return Campaign(table.title, table.spindle, table.quantity, points, tuple(tests), noise, table.note, folder)
 
@@ -145,7 +150,7 @@ def _read_modes(file: Path, tests: list[str]) -> list[ModeRow]:
 def write_campaign(campaign: Campaign, folder: Path, replace: bool = False, limits: Limits = LIMITS) -> None:
     """Write the folder of a campaign, whole or not at all: beside its place first, then moved there.
 
-    Each test's FRFs go to `<id>.uff`, all modes to `modes.csv`. Raises `BadInput` for what `read_campaign` would refuse, and for a
+    Each test's FRFs go to `<id>.uff`, its runout to `<id>_runout.csv`, all modes to `modes.csv`. Raises `BadInput` for what `read_campaign` would refuse, and for a
     folder that is not empty, unless `replace` is set and it holds a campaign, which is then lost.
     """
     folder = Path(folder).absolute()
@@ -165,7 +170,12 @@ def write_campaign(campaign: Campaign, folder: Path, replace: bool = False, limi
                 if test.frf.quantity != campaign.quantity:
                     raise BadInput(f"{folder}: tests.{test.id}: FRFs of {test.frf.quantity} in a campaign of {campaign.quantity}")
                 write_frf(partial / f"{test.id}.uff", test.frf, campaign.points, campaign.title, test.id)
-        if _exact(read_campaign(partial, limits)) != _exact(campaign):
+            if test.runout is not None:
+                write_runout(partial / f"{test.id}_runout.csv", test.runout)
+        again = read_campaign(partial, limits)
+        if not all(same(a.runout, b.runout) for a, b in zip(again.tests, campaign.tests, strict=True)):
+            raise BadInput(f"{folder}: a runout record would not read back; it needs finite numbers at even steps")
+        if _exact(again) != _exact(campaign):
             raise BadInput(
                 f"{folder}: would not read back bit for bit; FRFs must be complex128 and float64, modes those of their test, "
                 "directions along an axis"
@@ -222,6 +232,8 @@ def _toml_text(campaign: Campaign) -> str:
             "temperature_C": t.temperature,
             "speed_rpm": in_unit(t.speed, RPM),
             "frf": None if t.frf is None else f"{t.id}.uff",
+            "runout": None if t.runout is None else f"{t.id}_runout.csv",
+            "spectrum_window": t.runout.window if t.runout is not None and t.runout.kind == "spectrum" else None,
             "hammer_level_N": t.level,
             "soak_time_min": None if t.soak_time is None else in_unit(t.soak_time, MINUTE),
             "repeat": t.repeat,

@@ -42,6 +42,8 @@ class TestTable(Table):
     temperature_C: Annotated[float, Field(gt=-273.15, allow_inf_nan=False)]
     speed_rpm: Finite
     frf: PlainName | None = None
+    runout: PlainName | None = None
+    spectrum_window: Literal["none", "hann", "flattop"] | None = None
     hammer_level_N: Positive | None = None
     soak_time_min: NotNegative | None = None
     window_decay_1_per_s: NotNegative = 0.0
@@ -52,7 +54,7 @@ class TestTable(Table):
 class CampaignTable(Table):
     title: Name
     spindle: Name
-    quantity: Literal["receptance", "mobility", "accelerance"]
+    quantity: Literal["receptance", "mobility", "accelerance", "displacement"]
     note: str = ""
     modes: PlainName | None = None
     noise: NoiseTable | None = None
@@ -80,8 +82,13 @@ def checked(file: Path, raw: dict[str, Any]) -> CampaignTable:
     once: dict[str, list[Any]] = {
         "points: node": [p.node for p in table.points],
         "tests: id": [t.id for t in table.tests],
-        "file": [name for name in (table.modes, *(t.frf for t in table.tests)) if name],
+        "file": [name for name in (table.modes, *(t.frf for t in table.tests), *(t.runout for t in table.tests)) if name],
     }
+    for t in table.tests:
+        if t.frf and table.quantity == "displacement":
+            raise BadInput(f"{file}: tests.{t.id}: frf: a campaign of displacement holds runout; FRFs need receptance, mobility or accelerance")
+        if t.spectrum_window and not t.runout:
+            raise BadInput(f"{file}: tests.{t.id}: spectrum_window = {t.spectrum_window!r}: is for a spectrum under runout, and there is none")
     for key, values in once.items():
         for value, count in Counter(values).items():
             if count > 1:

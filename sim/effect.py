@@ -39,6 +39,16 @@ class Parameter:
     choices: tuple[float, ...] = ()
 
 
+def scale_parameter(typical: float, prior_sd: float, limits: tuple[float, float], meaning: str, source: str) -> Parameter:
+    """The size of an effect in units of what its formula gives: 0 nothing, 1 all of it."""
+    return Parameter("scale", "1", 0.0, typical, prior_sd, limits, meaning, source)
+
+
+def direction_parameter(prior_sd: float, half_turn: float, meaning: str) -> Parameter:
+    """A direction (deg) of which nothing is known; `half_turn` is where it comes back to itself from either side."""
+    return Parameter("direction", "deg", 0.0, 0.0, prior_sd, (-half_turn, half_turn), meaning, "unknown before measuring: any")
+
+
 @dataclass(frozen=True, eq=False)
 class Measurement:
     """The measuring chain: what is read of the chain's motion, and how.

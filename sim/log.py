@@ -7,9 +7,7 @@ same numbers stand as series on `temperature` and `time`. `numbers/` holds the F
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +15,12 @@ import numpy as np
 import rerun as rr
 
 from model.ball_row import Array
-from model.scene import BadInput
 from sim import log_drawing as drawing
 from sim.log_blueprint import CHARTS, at, blueprint, pair_path
+from sim.log_columns import any_values, curve_look, draw, log_curve, log_frf_numbers, log_mesh, log_peak_numbers, over_frequency, whole_log
 from sim.log_content import Pair, Peak, Shown, bearing_series, decibel, frf_of, one, shown, summary
-from sim.log_drawing import CYCLE, MM, Curve, heat
-from sim.log_read import APPLICATION, LogContents, describe, read_log
+from sim.log_drawing import CYCLE, Curve, heat
+from sim.log_read import LogContents, describe, read_log
 from sim.operating import provenance
 from sim.run import Run
 from thermal.expansion import DeformedSection, field
@@ -37,96 +35,53 @@ LIGHT = (235, 235, 235)
 
 def write_log(run: Run, path: Path) -> None:
     """Write the log of a run, whole or not at all. BadInput if its folder does not exist."""
-    path = Path(path)
-    if not path.parent.is_dir():
-        raise BadInput(f"{path}: its folder does not exist")
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
-        with _strict():
-            _write(shown(run), partial)
-        partial.rename(path)
-    finally:
-        partial.unlink(missing_ok=True)
+    with whole_log(path) as (recording, partial):
+        _write(shown(run), recording, partial)
 
 
-@contextmanager
-def _strict() -> Iterator[None]:
-    """Rerun's errors are raised here; else it prints them and goes on, and the log would lack something."""
-    before = rr.strict_mode()
-    rr.set_strict_mode(True)
-    try:
-        yield
-    finally:
-        rr.set_strict_mode(before)
-
-
-def _write(content: Shown, file: Path) -> None:
+def _write(content: Shown, recording: rr.RecordingStream, file: Path) -> None:
     run, spindle = content.run, content.run.spindle
     sections = [field(spindle, t) for t in content.temperatures]
     factor = drawing.exaggeration(sections, drawing.reach(spindle))
     series = {b.name: bearing_series(run, b.name) for b in spindle.bearings}
-    recording = rr.RecordingStream(APPLICATION, send_properties=False)
-    try:
-        quantities = dict(series[spindle.bearings[0].name])
-        recording.save(file, default_blueprint=blueprint(content, list(quantities), factor))
-        ends = (min(content.temperatures), max(content.temperatures))
-        recording.send_recording_name(f"{spindle.name}, " + " to ".join(f"{t:g} C" for t in dict.fromkeys(ends)))
-        recording.send_property("run", _values({"title": spindle.title, **provenance(spindle)}))
-        log_numbers(recording, content)
-        log_frfs(recording, content)
-        log_peaks(recording, content)
-        log_key(recording, content)
-        log_motion(recording, content)
-        log_section(recording, content, sections, factor)
-        log_bearings(recording, content, series)
-        log_records(recording, content)
-        text = rr.TextDocument(summary(run, content.peaks), media_type=rr.MediaType.MARKDOWN)
-        recording.log("summary", text, static=True)
-    finally:
-        recording.disconnect()
+    quantities = dict(series[spindle.bearings[0].name])
+    recording.save(file, default_blueprint=blueprint(content, list(quantities), factor))
+    ends = (min(content.temperatures), max(content.temperatures))
+    recording.send_recording_name(f"{spindle.name}, " + " to ".join(f"{t:g} C" for t in dict.fromkeys(ends)))
+    recording.send_property("run", any_values({"title": spindle.title, **provenance(spindle)}))
+    log_numbers(recording, content)
+    log_frfs(recording, content)
+    log_peaks(recording, content)
+    log_key(recording, content)
+    log_motion(recording, content)
+    log_section(recording, content, sections, factor)
+    log_bearings(recording, content, series)
+    log_records(recording, content)
+    text = rr.TextDocument(summary(run, content.peaks), media_type=rr.MediaType.MARKDOWN)
+    recording.log("summary", text, static=True)
 
 
 # ---------------------------------------------------------------- frequency response
 
 
 def log_numbers(recording: rr.RecordingStream, content: Shown) -> None:
-    """Every FRF as computed, a row a line with the values of all (response, reference) pairs in it; and the peaks."""
+    """Every FRF as computed; and the peaks."""
     for order, test in enumerate(content.tests):
-        frf = frf_of(test)
-        pairs = frf.value.shape[0] * frf.value.shape[1]
-        arrays = {"real": frf.value.real, "imaginary": frf.value.imag, "coherence": frf.coherence, "standard_error": frf.sd}
-        columns = [*rr.AnyValues.columns(frequency_Hz=frf.frequency)]
-        for name, array in arrays.items():
-            if array is not None:
-                flat = np.ascontiguousarray(array.reshape(pairs, -1).T).ravel()
-                columns += _column(name, flat).partition(np.full(len(frf.frequency), pairs))
-        recording.send_columns(at("numbers", test.id), [_over_frequency(frf.frequency)], columns)
-        about = rr.AnyValues(
-            id=test.id,
-            order=order,
-            temperature_C=test.temperature,
-            speed_rad_per_s=test.speed,
-            quantity=frf.quantity,
-            response_nodes=frf.response_nodes,
-            reference_nodes=frf.reference_nodes,
-        )
-        recording.log(at("numbers", test.id, "about"), about, static=True)
-    names = Peak.__dataclass_fields__
-    peaks = _values({name: [getattr(p, name) for p in content.peaks] for name in names})
-    recording.log("numbers/peaks", peaks, static=True)
+        log_frf_numbers(recording, test.id, order, test.temperature, test.speed, frf_of(test))
+    log_peak_numbers(recording, content.peaks)
 
 
 def log_frfs(recording: rr.RecordingStream, content: Shown) -> None:
     """Level, phase and coherence of every FRF for the eye."""
     for test in content.tests:
         frf, colour = frf_of(test), heat(test.temperature, content.temperatures)
-        look = _line(colour, f"{test.temperature:g} °C", 1.5)
+        look = curve_look(colour, f"{test.temperature:g} °C", 1.5)
         for pair in ((r, h) for r in frf.response_nodes for h in frf.reference_nodes):
             value = one(frf.value, frf, pair)
             series = {"level": decibel(value), "phase": np.degrees(np.angle(value))}
             series |= {} if frf.coherence is None else {"coherence": one(frf.coherence, frf, pair)}
             for name, values in series.items():
-                _series(recording, at(*pair_path(pair), name, test.id), _over_frequency(frf.frequency), values, look)
+                log_curve(recording, at(*pair_path(pair), name, test.id), over_frequency(frf.frequency), values, look)
 
 
 def log_peaks(recording: rr.RecordingStream, content: Shown) -> None:
@@ -145,8 +100,8 @@ def log_peaks(recording: rr.RecordingStream, content: Shown) -> None:
         for (group, name), (look, own, height) in marks.items():
             if own:
                 values = [_level(frfs[p.test], pair, p.frequency) if height is None else height for p in own]
-                times = _over_frequency(np.array([p.frequency for p in own]))
-                _series(recording, at(*pair_path(pair), "level", group, name), times, np.array(values), look)
+                times = over_frequency(np.array([p.frequency for p in own]))
+                log_curve(recording, at(*pair_path(pair), "level", group, name), times, np.array(values), look)
 
 
 def _level(frf: Any, pair: Pair, frequency: float) -> float:
@@ -156,14 +111,12 @@ def _level(frf: Any, pair: Pair, frequency: float) -> float:
 def log_key(recording: rr.RecordingStream, content: Shown) -> None:
     """What the colours and marks of the level plots mean, and the numbers of the modes above their peaks."""
     some = np.unique(np.linspace(0, len(content.tests) - 1, KEYS).round().astype(int))
-    words = [(f"{t:g} °C", heat(t, content.temperatures)) for t in np.array(content.temperatures)[some]] + [
-        ("◆ identified", LIGHT)
-    ]
+    words = [(f"{t:g} °C", heat(t, content.temperatures)) for t in np.array(content.temperatures)[some]] + [("◆ identified", LIGHT)]
     for k, own in enumerate(content.measured.values()):
         words.append((f"▲ {'measured ' if k == 0 else ''}{own[0].temperature:g} °C", MEASURED[k % 2]))
     low, high = content.band
     peaks = [(m.frequency - low) / (high - low) for m in content.modes]
-    _draw(recording, "charts/key", drawing.key(words, peaks, CHARTS["key"][0]))
+    draw(recording, "charts/key", drawing.key(words, peaks, CHARTS["key"][0]))
 
 
 # ---------------------------------------------------------------- model, section, bearings
@@ -183,19 +136,10 @@ def log_motion(recording: rr.RecordingStream, content: Shown) -> None:
                 moves = rr.Transform3D.columns(translation=translation, quaternion=turn)
                 recording.send_columns(at("model", name, body), [rr.TimeColumn("frequency", sequence=frequency), slow], moves)
             for mesh in meshes.get(body, []):
-                vertices, triangles, normals = mesh.shaded()
-                shape = rr.Mesh3D(
-                    vertex_positions=MM * vertices,
-                    triangle_indices=triangles,
-                    vertex_normals=normals,
-                    albedo_factor=(255 * np.array(mesh.rgba)).astype(np.uint8),
-                )
-                recording.log(at("model", name, body, mesh.region), shape, static=True)
+                log_mesh(recording, at("model", name, body, mesh.region), mesh)
 
 
-def log_section(
-    recording: rr.RecordingStream, content: Shown, sections: Sequence[Mapping[str, DeformedSection]], factor: float
-) -> None:
+def log_section(recording: rr.RecordingStream, content: Shown, sections: Sequence[Mapping[str, DeformedSection]], factor: float) -> None:
     """The deformed section: lowest against highest temperature in one picture, and every one on its timeline."""
     spindle, temperatures = content.run.spindle, content.temperatures
     ends = [("left", -1, int(np.argmin(temperatures))), ("right", 1, int(np.argmax(temperatures)))]
@@ -226,10 +170,10 @@ def log_bearings(recording: rr.RecordingStream, content: Shown, series: Mapping[
     panels: dict[tuple[str, str], list[Curve]] = {}
     for k, (bearing, own) in enumerate(series.items()):
         for (name, unit), values in own.items():
-            look = _line(SIDES[k % 2], bearing)
-            _series(recording, at("bearings", name, bearing), _over_temperature(content), values, look)
+            look = curve_look(SIDES[k % 2], bearing)
+            log_curve(recording, at("bearings", name, bearing), _over_temperature(content), values, look)
             panels.setdefault((name, unit), []).append(Curve(np.array(content.temperatures), values, np.array(SIDES[k % 2])))
-    _draw(recording, "charts/bearings", drawing.charts([(f"{n}, {u}", "°C", c) for (n, u), c in panels.items()], 3, 130, 112))
+    draw(recording, "charts/bearings", drawing.charts([(f"{n}, {u}", "°C", c) for (n, u), c in panels.items()], 3, 130, 112))
 
 
 # ---------------------------------------------------------------- records
@@ -242,47 +186,19 @@ def log_records(recording: rr.RecordingStream, content: Shown) -> None:
     for step, test in zip(content.run.steps, content.tests, strict=True):
         record, colour = step.test.record, heat(test.temperature, content.temperatures)
         time = rr.TimeColumn("time", duration=record.time)
-        look = _line(colour, f"{test.temperature:g} °C")
+        look = curve_look(colour, f"{test.temperature:g} °C")
         place = {node: i for i, node in enumerate(frf_of(test).response_nodes)}
         for h, hammer in enumerate(hammers):
             force, velocity = record.force[h, 0], 1e3 * record.velocity[h, 0]
-            _series(recording, at("records", f"hammer {hammer}", "force", test.id), time, force, look)
+            log_curve(recording, at("records", f"hammer {hammer}", "force", test.id), time, force, look)
             for node in hammers:
                 entity = at("records", f"hammer {hammer}", f"velocity {node}", test.id)
-                _series(recording, entity, time, velocity[place[node]], look)
+                log_curve(recording, entity, time, velocity[place[node]], look)
             for title, values, end in (("force", force, 5e-3), ("velocity", velocity[place[hammer]], 0.1)):
                 part = slice(int(np.searchsorted(record.time, end)) + 1)
                 curve = Curve(1e3 * record.time[part], values[part], colour)
                 panels.setdefault(f"{title} at {hammer}, {'N' if title == 'force' else 'mm/s'}", []).append(curve)
-    _draw(recording, "charts/records", drawing.charts([(title, "ms", c) for title, c in panels.items()], 2, 195, 84))
-
-
-# ---------------------------------------------------------------- columns
-
-
-def _series(
-    recording: rr.RecordingStream, entity: str, times: rr.TimeColumn, values: Array, look: rr.SeriesLines | rr.SeriesPoints
-) -> None:
-    recording.log(entity, look, static=True)
-    recording.send_columns(entity, [times], rr.Scalars.columns(scalars=values))
-
-
-def _line(colour: Any, name: str, width: float = 1.0) -> rr.SeriesLines:
-    """Without Rerun's aggregation, which averages neighbouring points and so lowers peaks."""
-    return rr.SeriesLines(colors=[colour], names=name, widths=width, aggregation_policy=rr.components.AggregationPolicy.Off)
-
-
-def _values(values: dict[str, Any]) -> rr.AnyValues:
-    return rr.AnyValues(**values)
-
-
-def _column(name: str, values: Array) -> rr.ComponentColumnList:
-    columns: dict[str, Any] = {name: values}
-    return rr.AnyValues.columns(**columns)
-
-
-def _over_frequency(frequency: Array) -> rr.TimeColumn:
-    return rr.TimeColumn("frequency", sequence=np.round(frequency).astype(int))
+    draw(recording, "charts/records", drawing.charts([(title, "ms", c) for title, c in panels.items()], 2, 195, 84))
 
 
 def _over_temperature(content: Shown) -> rr.TimeColumn:
@@ -290,11 +206,3 @@ def _over_temperature(content: Shown) -> rr.TimeColumn:
     whole = all(float(t).is_integer() for t in content.temperatures)
     name, unit = ("temperature", 1.0) if whole else ("temperature, 0.01 C", 0.01)
     return rr.TimeColumn(name, sequence=np.round(np.array(content.temperatures) / unit).astype(int))
-
-
-def _draw(recording: rr.RecordingStream, entity: str, chart: drawing.Drawing) -> None:
-    if chart.strips:
-        lines = rr.LineStrips2D(chart.strips, colors=chart.strip_colours, radii=rr.Radius.ui_points(0.8))
-        recording.log(f"{entity}/lines", lines, static=True)
-    text = rr.Points2D(chart.points, labels=chart.labels, colors=chart.label_colours, radii=0.0, show_labels=True)
-    recording.log(f"{entity}/labels", text, static=True)

@@ -6,7 +6,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,14 +17,12 @@ import rerun.blueprint as rrb
 
 from model.machine import Spindle
 from model.modes import ComplexArray
-from model.scene import BadInput
 from sim.campaign import Test
 from sim.frf import Frf
-from sim.log import _column, _line, _over_frequency, _series, _strict, _values
 from sim.log_blueprint import at
+from sim.log_columns import any_values, curve_look, log_curve, log_frf_numbers, log_peak_numbers, over_frequency, whole_log
 from sim.log_content import Pair, Peak, decibel
 from sim.log_drawing import heat
-from sim.log_read import APPLICATION
 from sim.operating import provenance
 
 COMPUTED = (235, 235, 235)
@@ -49,24 +46,12 @@ def write_comparison_log(
     spindle: Spindle, title: str, tests: Sequence[FrfsBeside], peaks: Mapping[str, Sequence[PairedPeak]], path: Path
 ) -> None:
     """Write the log, whole or not at all; `peaks` by test id. BadInput if its folder does not exist."""
-    path = Path(path)
-    if not path.parent.is_dir():
-        raise BadInput(f"{path}: its folder does not exist")
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
-        with _strict():
-            recording = rr.RecordingStream(APPLICATION, send_properties=False)
-            try:
-                recording.save(partial, default_blueprint=_blueprint(title, tests))
-                recording.send_recording_name(f"{spindle.name} beside {title}")
-                recording.send_property("run", _values({"title": f"{spindle.title}: {title}", **provenance(spindle)}))
-                _log_numbers(recording, tests, peaks)
-                _log_frfs(recording, tests, peaks)
-            finally:
-                recording.disconnect()
-        partial.rename(path)
-    finally:
-        partial.unlink(missing_ok=True)
+    with whole_log(path) as (recording, partial):
+        recording.save(partial, default_blueprint=_blueprint(title, tests))
+        recording.send_recording_name(f"{spindle.name} beside {title}")
+        recording.send_property("run", any_values({"title": f"{spindle.title}: {title}", **provenance(spindle)}))
+        _log_numbers(recording, tests, peaks)
+        _log_frfs(recording, tests, peaks)
 
 
 def pairs_of(frf: Frf) -> list[Pair]:
@@ -83,13 +68,13 @@ def _log_frfs(recording: rr.RecordingStream, tests: Sequence[FrfsBeside], peaks:
     temperatures = [t.test.temperature for t in tests]
     for shown in tests:
         frf, colour = shown.measured, heat(shown.test.temperature, temperatures)
-        axis = _over_frequency(frf.frequency)
+        axis = over_frequency(frf.frequency)
         for pair in pairs_of(frf):
             i, j = frf.response_nodes.index(pair[0]), frf.reference_nodes.index(pair[1])
             levels = {"measured": decibel(frf.value[i, j]), "computed": decibel(shown.computed[i, j])}
-            looks = {"measured": _line(colour, f"measured, {shown.test.id}", 2.0), "computed": _line(COMPUTED, "computed", 1.0)}
+            looks = {"measured": curve_look(colour, f"measured, {shown.test.id}", 2.0), "computed": curve_look(COMPUTED, "computed", 1.0)}
             for name, level in levels.items():
-                _series(recording, f"{_place(shown.test, pair, 'level')}/{name}", axis, level, looks[name])
+                log_curve(recording, f"{_place(shown.test, pair, 'level')}/{name}", axis, level, looks[name])
             for which, name in ((2, "measured"), (4, "computed")):
                 own = np.array([p[which] for p in peaks.get(shown.test.id, ())])
                 own = own[(own >= frf.frequency[0]) & (own <= frf.frequency[-1])]
@@ -98,23 +83,13 @@ def _log_frfs(recording: rr.RecordingStream, tests: Sequence[FrfsBeside], peaks:
                     paint = colour if name == "measured" else COMPUTED
                     look = rr.SeriesPoints(colors=[paint], markers=shape, marker_sizes=4, names=f"modes, {name}")
                     heights = np.interp(own, frf.frequency, levels[name])
-                    _series(recording, f"{_place(shown.test, pair, 'level')}/modes_{name}", _over_frequency(own), heights, look)
+                    log_curve(recording, f"{_place(shown.test, pair, 'level')}/modes_{name}", over_frequency(own), heights, look)
 
 
 def _log_numbers(recording: rr.RecordingStream, tests: Sequence[FrfsBeside], peaks: Mapping[str, Sequence[PairedPeak]]) -> None:
     """FRFs in full, a row a line with the values of all (response, reference) pairs; the computed ones as `<test> computed`."""
     for order, (id, test, frf) in enumerate(_both(tests)):
-        pairs = frf.value.shape[0] * frf.value.shape[1]
-        arrays = {"real": frf.value.real, "imaginary": frf.value.imag, "coherence": frf.coherence, "standard_error": frf.sd}
-        columns = [*rr.AnyValues.columns(frequency_Hz=frf.frequency)]
-        for name, array in arrays.items():
-            if array is not None:
-                flat = np.ascontiguousarray(array.reshape(pairs, -1).T).ravel()
-                columns += _column(name, flat).partition(np.full(len(frf.frequency), pairs))
-        recording.send_columns(at("numbers", id), [_over_frequency(frf.frequency)], columns)
-        about = {"id": id, "order": order, "temperature_C": test.temperature, "speed_rad_per_s": test.speed, "quantity": frf.quantity}
-        about |= {"response_nodes": frf.response_nodes, "reference_nodes": frf.reference_nodes}
-        recording.log(at("numbers", id, "about"), _values(about), static=True)
+        log_frf_numbers(recording, id, order, test.temperature, test.speed, frf)
     told = [
         peak
         for t in tests
@@ -124,7 +99,7 @@ def _log_numbers(recording: rr.RecordingStream, tests: Sequence[FrfsBeside], pea
             Peak("computed", t.test.id, t.test.temperature, number, kind, computed),
         )
     ]
-    recording.log("numbers/peaks", _values({name: [getattr(p, name) for p in told] for name in Peak.__dataclass_fields__}), static=True)
+    log_peak_numbers(recording, told)
 
 
 def _both(tests: Sequence[FrfsBeside]) -> Iterator[tuple[str, Test, Frf]]:

@@ -170,6 +170,11 @@ class Drawing:
         self.labels.append(text)
         self.label_colours.append(np.array(colour, np.uint8))
 
+    def line(self, strip: Array, colour: Sequence[int] | Colours) -> None:
+        """A line through the points (n, 2)."""
+        self.strips.append(strip)
+        self.strip_colours.append(np.array(colour, np.uint8))
+
 
 @dataclass(frozen=True, eq=False)
 class Curve:
@@ -187,21 +192,21 @@ def charts(panels: Sequence[tuple[str, str, Sequence[Curve]]], columns: int, wid
     for k, (title, unit, curves) in enumerate(panels):
         left, top = (k % columns) * width, (k // columns) * height
         box = (left + 42.0, top + 25.0, left + width - 12.0, top + height - 24.0)
-        x, y = (_ticks(np.concatenate([getattr(c, axis) for c in curves])) for axis in ("x", "y"))
+        x, y = (round_ticks(np.concatenate([getattr(c, axis) for c in curves])) for axis in ("x", "y"))
         drawing.label((box[0] + box[2]) / 2, top + 12.0, title, (255, 255, 255))
         for tick in y:
             level = _place(tick, y, box[3], box[1])
-            _add(drawing, np.array([(box[0], level), (box[2], level)]), (60, 60, 66))
+            drawing.line(np.array([(box[0], level), (box[2], level)]), (60, 60, 66))
         for tick in x:
             place = _place(tick, x, box[0], box[2])
-            _add(drawing, np.array([(place, box[1]), (place, box[3])]), (60, 60, 66))
+            drawing.line(np.array([(place, box[1]), (place, box[3])]), (60, 60, 66))
         drawing.label(left + 20.0, box[3] - 5.0, f"{y[0]:g}")
         drawing.label(left + 20.0, box[1] + 5.0, f"{y[-1]:g}")
         drawing.label(box[0], box[3] + 12.0, f"{x[0]:g}")
         drawing.label(box[2] - 12.0, box[3] + 12.0, f"{x[-1]:g} {unit}")
         for c in curves:
             strip = np.stack([_place(c.x, x, box[0], box[2]), _place(c.y, y, box[3], box[1])], axis=1)
-            _add(drawing, strip if len(strip) > 1 else strip + np.array([(-3.0, 0.0), (3.0, 0.0)]), c.colour)
+            drawing.line(strip if len(strip) > 1 else strip + np.array([(-3.0, 0.0), (3.0, 0.0)]), c.colour)
     return drawing
 
 
@@ -225,16 +230,11 @@ def key(words: Sequence[tuple[str, Sequence[int] | Colours]], peaks: Sequence[fl
     return drawing
 
 
-def _add(drawing: Drawing, strip: Array, colour: Sequence[int] | Colours) -> None:
-    drawing.strips.append(strip)
-    drawing.strip_colours.append(np.array(colour, np.uint8))
-
-
 def _place(value: Array | float, ticks: Array, start: float, end: float) -> Array:
     return start + (np.asarray(value) - ticks[0]) / (ticks[-1] - ticks[0]) * (end - start)
 
 
-def _ticks(values: Array) -> Array:
+def round_ticks(values: Array) -> Array:
     """Two to four round numbers that span `values`."""
     low, high = float(values.min()), float(values.max())
     if high - low < 1e-3 * max(abs(high), abs(low)) or high == low:

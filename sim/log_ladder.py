@@ -6,7 +6,6 @@ timeline `frequency`, measured and of every rung on one axis.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,10 +16,9 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from model.ball_row import Array
-from model.scene import BadInput
+from sim.log_columns import curve_look, draw, log_curve, log_peak_numbers, over_frequency, whole_log
 from sim.log_content import Peak
 from sim.log_drawing import Colours, Curve, Drawing, charts
-from sim.log_read import APPLICATION
 
 MEASURED, COMPUTED, HELD_OUT = np.array([(120, 255, 140), (255, 170, 80), (90, 200, 255)], np.uint8)
 FRAME, MARK = np.array([(60, 60, 66), (150, 150, 158)], np.uint8)
@@ -80,62 +78,44 @@ class ShownLadder:
 
 def write_ladder_log(content: ShownLadder, path: Path) -> None:
     """Write the log of a ladder, whole or not at all. BadInput if its folder does not exist."""
-    path = Path(path)
-    if not path.parent.is_dir():
-        raise BadInput(f"{path}: its folder does not exist")
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    before = rr.strict_mode()
-    rr.set_strict_mode(True)  # else Rerun prints its errors and goes on, and the log would lack something
-    try:
-        _write(content, partial)
-        partial.rename(path)
-    finally:
-        rr.set_strict_mode(before)
-        partial.unlink(missing_ok=True)
+    with whole_log(path) as (recording, partial):
+        _write(content, recording, partial)
 
 
-def _write(content: ShownLadder, file: Path) -> None:
-    recording = rr.RecordingStream(APPLICATION, send_properties=False)
-    try:
-        recording.save(file, default_blueprint=_blueprint(content))
-        recording.set_log_time_enabled(False)
-        recording.send_recording_name(content.title)
-        about: dict[str, Any] = {"title": content.title, **content.provenance}
-        recording.send_property("run", rr.AnyValues(**about))
-        peaks: dict[str, Any] = {name: [getattr(p, name) for p in content.peaks] for name in Peak.__dataclass_fields__}
-        recording.log("numbers/peaks", rr.AnyValues(**peaks), static=True)
-        numbers: dict[str, Any] = {"names": [r.name for r in content.rungs], "error": [r.error for r in content.rungs], "top": content.top}
-        recording.log("numbers/rungs", rr.AnyValues(**numbers), static=True)
-        for k, rung in enumerate(content.rungs, 1):
-            recording.set_time("rung", sequence=k)
-            _draw(recording, "charts/error", errors(content, k - 1))
-            recording.log("charts/pulls/map", rr.Image(pull_image(content, rung)))
-            _draw(recording, "charts/pulls", pull_labels(content, rung))
-            _draw(recording, "charts/responses", responses(content, rung))
-            recording.log("rung", rr.TextDocument(words(content, k - 1), media_type=rr.MediaType.MARKDOWN))
-            for name, value in (("all data", rung.error), ("left-out temperatures", rung.held_out)):
-                recording.log(rr.new_entity_path(["error", name]), rr.Scalars(value))
-        for name, colour in (("all data", COMPUTED), ("left-out temperatures", HELD_OUT)):
-            recording.log(rr.new_entity_path(["error", name]), rr.SeriesLines(colors=[colour], names=name), static=True)
-        _series(recording, content)
-    finally:
-        recording.disconnect()
+def _write(content: ShownLadder, recording: rr.RecordingStream, file: Path) -> None:
+    recording.save(file, default_blueprint=_blueprint(content))
+    recording.set_log_time_enabled(False)
+    recording.send_recording_name(content.title)
+    about: dict[str, Any] = {"title": content.title, **content.provenance}
+    recording.send_property("run", rr.AnyValues(**about))
+    log_peak_numbers(recording, content.peaks)
+    numbers: dict[str, Any] = {"names": [r.name for r in content.rungs], "error": [r.error for r in content.rungs], "top": content.top}
+    recording.log("numbers/rungs", rr.AnyValues(**numbers), static=True)
+    for k, rung in enumerate(content.rungs, 1):
+        recording.set_time("rung", sequence=k)
+        draw(recording, "charts/error", errors(content, k - 1), static=False)
+        recording.log("charts/pulls/map", rr.Image(pull_image(content, rung)))
+        draw(recording, "charts/pulls", pull_labels(content, rung), static=False)
+        draw(recording, "charts/responses", responses(content, rung), static=False)
+        recording.log("rung", rr.TextDocument(words(content, k - 1), media_type=rr.MediaType.MARKDOWN))
+        for name, value in (("all data", rung.error), ("left-out temperatures", rung.held_out)):
+            recording.log(rr.new_entity_path(["error", name]), rr.Scalars(value))
+    for name, colour in (("all data", COMPUTED), ("left-out temperatures", HELD_OUT)):
+        recording.log(rr.new_entity_path(["error", name]), rr.SeriesLines(colors=[colour], names=name), static=True)
+    log_levels(recording, content)
 
 
-def _series(recording: rr.RecordingStream, content: ShownLadder) -> None:
+def log_levels(recording: rr.RecordingStream, content: ShownLadder) -> None:
     """FRFs on the timeline `frequency` (whole Hz): measured, and of every rung, the later the brighter."""
     for i, level in enumerate(content.rungs[0].levels):
-        times = rr.TimeColumn("frequency", sequence=np.round(level.frequency).astype(int))
+        times = over_frequency(level.frequency)
         origin = _level_path(level)
         curves = [("measured", level.measured, MEASURED, 2.0)]
         for k, rung in enumerate(content.rungs):
             bright = COMPUTED * (0.35 + 0.65 * (k / max(len(content.rungs) - 1, 1)))
             curves.append((f"{k + 1} {rung.name}", rung.levels[i].computed, bright.astype(np.uint8), 1.0 if k != content.top else 2.0))
         for name, values, colour, width in curves:
-            look = rr.SeriesLines(colors=[colour], names=name, widths=width, aggregation_policy=rr.components.AggregationPolicy.Off)
-            entity = rr.new_entity_path([*origin, name])
-            recording.log(entity, look, static=True)
-            recording.send_columns(entity, [times], rr.Scalars.columns(scalars=values))
+            log_curve(recording, rr.new_entity_path([*origin, name]), times, values, curve_look(colour, name, width))
 
 
 def _level_path(level: Level) -> list[str]:
@@ -244,15 +224,6 @@ def words(content: ShownLadder, now: int) -> str:
     if now == len(content.rungs) - 1:
         lines += ["", *(f"- {s}" for s in content.sentences)]
     return "\n".join(lines) + "\n"
-
-
-def _draw(recording: rr.RecordingStream, entity: str, chart: Drawing) -> None:
-    if chart.strips:
-        lines = rr.LineStrips2D(chart.strips, colors=chart.strip_colours, radii=rr.Radius.ui_points(0.8))
-        recording.log(f"{entity}/lines", lines)
-    recording.log(
-        f"{entity}/labels", rr.Points2D(chart.points, labels=chart.labels, colors=chart.label_colours, radii=0.0, show_labels=True)
-    )
 
 
 # ---------------------------------------------------------------- blueprint

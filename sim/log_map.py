@@ -8,7 +8,6 @@ frequencies and coincidences as computed; `sim.log_map_read` reads them back.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,11 +19,9 @@ from matplotlib.colors import to_rgb
 from numpy.typing import ArrayLike
 
 from model.ball_row import Array
-from model.scene import BadInput
-from sim.log import _column, _draw, _line, _series, _strict, _values
 from sim.log_blueprint import DARK, at
-from sim.log_drawing import Colours, Drawing, _add, _ticks
-from sim.log_read import APPLICATION
+from sim.log_columns import any_values, curve_look, draw, log_curve, number_column, whole_log
+from sim.log_drawing import Colours, Drawing, round_ticks
 from sim.operating import provenance
 from sim.resonance import LineTrack, ResonanceMap, strongest
 from sim.resonance_output import map_json, sentences
@@ -67,14 +64,14 @@ class Frame:
 
     def axes(self, xlabel: str, ylabel: str) -> Drawing:
         drawing = Drawing()
-        for tick in _ticks(np.array(self.x)):
+        for tick in round_ticks(np.array(self.x)):
             if self.x[0] - 1e-9 <= tick <= self.x[1] + 1e-9:
-                _add(drawing, self.place([tick, tick], list(self.y)), GREY)
+                drawing.line(self.place([tick, tick], list(self.y)), GREY)
                 px, py = self.place(tick, self.y[0])
                 drawing.label(float(px), float(py) + 12.0, f"{tick:g}")
-        for tick in _ticks(np.array(self.y)):
+        for tick in round_ticks(np.array(self.y)):
             if self.y[0] - 1e-9 <= tick <= self.y[1] + 1e-9:
-                _add(drawing, self.place(list(self.x), [tick, tick]), GREY)
+                drawing.line(self.place(list(self.x), [tick, tick]), GREY)
                 px, py = self.place(self.x[0], tick)
                 drawing.label(float(px) - 22.0, float(py) + 4.0, f"{tick:g}")
         middle, base = self.place(sum(self.x) / 2, self.y[0])
@@ -90,7 +87,7 @@ class Frame:
         right = self.size[0] - self.margins[2]
         for (_, name, paint), place, start in zip(ends, apart, places, strict=True):
             y = self.size[1] * (1 - place)
-            _add(drawing, np.array([(right, self.size[1] * (1 - start)), (right + 10.0, y)]), paint)
+            drawing.line(np.array([(right, self.size[1] * (1 - start)), (right + 10.0, y)]), paint)
             drawing.label(right + 14.0 + 3.3 * len(name), y + 4.0, name, paint)
 
 
@@ -99,33 +96,21 @@ class Frame:
 
 def write_map_log(found: ResonanceMap, path: Path) -> None:
     """Write the log, whole or not at all. BadInput if its folder does not exist."""
-    path = Path(path)
-    if not path.parent.is_dir():
-        raise BadInput(f"{path}: its folder does not exist")
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
-        with _strict():
-            _write(found, partial)
-        partial.rename(path)
-    finally:
-        partial.unlink(missing_ok=True)
+    with whole_log(path) as (recording, partial):
+        _write(found, recording, partial)
 
 
-def _write(found: ResonanceMap, file: Path) -> None:
-    recording = rr.RecordingStream(APPLICATION, send_properties=False)
-    try:
-        recording.save(file, default_blueprint=blueprint(found))
-        recording.send_recording_name(f"{found.spindle.name}, resonance map")
-        about = {"title": found.spindle.title, "temperature_C": found.nominal.temperature, "speed_rad_per_s": found.nominal.speed}
-        recording.send_property("map", _values({**about, **provenance(found.spindle)}))
-        log_numbers(recording, found)
-        log_campbell(recording, found)
-        log_coincidences(recording, found)
-        log_temperature(recording, found)
-        log_series(recording, found)
-        recording.log("summary", rr.TextDocument(summary(found), media_type=rr.MediaType.MARKDOWN), static=True)
-    finally:
-        recording.disconnect()
+def _write(found: ResonanceMap, recording: rr.RecordingStream, file: Path) -> None:
+    recording.save(file, default_blueprint=blueprint(found))
+    recording.send_recording_name(f"{found.spindle.name}, resonance map")
+    about = {"title": found.spindle.title, "temperature_C": found.nominal.temperature, "speed_rad_per_s": found.nominal.speed}
+    recording.send_property("map", any_values({**about, **provenance(found.spindle)}))
+    log_numbers(recording, found)
+    log_campbell(recording, found)
+    log_coincidences(recording, found)
+    log_temperature(recording, found)
+    log_series(recording, found)
+    recording.log("summary", rr.TextDocument(summary(found), media_type=rr.MediaType.MARKDOWN), static=True)
 
 
 def _over_temperature(found: ResonanceMap) -> rr.TimeColumn:
@@ -134,14 +119,14 @@ def _over_temperature(found: ResonanceMap) -> rr.TimeColumn:
 
 def log_numbers(recording: rr.RecordingStream, found: ResonanceMap) -> None:
     """Speeds, and a row a temperature with all modes over all speeds; coincidences in columns."""
-    recording.log("numbers/speeds", _values({"speed_rad_per_s": found.speeds}), static=True)
+    recording.log("numbers/speeds", any_values({"speed_rad_per_s": found.speeds}), static=True)
     grid = np.stack([m.frequency for m in found.modes], axis=1)  # (T, modes, S)
-    columns: list[rr.ComponentColumn] = [*_column("temperature_C", found.temperatures)]
-    columns += _column("frequency_Hz", grid.reshape(-1)).partition(np.full(len(grid), grid[0].size))
+    columns: list[rr.ComponentColumn] = [*number_column("temperature_C", found.temperatures)]
+    columns += number_column("frequency_Hz", grid.reshape(-1)).partition(np.full(len(grid), grid[0].size))
     recording.send_columns("numbers/modes", [_over_temperature(found)], columns)
     told = map_json(found)["coincidences"]
     if told:
-        recording.log("numbers/coincidences", _values({name: [c[name] for c in told] for name in told[0]}), static=True)
+        recording.log("numbers/coincidences", any_values({name: [c[name] for c in told] for name in told[0]}), static=True)
 
 
 def log_campbell(recording: rr.RecordingStream, found: ResonanceMap) -> None:
@@ -149,7 +134,7 @@ def log_campbell(recording: rr.RecordingStream, found: ResonanceMap) -> None:
     speed, shown = found.speeds / RPM, drawn_lines(found)
     top = 1.1 * max(float(np.nanmax(m.frequency)) for m in found.modes)
     frame = Frame((0.0, float(speed[-1])), (0.0, top), CAMPBELL)
-    _draw(recording, "campbell/axes", frame.axes("speed, rpm", "frequency, Hz"))
+    draw(recording, "campbell/axes", frame.axes("speed, rpm", "frequency, Hz"))
     modes, lines, crossings, counts = [], [], [], []
     crossed = {(key(c.line), c.mode.number) for c in strongest(found.coincidences)}
     for i, t in enumerate(found.temperatures):
@@ -186,8 +171,8 @@ def log_campbell(recording: rr.RecordingStream, found: ResonanceMap) -> None:
             names.label(float(px), float(py) + 2.0, s.line.name, _paint(s))
     frame.name_ends(names, ends)
     nominal = frame.place([found.nominal.speed / RPM] * 2, [0.0, top])
-    _add(names, nominal, (120, 120, 126))
-    _draw(recording, "campbell/names", names)
+    names.line(nominal, (120, 120, 126))
+    draw(recording, "campbell/names", names)
     _follow(recording, found, "campbell/temperature", np.tile(frame.place(0.12 * speed[-1], 0.965 * top), (count, 1)))
 
 
@@ -210,16 +195,16 @@ def log_coincidences(recording: rr.RecordingStream, found: ResonanceMap) -> None
         order = np.argsort(curve.temperature)
         paint = WHIRL[c.mode.whirl]
         strip = frame.place(curve.speed[order] / RPM, curve.temperature[order])
-        _add(chart, strip if len(strip) > 1 else strip + np.array([(0.0, -2.0), (0.0, 2.0)]), paint)
+        chart.line(strip if len(strip) > 1 else strip + np.array([(0.0, -2.0), (0.0, 2.0)]), paint)
         tops.append((float(strip[-1, 0]), f"{c.line.name}, {c.mode.number}", paint))
     tops.sort()
     for row in range(3):
         own = tops[row::3]
         apart = spread(np.array([x for x, _, _ in own]) / SMALL[0], 100.0 / SMALL[0]) * SMALL[0]
         for (start, name, paint), place in zip(own, apart, strict=True):
-            _add(chart, np.array([(start, frame.margins[1]), (place, 22.0 + 18.0 * row)]), paint)
+            chart.line(np.array([(start, frame.margins[1]), (place, 22.0 + 18.0 * row)]), paint)
             chart.label(float(place), 17.0 + 18.0 * row, name, paint)
-    _draw(recording, "coincidences/curves", chart)
+    draw(recording, "coincidences/curves", chart)
     bar = [frame.place(list(frame.x), [t, t]) for t in found.temperatures]
     recording.log("coincidences/now", rr.LineStrips2D.from_fields(colors=[WHITE], radii=rr.Radius.ui_points(0.6)), static=True)
     columns = rr.LineStrips2D.columns(strips=bar).partition(np.ones(len(bar), int))
@@ -239,14 +224,14 @@ def log_temperature(recording: rr.RecordingStream, found: ResonanceMap) -> None:
     frame = Frame(ends, (0.93 * float(np.nanmin(values)), 1.05 * float(np.nanmax(values))), SMALL)
     chart = frame.axes("temperature, °C", "frequency, Hz")
     for m in found.modes:
-        _add(chart, frame.place(found.temperatures, m.frequency[:, s0]), WHIRL[m.whirl])
+        chart.line(frame.place(found.temperatures, m.frequency[:, s0]), WHIRL[m.whirl])
         named.append((float(m.frequency[-1, s0]), f"mode {m.number} {m.kind}", WHIRL[m.whirl]))
     for c in (c for c in found.coincidences if c.at_nominal_speed):
         track = next(t for t in found.lines if key(t.line) == key(c.line))
-        _add(chart, frame.place(found.temperatures, track.frequency[:, s0]), _paint(track))
+        chart.line(frame.place(found.temperatures, track.frequency[:, s0]), _paint(track))
         named.append((float(track.frequency[-1, s0]), f"{c.line.name} {c.line.bearing}", _paint(track)))
     frame.name_ends(chart, named)
-    _draw(recording, "temperature", chart)
+    draw(recording, "temperature", chart)
     met = [(c.condition.temperature, c.frequency) for c in found.coincidences if c.at_nominal_speed]
     if met:
         x, y = np.array(met).T
@@ -262,11 +247,13 @@ def log_series(recording: rr.RecordingStream, found: ResonanceMap) -> None:
         ("speed", speed, lambda values: values[t0]),
     ):
         for m in found.modes:
-            look = _line(WHIRL[m.whirl], f"mode {m.number} {m.kind}", 2.0)
-            _series(recording, at("series", f"over {over}", f"mode {m.number}"), times, pick(m.frequency), look)
+            look = curve_look(WHIRL[m.whirl], f"mode {m.number} {m.kind}", 2.0)
+            log_curve(recording, at("series", f"over {over}", f"mode {m.number}"), times, pick(m.frequency), look)
         for track in drawn_lines(found):
             name = f"{track.line.name} {track.line.cause} {track.line.order} {track.line.bearing}"
-            _series(recording, at("series", f"over {over}", name), times, pick(track.frequency), _line(_paint(track), track.line.name))
+            log_curve(
+                recording, at("series", f"over {over}", name), times, pick(track.frequency), curve_look(_paint(track), track.line.name)
+            )
     along = (
         ("temperature", TICK * found.nrro_temperature[:, 0], found.nrro_temperature),
         ("speed", found.nrro_speed[:, 0] / RPM, found.nrro_speed),
@@ -274,12 +261,12 @@ def log_series(recording: rr.RecordingStream, found: ResonanceMap) -> None:
     for over, places, values in along:
         times = rr.TimeColumn(TEMPERATURE if over == "temperature" else over, sequence=np.round(places).astype(int))
         for column, direction, paint in ((1, "radial", (200, 140, 255)), (2, "axial", (240, 200, 90))):
-            _series(
+            log_curve(
                 recording,
                 at("nrro", f"over {over}", direction),
                 times,
                 1e9 * values[:, column],
-                _line(paint, f"{direction} NRRO, nm rms", 1.5),
+                curve_look(paint, f"{direction} NRRO, nm rms", 1.5),
             )
 
 

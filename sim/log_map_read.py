@@ -11,7 +11,7 @@ import numpy as np
 
 from model.ball_row import Array
 from model.scene import BadInput
-from sim.log_read import APPLICATION, Opened, _flat, _values
+from sim.log_read import APPLICATION, Opened, component_array, component_list, component_rows
 
 RPM = 2 * np.pi / 60
 ABOUT = "/__properties/map"
@@ -43,21 +43,19 @@ def map_contents(log: Opened) -> MapContents:
     """What is in the log of a map. BadInput, one sentence that names the file, where something is missing."""
     try:
         about, numbers = log.columns[ABOUT], log.columns["/numbers/modes"]
-        speeds = _flat(log.columns["/numbers/speeds"], "speed_rad_per_s").to_numpy()
-        temperatures = _flat(numbers, "temperature_C").to_numpy()
+        speeds = component_array(log.columns["/numbers/speeds"], "speed_rad_per_s").to_numpy()
+        temperatures = component_array(numbers, "temperature_C").to_numpy()
         rising = np.argsort(temperatures)
-        found = log.columns.get("/numbers/coincidences", {})
-        names = [name for name in found if not name.startswith("rerun")]
         return MapContents(
             path=log.path,
             recording=log.recording,
             blueprint=log.blueprint,
-            scene=_values(about, "scene")[0],
-            title=_values(about, "title")[0],
+            scene=component_list(about, "scene")[0],
+            title=component_list(about, "title")[0],
             temperatures=temperatures[rising],
             speeds=speeds,
-            modes=_flat(numbers, "frequency_Hz").to_numpy().reshape(len(temperatures), -1, len(speeds))[rising],
-            coincidences=tuple(dict(zip(names, row, strict=True)) for row in zip(*(_values(found, n) for n in names), strict=True)),
+            modes=component_array(numbers, "frequency_Hz").to_numpy().reshape(len(temperatures), -1, len(speeds))[rising],
+            coincidences=component_rows(log.columns.get("/numbers/coincidences", {})),
             entities=log.rows,
             timelines=log.timelines,
         )

@@ -93,31 +93,37 @@ def contents_of(log: Opened) -> LogContents:
         about = columns["/__properties/run"]
         peaks = columns["/numbers/peaks"]
         tests = {e.removesuffix("/about"): own for e, own in columns.items() if e.startswith("/numbers/") and e.endswith("/about")}
-        order = sorted(tests, key=lambda e: int(_values(tests[e], "order")[0]))
+        order = sorted(tests, key=lambda e: int(component_list(tests[e], "order")[0]))
         return LogContents(
             path=log.path,
             application=log.application,
             recording=log.recording,
             blueprint=log.blueprint,
-            scene=_values(about, "scene")[0],
-            title=_values(about, "title")[0],
+            scene=component_list(about, "scene")[0],
+            title=component_list(about, "title")[0],
             entities=log.rows,
             timelines=log.timelines,
-            temperatures=tuple(_values(tests[e], "temperature_C")[0] for e in order),
-            peaks=tuple(Peak(*row) for row in zip(*(_values(peaks, name) for name in Peak.__dataclass_fields__), strict=True)),
-            frfs={_values(tests[e], "id")[0]: _frf(columns[e], tests[e]) for e in order},
+            temperatures=tuple(component_list(tests[e], "temperature_C")[0] for e in order),
+            peaks=tuple(Peak(*row) for row in zip(*(component_list(peaks, name) for name in Peak.__dataclass_fields__), strict=True)),
+            frfs={component_list(tests[e], "id")[0]: _frf(columns[e], tests[e]) for e in order},
         )
     except (KeyError, IndexError) as error:
         raise BadInput(f"{log.path}: is not a whole log of {APPLICATION}: {error} is missing") from None
 
 
-def _flat(columns: Columns, name: str) -> Any:
+def component_array(columns: Columns, name: str) -> Any:
     """All values (n,) of a component, in the order in which they were written."""
     return pa.concat_arrays([column.flatten() for column in columns[name]])
 
 
-def _values(columns: Columns, name: str) -> list[Any]:
-    return _flat(columns, name).to_pylist()
+def component_list(columns: Columns, name: str) -> list[Any]:
+    return component_array(columns, name).to_pylist()
+
+
+def component_rows(columns: Columns) -> tuple[dict[str, Any], ...]:
+    """The components of an entity, all of one length, as rows by their names; none where the log has no such entity."""
+    names = [name for name in columns if not name.startswith("rerun")]
+    return tuple(dict(zip(names, row, strict=True)) for row in zip(*(component_list(columns, name) for name in names), strict=True))
 
 
 def _frf(columns: Columns, about: Columns) -> Frf:
@@ -125,18 +131,18 @@ def _frf(columns: Columns, about: Columns) -> Frf:
 
     Rerun may have reordered rows that fall on the same whole number of Hz.
     """
-    responses, references = (tuple(_values(about, f"{role}_nodes")) for role in ("response", "reference"))
-    frequency = _flat(columns, "frequency_Hz").to_numpy()
+    responses, references = (tuple(component_list(about, f"{role}_nodes")) for role in ("response", "reference"))
+    frequency = component_array(columns, "frequency_Hz").to_numpy()
     rising = np.argsort(frequency)
 
     def array(name: str) -> np.ndarray:
-        lines = _flat(columns, name).to_numpy().reshape(len(frequency), len(responses), len(references))
+        lines = component_array(columns, name).to_numpy().reshape(len(frequency), len(responses), len(references))
         return np.ascontiguousarray(np.moveaxis(lines[rising], 0, 2))
 
     value = np.empty((len(responses), len(references), len(frequency)), complex)
     value.real, value.imag = array("real"), array("imaginary")
     others = [array(name) if name in columns else None for name in ("coherence", "standard_error")]
-    return Frf(frequency[rising], value, responses, references, _values(about, "quantity")[0], *others)
+    return Frf(frequency[rising], value, responses, references, component_list(about, "quantity")[0], *others)
 
 
 def describe(contents: LogContents) -> str:

@@ -7,7 +7,6 @@ timeline `speed` (rpm, rounded). `sim.log_runout_read` reads it all back.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -16,11 +15,9 @@ import numpy as np
 import rerun as rr
 
 from model.look import stripe_meshes
-from model.scene import BadInput
-from sim.log import _column, _draw, _strict, _values
 from sim.log_blueprint import at
+from sim.log_columns import any_values, draw, log_mesh, number_column, whole_log
 from sim.log_drawing import MM, body_meshes
-from sim.log_read import APPLICATION
 from sim.log_runout_blueprint import POLAR, WATERFALL, blueprint
 from sim.operating import provenance
 from sim.runout import AXIAL, Runout, X, Y
@@ -34,40 +31,28 @@ BALL = (225, 205, 150)
 
 def write_runout_log(runout: Runout, spectra: Sequence[LineSpectrum], path: Path) -> None:
     """Write the log of a record and of the `spectra` over speed (may be empty), whole or not at all. BadInput if its folder does not exist."""
-    path = Path(path)
-    if not path.parent.is_dir():
-        raise BadInput(f"{path}: its folder does not exist")
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
-        with _strict():
-            _write(runout, spectra, partial)
-        partial.rename(path)
-    finally:
-        partial.unlink(missing_ok=True)
+    with whole_log(path) as (recording, partial):
+        _write(runout, spectra, recording, partial)
 
 
-def _write(runout: Runout, spectra: Sequence[LineSpectrum], file: Path) -> None:
+def _write(runout: Runout, spectra: Sequence[LineSpectrum], recording: rr.RecordingStream, file: Path) -> None:
     condition, spindle = runout.point.condition, runout.point.spindle
     spectra = spectra if any(len(s.frequency) for s in spectra) else ()  # of a perfect spindle there is nothing to show
     moved, factor = turning_poses(runout)
-    recording = rr.RecordingStream(APPLICATION, send_properties=False)
-    try:
-        recording.save(file, default_blueprint=blueprint(runout, factor, bool(spectra)))
-        name = f"{spindle.name} at {condition.temperature:g} C, {condition.speed * 30 / np.pi:.6g} rpm"
-        recording.send_recording_name(name)
-        about = {"title": spindle.title, "temperature_C": condition.temperature, "speed_rad_per_s": condition.speed}
-        about |= {"revolutions": runout.averaged.count, "samples": len(runout.averaged.angle), "displacements_are_drawn_times": factor}
-        recording.send_property("runout", _values({**about, **provenance(spindle)}))
-        log_signals(recording, runout)
-        log_orbit(recording, runout)
-        log_model(recording, runout, moved)
-        log_numbers(recording, runout)
-        log_waterfall(recording, spectra)
-        _draw(recording, "charts/polar", polar(runout, 0, POLAR / 2))
-        text = rr.TextDocument(summary(runout), media_type=rr.MediaType.MARKDOWN)
-        recording.log("summary", text, static=True)
-    finally:
-        recording.disconnect()
+    recording.save(file, default_blueprint=blueprint(runout, factor, bool(spectra)))
+    name = f"{spindle.name} at {condition.temperature:g} C, {condition.speed * 30 / np.pi:.6g} rpm"
+    recording.send_recording_name(name)
+    about = {"title": spindle.title, "temperature_C": condition.temperature, "speed_rad_per_s": condition.speed}
+    about |= {"revolutions": runout.averaged.count, "samples": len(runout.averaged.angle), "displacements_are_drawn_times": factor}
+    recording.send_property("runout", any_values({**about, **provenance(spindle)}))
+    log_signals(recording, runout)
+    log_orbit(recording, runout)
+    log_model(recording, runout, moved)
+    log_numbers(recording, runout)
+    log_waterfall(recording, spectra)
+    draw(recording, "charts/polar", polar(runout, 0, POLAR / 2))
+    text = rr.TextDocument(summary(runout), media_type=rr.MediaType.MARKDOWN)
+    recording.log("summary", text, static=True)
 
 
 def log_signals(recording: rr.RecordingStream, runout: Runout) -> None:
@@ -109,14 +94,7 @@ def log_model(recording: rr.RecordingStream, runout: Runout, moved: dict[str, tu
         translation, turn = moved[body]
         recording.send_columns(at("model", body), [time], rr.Transform3D.columns(translation=translation, quaternion=turn))
         for mesh in (*meshes, *(s for s in stripes if s.body == body)):
-            vertices, triangles, normals = mesh.shaded()
-            shape = rr.Mesh3D(
-                vertex_positions=MM * vertices,
-                triangle_indices=triangles,
-                vertex_normals=normals,
-                albedo_factor=(255 * np.array(mesh.rgba)).astype(np.uint8),
-            )
-            recording.log(at("model", body, mesh.region), shape, static=True)
+            log_mesh(recording, at("model", body, mesh.region), mesh)
     for name, turn in cage_turns(runout).items():
         bearing = spindle.bearing(name)
         azimuth = 2 * np.pi * np.arange(bearing.balls) / bearing.balls
@@ -134,7 +112,7 @@ def log_numbers(recording: rr.RecordingStream, runout: Runout) -> None:
     values = runout.values()
     names = list(next(iter(values.values())).__dataclass_fields__)
     quoted = {"probe": list(values), **{n: [asdict(m)[n] for m in values.values()] for n in names}}
-    recording.log("numbers/quoted", _values(quoted), static=True)
+    recording.log("numbers/quoted", any_values(quoted), static=True)
     lines = runout.lines
     plain = ("frequency", "direction", "amplitude", "forward", "backward", "repeatable")
     told = {name: [getattr(g, name) for g in lines] for name in plain} | {"orders": [g.order for g in lines]}
@@ -142,7 +120,7 @@ def log_numbers(recording: rr.RecordingStream, runout: Runout) -> None:
     told["cause"] = [g.causes[0].cause if g.causes else "unexplained" for g in lines]
     told["bearing"] = [g.causes[0].bearing if g.causes else "" for g in lines]
     if lines:
-        recording.log("numbers/lines", _values(told), static=True)
+        recording.log("numbers/lines", any_values(told), static=True)
 
 
 def log_waterfall(recording: rr.RecordingStream, spectra: Sequence[LineSpectrum]) -> None:
@@ -151,13 +129,13 @@ def log_waterfall(recording: rr.RecordingStream, spectra: Sequence[LineSpectrum]
         return
     speed = rr.TimeColumn("speed", sequence=np.round([s.speed * 30 / np.pi for s in spectra]).astype(int))
     columns: list[rr.ComponentColumn] = []
-    columns += _column("speed_rad_per_s", np.array([s.speed for s in spectra]))
+    columns += number_column("speed_rad_per_s", np.array([s.speed for s in spectra]))
     for name in ("frequency", "radial", "axial", "natural"):
         parts = [getattr(s, name) for s in spectra]
-        columns += _column(name, np.concatenate(parts)).partition([len(p) for p in parts])
+        columns += number_column(name, np.concatenate(parts)).partition([len(p) for p in parts])
     recording.send_columns("numbers/waterfall", [speed], columns)
     for direction in ("radial", "axial"):
-        _draw(recording, f"charts/waterfall_{direction}", waterfall_chart(spectra, direction, *WATERFALL))
+        draw(recording, f"charts/waterfall_{direction}", waterfall_chart(spectra, direction, *WATERFALL))
 
 
 def summary(runout: Runout) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 
 from model.ball_row import Array
 from model.scene import BadInput
-from sim.log_read import APPLICATION, Columns, Opened, _flat, _values
+from sim.log_read import APPLICATION, Columns, Opened, component_array, component_list, component_rows
 from sim.waterfall import LineSpectrum
 
 ABOUT = "/__properties/runout"
@@ -50,25 +50,23 @@ def runout_contents(log: Opened) -> RunoutContents:
     try:
         about = log.columns[ABOUT]
         [values] = [name for name in log.columns[SIGNALS] if name.endswith("scalars")]
-        signals = _flat(log.columns[SIGNALS], values).to_numpy().reshape(-1, 6).T
-        quoted = {name: _values(log.columns[QUOTED], name) for name in log.columns[QUOTED] if not name.startswith("rerun")}
-        found = log.columns.get(LINES, {})
-        names = [name for name in found if not name.startswith("rerun")]
+        signals = component_array(log.columns[SIGNALS], values).to_numpy().reshape(-1, 6).T
+        quoted = {name: component_list(log.columns[QUOTED], name) for name in log.columns[QUOTED] if not name.startswith("rerun")}
         return RunoutContents(
             path=log.path,
             recording=log.recording,
             blueprint=log.blueprint,
-            scene=_values(about, "scene")[0],
-            title=_values(about, "title")[0],
-            temperature=_values(about, "temperature_C")[0],
-            speed=_values(about, "speed_rad_per_s")[0],
-            revolutions=_values(about, "revolutions")[0],
+            scene=component_list(about, "scene")[0],
+            title=component_list(about, "title")[0],
+            temperature=component_list(about, "temperature_C")[0],
+            speed=component_list(about, "speed_rad_per_s")[0],
+            revolutions=component_list(about, "revolutions")[0],
             repeatable=signals[:3],
             nonrepeatable=signals[3:],
             quoted={
                 probe: {name: column[i] for name, column in quoted.items() if name != "probe"} for i, probe in enumerate(quoted["probe"])
             },
-            lines=tuple(dict(zip(names, row, strict=True)) for row in zip(*(_values(found, name) for name in names), strict=True)),
+            lines=component_rows(log.columns.get(LINES, {})),
             spectra=_spectra(log.columns.get(WATERFALL, {})),
             entities=log.rows,
             timelines=log.timelines,

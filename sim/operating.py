@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version
@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 from model import mjcf
 from model.ball_row import Array
 from model.imperfections import Imperfections
-from model.machine import Condition, Spindle
+from model.machine import Condition, RingMotion, Spindle
 from model.modes import ComplexArray, Mode, frf, modes, point_rows
 from model.pair import PairState, solve
 from model.rotor_base import Matrices, RotorBase, rotor_base
@@ -94,21 +94,22 @@ class OperatingPoint:
 
 
 def operating_point(
-    spindle: Spindle, condition: Condition, effects: Sequence[tuple[Effect, Values]] | None = None
+    spindle: Spindle,
+    condition: Condition,
+    effects: Sequence[tuple[Effect, Values]] | None = None,
+    expansion: Callable[[Spindle], dict[str, RingMotion]] | None = None,
 ) -> OperatingPoint:
     """Region temperatures, thermal expansion, axial equilibrium of the bearings, and what hangs on them.
 
-    `effects` are the scene's by default.
+    `effects` are the scene's by default. `expansion` gives the ring motions of the drawing under a temperature field of its own, by
+    default that of the condition's temperature in all regions, as effects change it; ValueError for effects that then prescribe region
+    temperatures.
     """
     present = tuple(of_scene(spindle) if effects is None else effects)
     spindle = drawing(spindle, condition, present)
-    temperatures: float | dict[str, float] = condition.temperature
-    if any(effect.temperatures for effect, _ in present):
-        temperatures = {g.name: condition.temperature for g in spindle.regions}
-        for effect, values in present:
-            if effect.temperatures:
-                temperatures = effect.temperatures(spindle, condition, values, temperatures)
-    motions = expand(spindle, temperatures)
+    if expansion and (prescribing := [effect.name for effect, _ in present if effect.temperatures]):
+        raise ValueError(f"region temperatures are given, and {', '.join(prescribing)} would prescribe them")
+    motions = expansion(spindle) if expansion else expand(spindle, _region_temperatures(spindle, condition, present))
     for effect, values in present:
         if effect.motions:
             motions = effect.motions(spindle, condition, values, motions)
@@ -117,6 +118,17 @@ def operating_point(
         if effect.pair:
             state = effect.pair(spindle, condition, values, state)
     return OperatingPoint(spindle, condition, state, present)
+
+
+def _region_temperatures(spindle: Spindle, condition: Condition, effects: Sequence[tuple[Effect, Values]]) -> float | dict[str, float]:
+    """The condition's temperature (C), or one for every region where an effect has a say in it."""
+    if not any(effect.temperatures for effect, _ in effects):
+        return condition.temperature
+    temperatures = {g.name: condition.temperature for g in spindle.regions}
+    for effect, values in effects:
+        if effect.temperatures:
+            temperatures = effect.temperatures(spindle, condition, values, temperatures)
+    return temperatures
 
 
 def drawing(spindle: Spindle, condition: Condition, effects: Sequence[tuple[Effect, Values]]) -> Spindle:

@@ -101,6 +101,10 @@ def svg(figure: Figure, key: str, description: str) -> str:
     body = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.S)
     body = re.sub(r"<!--.*?-->", "", body, flags=re.S)
     body = re.sub(r'<g id="[A-Za-z.]+(_\d+)+">', "<g>", body)
+    # matplotlib's ids are hashes of places to their last bit, which the layout's solver leaves to chance
+    hashed = dict.fromkeys(re.findall(r'id="([a-z][0-9a-f]{10})"', body))
+    numbered = {name: f"{name[0]}{n}" for n, name in enumerate(hashed)}
+    body = re.sub(r'(id="|#)([a-z][0-9a-f]{10})\b', lambda m: m[1] + numbered.get(m[2], m[2]), body)
     body = re.sub(r'id="([^"]+)"', rf'id="{key}-\1"', body)
     body = re.sub(r'(href="|url\()#', rf"\1#{key}-", body)
     body = re.sub(r"font-family: [^;\"]+", "font-family: var(--sans)", body)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from model.ball_row import Array
 from sim.operating import provenance
 from sim.resonance import Coincidence, ResonanceMap, strongest
 from sim.resonance_plots import figures_svg, write_figures
+from sim.typeset import prose
 
 RPM = 2 * np.pi / 60
 SHOWN = 18  # coincidences in the terminal and the report
@@ -177,13 +177,14 @@ def write_map(found: ResonanceMap, folder: Path) -> None:
 
 def map_section(found: ResonanceMap) -> tuple[str, str]:
     """Title and HTML of a report section."""
-    said = "".join(f"<p>{escape(s)}</p>" for s in sentences(found))
+    said = "".join(f"<p>{prose(s)}</p>" for s in sentences(found))
     head = "".join(
-        f"<th>{h}</th>"
-        for h in ("line", "wave and order", "bearing", "mode", "°C", "rpm", "Hz", "strength, nm", "NRRO, nm rms", "margin, %")
+        f"<th{' class=left' if k < 4 else ''}>{h}</th>"
+        for k, h in enumerate(("line", "wave and order", "bearing", "mode", "°C", "rpm", "Hz", "strength, nm", "NRRO, nm rms", "margin, %"))
     )
     body = "".join(
-        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in _cells(c)) + "</tr>" for c in strongest(found.coincidences)[:SHOWN]
+        "<tr>" + "".join(f"<td{' class=left' if k < 4 else ''}>{prose(cell)}</td>" for k, cell in enumerate(_cells(c))) + "</tr>"
+        for c in strongest(found.coincidences)[:SHOWN]
     )
     drawings = figures_svg(found)
     captions = {
@@ -192,5 +193,6 @@ def map_section(found: ResonanceMap) -> tuple[str, str]:
         "coincidences": "Where lines meet modes, over both.",
         "nrro": "Nonrepeatable runout along temperature and speed, linear response.",
     }
-    pictures = "".join(f"<figure>{drawings[k]}<figcaption>{captions[k]}</figcaption></figure>" for k in captions)
-    return "Resonance map", f"{said}<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{pictures}"
+    pictures = "".join(f'<figure class="chart wide">{drawings[k]}<figcaption>{captions[k]}</figcaption></figure>' for k in captions)
+    table = f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+    return "Resonance map", said + table + pictures

@@ -5,12 +5,17 @@ from __future__ import annotations
 import re
 
 import numpy as np
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 
 def minus(text: str) -> str:
     """A true minus before digits, and units kept on the line of their number."""
     return re.sub(r"(?<=\d) (?=(%|Hz|N|°C)\b|%)", "\u00a0", re.sub(r"(?<![\w-])-(?=\d)", "−", text))
+
+
+def prose(text: str) -> str:
+    """Plain words of the terminal as HTML: escaped, with true minus, plus-minus and arrow."""
+    return minus(str(escape(text))).replace("+-", "±").replace("-&gt;", "→")
 
 
 def signed(value: float, digits: int = 1) -> str:

@@ -10,7 +10,9 @@ function type 0    with ID line 2 'frequency axis': the frequencies in double pr
                    only where the header, which holds six digits, would round them
 =================  ==================================================================================================
 
-UFF has no official type for the last two. Other datasets and function types are left alone. The format is described by UC-SDRL
+`read_motion` knows those of a runout test: function type 1, time response, and 12, spectrum, of displacement.
+
+UFF has no official type for the last two of the table. Other datasets and function types are left alone. The format is described by UC-SDRL
 (www.ceas3.uc.edu/sdrluff). A unit is what its label says; without a label, SI over the factors of the file's dataset 164.
 pyuff 2.5.8 turns NaN into zero on writing, halves the byte count of complex sets, and drops a set without end: seen to here.
 """
@@ -124,6 +126,46 @@ def read_frf(path: Path, quantity: str, points: Sequence[Point]) -> Frf:
     responses, references = (tuple(dict.fromkeys(pair[k] for pair in found["FRF"])) for k in (0, 1))
     arrays = {role: _stack(path, role, pairs, responses, references) for role, pairs in found.items() if pairs}
     return Frf(frequency, arrays["FRF"], responses, references, quantity, arrays.get("coherence"), arrays.get(STANDARD_ERROR))
+
+
+MOTIONS = {1: ("time", 17, "s"), 12: ("spectrum", 18, "Hz")}
+"""Function types of displacement records: what they are, the type of their abscissa and its unit."""
+
+
+def read_motion(path: Path, points: Sequence[Point]) -> tuple[str, tuple[int, ...], np.ndarray, np.ndarray]:
+    """The displacements of a UFF file: time or spectrum, nodes, abscissa (n,) in s or Hz, values (nodes, n) m along the points' directions.
+
+    Raises `BadInput` naming file and set for what is no displacement, units not known, nodes that are no points, NaN, and sets that differ.
+    """
+    sets = read_uff(path)
+    system = next((s for s in sets if s["type"] == 164), None)
+    kinds, values, axis = set(), {}, None
+    for number, record in enumerate(sets, 1):
+        if record["type"] != 58 or record["func_type"] not in MOTIONS:
+            continue
+        kind, abscissa, unit = MOTIONS[record["func_type"]]
+        node = record["rsp_node"]
+        where = f"{path}: set {number} ({kind} of node {node})"
+        sign = _sign(where, record, "response", points)
+        label = record["abscissa_axis_units_lab"].strip()
+        if record["abscissa_spec_data_type"] not in (0, abscissa) or label not in (unit, "", "NONE"):
+            raise BadInput(f"{where}: abscissa of type {record['abscissa_spec_data_type']} in {label!r}; allowed is type {abscissa} in {unit}")
+        scale = _scale(where, record, "ordinate", QUANTITIES["receptance"], system)
+        value = record["data"] * (scale * sign)
+        if not np.all(np.isfinite(value)):
+            raise BadInput(f"{where}: NaN or infinite; only finite numbers are allowed")
+        if np.iscomplexobj(value) != (kind == "spectrum"):
+            raise BadInput(f"{where}: its values are {'real' if kind == 'spectrum' else 'complex'}; a spectrum is complex, a record real")
+        axis = record["x"] if axis is None else axis
+        kinds.add(kind)
+        if len(kinds) > 1 or not np.array_equal(record["x"], axis):
+            raise BadInput(f"{where}: differs in kind or abscissa from the sets before; they must be the same")
+        if node in values:
+            raise BadInput(f"{where}: stands twice in this file; one is allowed for a node")
+        values[node] = value
+    if axis is None:
+        raise BadInput(f"{path}: holds no displacement (dataset 58, function type 1 or 12)")
+    return kinds.pop(), tuple(values), np.asarray(axis, float), np.array(list(values.values()))
 
 
 def _role(record: Mapping[str, Any]) -> str | None:

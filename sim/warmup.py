@@ -19,12 +19,11 @@ import numpy as np
 from model.ball_row import Array
 from model.machine import Condition, OutsideRange, Spindle
 from model.modes import Mode, modes
-from model.pair import solve
 from model.rotor_base import matrices
 from model.scene import BadInput
 from sim.effect import Effect, Values
 from sim.effects import of_scene
-from sim.operating import OperatingPoint, drawing
+from sim.operating import OperatingPoint, drawing, operating_point
 from sim.shift import follow
 from thermal import conduction, heat
 from thermal.influence import influence
@@ -138,16 +137,7 @@ class _Machine:
     def point(self, nodal: Array) -> OperatingPoint:
         capacity = self.read.model.lumped_capacity
         condition = Condition(float(capacity @ nodal / capacity.sum()), self.speed)
-        spindle = drawing(self.spindle, condition, self.effects)
-        motions = self.read.motions(spindle, nodal)
-        for effect, values in self.effects:
-            if effect.motions:
-                motions = effect.motions(spindle, condition, values, motions)
-        state = solve(spindle, condition, motions)
-        for effect, values in self.effects:
-            if effect.pair:
-                state = effect.pair(spindle, condition, values, state)
-        return OperatingPoint(spindle, condition, state, self.effects)
+        return operating_point(self.spindle, condition, self.effects, lambda drawn: self.read.motions(drawn, nodal))
 
     def moment(self, nodal: Array) -> Moment:
         model, point = self.read.model, self.point(nodal)

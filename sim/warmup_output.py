@@ -15,6 +15,7 @@ from rich.table import Table
 
 from model.ball_row import Array
 from sim.operating import provenance
+from sim.typeset import minus
 from sim.warmup import Moment, Warmup, energy
 from sim.warmup_plots import figure_png, figure_svg
 
@@ -161,4 +162,4 @@ def warmup_section(warmup: Warmup) -> tuple[str, str]:
         f"<p>Heat: motor {total['motor']:.1f} J, bearings {total['friction']:.1f} J in; convection {total['convection']:.1f} J out; "
         f"stored {total['stored']:.1f} J.</p>"
     )
-    return "Warm-up", f"{about}<figure>{figure_svg(warmup)}</figure>"
+    return "Warm-up", f'{minus(about)}<figure class="chart wide">{figure_svg(warmup)}</figure>'

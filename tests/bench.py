@@ -35,6 +35,7 @@ from sim.resonance import resonance_map
 from sim.run import identify
 from sim.running import run_spindle, running_model
 from sim.warmup import warm_up
+from tests import bench_sysid
 from thermal.expansion import expand
 
 SCENE = Path(__file__).parents[1] / "scenes" / "hdd_2003"
@@ -149,6 +150,8 @@ def main() -> None:
         command = [sys.executable, "-m", "spindle", "run", str(SCENE), "--out", f"{folder}/run", "--json"]
         subprocess.run(command, check=True, capture_output=True)
         row("spindle run: five temperatures, two hammer points, all outputs", f"{time.perf_counter() - start:.1f} s", "20 s")
+    for cells in bench_sysid.rows(spindle):
+        row(*cells)
     console.print(grid)
 
 

@@ -105,6 +105,12 @@ BAD = [
     (["impact", SCENE, "--hits", "0"], "count of one or more"),
     (["impact", SCENE, "--level", "-3"], "must be positive"),
     (["simulate", SCENE], "needs the campaign folder"),
+    (["simulate", SCENE, "--out", SCENE], "is not empty; a campaign is written to a new or empty folder"),
+    (["runout", SCENE, "--speed", "0"], "a spindle at rest has no runout"),
+    (["warmup", SCENE, "--minutes", "0"], "lasts longer than nothing"),
+    (["map", SCENE, "--speed", "0"], "nominal speed of a map must be positive"),
+    (["report", SCENE, "--out", SCENE], "did not write"),
+    (["diagnose", SCENE, SCENE], "no campaign there"),
     (["inspect", SCENE / "spindle.toml"], "spindle.toml"),
     (["run", SCENE, "--out", SCENE], "did not write"),
     (["fly", SCENE], "fly"),
@@ -170,6 +176,21 @@ def test_compare(capsys, tmp_path):
     assert first["damping_measured"] is first["damping_pull"] is first["mac"] is None
     assert cold["frac"] == found["comac"] == {}
     assert found["rms_pull"] == pytest.approx(40.7, abs=0.1)
+
+
+@pytest.mark.slow
+def test_diagnose(capsys, tmp_path):
+    """The paper's ten numbers; the misfit stands in the answer, and the folder holds the page and its pictures."""
+    found = answer(capsys, "diagnose", SCENE, SCENE / "measured" / "jang_2003", "--json", "--out", tmp_path / "d")
+    assert json.loads((tmp_path / "d" / "diagnosis.json").read_text()) == found
+    names = ("explanations", "misfit_drift", "misfit_places", "misfit_shares", "pulls")
+    files = {"diagnosis.json", "report.html", MARK} | {f"{n}.{kind}" for n in names for kind in ("svg", "png")}
+    assert {p.name for p in (tmp_path / "d").iterdir()} == files
+    assert found["verdict"] == "unexplained"
+    assert found["misfit"]["count"] == 10
+    assert sum(s["share"] for s in found["misfit"]["shares"]["mode"]) == pytest.approx(1.0)
+    assert found["misfit"]["words"][0].startswith(found["misfit"]["places"][0]["parameters"][0].capitalize())
+    assert isinstance(found["where"], list)
 
 
 def test_people_see_a_comparison(capsys, short_scene, tmp_path):

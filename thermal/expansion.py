@@ -28,22 +28,27 @@ def expand(spindle: Spindle, temperature: Temperature, tolerance: float = TOLERA
     that do not match the spindle's regions; OutsideRange where a material law does not reach.
     """
     means = region_temperatures(spindle, temperature)
-    motions: dict[str, tuple[float, float]] = {}
+    moves: dict[str, tuple[float, float]] = {}
     for response in influence(spindle, tolerance, means).responses.values():
         if isinstance(temperature, TemperatureField):
             strains = _strain_field(spindle, Solid(response.section, elasticity(spindle, means)), temperature)
             moved = np.einsum("ieq,eq->i", response.density, strains)
         else:
             moved = response.gain @ _region_strains(spindle, response, means)
-        motions |= {race.ring: (float(r), float(z)) for race, (r, z) in zip(response.races, moved.reshape(-1, 2), strict=True)}
+        moves |= {race.ring: (float(r), float(z)) for race, (r, z) in zip(response.races, moved.reshape(-1, 2), strict=True)}
+    return ring_motions(spindle, means, moves)
+
+
+def ring_motions(spindle: Spindle, means: Mapping[str, float], moves: Mapping[str, tuple[float, float]]) -> dict[str, RingMotion]:
+    """Motion of every bearing's rings from what their races move by (r, z in m) and the region means (C)."""
     result = {}
     for b in spindle.bearings:
         inner, outer = means[b.inner_ring], means[b.outer_ring]
         ring, ball = spindle.materials[b.ring_material], spindle.materials[b.ball_material]
         reference = spindle.reference_temperature
         result[b.name] = RingMotion(
-            *motions[b.inner_ring],
-            *motions[b.outer_ring],
+            *moves[b.inner_ring],
+            *moves[b.outer_ring],
             inner_strain=ring.thermal_strain(inner, reference),
             outer_strain=ring.thermal_strain(outer, reference),
             ball_strain=ball.thermal_strain((inner + outer) / 2, reference),

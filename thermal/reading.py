@@ -17,7 +17,7 @@ from skfem import Basis, LinearForm
 from model.machine import RingMotion, Spindle
 from thermal.conduction import HeatModel
 from thermal.elastic import Solid
-from thermal.expansion import expand
+from thermal.expansion import expand, ring_motions
 from thermal.influence import elasticity, influence
 from thermal.mesh import element
 from thermal.temperature import thermal_strain
@@ -68,22 +68,8 @@ class Reading:
                 own = self.region_of == k
                 strain[own] = thermal_strain(material, values[own], spindle.reference_temperature)
             motion = self.gain @ strain
-        moved = dict(zip(self.races, motion.reshape(-1, 2).tolist(), strict=True))
-        result = {}
-        for b in spindle.bearings:
-            inner, outer, reference = means[b.inner_ring], means[b.outer_ring], spindle.reference_temperature
-            ring, ball = spindle.materials[b.ring_material], spindle.materials[b.ball_material]
-            result[b.name] = RingMotion(
-                inner_r=moved[b.inner_ring][0],
-                inner_z=moved[b.inner_ring][1],
-                outer_r=moved[b.outer_ring][0],
-                outer_z=moved[b.outer_ring][1],
-                inner_strain=ring.thermal_strain(inner, reference),
-                outer_strain=ring.thermal_strain(outer, reference),
-                ball_strain=ball.thermal_strain((inner + outer) / 2, reference),
-                temperature=(inner + outer) / 2,
-            )
-        return result
+        moves = [(r, z) for r, z in motion.reshape(-1, 2).tolist()]
+        return ring_motions(spindle, means, dict(zip(self.races, moves, strict=True)))
 
 
 def reading(model: HeatModel) -> Reading:

@@ -8,8 +8,8 @@ import numpy as np
 
 from model.ball_row import respond
 from model.machine import Condition, Spindle
-from model.pair import BearingState, PairState
-from sim.effect import Effect, Parameter, Values
+from model.pair import BearingState, PairState, contact_status
+from sim.effect import Effect, Parameter, Values, direction_parameter
 
 
 def pair(spindle: Spindle, condition: Condition, values: Values, state: PairState) -> PairState:
@@ -22,9 +22,7 @@ def pair(spindle: Spindle, condition: Condition, values: Values, state: PairStat
         tilted(b, share * tilt, np.radians(values["direction"]), 2 * drawing.damping_ratio / omega)
         for b, drawing, share in zip(state.bearings, spindle.bearings, shares, strict=True)
     )
-    loose = [b.name for b in bearings if not b.in_contact]
-    status = "in contact" if not loose else f"{' and '.join(loose)} bearing lost contact"
-    return replace(state, bearings=bearings, status=status)
+    return replace(state, bearings=bearings, status=contact_status(bearings))
 
 
 def tilted(b: BearingState, tilt: float, direction: float, damping_time: float) -> BearingState:
@@ -62,16 +60,7 @@ EFFECT = Effect(
             meaning="tilt of the upper bearing's non-turning ring; the change grows with its square",
             source="1 um of axial runout of a shoulder 7.5 mm across is 0.13 mrad (ISO 492 class 4 allows 2 to 3 um)",
         ),
-        Parameter(
-            "direction",
-            "deg",
-            neutral=0.0,
-            typical=0.0,
-            prior_sd=60.0,
-            limits=(-180.0, 180.0),
-            meaning="axis of the tilt, from x towards y",
-            source="unknown before measuring: any",
-        ),
+        direction_parameter(60.0, 180.0, "axis of the tilt, from x towards y"),
         Parameter(
             "lower_share",
             "1",

@@ -1,4 +1,4 @@
-"""The hub's material expands more or less than its data sheet says."""
+"""The hub's material, or that of the bearing rings, expands more or less than its data sheet says."""
 
 from __future__ import annotations
 
@@ -11,13 +11,12 @@ from sim.effect import Effect, Parameter, Values
 
 
 def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
-    error = values["hub_expansion"]
-    if error == 0.0:
-        return spindle
-    name = main_material(spindle)
-    law = spindle.materials[name].thermal_expansion
-    scaled = Law(law.temperature, tuple(v * (1 + error) for v in law.value))
-    return replace(spindle, materials={**spindle.materials, name: replace(spindle.materials[name], thermal_expansion=scaled)})
+    for name, error in ((main_material(spindle), values["hub_expansion"]), (spindle.bearings[0].ring_material, values["ring_expansion"])):
+        if error != 0.0:
+            law = spindle.materials[name].thermal_expansion
+            scaled = replace(spindle.materials[name], thermal_expansion=Law(law.temperature, tuple(v * (1 + error) for v in law.value)))
+            spindle = replace(spindle, materials={**spindle.materials, name: scaled})
+    return spindle
 
 
 def main_material(spindle: Spindle) -> str:
@@ -37,10 +36,10 @@ def ring_volume(region: Region) -> float:
 
 EFFECT = Effect(
     name="expansion_mismatch",
-    title="The hub's thermal expansion differs from its data sheet",
+    title="Thermal expansion of hub or rings differs from its data sheet",
     equation=(
         "alpha_hub = (1 + hub_expansion) alpha_data sheet, for the material that fills most of the rotating part, wherever it is "
-        "used; ring motions follow by thermo-elastic influence: u = gain . strain"
+        "used, and alpha_rings = (1 + ring_expansion) alpha_data sheet for the rings' material, of which shaft and balls may be too; ring motions follow by thermo-elastic influence: u = gain . strain"
     ),
     parameters=(
         Parameter(
@@ -52,6 +51,16 @@ EFFECT = Effect(
             limits=(-0.3, 0.3),
             meaning="relative error of the expansion coefficient of the hub's main material",
             source="spread of wrought and cast aluminium alloys, 21 to 24.5e-6/K (ASM Handbook vol. 2, 1990)",
+        ),
+        Parameter(
+            "ring_expansion",
+            "1",
+            neutral=0.0,
+            typical=0.0,
+            prior_sd=0.03,
+            limits=(-0.3, 0.3),
+            meaning="relative error of the expansion coefficient of the rings' material",
+            source="bearing steel 11.5 to 12.5e-6/K by its makers and its retained austenite; stainless shafts 10 to 11e-6/K",
         ),
     ),
     sees="bearing modes fall more with temperature (less for a negative error), in proportion to the rise; nothing at the reference",

@@ -8,7 +8,7 @@ import numpy as np
 
 from model.machine import Condition, Point, Spindle
 from model.rotor_base import RotorBase, point_row
-from sim.effect import Effect, Measurement, Parameter, Values
+from sim.effect import Effect, Measurement, Parameter, Values, direction_parameter
 
 
 def measurement(spindle: Spindle, condition: Condition, values: Values, chain: RotorBase, measurement: Measurement) -> Measurement:
@@ -53,15 +53,8 @@ EFFECT = Effect(
             meaning="distance of the mean impact from the node, the same at all hammer nodes",
             source="assumed: hits by hand with a 2 to 5 mm tip scatter by a tip's width",
         ),
-        Parameter(
-            "direction",
-            "deg",
-            neutral=0.0,
-            typical=0.0,
-            prior_sd=60.0,
-            limits=(-180.0, 180.0),
-            meaning="direction of the miss on the struck face: 0 outward (upward on a side face), 90 tangential, counterclockwise",
-            source="unknown before measuring: any",
+        direction_parameter(
+            60.0, 180.0, "direction of the miss on the struck face: 0 outward (upward on a side face), 90 tangential, counterclockwise"
         ),
     ),
     sees=(

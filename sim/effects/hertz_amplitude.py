@@ -17,7 +17,7 @@ import numpy as np
 
 from model.machine import Condition, Spindle
 from model.pair import BearingState, PairState
-from sim.effect import Effect, Parameter, Values
+from sim.effect import Effect, Values, scale_parameter
 
 COEFFICIENT = 1 / 32
 """Of a^2 in the small-amplitude law."""
@@ -65,10 +65,7 @@ EFFECT = Effect(
         "(harmonic balance: Nayfeh & Mook, Nonlinear Oscillations, 1979, ch. 2)"
     ),
     parameters=(
-        Parameter(
-            "scale",
-            "1",
-            neutral=0.0,
+        scale_parameter(
             typical=1.0,
             prior_sd=0.7,
             limits=(0.0, 5.0),

@@ -8,7 +8,7 @@ import numpy as np
 
 from model.hertz import race_contact
 from model.machine import Bearing, Condition, RingMotion, Spindle
-from sim.effect import Effect, Parameter, Values
+from sim.effect import Effect, Parameter, Values, scale_parameter
 
 OIL_DENSITY = 890.0  # kg/m3, mineral oil at 15 C (Harris, *Rolling Bearing Analysis*, 2001); turns kinematic into dynamic viscosity
 
@@ -71,10 +71,7 @@ EFFECT = Effect(
         "(Hamrock & Dowson 1977); u = speed d_m (1 - gamma^2) / 4; unloaded distance less by scale (h_inner + h_outer)"
     ),
     parameters=(
-        Parameter(
-            "scale",
-            "1",
-            neutral=0.0,
+        scale_parameter(
             typical=0.3,
             prior_sd=0.3,
             limits=(0.0, 1.5),

@@ -17,7 +17,7 @@ import numpy as np
 
 from model.ball_row import Array
 from model.machine import Condition, Law, Material, RingMotion, Spindle
-from sim.effect import Effect, Parameter, Values
+from sim.effect import Effect, Values, scale_parameter
 from sim.effects.expansion_mismatch import ring_volume
 from sim.effects.mount_compliance import with_stiffness
 from thermal.influence import influence
@@ -166,10 +166,7 @@ EFFECT = Effect(
         "K ~ 2 / ((1 - nu_b^2)/E_b + (1 - nu_r^2)/E_r); ring motions by thermo-elastic influence of the softened section"
     ),
     parameters=(
-        Parameter(
-            "scale",
-            "1",
-            neutral=0.0,
+        scale_parameter(
             typical=1.0,
             prior_sd=0.4,
             limits=(-1.0, 3.0),

@@ -8,8 +8,6 @@ from model.imperfections import Imperfections, Wave
 from model.machine import Condition, Spindle
 from sim.effect import Effect, Parameter, Values
 
-RINGS = ("inner_radial", "outer_radial")
-
 
 def order(spindle: Spindle, values: Values) -> int:
     """Order of the wave, multiple Z + offset, at least 1."""
@@ -26,9 +24,11 @@ def imperfections(spindle: Spindle, condition: Condition, values: Values, imperf
     if values["amplitude"] == 0.0:
         return imperfections
     name = spindle.bearings[bearing(spindle, values)].name
-    row, ring = imperfections.row(name), RINGS[round(values["ring"])]
-    wave = Wave(order(spindle, values), values["amplitude"] * 1e-9, 0.0)
-    waved = replace(row, **{ring: (*getattr(row, ring), wave)})
+    row, wave = imperfections.row(name), Wave(order(spindle, values), values["amplitude"] * 1e-9, 0.0)
+    if round(values["ring"]):
+        waved = replace(row, outer_radial=(*row.outer_radial, wave))
+    else:
+        waved = replace(row, inner_radial=(*row.inner_radial, wave))
     return replace(imperfections, bearings={**imperfections.bearings, name: waved})
 
 

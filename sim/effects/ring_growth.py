@@ -16,7 +16,7 @@ import numpy as np
 
 from model.machine import Bearing, Condition, Material, Region, RingMotion, Spindle
 from model.section import cells
-from sim.effect import Effect, Parameter, Values
+from sim.effect import Effect, Values, scale_parameter
 
 
 @dataclass(frozen=True)
@@ -133,10 +133,7 @@ EFFECT = Effect(
         "u(a) = rho omega^2 a ((3 + nu) b^2 + (1 - nu) a^2) / (4 E)"
     ),
     parameters=(
-        Parameter(
-            "scale",
-            "1",
-            neutral=0.0,
+        scale_parameter(
             typical=1.0,
             prior_sd=0.5,
             limits=(0.0, 5.0),

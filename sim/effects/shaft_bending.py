@@ -17,7 +17,7 @@ from model.ball_row import Array
 from model.machine import Condition, Region, Spindle
 from model.rotor_base import Element, RotorBase
 from model.section import cells
-from sim.effect import Effect, Parameter, Values
+from sim.effect import Effect, Values, scale_parameter
 
 
 @dataclass(frozen=True)
@@ -124,10 +124,7 @@ EFFECT = Effect(
         "(Timoshenko beam, shear factor of Cowper 1966)"
     ),
     parameters=(
-        Parameter(
-            "scale",
-            "1",
-            neutral=0.0,
+        scale_parameter(
             typical=0.3,
             prior_sd=0.3,
             limits=(0.0, 5.0),

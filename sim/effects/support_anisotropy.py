@@ -9,7 +9,7 @@ import numpy as np
 from model.ball_row import Array
 from model.machine import Condition, Spindle
 from model.rotor_base import RotorBase
-from sim.effect import Effect, Parameter, Values
+from sim.effect import Effect, Parameter, Values, direction_parameter
 from sim.effects.mount_compliance import role
 
 
@@ -70,16 +70,7 @@ EFFECT = Effect(
             meaning="split of the plate's tilt stiffness, beyond the drawing's, over that of the flange",
             source="assumed: a plate wider than its flange is less uneven",
         ),
-        Parameter(
-            "direction",
-            "deg",
-            neutral=0.0,
-            typical=0.0,
-            prior_sd=45.0,
-            limits=(-90.0, 90.0),
-            meaning="direction of the stiffer plane, from x towards y",
-            source="unknown before measuring: any",
-        ),
+        direction_parameter(45.0, 90.0, "direction of the stiffer plane, from x towards y"),
     ),
     sees="rocking pairs split further (or less, across the drawing's own split) at rest as at speed, the same at every temperature",
     resembles=("bearing_misalignment", "flange_fit_loosening", "added_disk"),

@@ -15,7 +15,7 @@ from scipy.sparse.linalg import splu
 
 from model.ball_row import Array
 from model.machine import Condition, Spindle
-from sim.effect import Effect, Parameter, Values
+from sim.effect import Effect, Parameter, Values, scale_parameter
 from thermal import conduction, friction
 from thermal.influence import influence
 
@@ -96,10 +96,7 @@ EFFECT = Effect(
         "M0 = 1e-7 f0 (nu n)^(2/3) d_m^3, M1 = f1 P1 d_m (Palmgren; Harris, Rolling Bearing Analysis, 4th ed. 2001)"
     ),
     parameters=(
-        Parameter(
-            "scale",
-            "1",
-            neutral=0.0,
+        scale_parameter(
             typical=1.0,
             prior_sd=0.7,
             limits=(0.0, 4.0),

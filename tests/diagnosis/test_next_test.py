@@ -7,6 +7,7 @@ import pytest
 
 from diagnosis.explain import explain
 from diagnosis.locate import free_form, locate
+from diagnosis.misfit import misfit
 from diagnosis.next_test import Explanation, next_tests, plans
 from diagnosis.prediction import outcomes
 from diagnosis.verdict import diagnosis_json
@@ -77,7 +78,7 @@ def test_predictions_are_confirmed_or_refuted(spindle, tmp_path):
     fitted = Explanation("lag", [(lag, found.best.fit.values["soak_lag"])], found.best.fit.nuisance, np.diag((0.1 * about.sd) ** 2))
     plain = Explanation("plain", [], found.best.fit.nuisance, np.diag((0.1 * about.sd) ** 2))
     test = next_tests(about, [fitted, plain])[0]
-    answer = diagnosis_json(found, about, [], [test])
+    answer = diagnosis_json(found, about, [], [test], misfit(about, found.base))
     answer["next_test"][0]["condition"] = {"temperature_C": 60.0, "speed_rpm": 0.0}
     there = about.data.observations[2].condition
     for e in (fitted, plain):  # what each would have written down for a test that was made

@@ -225,7 +225,7 @@ def test_section_grows_with_the_free_expansion_of_the_base(run: Run, logged: dic
     [(20, 60), (0, 2.1e-4), (8.4, 16), (24.5, 26.6), (16, 16), (0, 0), (-48, 39), (3.1, 2.9), (-1e-9, 1e-9), (1e6, 1e6 + 1)],
 )
 def test_axes_end_at_round_numbers_around_the_values(values: tuple[float, float]) -> None:
-    ticks = log_drawing._ticks(np.array(values, float))
+    ticks = log_drawing.round_ticks(np.array(values, float))
     assert 2 <= len(ticks) <= 4
     assert ticks[0] <= min(values) + 1e-9
     assert ticks[-1] >= max(values) - 1e-9

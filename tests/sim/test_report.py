@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -11,22 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from model.machine import Condition, Spindle
 from model.modes import group_energy
-from model.scene import BadInput, content_hash, load
+from model.scene import content_hash
 from sim import plots
-from sim.campaign import Campaign, ModeRow, Test
+from sim.campaign import ModeRow
 from sim.comparison import compared
 from sim.headlines import misses
-from sim.impact import impact_tests
-from sim.modal import extract
-from sim.mode_numbers import by_kind, measured_rows, numbered
-from sim.operating import operating_point
-from sim.published import published, read_published
 from sim.report import background, html, write_report
-from sim.run import Run, Step, measured_campaigns
+from sim.run import Run
+from tests.made_campaign import other_campaign
 
-SCENE = Path(__file__).parents[2] / "scenes" / "hdd_2003"
 VOID = {"meta", "br", "img", "link", "hr", "input"}
 
 
@@ -84,24 +77,6 @@ def number(cell: str) -> float:
     return float(found.group(1).replace("−", "-"))
 
 
-def small_run(spindle: Spindle, temperatures: Sequence[float], measured: tuple[Campaign, ...]) -> Run:
-    """One hit on every hammer point and a short record; modes identified in a narrow band."""
-    settings = replace(spindle.hammer, hits=1, record_length=0.1, exponential_end=0.05)
-    steps = []
-    for temperature in temperatures:
-        point = operating_point(spindle, Condition(temperature))
-        test = impact_tests([point], settings)[0]
-        frf = test.estimate.h1
-        steps.append(Step(point, test, extract(frf.frequency, frf.value, band=(700.0, 1700.0))))
-    return Run(spindle, tuple(steps), measured)
-
-
-@pytest.fixture(scope="module")
-def run() -> Run:
-    spindle = load(SCENE)
-    return small_run(spindle, (20.0, 60.0), measured_campaigns(spindle))
-
-
 @pytest.fixture(scope="module")
 def text(run: Run) -> str:
     return html(run)
@@ -110,12 +85,6 @@ def text(run: Run) -> str:
 @pytest.fixture(scope="module")
 def page(text: str) -> Page:
     return Page(text)
-
-
-def other_campaign(modes: Sequence[ModeRow], temperature: float = 20.0, speed: float = 0.0) -> Campaign:
-    ids = dict.fromkeys(m.test for m in modes)
-    tests = tuple(Test(i, temperature, speed, modes=tuple(m for m in modes if m.test == i)) for i in ids)
-    return Campaign("other", "hdd_2003", "mobility", (), tests)
 
 
 # ---------------------------------------------------------------- numbers
@@ -273,103 +242,6 @@ def test_changed_spindle_is_told(run: Run):
     changed = replace(run.spindle, reference_temperature=21.0)
     said = {title: str(body) for title, body in background(Run(changed, run.steps, ()))}
     assert "differs from its file" in said["Where the numbers come from"]
-
-
-# ---------------------------------------------------------------- which mode is which
-
-
-def test_by_kind_takes_the_order_of_frequency_within_a_kind():
-    known = [("rocking", 1790.0), ("axial", 1550.0), ("rocking", 1740.0), ("axial", 1020.0), ("lateral", 5.0), ("axial", 1e4)]
-    kinds = ["axial", "rocking", "axial", "rocking", "rocking"]
-    assert by_kind(known, kinds) == {0: 3, 1: 2, 2: 1, 3: 0}
-
-
-def test_measured_rows_go_by_the_first_step(run: Run):
-    """Also for a test at the last temperature, and for a run from hot to cold; tests at another speed are left out."""
-    found = measured_rows(run)
-    assert {test: {i: row.mode for i, row in rows.items()} for test, rows in found.items()} == {
-        "T20": {i: i + 1 for i in range(5)},
-        "T60": {i: i + 1 for i in range(5)},
-    }
-    assert measured_rows(replace(run, steps=run.steps[::-1])) == found
-    turning = other_campaign([ModeRow("a", 1, "axial", 1010.0, 1.0)], speed=100.0)
-    assert measured_rows(replace(run, measured=(turning,))) == {}
-
-
-def test_same_test_names_in_two_campaigns(run: Run):
-    """Each campaign keeps its own frequencies."""
-    campaign = replace(run.measured[0], folder=Path("first"))
-    tests = tuple(replace(t, modes=tuple(replace(m, frequency=m.frequency + 7) for m in t.modes)) for t in campaign.tests)
-    table = compared(replace(run, measured=(campaign, replace(campaign, tests=tests, folder=Path("second")))))
-    for n in range(1, 6):
-        a, b = (table.at(f"measured, {name}", 20.0, n) for name in ("first", "second"))
-        assert a is not None
-        assert b is not None
-        assert b[0] - a[0] == pytest.approx(7)
-
-
-def test_repeated_tests_give_their_mean(run: Run):
-    """Two tests at one temperature, 1 Hz each: the mean, with 1 / sqrt(2) Hz."""
-    modes = [ModeRow(t, 1, "axial", f, 1.0) for t, f in (("a", 1000.0), ("b", 1004.0))]
-    value = compared(replace(run, measured=(other_campaign(modes),))).at("measured", 20.0, 1)
-    assert value == pytest.approx((1002.0, np.sqrt(0.5)))
-
-
-def test_modes_are_followed_over_a_long_way():
-    """From 20 C to 120 C bearing modes fall past others; one jump finds the same modes as small steps."""
-    spindle = load(SCENE)
-
-    def steps(*temperatures: float) -> Run:
-        return Run(spindle, tuple(Step(operating_point(spindle, Condition(t)), None, None) for t in temperatures), ())  # type: ignore[arg-type]
-
-    direct, slow = steps(20.0, 120.0), steps(*range(20, 121, 5))
-    assert numbered(direct)[-1] == numbered(slow)[-1]
-    modes = direct.steps[-1].point.modes
-    index = {number: i for i, number in numbered(direct)[-1].items()}
-    assert [modes[index[n]].kind for n in (1, 2, 5)] == ["axial"] * 3
-    assert [modes[index[n]].kind for n in (3, 4, 6, 7)] == ["rocking"] * 4
-    assert list(index.values()) != sorted(index.values())  # some have crossed
-
-
-def test_a_perfect_measurement_misses_nothing(run: Run):
-    """Sentences come from the numbers: with the model's own frequencies as measurement, no shift or split is complained about."""
-    rows = [
-        ModeRow(f"t{k}", i + 1, m.kind, m.frequency, 0.5) for k, step in enumerate(run.steps) for i, m in enumerate(step.point.modes[:7])
-    ]
-    tests = tuple(Test(f"t{k}", t, 0.0, modes=tuple(r for r in rows if r.test == f"t{k}")) for k, t in enumerate((20.0, 60.0)))
-    said = misses(compared(Run(replace(run.spindle, file=None), run.steps, (Campaign("self", "", "mobility", (), tests),))))
-    assert len(said) == 1
-    assert "0.0 Hz or 0.0 %" in said[0]
-
-
-# ---------------------------------------------------------------- published tables
-
-
-def test_published_of_the_scene():
-    """The analysis column of Table 2 as printed."""
-    (paper,) = published(load(SCENE))
-    assert paper.frequency == {20.0: (1002, 1545, 1795, 1821, 2010), 60.0: (1001, 1542, 1771, 1800, 1996)}
-    assert paper.kinds == ("axial", "axial", "rocking", "rocking", "axial")
-    assert paper.flexibility == ("base", "base", "ball bearing", "ball bearing", "ball bearing")
-    assert "Jang" in paper.source
-
-
-@pytest.mark.parametrize(
-    ("content", "says"),
-    [
-        ("mode,kind,frequency_20_Hz\n1,axial,1002\n", "columns"),
-        ("mode,kind\n1,axial\n", "columns"),
-        ("mode,frequency_20C_Hz\n1,1002\n", "columns"),
-        ("mode,kind,frequency_20C_Hz\n1,axial,fast\n", "'fast'"),
-        ("mode,kind,frequency_20C_Hz\n1,axial\n", "no number"),
-    ],
-)
-def test_bad_published_table_is_refused_by_name(content: str, says: str, tmp_path: Path):
-    path = tmp_path / "bad.csv"
-    path.write_text(content)
-    with pytest.raises(BadInput, match=says) as error:
-        read_published(path)
-    assert str(path) in str(error.value)
 
 
 # ---------------------------------------------------------------- pictures

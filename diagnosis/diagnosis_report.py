@@ -1,0 +1,194 @@
+"""The diagnosis as sections of an HTML page, and the files of its folder: page, pictures as SVG and PNG."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+
+from diagnosis.diagnosis_plots import figures
+from diagnosis.explain import Diagnosis
+from diagnosis.misfit import Misfit
+from diagnosis.theory import Theory
+from diagnosis.verdict import plan_words
+from sim.plots import STYLE, svg
+from sim.report import Section, page
+from sim.typeset import minus, prose, with_error
+
+CAPTIONS = {
+    "pulls": "(Computed − measured) / standard error of every mode in every test: with the build tolerances fitted, and with "
+    "the best explanation, whose formula is granted an error of its own: pulls may stay where it moves modes most.",
+    "explanations": "Green: what the verdict names. Amber: at a limit of what is physically believable. All tolerances are fitted anew with each.",
+    "misfit_places": "The element that would have to change, and by how much at every condition, with one standard error; others that would do follow.",
+    "misfit_drift": "The same of the toleranced parameters of the scene.",
+    "misfit_shares": "What the tolerances leave, shared out over what was measured, where and when.",
+}
+UNSEEN = 0.9  # standard error over that of the tolerance, from which the data say nothing of a parameter
+
+
+def sections(found: Diagnosis, about: Theory, m: Misfit, answer: dict[str, Any], drawn: dict[str, Figure] | None = None) -> list[Section]:
+    """Titles and HTML; `answer` is the JSON answer of the diagnosis, the misfit's in it."""
+    drawn = figures(found, about, m) if drawn is None else drawn
+    with rc_context(STYLE):
+        shown = {name: _figure(svg(f, f"diagnosis-{name}", CAPTIONS[name]), CAPTIONS[name]) for name, f in drawn.items()}
+    told = [("Verdict", _verdict(answer))]
+    told.append(("Explanations", shown.get("explanations", "") + _candidates(answer)))
+    told.append(("Where the model pulls", shown["pulls"]))
+    words = "<ul>" + "".join(f"<li>{prose(w)}</li>" for w in answer["misfit"]["words"]) + "</ul>"
+    free = "".join(shown.get(f"misfit_{k}", "") for k in ("places", "drift", "shares"))
+    told.append(("Without any catalogue", words + free))
+    if answer["next_test"]:
+        told.append(("Which test would decide", _tests(answer)))
+    told.append(("What these data pin down", _tolerances(answer)))
+    told.append(("What these data could have shown", _detectable(found, answer)))
+    return told
+
+
+def write_diagnosis(found: Diagnosis, about: Theory, m: Misfit, answer: dict[str, Any], folder: Path) -> None:
+    """`report.html`, and every picture as SVG and PNG, into a folder that exists."""
+    drawn = figures(found, about, m)
+    count = len(about.data.observations)
+    conditions = f"the conditions of {count} test{'s' if count > 1 else ''}: {answer['campaign']}"
+    told = sections(found, about, m, answer, drawn)
+    (folder / "report.html").write_text(page(about.spindle, conditions, told), encoding="utf-8")
+    with rc_context(STYLE):
+        for name, figure in drawn.items():
+            figure.set_layout_engine("none")  # laid out for the page already
+            figure.savefig(folder / f"{name}.svg", facecolor="white", metadata={"Date": None})
+            figure.savefig(folder / f"{name}.png", dpi=130, facecolor="white")
+
+
+def _verdict(answer: dict[str, Any]) -> str:
+    named = f": {', '.join(answer['effects'])}" if answer["effects"] else ""
+    error = answer["error"]
+    rows = [
+        [("all tests", 0), (f"{error['before']:.2f}", 1), (f"{error['after']:.2f}", 1)],
+        [("temperatures left out one after the other", 0), (f"{error['held_out_before']:.2f}", 1), (f"{error['held_out_after']:.2f}", 1)],
+    ]
+    grid = _grid("Error, rms in standard errors: with tolerances fitted, and with what the verdict names.", ["", "before", "after"], rows)
+    card = f'<div class="cards"><div class="card"><span>verdict</span><b>{escape(answer["verdict"] + named)}</b></div></div>'
+    said = "".join(f"<p>{prose(answer[key])}</p>" for key in ("reason", "would_change"))
+    free = f"<p>Without any catalogue: {prose(answer['misfit']['words'][0])}</p>" if answer["misfit"]["rejected"] else ""
+    return card + said + free + grid
+
+
+def _candidates(answer: dict[str, Any]) -> str:
+    head = ["effects", "ln evidence", "probability", "left-out error, %", "value", "", "unit", "believable"]
+    rows: list[list[tuple[str, int]]] = []
+    for c in answer["candidates"]:
+        for k, (name, v) in enumerate(c["parameters"].items()):
+            first = k == 0
+            value, _, sd = _with_error(v["value"], v["sd"]).partition(" <small>")
+            rows.append(
+                [
+                    (escape(" + ".join(c["effects"])) if first else "", 0),
+                    (minus(_evidence(c["delta_evidence"])) if first else "", 1),
+                    (f"{c['probability']:.3f}" if first else "", 1),
+                    (f"{100 * c['held_out_error_ratio']:.0f}" if first else "", 1),
+                    (escape(name.split(".", 1)[1]) if len(c["effects"]) == 1 else escape(name), 0),
+                    (value + (f" <small>{sd}" if sd else ""), 1),
+                    (_unit(v["unit"]), 0),
+                    (("yes" if c["believable"] else "no, at a limit") if first else "", 0),
+                ]
+            )
+    return _grid("ln evidence and left-out error are against the model without effects, probability among all tried.", head, rows)
+
+
+def _tests(answer: dict[str, Any]) -> str:
+    parts = []
+    for t in answer["next_test"]:
+        times = "" if t["repeats"] == 1 else f"; {t['repeats']} of them make it 100 to 1"
+        first, second = (escape(s) for s in t["separates"])
+        words = f"<h3>A test {escape(plan_words(t['condition']))}</h3><p>It tells {first} from {second} with odds of {_odds(t['odds'])} to 1{times}.</p>"
+        most = max(len(rows) for rows in t["predicted"].values())
+        rows = [
+            [(escape(name), 0), *((_with_error(r["frequency_Hz"], r["sd_Hz"], 1), 1) for r in told), *[("", 1)] * (most - len(told))]
+            for name, told in t["predicted"].items()
+        ]
+        parts.append(words + _grid("What each predicts of it, Hz.", ["", *(f"mode {k}" for k in range(1, most + 1))], rows))
+    return "".join(parts)
+
+
+def _odds(odds: float) -> str:
+    if odds < 1e4:
+        return f"{odds:.3g}"
+    power = int(np.floor(np.log10(odds)))
+    return f"10<sup>{power}</sup>" + (" or more" if odds > 1e20 else "")
+
+
+def _tolerances(answer: dict[str, Any]) -> str:
+    rows = []
+    for name, t in answer["tolerances"].items():
+        share = t["sd"] / t["prior_sd"]
+        scale, unit = (1.0, "K") if name.startswith("temperature of") else (100.0, "%")
+        rows.append(
+            [
+                (escape(name), 0), (_signed(t["value"] / t["prior_sd"]), 1), (f"{share:.2f}", 1),
+                (_signed(scale * t["value"]), 1), (f"{scale * t['prior_sd']:.2f}", 1), (unit, 0),
+                ("cannot be seen" if share > UNSEEN else "", 0),
+            ]
+        )  # fmt: skip
+    head = ["", "fitted, s.d.", "its error, s.d.", "fitted", "tolerance, s.d.", "unit", ""]
+    return _grid("Build tolerances and measuring errors, fitted with their standard deviations as prior.", head, rows)
+
+
+def _detectable(found: Diagnosis, answer: dict[str, Any]) -> str:
+    rows = []
+    for s in sorted(found.signatures, key=lambda s: s.effect.name):
+        main = s.effect.parameters[0]
+        smallest = f"{s.smallest:.2g}" if np.isfinite(s.smallest) else "–"
+        rows.append(
+            [
+                (escape(s.effect.name), 0), (escape(main.name), 0), (smallest, 1),
+                (f"{float(f'{abs(main.typical - main.neutral):.3g}'):g}", 1), (_unit(main.unit), 0), (_seen(s.visibility), 1),
+                ("not visible" if s.effect.name in answer["invisible"] else "", 0),
+            ]
+        )  # fmt: skip
+    head = ["effect", "parameter", "smallest", "typical", "unit", "seen, s.e.", ""]
+    caption = (
+        "Size from which each effect would have been told from the tolerances, beside its typical size (both from the neutral value), and how "
+        "many standard errors the typical size makes in these data after the tolerances are fitted anew."
+    )
+    return _grid(caption, head, rows)
+
+
+def _signed(value: float) -> str:
+    return minus(f"{round(value, 2) + 0.0:+.2f}")  # never -0.00
+
+
+def _evidence(value: float) -> str:
+    return f"{value:+.1f}" if abs(value) < 1000 else f"{value:+.0f}"
+
+
+def _seen(errors: float) -> str:
+    return f"{errors:.1f}" if errors < 100 else f"{errors:.0f}"
+
+
+def _unit(unit: str) -> str:
+    return "" if unit == "1" else escape(unit)
+
+
+def _with_error(value: float, sd: float, digits: int = 3) -> str:
+    """A value with its error; very large and small ones as powers of ten."""
+    if 1e-3 <= max(abs(value), sd) < 1e5:
+        return str(with_error((value, sd), digits=digits))
+    return minus(f"{value:.3g}") + f" <small>± {sd:.1g}</small>"
+
+
+def _figure(drawn: str, caption: str) -> str:
+    return f'<figure class="chart wide">{drawn}<figcaption>{caption}</figcaption></figure>'
+
+
+def _grid(caption: str, head: Sequence[str], rows: Sequence[Sequence[tuple[str, int]]]) -> str:
+    """A table; a cell is its HTML and whether it is a number, set right."""
+    words = [not row[1] for row in rows[0]] if rows else [True] * len(head)
+    top = "".join(f"<th{' class=left' if left else ''}>{escape(h)}</th>" for h, left in zip(head, words, strict=True))
+    body = "".join("<tr>" + "".join(f"<td{'' if number else ' class=left'}>{text}</td>" for text, number in row) + "</tr>" for row in rows)
+    return (
+        f'<div class="scroll"><table><caption>{escape(caption)}</caption><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
+    )

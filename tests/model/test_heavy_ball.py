@@ -1,0 +1,101 @@
+"""One ball with inertia: kinematics against the long form, derivatives against differences, rows of equal balls against one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from model import heavy_ball
+from model.ball_row import BallInertia, BallRow, centred_axial_force, respond
+from model.heavy_ball import HeavyBall, NoEquilibrium, balance, settled
+
+DISK_BALL = BallInertia(1.588e-3, 9.1e-3, 7800.0, 0.0, 754.0)
+BOTH_TURN = BallInertia(22.23e-3, 125.26e-3, 7800.0, 1047.0, -300.0, share=0.7)
+BALL = HeavyBall(0.6e-3, 0.7e-3, 8e9, 9e9, BallInertia(22.23e-3, 125.26e-3, 7800.0, 1047.0, 0.0))
+LINE = (-1.0e-3, 0.86e-3)  # 19 um pressed, at 41 deg
+
+
+@pytest.mark.parametrize("inertia", [DISK_BALL, BOTH_TURN], ids=["outer-turns", "both-turn"])
+@pytest.mark.parametrize("angle", [0.1, 0.43, 0.9])
+def test_loads_are_those_of_the_spin_axis_written_out(inertia, angle):
+    """Harris 1991, ch. 8, with the spin axis' angle beta kept: spin and moment before anything is cancelled."""
+    centrifugal, _, moment, _ = inertia.loads(np.cos(angle), np.sin(angle))
+    gamma = inertia.diameter / inertia.pitch_diameter
+    cage = (inertia.inner_speed * (1 - gamma * np.cos(angle)) + inertia.outer_speed * (1 + gamma * np.cos(angle))) / 2
+    beta = np.arctan2(np.sin(angle), np.cos(angle) + gamma)
+    rolling = np.cos(angle - beta) * (gamma / (1 + gamma * np.cos(angle)) + gamma / (1 - gamma * np.cos(angle)))
+    spin = (inertia.outer_speed - inertia.inner_speed) / rolling
+    assert centrifugal == pytest.approx(inertia.share * inertia.mass * inertia.pitch_diameter / 2 * cage**2, rel=1e-12)
+    polar = inertia.mass * inertia.diameter**2 / 10
+    assert moment == pytest.approx(inertia.share * polar * spin * cage * np.sin(beta), rel=1e-12)
+
+
+@pytest.mark.parametrize("inertia", [DISK_BALL, BOTH_TURN], ids=["outer-turns", "both-turn"])
+def test_slopes_of_the_loads(inertia):
+    h, angle = 1e-5, 0.5
+    above, below = (inertia.loads(np.cos(a), np.sin(a)) for a in (angle + h, angle - h))
+    _, centrifugal, _, moment = inertia.loads(np.cos(angle), np.sin(angle))
+    assert (above[0] - below[0]) / (2 * h) == pytest.approx(centrifugal, rel=1e-6)
+    assert (above[2] - below[2]) / (2 * h) == pytest.approx(moment, rel=1e-6)
+
+
+@pytest.mark.parametrize("centre", [(-0.47e-3, 0.38e-3), (-0.44e-3, 0.36e-3)], ids=["both-races", "outer-race-only"])
+def test_derivatives_of_the_balance(centre):
+    """Central differences by the ball's centre and by the outer groove's, of the resultant and of the force on the ring."""
+    here, h = balance(BALL, centre, LINE), 1e-11
+    assert here.outer > 0
+    assert (here.inner > 0) == (centre[0] < -0.45e-3)
+    for i in range(2):
+        step = h * np.eye(2)[i]
+        by_centre, by_line = (
+            [
+                [(p - m) / (2 * h) for p, m in zip(getattr(plus, name), getattr(minus, name), strict=True)]
+                for name in ("resultant", "on_outer")
+            ]
+            for plus, minus in (
+                (balance(BALL, tuple(centre + step), LINE), balance(BALL, tuple(centre - step), LINE)),
+                (balance(BALL, centre, tuple(LINE + step)), balance(BALL, centre, tuple(LINE - step))),
+            )
+        )
+        s, j, g = (np.reshape(m, (2, 2))[:, i] for m in (here.by_inner, here.by_outer, here.by_line))
+        size = 1e-5 * np.abs(here.by_line).max()
+        assert by_centre[0] == pytest.approx(-(s + g), abs=size)
+        assert by_centre[1] == pytest.approx(-j, abs=size)
+        assert by_line[0] == pytest.approx(g, abs=size)
+        assert by_line[1] == pytest.approx(j, abs=size)
+
+
+def test_stiffness_is_the_derivative_of_the_force_of_a_settled_ball():
+    def on_outer(line):
+        return np.array(settled(BALL, tuple(line), 1e-10, 1.0).on_outer)
+
+    stiffness, h = np.reshape(settled(BALL, LINE, 1e-10, 1.0).stiffness(), (2, 2)), 1e-9
+    for i in range(2):
+        step = h * np.eye(2)[i]
+        slope = (on_outer(LINE + step) - on_outer(LINE - step)) / (2 * h)
+        assert slope == pytest.approx(stiffness[:, i], abs=1e-5 * np.abs(stiffness).max())
+
+
+def test_centred_rows_are_one_ball_many_times(monkeypatch):
+    """Equal balls are settled once, answer alike, and the short way to the axial force gives that of `respond`."""
+    row = BallRow(12, 1.0e-3, 0.86e-3, 0.6e-3, 0.7e-3, 8e9, 9e9, 60e-3, BALL.inertia)
+    calls = []
+    monkeypatch.setattr("model.ball_row.settled", lambda *given: calls.append(given) or heavy_ball.settled(*given))
+    for movement in (-5e-6, 0.0, 8e-6):
+        calls.clear()
+        answer = respond(replace(row, axial=row.axial + movement))
+        assert len(calls) == 1
+        assert np.ptp(answer.ball_force) == 0 < answer.ball_force[0]
+        assert centred_axial_force(row, movement) == pytest.approx(answer.force[2], rel=1e-12)
+        without = replace(row, inertia=None)
+        assert centred_axial_force(without, movement) == pytest.approx(
+            respond(replace(without, axial=row.axial + movement)).force[2], rel=1e-12
+        )
+    calls.clear()
+    respond(row, np.array([1e-6, 0, 0, 0, 0]))
+    assert len(calls) > 6
+
+
+def test_a_ball_that_does_not_settle_says_so():
+    with pytest.raises(NoEquilibrium, match="did not settle; the largest residual"):
+        settled(BALL, LINE, 0.0, 1.0)

@@ -1,0 +1,104 @@
+"""Effects on temperature and expansion, each against something it did not produce."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from model.machine import Condition, Friction, Law, Region
+from sim.effects import expansion_mismatch, loose_inserts, preload_loss, soak_lag, thermal_gradient
+from tests.effect_points import REST, RPM, RUNNING
+from thermal import conduction, heat
+from thermal.expansion import expand
+from thermal.influence import influence
+
+# ------------------------------------------------------------------ temperature
+
+
+def test_friction_heat_against_the_steady_solver(spindle):
+    """`heat.steady` finds friction and temperature bearing by bearing with brackets; without motor heat both must agree."""
+    still = replace(spindle, thermal=replace(spindle.thermal, sources=()))
+    model = conduction.model(still, influence(still).sections)
+    expected = heat.steady(model, heat.running(still, 60.0, RUNNING.speed)).region_means()
+    uniform = {g.name: 60.0 for g in spindle.regions}
+    found = thermal_gradient.EFFECT.temperatures(spindle, RUNNING, {"scale": 1.0, "common_share": 1.0}, uniform)
+    assert found == pytest.approx(expected, abs=1e-6)
+    assert min(found.values()) > 61.5
+    assert found["upper inner ring"] > found["upper outer ring"] + 0.5
+    told = thermal_gradient.EFFECT.temperatures(spindle, RUNNING, {"scale": 1.0, "common_share": 0.0}, uniform)
+    assert told["lower outer ring"] + told["upper outer ring"] == pytest.approx(120.0, abs=1e-9)
+    assert told["shaft"] - told["sleeve"] == pytest.approx(found["shaft"] - found["sleeve"], abs=1e-9)
+
+
+def test_friction_heat_grows_with_speed_as_palmgren(spindle):
+    """With constant viscosity and no load part H = M0 omega ~ speed^(5/3) exactly, and the rise is proportional to scale and H."""
+    grease = Friction(2.0, 0.0, Law((20.0,), (1e-4,)), spindle.thermal.friction.conductance)
+    plain = replace(spindle, thermal=replace(spindle.thermal, friction=grease))
+    uniform = {g.name: 30.0 for g in spindle.regions}
+
+    def rise(rpm, scale):
+        warm = thermal_gradient.EFFECT.temperatures(plain, Condition(30.0, rpm * RPM), {"scale": scale, "common_share": 0.5}, uniform)
+        return np.array([warm[g.name] for g in spindle.regions]) - 30.0
+
+    assert rise(6000, 1.0) == pytest.approx(2 ** (5 / 3) * rise(3000, 1.0), rel=1e-9)
+    assert rise(6000, 0.3) == pytest.approx(0.3 * rise(6000, 1.0), rel=1e-9)
+
+
+def test_friction_heat_solves_conduction_once(spindle):
+    """Build tolerances do not change conduction: a perturbed spindle finds the kept solution."""
+    other = preload_loss.EFFECT.spindle(spindle, REST, {"loss": 0.1, "thermal_share": 0.0})
+    assert thermal_gradient.unit_rise(other) is thermal_gradient.unit_rise(spindle)
+
+
+@pytest.mark.parametrize(("soak", "share"), [(np.inf, 0.25), (2700.0, 0.25), (5400.0, 0.0625), (1350.0, 0.5), (0.0, 1.0)])
+def test_soak_lag_scales_the_rotating_part(spindle, soak, share):
+    """Newton's cooling: the missing share squares when the time doubles; outer rings move in proportion, inner ones wholly."""
+    uniform = {g.name: 60.0 for g in spindle.regions}
+    values = {"hub_share": 0.25, "nominal_soak": 2700.0, "ball_share": 0.2}
+    condition = replace(REST, soak_time=soak)
+    motions = expand(spindle, soak_lag.EFFECT.temperatures(spindle, condition, values, uniform))
+    motions = soak_lag.EFFECT.motions(spindle, condition, values, motions)
+    for name, whole in expand(spindle, 60.0).items():
+        assert motions[name].outer_r == pytest.approx((1 - share) * whole.outer_r, rel=1e-9, abs=1e-15)
+        assert motions[name].inner_r == pytest.approx(whole.inner_r, rel=1e-12)
+        assert motions[name].ball_strain == pytest.approx((1 - 0.2 * share) * whole.ball_strain, rel=1e-9)
+        assert motions[name].outer_strain == pytest.approx((1 - 0.6 * share) * whole.outer_strain, rel=1e-9)
+        assert motions[name].temperature == pytest.approx(60 - 0.2 * share * 40)
+
+
+# ------------------------------------------------------------------ expansion
+
+
+def bonded_rings(spindle, aluminium, height=0.1e-3):
+    """The verification sheet's bonded rings as a spindle: a steel ring 5 to 6.5 mm in aluminium 6.5 to 10 mm, thin: plane stress."""
+    materials = dict(spindle.materials)
+    for name, expansion in (("steel", 12.5e-6), ("aluminium", aluminium)):
+        materials[name] = replace(materials[name], thermal_expansion=Law((20.0,), (expansion,)))
+    regions = (
+        Region("hub", "rotating", "aluminium", (5e-3, 10e-3), (0.0, height)),
+        Region("outer", "rotating", "steel", (5e-3, 6.5e-3), (0.0, height)),
+        Region("inner", "stationary", "steel", (2.5e-3, 3.752e-3), (0.0, height)),
+    )
+    rows = (replace(spindle.bearings[0], inner_ring="inner", outer_ring="outer"),)
+    return replace(spindle, materials=materials, regions=regions, bearings=rows)
+
+
+def test_expansion_error_against_the_bonded_rings(spindle):
+    """u = 3.3646 um at 5 mm for 23e-6/K and 40 K (verification.md), from a sheet that says 10 % less; plane stress to 1e-3."""
+    thin = expansion_mismatch.EFFECT.spindle(bonded_rings(spindle, 23e-6 / 1.1), REST, {"hub_expansion": 0.1})
+    motion = expand(thin, 60.0)[spindle.bearings[0].name]
+    assert motion.outer_r == pytest.approx(3.3646e-6, rel=1e-3)
+    assert motion.inner_r == pytest.approx(12.5e-6 * 40 * 3.752e-3, rel=1e-6)
+
+
+@pytest.mark.parametrize("looseness", [0.0, 1.0])
+def test_loose_inserts_leave_a_hub_of_one_expansion_free(spindle, looseness):
+    """With steel that expands like aluminium only the inserts hold the hub back: without their hold it grows freely, r alpha dT."""
+    steel = replace(spindle.materials["steel"], thermal_expansion=spindle.materials["aluminium"].thermal_expansion)
+    alike = replace(spindle, materials={**spindle.materials, "steel": steel})
+    motions = expand(loose_inserts.EFFECT.spindle(alike, REST, {"looseness": looseness}), 60.0)
+    lower, upper = (motions[b.name] for b in spindle.bearings)
+    free = 23e-6 * 40
+    apart = spindle.bearings[1].z - spindle.bearings[0].z
+    assert upper.outer_z - lower.outer_z == pytest.approx(free * apart, rel=1e-6 if looseness else 0.2)
+    assert (lower.outer_r == pytest.approx(free * 5.349e-3, rel=1e-6)) is bool(looseness)
