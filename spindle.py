@@ -154,10 +154,14 @@ def _parser() -> argparse.ArgumentParser:
     several(simulate)
     hammer(simulate)
     simulate.add_argument("--runout", action="store_true", help="the turning spindle seen by probes on its hub, instead of hammer tests")
-    simulate.add_argument("--speeds", type=_number, nargs="+", metavar="RPM", help="of runout tests, each at every temperature (three up to 7200 by default)")
+    simulate.add_argument(
+        "--speeds", type=_number, nargs="+", metavar="RPM", help="of runout tests, each at every temperature (three up to 7200 by default)"
+    )
     simulate.add_argument("--seconds", type=_number, default=0.6, metavar="S", help="length of a runout record")
     simulate.add_argument("--noise-nm", type=_number, default=1.0, metavar="NM", help="rms noise of a runout probe")
-    report = verb("report", _report, "the HTML report: the whole chain, the turning spindle, warm-up, resonances, and a ladder on what was measured")
+    report = verb(
+        "report", _report, "the HTML report: the whole chain, the turning spindle, warm-up, resonances, and a ladder on what was measured"
+    )
     several(report)
     hammer(report)
     against = verb("compare", _compare, "a campaign beside the scene: modes, dampings, shapes and FRFs, and one number for the whole")
@@ -167,7 +171,9 @@ def _parser() -> argparse.ArgumentParser:
     missing = verb("diagnose", _diagnose, "which physics the scene lacks to explain a campaign")
     missing.add_argument("campaign", metavar="CAMPAIGN", type=Path)
     held_out(missing, "tests to leave out, so that `compare` can show what is predicted of them")
-    missing.add_argument("--predictions", type=Path, metavar="DIAGNOSIS.json", help="an earlier diagnosis: did what it predicted come true?")
+    missing.add_argument(
+        "--predictions", type=Path, metavar="DIAGNOSIS.json", help="an earlier diagnosis: did what it predicted come true?"
+    )
     rungs = verb("ladder", _ladder, "model forms, tolerances and effects taken in one after the other, and the error at every step")
     rungs.add_argument("campaign", metavar="CAMPAIGN", type=Path)
     rungs.add_argument("--effects", nargs="+", metavar="NAME", help="effects to add, in this order (those that diagnose names by default)")
@@ -185,7 +191,11 @@ def _parser() -> argparse.ArgumentParser:
         help="parameter values (typical ones by default); EFFECT.NAME where several effects have one of that name",
     )
     add.add_argument(
-        "--from", dest="diagnosis", type=Path, metavar="DIAGNOSIS.json", help="take fitted values and build tolerances from the answer of diagnose --json"
+        "--from",
+        dest="diagnosis",
+        type=Path,
+        metavar="DIAGNOSIS.json",
+        help="take fitted values and build tolerances from the answer of diagnose --json",
     )
     running = verb("runout", _runout, "repeatable and nonrepeatable runout of the turning spindle, and the lines it is made of")
     one(running)
@@ -194,7 +204,10 @@ def _parser() -> argparse.ArgumentParser:
     running.add_argument("--seed", type=int, help="draw plausible imperfections instead of the scene's")
     running.add_argument("--element", choices=ELEMENTS, default="linear", help="bearing element of the time simulation")
     running.add_argument(
-        "--path", choices=("simulated", "linear"), default="simulated", help="a run in MuJoCo, or the exact harmonic answer of the linear model"
+        "--path",
+        choices=("simulated", "linear"),
+        default="simulated",
+        help="a run in MuJoCo, or the exact harmonic answer of the linear model",
     )
     warmup = verb("warmup", _warmup, "from cold start (or into a chamber soak): temperatures, preload, friction and frequencies over time")
     one(warmup)

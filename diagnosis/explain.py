@@ -16,12 +16,13 @@ from model.ball_row import Array
 from model.pair import NoEquilibrium
 from sim.effect import Effect
 
-SINGLES, PAIRED = 4, 3  # effects refitted after the rough fits, and effects tried beside the best
+SINGLES, PAIRED = 5, 3  # effects refitted after the rough fits, and effects tried beside the best
 CLOSE = 3.0  # root of chi2 a number, priors included, up to which tolerances alone come close to the data
 NEAR = 60.0  # ln evidence within which a fit is polished
 CLEAR = 12.0  # ln evidence by which an explanation must lead the model without it: calibrated on campaigns with none
 AHEAD = 5.0  # ln evidence by which it must lead every rival to be identified
 OF_ALL = 0.01  # share of its ln evidence by which it must lead, where that is more: laws are not exact
+THERE = 3.0  # standard errors by which both effects of a pair must differ from none
 MISFIT = 1e-4  # probability below which a misfit is not chance
 FALLS = 1 / 3  # held-out error ratio that counts as a clear fall
 
@@ -212,6 +213,10 @@ def explain(
         pairs = _best(_all(theory, about, [(*_again(best, e), None) for e in seconds], True, workers))
         level = [f for f in pairs.values() if abs(best.evidence - f.evidence) < NEAR]
         fits |= pairs | _best([*level, *_all(theory, about, [(*_again(f), f.nuisance) for f in level], True, workers)])
+        best = max(fits.values(), key=lambda f: f.evidence)
+        if len(best.effects) == 2:  # whether one of them would do is asked from where the two came to rest
+            alone = [((e,), list(best.values[e.name].values()), best.nuisance) for e in best.effects]
+            fits = _best([*fits.values(), *_all(theory, about, alone, True, workers)])
         progress(f"{len(pairs)} pairs fitted")
     return _verdict(theory, base, list(fits.values()), signatures)
 
@@ -275,6 +280,12 @@ def _best(fits: Sequence[Fit]) -> dict[tuple[str, ...], Fit]:
     return best
 
 
+def _there(found: Fit, effect: Effect) -> bool:
+    """Whether a fitted effect is clearly more than nothing."""
+    main = effect.parameters[0]
+    return abs(found.values[effect.name][main.name] - main.neutral) > THERE * found.sd[effect.name][main.name]
+
+
 def _verdict(theory: Theory, base: Fit, fits: list[Fit], signatures: list[Signature]) -> Diagnosis:
     n = len(theory.data.value)
     before, count = held_out(theory, base)
@@ -304,6 +315,7 @@ def _verdict(theory: Theory, base: Fit, fits: list[Fit], signatures: list[Signat
                       f"{' + '.join(best.effects)} a misfit of {best.fit.misfit:.0f} is left.")  # fmt: skip
     ahead = max(AHEAD, OF_ALL * best.delta_evidence)
     rivals = [c for c in candidates if best.delta_evidence - c.delta_evidence < ahead]
+    rivals = [c for c in rivals if len(c.effects) == 1 or all(_there(c.fit, e) for e in c.fit.effects)] or rivals
     singles = [c for c in rivals if len(c.effects) == 1]
     if singles:  # a pair must beat its own members clearly to be needed
         rivals = singles

@@ -236,7 +236,8 @@ def held_out(found: Explanation, parts: Sequence[Family]) -> tuple[float, float]
 
 def _smallest(effects: Sequence[Effect], tried: Sequence[Explanation], found: Sources, parts: Sequence[Family]) -> dict[str, float]:
     """Size of each effect's most visible variant from which it would stand out at `CLEAR`: sqrt(2 CLEAR) standard deviations of what the scene may have of
-    the same lines, with the errors of the lines."""
+    the same lines, with the errors of the lines. Where it shares its line with something larger, it adds to that as chance has their angle: square to it, it
+    shows less."""
     smallest: dict[str, float] = {}
     for effect in effects:
         sizes = []

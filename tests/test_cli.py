@@ -216,7 +216,7 @@ def test_effects_are_listed(capsys):
 def test_effects_are_explained(capsys, effect):
     found = answer(capsys, "effects", effect.name, "--json")
     assert {"equation", "parameters", "sees", "resembles", "valid"} < set(found)
-    keys = {"name", "unit", "neutral", "typical", "prior_sd", "limits", "meaning", "source"}
+    keys = {"name", "unit", "neutral", "typical", "prior_sd", "limits", "meaning", "source", "choices"}
     assert all(set(p) == keys for p in found["parameters"])
     assert main(["effects", effect.name]) == 0
     text = " ".join(capsys.readouterr().out.split())

@@ -266,7 +266,9 @@ def test_partners_cross_where_shapes_do(spindle):
     p = computed(spindle, o, at(1998.0, 2050.0, 2060.0), shape, ("axial", "rocking", "rocking"))
     assert partners(o, p).tolist() == [-1, -1, 0]
     nearer = replace(p, pole=at(1998.0, 1900.0, 1890.0))
-    assert partners(o, nearer).tolist() == [2, 1, 0]  # in order of frequency: shapes of a close pair turn in their plane
+    assert partners(o, nearer).tolist() == [1, 2, 0]  # by their shapes, which tell them apart
+    turned = replace(o, shape=np.vstack([o.shape[0] + o.shape[1], o.shape[0] - o.shape[1], o.shape[2]]))
+    assert partners(turned, nearer).tolist() == [2, 1, 0]  # in order of frequency: these have turned in their plane
 
 
 def test_numbers_follow_shapes_through_a_crossing(spindle):
