@@ -17,6 +17,7 @@ lint: $(READY)
 
 blind: $(READY)
 	.venv/bin/python -m tests.blind
+	.venv/bin/python -m tests.blind_variants
 
 bench: $(READY)
 	.venv/bin/python -m tests.bench

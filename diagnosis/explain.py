@@ -215,7 +215,9 @@ def explain(
         fits |= pairs | _best([*level, *_all(theory, about, [(*_again(f), f.nuisance) for f in level], True, workers)])
         best = max(fits.values(), key=lambda f: f.evidence)
         if len(best.effects) == 2:  # whether one of them would do is asked from where the two came to rest
-            alone = [((e,), list(best.values[e.name].values()), best.nuisance) for e in best.effects]
+            alone: list[tuple[tuple[Effect, ...], list[float], Array | None]] = [
+                ((e,), list(best.values[e.name].values()), best.nuisance) for e in best.effects
+            ]
             fits = _best([*fits.values(), *_all(theory, about, alone, True, workers)])
         progress(f"{len(pairs)} pairs fitted")
     return _verdict(theory, base, list(fits.values()), signatures)
