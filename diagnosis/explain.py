@@ -98,10 +98,11 @@ def screen(theory: Theory, found: Fit, catalogue: Sequence[Effect], share: float
     """
     rest, factor = left_over(theory, found)
     present = [(e, found.values[e.name]) for e in found.effects]
+    named = {e.name for e in found.effects}
     here = theory.data.value - found.residual
     signatures = []
     for effect in catalogue:
-        if effect in found.effects:
+        if effect.name in named:
             continue
         main = effect.parameters[0]
         size = main.neutral + share * (main.typical - main.neutral)
@@ -207,17 +208,17 @@ def explain(
     best = max(fits.values(), key=lambda f: f.evidence)
     if best.evidence - base.evidence > CLEAR:
         close = [f for f in fits.values() if best.evidence - f.evidence < NEAR]
-        fits |= _best([*close, *_all(theory, about, [(*_again(f), f.nuisance) for f in close], True, workers)])
+        again = [task for f in close for task in ((*_again(f), f.nuisance), (*_exactly(f), f.nuisance))]
+        fits |= _best([*close, *_all(theory, about, again, True, workers)])
         best = max(fits.values(), key=lambda f: f.evidence)
         seconds = [s.effect for s in screen(theory, best, catalogue, 0.1)[:PAIRED] if s.gain > 2 * AHEAD]
         pairs = _best(_all(theory, about, [(*_again(best, e), None) for e in seconds], True, workers))
         level = [f for f in pairs.values() if abs(best.evidence - f.evidence) < NEAR]
-        fits |= pairs | _best([*level, *_all(theory, about, [(*_again(f), f.nuisance) for f in level], True, workers)])
+        again = [task for f in level for task in ((*_again(f), f.nuisance), (*_exactly(f), f.nuisance))]
+        fits |= pairs | _best([*level, *_all(theory, about, again, True, workers)])
         best = max(fits.values(), key=lambda f: f.evidence)
         if len(best.effects) == 2:  # whether one of them would do is asked from where the two came to rest
-            alone: list[tuple[tuple[Effect, ...], list[float], Array | None]] = [
-                ((e,), list(best.values[e.name].values()), best.nuisance) for e in best.effects
-            ]
+            alone = [((e,), list(best.values[e.name].values()), best.nuisance) for e in best.effects]
             fits = _best([*fits.values(), *_all(theory, about, alone, True, workers)])
         progress(f"{len(pairs)} pairs fitted")
     return _verdict(theory, base, list(fits.values()), signatures)
@@ -228,7 +229,7 @@ Task = tuple[tuple[Effect, ...], list[float]]
 
 
 def _all(
-    theory: Theory, about: Array, tasks: list[tuple[tuple[Effect, ...], list[float], Array | None]], thorough: bool, workers: int
+    theory: Theory, about: Array, tasks: Sequence[tuple[tuple[Effect, ...], list[float], Array | None]], thorough: bool, workers: int
 ) -> list[Fit]:
     """Fits of all tasks (effects, start, nuisance start), side by side."""
     work = Work(theory, about, tuple(tasks), thorough)
@@ -271,6 +272,12 @@ def _again(found: Fit, more: Effect | None = None) -> Task:
         return found.effects, values
     main = more.parameters[0]
     return (*found.effects, more), [*values, main.neutral + 0.2 * (main.typical - main.neutral), *more.typical_list()[1:]]
+
+
+def _exactly(found: Fit) -> Task:
+    """The effects of a fit from where it came to rest, with laws that are exact: errors of form keep a fit from finding that they are none."""
+    effects = tuple(replace(e, form_error=0.0, damping_form_error=0.0) for e in found.effects)
+    return effects, _again(found)[1]
 
 
 def _best(fits: Sequence[Fit]) -> dict[tuple[str, ...], Fit]:
