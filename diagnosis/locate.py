@@ -19,6 +19,7 @@ from model.tolerance import Toleranced, toleranced
 from sim.effect import Effect, Parameter, Values
 
 FREE = 0.3  # prior standard deviation of a relative change that may be anything
+SOLID = 0.03  # the same of a mass or inertia: what a part weighs does not go with temperature or speed
 SMALL = 1e-3  # relative change for derivatives
 
 
@@ -71,8 +72,13 @@ def free_form(spindle: Spindle, change: Change) -> list[tuple[Effect, Values]]:
     return [(replace(element, spindle=following(element.spindle), pair=following(element.pair)), {"change": 0.0})]
 
 
+def width(element: str) -> float:
+    """Prior standard deviation of the relative change of an element at one condition."""
+    return SOLID if element.endswith(("mass", "inertia")) else FREE
+
+
 def _change(name: str) -> Parameter:
-    return Parameter("change", "1", 0.0, 0.1, FREE, (-0.95, 5.0), f"relative change of the {name}", "free form")
+    return Parameter("change", "1", 0.0, 0.1, width(name), (-0.95, 5.0), f"relative change of the {name}", "free form")
 
 
 def _named(name: str, **hooks) -> Effect:
@@ -131,11 +137,11 @@ def locate(theory: Theory, most: int = 5) -> list[Change]:
     for element in elements(theory.spindle):
         slope = (theory.features(nothing, [(element, {"change": SMALL})]) - here) / SMALL
         columns = np.linalg.solve(factor, data.whiten @ np.array([np.where(row, slope, 0.0) for row in rows]).T)
-        normal = columns.T @ columns + np.eye(len(conditions)) / FREE**2
+        normal = columns.T @ columns + np.eye(len(conditions)) / width(element.name) ** 2
         change = np.linalg.solve(normal, columns.T @ rest)
         left = rest - columns @ change
         sd = np.sqrt(np.diag(np.linalg.inv(normal)))
-        removes = 1 - (float(left @ left) + float(change @ change) / FREE**2) / total
+        removes = 1 - (float(left @ left) + float(change @ change) / width(element.name) ** 2) / total
         changes.append(
             Change(
                 element.name, conditions, tuple(map(float, change)), tuple(map(float, sd)), float(removes), _pattern(conditions, change, sd)

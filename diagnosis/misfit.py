@@ -14,7 +14,7 @@ import numpy as np
 from scipy.stats import chi2 as chi_squared
 
 from diagnosis.fit import Fit
-from diagnosis.locate import FREE, SMALL, Change, elements, enlarged, poles_only
+from diagnosis.locate import SMALL, Change, elements, enlarged, poles_only, width
 from diagnosis.patterns import Chosen, Shape, choose, choose_for, f_test, shapes
 from diagnosis.sensitivity import derivative
 from diagnosis.shares import Modes, Share, modes_at, shares
@@ -272,13 +272,14 @@ def _asked(names: Sequence[str]) -> float | None:
 
 
 def _free(about: Frame, names: tuple[str, ...], slope: Array) -> Drift:
-    """A relative change along `slope` (n,) that is free at every condition, with a prior of `FREE`."""
+    """A relative change along `slope` (n,) that is free at every condition, with the prior of the freest of them."""
+    prior = max(width(name) for name in names)
     rest = about.white(about.residual)
     columns = about.white(np.array([np.where(about.rows(c), slope, 0.0) for c in about.conditions]).T)
-    normal = columns.T @ columns + np.eye(len(about.conditions)) / FREE**2
+    normal = columns.T @ columns + np.eye(len(about.conditions)) / prior**2
     covariance: Array = np.linalg.inv(normal).astype(float)
     change = covariance @ (columns.T @ rest)
-    left = float(np.sum((rest - columns @ change) ** 2)) + float(change @ change) / FREE**2
+    left = float(np.sum((rest - columns @ change) ** 2)) + float(change @ change) / prior**2
     total, n, k = float(rest @ rest), len(rest), len(about.conditions)
     excess = max(about.floor, left / max(n - k, 1))
     return Drift(
