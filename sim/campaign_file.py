@@ -86,9 +86,13 @@ def checked(file: Path, raw: dict[str, Any]) -> CampaignTable:
     }
     for t in table.tests:
         if t.frf and table.quantity == "displacement":
-            raise BadInput(f"{file}: tests.{t.id}: frf: a campaign of displacement holds runout; FRFs need receptance, mobility or accelerance")
+            raise BadInput(
+                f"{file}: tests.{t.id}: frf: a campaign of displacement holds runout; FRFs need receptance, mobility or accelerance"
+            )
         if t.spectrum_window and not t.runout:
-            raise BadInput(f"{file}: tests.{t.id}: spectrum_window = {t.spectrum_window!r}: is for a spectrum under runout, and there is none")
+            raise BadInput(
+                f"{file}: tests.{t.id}: spectrum_window = {t.spectrum_window!r}: is for a spectrum under runout, and there is none"
+            )
     for key, values in once.items():
         for value, count in Counter(values).items():
             if count > 1:

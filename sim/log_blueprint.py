@@ -27,9 +27,7 @@ def blueprint(shown: Shown, quantities: list[tuple[str, str]], factor: float) ->
     cold, hot = min(shown.temperatures), max(shown.temperatures)
     sides = f"{cold:g} °C left, {hot:g} °C right" if hot > cold else f"{cold:g} °C"
     section = f"Section, {sides}, moved × {factor:g}"
-    left = rrb.Vertical(
-        rrb.Grid(*_model_views(shown), grid_columns=2), _section_view(shown, "compared", section), row_shares=[2.6, 1]
-    )
+    left = rrb.Vertical(rrb.Grid(*_model_views(shown), grid_columns=2), _section_view(shown, "compared", section), row_shares=[2.6, 1])
     middle = rrb.Vertical(_chart("key"), rrb.Tabs(*(_frf_views(shown, pair) for pair in shown.pairs)), row_shares=[1, 12])
     right = rrb.Vertical(
         _chart("bearings", f"Bearings: {_sides(shown)}"),
@@ -76,9 +74,7 @@ def _section_view(shown: Shown, which: str, name: str) -> rrb.View:
 def _chart(name: str, title: str | None = None) -> rrb.View:
     width, height = CHARTS[name]
     bounds = rrb.VisualBounds2D(x_range=(0, width), y_range=(0, height))
-    return rrb.Spatial2DView(
-        origin=f"charts/{name}", name=title, titlebar=title is not None, visual_bounds=bounds, background=DARK
-    )
+    return rrb.Spatial2DView(origin=f"charts/{name}", name=title, titlebar=title is not None, visual_bounds=bounds, background=DARK)
 
 
 def _frf_views(shown: Shown, pair: Pair) -> rrb.Container:

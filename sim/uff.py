@@ -149,7 +149,9 @@ def read_motion(path: Path, points: Sequence[Point]) -> tuple[str, tuple[int, ..
         sign = _sign(where, record, "response", points)
         label = record["abscissa_axis_units_lab"].strip()
         if record["abscissa_spec_data_type"] not in (0, abscissa) or label not in (unit, "", "NONE"):
-            raise BadInput(f"{where}: abscissa of type {record['abscissa_spec_data_type']} in {label!r}; allowed is type {abscissa} in {unit}")
+            raise BadInput(
+                f"{where}: abscissa of type {record['abscissa_spec_data_type']} in {label!r}; allowed is type {abscissa} in {unit}"
+            )
         scale = _scale(where, record, "ordinate", QUANTITIES["receptance"], system)
         value = record["data"] * (scale * sign)
         if not np.all(np.isfinite(value)):

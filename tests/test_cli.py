@@ -291,7 +291,10 @@ def test_add_takes_fitted_values_from_the_first_candidate_with_the_effect(capsys
     said = load(tmp_path / "b").provenance["effects.bond_softening.values.transition"]
     assert said.origin == "calibrated"
     assert "diagnosis.json: hot_compliance, transition; set by hand: width" in said.source
-    assert answer(capsys, "add", SCENE, "soak_lag", "--from", diagnosis, "--out", tmp_path / "s", "--json")["added"][0]["values"]["hub_share"] == 0.1
+    assert (
+        answer(capsys, "add", SCENE, "soak_lag", "--from", diagnosis, "--out", tmp_path / "s", "--json")["added"][0]["values"]["hub_share"]
+        == 0.1
+    )
 
 
 NOT_ADDED = [

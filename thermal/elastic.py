@@ -155,7 +155,5 @@ class Solid:
         weight = (3 * self.lam + 2 * self.mu) * r * self.basis.dx
         density = np.array([weight * dilatation(self.basis.interpolate(a), r) for a in adjoint])
         units = self.region_strains()
-        response = Response(
-            self.section, tuple(races), np.einsum("ieq,keq->ik", density, units), density, self.displacement(units)
-        )
+        response = Response(self.section, tuple(races), np.einsum("ieq,keq->ik", density, units), density, self.displacement(units))
         return response, adjoint.reshape(len(adjoint), -1, 2)

@@ -11,7 +11,8 @@ from sim.effect import Effect, Parameter, Values
 
 
 def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
-    for name, error in ((main_material(spindle), values["hub_expansion"]), (spindle.bearings[0].ring_material, values["ring_expansion"])):
+    hub, rings = values["hub_expansion"], values["ring_share"] * values["hub_expansion"]
+    for name, error in ((main_material(spindle), hub), (spindle.bearings[0].ring_material, rings)):
         if error != 0.0:
             law = spindle.materials[name].thermal_expansion
             scaled = replace(spindle.materials[name], thermal_expansion=Law(law.temperature, tuple(v * (1 + error) for v in law.value)))
@@ -39,7 +40,7 @@ EFFECT = Effect(
     title="Thermal expansion of hub or rings differs from its data sheet",
     equation=(
         "alpha_hub = (1 + hub_expansion) alpha_data sheet, for the material that fills most of the rotating part, wherever it is "
-        "used, and alpha_rings = (1 + ring_expansion) alpha_data sheet for the rings' material, of which shaft and balls may be too; ring motions follow by thermo-elastic influence: u = gain . strain"
+        "used, and alpha_rings = (1 + ring_share hub_expansion) alpha_data sheet for the rings' material, of which shaft and balls may be too; ring motions follow by thermo-elastic influence: u = gain . strain"
     ),
     parameters=(
         Parameter(
@@ -53,13 +54,13 @@ EFFECT = Effect(
             source="spread of wrought and cast aluminium alloys, 21 to 24.5e-6/K (ASM Handbook vol. 2, 1990)",
         ),
         Parameter(
-            "ring_expansion",
+            "ring_share",
             "1",
             neutral=0.0,
             typical=0.0,
-            prior_sd=0.03,
-            limits=(-0.3, 0.3),
-            meaning="relative error of the expansion coefficient of the rings' material",
+            prior_sd=0.7,
+            limits=(-5.0, 5.0),
+            meaning="relative error of the expansion coefficient of the rings' material over that of the hub's",
             source="bearing steel 11.5 to 12.5e-6/K by its makers and its retained austenite; stainless shafts 10 to 11e-6/K",
         ),
     ),

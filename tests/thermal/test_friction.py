@@ -52,7 +52,7 @@ def test_grease_of_the_reference_spindle_follows_astm_d341(spindle):
     celsius, found = np.array(law.temperature), np.array(law.value) * 1e6
     ends = np.log10(np.log10(np.array([26.0, 5.1]) + 0.7))
     slope = (ends[1] - ends[0]) / np.log10(373.15 / 313.15)
-    expected = 10 ** 10 ** (ends[0] + slope * np.log10((celsius + 273.15) / 313.15)) - 0.7
+    expected = 10**10 ** (ends[0] + slope * np.log10((celsius + 273.15) / 313.15)) - 0.7
     assert found == pytest.approx(expected, rel=5e-3)
 
 

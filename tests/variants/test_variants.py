@@ -39,7 +39,9 @@ def undisturbed() -> OperatingPoint:
 
 def test_every_effect_of_the_catalogue_has_a_variant_and_there_are_eight_outside():
     named = {name for v in VARIANTS for name in v.truth}
-    assert named == {e.name for e in CATALOGUE if any(getattr(e, hook) for hook in HOOKS if hook != "imperfections")}  # those of runout have no modes
+    assert named == {
+        e.name for e in CATALOGUE if any(getattr(e, hook) for hook in HOOKS if hook != "imperfections")
+    }  # those of runout have no modes
     assert len({v.name for v in VARIANTS}) == len(VARIANTS)
     assert sum(not v.truth for v in VARIANTS) >= 8
 
