@@ -138,14 +138,14 @@ def variations(effect: Effect) -> list[dict[str, float]]:
 
 
 def starts(signature: Signature) -> list[list[float]]:
-    """Start values of a fit: typical, and the size the linear screening expects with the parameters it did so, all inside the limits."""
+    """Start values of a fit: what the linear screening expects first, then typical values and their opposite, all inside the limits."""
     effect = signature.effect
     main = effect.parameters[0]
     reach = main.typical - main.neutral
-    wanted = [(main.typical, effect.typical()), (main.neutral - reach, effect.typical())]
-    wanted.append((main.neutral + signature.expected * reach, signature.others))
-    found = {(float(np.clip(size, *main.limits)), *[others[p.name] for p in effect.parameters[1:]]) for size, others in wanted}
-    return [list(start) for start in sorted(found) if start[0] != main.neutral]
+    wanted = [(main.neutral + signature.expected * reach, signature.others)]
+    wanted += [(main.typical, effect.typical()), (main.neutral - reach, effect.typical())]
+    found = [(float(np.clip(size, *main.limits)), *[others[p.name] for p in effect.parameters[1:]]) for size, others in wanted]
+    return [list(start) for start in dict.fromkeys(found) if start[0] != main.neutral]
 
 
 def held_out(theory: Theory, result: Fit, rating: Array | None = None) -> tuple[float, int]:
@@ -207,6 +207,11 @@ def explain(
     progress("promising effects refitted with all tolerances free")
     best = max(fits.values(), key=lambda f: f.evidence)
     if best.evidence - base.evidence > CLEAR:
+        alike = [s for s in signatures if s.effect.name in best.effects[0].resembles and (s.effect.name,) not in fits and s.visibility > 1]
+        tried = [((s.effect,), start, None) for s in alike for start in starts(s)[:1]]
+        fits |= _best(_all(theory, about, tried, True, workers))
+        best = max(fits.values(), key=lambda f: f.evidence)
+        progress(f"{len(alike)} effects refitted that the best resembles")
         close = [f for f in fits.values() if best.evidence - f.evidence < NEAR]
         again = [task for f in close for task in ((*_again(f), f.nuisance), (*_exactly(f), f.nuisance))]
         fits |= _best([*close, *_all(theory, about, again, True, workers)])
