@@ -22,6 +22,7 @@ NEAR = 60.0  # ln evidence within which a fit is polished
 CLEAR = 12.0  # ln evidence by which an explanation must lead the model without it: calibrated on campaigns with none
 AHEAD = 5.0  # ln evidence by which it must lead every rival to be identified
 OF_ALL = 0.01  # share of its ln evidence by which it must lead, where that is more: laws are not exact
+SURE = float(np.log(20.0))  # ln odds that such a lead is worth
 THERE = 3.0  # standard errors by which both effects of a pair must differ from none
 MISFIT = 1e-4  # probability below which a misfit is not chance
 FALLS = 1 / 3  # held-out error ratio that counts as a clear fall
@@ -306,7 +307,8 @@ def _verdict(theory: Theory, base: Fit, fits: list[Fit], signatures: list[Signat
     rms_before = float(np.sqrt(before / count))
     everything = [base, *fits]
     logs = np.array([f.evidence for f in everything])
-    weights = np.exp(logs - logs.max())
+    ahead = max(AHEAD, OF_ALL * float(logs.max() - base.evidence))
+    weights = np.exp((logs - logs.max()) * SURE / ahead)  # a lead of `ahead` is 95 %: blind campaigns did not bear out more
     weights /= weights.sum()
     candidates = []
     for f, w in zip(fits, weights[1:], strict=True):
@@ -327,7 +329,6 @@ def _verdict(theory: Theory, base: Fit, fits: list[Fit], signatures: list[Signat
     if chi_squared.sf(best.fit.chi2, n) < MISFIT or best.delta_evidence < CLEAR:
         return answer("unexplained", (), f"The model is rejected (misfit {base.misfit:.0f} for {n} numbers), and even with "
                       f"{' + '.join(best.effects)} a misfit of {best.fit.misfit:.0f} is left.")  # fmt: skip
-    ahead = max(AHEAD, OF_ALL * best.delta_evidence)
     rivals = [c for c in candidates if best.delta_evidence - c.delta_evidence < ahead]
     rivals = [c for c in rivals if len(c.effects) == 1 or all(_there(c.fit, e) for e in c.fit.effects)] or rivals
     singles = [c for c in rivals if len(c.effects) == 1]
