@@ -134,7 +134,8 @@ def test_tolerances_are_found_and_not_taken_for_physics(spindle):
     assert found.misfit < 1.5 * len(about.data.value)
 
 
-PRACTISED = [("practice_a", "identified", "bond_softening"), ("practice_b", "none", None), ("practice_c", "identified", "soak_lag")]
+PRACTISED = [("practice_a", "identified", "bond_softening"), ("practice_b", "none", None), ("practice_c", "ambiguous", "soak_lag")]
+"""At rest alone, a hub that lags behind cannot be told from one that expands less."""
 
 
 @pytest.mark.slow
@@ -146,7 +147,8 @@ def test_practice_campaigns(spindle, campaign, verdict, effect):
     observations = observe(read_campaign(PRACTICE / campaign), spindle)
     found = explain(theory_of(spindle, observations), CATALOGUE)
     assert found.verdict == verdict
-    assert found.effects == (() if effect is None else (effect,))
+    assert effect is None or effect in found.effects
+    assert len(found.effects) == {"none": 0, "identified": 1, "ambiguous": 2}[verdict]
 
 
 def test_tolerances_may_carry_close_modes_across_each_other(spindle):
