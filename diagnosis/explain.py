@@ -203,6 +203,7 @@ def explain(
         for slopes, first in ways:
             rough = _best(_all(theory, slopes, [(*task, first) for task in tasks], False, workers))
             promising += [_again(f) for f in sorted(rough.values(), key=lambda f: -f.evidence)[:SINGLES]]
+        promising = promising or [((s.effect,), s.effect.typical_list()) for s in signatures[:3]]  # where nothing is visible at all
         progress(f"{len(tasks)} rough fits made")
     fits = _best(_all(theory, about, [(*task, None) for task in promising], True, workers))
     progress("promising effects refitted with all tolerances free")

@@ -9,6 +9,7 @@ refute both, wherever the effect is a thousand times larger than the errors of m
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import product
 
@@ -151,7 +152,8 @@ def fit(
     tempers = (*first, *[1.0] * (RENEWALS - (nuisance is not None))) if thorough else first[:2]
     for temper in tempers:
         if thorough and (effects or temper < TEMPERS[0]):
-            by_nuisance = derivative(theory, x, applied(theta))
+            with suppress(NoEquilibrium):  # where a neighbour of this state cannot be mounted, the last derivative serves on
+                by_nuisance = derivative(theory, x, applied(theta))
         whiten = with_form_errors(m, x, theta, temper)
         current, damping = cost(m, x, theta), 1e-3
         before = current
