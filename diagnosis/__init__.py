@@ -6,7 +6,7 @@ theory            the same numbers predicted: spindle, tolerances, effects -> fr
 sensitivity       their derivatives by tolerances
 partners          which measured mode is which computed one, through all conditions
 thermometer       the error of a test's temperature among the errors of its modes
-fit               Gauss-Newton with priors, tempered, and its Laplace evidence
+fit               Gauss-Newton with priors, tempered, and its Laplace evidence; many_fits several of them side by side
 compare           modes paired through all conditions; errors in Hz, percent and standard errors; MAC, FRAC, COMAC
 correlation       likeness of FRFs by FRF, band and line: FRAC, CSAC, CSF, and FDAC with the shift it tells
 compare_words     a comparison as JSON and in the terminal; compare_plots its pictures; compare_report its report, folder, log

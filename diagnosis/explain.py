@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
-from multiprocessing import get_context
 
 import numpy as np
 from scipy.stats import chi2 as chi_squared
 
 from diagnosis.fit import Fit, fit, linearise
+from diagnosis.many_fits import Task, side_by_side
 from diagnosis.theory import Theory
 from model.ball_row import Array
 from model.pair import NoEquilibrium
@@ -201,75 +200,34 @@ def explain(
         ways += [(about, None)] if not comes_close or strained else []
         promising = []
         for slopes, first in ways:
-            rough = _best(_all(theory, slopes, [(*task, first) for task in tasks], False, workers))
+            rough = _best(side_by_side(theory, slopes, [(*task, first) for task in tasks], False, workers))
             promising += [_again(f) for f in sorted(rough.values(), key=lambda f: -f.evidence)[:SINGLES]]
         promising = promising or [((s.effect,), s.effect.typical_list()) for s in signatures[:3]]  # where nothing is visible at all
         progress(f"{len(tasks)} rough fits made")
-    fits = _best(_all(theory, about, [(*task, None) for task in promising], True, workers))
+    fits = _best(side_by_side(theory, about, [(*task, None) for task in promising], True, workers))
     progress("promising effects refitted with all tolerances free")
     best = max(fits.values(), key=lambda f: f.evidence)
     if best.evidence - base.evidence > CLEAR:
         alike = [s for s in signatures if s.effect.name in best.effects[0].resembles and (s.effect.name,) not in fits and s.visibility > 1]
         tried = [((s.effect,), start, None) for s in alike for start in starts(s)[:1]]
-        fits |= _best(_all(theory, about, tried, True, workers))
+        fits |= _best(side_by_side(theory, about, tried, True, workers))
         best = max(fits.values(), key=lambda f: f.evidence)
         progress(f"{len(alike)} effects refitted that the best resembles")
         close = [f for f in fits.values() if best.evidence - f.evidence < NEAR]
         again = [task for f in close for task in ((*_again(f), f.nuisance), (*_exactly(f), f.nuisance))]
-        fits |= _best([*close, *_all(theory, about, again, True, workers)])
+        fits |= _best([*close, *side_by_side(theory, about, again, True, workers)])
         best = max(fits.values(), key=lambda f: f.evidence)
         seconds = [s.effect for s in screen(theory, best, catalogue, 0.1)[:PAIRED] if s.gain > 2 * AHEAD]
-        pairs = _best(_all(theory, about, [(*_again(best, e), None) for e in seconds], True, workers))
+        pairs = _best(side_by_side(theory, about, [(*_again(best, e), None) for e in seconds], True, workers))
         level = [f for f in pairs.values() if abs(best.evidence - f.evidence) < NEAR]
         again = [task for f in level for task in ((*_again(f), f.nuisance), (*_exactly(f), f.nuisance))]
-        fits |= pairs | _best([*level, *_all(theory, about, again, True, workers)])
+        fits |= pairs | _best([*level, *side_by_side(theory, about, again, True, workers)])
         best = max(fits.values(), key=lambda f: f.evidence)
         if len(best.effects) == 2:  # whether one of them would do is asked from where the two came to rest
             alone = [((e,), list(best.values[e.name].values()), best.nuisance) for e in best.effects]
-            fits = _best([*fits.values(), *_all(theory, about, alone, True, workers)])
+            fits = _best([*fits.values(), *side_by_side(theory, about, alone, True, workers)])
         progress(f"{len(pairs)} pairs fitted")
     return _verdict(theory, base, list(fits.values()), signatures)
-
-
-Task = tuple[tuple[Effect, ...], list[float]]
-"""Effects to fit, and a start value for every parameter of theirs."""
-
-
-def _all(
-    theory: Theory, about: Array, tasks: Sequence[tuple[tuple[Effect, ...], list[float], Array | None]], thorough: bool, workers: int
-) -> list[Fit]:
-    """Fits of all tasks (effects, start, nuisance start), side by side."""
-    work = Work(theory, about, tuple(tasks), thorough)
-    if workers < 2 or len(tasks) < 2:
-        return [work.fit(i) for i in range(len(tasks))]
-    with ProcessPoolExecutor(workers, get_context("fork"), _take, (work,)) as pool:
-        found = pool.map(_done, range(len(tasks)))
-        return [replace(f, effects=task[0]) for f, task in zip(found, tasks, strict=True)]
-
-
-@dataclass(frozen=True, eq=False)
-class Work:
-    """Fits to be made by several processes, which get them by being forked: effects, of users too, need not be picklable."""
-
-    theory: Theory
-    about: Array
-    tasks: tuple[tuple[tuple[Effect, ...], list[float], Array | None], ...]
-    thorough: bool
-
-    def fit(self, i: int) -> Fit:
-        effects, start, nuisance = self.tasks[i]
-        return fit(self.theory, self.about, effects, start, self.thorough, nuisance)
-
-
-_work: list[Work] = []  # of a forked process: what it was given
-
-
-def _take(work: Work) -> None:
-    _work[:] = [work]
-
-
-def _done(i: int) -> Fit:
-    return replace(_work[0].fit(i), effects=())
 
 
 def _again(found: Fit, more: Effect | None = None) -> Task:

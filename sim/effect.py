@@ -49,6 +49,18 @@ def direction_parameter(prior_sd: float, half_turn: float, meaning: str) -> Para
     return Parameter("direction", "deg", 0.0, 0.0, prior_sd, (-half_turn, half_turn), meaning, "unknown before measuring: any")
 
 
+def bearing_parameter(source: str) -> Parameter:
+    """Which bearing holds an imperfection."""
+    meaning = "0 the first bearing of the scene (the lower one), 1 the second"
+    return Parameter("bearing", "1", 0.0, 1.0, 1.0, (0.0, 1.0), meaning, source, choices=(0.0, 1.0))
+
+
+def phase_parameter(meaning: str) -> Parameter:
+    """An azimuth (deg) of which nothing is known."""
+    source = "any azimuth is as likely as another: the standard deviation is that of a uniform angle"
+    return Parameter("phase", "deg", 0.0, 60.0, 104.0, (-180.0, 180.0), meaning, source)
+
+
 @dataclass(frozen=True, eq=False)
 class Measurement:
     """The measuring chain: what is read of the chain's motion, and how.

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from model.imperfections import Imperfections
 from model.machine import Condition, Spindle
-from sim.effect import Effect, Parameter, Values
+from sim.effect import Effect, Parameter, Values, bearing_parameter
 from sim.effects.race_waviness import bearing
 
 
@@ -38,17 +38,7 @@ EFFECT = Effect(
             meaning="diameter of one ball over that of the others, beyond what the scene has",
             source="ISO 3290-1:2014: lot diameter variation 0.13 um in grade 3, 1 um in grade 20; a ball of another lot",
         ),
-        Parameter(
-            "bearing",
-            "1",
-            neutral=0.0,
-            typical=1.0,
-            prior_sd=1.0,
-            limits=(0.0, 1.0),
-            meaning="0 the first bearing of the scene (the lower one), 1 the second",
-            source="either may hold it: both are filled from one lot",
-            choices=(0.0, 1.0),
-        ),
+        bearing_parameter("either may hold it: both are filled from one lot"),
     ),
     sees="the line at the cage frequency (fc, radial, forward) is large, and the same at every speed far from resonances",
     resembles=("cage_unbalance",),

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from model.imperfections import Imperfections, Wave
 from model.machine import Condition, Spindle
-from sim.effect import Effect, Parameter, Values
+from sim.effect import Effect, Parameter, Values, bearing_parameter
 from sim.effects.race_waviness import bearing
 
 
@@ -49,17 +49,7 @@ EFFECT = Effect(
             source="ovals are what lapping leaves most (Wardle 1988, part 2)",
             choices=(1.0, 2.0, 3.0),
         ),
-        Parameter(
-            "bearing",
-            "1",
-            neutral=0.0,
-            typical=1.0,
-            prior_sd=1.0,
-            limits=(0.0, 1.0),
-            meaning="0 the first bearing of the scene (the lower one), 1 the second",
-            source="either may hold it: both are filled from one lot",
-            choices=(0.0, 1.0),
-        ),
+        bearing_parameter("either may hold it: both are filled from one lot"),
     ),
     sees="three lines belong together: 2 k fb - fc and 2 k fb + fc across the axis and 2 k fb along it",
     resembles=("race_waviness",),

@@ -8,7 +8,7 @@ from math import radians
 
 from model.imperfections import Imperfections
 from model.machine import Condition, Spindle
-from sim.effect import Effect, Parameter, Values
+from sim.effect import Effect, Parameter, Values, bearing_parameter, phase_parameter
 from sim.effects.race_waviness import bearing
 
 
@@ -37,27 +37,8 @@ EFFECT = Effect(
             meaning="unbalance of the cage beyond the scene's",
             source="a cage of 0.5 to 1 g that runs 0.2 to 0.3 mm off centre in its guiding clearance",
         ),
-        Parameter(
-            "phase",
-            "deg",
-            neutral=0.0,
-            typical=60.0,
-            prior_sd=104.0,
-            limits=(-180.0, 180.0),
-            meaning="azimuth to which it points at time zero, when ball 0 is at azimuth 0",
-            source="any azimuth is as likely as another: the standard deviation is that of a uniform angle",
-        ),
-        Parameter(
-            "bearing",
-            "1",
-            neutral=0.0,
-            typical=1.0,
-            prior_sd=1.0,
-            limits=(0.0, 1.0),
-            meaning="0 the first bearing of the scene (the lower one), 1 the second",
-            source="either may have it: both come from one lot",
-            choices=(0.0, 1.0),
-        ),
+        phase_parameter("azimuth to which it points at time zero, when ball 0 is at azimuth 0"),
+        bearing_parameter("either may have it: both come from one lot"),
     ),
     sees="the line at the cage frequency (fc, radial, forward) grows as the square of the speed",
     resembles=("ball_size",),

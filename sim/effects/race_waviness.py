@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from model.imperfections import Imperfections, Wave
 from model.machine import Condition, Spindle
-from sim.effect import Effect, Parameter, Values
+from sim.effect import Effect, Parameter, Values, bearing_parameter
 
 
 def order(spindle: Spindle, values: Values) -> int:
@@ -83,17 +83,7 @@ EFFECT = Effect(
             source="either may be worse: both are ground the same way",
             choices=(0.0, 1.0),
         ),
-        Parameter(
-            "bearing",
-            "1",
-            neutral=0.0,
-            typical=1.0,
-            prior_sd=1.0,
-            limits=(0.0, 1.0),
-            meaning="0 the first bearing of the scene (the lower one), 1 the second",
-            source="either may be worse: both come from one lot",
-            choices=(0.0, 1.0),
-        ),
+        bearing_parameter("either may be worse: both come from one lot"),
     ),
     sees="one line, at a frequency that tells ring and order; growing where it meets a natural frequency; nothing in an impact test",
     resembles=("unbalance", "ball_waviness"),

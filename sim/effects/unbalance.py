@@ -8,7 +8,7 @@ from math import radians
 
 from model.imperfections import Imperfections
 from model.machine import Condition, Spindle
-from sim.effect import Effect, Parameter, Values
+from sim.effect import Effect, Parameter, Values, phase_parameter
 
 G_MM, G_MM2 = 1e-6, 1e-9
 
@@ -49,16 +49,7 @@ EFFECT = Effect(
             meaning="static unbalance beyond the scene's",
             source="ISO 21940-11:2016: a hub of 40 g at 7200 rpm in G 6.3 (not balanced further) may have 0.33 g mm, in G 16 0.85",
         ),
-        Parameter(
-            "phase",
-            "deg",
-            neutral=0.0,
-            typical=60.0,
-            prior_sd=104.0,
-            limits=(-180.0, 180.0),
-            meaning="azimuth to which it points at time zero",
-            source="any azimuth is as likely as another: the standard deviation is that of a uniform angle",
-        ),
+        phase_parameter("azimuth to which it points at time zero"),
         Parameter(
             "couple",
             "g mm2",
