@@ -6,6 +6,7 @@ theory            the same numbers predicted: spindle, tolerances, effects -> fr
 sensitivity       their derivatives by tolerances
 partners          which measured mode is which computed one, through all conditions
 thermometer       the error of a test's temperature among the errors of its modes
+lines             toleranced parameters fitted to the lines of one test, all else known: for scripts
 fit               Gauss-Newton with priors, tempered, and its Laplace evidence; many_fits several of them side by side
 compare           modes paired through all conditions; errors in Hz, percent and standard errors; MAC, FRAC, COMAC
 correlation       likeness of FRFs by FRF, band and line: FRAC, CSAC, CSF, and FDAC with the shift it tells

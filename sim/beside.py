@@ -30,8 +30,8 @@ class Beside:
 
         An exponential window exp(-decay t) left in the measured ones damps these as much: they are taken at i omega + decay.
         """
-        s = np.asarray(frequency - 1j * self.test.window_decay / (2 * np.pi), complex)
-        value = self.point.frf(s) * (2j * np.pi * s) ** POWER[self.measured.quantity]  # type: ignore[arg-type]
+        s = 2j * np.pi * frequency + self.test.window_decay
+        value = self.point.frf(frequency, self.test.window_decay) * s ** POWER[self.measured.quantity]
         return np.asarray(value[: len(self.measured.response_nodes)], complex)
 
 

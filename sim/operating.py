@@ -85,10 +85,13 @@ class OperatingPoint:
         """All oscillating modes, in order of frequency."""
         return modes(self.chain, self.linear)
 
-    def frf(self, frequency: Array) -> ComplexArray:
-        """Exact mobility (n_resp, n_ref, n) of the linear model at `frequency` (Hz), as the measuring chain shows it."""
+    def frf(self, frequency: Array, window_decay: float = 0.0) -> ComplexArray:
+        """Exact mobility (n_resp, n_ref, n) of the linear model at `frequency` (Hz), as the measuring chain shows it.
+
+        `window_decay` (1/s) is that of an exponential window that is known and still in the FRFs.
+        """
         m = self.measurement
-        s: ComplexArray = np.asarray(frequency - 1j * m.decay / (2 * np.pi), complex)
+        s: ComplexArray = np.asarray(frequency - 1j * (m.decay + window_decay) / (2 * np.pi), complex)
         value = frf(self.linear, m.response_rows, m.reference_rows, s, "mobility")
         return value * (m.gain[:, None] * np.exp(-2j * np.pi * frequency * m.delay[:, None]))[:, None, :]
 

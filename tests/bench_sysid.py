@@ -2,12 +2,10 @@
 
 A spindle whose parameter is `TRUE` above its drawing is hit once at each hammer node and measured with the scene's noise. Both start
 from the drawing, know everything else, and get the same records, the same band and the same noise. The toolbox simulates the records
-with trial values until the response agrees; this program extracts the modes of the FRFs and fits the parameter to those. The toolbox
-has every advantage that the comparison allows: records and trial simulations come from one model with one step (no error of the model
-at all), its residuals are whitened with the noise that was put in, a compiled model comes from our own chain within milliseconds, and it
-stops at `ENOUGH`, below its standard error. Our fit keeps the floors under its errors (`diagnosis.observe`), for no machine is its model: so it
-states more than it makes where modes are sharp, and where they overlap (preload: the 3 % damped pair near 2.4 kHz) modes know less than
-the whole record does once gains, shapes and all other parameters are taken as known.
+with trial values until the response agrees; this program estimates the FRFs and fits the parameter to their lines
+(`diagnosis.lines`). The toolbox has every advantage that the comparison allows: records and trial simulations come from one model with one
+step (no error of the model at all), its residuals are whitened with the noise that was put in, a compiled model comes from our own chain
+within milliseconds, and it stops at `ENOUGH`, below its standard error.
 """
 
 from __future__ import annotations
@@ -16,7 +14,6 @@ import io
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -25,22 +22,17 @@ import mujoco
 import numpy as np
 from mujoco import sysid
 
-from diagnosis.fit import fit, linearise
-from diagnosis.observe import observe
-from diagnosis.theory import Theory, data_of
+from diagnosis.lines import fit_lines
 from model.ball_row import Array
 from model.machine import Condition, HammerTest, Spindle
 from model.scene import load
 from model.tolerance import Toleranced, toleranced
-from sim.campaign import Campaign, Test
-from sim.impact import ImpactTest, impact_tests, loaded_state, sampling
+from sim.impact import ImpactTest, estimate_of, impact_tests, loaded_state, sampling
 from sim.operating import operating_point
 
 PARAMETERS = ("plate tilt x stiffness", "preload")
 TRUE = 0.02  # relative deviation of the parameter
 LIMITS = (-0.2, 0.2)  # that both may search
-PRIOR = 0.1  # standard deviation of the free parameter in our fit: a hundred to a thousand standard errors
-KNOWN = 1e-6  # and of all others
 ENOUGH = 1e-5  # step of the parameter at which the toolbox may stop: Gauss-Newton is then far nearer
 DIFFERENCE = 1e-5  # of the parameter, for the toolbox's Jacobian: its own 1.5e-8 drowns in the tolerance of the bearing equilibrium
 SEEDS = 3
@@ -50,24 +42,12 @@ INSTALL = ".venv/bin/python -m pip install --editable '.[bench]'"
 
 @dataclass(frozen=True)
 class Estimated:
-    """A relative deviation with its stated standard error, and the seconds it took: all, and of them those of the fit without extraction.
-
-    `simulations` counts the records simulated on the way.
-    """
+    """A relative deviation with its stated standard error, the seconds it took, and the simulations of the records on the way."""
 
     value: float
     sd: float
     seconds: float
-    fit_seconds: float
     simulations: int
-
-
-class OneFree(Theory):
-    """The theory of a spindle with one toleranced parameter, the first of its names."""
-
-    @cached_property
-    def build(self) -> list[Toleranced]:
-        return [p for p in toleranced(self.spindle) if p.name == self.names[0]]
 
 
 def available() -> bool:
@@ -86,17 +66,11 @@ def measured(spindle: Spindle, name: str, seed: int) -> ImpactTest:
 
 
 def ours(spindle: Spindle, name: str, test: ImpactTest) -> Estimated:
-    """Modes of the FRFs with their standard errors, then `diagnosis.fit` with one parameter free."""
+    """FRFs of the records, then the parameter from their lines."""
     start = time.perf_counter()
-    frf, decay = test.estimate.h1, test.estimate.window_decay
-    one = Test("hit", COLD.temperature, speed=0.0, level=spindle.hammer.level, frf=frf, window_decay=decay)
-    observations = observe(Campaign("bench", spindle.name, "mobility", spindle.points, (one,)), spindle)
-    extracted = time.perf_counter()
-    names = (name, "temperature of hit", *(f"gain of channel {i + 1}" for i in range(len(spindle.points))))
-    theory = OneFree(spindle, data_of(observations), names, np.array([PRIOR] + [KNOWN] * (len(names) - 1)))
-    found = fit(theory, linearise(theory))
-    end = time.perf_counter()
-    return Estimated(float(found.nuisance[0]), float(found.nuisance_sd[0]), end - start, end - extracted, 0)
+    estimated = estimate_of(spindle.hammer, test.point, test.record)
+    found = fit_lines(spindle, COLD, estimated.h1, [parameter(spindle, name)], estimated.window_decay)
+    return Estimated(float(found.value[0]), float(found.sd[0]), time.perf_counter() - start, 0)
 
 
 def held_force(test: HammerTest, force: Array) -> Array:
@@ -152,7 +126,7 @@ def toolbox(spindle: Spindle, name: str, test: ImpactTest) -> Estimated:
     free = sysid.ParameterDict({"x": sysid.Parameter("x", 0.0, *LIMITS)})
     found, result = sysid.optimize(free, residual, verbose=False, xtol=ENOUGH, eps=DIFFERENCE, output=io.StringIO())
     took = time.perf_counter() - start
-    return Estimated(float(found["x"].value[0]), float(1 / np.linalg.norm(result.jac)), took, took, simulations)
+    return Estimated(float(found["x"].value[0]), float(1 / np.linalg.norm(result.jac)), took, simulations)
 
 
 def beside(spindle: Spindle, name: str, seed: int) -> tuple[Estimated, Estimated]:
@@ -171,10 +145,9 @@ def rows(spindle: Spindle) -> list[tuple[str, str, str]]:
     for name in PARAMETERS:
         pairs = [beside(spindle, name, seed) for seed in range(SEEDS)]
         fast, slow = (median(e.seconds for e in who) for who in zip(*pairs, strict=True))
-        fit_alone = median(own.fit_seconds for own, _ in pairs)
         ratio = median(other.seconds / own.seconds for own, other in pairs)
         what = f"{name} fitted: ours / MuJoCo's sysid"
-        seconds = f"{fast:.2f} (fit alone {fit_alone:.2f}) / {slow:.1f} s: {ratio:.0f} times"
+        seconds = f"{fast:.3f} / {slow:.1f} s: {ratio:.0f} times"
         errors = " / ".join(f"{rms:.0f} ({sd:.0f}) ppm" for rms, sd in (errors_of(who) for who in zip(*pairs, strict=True)))
         found += [(what, seconds, "20 times"), (f"    rms error of {SEEDS} tests (stated)", errors, "equal")]
     return found
@@ -194,7 +167,7 @@ def main() -> None:
             for who, e in zip(("ours", "toolbox"), beside(scene, name, seed), strict=True):
                 error = f"error {1e6 * (e.value - TRUE):+.1f} +- {1e6 * e.sd:.1f} ppm"
                 print(
-                    f"{name}, test {seed + 1}, {who}: {error}, {e.seconds:.2f} s, fit {e.fit_seconds:.3f} s, {e.simulations} simulations",
+                    f"{name}, test {seed + 1}, {who}: {error}, {e.seconds:.3f} s, {e.simulations} simulations",
                     flush=True,
                 )
     if not available():
