@@ -67,12 +67,28 @@ def test_film_speed_is_the_balls_rolling_speed(spindle):
 
 def test_film_shortens_the_unloaded_distance(spindle):
     """By scale (h_i + h_o); worked by hand at 60 C, 7200 rpm: U 1.29e-10, G 5029, W 3.8e-5, factor of k 0.99: h_i 0.0763 um (2 %)."""
-    inner, outer = lubricant_film.films(spindle, spindle.bearings[0], RUNNING.speed, 60.0, 2.2e-8)
+    inner, outer = lubricant_film.films(spindle, spindle.bearings[0], RUNNING.speed, 60.0)
     assert inner == pytest.approx(0.0763e-6, rel=0.02)
     assert 1.1 < outer / inner < 1.2  # (R_o / R_i)^(1 - 0.67 + 2 0.067), R_o / R_i = (1 + gamma) / (1 - gamma)
     point, plain = at(spindle, RUNNING, lubricant_film, scale=0.5), operating_point(spindle, RUNNING, [])
     change = [p.state.bearings[0].row.unloaded_distance for p in (plain, point)]
     assert change[0] - change[1] == pytest.approx((inner + outer) / 2, rel=1e-3)  # the film's temperature is the rings'
+
+
+def test_a_film_that_does_not_wedge_is_a_spring_in_series_with_the_balls(spindle):
+    """Load over approach by a finite change of load: film h Q^-0.067 beside Hertz's delta ~ Q^(2/3), worked without derivatives."""
+    values = {"scale": 2.0, "wedge": 0.0, "loss_factor": 0.4}
+    plain, point = operating_point(spindle, RUNNING, []), at(spindle, RUNNING, lubricant_film, **values)
+    omega = 2 * np.pi * spindle.structure.damping_frequency
+    for drawn, b, old in zip(spindle.bearings, point.state.bearings, plain.state.bearings, strict=True):
+        film = 2 * sum(lubricant_film.films(spindle, drawn, RUNNING.speed, 60.0))
+        load = 1 + np.array([-1e-4, 1e-4])
+        approach = np.diff(old.deformation * load ** (2 / 3)), np.diff(film * load**-0.067)
+        share = -approach[1].item() / approach[0].item()  # a thinner film under more load adds to the approach
+        assert b.deformation == old.deformation
+        assert b.stiffness == pytest.approx(old.stiffness / (1 + share), rel=1e-6)
+        complex_stiffness = 1 / (1 / (old.stiffness[2, 2] + 1j * omega * old.damping[2, 2]) + share / old.stiffness[2, 2] * (1 - 0.4j))
+        assert omega * b.damping[2, 2] == pytest.approx(complex_stiffness.imag, rel=0.01)  # to first order in the losses
 
 
 @pytest.mark.parametrize(("temperature", "ratio"), [(20.0, 1.0), (40.0, 26.0 / 63.1), (60.0, 13.2 / 63.1)])
