@@ -15,7 +15,8 @@ locate            which element would have to change, by how much, at which cond
 misfit            shares of the misfit, what it grows with, what would have to drift, elements that change together
 shares            the misfit shared out over modes, points, bands, conditions; patterns: the simplest shape over conditions
 misfit_words      the misfit as JSON and in sentences; misfit_plots its pictures
-explain           screening, refitting, pairs, held-out conditions: one of five verdicts
+screening         what every effect would do to these data beside what tolerances can do
+explain           the whole search: screening, refitting, look-alikes, pairs; decide the verdict, by evidence and held-out conditions
 next_test         the test that would separate surviving explanations; prediction what was predicted beside what a test showed
 verdict           `spindle diagnose`: JSON and words
 diagnosis_report  the diagnosis as a page and a folder; diagnosis_plots its pictures

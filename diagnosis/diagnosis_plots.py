@@ -9,10 +9,11 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from diagnosis import misfit_plots
-from diagnosis.explain import CLEAR, Diagnosis
+from diagnosis.decide import Diagnosis
 from diagnosis.fit import Fit
 from diagnosis.ladder_plots import PullMap, draw_maps, pulls
 from diagnosis.misfit import Misfit
+from diagnosis.screening import CLEAR
 from diagnosis.shares import Modes, modes_at
 from diagnosis.theory import Theory
 from sim.plots import INK, PALE, STYLE

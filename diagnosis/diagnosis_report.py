@@ -11,8 +11,8 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
+from diagnosis.decide import Diagnosis
 from diagnosis.diagnosis_plots import figures
-from diagnosis.explain import Diagnosis
 from diagnosis.misfit import Misfit
 from diagnosis.theory import Theory
 from diagnosis.verdict import plan_words

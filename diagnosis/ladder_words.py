@@ -7,10 +7,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from diagnosis.explain import CLEAR
 from diagnosis.ladder import TOLERANCES, Ladder
 from diagnosis.next_test import Plan
 from diagnosis.rung import Rung, determined
+from diagnosis.screening import CLEAR
 
 RPM = 2 * np.pi / 60
 CERTAIN = 1000.0  # odds, beyond which models are not to be trusted so far

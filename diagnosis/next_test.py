@@ -13,7 +13,7 @@ from itertools import combinations
 
 import numpy as np
 
-from diagnosis.explain import Candidate, Diagnosis
+from diagnosis.decide import Candidate, Diagnosis
 from diagnosis.fit import Fit
 from diagnosis.locate import Change, free_form
 from diagnosis.observe import DAMPING_FLOOR, FREQUENCY_FLOOR, SHAPE_FLOOR, Observation

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.explain import held_out
+from diagnosis.decide import held_out
 from diagnosis.fit import Fit
 from diagnosis.observe import condition_of
 from diagnosis.partners import numbered

@@ -17,10 +17,11 @@ from itertools import product
 import numpy as np
 from scipy.stats import chi2 as chi_squared
 
-from diagnosis.explain import AHEAD, CLEAR, FALLS, MISFIT
+from diagnosis.decide import AHEAD, FALLS, MISFIT
 from diagnosis.runout_fit import Family, FamilyFit, families, fit_family, merged
 from diagnosis.runout_lines import Seen, StrangeLine, look, runout_tests
 from diagnosis.runout_sources import SourceKey, Sources, of_effect, sources
+from diagnosis.screening import CLEAR
 from model.ball_row import Array
 from model.machine import Spindle
 from sim.campaign import Campaign

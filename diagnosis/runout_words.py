@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from diagnosis.explain import CLEAR
 from diagnosis.runout import Explanation, RunoutDiagnosis
 from diagnosis.runout_sources import SourceKey
+from diagnosis.screening import CLEAR
 from sim.effect import Effect
 
 RPM = 2 * np.pi / 60

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from diagnosis.explain import Candidate, Diagnosis, explain
+from diagnosis.decide import Candidate, Diagnosis
+from diagnosis.explain import explain
 from diagnosis.locate import Change, locate
 from diagnosis.misfit import Misfit, misfit
 from diagnosis.misfit_words import misfit_json

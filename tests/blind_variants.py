@@ -33,8 +33,10 @@ from rich.console import Console
 from rich.table import Column, Table
 from scipy.optimize import linear_sum_assignment
 
-from diagnosis.explain import CLEAR, Candidate, explain, screen
+from diagnosis.decide import Candidate
+from diagnosis.explain import explain
 from diagnosis.observe import observe
+from diagnosis.screening import CLEAR, screen
 from diagnosis.theory import data_of, theory
 from model.machine import Condition, Spindle
 from model.modes import oscillating, poles

@@ -6,10 +6,10 @@ The standard error of 1 Hz is assumed (the paper prints none), and so is the sec
 import numpy as np
 import pytest
 
-from diagnosis.explain import CLEAR
 from diagnosis.ladder import TOLERANCES, ladder
 from diagnosis.ladder_words import remaining
 from diagnosis.rung import determined
+from diagnosis.screening import CLEAR
 from sim.campaign import read_campaign
 from tests.conftest import SCENE
 

@@ -1,0 +1,138 @@
+"""From fitted explanations to one of five verdicts: evidence, held-out conditions, and what is believable."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2 as chi_squared
+
+from diagnosis.fit import Fit
+from diagnosis.screening import CLEAR, Signature
+from diagnosis.theory import Theory
+from model.ball_row import Array
+from sim.effect import Effect
+
+AHEAD = 5.0  # ln evidence by which it must lead every rival to be identified
+OF_ALL = 0.01  # share of its ln evidence by which it must lead, where that is more: laws are not exact
+SURE = float(np.log(20.0))  # ln odds that such a lead is worth
+THERE = 3.0  # standard errors by which both effects of a pair must differ from none
+MISFIT = 1e-4  # probability below which a misfit is not chance
+FALLS = 1 / 3  # held-out error ratio that counts as a clear fall
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """An explanation: effects fitted with all tolerances free."""
+
+    fit: Fit
+    delta_evidence: float  # ln evidence over the model without effects
+    probability: float
+    held_out_ratio: float  # rms pull of left-out conditions over that of the model without effects
+    believable: bool
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        return tuple(e.name for e in self.fit.effects)
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    verdict: str
+    effects: tuple[str, ...]
+    reason: str
+    base: Fit
+    candidates: tuple[Candidate, ...]
+    signatures: tuple[Signature, ...]
+    held_out_before: float
+    held_out_after: float
+
+    @property
+    def best(self) -> Candidate | None:
+        return self.candidates[0] if self.candidates else None
+
+
+def held_out(theory: Theory, result: Fit, rating: Array | None = None) -> tuple[float, int]:
+    """Sum of squares and number of whitened residuals of conditions left out one after the other, each predicted from all others.
+
+    About the optimum the model is linear in its parameters, so leaving a condition out is algebra: minimise without its rows, then look.
+    The prediction is rated by the errors of its parameters and by those that `rating` (n, n) whitens, the data's own by default.
+    """
+    rating = theory.data.whiten if rating is None else rating
+    data = theory.data
+    temperatures = [o.condition.temperature for o in data.observations]
+    widths = np.concatenate([theory.sd, [p.prior_sd for e in result.effects for p in e.parameters]])
+    fitted, rated = (w @ (result.jacobian * widths) for w in (result.whiten, rating))
+    residual, rated_residual = result.whiten @ result.residual, rating @ result.residual
+    offset = np.concatenate([result.nuisance / theory.sd, np.zeros(len(widths) - len(theory.sd))])
+    total, count = 0.0, 0
+    for leave in sorted(set(temperatures)):
+        out = np.array([temperatures[f.test] == leave for f in data.features])
+        normal = fitted[~out].T @ fitted[~out] + np.eye(len(widths))
+        step = np.linalg.solve(normal, fitted[~out].T @ residual[~out] - offset)
+        left = rated_residual[out] - rated[out] @ step
+        spread = np.eye(out.sum()) + rated[out] @ np.linalg.solve(normal, rated[out].T)
+        total += float(left @ np.linalg.solve(spread, left))
+        count += int(out.sum())
+    return total, count
+
+
+def _there(found: Fit, effect: Effect) -> bool:
+    """Whether a fitted effect is clearly more than nothing."""
+    main = effect.parameters[0]
+    return abs(found.values[effect.name][main.name] - main.neutral) > THERE * found.sd[effect.name][main.name]
+
+
+def decide(theory: Theory, base: Fit, fits: list[Fit], signatures: list[Signature]) -> Diagnosis:
+    n = len(theory.data.value)
+    before, count = held_out(theory, base)
+    rms_before = float(np.sqrt(before / count))
+    everything = [base, *fits]
+    logs = np.array([f.evidence for f in everything])
+    ahead = max(AHEAD, OF_ALL * float(logs.max() - base.evidence))
+    weights = np.exp((logs - logs.max()) * SURE / ahead)  # a lead of `ahead` is 95 %: blind campaigns did not bear out more
+    weights /= weights.sum()
+    candidates = []
+    for f, w in zip(fits, weights[1:], strict=True):
+        # both rated alike, with what the effect's own law may miss
+        ratio = float(np.sqrt(held_out(theory, f, f.whiten)[0] / held_out(theory, base, f.whiten)[0]))
+        candidates.append(Candidate(f, f.evidence - base.evidence, float(w), ratio, not f.at_limit))
+    candidates.sort(key=lambda c: -c.delta_evidence)
+    best = candidates[0]
+    rejected = chi_squared.sf(base.chi2, n) < MISFIT
+    after = best.held_out_ratio * rms_before
+
+    def answer(verdict: str, effects: Sequence[str], reason: str) -> Diagnosis:
+        return Diagnosis(verdict, tuple(effects), reason, base, tuple(candidates), tuple(signatures), rms_before, after)
+
+    if best.delta_evidence < CLEAR and not rejected:
+        return answer("none", (), f"The tolerances alone explain the data: misfit {base.misfit:.0f} for {n} numbers; the best effect, "
+                      f"{' + '.join(best.effects)}, gains {best.delta_evidence:.1f} in ln evidence where {CLEAR:g} is asked.")  # fmt: skip
+    if chi_squared.sf(best.fit.chi2, n) < MISFIT or best.delta_evidence < CLEAR:
+        return answer("unexplained", (), f"The model is rejected (misfit {base.misfit:.0f} for {n} numbers), and even with "
+                      f"{' + '.join(best.effects)} a misfit of {best.fit.misfit:.0f} is left.")  # fmt: skip
+    rivals = [c for c in candidates if best.delta_evidence - c.delta_evidence < ahead]
+    rivals = [c for c in rivals if len(c.effects) == 1 or all(_there(c.fit, e) for e in c.fit.effects)] or rivals
+    singles = [c for c in rivals if len(c.effects) == 1]
+    if singles:  # a pair must beat its own members clearly to be needed
+        rivals = singles
+    names = sorted({name for c in rivals for name in c.effects})
+    if len(rivals) == 1 and len(rivals[0].effects) == 1 and rivals[0].believable and rivals[0].held_out_ratio < FALLS:
+        c = rivals[0]
+        return answer("identified", c.effects, f"{c.effects[0]} leads every other explanation by more than {ahead:.0f} in ln evidence; "
+                      f"the error on left-out conditions falls to {100 * c.held_out_ratio:.0f} %.")  # fmt: skip
+    if len(rivals) == 1 and len(rivals[0].effects) == 2:
+        c = rivals[0]
+        return answer("two effects", c.effects, f"{c.effects[0]} and {c.effects[1]} are both needed: dropping either costs more than "
+                      f"{ahead:.0f} in ln evidence.")  # fmt: skip
+    if len(rivals) == 1:
+        second = next((c for c in candidates if len(c.effects) == 1 and c is not rivals[0] and c.delta_evidence > CLEAR), None)
+        names = sorted({*names, *(second.effects if second else ())})
+        why = (
+            "is not believable"
+            if not rivals[0].believable
+            else f"leaves {100 * rivals[0].held_out_ratio:.0f} % of the error on left-out conditions"
+        )
+        return answer("ambiguous", names, f"{' + '.join(rivals[0].effects)} leads by more than {ahead:.0f} in ln evidence but {why}.")
+    return answer("ambiguous", names, f"{', '.join(names)} explain the data within {ahead:.0f} in ln evidence of each other.")
