@@ -2,21 +2,32 @@
 
 from __future__ import annotations
 
-from model.machine import Condition, Region, Spindle
+from dataclasses import replace
+
+from model.machine import Condition, Joint, Region, Spindle
 from sim.effect import Effect, Parameter, Values
-from sim.effects.mount_compliance import role, with_stiffness
+from sim.effects.mount_compliance import role
+from sim.effects.plate_prestress import beyond
 
 LOOSE = 0.02
 """Share of the contact stiffness that a fit without interference keeps: its screws or adhesive, and dirt."""
 
 
 def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
-    share = values["contact_share"]
-    if share == 0.0:
+    if values["contact_share"] == 0.0:
         return spindle
-    remaining = max(1 - opening(spindle, condition.temperature) / (values["interference"] * 1e-6), LOOSE)
-    factor = 1 / (1 - share + share / remaining)
-    return with_stiffness(spindle, {j.name: factor for j in spindle.structure.joints if role(spindle, j) == "flange"})
+    lost = beyond(opening(spindle, condition.temperature) / (values["interference"] * 1e-6), values["closed"]) / (1 - values["closed"])
+    added = values["contact_share"] * (1 / max(1 - lost, LOOSE) - 1)
+
+    def loosened(joint: Joint) -> Joint:
+        x, y, z, tilt_x, tilt_y = joint.stiffness
+        move, tilt = 1 / (1 + values["translation_share"] * added), 1 / (1 + added)
+        rubbing = (joint.damping_ratio + values["loss_factor"] / 2 * added) * tilt if added > 0.0 else joint.damping_ratio
+        return replace(joint, stiffness=(move * x, move * y, move * z, tilt * tilt_x, tilt * tilt_y), damping_ratio=rubbing)
+
+    structure = spindle.structure
+    joints = tuple(loosened(j) if role(spindle, j) == "flange" else j for j in structure.joints)
+    return replace(spindle, structure=replace(structure, joints=joints))
 
 
 def opening(spindle: Spindle, temperature: float) -> float:
@@ -46,7 +57,9 @@ EFFECT = Effect(
     name="flange_fit_loosening",
     title="The flange loosens on the shaft as it expands",
     equation=(
-        "k(T) = k / (1 - c + c / rho), rho = 1 - d (eps_flange - eps_shaft) / interference, c = contact_share; pressure of a press "
+        "k(T) = k / (1 + a), a = contact_share (1 / rho - 1), rho = 1 - (x -+ closed) / (1 - closed), 1 within +- closed, "
+        "x = d (eps_flange - eps_shaft) / interference, for tilts, translation_share a for translations; zeta -> (zeta + eta a / 2) / (1 + a) "
+        "where looser; pressure of a press "
         "fit is proportional to its interference (Lame; Timoshenko & Goodier, Theory of Elasticity, 1970), contact stiffness of rough "
         "faces to pressure (Greenwood & Williamson, Contact of nominally flat surfaces, 1966); near rho = 0 the joint gives way"
     ),
@@ -70,6 +83,36 @@ EFFECT = Effect(
             limits=(2.5, 60.0),
             meaning="interference on the diameter at the reference temperature; the fit is loose when expansion has used it up",
             source="a light press fit on 5 mm: H7/p6 to H7/s6, 0 to 27 um (ISO 286-2)",
+        ),
+        Parameter(
+            "closed",
+            "1",
+            neutral=0.0,
+            typical=0.0,
+            prior_sd=0.2,
+            limits=(0.0, 0.9),
+            meaning="share of the interference that may change before the contact feels it",
+            source="assumed: none; a contact pressed flat keeps its stiffness until its pressure is almost gone",
+        ),
+        Parameter(
+            "translation_share",
+            "1",
+            neutral=1.0,
+            typical=1.0,
+            prior_sd=0.5,
+            limits=(0.0, 1.0),
+            meaning="how much of it translations feel: less than tilts where the fit opens at one end",
+            source="assumed: all",
+        ),
+        Parameter(
+            "loss_factor",
+            "1",
+            neutral=0.1,
+            typical=0.1,
+            prior_sd=0.1,
+            limits=(0.0, 1.0),
+            meaning="loss factor of the contact's added compliance: it rubs",
+            source="bolted and fitted joints 0.01 to 0.2 (Beards, Damping in structural joints, Shock Vib. Digest, 1992)",
         ),
     ),
     sees="modes that strain the flange fall with temperature, more and more towards the fit's end, at any speed alike; rise when cold",

@@ -1,4 +1,4 @@
-"""The hub's rim tilts on its web: the outer part of the hub follows the middle of the hub only through a compliant plate."""
+"""The hub's rim tilts on its web, or its rings in their seats: parts of the hub follow each other only through compliant metal."""
 
 from __future__ import annotations
 
@@ -9,13 +9,19 @@ import numpy as np
 from model.machine import Body, Condition, Spindle
 from model.rotor_base import Element, RotorBase
 from sim.effect import Effect, Parameter, Values
+from sim.effects.bond_softening import in_series
 
+TILTS = np.array([0.0, 0.0, 0.0, 1.0, 1.0])
 DAMPING_RATIO = 0.002
 """Of the web at the structure's damping frequency: half a loss factor of 0.004, a metal part with pressed-on rings."""
 
 
 def chain(spindle: Spindle, condition: Condition, values: Values, chain: RotorBase) -> RotorBase:
-    compliance = values["compliance"] * 1e-6
+    if values["compliance"] == 0.0:
+        return chain
+    seats, compliance = values["seat_share"] * values["compliance"] * 1e-6, (1 - values["seat_share"]) * values["compliance"] * 1e-6
+    if seats > 0.0:
+        chain = replace(chain, elements=tuple(seated(e, seats) if e.group == "bearings" else e for e in chain.elements))
     if compliance == 0.0:
         return chain
     hub = next(b for b in chain.bodies if b.turns)
@@ -25,6 +31,12 @@ def chain(spindle: Spindle, condition: Condition, values: Values, chain: RotorBa
     web = Element(f"{hub.name} web", "hub", hub.name, rim.name, hub.z, stiffness, damping)
     bodies = tuple(middle if b.name == hub.name else b for b in chain.bodies)
     return replace(chain, bodies=(*bodies, rim), elements=(*chain.elements, web))
+
+
+def seated(bearing: Element, compliance: float) -> Element:
+    """The bearing with its ring tilting in a seat of a compliance (rad/(N m)) without losses of its own."""
+    stiffness, damping = in_series(bearing.stiffness, bearing.damping, compliance * TILTS, 0.0, 1.0)
+    return replace(bearing, stiffness=stiffness, damping=damping)
 
 
 def divided(hub: Body, share: float) -> tuple[Body, Body]:
@@ -42,8 +54,9 @@ EFFECT = Effect(
     name="hub_flexibility",
     title="The hub's rim tilts on a compliant web",
     equation=(
-        "I_rim theta_r'' + G_rim theta_r' + k (theta_r - theta_h) = 0, k = 1 / compliance, I_rim = rim_share I_p / 2 about a diameter and "
-        "rim_share I_p about the axis, taken off the hub; below resonance the hub's inertia grows: "
+        "I_rim theta_r'' + G_rim theta_r' + k (theta_r - theta_h) = 0, I_rim = rim_share I_p / 2 about a diameter and "
+        "rim_share I_p about the axis, taken off the hub; k = 1 / ((1 - seat_share) compliance), "
+        "and every ring tilts in the hub by seat_share compliance, K (1 + C K)^-1; below resonance the hub's inertia grows: "
         "I(w) = I_h + I_rim / (1 - w^2 I_rim / k); annular web k = E t^3 / alpha (Roark & Young, Formulas for Stress and Strain, 1989)"
     ),
     parameters=(
@@ -69,6 +82,16 @@ EFFECT = Effect(
             limits=(0.05, 0.95),
             meaning="share of the hub's polar inertia that is on the rim",
             source="yoke, magnet and the plate beyond the hub body of a disk-drive hub: 63 % by its section",
+        ),
+        Parameter(
+            "seat_share",
+            "1",
+            neutral=0.0,
+            typical=0.0,
+            prior_sd=0.4,
+            limits=(0.0, 1.0),
+            meaning="share of the compliance that is between the rings and the hub, not between hub and rim",
+            source="assumed: none, the hub is thick where it holds the rings",
         ),
     ),
     sees="rocking modes lower, the higher the mode the more, at every temperature; their split with speed changes; axial modes stay",

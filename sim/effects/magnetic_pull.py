@@ -12,17 +12,23 @@ from sim.effect import Effect, Parameter, Values
 
 
 def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
-    pull = values["pull"]
+    pull = pull_at(spindle, condition, values)
     if pull == 0.0:
         return spindle
     return replace(spindle, pair=replace(spindle.pair, axial_bias=spindle.pair.axial_bias - pull))
 
 
+def pull_at(spindle: Spindle, condition: Condition, values: Values) -> float:
+    """The pull (N) at a condition: it goes with the square of the magnet's remanence."""
+    rise = condition.temperature - spindle.reference_temperature
+    return float(values["pull"] * max(1 + 1e-2 * values["remanence_slope"] * rise, 0.0) ** 2)
+
+
 def chain(spindle: Spindle, condition: Condition, values: Values, chain: RotorBase) -> RotorBase:
-    stiffness = abs(values["pull"]) * values["radial_ratio"] * 1e3
+    stiffness = abs(pull_at(spindle, condition, values)) * values["radial_ratio"] * 1e3
     if stiffness == 0.0:
         return chain
-    across = np.diag([-stiffness, -stiffness, 0.0, 0.0, 0.0])
+    across = np.diag([-stiffness, -stiffness, values["axial_ratio"] * stiffness, 0.0, 0.0])
     structure = spindle.structure
     element = Element("magnet", "motor", stator_body(spindle), structure.outer_body, magnet_height(spindle), across, np.zeros((5, 5)))
     return replace(chain, elements=(*chain.elements, element))
@@ -45,8 +51,9 @@ EFFECT = Effect(
     name="magnetic_pull",
     title="Magnetic pull of the motor on the hub",
     equation=(
-        "axial force on the hub F_z = -pull in the pair's equilibrium (Jang et al. 2003, Eq. 8); between stator and hub "
-        "K = diag(-k, -k, 0, 0, 0) at the magnet's height, k = radial_ratio |pull|: the pull grows as the gap closes"
+        "axial force on the hub F_z = -P, P = pull (1 + remanence_slope (T - T_ref))^2, in the pair's equilibrium (Jang et al. 2003, "
+        "Eq. 8); between stator and hub K = diag(-k, -k, axial_ratio k, 0, 0) at the magnet's height, k = radial_ratio |P|: "
+        "the pull grows as the gap closes; axial_ratio 2 without iron (Earnshaw: div grad of the energy is 0)"
     ),
     parameters=(
         Parameter(
@@ -68,6 +75,26 @@ EFFECT = Effect(
             limits=(0.0, 200.0),
             meaning="negative radial stiffness over axial pull",
             source="assumed: air-gap field energy changing over a gap of some tenths of a millimetre, several times the axial pull",
+        ),
+        Parameter(
+            "axial_ratio",
+            "1",
+            neutral=0.0,
+            typical=0.0,
+            prior_sd=1.0,
+            limits=(0.0, 2.0),
+            meaning="restoring axial stiffness of the magnet over the negative radial one",
+            source="2 between magnets without iron (Earnshaw's theorem), less where iron saturates; left out by default",
+        ),
+        Parameter(
+            "remanence_slope",
+            "%/K",
+            neutral=-0.12,
+            typical=-0.12,
+            prior_sd=0.05,
+            limits=(-0.3, 0.0),
+            meaning="change of the magnet's remanence with temperature",
+            source="sintered NdFeB -0.12 %/K, ferrite -0.2, SmCo -0.04 (makers' data sheets)",
         ),
     ),
     sees=(

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from model.machine import Condition, Spindle
 from sim.effect import Effect, Parameter, Values
 from sim.effects.mount_compliance import RISE, role, with_stiffness
 
 
 def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
-    axial = values["stiffening"] * (condition.temperature - spindle.reference_temperature) / RISE
+    axial = values["stiffening"] * beyond(condition.temperature - spindle.reference_temperature, values["play"]) / RISE
     if axial == 0.0:
         return spindle
     plates = [j.name for j in spindle.structure.joints if role(spindle, j) == "plate"]
@@ -16,12 +18,17 @@ def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
     return with_stiffness(spindle, dict.fromkeys(plates, 1 + axial), dict.fromkeys(plates, 1 + tilt))
 
 
+def beyond(value: float, play: float) -> float:
+    """What is left of a value, of either sign, after a play."""
+    return float(np.sign(value) * max(abs(value) - play, 0.0))
+
+
 EFFECT = Effect(
     name="plate_prestress",
     title="Thermal stress in the base plate",
     equation=(
-        "k = k_0 (1 + N / N_cr), N in-plane force per length (tension positive), N / N_cr = stiffening (T - T_ref) / 40 K for axial "
-        "motion and tilt_share times that for tilts; clamped disc N_cr = 14.68 D / a^2, with one nodal diameter 26.37 D / a^2, "
+        "k = k_0 (1 + N / N_cr), N in-plane force per length (tension positive), N / N_cr = stiffening (T - T_ref -+ play) / 40 K for axial "
+        "motion and tilt_share times that for tilts, 0 within the play; clamped disc N_cr = 14.68 D / a^2, with one nodal diameter 26.37 D / a^2, "
         "D = E t^3 / 12 (1 - nu^2), held at its rim N = E t Delta_alpha Delta_T / (1 - nu) "
         "(Timoshenko & Gere, Theory of Elastic Stability, 1961)"
     ),
@@ -49,9 +56,19 @@ EFFECT = Effect(
             meaning="relative change of the plate's tilt stiffness over that of its axial one",
             source="14.68 / 26.37: buckling loads of a clamped disc without and with one nodal diameter",
         ),
+        Parameter(
+            "play",
+            "K",
+            neutral=0.0,
+            typical=0.0,
+            prior_sd=5.0,
+            limits=(0.0, 35.0),
+            meaning="change of temperature, up or down, that the screws' play takes before the plate is held",
+            source="assumed: held from the start; 1 um of play in 30 mm of aluminium on steel is 3 K",
+        ),
     ),
     sees="axial modes of the plate rise (tension) or fall with temperature against the model, rocking ones less; nothing at the reference",
     resembles=("mount_compliance", "modulus_softening", "flange_fit_loosening"),
-    valid="far below the buckling load, linear in temperature; the plate stays flat (bowing is another effect)",
+    valid="far below the buckling load, linear in temperature beyond the play; the plate stays flat (bowing is another effect)",
     spindle=spindle,
 )

@@ -15,7 +15,7 @@ def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
         return spindle
     bodies = []
     for body in spindle.structure.bodies:
-        here = values["turning_share"] * mass if body.turns else mass
+        here = values["turning_share" if body.turns else "standing_share"] * mass
         for point in spindle.points:
             if point.body == body.name and here > 0.0:
                 body = loaded(body, point, here)
@@ -46,18 +46,28 @@ EFFECT = Effect(
             typical=1.0,
             prior_sd=0.6,
             limits=(0.0, 100.0),
-            meaning="mass at every measuring point on a part that does not turn",
+            meaning="mass of a sensor",
             source="miniature accelerometers with their wax and cable end: 0.2 to 2 g by their makers' data sheets",
+        ),
+        Parameter(
+            "standing_share",
+            "1",
+            neutral=1.0,
+            typical=1.0,
+            prior_sd=0.5,
+            limits=(0.0, 1.0),
+            meaning="mass at every measuring point on a part that does not turn, in sensors",
+            source="one a point; none where these are looked at by light",
         ),
         Parameter(
             "turning_share",
             "1",
             neutral=0.02,
             typical=0.02,
-            prior_sd=0.02,
+            prior_sd=0.5,
             limits=(0.0, 1.0),
-            meaning="mass at every measuring point on the turning part, over that on the others",
-            source="assumed: 1 cm2 of retroreflective tape, 0.2 kg/m2",
+            meaning="the same on the turning part",
+            source="assumed: 1 cm2 of retroreflective tape, 0.2 kg/m2; sensors too where it was hit at rest",
         ),
     ),
     sees="modes that move the sensors' parts lie lower, the same at every temperature and speed; gone when sensors are moved",

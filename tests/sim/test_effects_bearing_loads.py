@@ -14,16 +14,23 @@ from sim.operating import operating_point
 from tests.effect_points import REST, at
 
 
-@pytest.mark.parametrize("pull", [3.0, -2.0])
-def test_magnet_shares_its_pull_between_the_bearings(spindle, pull):
-    """Statics: what the lower bearing carries more than the upper one is the downward pull."""
-    lower, upper = at(spindle, REST, magnetic_pull, pull=pull).state.bearings
-    assert lower.preload - upper.preload == pytest.approx(pull, rel=1e-9)
+@pytest.mark.parametrize(("pull", "slope", "there"), [(3.0, 0.0, 3.0), (-2.0, 0.0, -2.0), (3.0, -0.12, 3.0 * 0.952**2)])
+def test_magnet_shares_its_pull_between_the_bearings(spindle, pull, slope, there):
+    """Statics: what the lower bearing carries more than the upper one is the downward pull, less by its remanence 40 K above 20 C."""
+    lower, upper = at(spindle, REST, magnetic_pull, pull=pull, remanence_slope=slope).state.bearings
+    assert lower.preload - upper.preload == pytest.approx(there, rel=1e-9)
+
+
+def test_magnets_without_iron_hold_along_the_axis_what_they_push_across(spindle):
+    """Earnshaw: the stiffnesses of a magnet in another's field add up to nothing."""
+    magnet = at(spindle, REST, magnetic_pull, axial_ratio=2.0).chain.elements[-1]
+    assert np.trace(magnet.stiffness) == pytest.approx(0.0, abs=1e-6)
+    assert magnet.stiffness[2, 2] > 0
 
 
 def test_magnet_pushes_away_from_the_middle(spindle):
     """The force on a hub displaced by 1 um against the seat is 30 nN/nm outward, also when the seat tilts under it (lever 3 mm)."""
-    point = at(spindle, REST, magnetic_pull)
+    point = at(spindle, Condition(20.0), magnetic_pull)
     dofs = list(matrices(point.chain).dofs)
     without = replace(point.chain, elements=point.chain.elements[:-1])
     change = matrices(point.chain).stiffness - matrices(without).stiffness

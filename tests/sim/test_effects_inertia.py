@@ -36,7 +36,7 @@ def test_hub_flexibility_against_two_tilting_discs(spindle, share, speed):
     hub = Body("hub", 0.026, (across, across, polar), 0.0, ("tilt_x", "tilt_y"), True, ())
     spring = Element("support", "bearings", "ground", "hub", 0.0, np.diag([0, 0, 0, support, support]), NONE)
     chain = hub_flexibility.EFFECT.chain(
-        spindle, REST, {"compliance": compliance * 1e6, "rim_share": share}, RotorBase((hub,), (spring,), speed)
+        spindle, REST, {"compliance": compliance * 1e6, "rim_share": share, "seat_share": 0.0}, RotorBase((hub,), (spring,), speed)
     )
     web = chain.elements[-1]
     found = undamped(replace(chain, elements=(spring, replace(web, damping=NONE))))
@@ -45,6 +45,18 @@ def test_hub_flexibility_against_two_tilting_discs(spindle, share, speed):
     outer = np.poly1d([-rim / 2, rim * speed, k])
     exact = sorted(np.abs((middle * outer - k**2).roots.real) / (2 * np.pi))
     assert found == pytest.approx(exact, rel=1e-8)
+
+
+def test_hub_flexibility_in_the_seats_of_the_rings(spindle):
+    """A moment of 1 N m through one bearing alone, its ring free to move sideways: its tilt is more by the compliance of the seat; so is
+    the hub's web by the rest."""
+    plain, point = operating_point(spindle, REST, ()), at(spindle, REST, hub_flexibility, compliance=200.0, seat_share=0.25)
+    for name in ("lower", "upper"):
+        old, new = (np.linalg.inv(next(e.stiffness for e in p.chain.elements if e.name == name)) for p in (plain, point))
+        assert new - old == pytest.approx(np.diag([0, 0, 0, 50e-6, 50e-6]), abs=1e-12)
+    assert point.chain.elements[-1].stiffness[3, 3] == pytest.approx(1 / 150e-6, rel=1e-12)
+    all_in_seats = at(spindle, REST, hub_flexibility, compliance=200.0, seat_share=1.0)
+    assert [b.name for b in all_in_seats.chain.bodies] == [b.name for b in plain.chain.bodies]
 
 
 def test_hub_flexibility_keeps_the_hub_whole(spindle):
@@ -57,7 +69,7 @@ def test_hub_flexibility_damping_of_the_web(spindle):
     """A rim alone on its web, tuned to the structure's damping frequency (1500 Hz), has a damping ratio of 0.2 %."""
     rim = 1e-6
     compliance = 1 / (rim * (2 * np.pi * 1500) ** 2)
-    values = {"compliance": 1e6 * compliance, "rim_share": 0.5}
+    values = {"compliance": 1e6 * compliance, "rim_share": 0.5, "seat_share": 0.0}
     hub = Body("hub", 0.03, (rim, rim, 4 * rim), 0.0, ("tilt_x", "tilt_y"), True, ())
     web = hub_flexibility.EFFECT.chain(spindle, REST, values, RotorBase((hub,), (), 0.0)).elements[0]
     alone = RotorBase((Body("hub rim", 0.01, (rim, rim, 2 * rim), 0.0, ("tilt_x", "tilt_y"), True, ()),), (replace(web, a="ground"),), 0.0)
