@@ -10,7 +10,7 @@ from scipy.stats import chi2 as chi_squared
 from diagnosis.decide import AHEAD, Diagnosis, decide
 from diagnosis.fit import Fit, fit, linearise
 from diagnosis.many_fits import Task, side_by_side
-from diagnosis.screening import CLEAR, screen, starts
+from diagnosis.screening import CLEAR, Signature, screen, starts
 from diagnosis.theory import Theory
 from model.ball_row import Array
 from sim.effect import Effect
@@ -64,8 +64,8 @@ def explain(
         again = [task for f in close for task in ((*_again(f), f.nuisance), (*_exactly(f), f.nuisance))]
         fits |= _best([*close, *side_by_side(theory, about, again, True, workers)])
         best = max(fits.values(), key=lambda f: f.evidence)
-        seconds = [s.effect for s in screen(theory, best, catalogue, 0.1)[:PAIRED] if s.gain > 2 * AHEAD]
-        pairs = _best(side_by_side(theory, about, [(*_again(best, e), None) for e in seconds], True, workers))
+        seconds = [s for s in screen(theory, best, catalogue, 0.1)[:PAIRED] if s.gain > 2 * AHEAD]
+        pairs = _best(side_by_side(theory, about, [(*_beside(best, s), None) for s in seconds], True, workers))
         level = [f for f in pairs.values() if abs(best.evidence - f.evidence) < NEAR]
         again = [task for f in level for task in ((*_again(f), f.nuisance), (*_exactly(f), f.nuisance))]
         fits |= pairs | _best([*level, *side_by_side(theory, about, again, True, workers)])
@@ -77,13 +77,15 @@ def explain(
     return decide(theory, base, list(fits.values()), signatures)
 
 
-def _again(found: Fit, more: Effect | None = None) -> Task:
-    """The effects of a fit from where it came to rest, and one more at a small size."""
-    values = [found.values[e.name][p.name] for e in found.effects for p in e.parameters]
-    if more is None:
-        return found.effects, values
-    main = more.parameters[0]
-    return (*found.effects, more), [*values, main.neutral + 0.2 * (main.typical - main.neutral), *more.typical_list()[1:]]
+def _again(found: Fit) -> Task:
+    """The effects of a fit from where it came to rest."""
+    return found.effects, [found.values[e.name][p.name] for e in found.effects for p in e.parameters]
+
+
+def _beside(found: Fit, more: Signature) -> Task:
+    """The same and one more effect, as large as screening beside them expects."""
+    effects, values = _again(found)
+    return (*effects, more.effect), [*values, *starts(more)[0]]
 
 
 def _exactly(found: Fit) -> Task:

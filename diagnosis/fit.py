@@ -105,7 +105,7 @@ def fit(
     nuisance: Array | None = None,
     steps: int = 8,
 ) -> Fit:
-    """Best nuisance and effect parameters from one start (the effects' typical values by default).
+    """Best nuisance and effect parameters from one start (the effects' typical values by default); parameters with choices stay there.
 
     The data are tempered: their errors are first taken much larger than they are, so that effects find their size while tolerances
     stay where they are believed, then smaller down to the truth. A thorough fit takes the derivative by nuisance parameters anew
@@ -118,8 +118,9 @@ def fit(
     low, high = (np.array([p.limits[i] for p in rows]) for i in (0, 1))
     width = np.array([p.prior_sd for p in rows])
     sizes = {id(e.parameters[0]) for e in effects}
-    middle = np.array([p.neutral if id(p) in sizes else p.typical for p in rows])
     theta = np.array([p.typical for p in rows] if start is None else start, float)
+    chosen = np.array([bool(p.choices) for p in rows], bool)  # stay as they are; the caller tries one after the other
+    middle = np.where(chosen, theta, np.array([p.neutral if id(p) in sizes else p.typical for p in rows]))
     x = np.zeros(len(theory.sd)) if nuisance is None else nuisance.copy()
     scale = np.concatenate([theory.sd, width])
 
@@ -158,7 +159,8 @@ def fit(
         current, damping = cost(m, x, theta), 1e-3
         before = current
         for _ in range(steps if thorough else ROUGH):
-            for j, w in enumerate(width):
+            for j in np.flatnonzero(~chosen):
+                w = width[j]
                 h = 0.02 * w if theta[j] + 0.02 * w <= high[j] else -0.02 * w
                 moved = theta.copy()
                 moved[j] += h
@@ -188,7 +190,8 @@ def fit(
     white = whiten @ np.hstack([by_nuisance, by_theta]) * scale
     normal = white.T @ white + np.eye(len(scale))
     covariance = np.linalg.inv(normal) * np.outer(scale, scale)
-    sd = np.sqrt(np.diag(covariance))
+    sd = np.sqrt(np.diag(covariance)) * ~np.concatenate([np.zeros(len(x), bool), chosen])
+    one_of = float(sum(np.log(len(p.choices)) for p in rows if p.choices))  # all equally likely beforehand
     residual = data.value - m
     numbers = iter(range(len(x), len(x) + len(rows)))
     index = {e.name: {p.name: next(numbers) for p in e.parameters} for e in effects}
@@ -207,7 +210,7 @@ def fit(
         residual,
         float(np.sum((data.whiten @ residual) ** 2)),
         current,
-        -0.5 * current - 0.5 * float(np.linalg.slogdet(normal)[1]) + float(np.sum(np.log(np.diag(whiten) / np.diag(data.whiten)))),
+        -0.5 * current - 0.5 * float(np.linalg.slogdet(normal)[1]) - one_of + float(np.sum(np.log(np.diag(whiten) / np.diag(data.whiten)))),
         whiten,
         np.hstack([by_nuisance, by_theta]),
         at_limit,

@@ -96,11 +96,13 @@ def screen(theory: Theory, found: Fit, catalogue: Sequence[Effect], share: float
 
 
 def variations(effect: Effect) -> list[dict[str, float]]:
-    """Typical values, and one after the other every parameter but the first a prior width up and down, inside its limits."""
+    """Typical values, and one after the other every parameter but the first a prior width up and down, inside its limits, or at each of
+    its other choices."""
     typical = effect.typical()
     found = [typical]
     for p in effect.parameters[1:]:
-        ends = {float(np.clip(p.typical + sign * p.prior_sd, *p.limits)) for sign in (1, -1)} - {p.typical}
+        ends = {float(np.clip(p.typical + sign * p.prior_sd, *p.limits)) for sign in (1, -1)} if not p.choices else set(p.choices)
+        ends -= {p.typical}
         found += [typical | {p.name: end} for end in sorted(ends)]
     return found
 

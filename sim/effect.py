@@ -55,6 +55,12 @@ def bearing_parameter(source: str) -> Parameter:
     return Parameter("bearing", "1", 0.0, 1.0, 1.0, (0.0, 1.0), meaning, source, choices=(0.0, 1.0))
 
 
+def channel_parameter(meaning: str) -> Parameter:
+    """Which response channel is meant, counted from 1; 0 for the ordinary case of many."""
+    source = "a whole group of channels is assumed; one alone where a sensor or its amplifier is set wrongly"
+    return Parameter("channel", "1", 0.0, 0.0, 1.0, (0.0, 16.0), meaning, source, choices=tuple(float(c) for c in range(17)))
+
+
 def phase_parameter(meaning: str) -> Parameter:
     """An azimuth (deg) of which nothing is known."""
     source = "any azimuth is as likely as another: the standard deviation is that of a uniform angle"

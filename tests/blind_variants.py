@@ -154,7 +154,8 @@ def _candidate(c: Candidate) -> dict[str, Any]:
 
 
 def outcome(row: dict[str, Any]) -> str:
-    """right: nothing named where nothing (or nothing in the catalogue) was hidden; half: one of two effects named, and nothing else."""
+    """right: nothing named where nothing (or nothing in the catalogue) was hidden; half: one of two effects named, and nothing else; wrong
+    is also what names one effect too many."""
     verdict, named = row["verdict"], set(row["effects"])
     if not row["variants"]:
         return "right" if verdict == "none" else "false alarm"
@@ -166,9 +167,9 @@ def outcome(row: dict[str, Any]) -> str:
         return "missed"
     there = [any(name in named for name in names) for names in row["truth"]]
     all_true = named <= {name for names in row["truth"] for name in names}
-    if all(there):
-        return "identified" if all_true and verdict != "ambiguous" else "in the set"
-    return "half" if any(there) and all_true else "wrong"
+    if verdict == "ambiguous":
+        return "in the set" if all(there) else "half" if all_true else "wrong"
+    return ("identified" if all(there) else "half") if all_true else "wrong"
 
 
 def show(console: Console, rows: list[dict[str, Any]]) -> None:

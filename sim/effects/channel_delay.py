@@ -8,21 +8,23 @@ import numpy as np
 
 from model.machine import Condition, Spindle
 from model.rotor_base import RotorBase
-from sim.effect import Effect, Measurement, Parameter, Values
+from sim.effect import Effect, Measurement, Parameter, Values, channel_parameter
 
 
 def measurement(spindle: Spindle, condition: Condition, values: Values, chain: RotorBase, measurement: Measurement) -> Measurement:
     first = values["delay"] * 1e-6
     if first == 0.0:
         return measurement
-    later = first * (1 + values["skew"] * np.arange(len(measurement.delay)))
+    count = np.arange(len(measurement.delay))
+    only = values["channel"]
+    later = first * (count + 1 == only) if only else first * (1 + values["skew"] * count)
     return replace(measurement, delay=measurement.delay + later)
 
 
 EFFECT = Effect(
     name="channel_delay",
     title="Delay of the response channels against the force",
-    equation="Y_i(omega) -> exp(-i omega tau_i) Y_i(omega), tau_i = delay (1 + skew i), i = 0, 1, ... in the order of the points",
+    equation="Y_i(omega) -> exp(-i omega tau_i) Y_i(omega), tau_i = delay (1 + skew i), i = 0, 1, ... in the order of the points; of one channel alone where one is told",
     parameters=(
         Parameter(
             "delay",
@@ -44,6 +46,7 @@ EFFECT = Effect(
             meaning="further delay from one channel to the next over the first's: a multiplexer",
             source="assumed: multiplexed converters take 1 to 10 us a channel; simultaneous ones have none",
         ),
+        channel_parameter("which channel is late: 0 all of them, 1 the first in the order of the points, and so on"),
     ),
     sees=(
         "phase falls in proportion to frequency: driving-point FRFs lose their positive real part, one-mode circles turn; "

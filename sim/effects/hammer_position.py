@@ -18,6 +18,8 @@ def measurement(spindle: Spindle, condition: Condition, values: Values, chain: R
     direction = np.radians(values["direction"])
     aimed = [spindle.point(node) for node in spindle.hammer.hammer_nodes]
     missed = np.array([point_row(chain, off(p, offset, direction)) - point_row(chain, p) for p in aimed])
+    if values["node"]:
+        missed[np.arange(len(aimed)) + 1 != values["node"]] = 0.0
     return replace(measurement, reference_rows=measurement.reference_rows + missed)
 
 
@@ -50,11 +52,22 @@ EFFECT = Effect(
             typical=2.0,
             prior_sd=1.5,
             limits=(-20.0, 20.0),
-            meaning="distance of the mean impact from the node, the same at all hammer nodes",
+            meaning="distance of the mean impact from the node, the same at every node that is missed",
             source="assumed: hits by hand with a 2 to 5 mm tip scatter by a tip's width",
         ),
         direction_parameter(
             60.0, 180.0, "direction of the miss on the struck face: 0 outward (upward on a side face), 90 tangential, counterclockwise"
+        ),
+        Parameter(
+            "node",
+            "1",
+            neutral=0.0,
+            typical=0.0,
+            prior_sd=1.0,
+            limits=(0.0, 4.0),
+            meaning="which hammer node is missed: 0 all of them, 1 the scene's first, and so on",
+            source="assumed: whoever hits beside one hits beside all",
+            choices=(0.0, 1.0, 2.0, 3.0, 4.0),
         ),
     ),
     sees=(

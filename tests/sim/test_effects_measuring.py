@@ -18,7 +18,7 @@ def ideal(spindle):
 
 
 def test_sensor_gain_multiplies_its_channels(spindle):
-    ratio = at(spindle, RUNNING, sensor_gain, hub_gain=0.1, base_gain=-0.05).frf(LINES) / ideal(spindle)
+    ratio = at(spindle, RUNNING, sensor_gain, gain=0.1, rest_gain=-0.05).frf(LINES) / ideal(spindle)
     on_hub = [p.body == "hub" for p in spindle.points]
     assert ratio[on_hub] == pytest.approx(1.1, rel=1e-12)
     assert ratio[np.invert(on_hub)] == pytest.approx(0.95, rel=1e-12)
@@ -33,6 +33,28 @@ def test_channel_delay_turns_the_phase(spindle, skew, last):
     turn = np.unwrap(np.angle(point.frf(LINES)[[0, 6]] / ideal(spindle)[[0, 6]]))
     slope = np.polyfit(LINES, turn[:, 0].T, 1)[0]
     assert slope == pytest.approx(-2 * np.pi * np.array([50e-6, last]), rel=1e-9)
+
+
+def test_one_channel_alone_is_late_or_wrong(spindle):
+    for module, values, third in ((channel_delay, {"delay": 50.0}, np.exp(-2j * np.pi * LINES * 50e-6)), (sensor_gain, {"gain": 0.1}, 1.1)):
+        ratio = at(spindle, RUNNING, module, **values, channel=3.0).frf(LINES) / ideal(spindle)
+        assert ratio[2] == pytest.approx(np.broadcast_to(third, ratio[2].shape), rel=1e-9)
+        assert np.delete(ratio, 2, axis=0) == pytest.approx(1.0, rel=1e-12)
+
+
+def test_a_window_in_some_tests_only(spindle):
+    still = Condition(60.0)
+    for tests, here, there in ((0.0, 8.0, 8.0), (1.0, 8.0, 0.0), (2.0, 0.0, 8.0)):
+        found = [at(spindle, c, window_damping, decay=8.0, tests=tests).measurement.decay for c in (RUNNING, still)]
+        assert found == [here, there]
+
+
+def test_hammer_position_of_one_node(spindle):
+    both, first = (at(spindle, RUNNING, hammer_position, offset=2.0, node=n).measurement.reference_rows for n in (0.0, 1.0))
+    plain = operating_point(spindle, RUNNING, ()).measurement.reference_rows
+    assert np.array_equal(first[0], both[0])
+    assert np.array_equal(first[1], plain[1])
+    assert not np.array_equal(both[1], plain[1])
 
 
 def test_window_damping_against_a_windowed_impulse_response(spindle):
