@@ -17,7 +17,8 @@ from sim.effect import Effect
 AHEAD = 5.0  # ln evidence by which it must lead every rival to be identified
 OF_ALL = 0.01  # share of its ln evidence by which it must lead, where that is more: laws are not exact
 SURE = float(np.log(20.0))  # ln odds that such a lead is worth
-PAIR_OF_ALL = 0.05  # share of its ln evidence that the second effect of a pair must bring
+PAIR_OF_ALL = 0.02  # share of its ln evidence that the second effect of a pair must bring to be needed
+MORE = 0.9  # held-out error ratio of a pair over that of its best member up to which it predicts more
 WIDE = 2.0  # times the lead that identifies: rivals within it stay in the set, where there is one
 STRAINED = 4.0  # standard deviations at which a tolerance is an explanation of its own
 THERE = 3.0  # standard errors by which both effects of a pair must differ from none
@@ -92,8 +93,8 @@ def decide(theory: Theory, base: Fit, fits: list[Fit], signatures: list[Signatur
     before, count = held_out(theory, base)
     rms_before = float(np.sqrt(before / count))
     whole = max(f.evidence for f in fits) - base.evidence
-    ahead = max(AHEAD, OF_ALL * whole)
-    candidates = _rated(theory, base, fits, ahead, max(CLEAR, PAIR_OF_ALL * whole))
+    ahead, pair = max(AHEAD, OF_ALL * whole), max(CLEAR, PAIR_OF_ALL * whole)
+    candidates = _rated(theory, base, fits, ahead, pair)
     lead = candidates[0]
     rejected = chi_squared.sf(base.chi2, n) < MISFIT
 
@@ -109,15 +110,23 @@ def decide(theory: Theory, base: Fit, fits: list[Fit], signatures: list[Signatur
     if chi_squared.sf(lead.fit.chi2, n) < MISFIT or worse or lead.delta_evidence < CLEAR:
         return answer("unexplained", (), f"The model is rejected (misfit {base.misfit:.0f} for {n} numbers), and even with "
                       f"{named} a misfit of {lead.fit.misfit:.0f} is left.")  # fmt: skip
-    alike = [c for c in candidates if len(c.effects) == len(lead.effects) and all(_there(c.fit, e) for e in c.fit.effects[1:])]
+    alike = [c for c in candidates if len(c.effects) == len(lead.effects)]
     rivals = [c for c in alike if lead.delta_evidence - c.delta_evidence < ahead]
     if len(rivals) > 1:
         rivals = [c for c in alike if lead.delta_evidence - c.delta_evidence < WIDE * ahead]
         names = sorted({name for c in rivals for name in c.effects})
         return answer("ambiguous", names, f"{', '.join(names)} explain the data within {WIDE * ahead:.0f} in ln evidence of each other.")
+    more = [
+        c for c in candidates if c.delta_evidence + pair - lead.delta_evidence > ahead and c.held_out_ratio < MORE * lead.held_out_ratio
+    ]
+    perhaps = [c for c in more if len(c.effects) > len(lead.effects)]
+    if perhaps:
+        names, gain = sorted({*lead.effects, *perhaps[0].effects}), perhaps[0].delta_evidence + pair - lead.delta_evidence
+        return answer("ambiguous", names, f"{named} explains most, {' + '.join(perhaps[0].effects)} {gain:.0f} in ln evidence more, where "
+                      f"{pair:.0f} is asked of a second effect.")  # fmt: skip
     if len(lead.effects) == 2 and lead.believable:
         return answer("two effects", lead.effects, f"{lead.effects[0]} and {lead.effects[1]} are both needed: dropping either costs more "
-                      f"than {max(CLEAR, PAIR_OF_ALL * whole):.0f} in ln evidence.")  # fmt: skip
+                      f"than {pair:.0f} in ln evidence.")  # fmt: skip
     if lead.believable and lead.held_out_ratio < FALLS:
         return answer("identified", lead.effects, f"{named} leads every other explanation by more than {ahead:.0f} in ln evidence; "
                       f"the error on left-out conditions falls to {100 * lead.held_out_ratio:.0f} %.")  # fmt: skip
@@ -127,10 +136,12 @@ def decide(theory: Theory, base: Fit, fits: list[Fit], signatures: list[Signatur
 
 
 def _rated(theory: Theory, base: Fit, fits: Sequence[Fit], ahead: float, pair: float) -> list[Candidate]:
-    """Candidates, the best first; two effects at once are believed less than one beforehand, by `pair` in ln odds.
+    """Candidates, the best first, without pairs of which one effect is not there; two effects at once are believed less than one
+    beforehand, by `pair` in ln odds.
 
     A lead of `ahead` counts as 95 %: blind campaigns did not bear out more.
     """
+    fits = [f for f in fits if len(f.effects) == 1 or all(_there(f, e) for e in f.effects)]
     logs = np.array([0.0, *(f.evidence - base.evidence - pair * (len(f.effects) - 1) for f in fits)])
     weights = np.exp((logs - logs.max()) * SURE / ahead)
     weights /= weights.sum()

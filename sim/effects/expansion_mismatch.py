@@ -1,4 +1,4 @@
-"""The hub's material, or that of the bearing rings, expands more or less than its data sheet says."""
+"""The hub's material, or that of the bearing rings or the shaft, expands more or less than its data sheet says."""
 
 from __future__ import annotations
 
@@ -6,18 +6,37 @@ from dataclasses import replace
 
 import numpy as np
 
-from model.machine import Condition, Law, Region, Spindle
+from model.machine import Condition, Law, Material, Region, Spindle
 from sim.effect import Effect, Parameter, Values
 
 
 def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
-    hub, rings = values["hub_expansion"], values["ring_share"] * values["hub_expansion"]
-    for name, error in ((main_material(spindle), hub), (spindle.bearings[0].ring_material, rings)):
+    hub = values["hub_expansion"]
+    for name, error in ((main_material(spindle), hub), (spindle.bearings[0].ring_material, values["ring_share"] * hub)):
         if error != 0.0:
-            law = spindle.materials[name].thermal_expansion
-            scaled = replace(spindle.materials[name], thermal_expansion=Law(law.temperature, tuple(v * (1 + error) for v in law.value)))
-            spindle = replace(spindle, materials={**spindle.materials, name: scaled})
-    return spindle
+            spindle = with_material(spindle, expanding(spindle.materials[name], error))
+    return spindle if values["shaft_share"] * hub == 0.0 else with_shaft(spindle, values["shaft_share"] * hub)
+
+
+def expanding(material: Material, error: float) -> Material:
+    law = material.thermal_expansion
+    return replace(material, thermal_expansion=Law(law.temperature, tuple(v * (1 + error) for v in law.value)))
+
+
+def with_material(spindle: Spindle, material: Material) -> Spindle:
+    return replace(spindle, materials={**spindle.materials, material.name: material})
+
+
+def with_shaft(spindle: Spindle, error: float) -> Spindle:
+    """The standing body's parts but its bearing rings, of a steel of their own."""
+    structure = spindle.structure
+    standing = structure.body(structure.inner_body if spindle.pair.turning_ring == "outer" else structure.outer_body)
+    rings = {name for b in spindle.bearings for name in (b.inner_ring, b.outer_ring)}
+    shaft = [g for g in spindle.regions if g.name in standing.regions and g.name not in rings]
+    for name in {g.material for g in shaft}:
+        spindle = with_material(spindle, replace(expanding(spindle.materials[name], error), name=f"{name} of the shaft"))
+    regions = tuple(replace(g, material=f"{g.material} of the shaft") if g in shaft else g for g in spindle.regions)
+    return replace(spindle, regions=regions)
 
 
 def main_material(spindle: Spindle) -> str:
@@ -37,10 +56,10 @@ def ring_volume(region: Region) -> float:
 
 EFFECT = Effect(
     name="expansion_mismatch",
-    title="Thermal expansion of hub or rings differs from its data sheet",
+    title="Thermal expansion of hub, rings or shaft differs from its data sheet",
     equation=(
         "alpha_hub = (1 + hub_expansion) alpha_data sheet, for the material that fills most of the rotating part, wherever it is "
-        "used, and alpha_rings = (1 + ring_share hub_expansion) alpha_data sheet for the rings' material, of which shaft and balls may be too; ring motions follow by thermo-elastic influence: u = gain . strain"
+        "used, and alpha_rings = (1 + ring_share hub_expansion) alpha_data sheet for the rings' material, of which shaft and balls may be too, the shaft's further by shaft_share hub_expansion; ring motions follow by thermo-elastic influence: u = gain . strain"
     ),
     parameters=(
         Parameter(
@@ -62,6 +81,16 @@ EFFECT = Effect(
             limits=(-5.0, 5.0),
             meaning="relative error of the expansion coefficient of the rings' material over that of the hub's",
             source="bearing steel 11.5 to 12.5e-6/K by its makers and its retained austenite; stainless shafts 10 to 11e-6/K",
+        ),
+        Parameter(
+            "shaft_share",
+            "1",
+            neutral=0.0,
+            typical=0.0,
+            prior_sd=0.7,
+            limits=(-5.0, 5.0),
+            meaning="further relative error of the shaft's expansion coefficient, over that of the hub's",
+            source="the shaft's steel is another than the rings', by as much",
         ),
     ),
     sees="bearing modes fall more with temperature (less for a negative error), in proportion to the rise; nothing at the reference",

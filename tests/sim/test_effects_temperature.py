@@ -8,6 +8,7 @@ import pytest
 from model.machine import Condition, Friction, Law, Region
 from sim.effects import expansion_mismatch, loose_inserts, preload_loss, soak_lag, thermal_gradient
 from tests.effect_points import REST, RPM, RUNNING
+from tests.variants.thermal import shaft_steel
 from thermal import conduction, heat
 from thermal.expansion import expand
 from thermal.influence import influence
@@ -85,10 +86,23 @@ def bonded_rings(spindle, aluminium, height=0.1e-3):
 
 def test_expansion_error_against_the_bonded_rings(spindle):
     """u = 3.3646 um at 5 mm for 23e-6/K and 40 K (verification.md), from a sheet that says 10 % less; plane stress to 1e-3."""
-    thin = expansion_mismatch.EFFECT.spindle(bonded_rings(spindle, 23e-6 / 1.1), REST, {"hub_expansion": 0.1, "ring_share": 0.0})
+    thin = expansion_mismatch.EFFECT.spindle(
+        bonded_rings(spindle, 23e-6 / 1.1), REST, {"hub_expansion": 0.1, "ring_share": 0.0, "shaft_share": 0.0}
+    )
     motion = expand(thin, 60.0)[spindle.bearings[0].name]
     assert motion.outer_r == pytest.approx(3.3646e-6, rel=1e-3)
     assert motion.inner_r == pytest.approx(12.5e-6 * 40 * 3.752e-3, rel=1e-6)
+
+
+def test_a_shaft_of_another_steel_against_somebody_elses(spindle):
+    """Ring motions of a section whose shaft was told to be of another material, in a program of its own."""
+    values = {"hub_expansion": 1e-9, "ring_share": 0.0, "shaft_share": -0.08e9}
+    found, other = (expand(s, 60.0) for s in (expansion_mismatch.EFFECT.spindle(spindle, REST, values), shaft_steel(spindle, REST, 0.08)))
+    plain = expand(spindle, 60.0)
+    for name in found:
+        for key in ("inner_r", "inner_z", "outer_r", "outer_z"):
+            assert getattr(found[name], key) == pytest.approx(getattr(other[name], key), rel=1e-6, abs=1e-15)
+        assert found[name].inner_z != pytest.approx(plain[name].inner_z, rel=1e-3)
 
 
 @pytest.mark.parametrize("looseness", [0.0, 1.0])
