@@ -99,7 +99,7 @@ EFFECT = Effect(
             "1",
             neutral=1.0,
             typical=1.0,
-            prior_sd=0.5,
+            prior_sd=1.0,
             limits=(0.0, 1.0),
             meaning="how much of it translations feel: less than tilts where the fit opens at one end",
             source="assumed: all",

@@ -15,9 +15,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from model.machine import Condition, Spindle
-from model.pair import BearingState, PairState
-from sim.effect import Effect, Values, scale_parameter
+from model.machine import Bearing, Condition, Spindle
+from model.pair import BearingState, PairState, reference_deformation
+from sim.effect import Effect, Parameter, Values, scale_parameter
 
 COEFFICIENT = 1 / 32
 """Of a^2 in the small-amplitude law."""
@@ -30,8 +30,11 @@ def pair(spindle: Spindle, condition: Condition, values: Values, state: PairStat
     scale = values["scale"]
     if scale == 0.0 or condition.level == 0.0:
         return state
-    bearings = tuple(_softened(b, scale * amplitude(b, condition.level / len(state.bearings))) for b in state.bearings)
-    return replace(state, bearings=bearings)
+    force, bearings = condition.level / len(state.bearings), []
+    for b, drawn in zip(state.bearings, spindle.bearings, strict=True):
+        mounted = reference_amplitude(spindle, drawn, b, force)
+        bearings.append(_softened(b, scale * mounted * (amplitude(b, force) / mounted) ** values["softness_power"]))
+    return replace(state, bearings=tuple(bearings))
 
 
 def amplitude(b: BearingState, force: float) -> float:
@@ -39,6 +42,12 @@ def amplitude(b: BearingState, force: float) -> float:
     if b.deformation <= 0:
         return 0.0
     return force / (b.row.balls * np.sin(b.contact_angle) * b.ball_stiffness)
+
+
+def reference_amplitude(spindle: Spindle, drawn: Bearing, b: BearingState, force: float) -> float:
+    """The same in the state in which the pair was mounted."""
+    stiffness = 1.5 * b.row.constant * reference_deformation(spindle, drawn) ** 0.5
+    return float(force / (drawn.balls * np.sin(drawn.contact_angle) * stiffness))
 
 
 def describing_function(relative: float) -> float:
@@ -61,7 +70,8 @@ EFFECT = Effect(
     title="Hammer level softens the Hertz contacts",
     equation=(
         "K -> K k(a), k(a) = 2 / (1.5 pi a) int_0^pi max(1 + a cos t, 0)^1.5 cos t dt = 1 - a^2 / 32 - ..., "
-        "a = scale (level / 2) / (n sin(alpha) k_ball d0): the peak force, shared by the bearings, as a static axial load "
+        "a = scale (level / 2) / (n sin(alpha) k_ball d0): the peak force, shared by the bearings, as a static axial load, times "
+        "(c_ref / c)^(1 - softness_power) with c = 1 / (n sin(alpha) k_ball), where mass and damping rather than contacts limit the motion "
         "(harmonic balance: Nayfeh & Mook, Nonlinear Oscillations, 1979, ch. 2)"
     ),
     parameters=(
@@ -71,6 +81,16 @@ EFFECT = Effect(
             limits=(0.0, 5.0),
             meaning="ball vibration amplitude over the static deformation that the hammer's peak force would make",
             source="below 1 by the blow's shortness and the decay over the record, above 1 by resonance; set by the rig",
+        ),
+        Parameter(
+            "softness_power",
+            "1",
+            neutral=1.0,
+            typical=1.0,
+            prior_sd=1.0,
+            limits=(0.0, 1.0),
+            meaning="how the amplitude follows the compliance of the contacts as temperature changes it: 1 in proportion, 0 not at all",
+            source="1 for a slow push; at resonance the amplitude is the blow over mass and damping",
         ),
     ),
     sees="frequencies of bearing modes fall with the square of the hammer's level and most where preload is low; soft hits agree",

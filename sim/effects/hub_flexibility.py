@@ -88,7 +88,7 @@ EFFECT = Effect(
             "1",
             neutral=0.0,
             typical=0.0,
-            prior_sd=0.4,
+            prior_sd=1.0,
             limits=(0.0, 1.0),
             meaning="share of the compliance that is between the rings and the hub, not between hub and rim",
             source="assumed: none, the hub is thick where it holds the rings",

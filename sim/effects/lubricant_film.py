@@ -110,7 +110,7 @@ EFFECT = Effect(
             "1",
             neutral=1.0,
             typical=1.0,
-            prior_sd=0.5,
+            prior_sd=1.0,
             limits=(0.0, 1.0),
             meaning="share of the film that loads the pair: 1 between rings that stay where they are, 0 where a ring gives way",
             source="rings are bonded (paper); a spring preload would give way",

@@ -81,7 +81,7 @@ EFFECT = Effect(
             "1",
             neutral=0.0,
             typical=0.0,
-            prior_sd=1.0,
+            prior_sd=2.0,
             limits=(0.0, 2.0),
             meaning="restoring axial stiffness of the magnet over the negative radial one",
             source="2 between magnets without iron (Earnshaw's theorem), less where iron saturates; left out by default",

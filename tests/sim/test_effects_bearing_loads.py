@@ -108,3 +108,15 @@ def test_hammer_level_against_statics(spindle, cold):
     soft, hard = (at(spindle, replace(REST, level=x), hertz_amplitude).state.bearings[0].stiffness for x in (0.0, 5.0))
     assert np.array_equal(soft, operating_point(spindle, REST, []).state.bearings[0].stiffness)
     assert hard[2, 2] < soft[2, 2]
+
+
+def test_hammer_amplitude_that_does_not_follow_the_contacts(spindle):
+    """With power 0 the amplitude is that of the mounted pair at any temperature: at 20 C both are the same, at 60 C, softer, it is smaller."""
+    for condition, less in ((Condition(20.0, level=5.0), False), (replace(REST, level=5.0), True)):
+        following, fixed = (at(spindle, condition, hertz_amplitude, softness_power=p).state.bearings[0].stiffness[2, 2] for p in (1.0, 0.0))
+        assert fixed > following if less else fixed == pytest.approx(following, rel=1e-9)
+    hot = at(spindle, replace(REST, level=5.0), hertz_amplitude, softness_power=0.0).state.bearings[0]
+    b = operating_point(spindle, REST, []).state.bearings[0]
+    mounted = hertz_amplitude.amplitude(operating_point(spindle, Condition(20.0), []).state.bearings[0], 2.5)
+    factor = hertz_amplitude.describing_function(mounted / b.deformation)
+    assert hot.stiffness == pytest.approx(factor * b.stiffness, rel=1e-6)
