@@ -89,8 +89,10 @@ def screen(theory: Theory, found: Fit, catalogue: Sequence[Effect], share: float
         begin = typical.share if typical else share
         every = [typical, *(tried(effect, others, begin) for others in variations(effect)[1:])]
         if possible := [s for s in every if s is not None]:
-            # what the data could show is said of the typical effect, whichever variation fits them
             best = max(possible, key=lambda s: s.gain)
+            again = [tried(effect, others, begin) for others in choices(effect, best.others)]  # a choice may need the other parameter too
+            best = max([best, *(s for s in again if s is not None)], key=lambda s: s.gain)
+            # what the data could show is said of the typical effect, whichever variation fits them
             signatures.append(replace(best, visibility=possible[0].visibility, smallest=possible[0].smallest))
     return sorted(signatures, key=lambda s: -s.gain)
 
@@ -105,6 +107,11 @@ def variations(effect: Effect) -> list[dict[str, float]]:
         ends -= {p.typical}
         found += [typical | {p.name: end} for end in sorted(ends)]
     return found
+
+
+def choices(effect: Effect, values: dict[str, float]) -> list[dict[str, float]]:
+    """The same values with every other choice, one parameter after the other."""
+    return [values | {p.name: c} for p in effect.parameters[1:] for c in p.choices if c != values[p.name]]
 
 
 def starts(signature: Signature) -> list[list[float]]:

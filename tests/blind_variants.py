@@ -262,14 +262,14 @@ def shifts(console: Console, spindle: Spindle, wanted: Sequence[Variant]) -> Non
 
 def jobs(options: argparse.Namespace, wanted: Sequence[Variant]) -> list[Job]:
     """Sizes not told are drawn by the seed, evenly between just visible and large."""
-    found = [Job((), (), seed) for seed in range(options.none)]
-    for k in range(options.seeds):
+    found = [Job((), (), options.first + k) for k in range(options.none)]
+    for k in range(options.first, options.first + options.seeds):
         for i, v in enumerate(VARIANTS):
             seed = 1000 * (k + 1) + i
             drawn = [round(float(np.random.default_rng([seed, 31]).random()), 3)]
             found += [Job((v.name,), (s,), seed) for s in options.sizes or drawn if v in wanted]
     named = [v for v in wanted if v.truth]
-    for k in range(options.pairs):
+    for k in range(options.first, options.first + options.pairs):
         random = np.random.default_rng([k, 37])
         one, two = (named[i] for i in random.choice(len(named), 2, replace=False))
         if set(one.truth).isdisjoint(two.truth) and (one.plan is PLAN or two.plan is PLAN):
@@ -283,6 +283,7 @@ def main() -> int:
     parser.add_argument("--none", type=int, default=6, help="campaigns with nothing hidden")
     parser.add_argument("--pairs", type=int, default=0, help="campaigns with two variants (some draws are left out)")
     parser.add_argument("--seeds", type=int, default=1, help="campaigns of every variant")
+    parser.add_argument("--first", type=int, default=0, help="seed of the first campaign of each kind: another one, another study")
     parser.add_argument("--sizes", type=float, nargs="+", default=[], help="0 just visible to 1 large; drawn by default")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--limit", type=int, default=10**9, help="stop after so many new campaigns")
