@@ -77,6 +77,12 @@ def _verdict(answer: dict[str, Any]) -> str:
     return card + said + free + grid
 
 
+CANDIDATES = (
+    "ln evidence and left-out error are against the model without effects, probability among all tried; two effects at once are "
+    "believed less beforehand, by what a second effect must bring."
+)
+
+
 def _candidates(answer: dict[str, Any]) -> str:
     head = ["effects", "ln evidence", "probability", "left-out error, %", "value", "", "unit", "believable"]
     rows: list[list[tuple[str, int]]] = []
@@ -96,7 +102,7 @@ def _candidates(answer: dict[str, Any]) -> str:
                     (("yes" if c["believable"] else "no, at a limit") if first else "", 0),
                 ]
             )
-    return _grid("ln evidence and left-out error are against the model without effects, probability among all tried.", head, rows)
+    return _grid(CANDIDATES, head, rows)
 
 
 def _tests(answer: dict[str, Any]) -> str:
@@ -104,7 +110,7 @@ def _tests(answer: dict[str, Any]) -> str:
     for t in answer["next_test"]:
         times = "" if t["repeats"] == 1 else f"; {t['repeats']} of them make it 100 to 1"
         first, second = (escape(s) for s in t["separates"])
-        words = f"<h3>A test {escape(plan_words(t['condition']))}</h3><p>It tells {first} from {second} with odds of {_odds(t['odds'])} to 1{times}.</p>"
+        words = f"<h3>A test {escape(plan_words(t['condition']))}</h3><p>It tells {first} from {second} with odds of {_odds(t['odds'])} to 1{times}; most by {prose(t['tells'])}.</p>"
         most = max(len(rows) for rows in t["predicted"].values())
         rows = [
             [(escape(name), 0), *((_with_error(r["frequency_Hz"], r["sd_Hz"], 1), 1) for r in told), *[("", 1)] * (most - len(told))]
@@ -174,7 +180,9 @@ def _unit(unit: str) -> str:
 
 
 def _with_error(value: float, sd: float, digits: int = 3) -> str:
-    """A value with its error; very large and small ones as powers of ten."""
+    """A value with its error, very large and small ones as powers of ten; what was chosen, not fitted, has none."""
+    if sd == 0.0:
+        return minus(f"{value:g}")
     if 1e-3 <= max(abs(value), sd) < 1e5:
         return str(with_error((value, sd), digits=digits))
     return minus(f"{value:.3g}") + f" <small>± {sd:.1g}</small>"

@@ -141,7 +141,7 @@ def _wrong_splits(found: Ladder, r: Rung) -> Iterator[str]:
 def _tests(found: Ladder) -> Iterator[str]:
     """The test that separates two explanations best, and the mode in which it shows most."""
     for t in found.tests[:1]:
-        first, second = (np.array(p) for p in t.predictions)  # frequency and sd of every mode, Hz
+        first, second = (np.array([(m.frequency, m.sd) for m in p]) for p in t.predictions)
         count = min(len(first), len(second))
         if count:
             apart = np.abs(first[:count, 0] - second[:count, 0]) / np.hypot(first[:count, 1], second[:count, 1])

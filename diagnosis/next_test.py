@@ -56,21 +56,33 @@ class Plan:
 
 
 @dataclass(frozen=True)
+class ModePrediction:
+    """Natural frequency (Hz) and damping ratio of a mode, with standard deviations."""
+
+    frequency: float
+    sd: float
+    damping: float
+    damping_sd: float
+
+
+@dataclass(frozen=True)
 class NextTest:
-    """How far apart a test puts two explanations, as odds if either is true, how many repeats make them 100 to 1, and what each
-    predicts: frequencies with standard deviations (Hz)."""
+    """How far apart a test puts two explanations, as odds if either is true, how many repeats make them 100 to 1, what they differ in most,
+    in words, and what each predicts of every mode."""
 
     plan: Plan
     separates: tuple[str, str]
     odds: float
     repeats: int
-    predictions: tuple[tuple[tuple[float, float], ...], tuple[tuple[float, float], ...]]
+    tells: str
+    predictions: tuple[tuple[ModePrediction, ...], tuple[ModePrediction, ...]]
 
 
 def explanations(about: Theory, found: Diagnosis, places: Sequence[Change], near: float = 20.0, most: int = 4) -> list[Explanation]:
-    """What survives: candidates near the best, the model without effects where nothing was found, and the best free-form answer."""
+    """What survives: the candidates of the verdict and those near the best, and the best free-form answer."""
     ahead = found.candidates[0].delta_evidence if found.candidates else 0.0
-    alive: list[Candidate] = [c for c in found.candidates if ahead - c.delta_evidence < near][:most]
+    named = set(found.effects)
+    alive: list[Candidate] = [c for c in found.candidates if set(c.effects) <= named or ahead - c.delta_evidence < near][:most]
     result = [_explanation(about, " + ".join(c.effects), c.fit) for c in alive]
     if places and found.verdict != "none":
         result.append(replace(_explanation(about, f"free: {places[0].element}", found.base), applied=free_form(about.spindle, places[0])))
@@ -112,26 +124,49 @@ def next_tests(about: Theory, alive: Sequence[Explanation], most: int = 4) -> li
             plan = every[best[1]]
             repeats = next((n for n in range(1, 100) if _separation(about, plan, a, b, True, n) > DECIDED), 99)
             predictions = (_predicted(about, plan, a), _predicted(about, plan, b))
-            found.append(NextTest(plan, (a.name, b.name), float(np.exp(min(best[0], CERTAIN))), repeats, predictions))
+            odds = float(np.exp(min(best[0], CERTAIN)))
+            found.append(NextTest(plan, (a.name, b.name), odds, repeats, _tells(about, plan, a, b), predictions))
     return sorted(found, key=lambda n: -n.odds)[:most]
 
 
 def _separation(about: Theory, plan: Plan, a: Explanation, b: Explanation, exact: bool, repeats: int = 1) -> float:
     """Expected ln odds; without `exact` only the errors of the test and of its thermometer count. Zero where it cannot be made."""
     try:
-        there = _theory_there(about, plan, a)
-        nuisance = [_nuisance_there(about, there, e.nuisance) for e in (a, b)]
-        difference = there.features(nuisance[1], _applied(plan, b)) - there.features(nuisance[0], _applied(plan, a))
-        variance = np.zeros((len(difference), len(difference)))
-        for e, x in zip((a, b), nuisance, strict=True):
-            by = derivative(there, x, _applied(plan, e)) if exact else np.zeros((len(difference), len(x)))
-            variance += by @ _covariance_there(about, there, e.covariance) @ by.T
+        _, difference, variance = _difference(about, plan, a, b, exact, repeats)
     except (NoEquilibrium, OutsideRange, ValueError):
         return 0.0
-    floors = {"frequency": FREQUENCY_FLOOR, "damping": DAMPING_FLOOR}
-    floor = np.diag([floors.get(f.what, SHAPE_FLOOR) ** 2 for f in there.data.features])
-    variance += floor + np.diag(there.data.sd**2) / repeats
     return float(difference @ np.linalg.solve(variance, difference)) / 2
+
+
+def _difference(about: Theory, plan: Plan, a: Explanation, b: Explanation, exact: bool, repeats: int) -> tuple[Theory, Array, Array]:
+    """The planned test as `a` predicts it, by how much `b` differs there (n,), and the variance (n, n) of that difference."""
+    there = _theory_there(about, plan, a)
+    nuisance = [_nuisance_there(about, there, e.nuisance) for e in (a, b)]
+    difference = there.features(nuisance[1], _applied(plan, b)) - there.features(nuisance[0], _applied(plan, a))
+    variance = np.zeros((len(difference), len(difference)))
+    for e, x in zip((a, b), nuisance, strict=True):
+        by = derivative(there, x, _applied(plan, e)) if exact else np.zeros((len(difference), len(x)))
+        variance += by @ _covariance_there(about, there, e.covariance) @ by.T
+    floors = {"frequency": FREQUENCY_FLOOR, "damping": DAMPING_FLOOR}
+    variance += np.diag([floors.get(f.what, SHAPE_FLOOR) ** 2 for f in there.data.features]) + np.diag(there.data.sd**2) / repeats
+    return there, difference, variance
+
+
+WORDS = {"amplitude": "the shape", "phase": "the phase of the shape", "size": "the residue", "turn": "the phase of the residue"}
+
+
+def _tells(about: Theory, plan: Plan, a: Explanation, b: Explanation) -> str:
+    """The one number of the test that the two differ in by most of its errors."""
+    there, difference, variance = _difference(about, plan, a, b, True, 1)
+    sd = np.sqrt(np.diag(variance))
+    most = int(np.argmax(np.abs(difference) / sd))
+    feature = there.data.features[most]
+    what = f"{WORDS.get(feature.what, f'the {feature.what}')} of mode {feature.mode + 1}"
+    if feature.what in WORDS:
+        what += f" at channel {feature.channel + 1}"
+    if feature.what in ("phase", "turn"):
+        return f"{what}, {np.degrees(difference[most]):+.2g} +- {np.degrees(sd[most]):.2g} deg by {b.name}"
+    return f"{what}, {100 * difference[most]:+.2g} +- {100 * sd[most]:.2g} % by {b.name}"
 
 
 def _theory_there(about: Theory, plan: Plan, a: Explanation) -> Theory:
@@ -187,10 +222,12 @@ def _covariance_there(about: Theory, there: Theory, covariance: Array) -> Array:
     return result
 
 
-def _predicted(about: Theory, plan: Plan, e: Explanation) -> tuple[tuple[float, float], ...]:
-    """Frequencies in the band, and how well they are known, Hz."""
+def _predicted(about: Theory, plan: Plan, e: Explanation) -> tuple[ModePrediction, ...]:
+    """Modes in the band, and how well they are known."""
     there = _theory_there(about, plan, e)
     by = derivative(there, _nuisance_there(about, there, e.nuisance), _applied(plan, e))
-    variance = np.diag(by @ _covariance_there(about, there, e.covariance) @ by.T)
-    frequency = there.data.observations[0].frequency
-    return tuple((float(f), float(f * np.sqrt(variance[i]))) for f, i in zip(frequency, there.data.rows[0].frequency, strict=True))
+    sd = np.sqrt(np.diag(by @ _covariance_there(about, there, e.covariance) @ by.T))
+    o, rows = there.data.observations[0], there.data.rows[0]
+    damping = dict(zip(rows.mode_of_damping.tolist(), sd[rows.damping].tolist(), strict=True))
+    found = zip(o.frequency.tolist(), sd[rows.frequency].tolist(), o.damping.tolist(), strict=True)
+    return tuple(ModePrediction(f, f * s, zeta, zeta * damping.get(i, np.nan)) for i, (f, s, zeta) in enumerate(found))

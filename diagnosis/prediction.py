@@ -22,7 +22,8 @@ REFUTED, DOUBTFUL = 1e-6, 1e-2  # probabilities of a misfit as large by chance
 
 @dataclass(frozen=True)
 class Outcome:
-    """One prediction of one explanation for one test: rms of (measured - predicted) / sd over its modes, and in a word what that says."""
+    """One prediction of one explanation for one test: rms of (measured - predicted) / sd over frequencies and damping
+    of its modes, and in a word what that says."""
 
     test: str
     explanation: str
@@ -40,7 +41,9 @@ def outcomes(file: Path, observations: Sequence[Observation]) -> list[Outcome]:
         planned = json.loads(file.read_text(encoding="utf-8"))["next_test"]
         rows = [(dict(p["condition"]), dict(p["predicted"])) for p in planned]
         return [
-            _outcome(o, name, np.array([[r["frequency_Hz"], r["sd_Hz"]] for r in modes], float))
+            _outcome(
+                o, name, np.array([[r["frequency_Hz"], r["sd_Hz"], r.get("damping", 1.0), r.get("damping_sd", np.inf)] for r in modes])
+            )
             for condition, predicted in rows
             for o in observations
             if _is(o, condition)
@@ -63,11 +66,13 @@ def _is(o: Observation, condition: dict[str, Any]) -> bool:
 
 
 def _outcome(o: Observation, name: str, predicted: np.ndarray) -> Outcome:
-    """Modes paired in the way that costs least in ln frequency."""
-    cost = np.abs(np.log(o.frequency[:, None] / predicted[:, 0]))
-    seen, said = linear_sum_assignment(cost)
-    own = o.frequency * np.sqrt(np.diag(o.covariance)[: len(o.frequency)])
-    pull = (o.frequency[seen] - predicted[said, 0]) / np.hypot(own[seen], predicted[said, 1])
+    """Modes paired in the way that costs least in ln frequency; frequencies and, where known and predicted, ln damping ratios."""
+    m, error = len(o.frequency), np.sqrt(np.diag(o.covariance))
+    seen, said = linear_sum_assignment(np.abs(np.log(o.frequency[:, None] / predicted[:, 0])))
+    frequency, sd, damping, damping_sd = predicted[said].T
+    off = np.log(np.concatenate([o.frequency[seen] / frequency, o.damping[seen] / damping]))
+    known = np.hypot(np.concatenate([error[:m][seen], error[m:][seen]]), np.concatenate([sd / frequency, damping_sd / damping]))
+    pull = (off / known)[np.isfinite(known)]
     chance = float(chi_squared.sf(float(pull @ pull), len(pull)))
     verdict = "refuted" if chance < REFUTED else "doubtful" if chance < DOUBTFUL else "confirmed"
-    return Outcome(o.test.id, name, float(np.sqrt(np.mean(pull**2))), len(pull), verdict)
+    return Outcome(o.test.id, name, float(np.sqrt(np.mean(pull**2))), len(seen), verdict)

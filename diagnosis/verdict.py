@@ -14,7 +14,7 @@ from diagnosis.explain import explain
 from diagnosis.locate import Change, locate
 from diagnosis.misfit import Misfit, misfit
 from diagnosis.misfit_words import misfit_json
-from diagnosis.next_test import NextTest, Plan, explanations, next_tests
+from diagnosis.next_test import ModePrediction, NextTest, Plan, explanations, next_tests
 from diagnosis.observe import observe
 from diagnosis.theory import Theory, data_of, theory
 from model.machine import Spindle
@@ -76,10 +76,8 @@ def diagnosis_json(found: Diagnosis, about: Theory, places: list[Change], tests:
                 "separates": list(t.separates),
                 "odds": t.odds,
                 "repeats": t.repeats,
-                "predicted": {
-                    name: [{"frequency_Hz": f, "sd_Hz": sd} for f, sd in rows]
-                    for name, rows in zip(t.separates, t.predictions, strict=True)
-                },
+                "tells": t.tells,
+                "predicted": {name: [_mode(m) for m in rows] for name, rows in zip(t.separates, t.predictions, strict=True)},
             }
             for t in tests
         ],
@@ -129,6 +127,12 @@ def plan_words(told: dict[str, Any]) -> str:
     return words
 
 
+def _mode(m: ModePrediction) -> dict[str, float]:
+    """Without damping where nobody can predict it."""
+    damping = {"damping": m.damping, "damping_sd": m.damping_sd} if np.isfinite(m.damping_sd) else {}
+    return {"frequency_Hz": m.frequency, "sd_Hz": m.sd, **damping}
+
+
 def _candidate(c: Candidate) -> dict[str, Any]:
     units = {f"{e.name}.{p.name}": p.unit for e in c.fit.effects for p in e.parameters}
     return {
@@ -161,7 +165,7 @@ def show_diagnosis(console: Console, answer: dict[str, Any]) -> None:
     )
     console.print("\nBest explanations (ln evidence over the model without effects):")
     for c in answer["candidates"][:5]:
-        values = ", ".join(f"{k.split('.')[1]} {v['value']:.4g} +- {v['sd']:.2g}{_unit(v['unit'])}" for k, v in c["parameters"].items())
+        values = ", ".join(f"{k.split('.')[1]} {v['value']:.4g}{_error(v['sd'])}{_unit(v['unit'])}" for k, v in c["parameters"].items())
         console.print(
             f"  {' + '.join(c['effects'])}: {c['delta_evidence']:+.1f}, probability {c['probability']:.3f}; {values}", highlight=False
         )
@@ -173,7 +177,7 @@ def show_diagnosis(console: Console, answer: dict[str, Any]) -> None:
         first, second = t["separates"]
         times = "" if t["repeats"] == 1 else f", {t['repeats']} times for 100 to 1"
         console.print(
-            f"\nA test {plan_words(t['condition'])} would separate {first} from {second} with odds of {t['odds']:.3g} to 1{times}; they predict:",
+            f"\nA test {plan_words(t['condition'])} would separate {first} from {second} with odds of {t['odds']:.3g} to 1{times}, most by {t['tells']}; they predict:",
             highlight=False,
         )
         for name, rows in t["predicted"].items():
@@ -187,6 +191,11 @@ def show_diagnosis(console: Console, answer: dict[str, Any]) -> None:
         small = sorted(answer["detectable"].items())
         console.print("\nSmallest size these data would have shown: " + ", ".join(f"{k} {v:.2g}" for k, v in small), highlight=False)
         console.print(f"Not visible in these data at a typical size: {', '.join(answer['invisible']) or 'nothing'}")
+
+
+def _error(sd: float) -> str:
+    """What was chosen, not fitted, has none."""
+    return f" +- {sd:.2g}" if sd else ""
 
 
 def _unit(unit: str) -> str:

@@ -15,7 +15,7 @@ from diagnosis.diagnosis_report import sections, write_diagnosis
 from diagnosis.explain import explain
 from diagnosis.locate import locate
 from diagnosis.misfit import misfit
-from diagnosis.next_test import NextTest, Plan
+from diagnosis.next_test import ModePrediction, NextTest, Plan
 from diagnosis.verdict import diagnosis_json, show_diagnosis
 from model.machine import Condition
 from sim.effects import by_name
@@ -31,7 +31,11 @@ def told(spindle):
     found = explain(about, (LAG, by_name("grease_damping")), workers=1)
     places = locate(about)
     m = misfit(about, found.base, places)
-    test = NextTest(Plan(Condition(70.0)), ("soak_lag", "<free>"), 3e22, 1, (((1000.0, 0.5),), ((1010.0, 0.5), (1500.0, 2.0))))
+    one, other, more = (
+        ModePrediction(*row) for row in ((1000.0, 0.5, 0.01, 0.001), (1010.0, 0.5, 0.01, 0.001), (1500.0, 2.0, 0.02, np.nan))
+    )
+    separates = ("soak_lag", "<free>")
+    test = NextTest(Plan(Condition(70.0)), separates, 3e22, 1, "the frequency of mode 1, +1 +- 0.05 % by <free>", ((one,), (other, more)))
     return found, about, m, diagnosis_json(found, about, places, [test], m) | {"campaign": "lag & <haste>"}
 
 

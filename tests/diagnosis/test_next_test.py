@@ -1,6 +1,7 @@
 """The test that decides: where two explanations differ, by how much, and whether what was written down comes true."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -88,6 +89,28 @@ def test_predictions_are_confirmed_or_refuted(spindle, tmp_path):
     file.write_text(json.dumps(answer))
     said = {o.explanation: o.verdict for o in outcomes(file, data)}
     assert said == {"lag": "confirmed", "plain": "refuted"}
+
+
+def test_what_only_damping_tells_is_said_and_predicted(spindle, about, tmp_path):
+    """A grease that damps more moves no frequency: the test is told by a damping ratio, and a prediction is refuted by damping alone."""
+    grease = by_name("grease_damping")
+    best = next_tests(about, [known(about, "without", []), known(about, "grease", [(grease, {"viscous_share": 0.5})])])[0]
+    assert re.fullmatch(r"the damping of mode \d+, [+-][\d.e+]+ \+- [\d.e+-]+ % by grease", best.tells)
+    without, thick = best.predictions
+    assert [m.frequency for m in thick] == pytest.approx([m.frequency for m in without], rel=1e-3)
+    answer = {"condition": {"temperature_C": 60.0, "speed_rpm": 0.0}, "predicted": {}}
+    point = operating_point(spindle, Condition(60.0), [])
+    inside = [m for m in point.modes if 400 < m.frequency < 3000]
+    for name, factor in (("as it is", 1.0), ("four times as damped", 4.0)):
+        rows = [
+            {"frequency_Hz": m.frequency, "sd_Hz": 20.0, "damping": factor * m.damping_ratio, "damping_sd": 0.3 * m.damping_ratio}
+            for m in inside
+        ]
+        answer["predicted"][name] = rows
+    file = tmp_path / "diagnosis.json"
+    file.write_text(json.dumps({"next_test": [answer]}))
+    said = {o.explanation: o.verdict for o in outcomes(file, about.data.observations)}
+    assert said == {"as it is": "confirmed", "four times as damped": "refuted"}
 
 
 def operating_frequencies(about, explanation, condition):
