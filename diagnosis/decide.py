@@ -115,7 +115,8 @@ def decide(theory: Theory, base: Fit, fits: list[Fit], signatures: list[Signatur
     if len(rivals) > 1:
         rivals = [c for c in alike if lead.delta_evidence - c.delta_evidence < WIDE * ahead]
         names = sorted({name for c in rivals for name in c.effects})
-        return answer("ambiguous", names, f"{', '.join(names)} explain the data within {WIDE * ahead:.0f} in ln evidence of each other.")
+        return answer("ambiguous", names, f"{', '.join(names)} explain the data within {WIDE * ahead:.0f} in ln evidence of each other"
+                      f"{_likeness(signatures, names)}.")  # fmt: skip
     more = [
         c for c in candidates if c.delta_evidence + pair - lead.delta_evidence > ahead and c.held_out_ratio < MORE * lead.held_out_ratio
     ]
@@ -151,6 +152,15 @@ def _rated(theory: Theory, base: Fit, fits: Sequence[Fit], ahead: float, pair: f
         ratio = float(np.sqrt(held_out(theory, f, f.whiten)[0] / held_out(theory, base, f.whiten)[0]))
         candidates.append(Candidate(f, float(log), float(w), ratio, not f.at_limit))
     return sorted(candidates, key=lambda c: -c.delta_evidence)
+
+
+def _likeness(signatures: Sequence[Signature], names: Sequence[str]) -> str:
+    """How alike the effects of a set are in these data, beside what tolerances can do: the cosine of the two least alike."""
+    unit = np.array([s.direction for s in signatures if s.effect.name in names and np.linalg.norm(s.direction) > 0])
+    if len(unit) < 2:
+        return ""
+    unit /= np.linalg.norm(unit, axis=1, keepdims=True)
+    return f"; what they do to these data is {100 * float(np.min(np.abs(unit @ unit.T))):.0f} % alike"
 
 
 def _doubt(theory: Theory, base: Fit, lead: Candidate) -> str:

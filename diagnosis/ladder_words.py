@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
+from math import isfinite
 
 import numpy as np
 
@@ -155,6 +156,7 @@ def _tests(found: Ladder) -> Iterator[str]:
 def _plan(plan: Plan) -> str:
     told = f"at {plan.condition.temperature:g} C and {plan.condition.speed / RPM:.0f} rpm"
     told += f" with a peak force of {plan.condition.level:g} N" if plan.condition.level else ""
+    told += f" after {plan.condition.soak_time / 60:g} min in the chamber" if isfinite(plan.condition.soak_time) else ""
     told += f" with {plan.mass:g} g on the {plan.on}" if plan.mass else ""
     return told + (f", read also at a side of the {plan.point.body}" if plan.point else "")
 

@@ -28,11 +28,13 @@ from sim.effect import Effect, Parameter, Values
 TEMPERATURES = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0)  # C, a chamber's reach
 SPEEDS = (0.0, 3600.0, 7200.0, 12000.0)  # rpm
 HARD = 20.0  # N, a hard hit
+SOAK = 14400.0  # s in the chamber: four hours, a night's worth for parts of some hundred grams
 MASS = 2.0  # g, a piece of steel with a drop of wax
 CERTAIN = 50.0  # ln odds beyond which nothing is gained
 DECIDED = np.log(100.0)
 REFINED = 6  # tests of the first look at which the errors are worked out
 RPM = np.pi / 30
+FREE = "free: "  # how names of free-form answers begin
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,7 @@ def explanations(about: Theory, found: Diagnosis, places: Sequence[Change], near
     alive: list[Candidate] = [c for c in found.candidates if set(c.effects) <= named or ahead - c.delta_evidence < near][:most]
     result = [_explanation(about, " + ".join(c.effects), c.fit) for c in alive]
     if places and found.verdict != "none":
-        result.append(replace(_explanation(about, f"free: {places[0].element}", found.base), applied=free_form(about.spindle, places[0])))
+        result.append(replace(_explanation(about, f"{FREE}{places[0].element}", found.base), applied=free_form(about.spindle, places[0])))
     return result
 
 
@@ -98,13 +100,15 @@ def _explanation(about: Theory, name: str, fit: Fit) -> Explanation:
 
 
 def plans(spindle: Spindle, done: Sequence[Condition]) -> Iterator[Plan]:
-    """Feasible tests: other temperatures and speeds; at the coldest and hottest conditions at rest also a hard hit, a mass, another point."""
+    """Feasible tests: other temperatures and speeds; at the coldest and hottest conditions at rest also a hard hit, a long
+    soak, a mass, another point."""
     for temperature in TEMPERATURES:
         for rpm in SPEEDS:
             yield Plan(Condition(temperature, rpm * RPM))
     resting = sorted((c for c in done if c.speed == 0), key=lambda c: c.temperature)
-    for condition in dict.fromkeys(replace(c, level=0.0) for c in (*resting[:1], *resting[-1:])):
+    for condition in dict.fromkeys(replace(c, level=0.0, soak_time=np.inf) for c in (*resting[:1], *resting[-1:])):
         yield Plan(replace(condition, level=HARD))
+        yield Plan(replace(condition, soak_time=SOAK))
         for body in spindle.structure.bodies:
             if {"x", "z"} <= set(body.moves):
                 yield Plan(condition, mass=MASS, on=body.name)
@@ -114,7 +118,8 @@ def plans(spindle: Spindle, done: Sequence[Condition]) -> Iterator[Plan]:
 
 
 def next_tests(about: Theory, alive: Sequence[Explanation], most: int = 4) -> list[NextTest]:
-    """For every two explanations the feasible test that separates them best, the strongest first."""
+    """For every two explanations the feasible test that separates them best, the strongest first; free-form answers, which are no physics,
+    come last."""
     every = list(plans(about.spindle, [o.condition for o in about.data.observations]))
     found = []
     for a, b in combinations(alive, 2):
@@ -126,7 +131,7 @@ def next_tests(about: Theory, alive: Sequence[Explanation], most: int = 4) -> li
             predictions = (_predicted(about, plan, a), _predicted(about, plan, b))
             odds = float(np.exp(min(best[0], CERTAIN)))
             found.append(NextTest(plan, (a.name, b.name), odds, repeats, _tells(about, plan, a, b), predictions))
-    return sorted(found, key=lambda n: -n.odds)[:most]
+    return sorted(found, key=lambda n: (any(name.startswith(FREE) for name in n.separates), -n.odds))[:most]
 
 
 def _separation(about: Theory, plan: Plan, a: Explanation, b: Explanation, exact: bool, repeats: int = 1) -> float:

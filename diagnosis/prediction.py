@@ -35,7 +35,8 @@ class Outcome:
 def outcomes(file: Path, observations: Sequence[Observation]) -> list[Outcome]:
     """Every prediction of an earlier diagnosis (its JSON `file`) for which a test has been made since; BadInput for another file.
 
-    Tests with an added mass or a harder hit must say so themselves: they are matched by temperature and speed, and by level where planned.
+    Tests with an added mass or a harder hit must say so themselves: they are matched by temperature and speed, and by level and soak
+    time where planned.
     """
     try:
         planned = json.loads(file.read_text(encoding="utf-8"))["next_test"]
@@ -61,6 +62,7 @@ def _is(o: Observation, condition: dict[str, Any]) -> bool:
         abs(there.temperature - condition["temperature_C"]) < SAME["temperature"]
         and abs(there.speed - condition["speed_rpm"] * RPM) < SAME["speed"]
         and ("level_N" not in condition or there.level == condition["level_N"])
+        and ("soak_time_min" not in condition or there.soak_time == 60 * condition["soak_time_min"])
         and "added_mass_g" not in condition
     )
 

@@ -110,6 +110,8 @@ def _plan(plan: Plan) -> dict[str, Any]:
     told: dict[str, Any] = {"temperature_C": plan.condition.temperature, "speed_rpm": plan.condition.speed / RPM}
     if plan.condition.level:
         told["level_N"] = plan.condition.level
+    if np.isfinite(plan.condition.soak_time):
+        told["soak_time_min"] = plan.condition.soak_time / 60
     if plan.mass:
         told |= {"added_mass_g": plan.mass, "on": plan.on}
     if plan.point is not None:
@@ -120,6 +122,7 @@ def _plan(plan: Plan) -> dict[str, Any]:
 def plan_words(told: dict[str, Any]) -> str:
     words = f"at {told['temperature_C']:g} C, {told['speed_rpm']:.0f} rpm"
     words += f", hit with {told['level_N']:g} N" if "level_N" in told else ""
+    words += f", after {told['soak_time_min']:g} min in the chamber" if "soak_time_min" in told else ""
     words += f", with {told['added_mass_g']:g} g on the {told['on']}" if "added_mass_g" in told else ""
     if "point" in told:
         x, y, z = told["point"]["position_mm"]

@@ -37,6 +37,16 @@ def test_speed_separates_what_only_shows_when_turning(spindle, about):
     assert set(best.separates) == {"without", "inertia"}
 
 
+def test_a_long_soak_tells_a_lagging_hub_from_one_that_expands_less(spindle, about):
+    """At rest and at any temperature the two do nearly the same; a hub that has had its time does not lag any more."""
+    lag, less = by_name("soak_lag"), by_name("expansion_mismatch")
+    of_lag = known(about, "lag", [(lag, lag.typical() | {"hub_share": 0.2})], 1.0)
+    of_less = known(about, "less", [(less, less.typical() | {"hub_expansion": -0.2})], 1.0)
+    best = next_tests(about, [of_lag, of_less, known(about, "free: hub mass", [])])
+    assert set(best[0].separates) == {"lag", "less"}
+    assert best[0].plan.condition.soak_time == 4 * 3600
+
+
 def test_odds_grow_with_the_difference_and_fall_with_ignorance(spindle, about):
     loss = by_name("preload_loss")
 
