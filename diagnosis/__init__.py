@@ -2,6 +2,7 @@
 
 ================  =======================================================================================================
 observe           a campaign as mode tables with covariances: what the diagnosis takes as data
+data              the same as one vector of features with its covariance
 theory            the same numbers predicted: spindle, tolerances, effects -> frequencies, damping, shapes of every test
 sensitivity       their derivatives by tolerances
 partners          which measured mode is which computed one, through all conditions

@@ -15,8 +15,9 @@ from itertools import product
 
 import numpy as np
 
+from diagnosis.data import WHAT, Data, whitening
 from diagnosis.sensitivity import derivative
-from diagnosis.theory import WHAT, Data, Theory, whitening
+from diagnosis.theory import Theory
 from model.ball_row import Array
 from model.pair import NoEquilibrium
 from sim.effect import Effect

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from diagnosis.data import data_of
 from diagnosis.decide import AHEAD, Diagnosis, held_out
 from diagnosis.explain import explain
 from diagnosis.fit import Fit, fit, linearise
@@ -24,7 +25,7 @@ from diagnosis.next_test import NextTest, explanations, next_tests
 from diagnosis.observe import observe
 from diagnosis.rung import Both, Rung, as_drawn, fitted, mode_numbers
 from diagnosis.screening import screen, starts
-from diagnosis.theory import Theory, data_of, theory
+from diagnosis.theory import Theory, theory
 from model.ball_row import Array
 from model.machine import Spindle
 from model.pair import NoEquilibrium

@@ -15,10 +15,10 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
 
+from diagnosis.data import Data
 from diagnosis.ladder import Ladder
 from diagnosis.observe import Observation
 from diagnosis.rung import Rung
-from diagnosis.theory import Data
 from model.ball_row import Array
 from sim.plots import INK, PALE, STYLE, svg
 

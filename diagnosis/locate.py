@@ -10,8 +10,9 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.stats import chi2 as chi_squared
 
+from diagnosis.data import Data
 from diagnosis.fit import linearise
-from diagnosis.theory import Data, Theory
+from diagnosis.theory import Theory
 from model.ball_row import Array
 from model.machine import Condition, Spindle
 from model.pair import PairState

@@ -13,12 +13,13 @@ from itertools import combinations
 
 import numpy as np
 
+from diagnosis.data import data_of
 from diagnosis.decide import Candidate, Diagnosis
 from diagnosis.fit import Fit
 from diagnosis.locate import Change, free_form
 from diagnosis.observe import DAMPING_FLOOR, FREQUENCY_FLOOR, SHAPE_FLOOR, Observation
 from diagnosis.sensitivity import derivative
-from diagnosis.theory import Applied, Theory, data_of, predict, theory
+from diagnosis.theory import Applied, Theory, predict, theory
 from model.ball_row import Array
 from model.machine import Condition, OutsideRange, Point, Spindle
 from model.pair import NoEquilibrium

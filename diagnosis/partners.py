@@ -12,8 +12,9 @@ from itertools import combinations, pairwise
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from diagnosis.data import ALONE
 from diagnosis.observe import Observation
-from diagnosis.theory import ALONE, FAR, UNLIKE, Predicted, pair
+from diagnosis.theory import FAR, UNLIKE, Predicted, pair
 from model.ball_row import Array
 from model.modes import ComplexArray
 

@@ -15,10 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.correlation import bands
+from diagnosis.data import Feature
 from diagnosis.fit import Fit
 from diagnosis.observe import Observation
 from diagnosis.partners import numbered
-from diagnosis.theory import Feature, Predicted, Theory, pair, predict
+from diagnosis.theory import Predicted, Theory, pair, predict
 from model.ball_row import Array
 
 RPM = 2 * np.pi / 60

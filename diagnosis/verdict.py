@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
+from diagnosis.data import data_of
 from diagnosis.decide import Candidate, Diagnosis
 from diagnosis.explain import explain
 from diagnosis.locate import Change, locate
@@ -16,7 +17,7 @@ from diagnosis.misfit import Misfit, misfit
 from diagnosis.misfit_words import misfit_json
 from diagnosis.next_test import ModePrediction, NextTest, Plan, explanations, next_tests
 from diagnosis.observe import observe
-from diagnosis.theory import Theory, data_of, theory
+from diagnosis.theory import Theory, theory
 from model.machine import Spindle
 from sim.campaign import Campaign
 from sim.effect import Effect

@@ -22,9 +22,10 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from diagnosis.data import data_of
 from diagnosis.explain import explain
 from diagnosis.observe import observe
-from diagnosis.theory import data_of, theory
+from diagnosis.theory import theory
 from model.machine import Condition, Spindle
 from model.scene import load
 from model.tolerance import toleranced

@@ -33,11 +33,12 @@ from rich.console import Console
 from rich.table import Column, Table
 from scipy.optimize import linear_sum_assignment
 
+from diagnosis.data import data_of
 from diagnosis.decide import Candidate
 from diagnosis.explain import explain
 from diagnosis.observe import observe
 from diagnosis.screening import CLEAR, screen
-from diagnosis.theory import data_of, theory
+from diagnosis.theory import theory
 from model.machine import Condition, Spindle
 from model.modes import oscillating, poles
 from model.rotor_base import matrices

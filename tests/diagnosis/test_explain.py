@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from diagnosis.data import data_of
 from diagnosis.explain import explain
 from diagnosis.fit import fit, linearise
 from diagnosis.locate import elements, locate
 from diagnosis.misfit import misfit
 from diagnosis.observe import DAMPING_FLOOR, FREQUENCY_FLOOR, Observation, observe
-from diagnosis.theory import WITHOUT, Theory, data_of, predict, theory
+from diagnosis.theory import WITHOUT, Theory, predict, theory
 from diagnosis.verdict import diagnosis_json
 from model.machine import Condition
 from model.tolerance import toleranced

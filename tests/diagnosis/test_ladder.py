@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
+from diagnosis.data import data_of
 from diagnosis.fit import fit, linearise
 from diagnosis.forms import FIXED_STIFFNESS, FORMS, RADIAL_EXPANSION, pinned
 from diagnosis.ladder import TOLERANCES, ladder, named_by
@@ -20,7 +21,7 @@ from diagnosis.ladder_words import sentences
 from diagnosis.observe import FREQUENCY_FLOOR, observe
 from diagnosis.rung import as_drawn, determined, frequencies
 from diagnosis.screening import CLEAR
-from diagnosis.theory import data_of, theory
+from diagnosis.theory import theory
 from model.machine import Addition, Condition
 from model.pair import reference_motion, solve
 from model.scene import BadInput

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from diagnosis.data import data_of
 from diagnosis.fit import fit, linearise
 from diagnosis.locate import elements, locate
 from diagnosis.misfit import misfit
@@ -15,7 +16,7 @@ from diagnosis.misfit_plots import figures
 from diagnosis.misfit_words import merged, misfit_json, words
 from diagnosis.observe import observe
 from diagnosis.shares import BY, modes_at, shares, whitened
-from diagnosis.theory import data_of, predict, theory
+from diagnosis.theory import predict, theory
 from model.machine import Condition
 from model.tolerance import toleranced
 from sim.campaign import Campaign, ModeRow, Test, read_campaign

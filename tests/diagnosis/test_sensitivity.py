@@ -23,3 +23,15 @@ def test_derivatives_are_those_of_the_features(spindle, name):
     expected = np.array(columns).T
     assert np.abs(expected).max() > 0.01
     np.testing.assert_allclose(found, expected, atol=1e-4 * np.abs(expected).max())
+
+
+def test_a_late_linear_model_is_measured_anew(spindle):
+    """An effect of the measuring chain changes nothing else: the features are those of a theory that has not seen this state before."""
+    observations = hidden(spindle, [], 1)
+    warm, cold = theory_of(spindle, observations), theory_of(spindle, observations)
+    x = 0.3 * warm.sd
+    lag, late = by_name("soak_lag"), by_name("channel_delay")
+    for effects in ([], [(late, late.typical())], [(lag, lag.typical())], [(lag, lag.typical()), (late, late.typical())], [(lag, lag.neutral())]):
+        warm.features(x, effects)
+        assert np.array_equal(warm.features(x, effects), theory_of(spindle, observations).features(x, effects))
+    assert not np.array_equal(warm.features(x), cold.features(x, [(late, late.typical())]))
