@@ -8,14 +8,16 @@ from dataclasses import replace
 from scipy.stats import chi2 as chi_squared
 
 from diagnosis.decide import AHEAD, Diagnosis, decide
-from diagnosis.fit import Fit, fit, linearise
+from diagnosis.fit import TEMPERS, Fit, fit, linearise
 from diagnosis.many_fits import Task, side_by_side
-from diagnosis.screening import CLEAR, Signature, screen, starts
+from diagnosis.screening import CLEAR, Signature, best_starts, screen, starts
 from diagnosis.theory import Theory
 from model.ball_row import Array
 from sim.effect import Effect
 
 SINGLES, PAIRED = 5, 3  # effects refitted after the rough fits, and effects tried beside the best
+STARTS = 2  # of every effect, those that leave least of the data
+SAME = 0.2  # prior standard deviations within which two starts are one
 CLOSE = 3.0  # root of chi2 a number, priors included, up to which tolerances alone come close to the data
 NEAR = 60.0  # ln evidence within which a fit is polished
 
@@ -39,18 +41,20 @@ def explain(
     if quiet and all(s.gain < CLEAR for s in signatures):
         promising: list[Task] = [((s.effect,), s.effect.typical_list()) for s in signatures[:3]]
     else:
-        tasks: list[Task] = [((s.effect,), start) for s in signatures if s.visibility > 1 or s.gain > CLEAR for start in starts(s)]
+        seen = [s for s in signatures if s.visibility > 1 or s.gain > CLEAR]
         # where tolerances explain most, rough fits start from theirs; where they do not, or are strained, they have been dragged off by
-        # what is missing, and rough fits start from the drawing
+        # what is missing, and rough fits start from the drawing, with errors enlarged
         comes_close = base.chi2 < CLOSE**2 * len(theory.data.value)
-        ways: list[tuple[Array, Array | None]] = [(base.jacobian, base.nuisance)] if comes_close else []
-        ways += [(about, None)] if not comes_close or strained else []
-        promising = []
-        for slopes, first in ways:
-            rough = _best(side_by_side(theory, slopes, [(*task, first) for task in tasks], False, workers))
-            promising += [_again(f) for f in sorted(rough.values(), key=lambda f: -f.evidence)[:SINGLES]]
+        ways: list[tuple[Array, Array | None, float]] = [(base.jacobian, base.nuisance, 1.0)] if comes_close else []
+        ways += [(about, None, TEMPERS[1])] if not comes_close or strained else []
+        promising, made = [], 0
+        for slopes, first, enlarged in ways:
+            tasks = best_starts(theory, slopes, first, seen, STARTS, enlarged)
+            rough = _best(side_by_side(theory, slopes, [((effect,), start, first) for effect, start in tasks], False, workers))
+            promising += [_again(f) for f in sorted(rough.values(), key=lambda f: -f.evidence)[:SINGLES] if not _tried(f, promising)]
+            made += len(tasks)
         promising = promising or [((s.effect,), s.effect.typical_list()) for s in signatures[:3]]  # where nothing is visible at all
-        progress(f"{len(tasks)} rough fits made")
+        progress(f"{made} rough fits made")
     fits = _best(side_by_side(theory, about, [(*task, None) for task in promising], True, workers))
     progress("promising effects refitted with all tolerances free")
     best = max(fits.values(), key=lambda f: f.evidence)
@@ -80,6 +84,15 @@ def explain(
 def _again(found: Fit) -> Task:
     """The effects of a fit from where it came to rest."""
     return found.effects, [found.values[e.name][p.name] for e in found.effects for p in e.parameters]
+
+
+def _tried(found: Fit, tasks: Sequence[Task]) -> bool:
+    """Whether a fit came to rest where one of the tasks starts."""
+    effects, values = _again(found)
+    widths = [p.prior_sd for e in effects for p in e.parameters]
+    return any(
+        effects == other and all(abs(v - o) < SAME * w for v, o, w in zip(values, start, widths, strict=True)) for other, start in tasks
+    )
 
 
 def _beside(found: Fit, more: Signature) -> Task:

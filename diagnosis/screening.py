@@ -125,3 +125,31 @@ def starts(signature: Signature) -> list[list[float]]:
     wanted += [(main.neutral + signature.share * reach, effect.typical())] if signature.share < SMALL else []
     found = [(float(np.clip(size, *main.limits)), *[others[p.name] for p in effect.parameters[1:]]) for size, others in wanted]
     return [list(start) for start in dict.fromkeys(found) if start[0] != main.neutral]
+
+
+def best_starts(
+    theory: Theory, slopes: Array, nuisance: Array | None, signatures: Sequence[Signature], most: int, enlarged: float = 1.0
+) -> list[tuple[Effect, list[float]]]:
+    """Of the start values of every effect the `most` that leave least of the data, once tolerances have been refitted beside them.
+
+    To first order, `slopes` (n, p) being the derivative by the nuisance parameters about the values `nuisance`, the drawing's by default,
+    with the errors of the data `enlarged` so many times.
+    """
+    x = np.zeros(len(theory.sd)) if nuisance is None else nuisance
+    whiten = theory.data.whiten / enlarged
+    a = whiten @ (slopes * theory.sd)
+    factor = np.linalg.cholesky(np.eye(len(a)) + a @ a.T)
+
+    def left(effect: Effect, start: Sequence[float]) -> float:
+        values = dict(zip([p.name for p in effect.parameters], start, strict=True))
+        try:
+            rest = whiten @ (theory.data.value - theory.features(x, [(effect, values)])) + a @ (x / theory.sd)
+        except NoEquilibrium:
+            return np.inf
+        return float(np.sum(np.linalg.solve(factor, rest) ** 2))
+
+    found = []
+    for s in signatures:
+        ranked = sorted(starts(s), key=lambda start: left(s.effect, start))
+        found += [(s.effect, start) for start in ranked[:most]]
+    return found

@@ -195,12 +195,20 @@ class Theory:
         return toleranced(self.spindle)
 
     def built(self, x: Array) -> Spindle:
-        """The spindle with its build tolerances at x."""
-        spindle = self.spindle
-        for parameter, value in zip(self.build, x, strict=False):
-            if value != 0.0:
-                spindle = parameter.apply(spindle, float(value))
-        return spindle
+        """The spindle with its build tolerances at x; the last one is kept."""
+        key = x[: len(self.build)].tobytes()
+        if key not in self._built:
+            spindle = self.spindle
+            for parameter, value in zip(self.build, x, strict=False):
+                if value != 0.0:
+                    spindle = parameter.apply(spindle, float(value))
+            self._built.clear()
+            self._built[key] = spindle
+        return self._built[key]
+
+    @cached_property
+    def _built(self) -> dict[bytes, Spindle]:
+        return {}
 
     def warmer(self, x: Array) -> list[float]:
         """By how much (K) every test is warmer than its thermometer said."""

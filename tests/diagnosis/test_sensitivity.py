@@ -31,7 +31,13 @@ def test_a_late_linear_model_is_measured_anew(spindle):
     warm, cold = theory_of(spindle, observations), theory_of(spindle, observations)
     x = 0.3 * warm.sd
     lag, late = by_name("soak_lag"), by_name("channel_delay")
-    for effects in ([], [(late, late.typical())], [(lag, lag.typical())], [(lag, lag.typical()), (late, late.typical())], [(lag, lag.neutral())]):
+    for effects in (
+        [],
+        [(late, late.typical())],
+        [(lag, lag.typical())],
+        [(lag, lag.typical()), (late, late.typical())],
+        [(lag, lag.neutral())],
+    ):
         warm.features(x, effects)
         assert np.array_equal(warm.features(x, effects), theory_of(spindle, observations).features(x, effects))
     assert not np.array_equal(warm.features(x), cold.features(x, [(late, late.typical())]))
