@@ -19,7 +19,7 @@ OF_ALL = 0.01  # share of its ln evidence by which it must lead, where that is m
 SURE = float(np.log(20.0))  # ln odds that such a lead is worth
 PAIR_OF_ALL = 0.02  # share of its ln evidence that the second effect of a pair must bring to be needed
 MORE = 0.9  # held-out error ratio of a pair over that of its best member up to which it predicts more
-WIDE = 2.0  # times the lead that identifies: rivals within it stay in the set, where there is one
+WIDE = 3.0  # times the lead that identifies: rivals within it stay in the set, where there is one
 STRAINED = 4.0  # standard deviations at which a tolerance is an explanation of its own
 THERE = 3.0  # standard errors by which both effects of a pair must differ from none
 MISFIT = 1e-4  # probability below which a misfit is not chance
@@ -106,8 +106,8 @@ def decide(theory: Theory, base: Fit, fits: list[Fit], signatures: list[Signatur
     if lead.delta_evidence < CLEAR and not rejected:
         return answer("none", (), f"The tolerances alone explain the data: misfit {base.misfit:.0f} for {n} numbers; the best effect, "
                       f"{named}, gains {lead.delta_evidence:.1f} in ln evidence where {CLEAR:g} is asked.")  # fmt: skip
-    worse = lead.fit.misfit > base.misfit and chi_squared.sf(lead.fit.misfit, n) < MISFIT  # and only the errors of its law hide it
-    if chi_squared.sf(lead.fit.chi2, n) < MISFIT or worse or lead.delta_evidence < CLEAR:
+    told = chi_squared.sf(base.misfit, n) > MISFIT > chi_squared.sf(lead.fit.misfit, n)  # by tolerances, better than by the effect
+    if chi_squared.sf(lead.fit.chi2, n) < MISFIT or told or lead.delta_evidence < CLEAR:
         return answer("unexplained", (), f"The model is rejected (misfit {base.misfit:.0f} for {n} numbers), and even with "
                       f"{named} a misfit of {lead.fit.misfit:.0f} is left.")  # fmt: skip
     alike = [c for c in candidates if len(c.effects) == len(lead.effects)]
