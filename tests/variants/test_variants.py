@@ -163,7 +163,8 @@ def test_a_third_of_the_campaigns_lack_one_to_three_tests():
         ([["a"]], "identified", ["a"], "identified"),
         ([["a", "b"]], "identified", ["b"], "identified"),
         ([["a"]], "ambiguous", ["a", "c"], "in the set"),
-        ([["a"]], "two effects", ["a", "c"], "in the set"),
+        ([["a"]], "two effects", ["a", "c"], "wrong"),  # one too many
+        ([["a"]], "ambiguous", ["b", "c"], "wrong"),
         ([["a"]], "identified", ["c"], "wrong"),
         ([["a"]], "none", [], "missed"),
         ([["a"]], "unexplained", [], "missed"),
