@@ -16,7 +16,8 @@ from sim.effect import Effect
 
 AHEAD = 5.0  # ln evidence by which it must lead every rival to be identified
 OF_ALL = 0.01  # share of its ln evidence by which it must lead, where that is more: laws are not exact
-SURE = float(np.log(20.0))  # ln odds that such a lead is worth
+SURE = 1.2  # ln odds that such a lead is worth: 78 blind campaigns are likeliest at 1 to 1.5
+OTHER = 4.0  # such leads by which something that is not in the catalogue is believed less than its best entry, where that fits the data
 PAIR_OF_ALL = 0.02  # share of its ln evidence that the second effect of a pair must bring to be needed
 MORE = 0.9  # held-out error ratio of a pair over that of its best member up to which it predicts more
 WIDE = 3.0  # times the lead that identifies: rivals within it stay in the set, where there is one
@@ -140,14 +141,16 @@ def _rated(theory: Theory, base: Fit, fits: Sequence[Fit], ahead: float, pair: f
     """Candidates, the best first, without pairs of which one effect is not there; two effects at once are believed less than one
     beforehand, by `pair` in ln odds.
 
-    A lead of `ahead` counts as 95 %: blind campaigns did not bear out more.
+    Probabilities add up to one with that of no effect and that of something else, which would leave of the data what chance does.
     """
     fits = [f for f in fits if len(f.effects) == 1 or all(_there(f, e) for e in f.effects)]
-    logs = np.array([0.0, *(f.evidence - base.evidence - pair * (len(f.effects) - 1) for f in fits)])
-    weights = np.exp((logs - logs.max()) * SURE / ahead)
+    n = len(theory.data.value)
+    logs = np.array([f.evidence - base.evidence - pair * (len(f.effects) - 1) for f in fits])
+    left = max(fits[int(np.argmax(logs))].chi2 - n, 0.0) / 2
+    weights = np.exp((np.array([*logs, 0.0, logs.max() + left - OTHER * ahead]) - logs.max() - left) * SURE / ahead)
     weights /= weights.sum()
     candidates = []
-    for f, log, w in zip(fits, logs[1:], weights[1:], strict=True):
+    for f, log, w in zip(fits, logs, weights[:-2], strict=True):
         # both rated alike, with what the effect's own law may miss
         ratio = float(np.sqrt(held_out(theory, f, f.whiten)[0] / held_out(theory, base, f.whiten)[0]))
         candidates.append(Candidate(f, float(log), float(w), ratio, not f.at_limit))

@@ -78,7 +78,7 @@ def _verdict(answer: dict[str, Any]) -> str:
 
 
 CANDIDATES = (
-    "ln evidence and left-out error are against the model without effects, probability among all tried; two effects at once are "
+    "ln evidence and left-out error are against the model without effects, probability among all tried, no effect and one that is not listed; two effects at once are "
     "believed less beforehand, by what a second effect must bring."
 )
 
