@@ -37,7 +37,7 @@ from diagnosis.data import data_of
 from diagnosis.decide import Candidate
 from diagnosis.explain import explain
 from diagnosis.observe import observe
-from diagnosis.screening import CLEAR, screen
+from diagnosis.screening import screen
 from diagnosis.theory import theory
 from model.machine import Condition, Spindle
 from model.modes import oscillating, poles
@@ -121,13 +121,13 @@ def judge(job: Job) -> dict[str, Any]:
     about = theory(spindle, data_of(observe(made, spindle)))
     found = explain(about, CATALOGUE, 1)
     best, n = found.best, len(about.data.value)
-    told = {s.effect.name: s.visibility for s in screen(about, found.base, [v.of_size(s) for v, s in zip(variants, sizes, strict=True)])}
+    told = {s.effect.name: s.smallest for s in screen(about, found.base, [v.of_size(s) for v, s in zip(variants, sizes, strict=True)])}
     return {
         **asdict(job),
         "truth": [list(v.truth) for v in variants],
         "size": sizes,
         # None where only the instruments' record shows the variant; as many sizes as these data could just have shown
-        "over_smallest": [None if v.record else told.get(v.name, 0.0) / float(np.sqrt(2 * CLEAR)) for v in variants],
+        "over_smallest": [None if v.record else size / told.get(v.name, np.inf) for v, size in zip(variants, sizes, strict=True)],
         "tests": [t.id for t in made.tests],
         "verdict": found.verdict,
         "effects": list(found.effects),

@@ -17,10 +17,11 @@ def pair(spindle: Spindle, condition: Condition, values: Values, state: PairStat
     if tilt == 0.0:
         return state
     omega = 2 * np.pi * spindle.structure.damping_frequency
-    shares = [values["lower_share"]] * (len(state.bearings) - 1) + [1.0]
+    along, across, direction = values["lower_share"], values["lower_across"], np.radians(values["direction"])
+    upper, lower = (1.0, direction), (float(np.hypot(along, across)), direction + float(np.arctan2(across, along)))
     bearings = tuple(
-        tilted(b, share * tilt, np.radians(values["direction"]), 2 * drawing.damping_ratio / omega)
-        for b, drawing, share in zip(state.bearings, spindle.bearings, shares, strict=True)
+        tilted(b, share * tilt, axis, 2 * drawing.damping_ratio / omega)
+        for b, drawing, (share, axis) in zip(state.bearings, spindle.bearings, [lower] * (len(state.bearings) - 1) + [upper], strict=True)
     )
     return replace(state, bearings=bearings, status=contact_status(bearings))
 
@@ -70,6 +71,16 @@ EFFECT = Effect(
             limits=(-2.0, 2.0),
             meaning="tilt of the lower bearing's ring, about the same axis, over that of the upper's",
             source="assumed: one faulty seat",
+        ),
+        Parameter(
+            "lower_across",
+            "1",
+            neutral=0.0,
+            typical=0.0,
+            prior_sd=0.5,
+            limits=(-2.0, 2.0),
+            meaning="tilt of the lower bearing's ring about the axis at right angles, over that of the upper's",
+            source="assumed: one faulty seat; two that know nothing of each other are askew by as much in any directions",
         ),
     ),
     sees=(

@@ -120,3 +120,13 @@ def test_hammer_amplitude_that_does_not_follow_the_contacts(spindle):
     mounted = hertz_amplitude.amplitude(operating_point(spindle, Condition(20.0), []).state.bearings[0], 2.5)
     factor = hertz_amplitude.describing_function(mounted / b.deformation)
     assert hot.stiffness == pytest.approx(factor * b.stiffness, rel=1e-6)
+
+
+def test_two_rings_askew_in_directions_of_their_own(spindle):
+    """The lower ring 0.1 mrad about y while the upper one is 0.2 mrad about x: each as if the other were straight."""
+    both = at(spindle, REST, bearing_misalignment, tilt=0.2, direction=0.0, lower_across=0.5).state.bearings
+    upper = at(spindle, REST, bearing_misalignment, tilt=0.2, direction=0.0).state.bearings[1]
+    lower = operating_point(spindle, REST, []).state.bearings[0]
+    assert both[1].stiffness == pytest.approx(upper.stiffness, rel=1e-12)
+    turned = bearing_misalignment.tilted(lower, 0.1e-3, np.pi / 2, 0.0).stiffness
+    assert both[0].stiffness == pytest.approx(turned, rel=1e-9, abs=1e-6 * turned[0, 0])
