@@ -126,6 +126,10 @@ def decide(theory: Theory, base: Fit, fits: list[Fit], signatures: list[Signatur
         names, gain = sorted({*lead.effects, *perhaps[0].effects}), perhaps[0].delta_evidence + pair - lead.delta_evidence
         return answer("ambiguous", names, f"{named} explains most, {' + '.join(perhaps[0].effects)} {gain:.0f} in ln evidence more, where "
                       f"{pair:.0f} is asked of a second effect.")  # fmt: skip
+    first, last = lead.fit.effects[0], lead.fit.effects[-1]
+    if last.name in first.resembles or first.name in last.resembles:
+        return answer("ambiguous", sorted(lead.effects), f"{named} leads by more than {ahead:.0f} in ln evidence, but the two resemble each "
+                      "other: they may be one effect of another law.")  # fmt: skip
     if len(lead.effects) == 2 and lead.believable:
         return answer("two effects", lead.effects, f"{lead.effects[0]} and {lead.effects[1]} are both needed: dropping either costs more "
                       f"than {pair:.0f} in ln evidence.")  # fmt: skip
