@@ -18,7 +18,8 @@ AHEAD = 5.0  # ln evidence by which it must lead every rival to be identified
 OF_ALL = 0.01  # share of its ln evidence by which it must lead, where that is more: laws are not exact
 SURE = 1.2  # ln odds that such a lead is worth: 78 blind campaigns are likeliest at 1 to 1.5
 OTHER = 4.0  # such leads by which something that is not in the catalogue is believed less than its best entry, where that fits the data
-PAIR_OF_ALL = 0.02  # share of its ln evidence that the second effect of a pair must bring to be needed
+PAIR_OF_ALL = 0.02  # share of its ln evidence that the second effect of a pair must bring to be needed,
+MUCH_MORE = 0.5  # unless held-out errors fall to this share of those of either alone
 MORE = 0.9  # held-out error ratio of a pair over that of its best member up to which it predicts more
 WIDE = 3.0  # times the lead that identifies: rivals within it stay in the set, where there is one
 STRAINED = 4.0  # standard deviations at which a tolerance is an explanation of its own
@@ -118,12 +119,10 @@ def decide(theory: Theory, base: Fit, fits: list[Fit], signatures: list[Signatur
         names = sorted({name for c in rivals for name in c.effects})
         return answer("ambiguous", names, f"{', '.join(names)} explain the data within {WIDE * ahead:.0f} in ln evidence of each other"
                       f"{_likeness(signatures, names)}.")  # fmt: skip
-    more = [
-        c for c in candidates if c.delta_evidence + pair - lead.delta_evidence > ahead and c.held_out_ratio < MORE * lead.held_out_ratio
-    ]
+    more = [c for c in candidates if c.fit.evidence - lead.fit.evidence > ahead and c.held_out_ratio < MORE * lead.held_out_ratio]
     perhaps = [c for c in more if len(c.effects) > len(lead.effects)]
     if perhaps:
-        names, gain = sorted({*lead.effects, *perhaps[0].effects}), perhaps[0].delta_evidence + pair - lead.delta_evidence
+        names, gain = sorted({*lead.effects, *perhaps[0].effects}), perhaps[0].fit.evidence - lead.fit.evidence
         return answer("ambiguous", names, f"{named} explains most, {' + '.join(perhaps[0].effects)} {gain:.0f} in ln evidence more, where "
                       f"{pair:.0f} is asked of a second effect.")  # fmt: skip
     first, last = lead.fit.effects[0], lead.fit.effects[-1]
@@ -131,8 +130,9 @@ def decide(theory: Theory, base: Fit, fits: list[Fit], signatures: list[Signatur
         return answer("ambiguous", sorted(lead.effects), f"{named} leads by more than {ahead:.0f} in ln evidence, but the two resemble each "
                       "other: they may be one effect of another law.")  # fmt: skip
     if len(lead.effects) == 2 and lead.believable:
-        return answer("two effects", lead.effects, f"{lead.effects[0]} and {lead.effects[1]} are both needed: dropping either costs more "
-                      f"than {pair:.0f} in ln evidence.")  # fmt: skip
+        cost = lead.fit.evidence - max(c.fit.evidence for c in candidates if len(c.effects) == 1)
+        return answer("two effects", lead.effects, f"{lead.effects[0]} and {lead.effects[1]} are both needed: dropping either costs "
+                      f"{cost:.0f} in ln evidence or more.")  # fmt: skip
     if lead.believable and lead.held_out_ratio < FALLS:
         return answer("identified", lead.effects, f"{named} leads every other explanation by more than {ahead:.0f} in ln evidence; "
                       f"the error on left-out conditions falls to {100 * lead.held_out_ratio:.0f} %.")  # fmt: skip
@@ -143,22 +143,30 @@ def decide(theory: Theory, base: Fit, fits: list[Fit], signatures: list[Signatur
 
 def _rated(theory: Theory, base: Fit, fits: Sequence[Fit], ahead: float, pair: float) -> list[Candidate]:
     """Candidates, the best first, without pairs of which one effect is not there; two effects at once are believed less than one
-    beforehand, by `pair` in ln odds.
+    beforehand, by `pair` in ln odds or less.
 
     Probabilities add up to one with that of no effect and that of something else, which would leave of the data what chance does.
     """
     fits = [f for f in fits if len(f.effects) == 1 or all(_there(f, e) for e in f.effects)]
     n = len(theory.data.value)
-    logs = np.array([f.evidence - base.evidence - pair * (len(f.effects) - 1) for f in fits])
+    # all rated alike, with what the effect's own law may miss
+    ratios = [float(np.sqrt(held_out(theory, f, f.whiten)[0] / held_out(theory, base, f.whiten)[0])) for f in fits]
+    alone = {f.effects[0].name: (f, ratio) for f, ratio in zip(fits, ratios, strict=True) if len(f.effects) == 1}
+
+    def price(f: Fit, ratio: float) -> float:
+        """What the second effect of a pair must bring: less where it is plain that one does not do."""
+        members = [alone[e.name] for e in f.effects if e.name in alone]
+        if len(f.effects) == 1:
+            return 0.0
+        plain = all(ratio < MUCH_MORE * r or chi_squared.sf(g.chi2, n) < MISFIT for g, r in members)
+        return CLEAR if plain and chi_squared.sf(f.chi2, n) > MISFIT else pair
+
+    logs = np.array([f.evidence - base.evidence - price(f, ratio) for f, ratio in zip(fits, ratios, strict=True)])
     left = max(fits[int(np.argmax(logs))].chi2 - n, 0.0) / 2
     weights = np.exp((np.array([*logs, 0.0, logs.max() + left - OTHER * ahead]) - logs.max() - left) * SURE / ahead)
     weights /= weights.sum()
-    candidates = []
-    for f, log, w in zip(fits, logs, weights[:-2], strict=True):
-        # both rated alike, with what the effect's own law may miss
-        ratio = float(np.sqrt(held_out(theory, f, f.whiten)[0] / held_out(theory, base, f.whiten)[0]))
-        candidates.append(Candidate(f, float(log), float(w), ratio, not f.at_limit))
-    return sorted(candidates, key=lambda c: -c.delta_evidence)
+    found = zip(fits, logs.tolist(), weights[:-2].tolist(), ratios, strict=True)
+    return sorted((Candidate(f, log, w, ratio, not f.at_limit) for f, log, w, ratio in found), key=lambda c: -c.delta_evidence)
 
 
 def _likeness(signatures: Sequence[Signature], names: Sequence[str]) -> str:
