@@ -78,7 +78,7 @@ class Rigid:
 
     of: object
 
-    def frf(self, frequency):
+    def frf(self, frequency, window_decay=0.0):
         return np.ones((7, 2, 1)) / (2j * np.pi * frequency)
 
 
