@@ -11,6 +11,7 @@ from multiprocessing import get_context
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
 
 from model.ball_row import Array
 from model.machine import Condition, Spindle
@@ -79,6 +80,7 @@ def _observed(test: Test, noise: Noise) -> Observation:
 
 def _repeated(o: Observation, others: list[Observation]) -> Observation:
     """Without the modes that no other test shows anything like: a pole of the noise appears once, a mode of the machine again.
+    A mode of another test speaks for one mode only: what splits a peak in two has the shape of both.
 
     Less than three tests with shapes are taken as they are.
     """
@@ -87,8 +89,10 @@ def _repeated(o: Observation, others: list[Observation]) -> Observation:
         return o
     again = np.zeros(len(o.frequency), bool)
     for frequency, shape in shapes:
-        near = np.abs(np.log(o.frequency[:, None] / frequency)) < SAME
-        again |= (near & (mac(o.shape, shape) > ALIKE)).any(axis=1)
+        alike = mac(o.shape, shape)
+        like = (np.abs(np.log(o.frequency[:, None] / frequency)) < SAME) & (alike > ALIKE)
+        rows, columns = linear_sum_assignment(np.where(like, 1 - alike, len(like)))
+        again[rows] |= like[rows, columns]
     return _only(o, again)
 
 
