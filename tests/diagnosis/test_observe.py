@@ -1,0 +1,31 @@
+"""What of a test's poles is taken for a mode of the machine."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from diagnosis.observe import _repeated
+from tests.diagnosis.test_explain import hidden
+
+
+def with_pole(o, like, off):
+    """One pole more, of the shape of mode `like` and at (1 + off) times its frequency."""
+    m, order = len(o.frequency), np.append(np.arange(len(o.frequency)), like)
+    both = np.concatenate([order, order + m])
+    covariance = o.covariance[np.ix_(both, both)] + 1e-12 * np.eye(len(both))
+    frequency = o.frequency[order]
+    frequency[-1] *= 1 + off
+    return replace(
+        o, frequency=frequency, damping=o.damping[order], covariance=covariance, shape=o.shape[order], shape_sd=o.shape_sd[order],
+        residue=o.residue[order], residue_sd=o.residue_sd[order],
+    )  # fmt: skip
+
+
+def test_a_pole_that_splits_a_peak_is_left_out(spindle):
+    """It has the shape and nearly the frequency of a mode that the other tests show once; one that they show too stays."""
+    tests = hidden(spindle, [], 5)
+    split = with_pole(tests[0], 0, 0.01)
+    found = _repeated(split, tests[1:])
+    assert len(found.frequency) == len(tests[0].frequency)
+    also = [with_pole(o, 0, 0.01) for o in tests[1:]]
+    assert len(_repeated(split, also).frequency) == len(split.frequency)
