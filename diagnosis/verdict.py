@@ -108,7 +108,7 @@ def would_change(found: Diagnosis, places: list[Change], tests: list[NextTest]) 
 
 
 def _plan(plan: Plan) -> dict[str, Any]:
-    told: dict[str, Any] = {"temperature_C": plan.condition.temperature, "speed_rpm": plan.condition.speed / RPM}
+    told: dict[str, Any] = {"temperature_C": plan.condition.temperature, "speed_rpm": round(plan.condition.speed / RPM, 6)}
     if plan.condition.level:
         told["level_N"] = plan.condition.level
     if np.isfinite(plan.condition.soak_time):
