@@ -62,7 +62,7 @@ def _filler(theory: Theory, t: int, at: Linearised, result: Array) -> Callable[[
     found, chain = at.found, at.point.measurement
     inverse = np.linalg.inv(at.matrices.mass)
     gap = every[None, :] - every[:, None]  # [j, i] is pole i less pole j
-    np.fill_diagonal(gap, np.inf)  # a vector's own part is a matter of scale
+    gap[gap == 0] = np.inf  # a vector's own part is a matter of scale, and so is that of another of exactly the same pole
     seen_right, seen_left = chain.response_rows @ right, left @ chain.reference_rows.T
     bare, part = _away_from_zero(seen_right[:, found].T), _away_from_zero(seen_left[found])
     late = -1j * chain.delay
