@@ -155,9 +155,9 @@ def _rated(theory: Theory, base: Fit, fits: Sequence[Fit], ahead: float, pair: f
 
     def price(f: Fit, ratio: float) -> float:
         """What the second effect of a pair must bring: less where it is plain that one does not do."""
-        members = [alone[e.name] for e in f.effects if e.name in alone]
         if len(f.effects) == 1:
             return 0.0
+        members = [alone[e.name] for e in f.effects if e.name in alone]
         plain = all(ratio < MUCH_MORE * r or chi_squared.sf(g.chi2, n) < MISFIT for g, r in members)
         return CLEAR if plain and chi_squared.sf(f.chi2, n) > MISFIT else pair
 

@@ -31,6 +31,12 @@ def explain(
     """The whole diagnosis of one campaign; effects that the scene has already are left as they are."""
     catalogue = [e for e in catalogue if e.name not in {present.name for present, _ in theory.present}]
     about = linearise(theory)
+
+    def polished(found: Sequence[Fit]) -> list[Fit]:
+        """Fits made again from where they came to rest, with errors of form and with laws that are exact."""
+        again = [(*task, f.nuisance) for f in found for task in (_again(f), _exactly(f))]
+        return side_by_side(theory, about, again, True, workers)
+
     base = fit(theory, about)
     progress(f"tolerances fitted: misfit {base.misfit:.0f} for {len(theory.data.value)} numbers")
     signatures = screen(theory, base, catalogue)
@@ -65,14 +71,12 @@ def explain(
         best = max(fits.values(), key=lambda f: f.evidence)
         progress(f"{len(alike)} effects refitted that the best resembles")
         close = [f for f in fits.values() if best.evidence - f.evidence < NEAR]
-        again = [task for f in close for task in ((*_again(f), f.nuisance), (*_exactly(f), f.nuisance))]
-        fits |= _best([*close, *side_by_side(theory, about, again, True, workers)])
+        fits |= _best([*close, *polished(close)])
         best = max(fits.values(), key=lambda f: f.evidence)
         seconds = [s for s in screen(theory, best, catalogue, 0.1)[:PAIRED] if s.gain > 2 * AHEAD]
         pairs = _best(side_by_side(theory, about, [(*_beside(best, s), None) for s in seconds], True, workers))
         level = [f for f in pairs.values() if abs(best.evidence - f.evidence) < NEAR]
-        again = [task for f in level for task in ((*_again(f), f.nuisance), (*_exactly(f), f.nuisance))]
-        fits |= pairs | _best([*level, *side_by_side(theory, about, again, True, workers)])
+        fits |= pairs | _best([*level, *polished(level)])
         best = max(fits.values(), key=lambda f: f.evidence)
         if len(best.effects) == 2:  # whether one of them would do is asked from where the two came to rest
             alone = [((e,), list(best.values[e.name].values()), best.nuisance) for e in best.effects]

@@ -22,7 +22,7 @@ class Signature:
     """What an effect at its typical values does to the features, as far as tolerances cannot do the same.
 
     `share` of the typical size was tried. `visibility`: typical size in standard errors, after projection; `expected`: multiple of the typical size that would explain the misfit
-    best, with `expected_sd`, where the other parameters are `others`; `smallest`: size of the main parameter (its unit) these data could
+    best, where the other parameters are `others`; `smallest`: size of the main parameter (its unit) these data could
     show at `CLEAR`; `gain`: fall of chi2 that the effect promises, to first order.
     """
 
@@ -31,7 +31,6 @@ class Signature:
     share: float
     visibility: float
     expected: float
-    expected_sd: float
     smallest: float
     direction: Array  # (n,) whitened, projected
     gain: float
@@ -45,9 +44,14 @@ def left_over(theory: Theory, found: Fit) -> tuple[Array, Array]:
     """
     widths = np.concatenate([theory.sd, [p.prior_sd for e in found.effects for p in e.parameters]])
     a = found.whiten @ (found.jacobian * widths)
-    factor = np.linalg.cholesky(np.eye(len(a)) + a @ a.T)
+    factor = absorbing(a)
     prior = np.concatenate([found.nuisance / theory.sd, np.zeros(len(widths) - len(theory.sd))])
     return np.linalg.solve(factor, found.whiten @ found.residual + a @ prior), factor
+
+
+def absorbing(a: Array) -> Array:
+    """The Cholesky factor (n, n) of the covariance of data whose model has whitened derivatives `a` (n, p) by parameters of unit priors."""
+    return np.asarray(np.linalg.cholesky(np.eye(len(a)) + a @ a.T))
 
 
 def screen(theory: Theory, found: Fit, catalogue: Sequence[Effect], share: float = 1.0) -> list[Signature]:
@@ -73,10 +77,10 @@ def screen(theory: Theory, found: Fit, catalogue: Sequence[Effect], share: float
         direction: Array = np.asarray(np.linalg.solve(factor, found.whiten @ moved) / share, float)
         visible = float(np.linalg.norm(direction))
         if visible < 1e-6:
-            return Signature(effect, others, share, 0.0, 0.0, np.inf, np.inf, direction, 0.0)
+            return Signature(effect, others, share, 0.0, 0.0, np.inf, direction, 0.0)
         smallest = abs(main.typical - main.neutral) * float(np.sqrt(2 * CLEAR)) / visible
         expected = float(direction @ rest) / visible**2
-        return Signature(effect, others, share, visible, expected, 1 / visible, smallest, direction, (expected * visible) ** 2)
+        return Signature(effect, others, share, visible, expected, smallest, direction, (expected * visible) ** 2)
 
     signatures = []
     for effect in catalogue:
@@ -138,7 +142,7 @@ def best_starts(
     x = np.zeros(len(theory.sd)) if nuisance is None else nuisance
     whiten = theory.data.whiten / enlarged
     a = whiten @ (slopes * theory.sd)
-    factor = np.linalg.cholesky(np.eye(len(a)) + a @ a.T)
+    factor = absorbing(a)
 
     def left(effect: Effect, start: Sequence[float]) -> float:
         values = dict(zip([p.name for p in effect.parameters], start, strict=True))

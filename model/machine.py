@@ -299,6 +299,12 @@ class Spindle:
     def bearing(self, name: str) -> Bearing:
         return next(b for b in self.bearings if b.name == name)
 
+    @property
+    def standing(self) -> Body:
+        """The body that holds the rings that do not turn."""
+        s = self.structure
+        return s.body(s.inner_body if self.pair.turning_ring == "outer" else s.outer_body)
+
     def region(self, name: str) -> Region:
         return next(r for r in self.regions if r.name == name)
 

@@ -29,10 +29,8 @@ def with_material(spindle: Spindle, material: Material) -> Spindle:
 
 def with_shaft(spindle: Spindle, error: float) -> Spindle:
     """The standing body's parts but its bearing rings, of a steel of their own."""
-    structure = spindle.structure
-    standing = structure.body(structure.inner_body if spindle.pair.turning_ring == "outer" else structure.outer_body)
     rings = {name for b in spindle.bearings for name in (b.inner_ring, b.outer_ring)}
-    shaft = [g for g in spindle.regions if g.name in standing.regions and g.name not in rings]
+    shaft = [g for g in spindle.regions if g.name in spindle.standing.regions and g.name not in rings]
     for name in {g.material for g in shaft}:
         spindle = with_material(spindle, replace(expanding(spindle.materials[name], error), name=f"{name} of the shaft"))
     regions = tuple(replace(g, material=f"{g.material} of the shaft") if g in shaft else g for g in spindle.regions)

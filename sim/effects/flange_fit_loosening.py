@@ -41,11 +41,9 @@ def opening(spindle: Spindle, temperature: float) -> float:
 
 def fit(spindle: Spindle) -> tuple[Region, Region] | None:
     """The standing body's region (inside) and the support's (outside) that share the longest cylinder face, if any do."""
-    structure = spindle.structure
-    standing = structure.body(structure.inner_body if spindle.pair.turning_ring == "outer" else structure.outer_body)
-    made_of = {name for b in structure.bodies for name in b.regions}
+    made_of = {name for b in spindle.structure.bodies for name in b.regions}
     supports = [g for g in spindle.regions if g.name not in made_of]
-    pairs = [(g, s) for g in map(spindle.region, standing.regions) for s in supports if abs(g.r[1] - s.r[0]) < 1e-9]
+    pairs = [(g, s) for g in map(spindle.region, spindle.standing.regions) for s in supports if abs(g.r[1] - s.r[0]) < 1e-9]
     return max((p for p in pairs if _length(p) > 0), key=_length, default=None)
 
 

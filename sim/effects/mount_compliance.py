@@ -26,9 +26,7 @@ def compliance(spindle: Spindle, condition: Condition, values: Values) -> float:
 
 def role(spindle: Spindle, joint: Joint) -> str:
     """What a joint is: "flange" where it holds the body of the standing rings, else "mount" on the ground, else "plate"."""
-    structure = spindle.structure
-    standing = structure.inner_body if spindle.pair.turning_ring == "outer" else structure.outer_body
-    if standing in joint.bodies:
+    if spindle.standing.name in joint.bodies:
         return "flange"
     return "mount" if "ground" in joint.bodies else "plate"
 
