@@ -34,6 +34,7 @@ from sim.effect import Effect
 from sim.effects import CATALOGUE, by_name
 from sim.impact import impact_tests
 from sim.operating import operating_point
+from tests.blind_variants import outcome as score
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "out" / "blind" / "results.jsonl"
@@ -91,14 +92,9 @@ def judge(spindle: Spindle, effect: str | None, size: float, seed: int) -> dict:
 
 
 def outcome(row: dict) -> str:
-    """identified, in the set, wrong, missed or false alarm - or right, where nothing was hidden and nothing named."""
-    if row["effect"] is None:
-        return "right" if row["verdict"] == "none" else "false alarm"
-    if row["verdict"] == "identified":
-        return "identified" if row["effects"] == [row["effect"]] else "wrong"
-    if row["effect"] in row["effects"]:
-        return "in the set"
-    return "missed" if row["verdict"] in ("none", "unexplained") else "wrong"
+    """As `tests.blind_variants` keeps score: one effect too many is wrong here too."""
+    hidden = [row["effect"]] if row["effect"] else []
+    return score({"variants": hidden, "truth": [hidden] if hidden else [], "verdict": row["verdict"], "effects": row["effects"]})
 
 
 def show(console: Console, rows: list[dict]) -> None:
