@@ -35,6 +35,7 @@ class Candidate:
     fit: Fit
     delta_evidence: float  # ln evidence over the model without effects, less what two effects at once are less likely
     probability: float
+    margin: float  # ln evidence by which the best explanation must lead it to be alone
     held_out_ratio: float  # rms pull of left-out conditions over that of the model without effects
     believable: bool
 
@@ -113,12 +114,14 @@ def decide(theory: Theory, base: Fit, fits: list[Fit], signatures: list[Signatur
         return answer("unexplained", (), f"The model is rejected (misfit {base.misfit:.0f} for {n} numbers), and even with "
                       f"{named} a misfit of {lead.fit.misfit:.0f} is left.")  # fmt: skip
     alike = [c for c in candidates if len(c.effects) == len(lead.effects)]
-    rivals = [c for c in alike if lead.delta_evidence - c.delta_evidence < ahead]
-    if len(rivals) > 1:
-        rivals = [c for c in alike if lead.delta_evidence - c.delta_evidence < WIDE * ahead]
+    if any(lead.delta_evidence - c.delta_evidence < c.margin for c in alike[1:]):
+        rivals = [c for c in alike if lead.delta_evidence - c.delta_evidence < WIDE * c.margin]
         names = sorted({name for c in rivals for name in c.effects})
-        return answer("ambiguous", names, f"{', '.join(names)} explain the data within {WIDE * ahead:.0f} in ln evidence of each other"
+        apart = lead.delta_evidence - rivals[-1].delta_evidence
+        return answer("ambiguous", names, f"{', '.join(names)} explain the data within {apart:.0f} in ln evidence of each other"
                       f"{_likeness(signatures, names)}.")  # fmt: skip
+    gap = lead.delta_evidence - max([0.0, *(c.delta_evidence for c in alike[1:])])
+    leads = f"{named} leads every other explanation by {gap:.0f} or more in ln evidence"
     more = [c for c in candidates if c.fit.evidence - lead.fit.evidence > ahead and c.held_out_ratio < MORE * lead.held_out_ratio]
     perhaps = [c for c in more if len(c.effects) > len(lead.effects)]
     if perhaps:
@@ -127,18 +130,17 @@ def decide(theory: Theory, base: Fit, fits: list[Fit], signatures: list[Signatur
                       f"{pair:.0f} is asked of a second effect.")  # fmt: skip
     first, last = lead.fit.effects[0], lead.fit.effects[-1]
     if last.name in first.resembles or first.name in last.resembles:
-        return answer("ambiguous", sorted(lead.effects), f"{named} leads by more than {ahead:.0f} in ln evidence, but the two resemble each "
-                      "other: they may be one effect of another law.")  # fmt: skip
+        return answer("ambiguous", sorted(lead.effects), f"{leads}, but the two resemble each other: they may be one effect of another "
+                      "law.")  # fmt: skip
     if len(lead.effects) == 2 and lead.believable:
         cost = lead.fit.evidence - max(c.fit.evidence for c in candidates if len(c.effects) == 1)
         return answer("two effects", lead.effects, f"{lead.effects[0]} and {lead.effects[1]} are both needed: dropping either costs "
                       f"{cost:.0f} in ln evidence or more.")  # fmt: skip
     if lead.believable and lead.held_out_ratio < FALLS:
-        return answer("identified", lead.effects, f"{named} leads every other explanation by more than {ahead:.0f} in ln evidence; "
-                      f"the error on left-out conditions falls to {100 * lead.held_out_ratio:.0f} %.")  # fmt: skip
+        return answer("identified", lead.effects, f"{leads}; the error on left-out conditions falls to {100 * lead.held_out_ratio:.0f} %.")  # fmt: skip
     second = next((c for c in alike[1:] if c.delta_evidence > CLEAR), None)
     names = sorted({*lead.effects, *(second.effects if second else ())})
-    return answer("ambiguous", names, f"{named} leads by more than {ahead:.0f} in ln evidence but {_doubt(theory, base, lead)}.")
+    return answer("ambiguous", names, f"{leads}, but {_doubt(theory, base, lead)}.")
 
 
 def _rated(theory: Theory, base: Fit, fits: Sequence[Fit], ahead: float, pair: float) -> list[Candidate]:
@@ -153,20 +155,33 @@ def _rated(theory: Theory, base: Fit, fits: Sequence[Fit], ahead: float, pair: f
     ratios = [float(np.sqrt(held_out(theory, f, f.whiten)[0] / held_out(theory, base, f.whiten)[0])) for f in fits]
     alone = {f.effects[0].name: (f, ratio) for f, ratio in zip(fits, ratios, strict=True) if len(f.effects) == 1}
 
+    def refuted(f: Fit) -> bool:
+        """By the data, or by tolerances that nobody would believe."""
+        return bool(chi_squared.sf(f.chi2, n) < MISFIT or chi_squared.sf(np.sum((f.nuisance / theory.sd) ** 2), len(theory.sd)) < MISFIT)
+
     def price(f: Fit, ratio: float) -> float:
         """What the second effect of a pair must bring: less where it is plain that one does not do."""
         if len(f.effects) == 1:
             return 0.0
         members = [alone[e.name] for e in f.effects if e.name in alone]
-        plain = all(ratio < MUCH_MORE * r or chi_squared.sf(g.chi2, n) < MISFIT for g, r in members)
-        return CLEAR if plain and chi_squared.sf(f.chi2, n) > MISFIT else pair
+        plain = all(ratio < MUCH_MORE * r or refuted(g) for g, r in members)
+        return CLEAR if plain and not refuted(f) else pair
 
     logs = np.array([f.evidence - base.evidence - price(f, ratio) for f, ratio in zip(fits, ratios, strict=True)])
-    left = max(fits[int(np.argmax(logs))].chi2 - n, 0.0) / 2
-    weights = np.exp((np.array([*logs, 0.0, logs.max() + left - OTHER * ahead]) - logs.max() - left) * SURE / ahead)
+    lead = fits[int(np.argmax(logs))]
+
+    def margin(f: Fit) -> float:
+        """Less for what shares an effect with the best: only what is not common to both is in dispute."""
+        common = [alone[e.name][0].evidence for e in lead.effects if e in f.effects and e.name in alone]
+        return max(AHEAD, OF_ALL * (lead.evidence - max(common))) if common else ahead
+
+    margins = [margin(f) for f in fits]
+    left = max(lead.chi2 - n, 0.0) / 2
+    odds = np.array([*(logs - logs.max()), -logs.max(), left - OTHER * ahead]) * SURE / np.array([*margins, ahead, ahead])
+    weights = np.exp(odds - odds.max())
     weights /= weights.sum()
-    found = zip(fits, logs.tolist(), weights[:-2].tolist(), ratios, strict=True)
-    return sorted((Candidate(f, log, w, ratio, not f.at_limit) for f, log, w, ratio in found), key=lambda c: -c.delta_evidence)
+    found = zip(fits, logs.tolist(), weights[:-2].tolist(), margins, ratios, strict=True)
+    return sorted((Candidate(f, log, w, m, ratio, not f.at_limit) for f, log, w, m, ratio in found), key=lambda c: -c.delta_evidence)
 
 
 def _likeness(signatures: Sequence[Signature], names: Sequence[str]) -> str:

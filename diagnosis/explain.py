@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from scipy.stats import chi2 as chi_squared
 
-from diagnosis.decide import AHEAD, Diagnosis, decide
+from diagnosis.decide import AHEAD, MISFIT, Diagnosis, decide
 from diagnosis.fit import TEMPERS, Fit, fit, linearise
 from diagnosis.many_fits import Task, side_by_side
 from diagnosis.screening import CLEAR, Signature, best_starts, screen, starts
@@ -15,7 +15,7 @@ from diagnosis.theory import Theory
 from model.ball_row import Array
 from sim.effect import Effect
 
-SINGLES, PAIRED = 5, 3  # effects refitted after the rough fits, and effects tried beside the best
+SINGLES, PAIRED = 5, 4  # effects refitted after the rough fits, and effects tried beside the best
 STARTS = 2  # of every effect, those that leave least of the data
 SAME = 0.2  # prior standard deviations within which two starts are one
 CLOSE = 3.0  # root of chi2 a number, priors included, up to which tolerances alone come close to the data
@@ -36,6 +36,17 @@ def explain(
         """Fits made again from where they came to rest, with errors of form and with laws that are exact."""
         again = [(*task, f.nuisance) for f in found for task in (_again(f), _exactly(f))]
         return side_by_side(theory, about, again, True, workers)
+
+    def paired(first: Fit, best: Fit) -> dict[tuple[str, ...], Fit]:
+        """Fits of the effect of the first and one of those that screening finds beside it; polished where that may decide."""
+        # what another effect does may lie within the errors of form of the first: it shows where the first one's law is taken for exact
+        exact = side_by_side(theory, about, [(*_exactly(first), first.nuisance)], True, workers)[0]
+        refuted = chi_squared.sf(exact.misfit, len(theory.data.value)) < MISFIT
+        found = [(f, s) for f in ([first, exact] if refuted else [first]) for s in screen(theory, f, catalogue, 0.1)[:PAIRED]]
+        tasks = [(*_beside(first, f, s), None) for f, s in found if s.gain > 2 * AHEAD]
+        pairs = _best(side_by_side(theory, about, tasks, True, workers))
+        level = [f for f in pairs.values() if abs(best.evidence - f.evidence) < NEAR]
+        return _best([*pairs.values(), *polished(level)])
 
     base = fit(theory, about)
     progress(f"tolerances fitted: misfit {base.misfit:.0f} for {len(theory.data.value)} numbers")
@@ -73,15 +84,14 @@ def explain(
         close = [f for f in fits.values() if best.evidence - f.evidence < NEAR]
         fits |= _best([*close, *polished(close)])
         best = max(fits.values(), key=lambda f: f.evidence)
-        seconds = [s for s in screen(theory, best, catalogue, 0.1)[:PAIRED] if s.gain > 2 * AHEAD]
-        pairs = _best(side_by_side(theory, about, [(*_beside(best, s), None) for s in seconds], True, workers))
-        level = [f for f in pairs.values() if abs(best.evidence - f.evidence) < NEAR]
-        fits |= pairs | _best([*level, *polished(level)])
+        fits |= paired(best, best)
         best = max(fits.values(), key=lambda f: f.evidence)
-        if len(best.effects) == 2:  # whether one of them would do is asked from where the two came to rest
+        if len(best.effects) == 2:
+            # whether one of them would do is asked from where the two came to rest, and what else would do beside the second
             alone = [((e,), list(best.values[e.name].values()), best.nuisance) for e in best.effects]
-            fits = _best([*fits.values(), *side_by_side(theory, about, alone, True, workers)])
-        progress(f"{len(pairs)} pairs fitted")
+            each = side_by_side(theory, about, alone, True, workers)
+            fits = _best([*fits.values(), *each, *paired(each[1], best).values()])
+        progress(f"{sum(len(names) == 2 for names in fits)} pairs fitted")
     return decide(theory, base, list(fits.values()), signatures)
 
 
@@ -99,10 +109,9 @@ def _tried(found: Fit, tasks: Sequence[Task]) -> bool:
     )
 
 
-def _beside(found: Fit, more: Signature) -> Task:
-    """The same and one more effect, as large as screening beside them expects."""
-    effects, values = _again(found)
-    return (*effects, more.effect), [*values, *starts(more)[0]]
+def _beside(best: Fit, found: Fit, more: Signature) -> Task:
+    """The effects of the best from where a fit came to rest, and one more, as large as screening beside it expects."""
+    return (*best.effects, more.effect), [*_again(found)[1], *starts(more)[0]]
 
 
 def _exactly(found: Fit) -> Task:
@@ -112,9 +121,10 @@ def _exactly(found: Fit) -> Task:
 
 
 def _best(fits: Sequence[Fit]) -> dict[tuple[str, ...], Fit]:
+    """The best fit of every effect and every pair, whichever of the two came first."""
     best: dict[tuple[str, ...], Fit] = {}
     for f in fits:
-        key = tuple(e.name for e in f.effects)
+        key = tuple(sorted(e.name for e in f.effects))
         if key not in best or f.evidence > best[key].evidence:
             best[key] = f
     return best

@@ -14,6 +14,7 @@ from model.pair import NoEquilibrium
 from sim.effect import Effect
 
 CLEAR = 12.0  # ln evidence by which an explanation must lead the model without it
+LITTLE = 0.01  # of what is tried, for the direction in which an effect begins
 SMALL = 0.2  # share of the typical size below which a fit that starts there may not find home
 
 
@@ -58,8 +59,8 @@ def screen(theory: Theory, found: Fit, catalogue: Sequence[Effect], share: float
     """Finite signature of every effect beside those of a fit, projected off the tolerances; the most telling first.
 
     `share` of the typical size is tried, or less where that would do more to the data than anything that they still hold: what an effect
-    does need not grow with its size. The other parameters are at their typical values and one by one a prior width off them: that which
-    explains most counts.
+    does need not grow with its size. The other parameters are at their typical values, then one by one a prior width off them, then once
+    more about the best of these: what explains most counts.
     """
     rest, factor = left_over(theory, found)
     present = [(e, found.values[e.name]) for e in found.effects]
@@ -91,31 +92,27 @@ def screen(theory: Theory, found: Fit, catalogue: Sequence[Effect], share: float
             smaller = tried(effect, effect.typical(), much / typical.visibility)
             typical = replace(smaller, visibility=typical.visibility) if smaller else typical
         begin = typical.share if typical else share
-        every = [typical, *(tried(effect, others, begin) for others in variations(effect)[1:])]
-        if possible := [s for s in every if s is not None]:
+        possible = [s for s in (typical, *(tried(effect, others, begin) for others in variations(effect, effect.typical()))) if s]
+        if possible:
             best = max(possible, key=lambda s: s.gain)
-            again = [tried(effect, others, begin) for others in choices(effect, best.others)]  # a choice may need the other parameter too
-            best = max([best, *(s for s in again if s is not None)], key=lambda s: s.gain)
+            # two parameters may have to move together
+            again = [tried(effect, others, begin) for others in variations(effect, best.others)] if best is not typical else []
+            # what tolerances nearly absorb shows its own direction only where it is small: the rest is curvature
+            again.append(tried(effect, max([best, *(s for s in again if s)], key=lambda s: s.gain).others, LITTLE * begin))
+            best = max([best, *(s for s in again if s)], key=lambda s: s.gain)
             # what the data could show is said of the typical effect, whichever variation fits them
             signatures.append(replace(best, visibility=possible[0].visibility, smallest=possible[0].smallest))
     return sorted(signatures, key=lambda s: -s.gain)
 
 
-def variations(effect: Effect) -> list[dict[str, float]]:
-    """Typical values, and one after the other every parameter but the first a prior width up and down, inside its limits, or at each of
-    its other choices."""
-    typical = effect.typical()
-    found = [typical]
+def variations(effect: Effect, others: dict[str, float]) -> list[dict[str, float]]:
+    """Every parameter but the first one by one a prior width up and down, inside its limits, or at each of its other choices."""
+    found = []
     for p in effect.parameters[1:]:
-        ends = {float(np.clip(p.typical + sign * p.prior_sd, *p.limits)) for sign in (1, -1)} if not p.choices else set(p.choices)
-        ends -= {p.typical}
-        found += [typical | {p.name: end} for end in sorted(ends)]
+        value = others[p.name]
+        ends = {float(np.clip(value + sign * p.prior_sd, *p.limits)) for sign in (1, -1)} if not p.choices else set(p.choices)
+        found += [others | {p.name: end} for end in sorted(ends - {value})]
     return found
-
-
-def choices(effect: Effect, values: dict[str, float]) -> list[dict[str, float]]:
-    """The same values with every other choice, one parameter after the other."""
-    return [values | {p.name: c} for p in effect.parameters[1:] for c in p.choices if c != values[p.name]]
 
 
 def starts(signature: Signature) -> list[list[float]]:

@@ -36,6 +36,7 @@ from scipy.optimize import linear_sum_assignment
 from diagnosis.data import data_of
 from diagnosis.decide import Candidate
 from diagnosis.explain import explain
+from diagnosis.fit import fit, linearise
 from diagnosis.observe import observe
 from diagnosis.screening import screen
 from diagnosis.theory import theory
@@ -121,7 +122,7 @@ def judge(job: Job) -> dict[str, Any]:
     about = theory(spindle, data_of(observe(made, spindle)))
     found = explain(about, CATALOGUE, 1)
     best, n = found.best, len(about.data.value)
-    told = {s.effect.name: s.smallest for s in screen(about, found.base, [v.of_size(s) for v, s in zip(variants, sizes, strict=True)])}
+    told = smallest(spindle, variants, sizes, job.seed)
     return {
         **asdict(job),
         "truth": [list(v.truth) for v in variants],
@@ -138,6 +139,16 @@ def judge(job: Job) -> dict[str, Any]:
         "numbers": n,
         "seconds": time.perf_counter() - start,
     }
+
+
+def smallest(spindle: Spindle, variants: Sequence[Variant], sizes: Sequence[float], seed: int) -> dict[str, float]:
+    """The smallest size of every variant that the same tests of the same spindle could just have shown, had nothing been hidden."""
+    if not variants:
+        return {}
+    quiet = campaign(spindle, [(v, 0.0) for v in variants], seed)
+    about = theory(spindle, data_of(observe(quiet, spindle)))
+    effects = [v.of_size(s) for v, s in zip(variants, sizes, strict=True)]
+    return {s.effect.name: s.smallest for s in screen(about, fit(about, linearise(about)), effects)}
 
 
 def _candidate(c: Candidate) -> dict[str, Any]:

@@ -30,14 +30,25 @@ def chain(spindle: Spindle, condition: Condition, values: Values, chain: RotorBa
         return chain
     across = np.diag([-stiffness, -stiffness, values["axial_ratio"] * stiffness, 0.0, 0.0])
     structure = spindle.structure
-    element = Element("magnet", "motor", stator_body(spindle), structure.outer_body, magnet_height(spindle), across, np.zeros((5, 5)))
+    element = Element(
+        "magnet",
+        "motor",
+        stator_body(spindle, int(values["below"])),
+        structure.outer_body,
+        magnet_height(spindle),
+        across,
+        np.zeros((5, 5)),
+    )
     return replace(chain, elements=(*chain.elements, element))
 
 
-def stator_body(spindle: Spindle) -> str:
-    """The body on which the inner body stands: the stator is fixed there."""
-    structure = spindle.structure
-    return next((j.bodies[0] for j in structure.joints if j.bodies[1] == structure.inner_body), structure.inner_body)
+def stator_body(spindle: Spindle, below: int = 0) -> str:
+    """The body on which the inner body stands, or one that many joints nearer to the ground: the stator is fixed there."""
+    body = spindle.structure.inner_body
+    for _ in range(1 + below):
+        stands_on = next((j.bodies[0] for j in spindle.structure.joints if j.bodies[1] == body), "ground")
+        body = body if stands_on == "ground" else stands_on
+    return body
 
 
 def magnet_height(spindle: Spindle) -> float:
@@ -96,6 +107,17 @@ EFFECT = Effect(
             meaning="change of the magnet's remanence with temperature",
             source="sintered NdFeB -0.12 %/K, ferrite -0.2, SmCo -0.04 (makers' data sheets)",
         ),
+        Parameter(
+            "below",
+            "1",
+            neutral=0.0,
+            typical=0.0,
+            prior_sd=1.0,
+            limits=(0.0, 1.0),
+            meaning="where the stator is fixed: 0 on the body the shaft stands on, 1 on the body below that",
+            source="assumed: stators sit on the shaft's flange, or on the base plate round it",
+            choices=(0.0, 1.0),
+        ),
     ),
     sees=(
         "lower and upper bearing differ in preload by the pull, so their stiffness moves apart while its mean hardly changes; "
@@ -104,7 +126,7 @@ EFFECT = Effect(
     resembles=("preload_loss", "bearing_misalignment"),
     valid=(
         "rigidly preloaded pairs (a spring-loaded pair takes the bias on one ring's stop and the model leaves it out); hub centred "
-        "in the stator; the stator moves with the body the shaft stands on"
+        "in the stator; the stator is rigid"
     ),
     spindle=spindle,
     chain=chain,

@@ -18,16 +18,23 @@ def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
         here = values["turning_share" if body.turns else "standing_share"] * mass
         for point in spindle.points:
             if point.body == body.name and here > 0.0:
-                body = loaded(body, point, here)
+                body = loaded(body, point, here, values["unbalanced"])
         bodies.append(body)
     return replace(spindle, structure=replace(spindle.structure, bodies=tuple(bodies)))
 
 
-def loaded(body: Body, point: Point, mass: float) -> Body:
-    """The body with a point mass at a measuring point; a turning body has it spread round the axis, its mean over a turn."""
+def loaded(body: Body, point: Point, mass: float, unbalanced: float) -> Body:
+    """The body with a point mass at a measuring point; a turning body has it spread round the axis, its mean over a turn.
+
+    What is not `unbalanced` has a twin at the same distance below the body's centre of mass, half a mass each.
+    """
     x, y, z = point.position
-    about = ((x**2 + y**2) / 2, (x**2 + y**2) / 2) if body.turns else (y**2, x**2)
-    return with_mass(body, mass, z, (mass * about[0], mass * about[1], mass * (x**2 + y**2)))
+    arm = z - body.z
+    square = ((x**2 + y**2) / 2, (x**2 + y**2) / 2) if body.turns else (y**2, x**2)
+    twin = (1 - unbalanced) * mass
+    balanced = with_mass(body, twin, body.z, (twin * (square[0] + arm**2), twin * (square[1] + arm**2), twin * (x**2 + y**2)))
+    own = mass - twin
+    return with_mass(balanced, own, z, (own * square[0], own * square[1], own * (x**2 + y**2)))
 
 
 EFFECT = Effect(
@@ -68,6 +75,16 @@ EFFECT = Effect(
             limits=(0.0, 1.0),
             meaning="the same on the turning part",
             source="assumed: 1 cm2 of retroreflective tape, 0.2 kg/m2; sensors too where it was hit at rest",
+        ),
+        Parameter(
+            "unbalanced",
+            "1",
+            neutral=1.0,
+            typical=1.0,
+            prior_sd=0.5,
+            limits=(0.0, 1.0),
+            meaning="share of the mass that moves the centre of mass along the axis; the rest is balanced about it",
+            source="1 for sensors alone; 0 where dummy masses, cables or clamps on the other side balance them",
         ),
     ),
     sees="modes that move the sensors' parts lie lower, the same at every temperature and speed; gone when sensors are moved",
