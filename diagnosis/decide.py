@@ -118,8 +118,9 @@ def decide(theory: Theory, base: Fit, fits: list[Fit], signatures: list[Signatur
         rivals = [c for c in alike if lead.delta_evidence - c.delta_evidence < WIDE * c.margin]
         names = sorted({name for c in rivals for name in c.effects})
         apart = lead.delta_evidence - rivals[-1].delta_evidence
-        return answer("ambiguous", names, f"{', '.join(names)} explain the data within {apart:.0f} in ln evidence of each other"
-                      f"{_likeness(signatures, names)}.")  # fmt: skip
+        each = ", ".join(" + ".join(c.effects) for c in rivals)
+        return answer("ambiguous", names, f"{each} explain the data within {apart:.0f} in ln evidence of each other"
+                      f"{_likeness(signatures, [c.effects for c in rivals])}.")  # fmt: skip
     gap = lead.delta_evidence - max([0.0, *(c.delta_evidence for c in alike[1:])])
     leads = f"{named} leads every other explanation by {gap:.0f} or more in ln evidence"
     more = [c for c in candidates if c.fit.evidence - lead.fit.evidence > ahead and c.held_out_ratio < MORE * lead.held_out_ratio]
@@ -184,9 +185,11 @@ def _rated(theory: Theory, base: Fit, fits: Sequence[Fit], ahead: float, pair: f
     return sorted((Candidate(f, log, w, m, ratio, not f.at_limit) for f, log, w, m, ratio in found), key=lambda c: -c.delta_evidence)
 
 
-def _likeness(signatures: Sequence[Signature], names: Sequence[str]) -> str:
-    """How alike the effects of a set are in these data, beside what tolerances can do: the cosine of the two least alike."""
-    unit = np.array([s.direction for s in signatures if s.effect.name in names and np.linalg.norm(s.direction) > 0])
+def _likeness(signatures: Sequence[Signature], rivals: Sequence[tuple[str, ...]]) -> str:
+    """How alike the effects of a set are in these data, beside what tolerances can do: the cosine of the two least alike of those that
+    are not common to all."""
+    disputed = set().union(*rivals) - set(rivals[0]).intersection(*rivals)
+    unit = np.array([s.direction for s in signatures if s.effect.name in disputed and np.linalg.norm(s.direction) > 0])
     if len(unit) < 2:
         return ""
     unit /= np.linalg.norm(unit, axis=1, keepdims=True)

@@ -95,6 +95,35 @@ def test_a_hidden_effect_is_named(spindle, name, values):
             assert found.best.fit.sd[name][p.name] == 0.0
 
 
+PAIRS = [
+    # the second one's part lies within what the law of the first may miss
+    pytest.param(
+        {"plate_prestress": {"stiffening": -0.05}, "hammer_position": {"offset": 1.0}},
+        id="plate_prestress and hammer_position",
+        marks=pytest.mark.slow,
+    ),
+    # the second one is what a tolerance nine standard deviations off would do
+    pytest.param(
+        {"plate_prestress": {"stiffening": -0.03}, "preload_loss": {"loss": 0.28, "thermal_share": 0.0}},
+        id="plate_prestress and preload_loss",
+    ),
+    pytest.param(
+        {"soak_lag": {"hub_share": 0.2}, "hammer_position": {"offset": 2.0}}, id="soak_lag and hammer_position", marks=pytest.mark.slow
+    ),
+]
+
+
+@pytest.mark.parametrize("values", PAIRS)
+def test_two_hidden_effects_are_both_named(spindle, values):
+    two = [(by_name(name), by_name(name).typical() | told) for name, told in values.items()]
+    found = explain(theory_of(spindle, hidden(spindle, two, 4)), RIVALS, workers=1)
+    assert (found.verdict, set(found.effects)) == ("two effects", set(values))
+    for effect, true in two:
+        size = effect.parameters[0].name
+        sd = found.best.fit.sd[effect.name][size]
+        assert found.best.fit.values[effect.name][size] == pytest.approx(true[size], abs=max(5 * sd, 0.1 * abs(true[size])))
+
+
 @pytest.mark.parametrize("seed", [2, 3])
 def test_nothing_is_named_where_nothing_is_hidden(spindle, seed):
     about = theory_of(spindle, hidden(spindle, [], seed))

@@ -40,6 +40,12 @@ def test_magnet_pushes_away_from_the_middle(spindle):
     assert point.linear.stiffness == pytest.approx(matrices(point.chain).stiffness, rel=1e-6, abs=1.0)  # MuJoCo carries it
 
 
+@pytest.mark.parametrize(("below", "body"), [(0, "seat"), (1, "base")])
+def test_stator_stands_where_it_is_told(spindle, below, body):
+    assert at(spindle, REST, magnetic_pull, below=float(below)).chain.elements[-1].a == body
+    assert magnetic_pull.stator_body(spindle, 5) == "base"  # not on the ground
+
+
 def test_askew_ring_stiffness_is_the_curvature_of_its_energy(hot):
     """Second differences of the row's energy at the tilt (1e-4: the differences' own error)."""
     b, tilt = hot.bearings[1], 0.15e-3

@@ -139,6 +139,18 @@ def test_sensor_mass_against_rayleigh(spindle):
 def test_sensor_mass_of_one_sensor(spindle):
     """A gram at (20, 0, 0) mm on the seat: one gram, none about x, 1e-3 x 0.02^2 about y and z."""
     seat = spindle.structure.body("seat")
-    found = sensor_mass.loaded(seat, spindle.point(5), 1e-3)
+    found = sensor_mass.loaded(seat, spindle.point(5), 1e-3, 1.0)
     assert found.mass - seat.mass == pytest.approx(1e-3)
     assert np.subtract(found.inertia, seat.inertia) == pytest.approx([0, 4e-7, 4e-7], abs=1e-15)
+
+
+def test_balanced_sensors_leave_the_centre_of_mass(spindle):
+    """Half a gram at (12, 0, 20) mm on the hub and half its mirror image in z: the inertia of both, spread round the axis; a quarter shifts."""
+    hub, point = spindle.structure.body("hub"), spindle.point(1)
+    found = sensor_mass.loaded(hub, point, 1e-3, 0.0)
+    arm = 20e-3 - hub.z
+    assert (found.mass - hub.mass, found.z) == (pytest.approx(1e-3), pytest.approx(hub.z))
+    across = 1e-3 * (12e-3**2 / 2 + arm**2)
+    assert np.subtract(found.inertia, hub.inertia) == pytest.approx([across, across, 1e-3 * 12e-3**2], rel=1e-9)
+    quarter = sensor_mass.loaded(hub, point, 1e-3, 0.25)
+    assert quarter.mass * (quarter.z - hub.z) == pytest.approx(0.25e-3 * arm, rel=1e-9)
