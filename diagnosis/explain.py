@@ -42,8 +42,9 @@ def explain(
         # what another effect does may lie within the errors of form of the first: it shows where the first one's law is taken for exact
         exact = side_by_side(theory, about, [(*_exactly(first), first.nuisance)], True, workers)[0]
         refuted = chi_squared.sf(exact.misfit, len(theory.data.value)) < MISFIT
-        found = [(f, s) for f in ([first, exact] if refuted else [first]) for s in screen(theory, f, catalogue, 0.1)[:PAIRED]]
-        tasks = [(*_beside(first, f, s), None) for f, s in found if s.gain > 2 * AHEAD]
+        where = [first, exact] if refuted else [first]
+        seen = {s.effect.name: (f, s) for f in where for s in screen(theory, f, catalogue, 0.1)[:PAIRED] if s.gain > 2 * AHEAD}
+        tasks = [(*_beside(first, f, s), None) for f, s in seen.values()]
         pairs = _best(side_by_side(theory, about, tasks, True, workers))
         level = [f for f in pairs.values() if abs(best.evidence - f.evidence) < NEAR]
         return _best([*pairs.values(), *polished(level)])
@@ -87,10 +88,12 @@ def explain(
         fits |= paired(best, best)
         best = max(fits.values(), key=lambda f: f.evidence)
         if len(best.effects) == 2:
-            # whether one of them would do is asked from where the two came to rest, and what else would do beside the second
+            # whether one of them would do is asked from where the two came to rest; where it would not, what else would beside the second
             alone = [((e,), list(best.values[e.name].values()), best.nuisance) for e in best.effects]
             each = side_by_side(theory, about, alone, True, workers)
-            fits = _best([*fits.values(), *each, *paired(each[1], best).values()])
+            fits = _best([*fits.values(), *each])
+            if best.evidence - max(f.evidence for f in fits.values() if len(f.effects) == 1) > CLEAR:
+                fits = _best([*fits.values(), *paired(each[1], best).values()])
         progress(f"{sum(len(names) == 2 for names in fits)} pairs fitted")
     return decide(theory, base, list(fits.values()), signatures)
 
