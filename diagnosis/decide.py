@@ -23,7 +23,7 @@ MUCH_MORE = 0.5  # unless held-out errors fall to this share of those of either 
 MORE = 0.9  # held-out error ratio of a pair over that of its best member up to which it predicts more
 WIDE = 3.0  # times the lead that identifies: rivals within it stay in the set, where there is one
 STRAINED = 4.0  # standard deviations at which a tolerance is an explanation of its own
-THERE = 3.0  # standard errors by which both effects of a pair must differ from none
+THERE = 3.0  # standard errors, other parameters given, by which both effects of a pair must differ from none
 MISFIT = 1e-4  # probability below which a misfit is not chance
 FALLS = 1 / 3  # held-out error ratio that counts as a clear fall
 
@@ -85,10 +85,18 @@ def held_out(theory: Theory, result: Fit, rating: Array | None = None) -> tuple[
     return total, count
 
 
-def _there(found: Fit, effect: Effect) -> bool:
-    """Whether a fitted effect is clearly more than nothing."""
+def _there(theory: Theory, found: Fit, effect: Effect) -> bool:
+    """Whether a fitted effect is clearly more than nothing, its other parameters being what they are: how a size is shared out between
+    several of them may be unknown where its whole is not."""
     main = effect.parameters[0]
-    return abs(found.values[effect.name][main.name] - main.neutral) > THERE * found.sd[effect.name][main.name]
+    rows = [(e.name, p) for e in found.effects for p in e.parameters]
+    others = [len(theory.sd) + i for i, (name, p) in enumerate(rows) if name == effect.name and p is not main]
+    free = np.setdiff1d(np.arange(found.jacobian.shape[1]), others)
+    widths = np.concatenate([theory.sd, [p.prior_sd for _, p in rows]])
+    white = found.whiten @ (found.jacobian * widths)[:, free]
+    place = int(np.flatnonzero(free == len(theory.sd) + next(i for i, (_, p) in enumerate(rows) if p is main))[0])
+    sd = main.prior_sd * float(np.sqrt(np.linalg.inv(white.T @ white + np.eye(len(free)))[place, place]))
+    return abs(found.values[effect.name][main.name] - main.neutral) > THERE * sd
 
 
 def decide(theory: Theory, base: Fit, fits: list[Fit], signatures: list[Signature]) -> Diagnosis:
@@ -150,7 +158,7 @@ def _rated(theory: Theory, base: Fit, fits: Sequence[Fit], ahead: float, pair: f
 
     Probabilities add up to one with that of no effect and that of something else, which would leave of the data what chance does.
     """
-    fits = [f for f in fits if len(f.effects) == 1 or all(_there(f, e) for e in f.effects)]
+    fits = [f for f in fits if len(f.effects) == 1 or all(_there(theory, f, e) for e in f.effects)]
     n = len(theory.data.value)
     # all rated alike, with what the effect's own law may miss
     ratios = [float(np.sqrt(held_out(theory, f, f.whiten)[0] / held_out(theory, base, f.whiten)[0])) for f in fits]
