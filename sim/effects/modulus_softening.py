@@ -17,7 +17,7 @@ import numpy as np
 
 from model.ball_row import Array
 from model.machine import Condition, Law, Material, RingMotion, Spindle
-from sim.effect import Effect, Values, scale_parameter
+from sim.effect import Effect, Parameter, Values, scale_parameter
 from sim.effects.expansion_mismatch import ring_volume
 from sim.effects.mount_compliance import with_stiffness
 from thermal.influence import influence
@@ -45,7 +45,7 @@ def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
         for b in spindle.bearings
     )
     support = spindle.materials[support_material(spindle)]
-    factor = softening(support, condition.temperature, spindle.reference_temperature, scale)
+    factor = softening(support, condition.temperature, spindle.reference_temperature, scale * values["joint_share"])
     structure = with_stiffness(spindle, {j.name: factor for j in spindle.structure.joints}).structure
     return replace(spindle, materials=materials, bearings=bearings, structure=structure)
 
@@ -162,7 +162,7 @@ EFFECT = Effect(
     title="Elastic moduli fall with temperature",
     equation=(
         "E(T) = E (1 - scale 22 eps(T)), eps the material's own thermal strain: d ln E / dT = -22 alpha, aluminium -5.1e-4/K, steel "
-        "-2.5e-4/K (Anderson, Phys. Rev. 144, 1966: on -d ln K / d ln V); joint stiffness ~ E of the support, Hertz "
+        "-2.5e-4/K (Anderson, Phys. Rev. 144, 1966: on -d ln K / d ln V); joint stiffness ~ E of the support (joint_share of its fall), Hertz "
         "K ~ 2 / ((1 - nu_b^2)/E_b + (1 - nu_r^2)/E_r); ring motions by thermo-elastic influence of the softened section"
     ),
     parameters=(
@@ -175,6 +175,16 @@ EFFECT = Effect(
                 "handbook slopes about room temperature: aluminium alloys -4.5 to -6e-4/K, steels -2.3 to -3.3e-4/K (carbon steel "
                 "203.4 GPa at 21 C, 198.6 at 93 C: Roark, Formulas for Stress and Strain)"
             ),
+        ),
+        Parameter(
+            "joint_share",
+            "1",
+            neutral=1.0,
+            typical=1.0,
+            prior_sd=0.3,
+            limits=(0.0, 2.0),
+            meaning="softening of the structure's joints over that of the support's material",
+            source="1 for parts bending; half for steel screws in aluminium, 0 where contact pressure, not modulus, makes the stiffness",
         ),
     ),
     sees=(

@@ -92,6 +92,8 @@ def test_modulus_softening_scales_joints_and_contacts(spindle):
     """40 K: joints with aluminium, 1 - 40 x 5.06e-4; both contacts of steel on steel, and so the Hertz constant, with steel."""
     point = at(spindle, REST, modulus_softening)
     assert list(joints_ratio(spindle, point).values()) == pytest.approx([1 - 40 * 22 * 23e-6] * 3, rel=1e-12)
+    half = at(spindle, REST, modulus_softening, joint_share=0.5)
+    assert list(joints_ratio(spindle, half).values()) == pytest.approx([1 - 20 * 22 * 23e-6] * 3, rel=1e-12)
     motion = expand(spindle, 60.0)["upper"]
     soft = contact_constants(point.spindle, point.spindle.bearing("upper"), motion, 0.43)
     hard = contact_constants(spindle, spindle.bearing("upper"), motion, 0.43)
