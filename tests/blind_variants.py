@@ -31,14 +31,14 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 from rich.table import Column, Table
-from scipy.optimize import linear_sum_assignment
+from scipy.optimize import brentq, linear_sum_assignment
 
 from diagnosis.data import data_of
 from diagnosis.decide import Candidate
 from diagnosis.explain import explain
 from diagnosis.fit import fit, linearise
 from diagnosis.observe import observe
-from diagnosis.screening import screen
+from diagnosis.screening import CLEAR, screen
 from diagnosis.theory import theory
 from model.machine import Condition, Spindle
 from model.modes import oscillating, poles
@@ -142,13 +142,27 @@ def judge(job: Job) -> dict[str, Any]:
 
 
 def smallest(spindle: Spindle, variants: Sequence[Variant], sizes: Sequence[float], seed: int) -> dict[str, float]:
-    """The smallest size of every variant that the same tests of the same spindle could just have shown, had nothing been hidden."""
+    """The size of every variant that the same tests of the same spindle could just have shown, had nothing been hidden.
+
+    Where its whole signature, not one extrapolated from `sizes`, is worth `CLEAR`: between a hundredth and ten times those sizes.
+    """
     if not variants:
         return {}
-    quiet = campaign(spindle, [(v, 0.0) for v in variants], seed)
-    about = theory(spindle, data_of(observe(quiet, spindle)))
-    effects = [v.of_size(s) for v, s in zip(variants, sizes, strict=True)]
-    return {s.effect.name: s.smallest for s in screen(about, fit(about, linearise(about)), effects)}
+    about = theory(spindle, data_of(observe(campaign(spindle, [(v, 0.0) for v in variants], seed), spindle)))
+    base = fit(about, linearise(about))
+
+    def excess(v: Variant, log_size: float) -> float:
+        seen = screen(about, base, [v.of_size(float(np.exp(log_size)))])
+        return float(np.log(max(seen[0].visibility, 1e-9) ** 2 / (2 * CLEAR))) if seen else 10.0  # cannot be mounted: plain to see
+
+    found = {}
+    for v, size in zip(variants, sizes, strict=True):
+        low, high = np.log(size / 100), np.log(10 * size)
+        if excess(v, high) < 0:
+            found[v.name] = np.inf
+        else:
+            found[v.name] = size / 100 if excess(v, low) > 0 else float(np.exp(brentq(lambda x, v=v: excess(v, x), low, high, xtol=0.1)))
+    return found
 
 
 def _candidate(c: Candidate) -> dict[str, Any]:
