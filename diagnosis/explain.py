@@ -9,7 +9,7 @@ from scipy.stats import chi2 as chi_squared
 
 from diagnosis.decide import AHEAD, MISFIT, Diagnosis, decide
 from diagnosis.fit import TEMPERS, Fit, fit, linearise
-from diagnosis.many_fits import Task, side_by_side
+from diagnosis.many_fits import From, Task, side_by_side
 from diagnosis.screening import CLEAR, Signature, best_starts, screen, starts
 from diagnosis.theory import Theory
 from model.ball_row import Array
@@ -89,11 +89,13 @@ def explain(
         best = max(fits.values(), key=lambda f: f.evidence)
         if len(best.effects) == 2:
             # whether one of them would do is asked from where the two came to rest; where it would not, what else would beside the second
-            alone = [((e,), list(best.values[e.name].values()), best.nuisance) for e in best.effects]
-            each = side_by_side(theory, about, alone, True, workers)
+            each = side_by_side(theory, about, _members(best), True, workers)
             fits = _best([*fits.values(), *each])
             if best.evidence - max(f.evidence for f in fits.values() if len(f.effects) == 1) > CLEAR:
                 fits = _best([*fits.values(), *paired(each[1], best).values()])
+                better = max(fits.values(), key=lambda f: f.evidence)
+                each = side_by_side(theory, about, _members(better), True, workers) if better is not best else []
+                fits = _best([*fits.values(), *each])
         progress(f"{sum(len(names) == 2 for names in fits)} pairs fitted")
     return decide(theory, base, list(fits.values()), signatures)
 
@@ -101,6 +103,11 @@ def explain(
 def _again(found: Fit) -> Task:
     """The effects of a fit from where it came to rest."""
     return found.effects, [found.values[e.name][p.name] for e in found.effects for p in e.parameters]
+
+
+def _members(pair: Fit) -> list[From]:
+    """Each effect of a pair alone, from where the two came to rest."""
+    return [((e,), list(pair.values[e.name].values()), pair.nuisance) for e in pair.effects]
 
 
 def _tried(found: Fit, tasks: Sequence[Task]) -> bool:
