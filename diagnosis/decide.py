@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2 as chi_squared
 
-from diagnosis.fit import Fit
+from diagnosis.fit import Fit, prior_widths
 from diagnosis.screening import CLEAR, Signature
 from diagnosis.theory import Theory
 from model.ball_row import Array
@@ -69,7 +69,7 @@ def held_out(theory: Theory, result: Fit, rating: Array | None = None) -> tuple[
     rating = theory.data.whiten if rating is None else rating
     data = theory.data
     temperatures = [o.condition.temperature for o in data.observations]
-    widths = np.concatenate([theory.sd, [p.prior_sd for e in result.effects for p in e.parameters]])
+    widths = prior_widths(theory, result)
     fitted, rated = (w @ (result.jacobian * widths) for w in (result.whiten, rating))
     residual, rated_residual = result.whiten @ result.residual, rating @ result.residual
     offset = np.concatenate([result.nuisance / theory.sd, np.zeros(len(widths) - len(theory.sd))])
@@ -89,13 +89,11 @@ def _there(theory: Theory, found: Fit, effect: Effect) -> bool:
     """Whether a fitted effect is clearly more than nothing, its other parameters being what they are: how a size is shared out between
     several of them may be unknown where its whole is not."""
     main = effect.parameters[0]
-    rows = [(e.name, p) for e in found.effects for p in e.parameters]
-    others = [len(theory.sd) + i for i, (name, p) in enumerate(rows) if name == effect.name and p is not main]
-    free = np.setdiff1d(np.arange(found.jacobian.shape[1]), others)
-    widths = np.concatenate([theory.sd, [p.prior_sd for _, p in rows]])
-    white = found.whiten @ (found.jacobian * widths)[:, free]
-    place = int(np.flatnonzero(free == len(theory.sd) + next(i for i, (_, p) in enumerate(rows) if p is main))[0])
-    sd = main.prior_sd * float(np.sqrt(np.linalg.inv(white.T @ white + np.eye(len(free)))[place, place]))
+    before = found.effects[: found.effects.index(effect)]
+    place = len(theory.sd) + sum(len(e.parameters) for e in before)
+    white = found.whiten @ (found.jacobian * prior_widths(theory, found))
+    white = np.delete(white, np.arange(place + 1, place + len(effect.parameters)), axis=1)
+    sd = main.prior_sd * float(np.sqrt(np.linalg.inv(white.T @ white + np.eye(white.shape[1]))[place, place]))
     return abs(found.values[effect.name][main.name] - main.neutral) > THERE * sd
 
 

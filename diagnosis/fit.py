@@ -55,6 +55,11 @@ class Fit:
     at_limit: bool
 
 
+def prior_widths(theory: Theory, found: Fit) -> Array:
+    """Prior standard deviations (p + q,) of the nuisance parameters and of the effects', as the columns of `found.jacobian`."""
+    return np.concatenate([theory.sd, [p.prior_sd for e in found.effects for p in e.parameters]])
+
+
 def linearise(theory: Theory) -> Array:
     """Derivative (n, p) of the features by the nuisance parameters at the nominal spindle without effects."""
     return derivative(theory, np.zeros(len(theory.sd)), ())

@@ -15,7 +15,7 @@ import numpy as np
 
 from diagnosis.data import data_of
 from diagnosis.decide import Candidate, Diagnosis
-from diagnosis.fit import Fit
+from diagnosis.fit import Fit, prior_widths
 from diagnosis.locate import Change, free_form
 from diagnosis.observe import DAMPING_FLOOR, FREQUENCY_FLOOR, SHAPE_FLOOR, Observation
 from diagnosis.sensitivity import derivative
@@ -93,7 +93,7 @@ def explanations(about: Theory, found: Diagnosis, places: Sequence[Change], near
 
 
 def _explanation(about: Theory, name: str, fit: Fit) -> Explanation:
-    widths = np.concatenate([about.sd, [p.prior_sd for e in fit.effects for p in e.parameters]])
+    widths = prior_widths(about, fit)
     a = fit.whiten @ (fit.jacobian * widths)
     covariance = np.linalg.inv(a.T @ a + np.eye(len(widths))) * np.outer(widths, widths)
     own = len(about.sd)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.decide import held_out
-from diagnosis.fit import Fit
+from diagnosis.fit import Fit, prior_widths
 from diagnosis.observe import condition_of
 from diagnosis.partners import numbered
 from diagnosis.theory import Applied, Theory, pair, predict
@@ -87,7 +87,7 @@ def _rung(
 
 def determined(about: Theory, best: Fit) -> float:
     """How many combinations of parameters the data, not the priors, decide: trace of the resolution matrix, at most the data's number."""
-    widths = np.concatenate([about.sd, [p.prior_sd for e in best.effects for p in e.parameters]])
+    widths = prior_widths(about, best)
     eigenvalues = np.linalg.svd(about.data.whiten @ (best.jacobian * widths), compute_uv=False) ** 2
     return float(np.sum(eigenvalues / (1 + eigenvalues)))
 

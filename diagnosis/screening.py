@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.fit import Fit
+from diagnosis.fit import Fit, prior_widths
 from diagnosis.theory import Theory
 from model.ball_row import Array
 from model.pair import NoEquilibrium
@@ -43,7 +43,7 @@ def left_over(theory: Theory, found: Fit) -> tuple[Array, Array]:
     The squared length of `solve(factor, W v)` is the chi2 of v that is left after everything has been refitted with its priors, to first
     order about the fit. Returns the whitened, projected residual (n,) and the factor (n, n).
     """
-    widths = np.concatenate([theory.sd, [p.prior_sd for e in found.effects for p in e.parameters]])
+    widths = prior_widths(theory, found)
     a = found.whiten @ (found.jacobian * widths)
     factor = absorbing(a)
     prior = np.concatenate([found.nuisance / theory.sd, np.zeros(len(widths) - len(theory.sd))])
@@ -95,11 +95,12 @@ def screen(theory: Theory, found: Fit, catalogue: Sequence[Effect], share: float
         possible = [s for s in (typical, *(tried(effect, others, begin) for others in variations(effect, effect.typical()))) if s]
         if possible:
             best = max(possible, key=lambda s: s.gain)
-            # two parameters may have to move together
-            again = [tried(effect, others, begin) for others in variations(effect, best.others)] if best is not typical else []
+            if best is not typical:  # two parameters may have to move together
+                again = [tried(effect, others, begin) for others in variations(effect, best.others)]
+                best = max([best, *(s for s in again if s)], key=lambda s: s.gain)
             # what tolerances nearly absorb shows its own direction only where it is small: the rest is curvature
-            again.append(tried(effect, max([best, *(s for s in again if s)], key=lambda s: s.gain).others, LITTLE * begin))
-            best = max([best, *(s for s in again if s)], key=lambda s: s.gain)
+            little = tried(effect, best.others, LITTLE * begin)
+            best = little if little and little.gain > best.gain else best
             # what the data could show is said of the typical effect, whichever variation fits them
             signatures.append(replace(best, visibility=possible[0].visibility, smallest=possible[0].smallest))
     return sorted(signatures, key=lambda s: -s.gain)

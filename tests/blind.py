@@ -1,8 +1,8 @@
 """`make blind`: hidden effects, made by another path than the one that fits, and a scorecard of what the diagnosis says of them.
 
 Every campaign is measured like a real test: a spindle drawn from its tolerances, on a finer mesh, ball-by-ball bearings in MuJoCo's time
-domain at another step, noise, hits, modal extraction. Results are kept in out/blind/results.jsonl, a line a campaign, so that the study can be stopped and goes on where it
-was; `python -m tests.blind --none 50 --seeds 3 --sizes 0.1 0.3 1` sets its size.
+domain at another step, noise, hits, modal extraction. Results are kept in out/blind/results.jsonl, a line a campaign, so that the study can
+be stopped and goes on where it was; `python -m tests.blind --none 50 --seeds 3 --sizes 0.1 0.3 1` sets its size.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from sim.effect import Effect
 from sim.effects import CATALOGUE, by_name
 from sim.impact import impact_tests
 from sim.operating import operating_point
-from tests.blind_variants import outcome as score
+from tests.blind_score import outcome as score
 from thermal.expansion import expand
 
 ROOT = Path(__file__).parents[1]
@@ -98,7 +98,7 @@ def judge(spindle: Spindle, effect: str | None, size: float, seed: int) -> dict:
 
 
 def outcome(row: dict) -> str:
-    """As `tests.blind_variants` keeps score: one effect too many is wrong here too."""
+    """As `tests.blind_score` has it: one effect too many is wrong here too."""
     hidden = [row["effect"]] if row["effect"] else []
     return score({"variants": hidden, "truth": [hidden] if hidden else [], "verdict": row["verdict"], "effects": row["effects"]})
 

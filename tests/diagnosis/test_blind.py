@@ -2,7 +2,8 @@
 
 import pytest
 
-from tests.blind_variants import Job, judge, outcome
+from tests.blind_score import outcome
+from tests.blind_variants import Job, judge
 
 CAMPAIGNS = [
     pytest.param((), {"right"}, id="nothing"),

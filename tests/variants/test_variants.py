@@ -17,7 +17,8 @@ from model.scene import load
 from sim.effect import HOOKS
 from sim.effects import CATALOGUE
 from sim.operating import OperatingPoint, operating_point
-from tests.blind_variants import FREQUENCY, SCENE, Job, campaign, left_out, outcome
+from tests.blind_score import outcome
+from tests.blind_variants import FREQUENCY, SCENE, Job, campaign, left_out
 from tests.variants import PLAN, VARIANTS, by_name
 from tests.variants.structure import EI, cantilever
 from tests.variants.variant import in_series
