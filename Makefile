@@ -3,29 +3,34 @@ PYTHON ?= python3
 SPINDLE = .venv/bin/spindle
 READY = .venv/ready
 
-.PHONY: demo test lint bench blind clean
+.PHONY: demo test test-all lint bench blind clean
 
 demo: $(READY)
 	$(SPINDLE) run scenes/hdd_2003 --out out/hdd_2003
 
 test: $(READY) lint
-	.venv/bin/pytest
+	.venv/bin/pytest -n auto --dist worksteal
+
+test-all: $(READY) lint
+	.venv/bin/pytest -n auto --dist worksteal -m ''
 
 lint: $(READY)
 	.venv/bin/ruff check .
 	.venv/bin/mypy
 
+# A campaign a seed, as many as SEEDS says; what is in out/blind/results.jsonl already is not made again.
+SEEDS ?= 1000 1300
 blind: $(READY)
-	.venv/bin/python -m tests.blind
-	.venv/bin/python -m tests.blind_variants
+	.venv/bin/python -m tests.blind.study --seeds $(SEEDS)
+	.venv/bin/python -m tests.blind.score
 
 bench: $(READY)
 	.venv/bin/python -m tests.bench
 
-$(READY): pyproject.toml
+$(READY): pyproject.toml constraints.txt
 	$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11) and 'Thermospindle needs Python 3.11 or newer')"
 	$(PYTHON) -m venv .venv
-	.venv/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
+	.venv/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[test]'
 	touch $(READY)
 
 clean:

@@ -7,6 +7,7 @@ channel gains belong to the tests they were fitted to and not to the spindle, so
 from __future__ import annotations
 
 import json
+import math
 import shutil
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -14,12 +15,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from model.machine import Spindle
-from model.scene import BadInput, content_hash, load, scene_path
-from sim.campaign_file import toml
-from sim.effect import Effect
-from sim.effect_file import OwnEffect
-from sim.effects import CATALOGUE, by_name, checked, resolved
+from thermospindle.model.errors import BadInput
+from thermospindle.model.machine import Spindle
+from thermospindle.model.scene.reading import content_hash, load, scene_path
+from thermospindle.sim.campaign.form import toml
+from thermospindle.sim.effects import CATALOGUE, by_name, checked, resolved
+from thermospindle.sim.effects.effect import Effect, fitted_to, refusal
+from thermospindle.sim.effects.own import OwnEffect
 
 OF_TEST, OF_CHANNEL = "temperature of ", "gain of channel "  # nuisance parameters that are not the spindle's
 
@@ -83,9 +85,12 @@ def new_scene(
 
     Values are typical, unless fitted in the file `diagnosis`, unless set `by_hand`. The new scene is loaded before it is accepted.
     """
-    effects, file = [by_name(name, catalogue) for name in dict.fromkeys(names)], scene_path(target)
+    file = scene_path(target)
     old = load(file)
+    effects = [fitted_to(by_name(name, catalogue), old) for name in dict.fromkeys(names)]
     for effect in effects:
+        if why := refusal(effect, old):
+            raise BadInput(f"{file}: effect {effect.name}: {why}")
         if any(a.effect == effect.name for a in old.effects):
             raise BadInput(f"{file}: effects.{effect.name}: is there already; change its values there, or add to the scene it was added to")
     fitted: dict[str, dict[str, float]] = {}
@@ -154,19 +159,36 @@ def _effect_table(effect: Effect, values: dict[str, float], origin: str, source:
 
 def read_answer(file: Path) -> Answer:
     """The file of an answer of `spindle diagnose --json`; `BadInput` for another."""
+    if not file.is_file():
+        raise BadInput(f"--from {file}: cannot be read: no such file")
     try:
         raw = json.loads(file.read_text(encoding="utf-8"))
-        candidates = tuple((tuple(c["effects"]), dict(c["parameters"])) for c in raw["candidates"])
-        tolerances = {name: float(row["value"]) for name, row in raw.get("tolerances", {}).items()}
+        candidates = tuple((tuple(map(_text, c["effects"])), dict(c["parameters"])) for c in raw["candidates"])
+        tolerances = {name: _finite(row["value"]) for name, row in raw.get("tolerances", {}).items()}
         best = candidates[0][0] if candidates and raw.get("effects") else ()
         scene_hash = raw.get("scene_hash")
     except OSError as error:
         raise BadInput(f"--from {file}: cannot be read: {error.strerror}") from None
-    except (ValueError, KeyError, TypeError, AttributeError):
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
         raise BadInput(f"--from {file}: is not an answer of spindle diagnose --json, with candidates of effects and parameters") from None
     build = {name: float(f"{v:.8g}") for name, v in tolerances.items() if not name.startswith((OF_TEST, OF_CHANNEL))}
     tests = tuple(name.removeprefix(OF_TEST) for name in tolerances if name.startswith(OF_TEST))
     return Answer(candidates, best, build, tests, scene_hash)
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise TypeError
+    return value
+
+
+def _finite(value: Any) -> float:
+    """A JSON number as float; TypeError, ValueError or OverflowError for anything else, NaN and infinity among them."""
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        raise TypeError
+    if not math.isfinite(number := float(value)):
+        raise ValueError
+    return number
 
 
 def fitted_values(effects: Sequence[Effect], answer: Answer, file: Path) -> dict[str, dict[str, float]]:
@@ -186,9 +208,10 @@ def fitted_values(effects: Sequence[Effect], answer: Answer, file: Path) -> dict
             row = parameters.get(f"{effect.name}.{name}", parameters.get(name) if len(effects) == 1 else None)
             if row is not None:
                 value = row.get("value") if isinstance(row, dict) else row
-                if not isinstance(value, int | float) or isinstance(value, bool):
-                    raise BadInput(f"--from {file}: {effect.name}.{name}.value = {value!r}: must be a number")
-                found[effect.name][name] = float(value)
+                try:
+                    found[effect.name][name] = _finite(value)
+                except (TypeError, ValueError, OverflowError):
+                    raise BadInput(f"--from {file}: {effect.name}.{name}.value = {str(value)[:80]!r}: must be a finite number") from None
         if not found[effect.name]:
             raise BadInput(f"--from {file}: its candidate has no value for {effect.name}; its parameters are {', '.join(effect.neutral())}")
     return found

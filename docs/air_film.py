@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from model.rotor_base import Element
-from sim.effect import Effect, Parameter
-from sim.effects.magnetic_pull import magnet_height, stator_body
+from thermospindle.model.rotor.chain import Element
+from thermospindle.sim.effects.bearing.magnetic_pull import magnet_height, stator_body
+from thermospindle.sim.effects.effect import Effect, Parameter
 
 
 def viscosity(temperature):

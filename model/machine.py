@@ -1,4 +1,4 @@
-"""What a spindle is: frozen definitions in SI units, made by `model.scene.load`.
+"""What a spindle is: frozen definitions in SI units, made by `model.scene.reading.load`.
 
 Temperatures are in degrees Celsius (only differences enter the physics), angles in radians, everything else SI.
 """
@@ -12,15 +12,16 @@ from typing import Any
 
 import numpy as np
 
-from model.imperfections import Imperfections
+from thermospindle.model.errors import OutsideRange
+from thermospindle.model.imperfections import Imperfections
 
 PARTS = ("stationary", "rotating")
+SENSE = {"back-to-back": (-1, 1), "face-to-face": (1, -1), "tandem": (1, 1)}
+"""`Bearing.sense` of the (lower, upper) bearing of a pair: back-to-back outer rings load as they move apart."""
+RACEWAY_WIDTH = 1.9
+"""Width of a bearing over its ball diameter where none is told and rings share a tube: 1.7 to 2.1 in series 70, 719 and miniature ones."""
 MOVES = ("x", "y", "z", "tilt_x", "tilt_y")
 """Degrees of freedom of a body on the spindle axis, in the order of every 5-vector and 5x5 matrix of the project."""
-
-
-class OutsideRange(ValueError):
-    """A table or law was asked outside the range it was made for."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +77,7 @@ class Region:
     material: str
     r: tuple[float, float]
     z: tuple[float, float]
+    role: str = ""  # shaft, hub, insert or support: what effects know it by; empty for none of these
 
 
 @dataclass(frozen=True)
@@ -92,10 +94,12 @@ class Bearing:
     contact_angle: float
     inner_conformity: float
     outer_conformity: float
-    clearance: tuple[float, float]  # diametral, smallest and largest
+    clearance: tuple[float, float] | None  # diametral, smallest and largest; None where nobody says
     ball_material: str
     ring_material: str
     damping_ratio: float  # at Structure.damping_frequency
+    sense: int  # -1 or 1: direction along z in which moving the outer ring loads the row
+    raceway_width: float | None = None  # m, along z; None for the whole height of a ring that is this bearing's alone
 
     @property
     def unloaded_distance(self) -> float:
@@ -104,20 +108,27 @@ class Bearing:
 
 
 @dataclass(frozen=True)
-class Pair:
-    """How the two bearings are mounted against each other.
+class PreloadSpring:
+    """The spring behind one ring of the bearing `ring_of`; the other bearing locates the shaft and takes axial loads.
 
-    `stiffness_arrangement` is the arrangement whose load lines the radial-tilt coupling of the 5x5 stiffness follows. It is
-    the same as `arrangement` for any real pair; the reference scene says why it needs its own.
+    Without a `rate` the spring's force is the preload wherever the ring slides, and in vibration friction holds the ring in its seat. With
+    one, force falls as the ring follows, and the ring slides in vibration too, with its own `mass`.
     """
 
-    arrangement: str  # back-to-back | face-to-face | tandem
+    ring_of: str
+    rate: float | None = None  # N/m
+    mass: float = 0.0  # kg, of the sliding ring
+
+
+@dataclass(frozen=True)
+class Pair:
+    """How the two bearings are mounted against each other; which way each is loaded is `Bearing.sense`."""
+
     preload: float  # N, axial, at the reference temperature
-    preload_kind: str  # rigid | spring
-    stiffness_arrangement: str
     turning_ring: str  # inner | outer
     ball_inertia: float  # share of the balls' centrifugal force and gyroscopic moment in the equilibrium, 0 to 1
     axial_bias: float = 0.0  # N, external axial force on the outer rings' body, positive along z
+    spring: PreloadSpring | None = None  # None for rings fixed in their seats, and for a tandem set, which is loaded from outside
 
 
 @dataclass(frozen=True)
@@ -131,6 +142,7 @@ class Body:
     moves: tuple[str, ...]
     turns: bool
     regions: tuple[str, ...]  # the section regions it is made of; empty for a body given by numbers
+    role: str = ""  # base, seat, shaft or hub: what effects know it by; empty for none of these
 
 
 @dataclass(frozen=True)
@@ -143,6 +155,8 @@ class Joint:
     z: float
     stiffness: tuple[float, float, float, float, float]
     damping_ratio: float
+    role: str = ""  # mount, plate or flange: what effects know it by; empty for none of these
+    material: str = ""  # whose elastic modulus its stiffness follows; empty for none
 
 
 @dataclass(frozen=True)
@@ -290,6 +304,8 @@ class Spindle:
     hammer: HammerTest
     thermal: Thermal
     tolerances: Tolerances
+    nominal_speed: float  # rad/s, the service speed
+    temperatures: tuple[float, float]  # C, between which it is meant to run
     effects: tuple[Addition, ...] = ()
     build: Build | None = None
     imperfections: Imperfections = field(default_factory=Imperfections)
@@ -298,6 +314,29 @@ class Spindle:
 
     def bearing(self, name: str) -> Bearing:
         return next(b for b in self.bearings if b.name == name)
+
+    @property
+    def tandem(self) -> bool:
+        """Whether all bearings are loaded the same way, so that only an outer force can preload them."""
+        return len({b.sense for b in self.bearings}) == 1
+
+    @property
+    def turning(self) -> Body:
+        """The body that turns."""
+        return next(b for b in self.structure.bodies if b.turns)
+
+    def raceway(self, ring: str, bearing: Bearing) -> tuple[float, float]:
+        """Heights (m) between which the raceway of `bearing` lies on its region `ring`.
+
+        The bearing's height plus and minus half its `raceway_width`, inside the region. Without a width the whole height of a region that
+        serves one bearing, and `RACEWAY_WIDTH` ball diameters on one that several share.
+        """
+        region, width = self.region(ring), bearing.raceway_width
+        if width is None:
+            if sum(ring in (b.inner_ring, b.outer_ring) for b in self.bearings) == 1:
+                return region.z
+            width = RACEWAY_WIDTH * bearing.ball_diameter
+        return max(region.z[0], bearing.z - width / 2), min(region.z[1], bearing.z + width / 2)
 
     @property
     def standing(self) -> Body:

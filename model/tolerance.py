@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import brentq
 
-from model.hertz import in_series
-from model.machine import MOVES, Body, Joint, Spindle
-from model.pair import contact_constants, reference_deformation, reference_motion
+from thermospindle.model.bearing.hertz import in_series
+from thermospindle.model.bearing.pair import contact_constants, reference_deformation, reference_motion
+from thermospindle.model.machine import MOVES, Body, Joint, Spindle
 
 
 @dataclass(frozen=True)

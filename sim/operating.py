@@ -12,18 +12,18 @@ import mujoco
 import numpy as np
 from scipy.optimize import brentq
 
-from model import mjcf
-from model.ball_row import Array
-from model.imperfections import Imperfections
-from model.machine import Condition, RingMotion, Spindle
-from model.modes import ComplexArray, Mode, frf, modes, point_rows
-from model.pair import PairState, solve
-from model.rotor_base import Matrices, RotorBase, rotor_base
-from model.scene import content_hash
-from model.table import StiffnessTable, tabulate
-from sim.effect import Effect, Measurement, Values
-from sim.effects import of_scene
-from thermal.expansion import expand
+from thermospindle.model.bearing.pair import PairState, solve
+from thermospindle.model.bearing.stiffness_table import StiffnessTable, tabulate
+from thermospindle.model.imperfections import Imperfections
+from thermospindle.model.machine import Condition, RingMotion, Spindle
+from thermospindle.model.rotor import mjcf
+from thermospindle.model.rotor.chain import Matrices, RotorBase, rotor_base
+from thermospindle.model.rotor.modes import Mode, frf, modes, point_rows
+from thermospindle.model.scene.reading import content_hash
+from thermospindle.model.types import Array, ComplexArray
+from thermospindle.sim.effects import of_scene
+from thermospindle.sim.effects.effect import Effect, Measurement, Values
+from thermospindle.thermal.expansion import expand
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from model.machine import Condition, Spindle
-from sim.campaign import Campaign, Test, read_campaign
-from sim.impact import ImpactTest, impact_tests
-from sim.modal import Modes, extract
-from sim.operating import OperatingPoint, operating_point
+from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.units import RPM
+from thermospindle.sim.campaign.campaign import Campaign, Test, read_campaign
+from thermospindle.sim.hammer.pulse import check_band
+from thermospindle.sim.hammer.test import ImpactTest, impact_tests
+from thermospindle.sim.identification.frf import Frf
+from thermospindle.sim.identification.modal import Modes, extract
+from thermospindle.sim.operating import OperatingPoint, operating_point
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +45,7 @@ def run(
     progress: Callable[[str], None] = lambda done: None,
 ) -> Run:
     """Run the chain at every temperature (C); `progress` is told in words what has been done."""
+    check_band(spindle.hammer, str(spindle.file or spindle.name))
     points = []
     for temperature in temperatures:
         points.append(operating_point(spindle, Condition(temperature, speed)))
@@ -57,9 +61,8 @@ def run(
 
 def identify(test: ImpactTest) -> Modes:
     """Modes of an impact test, with the damping of its exponential window taken out."""
-    frf = test.estimate.h1
-    sd = frf.sd if frf.sd is not None and np.all(np.isfinite(frf.sd)) else None  # a single hit has no scatter
-    return extract(frf.frequency, frf.value, sd, kind=frf.quantity, window_decay=test.estimate.window_decay)
+    frf = _as_measured(test.estimate.h1)
+    return extract(frf.frequency, frf.value, frf.sd, kind=frf.quantity, window_decay=test.estimate.window_decay)
 
 
 def measured_campaigns(spindle: Spindle) -> tuple[Campaign, ...]:
@@ -72,13 +75,18 @@ def as_campaign(run: Run, title: str) -> Campaign:
     """The run's virtual tests in the form of a measured campaign."""
     tests = tuple(
         Test(
-            id=f"T{step.point.condition.temperature:g}_n{step.point.condition.speed * 30 / np.pi:.0f}",
+            id=f"T{step.point.condition.temperature:g}_n{step.point.condition.speed / RPM:.0f}",
             temperature=step.point.condition.temperature,
             speed=step.point.condition.speed,
             level=run.spindle.hammer.level,
             window_decay=step.test.estimate.window_decay,
-            frf=step.test.estimate.h1,
+            frf=_as_measured(step.test.estimate.h1),
         )
         for step in run.steps
     )
     return Campaign(title, run.spindle.name, "mobility", run.spindle.points, tests)
+
+
+def _as_measured(frf: Frf) -> Frf:
+    """A campaign holds no standard errors where a single hit has no scatter, and then says that there are none."""
+    return frf if frf.sd is None or np.all(np.isfinite(frf.sd)) else replace(frf, sd=None)

@@ -1,6 +1,6 @@
 """Warm-up: losses heat the running spindle, its rings move, and preload, stiffness and natural frequencies drift with them.
 
-The heat equation of the section (`thermal.heat`) and the axial equilibrium of the bearings (`model.pair`) are solved together at every
+The heat equation of the section (`thermal.heat`) and the axial equilibrium of the bearings (`model.bearing.pair`) are solved together at every
 stage of every time step: Palmgren's friction depends on the lubricant's temperature and on the preload, the preload on the temperature
 of the whole section. Spin-up takes seconds and is left out: the speed stands from time zero. A chamber soak is the same with air at
 another temperature than the spindle's.
@@ -16,18 +16,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from model.ball_row import Array
-from model.machine import Condition, OutsideRange, Spindle
-from model.modes import Mode, modes
-from model.rotor_base import matrices
-from model.scene import BadInput
-from sim.effect import Effect, Values
-from sim.effects import of_scene
-from sim.operating import OperatingPoint, drawing, operating_point
-from sim.shift import follow
-from thermal import conduction, heat
-from thermal.influence import influence
-from thermal.reading import Reading, reading
+from thermospindle.model.errors import BadInput, OutsideRange
+from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.rotor.chain import matrices
+from thermospindle.model.rotor.modes import Mode, modes
+from thermospindle.model.types import Array
+from thermospindle.model.units import RPM
+from thermospindle.sim.effects import of_scene
+from thermospindle.sim.effects.effect import Effect, Values
+from thermospindle.sim.identification.pairing import follow
+from thermospindle.sim.operating import OperatingPoint, drawing, operating_point
+from thermospindle.thermal import conduction, heat
+from thermospindle.thermal.influence import influence
+from thermospindle.thermal.readout import Reading, reading
 
 TOLERANCE = 0.01  # K, estimated error of one time step
 TIME_CONSTANTS = 8.0  # of the slowest decay that a warm-up lasts by default: the rest is 0.03 %
@@ -108,7 +109,7 @@ def warm_up(
     try:
         field = heat.settled(model, lambda nodal: drive(0.0, nodal))
     except OutsideRange as error:
-        where = f"{spindle.file or spindle.name}: from {start:g} C in air of {air:g} C at {speed * 30 / np.pi:g} rpm"
+        where = f"{spindle.file or spindle.name}: from {start:g} C in air of {air:g} C at {speed / RPM:g} rpm"
         raise OutsideRange(f"{where} the grease or a material is asked for a temperature that its law does not reach: {error}") from None
     final = model.nodal(field)
     constant = heat.slowest(model, field, drive(0.0, final))

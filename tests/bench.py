@@ -23,20 +23,20 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from model.machine import Condition, Spindle
-from model.mjcf import linearise
-from model.modes import modes
-from model.rotor_base import matrices
-from model.scene import load
-from sim.hammer import draw_hits
-from sim.impact import acquire, estimate_of, impact_tests, sampling, simulate
-from sim.operating import operating_point, stiffness_table
-from sim.resonance import resonance_map
-from sim.run import identify
-from sim.running import run_spindle, running_model
-from sim.warmup import warm_up
 from tests import bench_sysid
-from thermal.expansion import expand
+from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.rotor.chain import matrices
+from thermospindle.model.rotor.mjcf import linearise
+from thermospindle.model.rotor.modes import modes
+from thermospindle.model.scene.reading import load
+from thermospindle.sim.hammer.pulse import draw_hits
+from thermospindle.sim.hammer.test import acquire, estimate_of, impact_tests, sampling, simulate
+from thermospindle.sim.operating import operating_point, stiffness_table
+from thermospindle.sim.resonance.map import resonance_map
+from thermospindle.sim.run import identify
+from thermospindle.sim.running.run import run_spindle, running_model
+from thermospindle.sim.warmup import warm_up
+from thermospindle.thermal.expansion import expand
 
 SCENE = Path(__file__).parents[1] / "scenes" / "hdd_2003"
 
@@ -54,12 +54,12 @@ def seconds(work: Callable[[], object], repeat: int = 5) -> float:
 
 def cold_influence(spindle: Spindle) -> float:
     """Time of the finite elements with no cache of any kind (a new process would take as long)."""
-    from thermal import influence
+    from thermospindle.thermal import influence
 
     kept = os.environ.get("THERMOSPINDLE_CACHE")
     with tempfile.TemporaryDirectory() as empty:
         os.environ["THERMOSPINDLE_CACHE"] = empty
-        influence._kept.cache_clear()
+        influence.forget()
         start = time.perf_counter()
         expand(spindle, 60.0)
         took = time.perf_counter() - start

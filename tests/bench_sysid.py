@@ -3,7 +3,7 @@
 A spindle whose parameter is `TRUE` above its drawing is hit once at each hammer node and measured with the scene's noise. Both start
 from the drawing, know everything else, and get the same records, the same band and the same noise. The toolbox simulates the records
 with trial values until the response agrees; this program estimates the FRFs and fits the parameter to their lines
-(`diagnosis.lines`). The toolbox has every advantage that the comparison allows: records and trial simulations come from one model with one
+(`diagnosis.fit.lines`). The toolbox has every advantage that the comparison allows: records and trial simulations come from one model with one
 step (no error of the model at all), its residuals are whitened with the noise that was put in, a compiled model comes from our own chain
 within milliseconds, and it stops at `ENOUGH`, below its standard error.
 """
@@ -22,13 +22,13 @@ import mujoco
 import numpy as np
 from mujoco import sysid
 
-from diagnosis.lines import fit_lines
-from model.ball_row import Array
-from model.machine import Condition, HammerTest, Spindle
-from model.scene import load
-from model.tolerance import Toleranced, toleranced
-from sim.impact import ImpactTest, estimate_of, impact_tests, loaded_state, sampling
-from sim.operating import operating_point
+from thermospindle.diagnosis.fit.lines import fit_lines
+from thermospindle.model.machine import Condition, HammerTest, Spindle
+from thermospindle.model.scene.reading import load
+from thermospindle.model.tolerance import Toleranced, toleranced
+from thermospindle.model.types import Array
+from thermospindle.sim.hammer.test import ImpactTest, estimate_of, impact_tests, loaded_state, sampling
+from thermospindle.sim.operating import operating_point
 
 PARAMETERS = ("plate tilt x stiffness", "preload")
 TRUE = 0.02  # relative deviation of the parameter
@@ -101,7 +101,7 @@ def toolbox(spindle: Spindle, name: str, test: ImpactTest) -> Estimated:
         return operating_point(deviating.apply(spindle, float(parameters["x"].value[0])), COLD).model
 
     def whitened(parameters: Any, predicted: Any, record: Any, *_: Any, **__: Any) -> tuple[Array, Any, Any]:
-        """Lines of the band, real and imaginary, each in its own standard deviations: those `sim.impact` gives its noise."""
+        """Lines of the band, real and imaginary, each in its own standard deviations: those `sim.hammer.test` gives its noise."""
         seen = predicted.data[::every][: len(record.data)]
         frequency = np.fft.rfftfreq(len(record.data), 1 / settings.sample_rate)
         band = (frequency >= settings.band[0]) & (frequency <= settings.band[1])

@@ -8,13 +8,17 @@ from pathlib import Path
 
 import pytest
 
-from model.machine import Condition, Spindle
-from model.pair import reference_motion, solve
-from model.scene import load
-from thermal.expansion import expand
+from thermospindle.diagnosis.verdict import Diagnosis, diagnose
+from thermospindle.model.bearing.pair import reference_motion, solve
+from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.scene.reading import load
+from thermospindle.sim.campaign.campaign import read_campaign
+from thermospindle.sim.effects import by_name
+from thermospindle.thermal.expansion import expand
 
 ROOT = Path(__file__).parents[1]
 SCENE = ROOT / "scenes" / "hdd_2003"
+DATA = ROOT / "tests" / "data"
 
 
 @pytest.fixture(scope="session")
@@ -32,3 +36,9 @@ def cold(spindle):
 def hot(spindle):
     """Both bearings at 60 C, at rest."""
     return solve(spindle, Condition(60.0), expand(spindle, 60.0))
+
+
+@pytest.fixture(scope="session")
+def nothing_missing(spindle) -> Diagnosis:
+    """The diagnosis of another program's campaign with nothing hidden, beside two effects: made once for all tests."""
+    return diagnose(spindle, read_campaign(DATA / "foreign_none"), tuple(by_name(n) for n in ("soak_lag", "channel_delay")))

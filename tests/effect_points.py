@@ -1,11 +1,10 @@
 """Operating points that the tests of effects look at."""
 
-import numpy as np
 
-from model.machine import Condition
-from sim.operating import operating_point
+from thermospindle.model.machine import Condition
+from thermospindle.model.units import RPM
+from thermospindle.sim.operating import operating_point
 
-RPM = np.pi / 30
 REST, RUNNING = Condition(60.0), Condition(60.0, 7200 * RPM)
 COLD_FAST = Condition(20.0, 20000 * RPM)
 

@@ -9,11 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from model.machine import Point
-from sim.campaign import Campaign, ModeRow, Noise, Test
-from sim.frf import Frf
-
-RPM = 2 * np.pi / 60
+from thermospindle.model.machine import Point
+from thermospindle.model.units import RPM
+from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Noise, Test
+from thermospindle.sim.identification.frf import Frf
 
 POINTS = (
     Point(1, "hub_top0", "hub", (0.012, 0.0, 0.02), (0.0, 0.0, 1.0)),

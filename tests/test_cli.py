@@ -6,12 +6,16 @@ import re
 import numpy as np
 import pytest
 
-from model.scene import load
-from sim.campaign import read_campaign
-from sim.effects import CATALOGUE
-from sim.folder import MARK
-from spindle import main
 from tests.conftest import SCENE
+from thermospindle.cli import main
+from thermospindle.model.errors import BadInput
+from thermospindle.model.machine import Condition
+from thermospindle.model.scene.reading import load
+from thermospindle.model.units import RPM
+from thermospindle.report.folder import MARK
+from thermospindle.sim.campaign.campaign import read_campaign
+from thermospindle.sim.effects import CATALOGUE
+from thermospindle.sim.operating import operating_point
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +53,9 @@ def test_table(capsys, tmp_path):
 def test_modes(capsys, tmp_path):
     found = answer(capsys, "modes", SCENE, "--temperature", 20, "--speed", 7200, "--json", "--out", tmp_path / "m")
     frequency = [m["frequency_Hz"] for m in found["modes"]]
-    assert frequency == pytest.approx([1002.1, 1545.0, 1793.3, 1821.6, 2009.9, 2323.1, 2468.4], abs=0.5)
+    computed = operating_point(load(SCENE), Condition(20.0, 7200 * RPM)).modes
+    assert frequency == [m.frequency for m in computed if m.frequency < load(SCENE).hammer.band[1]]
+    assert frequency == pytest.approx([1002.0, 1545.0, 1760.9, 1855.6, 2010.0, 4465.0, 4532.2, 5551.5], abs=0.5)
     for mode in found["modes"]:
         assert mode["kind"] in {"axial", "rocking", "lateral"}
         assert {"base", "bearings"} <= set(mode["energy"])
@@ -61,7 +67,13 @@ def test_modes(capsys, tmp_path):
 def test_impact(capsys, short_scene):
     found = answer(capsys, "impact", short_scene, "--temperature", 60, "--json")
     assert {"frequency_Hz", "frequency_sd_Hz", "damping_ratio", "damping_ratio_sd"} == set(found["modes"][0])
-    assert found["modes"][0]["frequency_Hz"] == pytest.approx(1000.3, abs=1.0)
+    band = load(SCENE).hammer.band
+    computed = [m for m in operating_point(load(SCENE), Condition(60.0)).modes if band[0] < m.frequency < band[1]]
+    for mode in found["modes"]:  # every one is the model's, to 0.1 % in frequency and 5 % in damping, or as well as it is known
+        nearest = min(computed, key=lambda m: abs(m.frequency - mode["frequency_Hz"]))
+        assert mode["frequency_Hz"] == pytest.approx(nearest.frequency, rel=1e-3, abs=4 * mode["frequency_sd_Hz"])
+        assert mode["damping_ratio"] == pytest.approx(nearest.damping_ratio, rel=0.05, abs=4 * mode["damping_ratio_sd"])
+        assert abs(mode["frequency_Hz"] - nearest.frequency) < 6 * mode["frequency_sd_Hz"] + 0.1
 
 
 def test_simulate_writes_a_campaign_that_reads(capsys, short_scene, tmp_path):
@@ -75,7 +87,7 @@ def test_the_campaign_that_ships_is_of_this_scene(capsys):
     """scenes/hdd_2003/virtual: the model's own tests, so that compare finds nothing but noise."""
     found = answer(capsys, "compare", SCENE, SCENE / "virtual" / "soak_20_60", "--json")
     assert [t["temperature_C"] for t in found["tests"]] == [20, 60]
-    assert all(len(t["modes"]) == 7 and not t["missing_Hz"] for t in found["tests"])
+    assert all(len(t["modes"]) == 8 and not t["missing_Hz"] for t in found["tests"])
     assert found["rms_pull"] < 1.5
 
 
@@ -91,9 +103,14 @@ def test_run_and_inspect(capsys, short_scene, tmp_path):
         frf = log["frfs"][test.id]
         assert np.array_equal(np.array(frf["real"]) + 1j * np.array(frf["imag"]), test.frf.value)
         assert frf["frequency_Hz"] == test.frf.frequency.tolist()
-    again = answer(capsys, "run", short_scene, "--temperatures", 20, "--out", out, "--json")
-    assert len(again["conditions"]) == 1
-    assert not (out / "spindle_60C.xml").exists()
+
+
+@pytest.mark.slow
+def test_a_run_takes_the_place_of_an_earlier_one(capsys, short_scene, tmp_path):
+    for temperatures in ([20, 60], [20]):
+        found = answer(capsys, "run", short_scene, "--temperatures", *temperatures, "--out", tmp_path / "run", "--json")
+        assert len(found["conditions"]) == len(temperatures)
+        assert (tmp_path / "run" / "spindle_60C.xml").exists() == (60 in temperatures)
 
 
 BAD = [
@@ -142,7 +159,7 @@ def test_nothing_is_left_of_a_stopped_run(monkeypatch, capsys, short_scene, tmp_
     def stop(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("sim.output.write_report", stop)
+    monkeypatch.setattr("thermospindle.report.text.run.write_report", stop)
     assert main(["run", str(short_scene), "--temperatures", "20", "--out", str(tmp_path / "out")]) == 130
     assert list(tmp_path.iterdir()) == []
     assert "stopped" in capsys.readouterr().err
@@ -155,7 +172,7 @@ def test_people_see_tables(capsys, short_scene):
     assert "…" not in text
     assert main(["modes", str(SCENE)]) == 0
     text = capsys.readouterr().out
-    assert "1002.07" in text
+    assert "1002.00" in text
     assert "rocking" in text
 
 
@@ -170,26 +187,25 @@ def test_compare(capsys, tmp_path):
     cold, hot = found["tests"]
     assert (cold["id"], cold["temperature_C"], cold["speed_rpm"]) == ("T20", 20.0, 0.0)
     assert [round(m["error_Hz"]) for m in cold["modes"]] == [-21, -7, 57, 33, -58]
-    assert [round(m["pull"]) for m in hot["modes"]] == [-26, -8, 59, 38, -53]  # 1 Hz, and 0.2 K of up to 1.3 Hz/K
+    assert [round(m["pull"]) for m in hot["modes"]] == [-26, -8, 65, 39, -53]  # 1 Hz, and 0.2 K of up to 1.3 Hz/K
     first = cold["modes"][0]
     assert first["error_percent"] == pytest.approx(100 * (first["computed_Hz"] / first["measured_Hz"] - 1))
     assert first["damping_measured"] is first["damping_pull"] is first["mac"] is None
     assert cold["frac"] == found["comac"] == {}
-    assert found["rms_pull"] == pytest.approx(40.7, abs=0.1)
+    assert found["rms_pull"] == pytest.approx(41.5, abs=0.1)
 
 
 @pytest.mark.slow
 def test_diagnose(capsys, tmp_path):
-    """The paper's ten numbers; the misfit stands in the answer, and the folder holds the page and its pictures."""
+    """The paper's ten numbers, five modes at two temperatures, leave more than one answer; the folder holds the page and its pictures."""
     found = answer(capsys, "diagnose", SCENE, SCENE / "measured" / "jang_2003", "--json", "--out", tmp_path / "d")
     assert json.loads((tmp_path / "d" / "diagnosis.json").read_text()) == found
-    names = ("explanations", "misfit_drift", "misfit_places", "misfit_shares", "pulls")
-    files = {"diagnosis.json", "report.html", MARK} | {f"{n}.{kind}" for n in names for kind in ("svg", "png")}
-    assert {p.name for p in (tmp_path / "d").iterdir()} == files
-    assert found["verdict"] == "unexplained"
+    written = {p.name for p in (tmp_path / "d").iterdir()}
+    assert {"diagnosis.json", "report.html", MARK, "errors.svg", "errors.png", "explanations.svg", "explanations.png"} <= written
+    assert found["verdict"] in ("ambiguous", "unexplained")
     assert found["misfit"]["count"] == 10
-    assert sum(s["share"] for s in found["misfit"]["shares"]["mode"]) == pytest.approx(1.0)
-    assert found["misfit"]["words"][0].startswith(found["misfit"]["places"][0]["parameters"][0].capitalize())
+    assert sum(s["share"] for s in found["misfit"]["shares"]["test"]) == pytest.approx(1.0)
+    assert found["noise"] == {"T20": "the table of modes", "T60": "the table of modes"}
     assert isinstance(found["where"], list)
 
 
@@ -199,7 +215,7 @@ def test_people_see_a_comparison(capsys, short_scene, tmp_path):
     assert main(["compare", str(short_scene), str(campaign)]) == 0
     text = capsys.readouterr().out
     assert "COMAC" in text
-    assert "1002.07" in text
+    assert "1002.00" in text
     assert "…" not in text
 
 
@@ -216,7 +232,7 @@ def test_effects_are_listed(capsys):
 def test_effects_are_explained(capsys, effect):
     found = answer(capsys, "effects", effect.name, "--json")
     assert {"equation", "parameters", "sees", "resembles", "valid"} < set(found)
-    keys = {"name", "unit", "neutral", "typical", "prior_sd", "limits", "meaning", "source", "choices"}
+    keys = {"name", "unit", "neutral", "typical", "prior_sd", "limits", "meaning", "source", "choices", "counts"}
     assert all(set(p) == keys for p in found["parameters"])
     assert main(["effects", effect.name]) == 0
     text = " ".join(capsys.readouterr().out.split())
@@ -237,12 +253,12 @@ def test_add_writes_a_scene_whose_modes_move(capsys, tmp_path):
         assert (new / name).read_bytes() == (SCENE / name).read_bytes()
     assert (new / "spindle.toml").read_text().startswith((SCENE / "spindle.toml").read_text().rstrip())
     assert load(new).provenance["effects.bond_softening.values.transition"].origin == "assumed"
-    rocking = []
+    pair = []
     for scene in (SCENE, new):
         modes = answer(capsys, "modes", scene, "--temperature", 60, "--json")["modes"]
-        rocking.append(min(m["frequency_Hz"] for m in modes if m["kind"] == "rocking"))
-    assert rocking[0] == pytest.approx(1771.4, abs=0.5)
-    assert rocking[1] == pytest.approx(1565, rel=0.02)  # practice A, which has this bond and tolerances of 1.5 %
+        pair.append(min(m["frequency_Hz"] for m in modes if m["kind"] == "lateral"))
+    assert pair[0] == pytest.approx(4120.0, abs=0.5)
+    assert pair[1] == pytest.approx(3859, rel=0.01)  # tests/data/foreign_bond at 60 C: another program, this bond, tolerances of 1.5 %
 
 
 def test_added_at_its_neutral_value_an_effect_moves_nothing(capsys, tmp_path):
@@ -287,7 +303,7 @@ def test_add_takes_fitted_values_from_the_first_candidate_with_the_effect(capsys
     arguments = ("add", SCENE, "bond_softening", "--from", diagnosis, "--set", "width=3", "--out", tmp_path / "b", "--json")
     found = answer(capsys, *arguments)
     chosen = {"hot_compliance": 11.0, "transition": 47.0, "width": 3.0}  # the rest is typical
-    assert found["added"][0]["values"] == {"hot_compliance": 11.0, "cold_ratio": 4.75, "loss_factor": 0.04, "coupling_kept": 1.0} | chosen
+    assert found["added"][0]["values"] == {"hot_compliance": 11.0, "cold_ratio": 4.75, "loss_factor": 0.04} | chosen
     said = load(tmp_path / "b").provenance["effects.bond_softening.values.transition"]
     assert said.origin == "calibrated"
     assert "diagnosis.json: hot_compliance, transition; set by hand: width" in said.source
@@ -336,7 +352,12 @@ def test_an_effect_is_added_once(capsys, tmp_path):
 
 
 def test_nothing_is_left_of_a_scene_that_does_not_load(capsys, monkeypatch, tmp_path):
-    monkeypatch.setattr("diagnosis.add._effect_table", lambda *_: "[[effects]]\nname = 3\n")
+    """The new scene is read again before it is accepted; here something is wrong with it only then."""
+
+    def refuse(spindle, catalogue):
+        raise BadInput(f"{spindle.file}: effects.ring_growth: cannot be")
+
+    monkeypatch.setattr("thermospindle.diagnosis.add.resolved", refuse)
     assert main(["add", str(SCENE), "ring_growth", "--out", str(tmp_path / "new")]) == 2
-    assert f"{tmp_path / 'new' / 'spindle.toml'}: " in capsys.readouterr().err
+    assert f"{tmp_path / 'new' / 'spindle.toml'}: effects.ring_growth: cannot be" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []

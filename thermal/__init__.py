@@ -6,13 +6,14 @@ Modules, in the order of the calculation:
 mesh         meshes of a part's section, made here or read from Gmsh; every element belongs to a named region
 elastic      thermo-elasticity of one part; the influence of thermal strain on its ring motions by adjoint solutions
 refine       refinement where the ring motions need it; how well they have converged
+reduced      the influence of a part whose moduli follow the temperature, on a space of a few solutions
 store        influence on disk
 influence    the influence of a spindle, computed once for a geometry and elasticity
 friction     bearing friction torque and heat
 temperature  temperature fields, region means, free thermal strain
 conduction   the discrete heat equation of both parts, coupled through bearings and air gaps
 heat         steady and transient temperature, heat flows
-reading      region means and ring motions of many temperature fields on one mesh, quickly
+readout      region means and ring motions of many temperature fields on one mesh, quickly
 expansion    the front: `influence`, `expand` (ring motions), `field` (the deformed section)
 ===========  =====================================================================================================
 

@@ -17,9 +17,10 @@ from scipy.sparse import block_diag, coo_array, csr_array, diags_array
 from skfem import Basis, BilinearForm, FacetBasis, LinearForm
 from skfem.helpers import dot, grad
 
-from model.machine import AirGap, Bearing, Region, Spindle
-from thermal.mesh import PartMesh, element
-from thermal.temperature import TemperatureField
+from thermospindle.model.machine import AirGap, Bearing, Region, Spindle
+from thermospindle.thermal import influence
+from thermospindle.thermal.mesh import PartMesh, element
+from thermospindle.thermal.temperature import TemperatureField
 
 GAUSS = 3  # points between nodes of an air gap: exact for products of quadratics, and for r in them
 
@@ -132,8 +133,7 @@ def _conduction(spindle: Spindle, section: PartMesh, basis: Basis) -> tuple[csr_
 def _film(spindle: Spindle, section: PartMesh) -> tuple[csr_array, np.ndarray]:
     """Convection matrix (W/K) of one part and its load (W) for air 1 K above zero, as if there were no air gaps."""
     size = Basis(section.mesh, element(section.mesh)).N
-    rings = [(spindle.region(b.inner_ring), 1) for b in spindle.bearings] + [(spindle.region(b.outer_ring), 0) for b in spindle.bearings]
-    races = [section.side(g.name, 0, g.r[side]) for g, side in rings if g.part == section.part]
+    races = [section.race(race.ring, race.r, race.z) for race in influence.races(spindle, section.part)]
     matrix, load = csr_array((size, size)), np.zeros(size)
     for c in spindle.thermal.convections:
         if (facets := np.setdiff1d(section.exposed(c.regions), np.concatenate([[], *races]).astype(int))).size:
@@ -147,10 +147,10 @@ def _raceways(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Weights (nodes,) of the mean over the inner and over the outer raceway face, every area of it counting alike."""
     weights = np.zeros((2, max(span.stop for span in spans.values())))
-    for weight, ring, side in zip(weights, (bearing.inner_ring, bearing.outer_ring), (1, 0), strict=True):
-        g = spindle.region(ring)
-        area = supply.assemble(_face(sections[g.part], sections[g.part].side(ring, 0, g.r[side])), coefficient=1.0)
-        weight[spans[g.part]] = area / area.sum()
+    for weight, race in zip(weights, influence.raceways(spindle, bearing), strict=True):
+        part = spindle.region(race.ring).part
+        area = supply.assemble(_face(sections[part], sections[part].race(race.ring, race.r, race.z)), coefficient=1.0)
+        weight[spans[part]] = area / area.sum()
     return weights[0], weights[1]
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.sparse.linalg import splu
 from skfem import Basis, BilinearForm, ElementVector, FacetBasis, LinearForm
 
-from thermal.mesh import PartMesh, element
+from thermospindle.thermal.mesh import PartMesh, element
 
 QUADRATURE_ORDER = 4
 
@@ -36,10 +36,11 @@ class Elasticity:
 
 @dataclass(frozen=True)
 class Race:
-    """The raceway face of a ring: the side of `ring` at radius `r` (m)."""
+    """The raceway face of a ring: the side of `ring` at radius `r` (m), between the heights `z` (m) or, without them, all of it."""
 
     ring: str
     r: float
+    z: tuple[float, float] | None = None
 
 
 def strain(u, r):
@@ -135,10 +136,18 @@ class Solid:
 
     def race_mean(self, race: Race) -> np.ndarray:
         """Weights (nodes,) of the mean of a scalar over a raceway face, every length of it counting alike."""
-        facets = self.section.side(race.ring, 0, race.r)
+        facets = self.section.race(race.ring, race.r, race.z)
         face = FacetBasis(self.section.mesh, element(self.section.mesh), facets=facets, intorder=4)
         length = LinearForm(lambda v, w: v).assemble(face)
         return length / length.sum()
+
+    def functionals(self, races: Sequence[Race]) -> np.ndarray:
+        """Rows (2 races, dofs) that read the mean motion of raceways, r and z, off a displacement."""
+        rows = np.zeros((2 * len(races), self.basis.N))
+        for i, race in enumerate(races):
+            rows[2 * i, 0::2] = rows[2 * i + 1, 1::2] = self.race_mean(race)
+        rows[1::2, 1::2] -= self.axial_mean  # the motion is counted from the part's axial mean
+        return rows
 
     def respond(self, races: Sequence[Race]) -> tuple[Response, np.ndarray]:
         """Influence of thermal strain on the motion of `races`, and the adjoint displacements (2 races, nodes, 2) behind it.
@@ -146,11 +155,7 @@ class Solid:
         The motion is a linear functional j of the displacement K^-1 f(strain), so it is f(strain) . K^-1 j: one adjoint
         solution a functional answers any thermal strain (Becker, Rannacher, Acta Numerica 10 (2001), sec. 2).
         """
-        functionals = np.zeros((2 * len(races), self.basis.N))
-        for i, race in enumerate(races):
-            functionals[2 * i, 0::2] = functionals[2 * i + 1, 1::2] = self.race_mean(race)
-        functionals[1::2, 1::2] -= self.axial_mean  # the motion is counted from the part's axial mean
-        adjoint = self._solve(functionals.T).T
+        adjoint = self._solve(self.functionals(races).T).T
         r = self.basis.global_coordinates()[0]
         weight = (3 * self.lam + 2 * self.mu) * r * self.basis.dx
         density = np.array([weight * dilatation(self.basis.interpolate(a), r) for a in adjoint])

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from model.machine import RingMotion, Spindle
-from thermal.elastic import Response, Solid
-from thermal.influence import TOLERANCE, Influence, elasticity, influence
-from thermal.temperature import TemperatureField, region_temperatures, thermal_strain
+from thermospindle.model.machine import RingMotion, Spindle
+from thermospindle.thermal.elastic import Race, Response, Solid
+from thermospindle.thermal.influence import TOLERANCE, Influence, elasticity, gains, influence, raceways
+from thermospindle.thermal.temperature import TemperatureField, region_temperatures, thermal_strain
 
 __all__ = ["DeformedSection", "Influence", "expand", "field", "influence"]
 
@@ -24,31 +24,38 @@ TILES = {6: ((0, 3, 5), (1, 4, 3), (2, 5, 4), (3, 4, 5)), 8: ((0, 4, 7), (1, 5, 
 def expand(spindle: Spindle, temperature: Temperature, tolerance: float = TOLERANCE) -> dict[str, RingMotion]:
     """Motion of the rings of every bearing, by its name, from the reference temperature to `temperature`.
 
-    Balls and grooves have the mean temperature of their two rings, or of their own ring. ValueError for region temperatures
+    Balls and grooves have the mean temperature of their two rings, or of their own ring: of the whole region, also where bearings share
+    one. ValueError for region temperatures
     that do not match the spindle's regions; OutsideRange where a material law does not reach.
     """
     means = region_temperatures(spindle, temperature)
-    moves: dict[str, tuple[float, float]] = {}
-    for response in influence(spindle, tolerance, means).responses.values():
-        if isinstance(temperature, TemperatureField):
+    moves: dict[Race, tuple[float, float]] = {}
+    if isinstance(temperature, TemperatureField):
+        for response in influence(spindle, tolerance, means).responses.values():
             strains = _strain_field(spindle, Solid(response.section, elasticity(spindle, means)), temperature)
-            moved = np.einsum("ieq,eq->i", response.density, strains)
-        else:
-            moved = response.gain @ _region_strains(spindle, response, means)
-        moves |= {race.ring: (float(r), float(z)) for race, (r, z) in zip(response.races, moved.reshape(-1, 2), strict=True)}
+            moves |= _by_race(response.races, np.einsum("ieq,eq->i", response.density, strains))
+    else:
+        for gain in gains(spindle, tolerance, means):
+            moves |= _by_race(gain.races, gain.value @ _region_strains(spindle, gain.regions, means))
     return ring_motions(spindle, means, moves)
 
 
-def ring_motions(spindle: Spindle, means: Mapping[str, float], moves: Mapping[str, tuple[float, float]]) -> dict[str, RingMotion]:
+def _by_race(races: Sequence[Race], motion: np.ndarray) -> dict[Race, tuple[float, float]]:
+    """Motions (2 races,) as (r, z) of every race."""
+    return {race: (float(r), float(z)) for race, (r, z) in zip(races, motion.reshape(-1, 2), strict=True)}
+
+
+def ring_motions(spindle: Spindle, means: Mapping[str, float], moves: Mapping[Race, tuple[float, float]]) -> dict[str, RingMotion]:
     """Motion of every bearing's rings from what their races move by (r, z in m) and the region means (C)."""
     result = {}
     for b in spindle.bearings:
+        inner_race, outer_race = raceways(spindle, b)
         inner, outer = means[b.inner_ring], means[b.outer_ring]
         ring, ball = spindle.materials[b.ring_material], spindle.materials[b.ball_material]
         reference = spindle.reference_temperature
         result[b.name] = RingMotion(
-            *moves[b.inner_ring],
-            *moves[b.outer_ring],
+            *moves[inner_race],
+            *moves[outer_race],
             inner_strain=ring.thermal_strain(inner, reference),
             outer_strain=ring.thermal_strain(outer, reference),
             ball_strain=ball.thermal_strain((inner + outer) / 2, reference),
@@ -92,7 +99,7 @@ def _deformed_by_regions(spindle: Spindle, response: Response, means: Mapping[st
     nodal = np.empty(solid.scalar.N)
     for name in response.section.regions:
         nodal[solid.scalar.element_dofs[:, response.section.elements(name)]] = means[name]
-    return _drawing(solid, np.tensordot(_region_strains(spindle, response, means), response.shape, axes=1), nodal)
+    return _drawing(solid, np.tensordot(_region_strains(spindle, response.section.regions, means), response.shape, axes=1), nodal)
 
 
 def _drawing(solid: Solid, displacement: np.ndarray, temperature: np.ndarray) -> DeformedSection:
@@ -103,11 +110,11 @@ def _drawing(solid: Solid, displacement: np.ndarray, temperature: np.ndarray) ->
     return DeformedSection(section.regions, solid.nodes, triangles, displacement, temperature, owner)
 
 
-def _region_strains(spindle: Spindle, response: Response, means: Mapping[str, float]) -> np.ndarray:
-    """Free thermal strain (regions,) of the part's regions."""
-    materials = [spindle.materials[spindle.region(name).material] for name in response.section.regions]
+def _region_strains(spindle: Spindle, regions: Sequence[str], means: Mapping[str, float]) -> np.ndarray:
+    """Free thermal strain (regions,) of a part's regions."""
+    materials = [spindle.materials[spindle.region(name).material] for name in regions]
     reference = spindle.reference_temperature
-    return np.array([m.thermal_strain(means[n], reference) for n, m in zip(response.section.regions, materials, strict=True)])
+    return np.array([m.thermal_strain(means[n], reference) for n, m in zip(regions, materials, strict=True)])
 
 
 def _strain_field(spindle: Spindle, solid: Solid, temperature: TemperatureField) -> np.ndarray:

@@ -7,11 +7,8 @@ load rating, so far below 0.001 under a light preload.
 
 from __future__ import annotations
 
-import numpy as np
-
-from model.machine import Bearing, Friction
-
-RPM = 2 * np.pi / 60
+from thermospindle.model.machine import Bearing, Friction
+from thermospindle.model.units import RPM
 
 
 def torque(friction: Friction, bearing: Bearing, speed: float, temperature: float, load: float) -> float:

@@ -16,11 +16,11 @@ from scipy.optimize import brentq
 from scipy.sparse import csc_array, csr_array
 from scipy.sparse.linalg import SuperLU, eigsh, splu
 
-from model.ball_row import NoEquilibrium
-from model.machine import Spindle
-from thermal import friction
-from thermal.conduction import HeatModel
-from thermal.temperature import TemperatureField
+from thermospindle.model.errors import NoEquilibrium
+from thermospindle.model.machine import Spindle
+from thermospindle.thermal import friction
+from thermospindle.thermal.conduction import HeatModel
+from thermospindle.thermal.temperature import TemperatureField
 
 GAMMA = 2 - np.sqrt(2)
 """First stage of TR-BDF2 that gives both stages one matrix (Bank et al., IEEE Trans. CAD 4 (1985)): L-stable, second order."""

@@ -1,7 +1,10 @@
 """The influence of thermal strain on the motion of the rings: computed once for a geometry and elasticity, then kept.
 
+Where a modulus follows the temperature, the influence at any temperatures comes from a reduced basis (`thermal.reduced`), made once for a
+section and its laws.
+
 It is kept in the process, and on disk in `THERMOSPINDLE_CACHE` (a folder; empty for none), by default
-`$XDG_CACHE_HOME/thermospindle`, under a hash of all it depends on, this package's code included.
+`$XDG_CACHE_HOME/thermospindle`, under a hash of all it depends on, this package's code included; the oldest go when there is too much of it.
 """
 
 from __future__ import annotations
@@ -12,11 +15,13 @@ from functools import lru_cache
 
 import numpy as np
 
-from model.machine import Region, Spindle
-from thermal import store
-from thermal.elastic import Elasticity, Race, Response
-from thermal.mesh import PartMesh, tiled
-from thermal.refine import Convergence, converged_response
+from thermospindle.model.machine import Bearing, Region, Spindle
+from thermospindle.thermal import store
+from thermospindle.thermal.elastic import Elasticity, Race, Response
+from thermospindle.thermal.mesh import PartMesh, tiled
+from thermospindle.thermal.reduced import Reduced, reduced
+from thermospindle.thermal.reduced import Region as Softening
+from thermospindle.thermal.refine import Convergence, converged_response
 
 TOLERANCE = 1e-4
 """Of the ring motions, relative to the largest: 0.3 nm for the reference spindle at 60 C, 0.1 % of its preload."""
@@ -66,10 +71,84 @@ def influence(
     """
     answers = {}
     for part in dict.fromkeys(g.part for g in spindle.regions):
-        question = _question(spindle, part, tolerance, temperatures)
-        start = (sections or {}).get(question.part)
-        answers[question.part] = _kept(question) if start is None else _answer(question, start)
+        if (start := (sections or {}).get(part)) is not None:
+            answers[part] = _answer(_question(spindle, part, tolerance, temperatures), start)
+        elif (moduli := _softened(spindle, part, temperatures)) is not None:
+            family = _family(spindle, part, tolerance)
+            answers[part] = _response(family, moduli), _kept(family.reference)[1]
+        else:
+            answers[part] = _kept(_question(spindle, part, tolerance, None))
     return Influence({p: response for p, (response, _) in answers.items()}, {p: how for p, (_, how) in answers.items()})
+
+
+@dataclass(frozen=True, eq=False)
+class Gain:
+    """Motion of `races` (2 races, regions) in m for unit strains of `regions`."""
+
+    races: tuple[Race, ...]
+    regions: tuple[str, ...]
+    value: np.ndarray
+
+
+def gains(spindle: Spindle, tolerance: float, temperatures: Mapping[str, float]) -> tuple[Gain, ...]:
+    """The gains of `influence` at temperatures (C, by region), part by part, without what only fields of temperature need."""
+    found = []
+    for part in dict.fromkeys(g.part for g in spindle.regions):
+        moduli = _softened(spindle, part, temperatures)
+        if moduli is None:
+            response = _kept(_question(spindle, part, tolerance, None))[0]
+            found.append(Gain(response.races, response.section.regions, response.gain))
+        else:
+            space = _space(_family(spindle, part, tolerance))
+            found.append(Gain(space.races, space.section.regions, space.solution(_ordered(space, moduli))[0]))
+    return tuple(found)
+
+
+def _softened(spindle: Spindle, part: str, temperatures: Mapping[str, float] | None) -> tuple[tuple[str, float], ...] | None:
+    """Moduli (Pa) by region of a part at its temperatures; None where they are those of the reference."""
+    if temperatures is None:
+        return None
+    now = elasticity(spindle, temperatures)
+    own = [g for g in spindle.regions if g.part == part]
+    if all(len(spindle.materials[g.material].youngs_modulus.value) == 1 for g in own):
+        return None
+    return tuple((g.name, now[g.name].youngs_modulus) for g in own)
+
+
+@dataclass(frozen=True)
+class Family:
+    """The influence of one part at all temperatures: that at `temperature` (C), and what its regions' moduli follow."""
+
+    reference: Elastic
+    regions: tuple[Softening, ...]
+    temperature: float
+
+
+def _family(spindle: Spindle, part: str, tolerance: float) -> Family:
+    own = [g for g in spindle.regions if g.part == part]
+    made_of = {g.name: spindle.materials[g.material] for g in own}
+    regions = tuple(Softening(name, m.youngs_modulus, m.poisson_ratio) for name, m in made_of.items())
+    return Family(_question(spindle, part, tolerance, None), regions, spindle.reference_temperature)
+
+
+@lru_cache(maxsize=16)
+def _space(family: Family) -> Reduced:
+    if (found := store.load_space(repr(family), family.regions)) is not None:
+        return found
+    response = _kept(family.reference)[0]
+    space = reduced(response.section, response.races, family.regions, family.temperature)
+    store.save_space(repr(family), space)
+    return space
+
+
+@lru_cache(maxsize=16)
+def _response(family: Family, moduli: tuple[tuple[str, float], ...]) -> Response:
+    return _space(family).response(dict(moduli))
+
+
+def _ordered(space: Reduced, moduli: tuple[tuple[str, float], ...]) -> np.ndarray:
+    by_name = dict(moduli)
+    return np.array([by_name[r.name] for r in space.regions])
 
 
 def elasticity(spindle: Spindle, temperatures: Mapping[str, float] | None = None) -> dict[str, Elasticity]:
@@ -84,10 +163,17 @@ def elasticity(spindle: Spindle, temperatures: Mapping[str, float] | None = None
 
 def races(spindle: Spindle, part: str) -> tuple[Race, ...]:
     """The raceway faces on `part`: the outside of inner rings, the bore of outer rings; lower bearing first."""
-    inner = [(b.inner_ring, 1) for b in spindle.bearings]
-    outer = [(b.outer_ring, 0) for b in spindle.bearings]
-    faces = [(spindle.region(name), side) for pair in zip(inner, outer, strict=True) for name, side in pair]
-    return tuple(Race(g.name, g.r[side]) for g, side in faces if g.part == part)
+    faces = [face for b in spindle.bearings for face in raceways(spindle, b)]
+    return tuple(face for face in faces if spindle.region(face.ring).part == part)
+
+
+def raceways(spindle: Spindle, bearing: Bearing) -> tuple[Race, Race]:
+    """The raceway faces of the inner and the outer ring of a bearing; a ring of its own counts with its whole height."""
+    found = []
+    for ring, side in ((bearing.inner_ring, 1), (bearing.outer_ring, 0)):
+        g, span = spindle.region(ring), spindle.raceway(ring, bearing)
+        found.append(Race(ring, g.r[side], None if span == g.z else span))
+    return found[0], found[1]
 
 
 def _question(spindle: Spindle, part: str, tolerance: float, temperatures: Mapping[str, float] | None) -> Elastic:
@@ -101,10 +187,16 @@ def _kept(question: Elastic) -> tuple[Response, Convergence]:
     if (found := store.load(repr(question))) is not None:
         return found
     size = max(np.ptp([g.r for g in question.regions]), np.ptp([g.z for g in question.regions])) / CELLS_ACROSS
-    answer = _answer(question, tiled(question.part, question.regions, size))
+    heights = [race.z for race in question.races if race.z is not None]
+    answer = _answer(question, tiled(question.part, question.regions, size, heights=heights))
     store.save(repr(question), *answer)
     return answer
 
 
 def _answer(question: Elastic, start: PartMesh) -> tuple[Response, Convergence]:
     return converged_response(start, dict(question.elasticity), question.races, question.tolerance)
+
+
+def forget() -> None:
+    """Drop what this process has kept, so that it reads from disk or computes again as a new one would."""
+    _kept.cache_clear()

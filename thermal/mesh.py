@@ -14,8 +14,8 @@ from scipy.sparse.csgraph import connected_components
 from skfem import ElementQuadS2, ElementTriP2, Mesh, MeshQuad, MeshTri
 from skfem.element import Element
 
-from model.machine import Region, Spindle
-from model.section import cells
+from thermospindle.model.machine import Region, Spindle
+from thermospindle.model.rotor.section import cells
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +41,23 @@ class PartMesh:
         if not found.size:
             raise ValueError(f"the mesh of the {self.part} part has no face of {region!r} at {'rz'[axis]} = {position:g} m")
         return found
+
+    def race(self, ring: str, r: float, z: tuple[float, float] | None) -> np.ndarray:
+        """Facets of the raceway of `ring` at radius `r` (m), between the heights `z` (m) or all of that side.
+
+        ValueError for a mesh whose lines do not follow the raceway's ends.
+        """
+        facets = self.side(ring, 0, r)
+        if z is None:
+            return facets
+        ends = self.mesh.p[1][self.mesh.facets[:, facets]]
+        near = 1e-6 * np.ptp(self.mesh.p)
+        if cut := [end for end in z if np.any((ends.min(axis=0) < end - near) & (ends.max(axis=0) > end + near))]:
+            raise ValueError(f"the mesh of the {self.part} part has no line at z = {cut[0]:g} m, where a raceway of {ring!r} ends")
+        found = facets[(ends.min(axis=0) > z[0] - near) & (ends.max(axis=0) < z[1] + near)]
+        if not found.size:
+            raise ValueError(f"the mesh of the {self.part} part has no face of {ring!r} at r = {r:g} m between z = {z[0]:g} and {z[1]:g} m")
+        return np.asarray(found)
 
     def exposed(self, regions: Sequence[str]) -> np.ndarray:
         """Boundary facets of elements of `regions`, without the axis r = 0."""
@@ -74,12 +91,17 @@ def section_mesh(spindle: Spindle, part: str, size: float, shape: str = "triangl
 
     `shape` is triangle or quadrilateral. ValueError when regions of the part do not hold together.
     """
-    return tiled(part, part_regions(spindle, part), size, shape)
+    raceways = [spindle.raceway(ring, b) for b in spindle.bearings for ring in (b.inner_ring, b.outer_ring)]
+    return tiled(part, part_regions(spindle, part), size, shape, raceways)
 
 
-def tiled(part: str, regions: Sequence[Region], size: float, shape: str = "triangle") -> PartMesh:
-    """`section_mesh` of bare regions: where they overlap, the later one owns the element."""
-    grid = MeshQuad.init_tensor(_lines([g.r for g in regions], size), _lines([g.z for g in regions], size))
+def tiled(
+    part: str, regions: Sequence[Region], size: float, shape: str = "triangle", heights: Sequence[tuple[float, float]] = ()
+) -> PartMesh:
+    """`section_mesh` of bare regions: where they overlap, the later one owns the element. `heights` (m) are further lines in z."""
+    low, high = min(g.z[0] for g in regions), max(g.z[1] for g in regions)
+    inside = [span for span in heights if low <= span[0] and span[1] <= high]
+    grid = MeshQuad.init_tensor(_lines([g.r for g in regions], size), _lines([*(g.z for g in regions), *inside], size))
     r, z = grid.p[:, grid.t].mean(axis=1)
     owner = np.full(r.size, -1)
     for index, g in enumerate(regions):
@@ -99,7 +121,10 @@ def read_gmsh(path: str | Path, spindle: Spindle, part: str) -> PartMesh:
     First-order triangles or quadrilaterals; groups of other names are not of this part and are left out. ValueError names
     the regions that have no physical surface, or says what else the mesh lacks.
     """
-    data = meshio.read(path)
+    try:
+        data = meshio.read(path)
+    except (Exception, SystemExit) as error:  # meshio ends the program on files it does not know
+        raise ValueError(f"{path}: not a Gmsh file that can be read: {type(error).__name__} {error}") from None
     kinds = [kind for kind in ("triangle", "quad") if kind in data.cells_dict]
     if len(kinds) != 1:
         raise ValueError(f"{path}: one kind of element is needed, first-order triangles or quadrilaterals")
@@ -117,6 +142,8 @@ def read_gmsh(path: str | Path, spindle: Spindle, part: str) -> PartMesh:
         region_of[tags == named[name]] = index
     points, corners = np.unique(data.cells_dict[kind][region_of >= 0], return_inverse=True)
     vertices = np.ascontiguousarray(data.points[points, :2].T)
+    if not np.all(np.isfinite(vertices)):
+        raise ValueError(f"{path}: a node has a coordinate that is no finite number")
     if vertices[0].min() < 0:
         raise ValueError(f"{path}: radii (x) must not be negative")
     mesh = (MeshTri if kind == "triangle" else MeshQuad)(vertices, corners.reshape(-1, 3 if kind == "triangle" else 4).T)

@@ -1,24 +1,31 @@
-"""Influence on disk: one file a part, named by the hash of its question and of the code that answers it."""
+"""Influence on disk: one file a part, named by the hash of its question and of the code that answers it.
+
+Files that were not asked for longest go first when all of them together take more than `MOST_BYTES`.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import os
-import tempfile
-import zipfile
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import skfem
 from skfem import MeshTri
 
-from thermal.elastic import Race, Response
-from thermal.mesh import PartMesh
-from thermal.refine import Convergence
+from thermospindle.model.whole import whole
+from thermospindle.thermal.elastic import Race, Response
+from thermospindle.thermal.mesh import PartMesh
+from thermospindle.thermal.reduced import Reduced, Region
+from thermospindle.thermal.refine import Convergence
 
 ARRAYS = ("gain", "density", "shape")
+SPACE = ("fields", "stiffness", "load", "motion")
+MOST_BYTES = 256 << 20
 
 
 def folder() -> Path | None:
@@ -31,46 +38,95 @@ def folder() -> Path | None:
 
 def load(question: str) -> tuple[Response, Convergence] | None:
     """The kept answer, or None where there is none or its file cannot be read."""
-    file = _file(question)
-    if file is None or not file.is_file():
+    if (found := _read(question)) is None:
         return None
+    notes, data = found
     try:
-        with np.load(file, allow_pickle=False) as data:
-            notes = json.loads(str(data["notes"]))
-            if notes["question"] != question:
-                return None
-            mesh = MeshTri(np.ascontiguousarray(data["p"]), np.ascontiguousarray(data["t"]))
-            section = PartMesh(notes["part"], mesh, tuple(notes["regions"]), data["region_of"])
-            response = Response(section, tuple(Race(*race) for race in notes["races"]), *(data[name] for name in ARRAYS))
+        response = Response(_section(notes, data), _races(notes), *(data[name] for name in ARRAYS))
         return response, Convergence(tuple(notes["unknowns"]), tuple(notes["change"]), notes["error"])
-    except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile):
+    except Exception:  # as in `_read`
         return None
 
 
 def save(question: str, response: Response, convergence: Convergence) -> None:
     """Keep an answer; a folder that cannot be written is passed over, since the answer can always be computed again."""
+    notes = {"unknowns": convergence.unknowns, "change": convergence.change, "error": convergence.error}
+    _write(question, response.section, response.races, notes, {name: getattr(response, name) for name in ARRAYS})
+
+
+def load_space(question: str, regions: Sequence[Region]) -> Reduced | None:
+    """The kept space of a part whose `regions` follow the temperature, or None."""
+    if (found := _read(question)) is None:
+        return None
+    notes, data = found
+    try:
+        section = _section(notes, data)
+        ordered = tuple(next(r for r in regions if r.name == name) for name in section.regions)
+        fields, stiffness, load, motion = (data[name] for name in SPACE)
+        return Reduced(section, _races(notes), ordered, fields, stiffness, load, motion, notes["error"], notes["solved"])
+    except Exception:  # as in `_read`
+        return None
+
+
+def save_space(question: str, space: Reduced) -> None:
+    """Keep a space, as `save` keeps an answer."""
+    arrays = {name: getattr(space, name) for name in SPACE}
+    _write(question, space.section, space.races, {"error": space.error, "solved": space.solved}, arrays)
+
+
+def _section(notes: dict[str, Any], data: Mapping[str, np.ndarray]) -> PartMesh:
+    mesh = MeshTri(np.ascontiguousarray(data["p"]), np.ascontiguousarray(data["t"]))
+    return PartMesh(notes["part"], mesh, tuple(notes["regions"]), data["region_of"])
+
+
+def _races(notes: dict[str, Any]) -> tuple[Race, ...]:
+    return tuple(Race(ring, r, z and (z[0], z[1])) for ring, r, z in notes["races"])
+
+
+def _read(question: str) -> tuple[dict[str, Any], dict[str, np.ndarray]] | None:
+    """Notes and arrays of a file; it counts as asked for now."""
+    file = _file(question)
+    if file is None or not file.is_file():
+        return None
+    try:
+        with np.load(file, allow_pickle=False) as data:
+            arrays = {name: data[name] for name in data.files}
+        notes = json.loads(str(arrays["notes"]))
+        numbers = (a for a in arrays.values() if a.dtype.kind == "f")
+        if notes["question"] != question or not all(np.all(np.isfinite(a)) for a in numbers):
+            return None
+        os.utime(file)
+        return notes, arrays
+    except Exception:  # a damaged archive fails in many ways (zipfile, tokenize, json); whatever it is, the answer is computed again
+        return None
+
+
+def _write(question: str, section: PartMesh, races: Sequence[Race], more: dict[str, Any], arrays: dict[str, Any]) -> None:
     file = _file(question)
     if file is None:
         return
-    section = response.section
-    notes = {
+    notes = more | {
         "question": question,
         "part": section.part,
         "regions": section.regions,
-        "races": [(race.ring, race.r) for race in response.races],
-        "unknowns": convergence.unknowns,
-        "change": convergence.change,
-        "error": convergence.error,
+        "races": [(race.ring, race.r, race.z) for race in races],
     }
-    arrays = {name: getattr(response, name) for name in ARRAYS}
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=file.parent) as scratch:
-            part = Path(scratch) / file.name
+        with whole(file) as part:
             np.savez(part, notes=json.dumps(notes), p=section.mesh.p, t=section.mesh.t, region_of=section.region_of, **arrays)
-            os.replace(part, file)
+        _make_room(file.parent)
     except OSError:
         return
+
+
+def _make_room(place: Path) -> None:
+    """Remove the files that were not asked for longest, until the rest takes `MOST_BYTES` at most."""
+    total = 0
+    for file in sorted(place.glob("influence-*.npz"), key=lambda f: f.stat().st_mtime, reverse=True):
+        total += file.stat().st_size
+        if total > MOST_BYTES:
+            file.unlink(missing_ok=True)
 
 
 def _file(question: str) -> Path | None:

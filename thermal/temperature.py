@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from skfem import Basis, LinearForm
 
-from model.machine import Law, Material, OutsideRange, Spindle
-from thermal.mesh import PartMesh, element
+from thermospindle.model.errors import OutsideRange
+from thermospindle.model.machine import Law, Material, Spindle
+from thermospindle.thermal.mesh import PartMesh, element
 
 
 @dataclass(frozen=True, eq=False)

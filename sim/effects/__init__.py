@@ -1,4 +1,18 @@
-"""The catalogue of effects: one file each, one line here; and the effects of a scene, found in it or among a user's own."""
+"""The catalogue of effects: one file each, one line here; and the effects of a scene, found in it or among a user's own.
+
+============  ====================================================================================================
+effect        what a physical effect is: equation, parameters, pure functions of one step each
+own           a user's own effect: a Python file, or an entry point
+roles         what a scene's parts are for, and the changes that several effects make to them
+rules         the rules every effect keeps
+trial         an effect tried on a spindle
+temperature/  temperature and expansion
+bearing/      bearings
+structure/    joints, bodies, shaft
+running/      what excites a running spindle
+measuring/    the measuring chain
+============  ====================================================================================================
+"""
 
 from __future__ import annotations
 
@@ -6,46 +20,38 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from model.machine import Spindle
-from model.scene import BadInput
-from sim.effect import Effect, Values
-from sim.effect_file import OwnEffect, effect_of, installed
-from sim.effects import (
-    added_disk,
+from thermospindle.model.errors import BadInput, instead
+from thermospindle.model.machine import Spindle
+from thermospindle.sim.effects.bearing import (
     ball_inertia,
     ball_material,
-    ball_size,
-    ball_waviness,
     bearing_misalignment,
     bond_softening,
-    cage_unbalance,
-    channel_delay,
     clearance_opening,
     constant_force_preload,
-    expansion_mismatch,
-    flange_fit_loosening,
     grease_damping,
-    hammer_position,
     hertz_amplitude,
-    hub_flexibility,
-    loose_inserts,
     lubricant_film,
     magnetic_pull,
+    preload_loss,
+    ring_growth,
+)
+from thermospindle.sim.effects.effect import Effect, Values, fitted_to, refusal
+from thermospindle.sim.effects.measuring import channel_delay, hammer_position, sensor_gain, window_damping
+from thermospindle.sim.effects.own import OwnEffect, effect_of, installed
+from thermospindle.sim.effects.running import ball_size, ball_waviness, cage_unbalance, race_waviness, unbalance
+from thermospindle.sim.effects.structure import (
+    added_disk,
+    flange_fit_loosening,
+    hub_flexibility,
     modulus_softening,
     mount_compliance,
     plate_prestress,
-    preload_loss,
-    race_waviness,
-    ring_growth,
-    sensor_gain,
     sensor_mass,
     shaft_bending,
-    soak_lag,
     support_anisotropy,
-    thermal_gradient,
-    unbalance,
-    window_damping,
 )
+from thermospindle.sim.effects.temperature import expansion_mismatch, loose_inserts, soak_lag, thermal_gradient
 
 CATALOGUE: tuple[Effect, ...] = (
     # temperature and expansion
@@ -95,7 +101,12 @@ def by_name(name: str, catalogue: Sequence[Effect] = CATALOGUE) -> Effect:
     for effect in catalogue:
         if effect.name == name:
             return effect
-    raise BadInput(f"effect {name!r} is unknown; allowed are {', '.join(e.name for e in catalogue) or 'none'}")
+    raise BadInput(f"effect {name!r} is unknown; {instead(name, (e.name for e in catalogue))}")
+
+
+def usable(spindle: Spindle, catalogue: Sequence[Effect] = CATALOGUE) -> tuple[Effect, ...]:
+    """The effects of a catalogue that act on a spindle and are valid there (`effect.refusal`), in its scale (`effect.fitted_to`)."""
+    return tuple(fitted_to(e, spindle) for e in catalogue if refusal(e, spindle) is None)
 
 
 def checked(effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
@@ -103,7 +114,7 @@ def checked(effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
     known = {p.name: p for p in effect.parameters}
     for name, value in values.items():
         if name not in known:
-            raise BadInput(f"effect {effect.name}: {name}: unknown parameter; allowed are {', '.join(known)}")
+            raise BadInput(f"effect {effect.name}: {name}: unknown parameter; {instead(name, known)}")
         low, high = known[name].limits
         if not low <= value <= high:
             raise BadInput(f"effect {effect.name}: {name} = {value:g} {known[name].unit}: allowed is {low:g} to {high:g}")
@@ -133,6 +144,7 @@ def resolved(spindle: Spindle, catalogue: Sequence[Effect]) -> Spindle:
         effect = known.get(addition.effect)
         if effect is None:
             raise BadInput(_not_known(spindle, addition.effect, catalogue))
+        effect = fitted_to(effect, spindle)
         checked(effect, addition.values)
         additions.append(replace(addition, definition=effect))
     return replace(spindle, effects=tuple(additions))
@@ -146,7 +158,7 @@ def of_scene(spindle: Spindle) -> list[tuple[Effect, Values]]:
         effect = effect or next((e for e in installed() if e.name == addition.effect), None)
         if effect is None:
             raise BadInput(_not_known(spindle, addition.effect, (*CATALOGUE, *installed())))
-        found.append((effect, checked(effect, addition.values)))
+        found.append((effect, checked(fitted_to(effect, spindle), addition.values)))
     return found
 
 

@@ -5,17 +5,17 @@ import tomllib
 
 import pytest
 
-from diagnosis.before_after import held_out, without
-from model.machine import Condition
-from model.scene import BadInput, build, content_hash, load
-from model.tolerance import toleranced
-from sim.campaign import Campaign, ModeRow, Test
-from sim.effects import of_scene
-from sim.operating import operating_point
-from spindle import main
-from tests.conftest import ROOT, SCENE
+from tests.conftest import DATA, SCENE
+from thermospindle.cli import main
+from thermospindle.diagnosis.compare.before_after import held_out, without
+from thermospindle.model.errors import BadInput
+from thermospindle.model.machine import Condition
+from thermospindle.model.scene.reading import build, content_hash, load
+from thermospindle.model.tolerance import toleranced
+from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Test
+from thermospindle.sim.effects import of_scene
+from thermospindle.sim.operating import operating_point
 
-PRACTICE = ROOT.parent / "shared" / "practice"
 PAIR = {"preload_loss.loss": 0.2, "added_disk.mass": 1.5, "added_disk.height": 2.0}
 TOLERANCES = {"mount axial stiffness": 0.012, "preload": -0.03, "hub inertia": 0.004, "bearing damping": 0.1}
 OTHERS = {"temperature of T20": -0.3, "temperature of T60": 0.1, "gain of channel 1": 0.01}
@@ -160,7 +160,7 @@ def tables(spindle, temperatures):
     """A campaign of mode tables, exact of `spindle`."""
     tests = []
     for t in temperatures:
-        modes = [m for m in operating_point(spindle, Condition(t)).modes if m.frequency < 2600]
+        modes = [m for m in operating_point(spindle, Condition(t)).modes if m.frequency < 6000]
         rows = tuple(ModeRow(f"T{t:g}", i, m.kind, m.frequency, 0.1, m.damping_ratio, 1e-5) for i, m in enumerate(modes, 1))
         tests.append(Test(f"T{t:g}", t, 0.0, modes=rows))
     return Campaign("tables", spindle.name, "mobility", spindle.points, tuple(tests))
@@ -168,8 +168,8 @@ def tables(spindle, temperatures):
 
 @pytest.fixture
 def written(monkeypatch):
-    """A function that makes a campaign what the command line reads."""
-    return lambda campaign: monkeypatch.setattr("sim.campaign.read_campaign", lambda folder: campaign)
+    """A function that makes a campaign what `compare` reads; in the verb itself, which keeps the name it was loaded with."""
+    return lambda campaign: monkeypatch.setattr("thermospindle.report.verbs.compare.read_campaign", lambda folder: campaign)
 
 
 def test_compare_shows_before_and_after(capsys, add, written, tmp_path):
@@ -185,7 +185,8 @@ def test_compare_shows_before_and_after(capsys, add, written, tmp_path):
         assert error[f"{which}before"] > 50
         assert error[f"{which}after"] < 1e-3
     assert error["after"] == pytest.approx(found["rms_pull"], abs=1e-9)
-    assert 3 * error["before"] ** 2 == pytest.approx(2 * error["fitted_before"] ** 2 + error["held_out_before"] ** 2)
+    # of 8 frequencies and 8 dampings a test; at 60 C the disk takes the rocking pair 8 % down, where it is missing and has no damping
+    assert 46 * error["before"] ** 2 == pytest.approx(30 * error["fitted_before"] ** 2 + 16 * error["held_out_before"] ** 2)
     assert main(arguments) == 0
     text = capsys.readouterr().out
     assert "held-out tests" in text
@@ -208,11 +209,9 @@ def test_held_out_tests_have_names(spindle):
 
 
 @pytest.mark.slow
-def test_practice_a_with_tests_that_the_diagnosis_never_saw(capsys, tmp_path):
-    """A campaign of a separate program; skipped where it is absent."""
-    if not PRACTICE.is_dir():
-        pytest.skip("no practice campaigns beside the project")
-    campaign, hidden = str(PRACTICE / "practice_a"), ["T30_n0", "T60_n7200"]
+def test_a_bond_with_tests_that_the_diagnosis_never_saw(capsys, tmp_path):
+    """A campaign of a separate program."""
+    campaign, hidden = str(DATA / "foreign_bond"), ["T30_n0", "T60_n7200"]
     assert main(["diagnose", str(SCENE), campaign, "--held-out", *hidden, "--out", str(tmp_path / "d"), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["effects"] == ["bond_softening"]
     found = str(tmp_path / "d" / "diagnosis.json")

@@ -7,15 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from diagnosis.correlation import TOLD, bands, correlate, likeness, scale_factor
-from diagnosis.partners import BELIEVABLE
-from model.machine import Condition
-from sim.beside import Beside, beside
-from sim.campaign import Test
-from sim.frf import Frf
-from sim.operating import operating_point
+from thermospindle.diagnosis.compare.correlation import TOLD, bands, correlate, likeness, scale_factor
+from thermospindle.diagnosis.prediction.partners import BELIEVABLE
+from thermospindle.model.machine import Condition
+from thermospindle.sim.campaign.beside import Beside, beside
+from thermospindle.sim.campaign.campaign import Test
+from thermospindle.sim.identification.frf import Frf
+from thermospindle.sim.operating import operating_point
 
-LINES = np.arange(400.0, 3000.0, 2.0)
+LINES = np.arange(400.0, 6000.0, 2.0)
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +60,7 @@ def test_a_shifted_model_is_told_by_how_much(spindle, point, shift):
     assert [b.shift for b in told] == pytest.approx([shift] * len(told), abs=5e-4)
     assert found.whole.shift == pytest.approx(shift, abs=2e-4)
     assert found.whole.fdac > 0.999
-    assert found.whole.csac < 0.99
+    assert found.whole.csac < 0.995  # blind to much of it under the broad lateral pair
 
 
 def test_no_shift_is_told_where_nothing_resonates(spindle, point):
@@ -85,7 +85,7 @@ class Rigid:
 def test_a_shift_beyond_the_search_is_not_told(spindle, point):
     found = correlate(measured(spindle, point, point.frf(LINES * (1 + 1.3 * BELIEVABLE))))
     assert found.whole.shift is None
-    assert found.whole.fdac < 0.96
+    assert found.whole.fdac < 0.985
 
 
 def test_fdac_on_its_diagonal_is_csac(spindle, point):
@@ -99,7 +99,7 @@ def test_symmetry_silences_pairs_at_rest(spindle):
     point = operating_point(spindle, Condition(40.0))
     found = correlate(measured(spindle, point, point.frf(LINES)))
     silent = [p for p, s in found.whole.by_frf.items() if s.frac is None]
-    assert silent == [(3, 6), (4, 1)]
+    assert silent == [(3, 2), (4, 1)]
     assert all(found.whole.by_frf[p].csf is None for p in silent)
 
 
@@ -125,7 +125,7 @@ def test_closed_forms():
 
 def test_lines_at_zero_and_few_lines(spindle, point):
     frequency = np.array([0.0, 500.0, 501.0])
-    frf = Frf(frequency, np.ones((7, 2, 3), complex), tuple(p.node for p in spindle.points), (1, 6), "receptance")
+    frf = Frf(frequency, np.ones((7, 2, 3), complex), tuple(p.node for p in spindle.points), (1, 2), "receptance")
     shown = beside(spindle, spindle.points, Test("t", 40.0, 0.0, frf=frf), Condition(40.0))
     assert shown.measured.frequency.tolist() == [500.0, 501.0]
     found = correlate(shown)

@@ -10,31 +10,34 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from diagnosis.data import data_of
-from diagnosis.fit import fit, linearise
-from diagnosis.forms import FIXED_STIFFNESS, FORMS, RADIAL_EXPANSION, pinned
-from diagnosis.ladder import TOLERANCES, ladder, named_by
-from diagnosis.ladder_log import response, shown
-from diagnosis.ladder_plots import pull_map
-from diagnosis.ladder_report import ladder_json, section, write_ladder
-from diagnosis.ladder_words import sentences
-from diagnosis.observe import FREQUENCY_FLOOR, observe
-from diagnosis.rung import as_drawn, determined, frequencies
-from diagnosis.screening import CLEAR
-from diagnosis.theory import theory
-from model.machine import Addition, Condition
-from model.pair import reference_motion, solve
-from model.scene import BadInput
-from sim.campaign import Campaign, ModeRow, Test, read_campaign
-from sim.effects import by_name
-from sim.log_ladder import LINEAR, pull_colours
-from sim.log_read import read_log
-from sim.operating import operating_point
-from spindle import main
 from tests.conftest import SCENE
+from thermospindle.cli import main
+from thermospindle.diagnosis.data.features import data_of
+from thermospindle.diagnosis.data.observe import FREQUENCY_FLOOR, observe
+from thermospindle.diagnosis.fit.fit import fit, linearise
+from thermospindle.diagnosis.inference.mechanism import variants
+from thermospindle.diagnosis.inference.next_test import ModePrediction, NextTest
+from thermospindle.diagnosis.inference.verdict import Candidate
+from thermospindle.diagnosis.ladder.forms import FIXED_STIFFNESS, FORMS, RADIAL_EXPANSION, pinned
+from thermospindle.diagnosis.ladder.ladder import TOLERANCES, ladder, named_by
+from thermospindle.diagnosis.ladder.rung import as_drawn, determined, frequencies
+from thermospindle.diagnosis.prediction.theory import theory
+from thermospindle.diagnosis.search.screening import CLEAR
+from thermospindle.model.bearing.pair import reference_motion, solve
+from thermospindle.model.errors import BadInput
+from thermospindle.model.machine import Addition, Condition
+from thermospindle.model.units import RPM
+from thermospindle.report.figures.ladder import pull_map
+from thermospindle.report.log.ladder_content import response, shown
+from thermospindle.report.log.read import read_log
+from thermospindle.report.page.ladder import section, write_ladder
+from thermospindle.report.text.ladder import sentences
+from thermospindle.report.text.ladder_table import ladder_json
+from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Test, read_campaign
+from thermospindle.sim.effects import by_name
+from thermospindle.sim.operating import operating_point
 
 VIRTUAL = SCENE / "virtual" / "soak_20_60"
-RPM = np.pi / 30
 SD = 0.05  # Hz
 
 
@@ -44,7 +47,7 @@ def tables(spindle, effects, temperatures=(20.0, 60.0), seed=0) -> Campaign:
     tests = []
     for t in temperatures:
         found = operating_point(spindle, Condition(t), effects).modes
-        modes = [m for m in found if 400 < m.frequency < 3000]
+        modes = [m for m in found if 400 < m.frequency < 6000]
         rows = [ModeRow(f"T{t:g}", i, m.kind, m.frequency + SD * random.standard_normal(), SD) for i, m in enumerate(modes, 1)]
         tests.append(Test(f"T{t:g}", t, 0.0, modes=tuple(rows)))
     return Campaign("made up", spindle.name, "mobility", (), tuple(tests))
@@ -181,7 +184,7 @@ def test_rungs_as_drawn_are_what_mujoco_says(spindle, lagging):
         off, shifts = [], []
         for test in lagging.campaign.tests:
             own = [
-                m.frequency for m in operating_point(spindle, Condition(test.temperature), form.applied).modes if 400 < m.frequency < 3000
+                m.frequency for m in operating_point(spindle, Condition(test.temperature), form.applied).modes if 400 < m.frequency < 6000
             ]
             off.append(np.array(own) - [r.frequency for r in test.modes])
             shifts.append(off[-1] - off[0])
@@ -197,9 +200,9 @@ def test_pulls_are_errors_over_standard_errors(lagging):
     pulls = pull_map(lagging, rung)
     measured, computed = frequencies(lagging.theory, rung.residual)
     assert pulls.damping is None
-    assert pulls.frequency.shape == (7, 2)
+    assert pulls.frequency.shape == (8, 2)
     sd = np.hypot(SD, FREQUENCY_FLOOR * measured)
-    assert pulls.frequency[:, 0] == pytest.approx(((computed - measured) / sd)[:7], rel=1e-3)  # errors are logarithms
+    assert pulls.frequency[:, 0] == pytest.approx(((computed - measured) / sd)[:8], rel=1e-3)  # errors are logarithms
     assert np.sqrt(np.mean(pulls.frequency**2)) == pytest.approx(rung.error, rel=1e-9)
 
 
@@ -225,34 +228,76 @@ def test_effects_of_the_scene_stand_on_every_rung(spindle):
 
 
 def candidate(evidence, *names):
-    effects = tuple(by_name(n) for n in names)
-    return SimpleNamespace(effects=names, delta_evidence=evidence, fit=SimpleNamespace(effects=effects))
+    mechanisms = tuple(variants(by_name(n))[0] for n in names)
+    return Candidate(SimpleNamespace(mechanisms=mechanisms), names, False, evidence, 0.5)
 
 
 VERDICTS = [
-    ("none", [candidate(3, "soak_lag")], []),
-    ("identified", [candidate(90, "soak_lag"), candidate(20, "preload_loss")], [("+ soak_lag", TOLERANCES)]),
+    ("none", (), [candidate(3, "soak_lag")], []),
+    ("identified", ("soak_lag",), [candidate(90, "soak_lag"), candidate(20, "preload_loss")], [("+ soak_lag", TOLERANCES)]),
     (
         "two effects",
+        ("soak_lag", "added_disk"),
         [candidate(90, "soak_lag", "added_disk"), candidate(50, "added_disk"), candidate(20, "soak_lag")],
         [("+ added_disk", TOLERANCES), ("+ soak_lag", "+ added_disk")],
     ),
     (
         "ambiguous",
+        ("soak_lag", "preload_loss"),
         [candidate(90, "soak_lag"), candidate(88, "preload_loss"), candidate(20, "added_disk")],
         [("or soak_lag", TOLERANCES), ("or preload_loss", TOLERANCES)],
     ),
     (
+        "ambiguous",
+        ("soak_lag", "preload_loss", "added_disk"),
+        [candidate(90, "soak_lag"), candidate(88, "preload_loss", "added_disk"), candidate(80, "added_disk")],
+        [("or soak_lag", TOLERANCES), ("or preload_loss + added_disk", TOLERANCES)],
+    ),
+    (
         "unexplained",
-        [candidate(9, "soak_lag"), candidate(1, "added_disk")],
-        [("nearest: soak_lag", TOLERANCES), ("nearest: added_disk", TOLERANCES)],
+        (),
+        [candidate(9, "soak_lag"), candidate(1, "added_disk"), candidate(0, "preload_loss"), candidate(-1, "plate_prestress")],
+        [("nearest: soak_lag", TOLERANCES), ("nearest: added_disk", TOLERANCES), ("nearest: preload_loss", TOLERANCES)],
     ),
 ]
 
 
-@pytest.mark.parametrize(("verdict", "candidates", "rungs"), VERDICTS, ids=[v[0] for v in VERDICTS])
-def test_rungs_that_a_diagnosis_asks_for(verdict, candidates, rungs):
-    assert [(name, on) for name, _, on in named_by(SimpleNamespace(verdict=verdict, candidates=candidates))] == rungs
+@pytest.mark.parametrize(("word", "effects", "candidates", "rungs"), VERDICTS, ids=["none", "one", "two", "or", "or two", "unexplained"])
+def test_rungs_that_a_diagnosis_asks_for(word, effects, candidates, rungs):
+    steps = named_by(SimpleNamespace(word=word, effects=effects, candidates=tuple(candidates)))
+    assert [(name, on) for name, _, on in steps] == rungs
+    assert all(name.split(" ", 1)[1] == " + ".join(e.name for e in own) for name, own, _ in steps)
+
+
+def named(lagging, word, tests=()):
+    """The climbed ladder as if a diagnosis had chosen its effects."""
+    return replace(lagging, diagnosis=SimpleNamespace(verdict=SimpleNamespace(word=word, reason="Because.")), tests=tests)
+
+
+@pytest.mark.parametrize(
+    ("word", "top"),
+    [("none", TOLERANCES), ("unexplained", TOLERANCES), ("ambiguous", "+ soak_lag"), ("two effects", "+ constant_force_preload")],
+)
+def test_where_the_ladder_leads(lagging, word, top):
+    """With a verdict that names no effect to the fitted tolerances; among alternatives to the likeliest."""
+    if word == "ambiguous":
+        lagging = replace(lagging, rungs=tuple(r if r.name != "+ soak_lag" else replace(r, evidence=1e9) for r in lagging.rungs))
+    assert named(lagging, word).top.name == top
+
+
+def test_the_verdict_and_the_next_test_are_told(lagging):
+    """The mode told is the one in which the two explanations differ most in standard errors, not in hertz."""
+    one = (ModePrediction(1000.0, 0.5, 0.01), ModePrediction(2000.0, 30.0, 0.01))
+    two = (ModePrediction(1010.0, 0.5, 0.01), ModePrediction(2060.0, 30.0, 0.01))
+    test = NextTest(Condition(70.0, 7200 * RPM), ("soak_lag", "preload_loss"), 1e6, 1, "", (one, two))
+    told = sentences(named(lagging, "ambiguous", (test,)))
+    assert "Diagnosis: ambiguous. Because." in told
+    assert told[-1] == (
+        "A test at 70 C, 7200 rpm would tell soak_lag from preload_loss, at odds of more than 1000 to 1 if either is right: a mode would lie at "
+        "1000.0 +- 0.5 Hz or at 1010.0 +- 0.5 Hz."
+    )
+    assert ladder_json(named(lagging, "ambiguous", (test,)))["verdict"] == "ambiguous"
+    assert ladder_json(lagging)["verdict"] is None
 
 
 # ---------------------------------------------------------------- telling it
@@ -289,10 +334,9 @@ def test_log_moves_on_the_timeline_rung(virtual, tmp_path):
             series[c.entity_path] = batch.column("Scalars:scalars").flatten().to_numpy()
     n = len(virtual.rungs)
     for entity in (
-        "/charts/pulls/map",
-        "/charts/pulls/labels",
-        "/charts/responses/lines",
-        "/charts/error/lines",
+        "/charts/pulls",
+        "/charts/responses",
+        "/charts/error",
         "/rung",
         r"/error/all\ data",
     ):
@@ -305,14 +349,6 @@ def test_log_moves_on_the_timeline_rung(virtual, tmp_path):
     measured = series[r"/frf/T20_n0/H\(1\,1\)/measured"]
     assert np.array_equal(measured, level.measured)
     assert sum(k.startswith(r"/frf/T20_n0/H\(1\,1\)/") for k in series) == n + 1
-
-
-def test_pull_colours_follow_sign_and_size():
-    colours = pull_colours(np.array([-300.0, -LINEAR, 0.0, LINEAR, 300.0, np.nan]), 300.0).astype(int)
-    red_less_blue = colours[:, 0] - colours[:, 2]
-    assert red_less_blue[0] < red_less_blue[1] < -10
-    assert 10 < red_less_blue[3] < red_less_blue[4]
-    assert np.array_equal(colours[2], colours[5])
 
 
 def numbers(text):

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.lines import chain_noise, fit_lines
-from model.machine import Condition
-from model.tolerance import toleranced
-from sim.frf import Frf
-from sim.impact import impact_tests
-from sim.operating import operating_point
+from thermospindle.diagnosis.fit.lines import chain_noise, fit_lines
+from thermospindle.model.machine import Condition
+from thermospindle.model.tolerance import toleranced
+from thermospindle.sim.hammer.test import impact_tests
+from thermospindle.sim.identification.frf import Frf
+from thermospindle.sim.operating import operating_point
 
 FREQUENCY = np.arange(400.0, 3001.0, 2.0)
 NAMES = ("plate tilt x stiffness", "preload")
@@ -56,7 +56,7 @@ def test_a_virtual_test_with_its_window(spindle):
 
 
 def test_a_fit_that_does_not_rest_says_so(spindle, monkeypatch):
-    monkeypatch.setattr("diagnosis.lines.LONGEST", 1)
+    monkeypatch.setattr("thermospindle.diagnosis.fit.lines.LONGEST", 1)
     free = parameters(spindle)
     exact = operating_point(free[0].apply(spindle, 0.02), Condition(20.0)).frf(FREQUENCY)
     frf = Frf(FREQUENCY, exact, tuple(p.node for p in spindle.points), spindle.hammer.hammer_nodes, "mobility")

@@ -4,19 +4,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.observe import _repeated
-from tests.diagnosis.test_explain import hidden
+from tests.diagnosis.hidden_modes import hidden
+from thermospindle.diagnosis.data.observe import _repeated
 
 
 def with_pole(o, like, off):
-    """One pole more, of the shape of mode `like` and at (1 + off) times its frequency."""
+    """One pole more, nearly of the shape of mode `like` and at (1 + off) times its frequency."""
     m, order = len(o.frequency), np.append(np.arange(len(o.frequency)), like)
     both = np.concatenate([order, order + m])
     covariance = o.covariance[np.ix_(both, both)] + 1e-12 * np.eye(len(both))
     frequency = o.frequency[order]
     frequency[-1] *= 1 + off
+    shape = o.shape[order]
+    shape[-1, 0] *= 1.05
     return replace(
-        o, frequency=frequency, damping=o.damping[order], covariance=covariance, shape=o.shape[order], shape_sd=o.shape_sd[order],
+        o, frequency=frequency, damping=o.damping[order], covariance=covariance, shape=shape, shape_sd=o.shape_sd[order],
         residue=o.residue[order], residue_sd=o.residue_sd[order],
     )  # fmt: skip
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from diagnosis.patterns import choose_for, f_test, shapes
-from model.machine import Condition
+from thermospindle.diagnosis.misfit.patterns import choose_for, f_test, shapes
+from thermospindle.model.machine import Condition
 
 STATIC = [Condition(t) for t in (20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0)]
 BOTH_WAYS = [Condition(t, s) for t in (20.0, 40.0, 60.0) for s in (-700.0, -350.0, 0.0, 350.0, 700.0)]

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from diagnosis.sensitivity import derivative
-from sim.effects import by_name
-from tests.diagnosis.test_explain import hidden, theory_of
+from tests.diagnosis.hidden_modes import hidden, theory_of
+from thermospindle.diagnosis.prediction.sensitivity import derivative
+from thermospindle.sim.effects import by_name
 
 
 @pytest.mark.parametrize("name", [None, "shaft_bending", "channel_delay", "window_damping", "thermal_gradient", "added_disk"])

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, least_squares
 
-from model.ball_row import BallRow, respond
+from thermospindle.model.bearing.ball_row import BallRow, respond
 
 BALLS = 10  # only balls times constant counts
 

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model.ball_row import BallInertia, BallRow, NoEquilibrium, displacement_under, energy, respond
-from model.hertz import race_contact
+from thermospindle.model.bearing.ball_row import BallInertia, BallRow, displacement_under, energy, respond
+from thermospindle.model.bearing.hertz import race_contact
+from thermospindle.model.errors import NoEquilibrium
 
 
 def row(balls, ball, pitch, inner, outer, angle, clearance, modulus) -> BallRow:

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model import heavy_ball
-from model.ball_row import BallInertia, BallRow, centred_axial_force, respond
-from model.heavy_ball import HeavyBall, NoEquilibrium, balance, settled
+from thermospindle.model.bearing import heavy_ball
+from thermospindle.model.bearing.ball_row import BallInertia, BallRow, centred_axial_force, respond
+from thermospindle.model.bearing.heavy_ball import HeavyBall, balance, settled
+from thermospindle.model.errors import NoEquilibrium
 
 DISK_BALL = BallInertia(1.588e-3, 9.1e-3, 7800.0, 0.0, 754.0)
 BOTH_TURN = BallInertia(22.23e-3, 125.26e-3, 7800.0, 1047.0, -300.0, share=0.7)
@@ -80,7 +81,7 @@ def test_centred_rows_are_one_ball_many_times(monkeypatch):
     """Equal balls are settled once, answer alike, and the short way to the axial force gives that of `respond`."""
     row = BallRow(12, 1.0e-3, 0.86e-3, 0.6e-3, 0.7e-3, 8e9, 9e9, 60e-3, BALL.inertia)
     calls = []
-    monkeypatch.setattr("model.ball_row.settled", lambda *given: calls.append(given) or heavy_ball.settled(*given))
+    monkeypatch.setattr("thermospindle.model.bearing.ball_row.settled", lambda *given: calls.append(given) or heavy_ball.settled(*given))
     for movement in (-5e-6, 0.0, 8e-6):
         calls.clear()
         answer = respond(replace(row, axial=row.axial + movement))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from model.hertz import ellipticity, in_series, point_contact, race_contact
+from thermospindle.model.bearing.hertz import ellipticity, in_series, point_contact, race_contact
 
 
 @pytest.mark.parametrize(("ratio", "expected"), [(5, 2.8902), (20, 6.9287), (100, 18.187)])

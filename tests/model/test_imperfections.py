@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from model.imperfections import GRADES, Imperfections, RowImperfections, Wave, drawn, waves
-from model.scene import BadInput, build, content_hash, load
+from thermospindle.model.drawn import GRADES, drawn
+from thermospindle.model.errors import BadInput
+from thermospindle.model.imperfections import Imperfections, RowImperfections, Wave, waves
+from thermospindle.model.scene.reading import build, content_hash, load
 
 FILE = Path(__file__).parents[2] / "scenes" / "hdd_2003" / "spindle.toml"
 
@@ -39,12 +41,18 @@ def test_same_seed_same_spindle(spindle):
     assert drawn(spindle, 4) != drawn(spindle, 5)
 
 
+def test_unbalance_is_permissible_at_the_spindles_own_speed(spindle):
+    """e = G / speed: twice as fast, half the unbalance."""
+    fast = replace(spindle, nominal_speed=2 * spindle.nominal_speed)
+    assert drawn(fast, 4).unbalance == pytest.approx(drawn(spindle, 4).unbalance / 2, rel=1e-12)
+
+
 @pytest.mark.parametrize("name", GRADES)
 def test_a_draw_keeps_the_limits_of_its_grade(spindle, name):
     """ISO 21940-11: m G / speed, the couple at half the span; ISO 3290-1: the set's diameters lie within V_DwL."""
     grade = GRADES[name]
     mass = next(b.mass for b in spindle.structure.bodies if b.turns)
-    permissible = mass * grade.balance / grade.service_speed
+    permissible = mass * grade.balance / spindle.nominal_speed
     sets = [drawn(spindle, seed, grade) for seed in range(50)]
     assert 0.3 * permissible < np.mean([s.unbalance for s in sets]) < 0.7 * permissible
     assert max(s.unbalance for s in sets) < permissible

@@ -5,10 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model.kinematics import Kinematics, ball_line, cage_line, kinematics, lines, race_line, ring_speeds, row_kinematics
-from model.machine import Condition
+from thermospindle.model.bearing.kinematics import (
+    Kinematics,
+    ball_line,
+    cage_line,
+    kinematics,
+    lines,
+    race_line,
+    ring_speeds,
+    row_kinematics,
+)
+from thermospindle.model.machine import Condition
+from thermospindle.model.units import RPM
 
-RPM, HZ = np.pi / 30, 2 * np.pi
+HZ = 2 * np.pi
 
 
 @pytest.fixture(scope="module")

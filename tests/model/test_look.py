@@ -10,12 +10,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from model import look, mjcf
-from model.machine import Condition
-from model.modes import modes
-from model.pair import reference_motion, solve
-from model.rotor_base import rotor_base
-from model.section import Cell, cells
+from thermospindle.model.bearing.pair import reference_motion, solve
+from thermospindle.model.machine import Condition
+from thermospindle.model.rotor import look, mjcf
+from thermospindle.model.rotor.chain import rotor_base
+from thermospindle.model.rotor.elements import ELEMENTS
+from thermospindle.model.rotor.modes import modes
+from thermospindle.model.rotor.section import Cell, cells
 
 KEPT = 0.75  # of the circle
 ROUND = [Cell("a", (0.0, 1.0), (0.0, 2.0)), Cell("a", (1.0, 2.0), (1.0, 2.0))]  # a shaft with a collar
@@ -173,7 +174,7 @@ def test_enumerations_are_those_of_mujoco():
     assert mujoco.mjtBuiltin.mjBUILTIN_GRADIENT == look.GRADIENT
 
 
-@pytest.mark.parametrize("element", mjcf.ELEMENTS)
+@pytest.mark.parametrize("element", ELEMENTS)
 def test_dressing_leaves_masses_and_matrices_bit_for_bit(spindle, spinning, element):
     bare = mjcf.spec(spindle, spinning, element).compile()
     model = dressed(spindle, spinning, element).compile()
@@ -242,7 +243,7 @@ def test_balls_that_lost_contact_are_shown_in_another_colour(spindle, cold):
 # ---------------------------------------------------------------- the file
 
 
-@pytest.mark.parametrize("element", mjcf.ELEMENTS)
+@pytest.mark.parametrize("element", ELEMENTS)
 def test_the_xml_is_one_file_with_the_same_spindle_in_it(spindle, spinning, element, tmp_path):
     out = dressed(spindle, spinning, element)
     text = mjcf.xml(out)

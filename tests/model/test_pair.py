@@ -5,14 +5,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model.machine import Condition, Law, RingMotion
-from model.pair import reference_motion, solve
-from model.tolerance import with_preload
+from thermospindle.model.bearing.ball_row import respond
+from thermospindle.model.bearing.pair import reference_motion, solve
+from thermospindle.model.machine import SENSE, Condition, Law, PreloadSpring, RingMotion
+from thermospindle.model.tolerance import with_preload
 
 
 def motions(spindle, **moves):
     nothing = reference_motion(spindle.reference_temperature)
     return {b.name: replace(nothing, **moves.get(b.name, moves.get("both", {}))) for b in spindle.bearings}
+
+
+def arranged(spindle, arrangement):
+    bearings = tuple(replace(b, sense=s) for b, s in zip(spindle.bearings, SENSE[arrangement], strict=True))
+    return replace(spindle, bearings=bearings)
+
+
+def sprung(spindle, ring_of="upper", **spring):
+    return replace(spindle, pair=replace(spindle.pair, spring=PreloadSpring(ring_of, **spring)))
 
 
 def test_reference_state(cold):
@@ -72,17 +82,49 @@ def test_unloading_is_a_state(spindle):
 
 
 def test_spring_preload_stays_constant(spindle):
-    spring = replace(spindle, pair=replace(spindle.pair, preload_kind="spring"))
+    spring = sprung(spindle)
     state = solve(spring, Condition(20.0), motions(spindle, upper={"outer_r": 0.8e-6}, lower={"outer_z": 2e-6}))
     assert [b.preload for b in state.bearings] == pytest.approx([16.0, 16.0], rel=1e-9)
     assert state.bearings[1].contact_angle > state.bearings[0].contact_angle
+
+
+def test_a_preload_spring_gives_way_as_its_ring_slides(spindle):
+    """Force balances at the ring and at the hub; a rate from nothing to rigid goes from constant force to fixed positions."""
+    moved = motions(spindle, upper={"outer_r": 0.3e-6}, lower={"outer_z": 0.2e-6})
+    for bias in (0.0, 3.0):
+        base = replace(spindle, pair=replace(spindle.pair, axial_bias=bias))
+        soft, fixed = solve(sprung(base), Condition(20.0), moved), solve(base, Condition(20.0), moved)
+        for rate, expected in ((1.0, soft), (1e13, fixed)):
+            state = solve(sprung(base, rate=rate), Condition(20.0), moved)
+            assert [b.preload for b in state.bearings] == pytest.approx([b.preload for b in expected.bearings], rel=1e-5)
+            assert state.hub_movement == pytest.approx(expected.hub_movement, rel=1e-5, abs=1e-14)
+        state = solve(sprung(base, rate=2e6), Condition(20.0), moved)
+        lower, upper = state.bearings
+        assert upper.preload == pytest.approx(16.0 - 2e6 * (upper.movement - state.hub_movement), rel=1e-9)
+        assert -lower.preload + upper.preload == pytest.approx(bias, abs=1e-8)
+        assert lower.movement == state.hub_movement != upper.movement
+
+
+@pytest.mark.parametrize("ring_of", ["lower", "upper"])
+def test_the_locating_bearing_takes_the_axial_load(spindle, ring_of):
+    spring = sprung(replace(spindle, pair=replace(spindle.pair, axial_bias=2.0)), ring_of)
+    load = {b.name: b.preload for b in solve(spring, Condition(20.0), motions(spindle)).bearings}
+    assert load[ring_of] == pytest.approx(16.0, rel=1e-9)
+    assert load["lower" if ring_of == "upper" else "upper"] == pytest.approx(14.0 if ring_of == "upper" else 18.0, rel=1e-9)
+
+
+def test_hub_movement_is_that_of_the_hub(spindle):
+    """A soft spring: the hub follows the locating bearing alone, whatever the other's ring does."""
+    state = solve(sprung(spindle), Condition(20.0), motions(spindle, upper={"outer_z": 1e-6}, lower={"outer_z": -0.4e-6}))
+    assert state.hub_movement == pytest.approx(0.4e-6, rel=1e-4)  # the Hertz constant is that of the moved rings' angle
+    assert state.bearing("upper").movement == pytest.approx(-1e-6, rel=1e-4)
 
 
 def test_face_to_face_loads_the_other_way(spindle):
     """Outer rings moved apart axially load a back-to-back pair and unload a face-to-face one by as much."""
     apart = motions(spindle, upper={"outer_z": 0.3e-6}, lower={"outer_z": -0.3e-6})
     together = motions(spindle, upper={"outer_z": -0.3e-6}, lower={"outer_z": 0.3e-6})
-    face = replace(spindle, pair=replace(spindle.pair, arrangement="face-to-face"))
+    face = arranged(spindle, "face-to-face")
     loaded, unloaded = solve(spindle, Condition(20.0), apart), solve(face, Condition(20.0), apart)
     assert loaded.bearings[0].preload > 17
     assert unloaded.bearings[0].preload < 15
@@ -90,7 +132,7 @@ def test_face_to_face_loads_the_other_way(spindle):
 
 
 def test_tandem_shares_the_load(spindle):
-    tandem = replace(spindle, pair=replace(spindle.pair, arrangement="tandem", preload_kind="spring"))
+    tandem = arranged(spindle, "tandem")
     state = solve(tandem, Condition(20.0), motions(spindle, upper={"outer_z": 0.1e-6}))
     lower, upper = state.bearings
     assert lower.preload + upper.preload == pytest.approx(32.0, rel=1e-9)
@@ -100,8 +142,7 @@ def test_tandem_shares_the_load(spindle):
 @pytest.mark.parametrize("arrangement", ["back-to-back", "face-to-face"])
 def test_back_to_back_resists_tilting_more(spindle, arrangement):
     """Lever of the load lines about the middle: half span +- arm tan(angle) (Harris 1991, ch. 7), in the limit of stiff balls."""
-    pair = replace(spindle.pair, stiffness_arrangement=arrangement)
-    state = solve(replace(spindle, pair=pair), Condition(20.0), motions(spindle))
+    state = solve(arranged(spindle, arrangement), Condition(20.0), motions(spindle))
     middle = sum(b.z for b in state.bearings) / 2
     tilt = 0.0
     for b in state.bearings:
@@ -113,6 +154,17 @@ def test_back_to_back_resists_tilting_more(spindle, arrangement):
     expected = 2 * 10 / 2 * b.ball_stiffness * (np.cos(b.contact_angle) * lever) ** 2
     geometric = 2 * 10 / 2 * b.contact_force / 102.7e-6 * (lever**2 + 0.02**2)  # bound of the F/A terms left out
     assert tilt == pytest.approx(expected, abs=geometric)
+
+
+@pytest.mark.parametrize("arrangement", ["back-to-back", "face-to-face", "tandem"])
+def test_the_state_holds_the_row_at_its_loaded_position(spindle, arrangement):
+    """Its axial force on the outer ring has the sense in which that ring is loaded, and its stiffness is the force's derivative."""
+    state = solve(arranged(spindle, arrangement), Condition(20.0), motions(spindle))
+    for b, sense in zip(state.bearings, SENSE[arrangement], strict=True):
+        assert respond(b.row).force[2] == pytest.approx(sense * 16.0, rel=1e-9)
+        near = [respond(replace(b.row, axial=b.row.axial + d)).force[2] for d in (-1e-9, 1e-9)]
+        assert b.axial_stiffness == pytest.approx((near[1] - near[0]) / 2e-9, rel=1e-5)
+        assert np.sign(b.coupling_stiffness) == np.sign(respond(b.row).tangent[0, 4])
 
 
 def test_the_preload_can_be_mounted_otherwise(spindle):

@@ -2,14 +2,17 @@
 
 import copy
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from model.machine import Law, OutsideRange
-from model.scene import BadInput, build, content_hash, load
-from model.section import cells, mass_properties
+from thermospindle.model.errors import BadInput, OutsideRange
+from thermospindle.model.machine import Law
+from thermospindle.model.rotor.section import cells, mass_properties
+from thermospindle.model.scene.reading import build, content_hash, implied_clearance, load
+from thermospindle.model.span import inside, temperature_range
 
 FILE = Path(__file__).parents[2] / "scenes" / "hdd_2003" / "spindle.toml"
 
@@ -27,10 +30,52 @@ def region(raw, name):
     return named(raw["section"]["regions"], name)
 
 
+def by_numbers(raw, tilt, polar):
+    hub = named(raw["structure"]["bodies"], "hub")
+    hub.pop("regions")
+    hub.update(mass_kg=0.026, z_mm=10.0, tilt_inertia_kg_m2=[tilt, tilt], origin="assumed")
+    if polar is not None:
+        hub.update(polar_inertia_kg_m2=polar)
+
+
+def one_tube_too_wide(raw):
+    region(raw, "lower outer ring").update(z_mm=[3.5, 18.0])
+    raw["section"]["regions"] = [g for g in raw["section"]["regions"] if g["name"] not in ("upper outer ring",)]
+    named(raw["structure"]["bodies"], "hub")["regions"].remove("upper outer ring")
+    for c in raw["thermal"]["convection"]:
+        c["regions"] = [n for n in c["regions"] if n != "upper outer ring"]
+    for b in raw["bearings"].values():
+        b.update(outer_ring="lower outer ring", raceway_width_mm=12.0)
+
+
 REFUSED = [
-    ("poisson", lambda r: r["materials"]["steel"].update(poisson_ratio=0.6), "materials.steel.poisson_ratio = 0.6", "less than 0.5"),
+    ("poisson", lambda r: r["materials"]["steel"].update(poisson_ratio=0.6), "materials.steel.poisson_ratio = 0.6", "less than or equal to 0.49"),
     ("misspelt", lambda r: r["materials"]["steel"].update(density=1.0), "materials.steel.density: unknown key", "density_kg_per_m3"),
-    ("missing", lambda r: r["tolerances"].pop("gain"), "tolerances.gain: missing", "no default"),
+    ("missing", lambda r: r["materials"]["steel"].pop("poisson_ratio"), "materials.steel.poisson_ratio: missing", "no default"),
+    ("quoted", lambda r: r["bearing_pair"].update(preload_N="16"), "bearing_pair.preload_N = '16'", "valid number"),
+    ("quoted-count", lambda r: r["ball_rows"]["hdd"].update(balls="10"), "ball_rows.hdd.balls = '10'", "valid integer"),
+    ("quoted-law", lambda r: r["materials"]["steel"].update(youngs_modulus_GPa="208"), "youngs_modulus_GPa", "valid number"),
+    ("no-polar", lambda r: by_numbers(r, 2e-6, None), "structure.bodies.hub", "needs polar_inertia_kg_m2"),
+    ("impossible-polar", lambda r: by_numbers(r, 2e-6, 5e-6), "structure.bodies.hub: no body has", "at most the sum of the others"),
+    ("impossible-tilt", lambda r: named(r["structure"]["bodies"], "seat").update(polar_inertia_kg_m2=1e-4), "seat", "at most the sum"),
+    (
+        "joint-material",
+        lambda r: named(r["structure"]["joints"], "mount").update(material="brass"),
+        "mount.material = 'brass'",
+        "allowed are",
+    ),
+    ("role", lambda r: named(r["structure"]["joints"], "mount").update(role="foot"), "mount.role = 'foot'", "mount"),
+    ("two-angles", lambda r: r["ball_rows"]["hdd"].update(free_contact_angle_deg=15.0), "ball_rows.hdd", "either contact_angle_deg"),
+    ("no-angle", lambda r: r["ball_rows"]["hdd"].pop("contact_angle_deg"), "ball_rows.hdd", "either contact_angle_deg"),
+    ("rate-of-no-spring", lambda r: r["bearing_pair"].update(preload_rate_N_per_m=1e5), "bearing_pair", "preload_rate_N_per_m is for"),
+    (
+        "no-such-sprung",
+        lambda r: r["bearing_pair"].update(preload_kind="spring", sprung_bearing="x"),
+        "sprung_bearing = 'x'",
+        "lower, upper",
+    ),
+    ("raceways", one_tube_too_wide, "raceway_width_mm: the raceways of 'lower' and 'upper'", "leave them apart"),
+    ("step", lambda r: r["hammer_test"].update(sample_rate_Hz=25600.0), "step_us = ", "without it the program chooses"),
     ("type", lambda r: r["tolerances"].update(gain="big"), "tolerances.gain = 'big'", "number"),
     ("infinite", lambda r: r["tolerances"].update(gain=float("inf")), "tolerances.gain = inf", "finite"),
     ("no-origin", lambda r: r["tolerances"].pop("origin"), "tolerances.structure = 0.015", "origin = printed, assumed or calibrated"),
@@ -143,3 +188,78 @@ def test_laws():
     assert Law((0.0,), (5.0,)).integral(20.0, 60.0) == pytest.approx(200.0)
     with pytest.raises(OutsideRange, match="from 20 to 100 C was asked at 120 C"):
         law(120.0)
+
+
+def test_what_a_scene_leaves_out_is_assumed_and_said(raw):
+    """Thermal data, tolerances and the hammer test have defaults, which the provenance names."""
+    for table in ("thermal", "tolerances", "hammer_test"):
+        raw.pop(table)
+    raw.pop("nominal_speed_rpm")
+    raw.pop("temperature_range_C")
+    assumed = build(raw, FILE)
+    assert assumed.hammer.hammer_nodes == (1,)
+    assert assumed.tolerances.structure == 0.015
+    assert {name for c in assumed.thermal.convections for name in c.regions} == {g.name for g in assumed.regions}
+    assert assumed.thermal.friction.viscosity(40.0) == pytest.approx(26e-6)
+    assert assumed.temperatures == (20.0, 60.0)
+    assert assumed.nominal_speed == pytest.approx(11000 * np.pi / 30)  # 100,000 mm rpm over 9.1 mm
+    for key in ("hammer_test.band_Hz", "tolerances.gain", "thermal.convection", "thermal.friction", "nominal_speed_rpm"):
+        assert assumed.provenance[key].origin == "assumed"
+        assert assumed.provenance[key].source.startswith("assumed default")
+
+
+def test_the_program_chooses_the_step(raw):
+    """It divides a usual sampling interval, 39.0625 us, and is stable for the stiffest mode with room to spare."""
+    raw["hammer_test"].pop("step_us")
+    raw["hammer_test"]["sample_rate_Hz"] = 25600.0
+    chosen = build(raw, FILE)
+    every = 1 / (25600.0 * chosen.hammer.step)
+    assert every == pytest.approx(round(every), rel=1e-12)
+    assert 1e-6 < chosen.hammer.step < 15e-6
+    stiff = copy.deepcopy(raw)
+    named(stiff["structure"]["joints"], "flange")["axial_stiffness_N_per_m"] *= 400
+    assert build(stiff, FILE).hammer.step < chosen.hammer.step
+
+
+def test_a_free_contact_angle_and_no_clearance(raw, spindle):
+    """As catalogues have it: the free angle that the reference's clearance means gives its loaded one back."""
+    clearance = implied_clearance(spindle, spindle.bearings[0])
+    free = np.arccos(1 - clearance / (2 * spindle.bearings[0].unloaded_distance))
+    raw["ball_rows"]["hdd"].pop("contact_angle_deg")
+    raw["ball_rows"]["hdd"].pop("diametral_clearance_mm")
+    raw["ball_rows"]["hdd"]["free_contact_angle_deg"] = float(np.degrees(free))
+    found = build(raw, FILE)
+    assert np.degrees(found.bearings[0].contact_angle) == pytest.approx(24.51, rel=1e-9)
+    assert found.bearings[0].clearance is None
+
+
+def test_the_sense_of_every_bearing_follows_the_arrangement(raw):
+    for arrangement, senses in (("back-to-back", [-1, 1]), ("face-to-face", [1, -1]), ("tandem", [1, 1])):
+        raw["bearing_pair"].update(arrangement=arrangement, preload_kind="spring" if arrangement == "tandem" else "rigid")
+        assert [b.sense for b in build(copy.deepcopy(raw), FILE).bearings] == senses
+        assert build(copy.deepcopy(raw), FILE).tandem is (arrangement == "tandem")
+
+
+def test_a_spring_without_a_rate_says_what_is_assumed(raw):
+    raw["bearing_pair"]["preload_kind"] = "spring"
+    assumed = build(copy.deepcopy(raw), FILE)
+    assert assumed.pair.spring.ring_of == "upper"
+    assert "friction holds" in assumed.provenance["bearing_pair.preload_rate_N_per_m"].source
+    assert "locates" in assumed.provenance["bearing_pair.sprung_bearing"].source
+    raw["bearing_pair"].update(sprung_bearing="lower", preload_rate_N_per_m=2e5, sprung_ring_mass_g=0.4)
+    spring = build(raw, FILE).pair.spring
+    assert (spring.ring_of, spring.rate, spring.mass) == ("lower", 2e5, 0.4e-3)
+
+
+def test_where_a_spindle_can_be_computed(spindle):
+    """The intersection of its laws; a finite difference turns one-sided where one ends."""
+    assert temperature_range(spindle) == (-20.0, 120.0)  # its grease
+    assert temperature_range(spindle, lubricant=False) == (-273.15, float("inf"))
+    steel = replace(spindle.materials["steel"], youngs_modulus=Law((20.0, 60.0), (208e9, 205e9)))
+    measured = replace(spindle, materials={**spindle.materials, "steel": steel})
+    assert temperature_range(measured) == (20.0, 60.0)
+    assert inside(20.0, 0.2, measured) == pytest.approx((20.0, 20.2))
+    assert inside(60.0, 0.2, measured) == pytest.approx((59.8, 60.0))
+    assert inside(40.0, 0.2, measured) == pytest.approx((39.9, 40.1))
+    unused = replace(steel, name="unused", thermal_expansion=Law((30.0, 31.0), (1e-5, 1e-5)))
+    assert temperature_range(replace(measured, materials={**measured.materials, "unused": unused})) == (20.0, 60.0)

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from model.machine import OutsideRange
-from model.scene import BadInput
-from model.table import COLUMNS, read_table, write_table
-from sim.operating import stiffness_table
+from thermospindle.model.bearing.stiffness_table import COLUMNS, read_table, write_table
+from thermospindle.model.errors import BadInput, OutsideRange
+from thermospindle.sim.operating import stiffness_table
 
 
 @pytest.fixture(scope="module")

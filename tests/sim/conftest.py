@@ -8,15 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from model.machine import Condition, Spindle
-from model.scene import load
-from sim.campaign import Campaign, write_campaign
-from sim.impact import impact_tests
-from sim.modal import extract
-from sim.operating import operating_point
-from sim.run import Run, Step, measured_campaigns
 from tests.conftest import SCENE
 from tests.made_campaign import campaign
+from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.scene.reading import load
+from thermospindle.sim.campaign.campaign import Campaign, write_campaign
+from thermospindle.sim.hammer.test import impact_tests
+from thermospindle.sim.identification.modal import extract
+from thermospindle.sim.operating import operating_point
+from thermospindle.sim.run import Run, Step, measured_campaigns
 
 
 def small_run(spindle: Spindle, temperatures: Sequence[float], measured: tuple[Campaign, ...]) -> Run:

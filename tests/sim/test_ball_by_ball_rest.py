@@ -4,10 +4,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from model import mjcf
-from model.machine import Condition
-from sim.effects import CATALOGUE
-from sim.operating import operating_point
+from thermospindle.model.machine import Condition
+from thermospindle.model.rotor import mjcf
+from thermospindle.sim.effects import CATALOGUE
+from thermospindle.sim.operating import operating_point
 
 
 @pytest.mark.parametrize("effect", [e for e in CATALOGUE if e.spindle or e.motions or e.temperatures or e.pair], ids=lambda e: e.name)

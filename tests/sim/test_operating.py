@@ -2,10 +2,10 @@
 
 import pytest
 
-from model.machine import Condition
-from sim.effects import soak_lag, thermal_gradient
-from sim.operating import operating_point
-from thermal.expansion import expand
+from thermospindle.model.machine import Condition
+from thermospindle.sim.effects.temperature import soak_lag, thermal_gradient
+from thermospindle.sim.operating import operating_point
+from thermospindle.thermal.expansion import expand
 
 
 def test_given_expansion_is_that_of_the_drawing_at_another_temperature(spindle):

@@ -8,19 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from model.machine import Addition, Condition, Friction, Law
-from model.pair import solve
-from model.scene import BadInput
-from sim import warmup as module
-from sim.operating import operating_point
-from sim.warmup import energy, warm_up
-from sim.warmup_output import rows, warmup_json, warmup_section
-from spindle import main
-from thermal import conduction, heat
-from thermal.expansion import expand, influence
-from thermal.reading import reading
+from thermospindle.cli import main
+from thermospindle.model.bearing.pair import solve
+from thermospindle.model.errors import BadInput
+from thermospindle.model.machine import Addition, Condition, Friction, Law
+from thermospindle.model.units import RPM
+from thermospindle.report.text.warmup import rows, warmup_json, warmup_section
+from thermospindle.sim import warmup as module
+from thermospindle.sim.operating import operating_point
+from thermospindle.sim.warmup import energy, warm_up
+from thermospindle.thermal import conduction, heat
+from thermospindle.thermal.expansion import expand, influence
+from thermospindle.thermal.readout import reading
 
-RPM = 2 * np.pi / 60
 SPEED = 7200 * RPM
 SCENE = Path(__file__).parents[2] / "scenes" / "hdd_2003"
 
@@ -148,9 +148,9 @@ def test_preload_falls_and_modes_with_it(warm):
     assert preload.max() > 16.2
     assert np.argmax(preload) < np.argmin(preload)
     assert preload[-1] < 15.0
-    kinds = [m.kind for m in warm.modes]
     shift = warm.frequencies[-1] - warm.frequencies[0]
-    assert np.all(shift[[k for k, kind in enumerate(kinds) if kind == "rocking"]] < -1.0)
+    on_bearings = [2, 3, 5, 6]  # the rocking pair and the hub's own; the seat's rocking mode hardly knows of the bearings
+    assert np.all(shift[on_bearings] < -1.0)
     assert np.isfinite(warm.frequencies).all()
 
 
@@ -203,7 +203,7 @@ def test_answer_as_json_and_rows(warm):
     assert all(len(series) == count for series in answer["temperature_C"].values())
     assert set(answer["temperature_C"]) == {g.name for g in warm.spindle.regions}
     assert answer["frequencies_Hz"][0] == pytest.approx(
-        [m.frequency for m in operating_point(warm.spindle, Condition(20.0, SPEED)).modes[:7]]
+        [m.frequency for m in operating_point(warm.spindle, Condition(20.0, SPEED)).modes[:8]]
     )
     assert answer["time_constant_s"] == warm.time_constant
     header, body = rows(warm)

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from model.machine import Spindle
-from model.scene import load
+from thermospindle.model.machine import Spindle
+from thermospindle.model.scene.reading import load
 
 SCENE = Path(__file__).parents[2] / "scenes" / "hdd_2003"
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model.machine import Region
-from thermal.elastic import Elasticity, Race, Solid
-from thermal.influence import elasticity, races
-from thermal.mesh import section_mesh, tiled
+from thermospindle.model.machine import Region
+from thermospindle.thermal.elastic import Elasticity, Race, Solid
+from thermospindle.thermal.influence import elasticity, races
+from thermospindle.thermal.mesh import section_mesh, tiled
 
 STEEL, ALUMINIUM = Elasticity(208e9, 0.30), Elasticity(70e9, 0.33)
 SHAPES = ("triangle", "quadrilateral")

@@ -6,14 +6,15 @@ from math import log
 import numpy as np
 import pytest
 
-from model.machine import Law, OutsideRange
-from thermal import influence as influence_module
-from thermal.elastic import Solid
-from thermal.expansion import expand, field, influence
-from thermal.influence import elasticity, races
-from thermal.mesh import section_mesh
-from thermal.refine import NotConverged, converged_response, remaining_error
-from thermal.temperature import TemperatureField, thermal_strain
+from thermospindle.model.errors import NotConverged, OutsideRange
+from thermospindle.model.machine import Law
+from thermospindle.thermal import influence as influence_module
+from thermospindle.thermal.elastic import Solid
+from thermospindle.thermal.expansion import expand, field, influence
+from thermospindle.thermal.influence import elasticity, races
+from thermospindle.thermal.mesh import section_mesh
+from thermospindle.thermal.refine import converged_response, remaining_error
+from thermospindle.thermal.temperature import TemperatureField, thermal_strain
 
 MOTIONS = ("inner_r", "inner_z", "outer_r", "outer_z")
 PARTS = ("stationary", "rotating")
@@ -82,7 +83,7 @@ def test_remaining_error_mistrusts_one_lucky_step():
 
 
 def test_unreachable_tolerance_is_refused(spindle, monkeypatch):
-    monkeypatch.setattr("thermal.refine.MOST_UNKNOWNS", 2000)
+    monkeypatch.setattr("thermospindle.thermal.refine.MOST_UNKNOWNS", 2000)
     with pytest.raises(NotConverged, match="rotating part"):
         converged_response(section_mesh(spindle, "rotating", 3e-3), elasticity(spindle), races(spindle, "rotating"), 1e-6)
 
@@ -120,7 +121,7 @@ def test_wrong_region_temperatures_are_named(spindle):
 
 def test_temperature_dependent_laws(spindle):
     """Expansion: the strain is the integral of the law. Modulus: taken at the temperature, so a law that makes aluminium as soft
-    at 60 C as another constant gives that constant's motions. Outside its range a law refuses."""
+    at 60 C as another constant gives that constant's motions, within the reduced basis (`thermal.reduced`) at this tolerance of 1e-3. Outside its range a law refuses."""
     aluminium = spindle.materials["aluminium"]
     law = Law((0.0, 40.0, 80.0), (20e-6, 24e-6, 32e-6))
     warm = np.array([0.0, 12.0, 40.0, 60.0, 80.0])
@@ -133,7 +134,7 @@ def test_temperature_dependent_laws(spindle):
         return replace(spindle, materials=dict(spindle.materials) | {"aluminium": replace(aluminium, youngs_modulus=modulus)})
 
     soft = values(expand(with_modulus(Law((20.0, 60.0), (70e9, 50e9))), 60.0, tolerance=1e-3))
-    assert soft == pytest.approx(values(expand(with_modulus(Law((20.0,), (50e9,))), 60.0, tolerance=1e-3)), rel=1e-12)
+    assert soft == pytest.approx(values(expand(with_modulus(Law((20.0,), (50e9,))), 60.0, tolerance=1e-3)), rel=3e-4)
     assert np.abs(soft - values(expand(spindle, 60.0, tolerance=1e-3))).max() > 5e-9
     with pytest.raises(OutsideRange):
         expand(with_modulus(Law((20.0, 50.0), (70e9, 50e9))), 60.0)
@@ -167,9 +168,10 @@ class TestCache:
     """The influence is computed once; a broken file or a missing folder costs time, never a result."""
 
     def count(self, monkeypatch):
-        influence_module._kept.cache_clear()
-        calls, real = [], influence_module._answer
-        monkeypatch.setattr(influence_module, "_answer", lambda *a: calls.append(a) or real(*a))
+        """Calls of the finite-element solver, one a part."""
+        influence_module.forget()
+        calls, real = [], influence_module.converged_response
+        monkeypatch.setattr(influence_module, "converged_response", lambda *a: calls.append(a) or real(*a))
         return calls
 
     def test_second_process_reads_the_file(self, spindle, monkeypatch, tmp_path):
@@ -177,7 +179,7 @@ class TestCache:
         calls = self.count(monkeypatch)
         first = influence(spindle, tolerance=2e-2)
         assert len(calls) == 2
-        influence_module._kept.cache_clear()  # as a new process would find it
+        influence_module.forget()  # as a new process would find it
         again = influence(spindle, tolerance=2e-2)
         assert len(calls) == 2
         for part in PARTS:
@@ -201,6 +203,21 @@ class TestCache:
         influence(replace(spindle, regions=longer), tolerance=2e-2)
         assert len(calls) == 5  # the stationary part is the same
 
+    @pytest.mark.parametrize("error", [NotImplementedError, RuntimeError, SyntaxError], ids=lambda e: e.__name__)
+    def test_whatever_a_damaged_file_raises_it_is_recomputed(self, spindle, monkeypatch, tmp_path, error):
+        """zipfile and numpy's header parser raise many things; one that escaped blocked every run until the file was deleted."""
+
+        def broken(*_, **__):
+            raise error("damaged")
+
+        monkeypatch.setenv("THERMOSPINDLE_CACHE", str(tmp_path))
+        calls = self.count(monkeypatch)
+        influence(spindle, tolerance=2e-2)
+        influence_module._kept.cache_clear()
+        monkeypatch.setattr("thermospindle.thermal.store.np.load", broken)
+        influence(spindle, tolerance=2e-2)
+        assert len(calls) == 4
+
     @pytest.mark.parametrize("damage", [b"", b"not a zip file", None], ids=["empty", "garbage", "cut short"])
     def test_broken_file_is_recomputed(self, spindle, monkeypatch, tmp_path, damage):
         monkeypatch.setenv("THERMOSPINDLE_CACHE", str(tmp_path))
@@ -208,7 +225,7 @@ class TestCache:
         first = influence(spindle, tolerance=2e-2)
         for file in tmp_path.iterdir():
             file.write_bytes(file.read_bytes()[:-1000] if damage is None else damage)
-        influence_module._kept.cache_clear()
+        influence_module.forget()
         again = influence(spindle, tolerance=2e-2)
         assert len(calls) == 4
         assert np.array_equal(first.responses["rotating"].gain, again.responses["rotating"].gain)

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model.machine import Friction, Law, OutsideRange
-from thermal.friction import heat, torque, viscous_torque
-
-RPM = 2 * np.pi / 60
+from thermospindle.model.errors import OutsideRange
+from thermospindle.model.machine import Friction, Law
+from thermospindle.model.units import RPM
+from thermospindle.thermal.friction import heat, torque, viscous_torque
 
 
 def friction(viscosity=100e-6, f0=2.0, f1=0.0013):

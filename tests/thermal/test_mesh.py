@@ -6,12 +6,12 @@ import meshio
 import numpy as np
 import pytest
 
-from model.machine import Region
-from thermal.elastic import Solid
-from thermal.expansion import influence
-from thermal.influence import elasticity, races
-from thermal.mesh import read_gmsh, section_mesh, tiled
-from thermal.refine import strain_error
+from thermospindle.model.machine import Region
+from thermospindle.thermal.elastic import Solid
+from thermospindle.thermal.expansion import influence
+from thermospindle.thermal.influence import elasticity, races
+from thermospindle.thermal.mesh import read_gmsh, section_mesh, tiled
+from thermospindle.thermal.refine import strain_error
 
 SHAPES = ("triangle", "quadrilateral")
 
@@ -152,4 +152,22 @@ def test_gmsh_file_without_any_names_is_refused(spindle, tmp_path):
     section = section_mesh(spindle, "rotating", 3e-3)
     meshio.write(tmp_path / "hub.msh", meshio.Mesh(section.mesh.p.T, [("triangle", section.mesh.t.T)]), file_format="gmsh22")
     with pytest.raises(ValueError, match="no physical surface"):
+        read_gmsh(tmp_path / "hub.msh", spindle, "rotating")
+
+
+@pytest.mark.parametrize(
+    "text", ["", "$MeshFormat\n", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n1\n1 a b c\n", "\x00\xff" * 50], ids=["empty", "cut", "text", "bytes"]
+)
+def test_what_is_no_gmsh_file_is_refused(spindle, tmp_path, text):
+    """meshio raises what it likes, and ends the program where it knows no reader."""
+    (tmp_path / "hub.msh").write_text(text, encoding="latin-1")
+    with pytest.raises(ValueError, match=r"hub\.msh: not a Gmsh file"):
+        read_gmsh(tmp_path / "hub.msh", spindle, "rotating")
+
+
+def test_a_gmsh_node_without_a_finite_place_is_refused(spindle, tmp_path):
+    section = section_mesh(spindle, "rotating", 3e-3)
+    section.mesh.p[0, 0] = np.nan
+    write_msh(tmp_path / "hub.msh", section, list(section.regions))
+    with pytest.raises(ValueError, match="no finite number"):
         read_gmsh(tmp_path / "hub.msh", spindle, "rotating")

@@ -1,0 +1,230 @@
+"""Measurement beside model, as the scene stands: modes, dampings, shapes and FRFs of every test, and one number for the whole.
+
+Errors are computed - measured, in Hz, percent and standard errors; those hold estimator error, scatter of repeats beyond it, the
+model's numerical floor, so they are never zero, and the error of the test's temperature (`thermometer`), which all modes of a test
+share: the rms pull is sqrt(r^T C^-1 r / n) with its correlations. A measured mode with no computed one within `BELIEVABLE` is missing
+from the model (or a false pole of the extraction), a computed mode in the band that was not measured is extra. Nothing is fitted here.
+Sources: Ewins, *Modal Testing* (2000), 5.3: MAC (Allemang 1982), COMAC (Lieven, Ewins 1988); for FRFs see `correlation`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from thermospindle.diagnosis.compare.correlation import Correlation, comac, correlate, frac, likeness
+from thermospindle.diagnosis.data.observe import Observation, observe
+from thermospindle.diagnosis.data.thermometer import squares, temperature_slope, with_temperature
+from thermospindle.diagnosis.prediction.partners import BELIEVABLE, crossings, expected_shapes, group, numbered, partners
+from thermospindle.diagnosis.prediction.theory import Predicted, predict
+from thermospindle.model.errors import BadInput
+from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.types import Array, ComplexArray
+from thermospindle.sim.campaign.beside import beside, measured_at
+from thermospindle.sim.campaign.campaign import Campaign, Test
+from thermospindle.sim.effects import of_scene
+
+
+@dataclass(frozen=True)
+class PairedMode:
+    """A measured mode and the computed one behind it; damping ratios are None where not measured, `mac` without shapes.
+
+    `number` counts the computed modes at the coldest test at rest and follows them from there by shape. Modes closer than
+    `theory.ALONE` (`close`) turn in their plane at the slightest asymmetry: their `mac` is the share of the measured shape in
+    the plane of the computed ones.
+    """
+
+    number: int
+    kind: str
+    measured: float  # Hz
+    computed: float  # Hz
+    sd: float  # Hz
+    damping_measured: float | None
+    damping_computed: float
+    damping_sd: float | None
+    mac: float | None
+    close: bool
+
+    @property
+    def error(self) -> float:
+        return self.computed - self.measured
+
+    @property
+    def pull(self) -> float:
+        return self.error / self.sd
+
+    @property
+    def damping_pull(self) -> float | None:
+        if self.damping_measured is None or self.damping_sd is None:
+            return None
+        return (self.damping_computed - self.damping_measured) / self.damping_sd
+
+
+@dataclass(frozen=True)
+class TestComparison:
+    """One test; `missing` measured and `extra` computed frequencies (Hz), `correlation` of its FRFs if it has any."""
+
+    __test__ = False  # not one of pytest's
+
+    test: Test
+    modes: tuple[PairedMode, ...]
+    missing: tuple[float, ...]
+    extra: tuple[float, ...]
+    missing_pull: tuple[float, ...]  # of an error of `BELIEVABLE`
+    correlation: Correlation | None
+    squares: float  # r^T C^-1 r of all frequencies and dampings, and of the missing modes
+    count: int  # of numbers in it
+
+    @property
+    def frac(self) -> dict[tuple[int, int], float | None]:
+        """By (response node, reference node)."""
+        return {} if self.correlation is None else frac(self.correlation)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A campaign beside a scene; `comac` by node, None where no mode moves it; `crossings` in words.
+
+    `rms_pull` is over frequencies and dampings, correlations of their errors included. A missing mode counts as an error of
+    `BELIEVABLE`, so that a model does not look better for losing a mode.
+    """
+
+    spindle: str
+    campaign: str
+    tests: tuple[TestComparison, ...]
+    comac: Mapping[int, float | None]
+    crossings: tuple[str, ...]
+
+    @property
+    def rms_pull(self) -> float:
+        return rms_pull(self.tests)
+
+
+def rms_pull(tests: Sequence[TestComparison]) -> float:
+    """The rms error of some tests in standard errors; infinite where nothing was measured."""
+    count = sum(t.count for t in tests)
+    return float(np.sqrt(sum(t.squares for t in tests) / count)) if count else float("inf")
+
+
+def compare(
+    spindle: Spindle,
+    campaign: Campaign,
+    observations: Sequence[Observation] | None = None,
+    progress: Callable[[str], None] = lambda done: None,
+) -> Comparison:
+    """Compare a scene, its own effects included, with a campaign. Raises `BadInput` for points on bodies the scene has not."""
+    for point in campaign.points:
+        bodies = [b.name for b in spindle.structure.bodies]
+        if point.body not in bodies:
+            raise BadInput(
+                f"{campaign.folder or campaign.title}: points.{point.node}.body = {point.body!r}: "
+                f"no body of scene {spindle.name}; allowed are {', '.join(bodies)}"
+            )
+    observed = observe(campaign, spindle, progress) if observations is None else observations
+    predicted = [_as_measured(spindle, campaign, o) for o in observed]
+    chosen = [partners(o, p) for o, p in zip(observed, predicted, strict=True)]
+    observed = [_at_its_temperature(spindle, campaign, o, p, i) for o, p, i in zip(observed, predicted, chosen, strict=True)]
+    numbers = numbered(observed, predicted)
+    scatter = _repeat_variance(observed, chosen, numbers)
+    tests = []
+    nodes = next((o.test.frf.response_nodes for o in observed if o.test.frf is not None), ())
+    pairs: list[tuple[ComplexArray, ComplexArray]] = []  # at these points
+    for o, p, partner, number, extra in zip(observed, predicted, chosen, numbers, scatter, strict=True):
+        tests.append(_test(spindle, campaign, o, p, partner, number, extra))
+        if o.shape is not None and o.test.frf is not None and o.test.frf.response_nodes == nodes:
+            pairs += [(o.shape[i], expected) for i, expected in expected_shapes(o, p, partner).items()]
+        progress(f"{o.test.id}: compared")
+    by_node = comac(nodes, pairs)
+    return Comparison(spindle.name, campaign.title, tuple(tests), by_node, crossings(observed, predicted, numbers))
+
+
+def _as_measured(spindle: Spindle, campaign: Campaign, o: Observation) -> Predicted:
+    """Modes predicted for a test, with shapes at its response points."""
+    found = predict(measured_at(spindle, campaign.points, o.test.frf), o, of_scene(spindle))
+    return found if o.shape is None else replace(found, shape=found.shape[:, : o.shape.shape[1]])
+
+
+def _at_its_temperature(spindle: Spindle, campaign: Campaign, o: Observation, p: Predicted, partner: Array) -> Observation:
+    """The observation with the error of its temperature among its errors."""
+    slope = temperature_slope(measured_at(spindle, campaign.points, o.test.frf), o, p, of_scene(spindle)).reshape(2, -1)
+    return with_temperature(o, np.where(partner >= 0, slope[:, partner], 0.0).ravel(), spindle.tolerances.temperature)
+
+
+def _repeat_variance(observed: Sequence[Observation], chosen: Sequence[Array], numbers: Sequence[Mapping[int, int]]) -> list[Array]:
+    """For every test, variance (2m,) of ln frequency and ln damping that repeats show beyond the errors of single tests.
+
+    Pooled over all conditions that were repeated, mode by mode, with their degrees of freedom: two repeats alone tell little. It
+    holds for all tests of the campaign, also those made once.
+    """
+    extra = [np.zeros(2 * len(o.frequency)) for o in observed]
+    seen: dict[tuple[int, int], dict[Condition, list[tuple[int, int]]]] = {}
+    for t, (o, partner, number) in enumerate(zip(observed, chosen, numbers, strict=True)):
+        m = len(o.frequency)
+        for i in range(2 * m):
+            if partner[i % m] >= 0 and np.isfinite(o.covariance[i, i]):
+                which = (number[int(partner[i % m])], i // m)
+                seen.setdefault(which, {}).setdefault(o.condition, []).append((t, i))
+    for by_condition in seen.values():
+        repeated = [places for places in by_condition.values() if len(places) > 1]
+        free = sum(len(places) - 1 for places in repeated)
+        if free:
+            beyond = sum((len(places) - 1) * _excess(observed, places) for places in repeated) / free
+            for t, i in (place for places in by_condition.values() for place in places):
+                extra[t][i] = max(0.0, beyond)
+    return extra
+
+
+def _excess(observed: Sequence[Observation], places: Sequence[tuple[int, int]]) -> float:
+    """Variance of the logarithms at (test, row) less the mean of their own variances."""
+    value = [np.log(np.concatenate([observed[t].frequency, observed[t].damping])[i]) for t, i in places]
+    return float(np.var(value, ddof=1) - np.mean([observed[t].covariance[i, i] for t, i in places]))
+
+
+# ---------------------------------------------------------------- one test
+
+
+def _test(
+    spindle: Spindle, campaign: Campaign, o: Observation, p: Predicted, partner: Array, number: Mapping[int, int], extra: Array
+) -> TestComparison:
+    m = len(o.frequency)
+    relative = np.sqrt(np.diag(o.covariance) + extra)
+    expected = expected_shapes(o, p, partner)
+    modes = []
+    for i in np.flatnonzero(partner >= 0).tolist():
+        j, known = int(partner[i]), bool(np.isfinite(relative[m + i]))
+        modes.append(
+            PairedMode(
+                number[j],
+                p.kind[j],
+                float(o.frequency[i]),
+                float(p.frequency[j]),
+                float(o.frequency[i] * relative[i]),
+                float(o.damping[i]) if known else None,
+                float(p.damping[j]),
+                float(o.damping[i] * relative[m + i]) if known else None,
+                None if o.shape is None else likeness(o.shape[i], expected[i]),
+                len(group(o, p, partner, i)) > 1,
+            )
+        )
+    lost = np.flatnonzero(partner < 0)
+    lost_pull = BELIEVABLE / relative[lost]
+    rows = np.flatnonzero(np.isfinite(relative) & (np.tile(partner, 2) >= 0))
+    computed = np.concatenate([p.frequency, p.damping])[np.concatenate([partner, partner + len(p.frequency)])[rows]]
+    error = np.log(computed / np.concatenate([o.frequency, o.damping])[rows])
+    covariance = (o.covariance + np.diag(np.where(np.isfinite(relative), extra, 0.0)))[np.ix_(rows, rows)]
+    frf = o.test.frf
+    low, high = spindle.hammer.band if frf is None else (frf.frequency[0], frf.frequency[-1])
+    found = set(partner.tolist())
+    shown = beside(spindle, campaign.points, o.test, o.condition)
+    return TestComparison(
+        o.test,
+        tuple(modes),
+        tuple(o.frequency[lost].tolist()),
+        tuple(float(f) for j, f in enumerate(p.frequency) if low <= f <= high and j not in found),
+        tuple(lost_pull.tolist()),
+        None if shown is None else correlate(shown),
+        squares(error, covariance) + float(lost_pull @ lost_pull),
+        len(rows) + len(lost),
+    )

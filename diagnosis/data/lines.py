@@ -1,0 +1,213 @@
+"""FRF lines of a test as the inference takes them: compressed without loss, with noise that their own scatter confirms.
+
+A measured FRF is smooth over a few lines wherever no pole is near, so that k neighbouring lines hold p < k numbers and noise. A block of
+lines is replaced by the values of its least-squares polynomial of degree p - 1 at the p Gauss nodes of the block's own discrete measure.
+By discrete orthogonality (Gautschi, *Orthogonal Polynomials*, 2004, Theorem 1.31 and 1.4.1) these values have independent errors of
+variance sd^2 / weight, the weights adding up to k: nothing is lost, and the model is evaluated at p frequencies instead of k. A block is
+divided until what its polynomial leaves is noise; where poles are sharp, single lines remain. What blocks leave also tells the noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.optimize import nnls
+
+from thermospindle.model.machine import Condition
+from thermospindle.model.types import Array, ComplexArray
+from thermospindle.sim.campaign.campaign import Noise, Test
+from thermospindle.sim.identification.frf import Frf
+from thermospindle.sim.identification.modal import noise_model, scatter
+
+NODES = 5  # of a block: polynomials of degree 4
+LONGEST = 160  # lines in a block
+BEYOND = 4  # polynomials of the next degrees, where what a block lacks shows first
+LACK_OF_FIT = 4.0  # standard deviations of a block's chi2, and of that of the next degrees alone, from which it is divided
+LINES_THAT_SCATTER = 50  # of an FRF at least, from whose neighbours its noise can be told
+ENOUGH = 200  # degrees of freedom from which the scatter within blocks tells the noise
+REPEATS, CAMPAIGN, SCATTER = "repeats", "the campaign", "scatter of neighbouring lines"
+KNOWN = (REPEATS, CAMPAIGN)
+SILENT = 1e-7  # of the largest value of a test: the least noise that is believed
+CONFIRMED = 1.1  # of a known noise, up to which the scatter of neighbouring lines does not contradict it
+
+
+@dataclass(frozen=True, eq=False)
+class LineData:
+    """One test: `value` (n_resp, n_ref, L) at `frequency` (L,) Hz in `quantity`; `sd` alike, the standard deviation sqrt(E |error|^2).
+
+    `noise_from` says in words where the noise was taken from, `raw` how many lines the test had.
+    """
+
+    test: Test
+    condition: Condition
+    frequency: Array
+    value: ComplexArray
+    sd: Array
+    quantity: str
+    noise_from: str
+    raw: int
+
+    @property
+    def count(self) -> int:
+        """Real numbers in the likelihood."""
+        return 2 * self.value.size
+
+
+def line_data(test: Test, condition: Condition, stated: Noise | None, expected: Noise) -> LineData:
+    """The lines of a test's FRFs above 0 Hz. Noise is that of the file (repeats, coherence), or `stated` by the campaign, or found in the
+    scatter of neighbouring lines, starting from what the scene's measuring chain is `expected` to have."""
+    frf = test.frf
+    assert frf is not None
+    use = frf.frequency > 0
+    frequency, value = frf.frequency[use], frf.value[:, :, use]
+    sd, noise_from = _noise(frf, value, use, stated, expected)
+    least = SILENT * float(np.abs(value).max())  # where symmetry forbids an answer there is rounding alone
+    sd = np.maximum(sd, least)
+    known, blocks = sd if noise_from in KNOWN else None, _blocks(value, sd)
+    seen = _within_blocks(value, blocks)
+    if seen is None and len(frequency) > LINES_THAT_SCATTER:  # noise stated too small divides every block to single lines
+        blocks = _blocks(value, np.maximum(sd, _smooth_sd(value, scatter(value))))
+        seen = _within_blocks(value, blocks)
+    for _ in range(2):
+        if seen is None:
+            break
+        sd_seen = np.maximum(np.sqrt(seen), least)
+        if known is not None and np.sqrt(np.mean(sd_seen**2 / known**2)) < CONFIRMED:
+            sd, blocks = known, _blocks(value, known)
+            break
+        sd = sd_seen if known is None else np.maximum(known, sd_seen)
+        noise_from = SCATTER if known is None else noise_from
+        blocks = _blocks(value, sd)
+        seen = _within_blocks(value, blocks)
+    at, kept, error = _compressed(frequency, value, sd, blocks)
+    return LineData(test, condition, at, kept, error, frf.quantity, noise_from, len(frequency))
+
+
+def _noise(frf: Frf, value: ComplexArray, use, stated: Noise | None, expected: Noise) -> tuple[Array, str]:
+    if frf.sd is not None and np.all(np.isfinite(frf.sd)):
+        return _smooth_sd(value, frf.sd[:, :, use]), REPEATS
+    if stated is not None:
+        return noise_model(value, stated.of_value, stated.of_largest), CAMPAIGN
+    seen = scatter(value) if value.shape[-1] > LINES_THAT_SCATTER else None
+    if seen is None:
+        return noise_model(value, expected.of_value, expected.of_largest), "the scene's measuring accuracy"
+    return _smooth_sd(value, seen), SCATTER
+
+
+def _smooth_sd(value: ComplexArray, sd: Array) -> Array:
+    """The noise of value and of largest that the standard errors `sd` of single lines follow, FRF by FRF; few hits scatter them."""
+    size = np.abs(value)
+    largest = size.max(axis=(0, 2))
+    smooth = np.empty_like(sd)
+    for i, j in np.ndindex(*sd.shape[:2]):
+        columns = np.stack([size[i, j] ** 2, np.full(sd.shape[2], max(largest[j], 1e-300) ** 2)], axis=1)
+        smooth[i, j] = np.maximum(columns @ _gamma_fit(columns, sd[i, j] ** 2, np.ones(sd.shape[2])), 1e-14 * largest[j] ** 2)
+    return np.sqrt(smooth)
+
+
+def _basis(k: int, p: int = NODES) -> tuple[Array, Array, Array]:
+    """Orthonormal polynomials (k, p) on k equally spaced lines; Gauss nodes (p,) in lines from the first, and their weights (p,)."""
+    x = np.arange(k) - (k - 1) / 2
+    j = np.arange(1, p)
+    off = np.sqrt(j**2 * (k**2 - j**2) / (4 * (4 * j**2 - 1.0)))  # Gram polynomials: Gautschi 2004, Table 1.2 (discrete Chebyshev)
+    nodes, vectors = np.linalg.eigh(np.diag(off, 1) + np.diag(off, -1))
+    weights = k * vectors[0] ** 2  # Golub & Welsch 1969
+    return _at_nodes(x, k, p), nodes + (k - 1) / 2, weights
+
+
+def _blocks(value: ComplexArray, sd: Array) -> list[tuple[int, int]]:
+    """Ranges of lines [first, after) whose polynomial leaves nothing but noise, from the whole band down by halves."""
+    n, found = value.shape[-1], []
+    parts = np.linspace(0, n, n // LONGEST + 2).astype(int)
+    open_ranges = list(pairwise(parts.tolist()))
+    while open_ranges:
+        first, after = open_ranges.pop()
+        k = after - first
+        if k <= NODES + 1:
+            found.append((first, after))
+            continue
+        q, _, _ = _basis(k, min(NODES + BEYOND, k))
+        v, variance = value[:, :, first:after], sd[:, :, first:after] ** 2
+        left = v - (v @ q[:, :NODES]) @ q[:, :NODES].T
+        beyond = np.abs(v @ q[:, NODES:]) ** 2 / (variance @ q[:, NODES:] ** 2)
+        if _lacking(np.abs(left) ** 2 / variance, left.shape[0] * left.shape[1] * (k - NODES)) or _lacking(beyond, beyond.size):
+            middle = (first + after) // 2
+            open_ranges += [(first, middle), (middle, after)]
+        else:
+            found.append((first, after))
+    return sorted(found)
+
+
+def _lacking(squares: Array, freedom: int) -> bool:
+    return float(squares.sum()) > freedom + LACK_OF_FIT * np.sqrt(freedom)
+
+
+def _within_blocks(value: ComplexArray, blocks: list[tuple[int, int]]) -> Array | None:
+    """Noise variances (n_resp, n_ref, n) from what the polynomials of all blocks leave, as shares of |H|^2 and of the largest |H|^2 to that
+    hammer, reference by reference; None where too few degrees of freedom are left."""
+    size = np.abs(value) ** 2
+    largest = np.broadcast_to(size.max(axis=(0, 2), keepdims=True), size.shape)
+    variance = np.empty(size.shape)
+    for j in range(value.shape[1]):
+        rows, seen, freedom = [], [], []
+        for first, after in blocks:
+            k = after - first
+            if k <= NODES + 1:
+                continue
+            q, _, _ = _basis(k)
+            v = value[:, j, first:after]
+            left = v - (v @ q) @ q.T
+            seen.append(np.sum(np.abs(left) ** 2, axis=1) / (k - NODES))
+            rows.append(np.stack([size[:, j, first:after].mean(axis=1), largest[:, j, 0]], axis=1))
+            freedom.append(np.full(len(v), float(k - NODES)))
+        if sum(f.sum() for f in freedom) < ENOUGH:
+            return None
+        a, y, w = np.concatenate(rows), np.concatenate(seen), np.concatenate(freedom)
+        variance[:, j] = np.maximum(_gamma_fit(a, y, w) @ np.stack([size[:, j], largest[:, j]]).reshape(2, -1), 1e-14 * largest[0, j, 0]).reshape(
+            size[:, j].shape
+        )
+    return variance
+
+
+def _gamma_fit(columns: Array, seen: Array, freedom: Array) -> Array:
+    """Shares (c,) >= 0 with `seen` (n,) about columns (n, c) @ shares: squares have errors in proportion to themselves, weighted anew."""
+    mean = seen + 1e-3 * seen.mean()
+    for _ in range(6):
+        weight = np.sqrt(freedom) / mean
+        share, _ = nnls(columns * weight[:, None], seen * weight)
+        mean = np.maximum(columns @ share, 1e-6 * seen.mean())
+    return share
+
+
+def _compressed(frequency: Array, value: ComplexArray, sd: Array, blocks: list[tuple[int, int]]) -> tuple[Array, ComplexArray, Array]:
+    at, kept, error = [], [], []
+    for first, after in blocks:
+        k = after - first
+        own = slice(first, after)
+        if k <= NODES + 1:
+            at.append(frequency[own])
+            kept.append(value[:, :, own])
+            error.append(sd[:, :, own])
+            continue
+        q, nodes, weights = _basis(k)
+        polynomials = _at_nodes(nodes - (k - 1) / 2, k)  # (p nodes, p polynomials)
+        at.append(np.interp(nodes, np.arange(k), frequency[own]))
+        kept.append((value[:, :, own] @ q) @ polynomials.T)
+        variance = (sd[:, :, own] ** 2 @ q**2) @ (polynomials**2).T  # equal noise gives sd^2 / weight
+        error.append(np.sqrt(np.maximum(variance, (sd[:, :, own] ** 2).min(axis=-1, keepdims=True) / weights)))
+    return np.concatenate(at), np.concatenate(kept, axis=-1), np.concatenate(error, axis=-1)
+
+
+def _at_nodes(x: Array, k: int, p: int = NODES) -> Array:
+    """The orthonormal polynomials (len(x), p) of `_basis` at positions `x` in lines from the middle."""
+    j = np.arange(1, p)
+    off = np.sqrt(j**2 * (k**2 - j**2) / (4 * (4 * j**2 - 1.0)))
+    previous, current = np.zeros(len(x)), np.full(len(x), 1 / np.sqrt(k))
+    columns = [current]
+    for m in range(p - 1):
+        following = (x * current - (off[m - 1] if m else 0.0) * previous) / off[m]
+        previous, current = current, following
+        columns.append(current)
+    return np.stack(columns, axis=1)

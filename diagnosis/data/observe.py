@@ -1,0 +1,144 @@
+"""A campaign as the diagnosis sees it: for every test its modes, with covariances that are never zero."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.parallel import in_parallel
+from thermospindle.model.types import Array, ComplexArray
+from thermospindle.sim.campaign.campaign import Campaign, Noise, Test
+from thermospindle.sim.identification.modal import extract, mac, noise_model
+
+FREQUENCY_FLOOR = 3e-5  # relative: finite elements and bearing equilibrium of the model itself
+DAMPING_FLOOR = 3e-3  # relative
+SHAPE_FLOOR = 3e-3  # relative, of a shape ratio
+UNCERTAIN = 3e-3  # relative error of a frequency from which a pole says nothing
+SAME = 0.3  # ln frequency within which two tests may show the same mode
+ALIKE = 0.3  # MAC above which they do
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """Modes of one test in order of frequency; m modes, n_resp channels.
+
+    `covariance` (2m, 2m) of [ln frequency, ln damping]; damping not measured is NaN with infinite variance. `shape` (m, n_resp) and
+    `shape_sd` are relative to the largest component; `residue` (m, n_ref) is that of the receptance between each reference and the
+    channel with the largest component, `residue_sd` (m,) relative. They are None for a table of modes, which says the `kind` of each
+    mode instead.
+    """
+
+    test: Test
+    condition: Condition
+    frequency: Array
+    damping: Array
+    covariance: Array
+    shape: ComplexArray | None
+    shape_sd: Array | None
+    residue: ComplexArray | None
+    residue_sd: Array | None
+    kind: tuple[str, ...] | None
+
+
+def observe(
+    campaign: Campaign, spindle: Spindle, progress: Callable[[str], None] = lambda done: None, workers: int = 1
+) -> list[Observation]:
+    """Mode tables of all tests; FRFs are turned into modes first, with the standard errors of the extraction.
+
+    A test without standard errors has the noise its campaign states, or else that of the scene's measuring accuracy.
+    """
+    noise = campaign.noise or Noise(spindle.hammer.noise_of_value, spindle.hammer.noise_of_largest)
+    observations = in_parallel(
+        partial(_observed, noise), campaign.tests, workers, lambda o: progress(f"{o.test.id}: {len(o.frequency)} modes")
+    )
+    return [_repeated(o, [other for other in observations if other is not o]) for o in observations]
+
+
+def _observed(noise: Noise, test: Test) -> Observation:
+    return _from_frf(test, noise) if test.frf is not None else _from_table(test)
+
+
+def _repeated(o: Observation, others: list[Observation]) -> Observation:
+    """Without the modes that no other test shows anything like: a pole of the noise appears once, a mode of the machine again.
+    A mode of another test speaks for one mode only: what splits a peak in two has the shape of both.
+
+    Less than three tests with shapes are taken as they are.
+    """
+    shapes = [(other.frequency, other.shape) for other in others if other.shape is not None]
+    if o.shape is None or len(shapes) < 2:
+        return o
+    again = np.zeros(len(o.frequency), bool)
+    for frequency, shape in shapes:
+        alike = mac(o.shape, shape)
+        like = (np.abs(np.log(o.frequency[:, None] / frequency)) < SAME) & (alike > ALIKE)
+        rows, columns = linear_sum_assignment(np.where(like, 1 - alike, len(like)))
+        again[rows] |= like[rows, columns]
+    return _only(o, again)
+
+
+def _only(o: Observation, kept: NDArray[np.bool_]) -> Observation:
+    """Some of the modes of a test that has shapes."""
+    if o.shape is None or o.shape_sd is None or o.residue is None or o.residue_sd is None:
+        raise ValueError("a table of modes has no shapes")
+    both = np.concatenate([kept, kept])
+    return replace(
+        o,
+        frequency=o.frequency[kept],
+        damping=o.damping[kept],
+        covariance=o.covariance[np.ix_(both, both)],
+        shape=o.shape[kept],
+        shape_sd=o.shape_sd[kept],
+        residue=o.residue[kept],
+        residue_sd=o.residue_sd[kept],
+    )
+
+
+def condition_of(test: Test) -> Condition:
+    soak = np.inf if test.soak_time is None else test.soak_time
+    return Condition(test.temperature, test.speed, test.level or 0.0, soak)
+
+
+def _from_frf(test: Test, noise: Noise) -> Observation:
+    frf = test.frf
+    assert frf is not None
+    sd = frf.sd
+    if sd is None or not np.all(np.isfinite(sd)):  # a single hit has no scatter
+        sd = noise_model(frf.value, noise.of_value, noise.of_largest)
+    found = extract(frf.frequency, frf.value, sd, kind=frf.quantity, window_decay=test.window_decay)
+    scale = np.concatenate([found.frequency, found.damping])
+    covariance = found.covariance / np.outer(scale, scale)
+    largest = np.argmax(np.abs(found.shape), axis=1)
+    residue = found.residues[np.arange(len(largest)), largest]
+    floor = np.concatenate([np.full(len(found.frequency), f) for f in (FREQUENCY_FLOOR, DAMPING_FLOOR)])
+    o = Observation(
+        test,
+        condition_of(test),
+        found.frequency,
+        found.damping,
+        covariance + np.diag(floor**2),
+        found.shape,
+        found.shape_sd,
+        residue,
+        np.hypot(np.sqrt(2 * np.diag(covariance)[len(found.frequency) :]), SHAPE_FLOOR),
+        None,
+    )
+    return _only(o, np.sqrt(np.diag(covariance)[: len(found.frequency)]) < UNCERTAIN)
+
+
+def _from_table(test: Test) -> Observation:
+    rows = sorted(test.modes, key=lambda r: r.frequency)
+    frequency = np.array([r.frequency for r in rows])
+    damping = np.array([np.nan if r.damping_ratio is None else r.damping_ratio for r in rows])
+    sd_f = np.array([r.frequency_sd for r in rows]) / frequency
+    sd_z = np.array(
+        [np.inf if r.damping_ratio_sd is None or r.damping_ratio is None else r.damping_ratio_sd / r.damping_ratio for r in rows]
+    )
+    variance = np.concatenate([sd_f**2 + FREQUENCY_FLOOR**2, sd_z**2 + DAMPING_FLOOR**2])
+    kinds = tuple(r.kind for r in rows)
+    return Observation(test, condition_of(test), frequency, damping, np.diag(variance), None, None, None, None, kinds)

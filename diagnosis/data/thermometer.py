@@ -1,0 +1,55 @@
+"""What a test's temperature error does to its modes: one unknown for the whole test, so its errors are correlated.
+
+The thermometer of a test is off by an unknown amount of standard deviation s (kelvin; the scene's `tolerances.temperature_K`), the same
+for all its modes. With g the derivative of the computed features by temperature, the covariance of computed - measured is
+C + s^2 g g^T. By the matrix inversion lemma r^T (C + s^2 g g^T)^-1 r = min over x of |r - g x|^2_C + (x / s)^2: the offset fitted with
+its prior. Gains of channels scale shapes, not frequencies or dampings, and do not enter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from thermospindle.diagnosis.data.observe import Observation
+from thermospindle.diagnosis.prediction.theory import Applied, Predicted, predict
+from thermospindle.model.machine import Spindle
+from thermospindle.model.types import Array
+
+STEP = 0.1  # K, of the difference: frequencies move by less than 1e-4 of themselves
+NEAR = 1e-3  # ln frequency that costs as much as a fully different shape
+
+
+def temperature_slope(spindle: Spindle, o: Observation, p: Predicted, effects: Applied) -> Array:
+    """Derivative (2k,) by temperature, 1/K, of [ln frequency, ln damping] of the k computed modes `p` of a test.
+
+    A one-sided difference towards the reference temperature, so that it stays inside laws that hold for the test itself.
+    """
+    step = -STEP if o.condition.temperature > spindle.reference_temperature else STEP
+    moved = predict(spindle, o, effects, step)
+    shape = moved.shape[:, : p.shape.shape[1]]
+    distance = np.abs(np.log(p.frequency[:, None] / moved.frequency)) / NEAR
+    unlike = 1 - np.abs(_unit(p.shape).conj() @ _unit(shape).T) ** 2
+    found = np.zeros(2 * len(p.frequency))
+    for i, j in zip(*linear_sum_assignment(distance + unlike), strict=True):
+        found[i] = np.log(moved.frequency[j] / p.frequency[i]) / step
+        found[len(p.frequency) + i] = np.log(moved.damping[j] / p.damping[i]) / step
+    return found
+
+
+def with_temperature(o: Observation, slope: Array, sd: float) -> Observation:
+    """The observation with the temperature error `sd` (K) in its covariance; `slope` (2m,) by observed mode."""
+    known = np.isfinite(np.diag(o.covariance))
+    slope = np.where(known, slope, 0.0)
+    return replace(o, covariance=o.covariance + sd**2 * np.outer(slope, slope))
+
+
+def squares(difference: Array, covariance: Array) -> float:
+    """r^T C^-1 r for the errors (n,) and their covariance (n, n)."""
+    return float(difference @ np.linalg.solve(covariance, difference)) if len(difference) else 0.0
+
+
+def _unit(shape: np.ndarray) -> np.ndarray:
+    return shape / np.maximum(np.linalg.norm(shape, axis=1, keepdims=True), 1e-300)

@@ -1,0 +1,214 @@
+"""From drift to an effect of one's own: what a free form found, as the simplest law of physics that fits it, written as an effect file.
+
+Laws over temperature T and speed n: none, linear, exponential, Arrhenius, sigmoid, step; and a power of speed, alone or times one of these.
+Each is fitted to the drift of one element in every test, with a constant beside it, weighted by its standard errors; the Bayesian
+information criterion chooses (Schwarz, *Ann. Statist.* 6 (1978) 461).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from thermospindle.model.errors import BadInput
+from thermospindle.model.types import Array
+
+REFERENCE = 20.0  # C at which laws are told
+KELVIN = 273.15
+NEAR = 10.0  # criterion within which rivals are named in the file
+
+
+@dataclass(frozen=True)
+class Law:
+    """A law g(T, n; shape): its Python expression, the shape parameters with unit, start and limits."""
+
+    name: str
+    expression: str
+    shape: tuple[tuple[str, str, float, tuple[float, float]], ...] = ()
+
+    def __call__(self, temperature: Array, share: Array, values: Any) -> Array:
+        names = {"T": temperature, "n": share, "exp": np.exp, "where": np.where, **{s[0]: v for s, v in zip(self.shape, values, strict=True)}}
+        return np.broadcast_to(np.asarray(eval(self.expression, {"__builtins__": {}}, names), float), temperature.shape)  # the text is one of ours, above
+
+
+OF_TEMPERATURE = (
+    Law("linear in temperature", "(T - 20) / 40"),
+    Law("exponential in temperature", "exp((T - 20) / scale) - 1", (("scale", "K", 20.0, (3.0, 200.0)),)),
+    Law("Arrhenius", "exp(activation * (1 / 293.15 - 1 / (T + 273.15))) - 1", (("activation", "K", 4000.0, (300.0, 20000.0)),)),
+    Law("sigmoid in temperature", "1 / (1 + exp((middle - T) / width))", (("middle", "C", 40.0, (-40.0, 200.0)), ("width", "K", 4.0, (0.5, 40.0)))),
+    Law("step in temperature", "where(T > middle, 1.0, 0.0)", (("middle", "C", 35.0, (-40.0, 200.0)),)),
+)
+OF_SPEED = (Law("linear in speed", "n"), Law("power of speed", "n ** power", (("power", "1", 1.0, (0.2, 4.0)),)))
+
+
+def laws(with_temperature: bool, with_speed: bool) -> list[Law]:
+    """The laws that tests at several temperatures, or several speeds, can tell."""
+    found = [Law("constant", "1.0")]
+    found += OF_TEMPERATURE if with_temperature else ()
+    found += OF_SPEED if with_speed else ()
+    if with_temperature and with_speed:
+        found += [Law(f"{s.name}, {t.name}", f"({s.expression}) * (1 + {t.expression})", (*s.shape, *t.shape)) for s in OF_SPEED[:1] for t in OF_TEMPERATURE[:3]]
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A law fitted: `size`, `offset` (0 for the constant law) and shape values with standard errors; the criterion, smaller is better."""
+
+    law: Law
+    values: Array  # size, offset, shape...
+    sd: Array
+    criterion: float
+
+
+def fit_law(law: Law, temperature: Array, share: Array, change: Array, sd: Array) -> Fitted | None:
+    """Least squares in size, offset and shape, the first two linear; None where there are more parameters than tests."""
+    offset = law.expression != "1.0"
+    count = 1 + offset + len(law.shape)
+    if count >= len(change) + (not offset):
+        return None
+    best: Fitted | None = None
+    for begin in _starts(law, temperature):
+
+        def linear(shape: Array) -> tuple[Any, Array]:
+            columns = [law(temperature, share, shape)] + ([np.ones_like(change)] if offset else [])
+            a = np.stack(columns, axis=1) / sd[:, None]
+            found = np.linalg.lstsq(a, change / sd, rcond=None)[0]
+            return found, a @ found - change / sd
+
+        low, high = ([s[3][k] for s in law.shape] for k in (0, 1))
+        shape = begin
+        if law.shape and law.name != "step in temperature":
+            shape = least_squares(lambda v: linear(v)[1], begin, bounds=(low, high)).x
+        amplitude, residual = linear(shape)
+        criterion = float(residual @ residual) + count * np.log(len(change))
+        if best is None or criterion < best.criterion:
+            values = np.concatenate([amplitude, np.zeros(int(not offset)), shape])
+            best = Fitted(law, values, _errors(law, values, offset, temperature, share, sd), criterion)
+    return best
+
+
+def _starts(law: Law, temperature: Array) -> list[Array]:
+    if not law.shape:
+        return [np.zeros(0)]
+    start = np.array([s[2] for s in law.shape])
+    names = [s[0] for s in law.shape]
+    if "middle" not in names:
+        return [start]
+    every = np.unique(temperature)
+    return [np.where(np.array(names) == "middle", m, start) for m in (every[1:] + every[:-1]) / 2] or [start]
+
+
+def _errors(law: Law, values: Array, offset: bool, temperature: Array, share: Array, sd: Array) -> Array:
+    def model(v: Array) -> Array:
+        return v[0] * law(temperature, share, v[2:]) + v[1]
+
+    columns = []
+    for i in range(len(values)):
+        h = 1e-4 * max(abs(values[i]), 1e-3)
+        step = values + h * (np.arange(len(values)) == i)
+        columns.append((model(step) - model(values)) / h)
+    columns[1] = columns[1] if offset else np.zeros_like(sd)
+    a = np.stack(columns, axis=1) / sd[:, None]
+    return np.sqrt(np.maximum(np.diag(np.linalg.pinv(a.T @ a)), 0.0))
+
+
+def draft(diagnosis: Path, name: str, element: str | None = None) -> str:
+    """The text of an effect file called `name` from the free-form answer in an answer of `spindle diagnose --json`.
+
+    The first element that would have to drift is taken, or `element`. Raises `BadInput` where the file holds none.
+    """
+    place = _place(diagnosis, element)
+    unit = place["unit"]
+    key = "relative" if unit == "%" else f"change_{unit}"
+    factor = 100.0 if unit == "%" else 1.0
+    rows = place["change"]
+    temperature, speed = (np.array([float(r[k]) for r in rows]) for k in ("temperature_C", "speed_rpm"))
+    change, sd = factor * np.array([float(r[key]) for r in rows]), factor * np.array([float(r["sd"]) for r in rows])
+    top = float(np.max(np.abs(speed))) or 1.0
+    share = np.abs(speed) / top
+    candidates = [fit_law(law, temperature, share, change, np.maximum(sd, 1e-9)) for law in laws(np.ptp(temperature) > 1, np.ptp(speed) > 1)]
+    ranked = sorted((c for c in candidates if c is not None), key=lambda c: c.criterion)
+    return _text(name, place, ranked, top, unit, diagnosis)
+
+
+def _place(diagnosis: Path, element: str | None) -> Mapping[str, Any]:
+    try:
+        places = json.loads(diagnosis.read_text(encoding="utf-8"))["where"]
+        found = [p for p in places if element is None or p["element"] == element]
+        if found:
+            [float(r["temperature_C"]) + float(r["speed_rpm"]) + float(r["sd"]) for r in found[0]["change"]]
+            return found[0]
+        named = [str(p["element"]) for p in places]
+    except OSError as error:
+        raise BadInput(f"{diagnosis}: cannot be read: {error.strerror}") from None
+    except (ValueError, KeyError, TypeError):
+        raise BadInput(f"{diagnosis}: is not an answer of spindle diagnose --json with elements that drift in `where`") from None
+    if element is None:
+        raise BadInput(f"{diagnosis}: where: is empty; the diagnosis found nothing that drifts, and there is nothing to draft")
+    raise BadInput(f"--element {element}: does not drift in {diagnosis}; allowed are {', '.join(named) or 'none'}")
+
+
+def _text(name: str, place: Mapping[str, Any], ranked: Sequence[Fitted], top: float, unit: str, diagnosis: Path) -> str:
+    best = ranked[0]
+    size, offset = best.values[:2]
+    share_of = float(offset / size) if size else 0.0
+    rivals = "; ".join(f"{r.law.name} ({r.criterion - best.criterion:+.1f})" for r in ranked[1:] if r.criterion - best.criterion < NEAR) or "none near"
+    step = best.law.expression.startswith("where")
+    shape = list(zip(best.law.shape, best.values[2:], best.sd[2:], strict=True))
+    lines = [
+        f'"""{place["element"]} drifts: {best.law.name}. Drafted by `spindle draft` from {diagnosis.name}; name it, read it, edit it.',
+        "",
+        f"change = size * ({best.law.expression} + constant) in {unit}, T in C, n = speed / {top:g} rpm.",
+        f"size {size:.4g} +- {best.sd[0]:.2g} {unit}; what is there everywhere {offset:.4g} +- {best.sd[1]:.2g} {unit}"
+        + "".join(f", {s[0]} {v:.4g} +- {e:.2g} {s[1]}" for s, v, e in shape)
+        + ".",
+        f"Rivals by the Bayesian information criterion: {rivals}.",
+        '"""',
+        "",
+        *(["from math import exp", ""] if "exp(" in best.law.expression else []),
+        "from thermospindle.diagnosis.inference.freeform import drifting",
+        "from thermospindle.sim.effects.effect import Parameter",
+        "",
+        f"TOP = {top:g}  # rpm",
+        "",
+        "",
+        "def law(T, rpm, values):",
+        f'    """Change of {place["element"]} in {unit} at temperature T (C) and speed (rpm)."""',
+        "    n = abs(rpm) / TOP",
+        *(f"    {s[0]} = {v:g}  # {s[1]}, between two tests" if step else f'    {s[0]} = values["{s[0]}"]' for s, v, _ in shape),
+        f'    return values["size"] * (({_scalar(best.law.expression)}) + values["constant"])',
+        "",
+        "",
+        "EFFECT = drifting(",
+        f'    "{place["element"]}",',
+        f'    name="{name}",',
+        f'    title="{place["element"]} drifts: {best.law.name}",',
+        f'    equation="change = size ({best.law.expression} + constant), T in C, n = speed / {top:g} rpm",',
+        "    law=law,",
+        "    parameters=(",
+        _parameter("size", unit, 0.0, size, "how much it changes", (-400.0, 400.0)),
+        _parameter("constant", "1", share_of, share_of, "what is there at every temperature and speed, over the size", (-100.0, 100.0)),
+        *(_parameter(s[0], s[1], v, v, f"shape of the law, +- {e:.2g}", s[3]) for s, v, e in shape if not step),
+        "    ),",
+        f'    source="fitted to the drift found in {diagnosis.name}",',
+        ")",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _scalar(expression: str) -> str:
+    return "1.0 if T > middle else 0.0" if expression.startswith("where") else expression
+
+
+def _parameter(name: str, unit: str, neutral: float, typical: float, meaning: str, limits: tuple[float, float]) -> str:
+    width = max(abs(typical), 1e-3) if neutral == 0.0 else max(0.3 * abs(typical), 1e-3)
+    return (
+        f'        Parameter("{name}", "{unit}", {neutral:.6g}, {typical:.6g}, {width:.3g}, ({limits[0]:g}, {limits[1]:g}), "{meaning}", "fitted by spindle draft to what a diagnosis found to drift"),'
+    )

@@ -1,0 +1,87 @@
+"""Toleranced parameters of a spindle fitted to the lines of one test's FRFs, all else taken as known.
+
+For scripts that follow one parameter through virtual tests: nothing is extracted, every line counts with its own standard error, so
+nothing of the record is lost (maximum likelihood in the frequency domain: Pintelon & Schoukens, *System Identification*, 2012, ch. 9).
+Where the model may be wrong it is the wrong tool: thousands of lines then agree on a wrong value. `diagnosis.inference` grants the model errors of its own for
+that reason.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from thermospindle.model.machine import Condition, HammerTest, Spindle
+from thermospindle.model.tolerance import Toleranced
+from thermospindle.model.types import Array, ComplexArray
+from thermospindle.sim.campaign.beside import POWER
+from thermospindle.sim.identification.frf import Frf
+from thermospindle.sim.operating import operating_point
+
+STEP = 1e-5  # relative, for differences: far above what the bearing equilibrium is solved to
+ENOUGH = 0.01  # standard errors, a step after which nothing more is gained
+LONGEST = 20  # steps
+
+
+@dataclass(frozen=True, eq=False)
+class LineFit:
+    """Relative deviations (p,) from the drawing with their covariance (p, p), and the chi2 of `lines` complex values, 1 each if the
+    model holds."""
+
+    names: tuple[str, ...]
+    value: Array
+    covariance: Array
+    chi2: float
+    lines: int
+    steps: int
+
+    @property
+    def sd(self) -> Array:
+        return np.sqrt(np.diag(self.covariance))
+
+
+def fit_lines(spindle: Spindle, condition: Condition, frf: Frf, parameters: Sequence[Toleranced], window_decay: float = 0.0) -> LineFit:
+    """Gauss-Newton from the drawing over the lines of the hammer's band.
+
+    `window_decay` (1/s) is that of the exponential window that the FRFs were estimated with. Errors are those of `frf`, or where it has
+    none (a single hit) the noise of the scene's measuring chain. ValueError if steps do not come to rest.
+    """
+    inside = (frf.frequency >= spindle.hammer.band[0]) & (frf.frequency <= spindle.hammer.band[1])
+    frequency = frf.frequency[inside]
+    to_mobility = (2j * np.pi * frequency + window_decay) ** -POWER[frf.quantity]
+    measured = frf.value[..., inside] * to_mobility
+    told = frf.sd[..., inside] * np.abs(to_mobility) if frf.sd is not None else np.array(np.nan)
+    sd = told if np.all(np.isfinite(told)) else chain_noise(spindle.hammer, measured)
+    rows = [p.node for p in spindle.points]
+    response = [rows.index(node) for node in frf.response_nodes]
+    reference = [spindle.hammer.hammer_nodes.index(node) for node in frf.reference_nodes]
+
+    def seen(x: Array) -> ComplexArray:
+        built = spindle
+        for parameter, value in zip(parameters, x, strict=True):
+            built = parameter.apply(built, float(value))
+        return operating_point(built, condition).frf(frequency, window_decay)[np.ix_(response, reference)]
+
+    def stacked(value: ComplexArray) -> Array:
+        """Real and imaginary parts in standard errors."""
+        return np.sqrt(2) * np.concatenate([(value.real / sd).ravel(), (value.imag / sd).ravel()])
+
+    x = np.zeros(len(parameters))
+    for step in range(1, LONGEST + 1):
+        here = seen(x)
+        residual = stacked(measured - here)
+        jacobian = np.stack([stacked(seen(x + STEP * unit) - here) / STEP for unit in np.eye(len(x))], axis=1)
+        covariance: Array = np.asarray(np.linalg.inv(jacobian.T @ jacobian), float)
+        move = covariance @ (jacobian.T @ residual)
+        x = x + move
+        if np.all(np.abs(move) < ENOUGH * np.sqrt(np.diag(covariance))):
+            return LineFit(tuple(p.name for p in parameters), x, covariance, 0.5 * float(residual @ residual), measured.size, step)
+    raise ValueError(f"the fit of {', '.join(p.name for p in parameters)} has not come to rest after {LONGEST} steps")
+
+
+def chain_noise(hammer: HammerTest, value: ComplexArray) -> Array:
+    """Standard errors (n_resp, n_ref, n) of FRFs: a share of every line, and of the largest answer to that hammer."""
+    largest = np.abs(value).max(axis=(0, 2), keepdims=True)
+    return np.hypot(hammer.noise_of_value * np.abs(value), hammer.noise_of_largest * largest)

@@ -1,0 +1,14 @@
+"""Inference from the FRF lines (or mode tables) of a campaign: what the model lacks, by evidence.
+
+=========  ========================================================================================================
+nuisance   build tolerances, measuring errors, and the model's own constant discrepancy
+model      residuals of every test in standard errors, with exact derivatives
+mechanism  what an effect changes, and its law as a prior over conditions
+freeform   what would have to drift where nobody names a cause
+fit        tempered Gauss-Newton with priors
+evidence   Laplace evidence with everything of unknown size learned
+search     screening, fits, pairs: the evidence of every explanation
+verdict    posterior probabilities, and the answer with the least expected loss
+next_test  which test would decide between the explanations that survive
+=========  ========================================================================================================
+"""

@@ -1,0 +1,258 @@
+"""The evidence of a fitted model, with everything of unknown size learned: Laplace's quadratic, and priors as Gaussians over a grid.
+
+About the fit chi2 is a quadratic in all parameters p: c - 2 b p + p A p. For priors N(0, Pi) and errors s times those stated,
+
+    ln Z(Pi, s) = -c / 2 s^2 + b (A / s^2 + Pi^-1)^-1 b / 2 s^4 - ln det(1 + Pi A / s^2) / 2 - n ln s,
+
+(MacKay, *Neural Computation* 4 (1992) 415, Eq. 2.6). Sizes learned so, each over a short grid: of the model's constant and drifting
+discrepancies in stiffness and damping, of gain drift and of the errors s (at their likeliest: empirical Bayes), and of every mechanism its
+width and its departure from its law (the mean over the grid). What is quoted is the posterior at the best place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.special import log_ndtr, logsumexp
+
+from thermospindle.diagnosis.inference import nuisance as kinds_of
+from thermospindle.diagnosis.inference.fit import Fit
+from thermospindle.diagnosis.inference.mechanism import size_covariance
+from thermospindle.diagnosis.inference.model import CampaignModel
+from thermospindle.model.types import Array
+
+GRIDS = {
+    kinds_of.STIFFNESS: (0.0, 1e-4, 1e-3, 1e-2),  # relative error of a frequency
+    kinds_of.DAMPING: (0.0, 0.03, 0.1),
+    kinds_of.STIFFNESS_DRIFT: (0.0, 3e-5, 1e-4, 3e-4, 1e-3),
+    kinds_of.DAMPING_DRIFT: (0.0, 0.01, 0.03),
+    kinds_of.DRIFT: (0.0, 1e-3, 1e-2),
+}
+REFERENCE = {
+    kinds_of.STIFFNESS: kinds_of.STIFFNESS_SD,
+    kinds_of.DAMPING: kinds_of.DAMPING_SD,
+    kinds_of.STIFFNESS_DRIFT: kinds_of.STIFFNESS_DRIFT_SD,
+    kinds_of.DAMPING_DRIFT: kinds_of.DAMPING_DRIFT_SD,
+    kinds_of.DRIFT: kinds_of.DRIFT_SD,
+}
+WIDTHS = (0.5, 1.0, 2.0, 4.0)  # of a size, in its own prior standard deviations
+DEPARTURES = (0.0, 0.1, 0.3, 1.0)  # from a law, of the size
+FREE_WIDTHS = (0.1, 0.3, 1.0, 3.0, 10.0)  # free forms have a width to be learned; their law is a constant
+SWEEPS = 3  # at most, through the sizes of nuisances one after the other
+
+
+@dataclass(frozen=True)
+class Learned:
+    """What is likeliest: `sizes` of discrepancies and of gain drift by kind of nuisance, the factor of the stated errors; width and departure of
+    every mechanism."""
+
+    sizes: Mapping[str, float]
+    errors: float
+    widths: tuple[float, ...]
+    departures: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """ln evidence; what was learned; posterior mean (n,) and covariance (n, n) of all parameters, and of the sizes of every mechanism in every
+    test: mean (mechanisms, tests) and covariance (mechanisms, tests, tests), in their units."""
+
+    ln: float
+    learned: Learned
+    mean: Array
+    covariance: Array
+    sizes: Array
+    size_covariance: Array
+    chi2: float
+
+
+@dataclass(frozen=True, eq=False)
+class Quadratic:
+    """chi2 = constant - 2 b p + p A p."""
+
+    constant: float
+    b: Array
+    a: Array
+
+    def at(self, p: Array) -> float:
+        return float(self.constant - 2 * self.b @ p + p @ self.a @ p)
+
+
+def quadratic(chi2: float, gradient: Array, information: Array, point: Array) -> Quadratic:
+    b = information @ point - gradient
+    return Quadratic(float(chi2 - 2 * gradient @ point + point @ information @ point), b, information)
+
+
+def evidence(model: CampaignModel, fit: Fit, near: Learned | None = None) -> Evidence:
+    """The evidence of a fit at its own temper (its errors are 1 / temper times the data's); with `near` the sizes of discrepancies, drift and
+    errors are taken from there, which is quick."""
+    whole = quadratic(fit.chi2, fit.gradient, fit.information, fit.point)
+    t2 = fit.temper**2
+    whole = Quadratic(t2 * whole.constant, t2 * whole.b, t2 * whole.a)
+    p = len(fit.nuisance)
+    kinds = {q.kind for q in model.parameters}
+    grids = {kind: grid for kind, grid in GRIDS.items() if kind in kinds}
+    scales = [1.0] if fit.temper < 1.0 else [float(s) for s in _error_scales(whole, fit.count)]
+    own_grid = list(_mechanism_grid(fit))
+    priors = [_mechanism_prior(model, fit, own) for own in own_grid]
+
+    def rated(s: float, sizes: Mapping[str, float]) -> tuple[float, int]:
+        """ln evidence, the mean over widths and departures; and which of these is best."""
+        scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
+        inner = _marginal(scaled, _prior_diagonal(model, sizes), p)
+        values = np.array([inner.with_prior(prior) for prior in priors]) - fit.count * np.log(s)
+        return float(logsumexp(values) - np.log(len(values))), int(np.argmax(values))
+
+    if near is not None:
+        s, sizes = near.errors, dict(near.sizes)
+        total, own_best = rated(s, sizes)
+    else:
+        s, sizes = scales[len(scales) // 2], {kind: 0.0 for kind in grids}
+        total, own_best = rated(s, sizes)
+        for _ in range(SWEEPS):
+            before = total
+            for kind, grid in grids.items():
+                for size in grid:
+                    if size != sizes[kind]:
+                        value, best = rated(s, {**sizes, kind: size})
+                        if value > total:
+                            total, own_best, sizes = value, best, {**sizes, kind: size}
+            for scale in scales:
+                if scale != s:
+                    value, best = rated(scale, sizes)
+                    if value > total:
+                        total, own_best, s = value, best, scale
+            if total - before < 0.01:
+                break
+    own = own_grid[own_best]
+    scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
+    mean, covariance = _posterior(scaled, _whole_prior(model, fit, sizes, own))
+    at, means, covariances, truncation = p, [], [], 0.0
+    tests = len(model.tests)
+    for m, root in zip(fit.mechanisms, fit.roots, strict=True):
+        part = slice(at, at + tests)
+        means.append(m.size.neutral + root @ mean[part])
+        covariances.append(root @ covariance[part, part] @ root.T)
+        truncation += _one_sided(m, means[-1], covariances[-1])
+        at += tests + len(m.shape)
+    learned = Learned(sizes, s, tuple(w for w, _ in own), tuple(d for _, d in own))
+    shape = (len(fit.mechanisms), tests)
+    return Evidence(
+        total + truncation, learned, mean, covariance, np.array(means).reshape(shape), np.array(covariances).reshape(*shape, tests),
+        whole.at(mean),
+    )
+
+
+def _one_sided(mechanism, mean: Array, covariance: Array) -> float:
+    """ln of twice the posterior probability of the sign that limits allow: a size that may not be negative has half its prior."""
+    low, high = mechanism.size.limits
+    sign = 1.0 if low >= mechanism.size.neutral else -1.0 if high <= mechanism.size.neutral else 0.0
+    if not sign:
+        return 0.0
+    weight = np.linalg.lstsq(covariance + 1e-12 * np.trace(covariance) * np.eye(len(mean)), np.ones(len(mean)), rcond=None)[0]
+    weight = weight / weight.sum()
+    sd = float(np.sqrt(max(weight @ covariance @ weight, 1e-300)))
+    return float(np.log(2) + log_ndtr(sign * float(weight @ (mean - mechanism.size.neutral)) / sd))
+
+
+def _error_scales(whole: Quadratic, count: int) -> Array:
+    """1, and above it steps of 5 % around the root of the least chi2 a number: errors are never taken smaller than stated."""
+    least = whole.constant - whole.b @ np.linalg.lstsq(whole.a + 1e-9 * np.eye(len(whole.b)), whole.b, rcond=None)[0]
+    centre = np.sqrt(max(float(least) / count, 0.0))
+    return np.array([1.0]) if centre < 1.02 else np.unique(np.concatenate([[1.0], np.maximum(centre * np.array([0.95, 1.0, 1.05, 1.2]), 1.0)]))
+
+
+def _prior_diagonal(model: CampaignModel, sizes: Mapping[str, float]) -> Array:
+    """Prior variances (P,) of the nuisance parameters in units of their reference widths."""
+    return np.array([(sizes[p.kind] / REFERENCE[p.kind]) ** 2 if p.kind in sizes else 1.0 for p in model.parameters])
+
+
+def _mechanism_grid(fit: Fit):
+    """(width, departure) of every mechanism."""
+    return product(*[list(product(FREE_WIDTHS if m.free else WIDTHS, DEPARTURES)) for m in fit.mechanisms])
+
+
+def _mechanism_prior(model: CampaignModel, fit: Fit, own: Sequence[tuple[float, float]]) -> Array:
+    """Prior covariance of [z, u] of all mechanisms."""
+    conditions = [d.condition for d in model.tests]
+    n = sum(len(conditions) + len(m.shape) for m in fit.mechanisms)
+    prior, at = np.eye(n), 0
+    for m, root, (width, departure) in zip(fit.mechanisms, fit.roots, own, strict=True):
+        sizes = size_covariance(conditions, width * m.size.prior_sd, departure)
+        half = solve_triangular(root, sizes, lower=True)
+        prior[at : at + len(root), at : at + len(root)] = solve_triangular(root, half.T, lower=True)
+        at += len(root) + len(m.shape)
+    return prior
+
+
+def _whole_prior(model: CampaignModel, fit: Fit, sizes: Mapping[str, float], own: Sequence[tuple[float, float]]) -> Array:
+    diagonal = _prior_diagonal(model, sizes)
+    n = len(diagonal)
+    prior = np.zeros((len(fit.point), len(fit.point)))
+    prior[:n, :n] = np.diag(diagonal)
+    prior[n:, n:] = _mechanism_prior(model, fit, own)
+    return prior
+
+
+@dataclass(frozen=True, eq=False)
+class _Marginal:
+    """The quadratic of [z, u] with nuisances integrated over their priors: ln of the integral is `constant` + b p - p A p / 2."""
+
+    constant: float
+    b: Array
+    a: Array
+
+    def with_prior(self, prior: Array) -> float:
+        if not len(self.b):
+            return self.constant
+        root = np.linalg.cholesky(prior + 1e-12 * np.eye(len(prior)))
+        inner = root.T @ self.a @ root + np.eye(len(prior))
+        half = root.T @ self.b
+        factor = np.linalg.cholesky(inner)
+        solved = solve_triangular(factor, half, lower=True)
+        return self.constant + 0.5 * float(solved @ solved) - float(np.log(np.diag(factor)).sum())
+
+
+def _marginal(q: Quadratic, diagonal: Array, p: int) -> _Marginal:
+    root = np.sqrt(diagonal)
+    inner = root[:, None] * q.a[:p, :p] * root[None, :] + np.eye(p)
+    factor, lower = cho_factor(inner, lower=True)
+    b1 = root * q.b[:p]
+    cross = root[:, None] * q.a[:p, p:]
+    solved_b = cho_solve((factor, lower), b1)
+    constant = -0.5 * q.constant + 0.5 * float(b1 @ solved_b) - float(np.log(np.diag(factor)).sum())
+    if q.a.shape[0] == p:
+        return _Marginal(constant, np.zeros(0), np.zeros((0, 0)))
+    solved = cho_solve((factor, lower), cross)
+    return _Marginal(constant, q.b[p:] - solved.T @ b1, q.a[p:, p:] - cross.T @ solved)
+
+
+def _posterior(q: Quadratic, prior: Array) -> tuple[Array, Array]:
+    """Mean and covariance under N(0, prior), which may be singular."""
+    root = np.linalg.cholesky(prior + 1e-14 * np.eye(len(prior)))
+    inner = np.linalg.inv(root.T @ q.a @ root + np.eye(len(prior)))
+    covariance = root @ inner @ root.T
+    return covariance @ q.b, covariance
+
+
+def left_out(model: CampaignModel, fit: Fit, found: Evidence, groups: Sequence[Sequence[int]]) -> float:
+    """Root mean square residual, in standard errors of the data, of groups of tests predicted from all others, with what was learned from all."""
+    learned = found.learned
+    own = list(zip(learned.widths, learned.departures, strict=True))
+    prior = _whole_prior(model, fit, learned.sizes, own)
+    by_test = [quadratic(*b, fit.point) for b in fit.by_test]
+    total, count = 0.0, 0
+    for group in groups:
+        rest = [q for t, q in enumerate(by_test) if t not in group]
+        if not rest:
+            continue
+        s2 = learned.errors**2
+        q = Quadratic(0.0, np.sum([r.b for r in rest], axis=0) / s2, np.sum([r.a for r in rest], axis=0) / s2)
+        mean, _ = _posterior(q, prior)
+        total += sum(by_test[t].at(mean) for t in group)
+        count += sum(model.tests[t].count for t in group)
+    return float(np.sqrt(max(total, 0.0) / count)) if count else float("nan")

@@ -1,0 +1,254 @@
+"""Fitting nuisance parameters and the sizes of mechanisms to a campaign: Gauss-Newton with priors, tempered.
+
+Peaks that do not overlap do not pull at each other: with the data's own errors a fit stalls. Errors are therefore first taken thousands of
+times too large, so that priors rule and all peaks move together, then less and less (a homotopy: Allgower & Georg, *Numerical Continuation
+Methods*, 1990). Steps are damped as Levenberg and Marquardt do; a step to where no spindle can be built is taken shorter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from thermospindle.diagnosis.inference import nuisance as kinds_of
+from thermospindle.diagnosis.inference.mechanism import REFERENCE_DEPARTURE, REFERENCE_WIDTH, Mechanism, size_covariance
+from thermospindle.diagnosis.inference.model import FAILED, Applied, CampaignModel, Rates
+from thermospindle.model.types import Array, Integers
+
+TEMPERS = (3e-4, 3e-3, 0.03, 0.3, 1.0)
+LONGEST = 3.0  # prior standard deviations in one step
+ENOUGH = 0.1  # of the cost, from which a fit goes on
+SIZE_STEP = 0.02  # of a size's or shape parameter's prior standard deviation, for differences
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Where a model stands: nuisance values x (P,) in prior standard deviations, sizes (mechanisms, tests) and shape parameters of every mechanism
+    in their units; and the quadratic of chi2 about it over all parameters p = [x, z, u]: chi2 + 2 gradient (p - point) + (p - point) information
+    (p - point), with z the whitened sizes (`roots`) and u the shape parameters, mechanism by mechanism.
+
+    `by_test` holds chi2, gradient and information of every test.
+    """
+
+    mechanisms: tuple[Mechanism, ...]
+    point: Array
+    sizes: Array
+    shapes: tuple[tuple[float, ...], ...]
+    roots: tuple[Array, ...]
+    chi2: float
+    gradient: Array
+    information: Array
+    by_test: tuple[tuple[float, Array, Array], ...]
+    count: int
+    rates: Rates
+    temper: float
+
+    @property
+    def nuisance(self) -> Array:
+        return self.point[: len(self.point) - sum(len(r) + len(m.shape) for r, m in zip(self.roots, self.mechanisms, strict=True))]
+
+
+class Problem:
+    """A campaign and the mechanisms that act in it, as a least-squares problem over p = [x, z_1, u_1, z_2, u_2, ...]."""
+
+    def __init__(self, model: CampaignModel, mechanisms: Sequence[Mechanism]) -> None:
+        self.model, self.mechanisms = model, tuple(mechanisms)
+        conditions = [d.condition for d in model.tests]
+        self.roots: tuple[Array, ...] = tuple(
+            np.asarray(np.linalg.cholesky(size_covariance(conditions, REFERENCE_WIDTH * m.size.prior_sd, REFERENCE_DEPARTURE)), float)
+            for m in self.mechanisms
+        )
+        self.tests = len(conditions)
+        self.nuisances = len(model.parameters)
+        self.length = self.nuisances + sum(self.tests + len(m.shape) for m in self.mechanisms)
+        small = (kinds_of.STIFFNESS, kinds_of.DAMPING, kinds_of.STIFFNESS_DRIFT, kinds_of.DAMPING_DRIFT, kinds_of.DRIFT)
+        self.reach = np.ones(self.length)  # what of a parameter's move counts towards the longest step
+        self.reach[: self.nuisances] = [0.05 if q.kind in small else 1.0 for q in model.parameters]
+
+    def parts(self, p: Array) -> tuple[Array, Array, list[Array]]:
+        """Nuisance values (P,), sizes (mechanisms, tests) and shape parameters of a parameter vector, in their units."""
+        at, sizes, shapes = self.nuisances, [], []
+        for m, root in zip(self.mechanisms, self.roots, strict=True):
+            sizes.append(m.size.neutral + root @ p[at : at + self.tests])
+            at += self.tests
+            shapes.append(np.array([np.clip(q.neutral + q.prior_sd * v, *q.limits) for q, v in zip(m.shape, p[at : at + len(m.shape)], strict=True)]))
+            at += len(m.shape)
+        return p[: self.nuisances], np.array(sizes).reshape(len(self.mechanisms), self.tests), shapes
+
+    def applied(self, t: int, sizes: Array, shapes: Sequence[Array]) -> tuple[list, list[float]]:
+        """The effects that act in test `t`, and how far each size lies beyond its limit."""
+        effects, beyond = [], []
+        for m, size, shape in zip(self.mechanisms, sizes[:, t], shapes, strict=True):
+            within = float(np.clip(size, *m.size.limits))
+            effects.append((m.effect, m.values(within, shape.tolist())))
+            beyond.append(float(size) - within)
+        return effects, beyond
+
+    def acting(self, effects: Applied) -> list:
+        """Without those of no size, which change nothing: what was worked out without them serves."""
+        return [(e, v) for (e, v), m in zip(effects, self.mechanisms, strict=True) if v[m.size.name] != m.size.neutral]
+
+    def residual(self, t: int, p: Array) -> Array:
+        x, sizes, shapes = self.parts(p)
+        effects, beyond = self.applied(t, sizes, shapes)
+        r = self.model.residual(t, x, self.acting(effects))
+        for k, over in enumerate(beyond):
+            if over:
+                r = r + over * self.by_size(t, x, effects, k)
+        return r
+
+    def by_size(self, t: int, x: Array, effects: Applied, k: int) -> Array:
+        m = self.mechanisms[k]
+        return self._by_value(t, x, effects, k, m.size)
+
+    def _by_value(self, t: int, x: Array, effects: Applied, k: int, q) -> Array:
+        """Derivative (N,) of the residual of test `t` by parameter `q` of mechanism `k`, from inside its limits."""
+        effect, values = effects[k]
+        step = SIZE_STEP * q.prior_sd
+        for h in (step, -step):
+            if q.limits[0] <= values[q.name] + h <= q.limits[1]:
+                moved = list(effects)
+                moved[k] = (effect, {**values, q.name: values[q.name] + h})
+                try:
+                    return self.model.column(t, x, self.acting(effects), self.acting(moved), h)
+                except FAILED:
+                    continue
+        return np.zeros(self.model.tests[t].count)
+
+    def linearised(self, t: int, p: Array, rates: Rates) -> tuple[Array, Array, Integers]:
+        """Residual (N,), derivatives (N, k) and the numbers (k,) of the parameters of p they belong to."""
+        x, sizes, shapes = self.parts(p)
+        effects, beyond = self.applied(t, sizes, shapes)
+        r, jacobian, numbers = self.model.jacobian(t, x, self.acting(effects), rates)
+        columns, places, at = [jacobian], [numbers], self.nuisances
+        for k, (m, root) in enumerate(zip(self.mechanisms, self.roots, strict=True)):
+            by_size = self.by_size(t, x, effects, k)
+            if beyond[k]:
+                r = r + beyond[k] * by_size
+            columns.append(by_size[:, None] * root[t][None, : t + 1])
+            places.append(at + np.arange(t + 1))
+            at += self.tests
+            for q in m.shape:
+                columns.append((q.prior_sd * self._by_value(t, x, effects, k, q))[:, None])
+                places.append(np.array([at]))
+                at += 1
+        return r, np.concatenate(columns, axis=1), np.concatenate(places)
+
+    def effects_of(self, p: Array) -> list[list]:
+        _, sizes, shapes = self.parts(p)
+        return [self.acting(self.applied(t, sizes, shapes)[0]) for t in range(self.tests)]
+
+    def linearisation(self, p: Array, rates: Rates) -> Linearisation:
+        return Linearisation(self.length, [self.linearised(t, p, rates) for t in range(self.tests)])
+
+    def residuals(self, p: Array) -> list[Array] | None:
+        """Residuals of every test; None where no spindle can be built."""
+        try:
+            found = [self.residual(t, p) for t in range(self.tests)]
+        except FAILED:
+            return None
+        return found if all(np.all(np.isfinite(r)) for r in found) else None
+
+
+class Linearisation:
+    """Derivatives of all tests at one point: information J^T J, and gradients J^T r of residuals there or near."""
+
+    def __init__(self, length: int, rows: Sequence[tuple[Array, Array, Integers]]) -> None:
+        self.length, self.rows = length, rows
+        self.residuals = [r for r, _, _ in rows]
+        self.by_test = []
+        for _, jacobian, numbers in rows:
+            information = np.zeros((length, length))
+            information[np.ix_(numbers, numbers)] = jacobian.T @ jacobian
+            self.by_test.append(information)
+        self.information: Array = np.sum(self.by_test, axis=0)
+
+    def gradients(self, residuals: Sequence[Array]) -> list[Array]:
+        found = []
+        for r, (_, jacobian, numbers) in zip(residuals, self.rows, strict=True):
+            gradient = np.zeros(self.length)
+            gradient[numbers] = jacobian.T @ r
+            found.append(gradient)
+        return found
+
+
+def fit(
+    model: CampaignModel, mechanisms: Sequence[Mechanism] = (), start: Array | None = None, rates: Rates | None = None,
+    tempers: Sequence[float] = TEMPERS, keep: list[Fit] | None = None, steps: int = 4,
+) -> Fit:
+    """The fit with the reference widths of all priors; `keep` takes the fit at every temper.
+
+    Raises what the model raises where even the start cannot be built.
+    """
+    problem = Problem(model, mechanisms)
+    p = np.zeros(problem.length) if start is None else start.copy()
+    for temper in tempers:
+        rates = model.rates(problem.parts(p)[0], problem.effects_of(p), rates)
+        p, lines, residuals = _settled(problem, p, rates, temper, steps, fresh=temper == 1.0)
+        if keep is not None or temper == tempers[-1]:
+            done = _finished(problem, p, rates, temper, lines, residuals)
+            if keep is not None:
+                keep.append(done)
+    return done
+
+
+def _settled(problem: Problem, p: Array, rates: Rates, temper: float, steps: int, fresh: bool) -> tuple[Array, Linearisation, list[Array]]:
+    """Steps at one temper until the cost stands still. Derivatives are taken anew only where steps do not do what they promise, and
+    with `fresh` at the end."""
+    lines = problem.linearisation(p, rates)
+    residuals, current, damping = lines.residuals, True, 1e-4
+    cost = _cost(residuals, p, temper)
+    for _ in range(8 * steps if temper == 1.0 else 3 * steps):
+        gradient = temper**2 * np.sum(lines.gradients(residuals), axis=0) + p
+        normal = temper**2 * lines.information + np.eye(problem.length)
+        for _ in range(6):
+            move = -np.linalg.solve(normal + damping * np.diag(np.diag(normal)), gradient)
+            share = min(1.0, LONGEST / max(float((np.abs(move) * problem.reach).max()), 1e-300))
+            move *= share
+            promised = -2 * float(gradient @ move) - float(move @ normal @ move)
+            there = problem.residuals(p + move)
+            new = np.inf if there is None else _cost(there, p + move, temper)
+            if new < cost or not current:
+                break
+            damping = max(10 * damping, 1e-3)
+        gained = cost - new
+        if gained > 0 and there is not None:
+            p, residuals, cost, damping, current = p + move, there, new, damping / 10, False
+        done = gained < (ENOUGH if temper == 1.0 else max(1.0, 0.02 * cost))
+        if (done and current) or (done and gained > -np.inf and promised < ENOUGH):
+            break
+        if gained < 0.6 * promised or done:
+            lines, current = problem.linearisation(p, rates), True
+            residuals = lines.residuals
+            if done and not fresh:
+                break
+    if fresh and not current:
+        lines = problem.linearisation(p, rates)
+        residuals = lines.residuals
+    return p, lines, residuals
+
+
+def _cost(residuals: Sequence[Array], p: Array, temper: float) -> float:
+    return temper**2 * sum(float(r @ r) for r in residuals) + float(p @ p)
+
+
+def _finished(problem: Problem, p: Array, rates: Rates, temper: float, lines: Linearisation, residuals: Sequence[Array]) -> Fit:
+    _, sizes, shapes = problem.parts(p)
+    gradients = lines.gradients(residuals)
+    by_test = tuple((float(r @ r), g, a) for r, g, a in zip(residuals, gradients, lines.by_test, strict=True))
+    return Fit(
+        problem.mechanisms,
+        p,
+        sizes,
+        tuple(tuple(float(v) for v in s) for s in shapes),
+        problem.roots,
+        sum(b[0] for b in by_test),
+        np.sum(gradients, axis=0),
+        lines.information,
+        by_test,
+        sum(d.count for d in problem.model.tests),
+        rates,
+        temper,
+    )

@@ -1,0 +1,163 @@
+"""What would have to drift, where nobody names a cause: every element's stiffness and damping, the rings' positions, the preload.
+
+Free-form models compete with the named effects by the same evidence. They have no law: how much they change in each test is free, only
+continuous over the conditions, and its width is learned. So a named effect whose law holds beats them, for it has less to choose; one
+whose law is wrong, or an effect that no catalogue has, does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from thermospindle.diagnosis.inference.mechanism import Mechanism
+from thermospindle.model.bearing.pair import PairState
+from thermospindle.model.machine import MOVES, Condition, RingMotion, Spindle
+from thermospindle.model.rotor.chain import RotorBase
+from thermospindle.model.tolerance import with_preload
+from thermospindle.model.types import Array
+from thermospindle.model.units import RPM
+from thermospindle.sim.effects.effect import Effect, Parameter, Values
+
+STIFFNESS_WIDTH, DAMPING_WIDTH, PRELOAD_WIDTH = 3.0, 20.0, 5.0  # %
+RING_WIDTH = 0.2  # um
+
+
+def free_forms(spindle: Spindle) -> list[Mechanism]:
+    """One mechanism for everything that might drift; its size in per cent (of ln) or um is what changes in each test."""
+    found = []
+    for joint in spindle.structure.joints:
+        for label, moves in _groups(joint.stiffness):
+            found.append(_form(f"{joint.name} {label} stiffness", "%", STIFFNESS_WIDTH, chain=_scaled(joint.name, moves, damping_too=True)))
+        found.append(_form(f"{joint.name} damping", "%", DAMPING_WIDTH, chain=_scaled(joint.name, range(0), damping_too=True, damping_only=True)))
+    names = [b.name for b in spindle.bearings]
+    sets = [("bearings", names), *([(name, [name]) for name in names] if len(names) > 1 else [])]
+    for label, own in sets:
+        found.append(_form(f"{label} stiffness", "%", STIFFNESS_WIDTH, pair=_stiffened(own, range(5))))
+        found.append(_form(f"{label} rings apart radially", "um", RING_WIDTH, motions=_moved(own, "outer_r")))
+    found.append(_form("bearings radial stiffness", "%", STIFFNESS_WIDTH, pair=_stiffened(names, (0, 1))))
+    found.append(_form("bearings axial stiffness", "%", STIFFNESS_WIDTH, pair=_stiffened(names, (2,))))
+    found.append(_form("bearings tilt stiffness", "%", STIFFNESS_WIDTH, pair=_stiffened(names, (3, 4))))
+    found.append(_form("bearings damping", "%", DAMPING_WIDTH, pair=_damped(names)))
+    found.append(_form("preload", "%", PRELOAD_WIDTH, spindle=_preloaded))
+    return found
+
+
+def _form(name: str, unit: str, width: float, **hooks: Any) -> Mechanism:
+    size = Parameter("change", unit, 0.0, width, width, (-400.0, 400.0) if unit == "%" else (-20.0, 20.0), f"change of {name}", "free")
+    effect = Effect(name, f"{name} drifts freely", "", (size,), "", (), "", **hooks)
+    return Mechanism(effect, {}, (), free=True)
+
+
+def _groups(stiffness: tuple[float, ...]) -> list[tuple[str, tuple[int, ...]]]:
+    """Moves that share a stiffness, as tolerances have them."""
+    found: list[tuple[str, tuple[int, ...]]] = []
+    for label, moves in (("axial", (2,)), ("lateral", (0, 1)), ("tilt", (3, 4))):
+        if not stiffness[moves[0]]:
+            continue
+        if len({stiffness[m] for m in moves}) == 1:
+            found.append((label, moves))
+        else:
+            found += [(MOVES[m].replace("_", " "), (m,)) for m in moves]
+    return found
+
+
+def _factor(values: Values) -> float:
+    return float(np.exp(values["change"] / 100))
+
+
+def _congruent(matrix: Array, moves, factor: float) -> Array:
+    """D K D with the root of `factor` on `moves`: those entries times the factor, and positive as before."""
+    d = np.ones(5)
+    d[list(moves)] = np.sqrt(factor)
+    return d[:, None] * matrix * d[None, :]
+
+
+def _scaled(name: str, moves, damping_too: bool, damping_only: bool = False):
+    def chain(spindle: Spindle, condition: Condition, values: Values, chain: RotorBase) -> RotorBase:
+        f = _factor(values)
+        elements = []
+        for e in chain.elements:
+            if e.name == name and damping_only:
+                e = replace(e, damping=f * e.damping)
+            elif e.name == name:
+                e = replace(e, stiffness=_congruent(e.stiffness, moves, f), damping=_congruent(e.damping, moves, f) if damping_too else e.damping)
+            elements.append(e)
+        return replace(chain, elements=tuple(elements))
+
+    return chain
+
+
+def _stiffened(names: list[str], moves):
+    def pair(spindle: Spindle, condition: Condition, values: Values, state: PairState) -> PairState:
+        f = _factor(values)
+        bearings = tuple(
+            replace(b, stiffness=_congruent(b.stiffness, moves, f), damping=_congruent(b.damping, moves, f)) if b.name in names else b
+            for b in state.bearings
+        )
+        return replace(state, bearings=bearings)
+
+    return pair
+
+
+def _damped(names: list[str]):
+    def pair(spindle: Spindle, condition: Condition, values: Values, state: PairState) -> PairState:
+        f = _factor(values)
+        return replace(state, bearings=tuple(replace(b, damping=f * b.damping) if b.name in names else b for b in state.bearings))
+
+    return pair
+
+
+def _moved(names: list[str], coordinate: str):
+    def motions(spindle: Spindle, condition: Condition, values: Values, by_bearing: dict[str, RingMotion]) -> dict[str, RingMotion]:
+        move = 1e-6 * values["change"]
+        return {b: replace(m, **{coordinate: getattr(m, coordinate) + move}) if b in names else m for b, m in by_bearing.items()}
+
+    return motions
+
+
+def _preloaded(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
+    return with_preload(spindle, spindle.pair.preload * _factor(values))
+
+
+def drifting(
+    element: str, *, name: str, title: str, equation: str, law: Callable, parameters: tuple[Parameter, ...], source: str
+) -> Effect:
+    """An effect of one's own: what the free form called `element` changes, by `law`(temperature C, speed rpm, values) in its unit.
+
+    What `spindle draft` writes is made with it; it acts where the free form acts, and at size zero not at all.
+    """
+
+    def form(spindle: Spindle) -> Mechanism:
+        found = next((m for m in free_forms(spindle) if m.name == element), None)
+        if found is None:
+            raise ValueError(f"effect {name}: spindle {spindle.name} has no {element}")
+        return found
+
+    def hook(key: str) -> Callable:
+        def changed(spindle: Spindle, condition: Condition, values: Values, what):
+            acting = getattr(form(spindle).effect, key)
+            change = float(law(condition.temperature, condition.speed / RPM, values))
+            return acting(spindle, condition, {"change": change}, what) if acting and change else what
+
+        return changed
+
+    def drawn(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
+        acting = form(spindle).effect.spindle
+        change = float(law(condition.temperature, condition.speed / RPM, values))
+        return acting(spindle, condition, {"change": change}) if acting and change else spindle
+
+    def idle(spindle: Spindle) -> str | None:
+        return None if any(m.name == element for m in free_forms(spindle)) else f"the scene has no {element}"
+
+    alike = ("grease_damping",) if "damping" in element else ("mount_compliance", "modulus_softening")
+    if any(word in element for word in ("rings", "preload", "bearings")):
+        alike = ("preload_loss", "bond_softening")
+    sees = f"whatever a change of {element} shows, over the conditions of its law"
+    return Effect(
+        name, title, equation, parameters, sees, alike, f"the tests it was drafted from: {source}", spindle=drawn, pair=hook("pair"),
+        motions=hook("motions"), chain=hook("chain"), idle=idle,
+    )  # fmt: skip

@@ -1,0 +1,452 @@
+"""The model of a campaign: residuals of every test in standard errors, and their derivatives, for any nuisance values and effects.
+
+The receptance between hammers B and points A is A D(s)^-1 B^T with D = s^2 M + s C + K. Everything that moves matrices alone has the exact
+derivative -A D^-1 (s^2 dM + s dC + dK) D^-1 B^T, so that one factorisation a line serves all parameters; what also moves rows, gains or
+delays is differenced. Structure enters K, C and M in proportion: these derivatives are taken once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from thermospindle.diagnosis.data.lines import LineData
+from thermospindle.diagnosis.data.mode_table import ModeData
+from thermospindle.diagnosis.inference import nuisance as kinds_of
+from thermospindle.diagnosis.inference.nuisance import Nuisance, ReferenceModes, nuisances, reference_modes
+from thermospindle.model.errors import NoEquilibrium, OutsideRange
+from thermospindle.model.machine import Condition, RingMotion, Spindle
+from thermospindle.model.rotor.chain import Matrices, matrices
+from thermospindle.model.rotor.modes import kinds, oscillating, poles
+from thermospindle.model.tolerance import Toleranced, toleranced
+from thermospindle.model.types import Array, ComplexArray, Integers
+from thermospindle.sim.campaign.beside import POWER, measured_at
+from thermospindle.sim.campaign.campaign import Campaign, Noise
+from thermospindle.sim.effects import of_scene
+from thermospindle.sim.effects.effect import HOOKS, Effect, Measurement, Values
+from thermospindle.sim.operating import OperatingPoint, operating_point
+
+Applied = Sequence[tuple[Effect, Values]]
+TestData = LineData | ModeData
+Discrepancies = tuple[Integers, Integers, Integers, Array]
+
+STEP = 0.02  # of a prior standard deviation, for differences
+MOST_MODES = 10  # of the discrepancy's basis
+MEASURING = frozenset(HOOKS) - {"measurement"}
+FAILED = (NoEquilibrium, OutsideRange, ValueError, RuntimeError, ZeroDivisionError, FloatingPointError, np.linalg.LinAlgError)
+"""What a model says at parameter values where no spindle can be built; a fit then steps less far."""
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """One test's linear model: matrices with dofs, and its measuring chain (None for a table of modes)."""
+
+    matrices: Matrices
+    chain: Measurement
+    layout: tuple
+
+
+@dataclass(eq=False)
+class CampaignModel:
+    """A spindle, the tests it is to explain and its nuisance parameters. Nuisance vectors are in prior standard deviations."""
+
+    spindle: Spindle
+    tests: tuple[TestData, ...]
+    scenes: tuple[Spindle, ...]  # the spindle with the points of each test
+    build: tuple[Toleranced, ...]
+    parameters: tuple[Nuisance, ...]
+    reference: ReferenceModes
+    present: Applied
+
+    def __getstate__(self) -> dict:
+        """Without what was worked out: it is on its way to another process."""
+        return {k: v for k, v in self.__dict__.items() if k not in ("_points", "_spindles", "_linearised")}
+
+    # ------------------------------------------------------------ the spindle at nuisance values
+
+    def _built(self, t: int, x: Array) -> Spindle:
+        values = x[: len(self.build)]
+        t = self._like[t]
+        key = (t, values.tobytes())
+        if key not in self._spindles:
+            if len(self._spindles) > 4 * len(self.tests):
+                self._spindles.clear()
+            spindle = self.scenes[t]
+            for parameter, value in zip(self.build, values, strict=True):
+                if value:
+                    spindle = parameter.apply(spindle, float(max(value * parameter.sd, -0.9)))
+            self._spindles[key] = spindle
+        return self._spindles[key]
+
+    @cached_property
+    def _spindles(self) -> dict:
+        return {}
+
+    @cached_property
+    def _like(self) -> list[int]:
+        """For every test the first that has the same points and hammers."""
+        keys = [(s.points, s.hammer.hammer_nodes) for s in self.scenes]
+        return [keys.index(key) for key in keys]
+
+    @cached_property
+    def _expansion(self) -> list[int]:
+        return [i for i, p in enumerate(self.parameters) if p.kind == kinds_of.EXPANSION]
+
+    @cached_property
+    def _temperature(self) -> list[int]:
+        return [next(i for i, p in enumerate(self.parameters) if p.kind == kinds_of.TEMPERATURE and p.test == t) for t in range(len(self.tests))]
+
+    @cached_property
+    def _discrepancies(self) -> list[tuple[Discrepancies, Discrepancies]]:
+        """For every test, of stiffness and of damping: parameter numbers, first and second mode of each, and its factor in the modal matrix."""
+        found = []
+        omega, damping = self.reference.omega, np.sqrt(2 * self.reference.damping * self.reference.omega)
+        for t in range(len(self.tests)):
+            of_test = []
+            for kinds_, scale, twice in (
+                ((kinds_of.STIFFNESS, kinds_of.STIFFNESS_DRIFT), omega, 2.0),
+                ((kinds_of.DAMPING, kinds_of.DAMPING_DRIFT), damping, 1.0),
+            ):
+                rows = [(n, *p.modes) for n, p in enumerate(self.parameters) if p.kind in kinds_ and p.test in (None, t)]
+                number, i, j = np.array(rows, int).reshape(-1, 3).T
+                sd = np.array([self.parameters[n].sd for n in number])
+                of_test.append((number, i, j, twice * sd * scale[i] * scale[j] * np.where(i == j, 1.0, np.sqrt(0.5))))
+            found.append((of_test[0], of_test[1]))
+        return found
+
+    @cached_property
+    def _gains(self) -> list[tuple[Integers, Integers]]:
+        """For every test the numbers of gain parameters and the channel of each."""
+        found = []
+        for t in range(len(self.tests)):
+            rows = [
+                (i, p.index)
+                for i, p in enumerate(self.parameters)
+                if p.kind == kinds_of.GAIN or (p.kind == kinds_of.DRIFT and p.test == t)
+            ]
+            number, channel = np.array(rows, int).reshape(-1, 2).T
+            found.append((number, channel))
+        return found
+
+    def operating(self, t: int, x: Array, effects: Applied) -> OperatingPoint:
+        """The operating point of test `t`; what differs in the measuring chain alone is not worked out again."""
+        acting = tuple((id(e), *v.values()) for e, v in effects if any(getattr(e, hook) for hook in MEASURING))
+        key = (t, x[: len(self.build)].tobytes(), float(x[self._temperature[t]]), x[self._expansion].tobytes(), acting)
+        late = self._points.get(key)
+        if late is None:
+            if len(self._points) > 6 * len(self.tests):
+                self._points.clear()
+            test = self.tests[t]
+            warmer = float(x[self._temperature[t]]) * self.parameters[self._temperature[t]].sd
+            condition = replace(test.condition, temperature=test.condition.temperature + warmer)
+            stretch = [1 + float(x[i]) * self.parameters[i].sd for i in self._expansion]
+            every = [_stretched(*stretch), *self.present, *effects] if x[self._expansion].any() else [*self.present, *effects]
+            late = self._points[key] = operating_point(self._built(t, x), condition, every)
+            late.chain  # noqa: B018 - worked out here, so that errors come here
+            return late
+        return replace_measuring(late, [*self.present, *effects])
+
+    @cached_property
+    def _points(self) -> dict:
+        return {}
+
+    @cached_property
+    def _linearised(self) -> dict:
+        return {}
+
+    def about(self, point: Array, rates: Rates) -> list[tuple[Array, Array, Integers]]:
+        """Residuals, derivatives and parameter numbers of every test without any effect at nuisance values `point`; the last is kept."""
+        key = point.tobytes()
+        if key not in self._linearised:
+            self._linearised.clear()
+            self._linearised[key] = [self.jacobian(t, point, [], rates) for t in range(len(self.tests))]
+        return self._linearised[key]
+
+    def linear(self, t: int, x: Array, effects: Applied) -> Linear:
+        point = self.operating(t, x, effects)
+        bare = point.__dict__.get("_bare")
+        if bare is None:
+            bare = matrices(point.chain)
+            object.__setattr__(point, "_bare", bare)
+        stiffness, damping = self._discrepancy(t, bare, x)
+        whole = Matrices(bare.mass, bare.damping + damping, bare.stiffness + stiffness, bare.dofs)
+        return Linear(whole, point.measurement, point.chain.layout)
+
+    def _discrepancy(self, t: int, linear: Matrices, x: Array) -> tuple[Array, Array]:
+        w = self.reference.over(linear.dofs)
+        added = []
+        for number, i, j, size in self._discrepancies[t]:
+            modal = np.zeros((len(self.reference.omega),) * 2)
+            np.add.at(modal, (i, j), size * x[number])
+            modal = np.where(modal == 0, modal.T, modal)
+            added.append(w @ modal @ w.T)
+        return added[0], added[1]
+
+    # ------------------------------------------------------------ residuals
+
+    def residual(self, t: int, x: Array, effects: Applied) -> Array:
+        """Residuals (N,) of test `t`, computed less measured, in standard errors."""
+        data = self.tests[t]
+        if isinstance(data, ModeData):
+            return _mode_residual(data, self.linear(t, x, effects))
+        return self._whitened(t, _Response(self.linear(t, x, effects), data, self._gain(t, x)).value, data.value)
+
+    def _gain(self, t: int, x: Array) -> Array:
+        number, channel = self._gains[t]
+        gain = np.zeros(self.channels)
+        np.add.at(gain, channel, x[number] * np.array([self.parameters[i].sd for i in number]))
+        return np.exp(gain)
+
+    @property
+    def channels(self) -> int:
+        return 1 + max((p.index for p in self.parameters if p.kind == kinds_of.GAIN), default=-1)
+
+    def _whitened(self, t: int, value: ComplexArray, measured: ComplexArray | float) -> Array:
+        data = self.tests[t]
+        assert isinstance(data, LineData)
+        left = ((value - measured) / data.sd * np.sqrt(2)).ravel()
+        return np.concatenate([left.real, left.imag])
+
+    def jacobian(self, t: int, x: Array, effects: Applied, rates: Rates) -> tuple[Array, Array, Integers]:
+        """Residuals (N,) of test `t`, their derivatives (N, k) by k nuisance parameters, and the numbers (k,) of these."""
+        data, linear = self.tests[t], self.linear(t, x, effects)
+        if isinstance(data, ModeData):
+            return self._mode_jacobian(t, data, linear, rates)
+        response = _Response(linear, data, self._gain(t, x))
+        own, channel = self._gains[t]
+        pairs = self._discrepancies[t]
+        numbers = np.concatenate([rates.numbers[t], *[row[0] for row in pairs], own])
+        n_resp, n_ref, lines = response.value.shape
+        weight = np.sqrt(2) / data.sd
+        jacobian = np.zeros((len(numbers), 2, n_resp, n_ref, lines))
+
+        def fill(first: int, moved: ComplexArray) -> int:
+            moved = moved * weight
+            jacobian[first : first + len(moved), 0], jacobian[first : first + len(moved), 1] = moved.real, moved.imag
+            return first + len(moved)
+
+        at = fill(0, response.moved(rates.mass[t], rates.damping[t], rates.stiffness[t]))
+        w = self.reference.over(linear.matrices.dofs)
+        left = np.ascontiguousarray((response.left @ w).transpose(2, 1, 0)) * response.factor  # (m, n_resp, L)
+        right = np.ascontiguousarray((w.T @ response.right).transpose(1, 2, 0))  # (m, n_ref, L)
+        for (_, i, j, whole), s in zip(pairs, (np.ones(1), response.s), strict=True):
+            size = -whole * np.where(i == j, 0.5, 1.0)
+            there = right * s
+            both = left[i][:, :, None] * (size[:, None, None] * there[j])[:, None]
+            both += left[j][:, :, None] * (size[:, None, None] * there[i])[:, None]
+            at = fill(at, both)
+        for k, c in enumerate(channel):
+            if c < n_resp:
+                gain = response.value[c] * weight[c] * self.parameters[own[k]].sd
+                jacobian[at + k, 0, c], jacobian[at + k, 1, c] = gain.real, gain.imag
+        return self._whitened(t, response.value, data.value), jacobian.reshape(len(numbers), -1).T, numbers
+
+    def column(self, t: int, x: Array, first: Applied, second: Applied, apart: float) -> Array:
+        """(residual at `second` - residual at `first`) / apart, (N,): the derivative by what differs between two lists of effects.
+
+        Where matrices alone differ the exact derivative of the FRF is taken, which has no error of the second order in the FRF.
+        """
+        data = self.tests[t]
+        at, moved = self.linear(t, x, first), self.linear(t, x, second)
+        same = at.layout == moved.layout and at.matrices.dofs == moved.matrices.dofs and _same_chain(at.chain, moved.chain)
+        if isinstance(data, ModeData):
+            return (_mode_residual(data, moved) - _mode_residual(data, at)) / apart
+        gain = self._gain(t, x)
+        response = _Response(at, data, gain)
+        if same:
+            difference = [(getattr(moved.matrices, k) - getattr(at.matrices, k))[None] / apart for k in ("mass", "damping", "stiffness")]
+            return self._whitened(t, response.moved(*difference)[0], 0.0)
+        return self._whitened(t, (_Response(moved, data, gain).value - response.value) / apart, 0.0)
+
+    # ------------------------------------------------------------ derivatives of the matrices
+
+    def rates(self, x: Array, effects_of: Sequence[Applied], old: Rates | None = None) -> Rates:
+        """dM, dC, dK by build tolerances, ring expansion and temperature, for every test; what structure alone moves is kept from `old`."""
+        numbers, mass, damping, stiffness = [], [], [], []
+        for t, effects in enumerate(effects_of):
+            base = self.operating(t, x, effects)
+            at = matrices(base.chain)
+            own = [*range(len(self.build)), *self._expansion, self._temperature[t]]
+            kept = old if old is not None and old.stiffness[t].shape[-1] == len(at.stiffness) else None
+            found: list[tuple[Array, Array, Array]] = []
+            for k, i in enumerate(own):
+                if kept and k < len(self.build) and self._structural[k]:
+                    found.append((kept.mass[t][k], kept.damping[t][k], kept.stiffness[t][k]))
+                    continue
+                step = x.copy()
+                step[i] += STEP
+                try:
+                    moved = matrices(self.operating(t, step, effects).chain)
+                    apart = STEP
+                except FAILED:  # the end of a law or of contact: from the other side
+                    step[i] -= 2 * STEP
+                    moved = matrices(self.operating(t, step, effects).chain)
+                    apart = -STEP
+                if moved.dofs != at.dofs:
+                    moved = at
+                changes = moved.mass - at.mass, moved.damping - at.damping, moved.stiffness - at.stiffness
+                found.append((changes[0] / apart, changes[1] / apart, changes[2] / apart))
+            by_mass, by_damping, by_stiffness = (np.array(v) for v in zip(*found, strict=True))
+            numbers.append(np.array(own))
+            mass.append(by_mass)
+            damping.append(by_damping)
+            stiffness.append(by_stiffness)
+        return Rates(tuple(numbers), tuple(mass), tuple(damping), tuple(stiffness))
+
+    @cached_property
+    def _structural(self) -> list[bool]:
+        """Which build tolerances leave the bearings alone."""
+        ends = [p.apply(self.spindle, 0.01) for p in self.build]
+        return [end.bearings is self.spindle.bearings and end.pair is self.spindle.pair for end in ends]
+
+    def _mode_jacobian(self, t: int, data: ModeData, linear: Linear, rates: Rates) -> tuple[Array, Array, Integers]:
+        """By first-order perturbation of the poles, -left (p^2 dM + p dC + dK) right (Lancaster 1964, AIAA J. 2, 1659)."""
+        found, partner, p = _partners(data, linear)
+        pole, right, left = p.value[found][partner], p.right[:, found][:, partner], p.left[found][partner]
+        stacks = [(rates.mass[t], rates.damping[t], rates.stiffness[t])]
+        numbers = [rates.numbers[t]]
+        w = self.reference.over(linear.matrices.dofs)
+        for of_damping, (number, i, j, whole) in enumerate(self._discrepancies[t]):
+            size = whole * np.where(i == j, 0.5, 1.0)
+            outer = size[:, None, None] * (w.T[i][:, :, None] * w.T[j][:, None, :] + w.T[j][:, :, None] * w.T[i][:, None, :])
+            zero = np.zeros_like(outer)
+            stacks.append((zero, outer, zero) if of_damping else (zero, zero, outer))
+            numbers.append(number)
+        m, c, k = (np.concatenate([s[i] for s in stacks]) for i in range(3))
+        moved = -sum(power * np.einsum("mi,kij,jm->mk", left, d, right) for power, d in ((pole[:, None] ** 2, m), (pole[:, None], c), (1.0, k)))
+        by_frequency = (moved * pole.conj()[:, None]).real / np.abs(pole[:, None]) ** 2
+        by_damping = moved.real / pole.real[:, None] - by_frequency
+        known = np.isfinite(data.damping_sd)
+        jacobian = np.concatenate([by_frequency / data.frequency_sd[:, None], by_damping[known] / data.damping_sd[known, None]])
+        return _mode_residual(data, linear), jacobian, np.concatenate(numbers)
+
+
+@dataclass(frozen=True, eq=False)
+class Rates:
+    """Derivatives (k, n, n) of mass, damping and stiffness of every test by the nuisance parameters `numbers` (k,)."""
+
+    numbers: tuple[Integers, ...]
+    mass: tuple[Array, ...]
+    damping: tuple[Array, ...]
+    stiffness: tuple[Array, ...]
+
+
+class _Response:
+    """FRFs of one test's linear model at its lines, in the measured quantity, with what their derivatives need."""
+
+    def __init__(self, linear: Linear, data: LineData, gain: Array) -> None:
+        chain, m = linear.chain, linear.matrices
+        n_resp = data.value.shape[0]
+        omega = 2 * np.pi * data.frequency
+        window = data.test.window_decay
+        self.s: ComplexArray = np.asarray(1j * omega + (chain.decay + window), complex)
+        dynamic = self.s[:, None, None] ** 2 * m.mass + self.s[:, None, None] * m.damping + m.stiffness
+        inverse = np.linalg.inv(dynamic)
+        self.left: ComplexArray = chain.response_rows[:n_resp] @ inverse  # (L, n_resp, n)
+        self.right: ComplexArray = inverse @ chain.reference_rows.T  # (L, n, n_ref)
+        self._references = chain.reference_rows.T
+        self.factor: ComplexArray = (
+            (gain[:n_resp] * chain.gain[:n_resp])[:, None]
+            * np.exp(-1j * omega * chain.delay[:n_resp, None])
+            * (self.s * (1j * omega + window) ** POWER[data.quantity])
+        )  # (n_resp, L)
+        receptance = self.left @ self._references  # (L, n_resp, n_ref)
+        self.value: ComplexArray = receptance.transpose(1, 2, 0) * self.factor[:, None, :]
+
+    def moved(self, mass: Array, damping: Array, stiffness: Array) -> ComplexArray:
+        """Derivatives (k, n_resp, n_ref, L) for dM, dC, dK (k, n, n)."""
+        k, n = mass.shape[:2]
+        lines, n_resp, _ = self.left.shape
+        flat = self.left.reshape(lines * n_resp, n)
+        total: ComplexArray = np.zeros((lines, n_resp, k, n), complex)
+        for power, matrix in ((2, mass), (1, damping), (0, stiffness)):
+            if matrix.any():
+                part = (flat @ matrix.transpose(1, 0, 2).reshape(n, k * n)).reshape(lines, n_resp, k, n)
+                total += part * (self.s**power)[:, None, None, None] if power else part
+        product = total.reshape(lines, n_resp * k, n) @ self.right  # (L, n_resp k, n_ref)
+        n_ref = product.shape[-1]
+        value = product.reshape(lines, n_resp, k, n_ref).transpose(2, 1, 3, 0)
+        return -value * self.factor[:, None, :]
+
+
+def _same_chain(a: Measurement, b: Measurement) -> bool:
+    return a is b or (
+        a.decay == b.decay
+        and all(np.array_equal(getattr(a, k), getattr(b, k)) for k in ("response_rows", "reference_rows", "gain", "delay"))
+    )
+
+
+def replace_measuring(point: OperatingPoint, effects: Applied) -> OperatingPoint:
+    """The same point under another list of effects that differs in the measuring chain alone; its chain and matrices are kept."""
+    if tuple(effects) == point.effects:
+        return point
+    other = replace(point, effects=tuple(effects))
+    other.__dict__["chain"] = point.chain
+    if "_bare" in point.__dict__:
+        other.__dict__["_bare"] = point.__dict__["_bare"]
+    return other
+
+
+def _stretched(radial: float, axial: float, grooves: float) -> tuple[Effect, Values]:
+    """Thermal ring motions times a factor each, in radius, along the axis, and of grooves."""
+    factors = {"inner_r": radial, "outer_r": radial, "inner_z": axial, "outer_z": axial, "inner_strain": grooves, "outer_strain": grooves}
+
+    def motions(spindle: Spindle, condition: Condition, values: Values, by_bearing: dict[str, RingMotion]) -> dict[str, RingMotion]:
+        return {b: replace(m, **{k: f * getattr(m, k) for k, f in factors.items()}) for b, m in by_bearing.items()}
+
+    return Effect("expansion", "", "", (), "", (), "", motions=motions), {}
+
+
+# ---------------------------------------------------------------- tables of modes
+
+
+def _partners(data: ModeData, linear: Linear):
+    """Poles of the model in order of frequency, and which of them is which measured mode: of its kind, near in ln frequency."""
+    p = poles(linear.matrices)
+    found = oscillating(p, 2.5 * float(data.frequency.max()))
+    frequency = np.abs(p.value[found]) / (2 * np.pi)
+    unlike = np.array(data.kind)[:, None] != np.array(kinds(linear.matrices, p.right[:, found]))[None, :]
+    # squares: two modes of a kind on one side of two measured ones cost the same either way in absolute differences, and would swap at random
+    cost = np.log(data.frequency[:, None] / frequency[None, :]) ** 2 + 9.0 * unlike
+    if cost.shape[1] < cost.shape[0]:
+        raise ValueError("the model has fewer modes than the table")
+    rows, columns = linear_sum_assignment(cost)
+    return found, columns[np.argsort(rows)], p
+
+
+def _mode_residual(data: ModeData, linear: Linear) -> Array:
+    found, partner, p = _partners(data, linear)
+    pole = p.value[found][partner] - linear.chain.decay
+    frequency, damping = np.abs(pole) / (2 * np.pi), -pole.real / np.abs(pole)
+    known = np.isfinite(data.damping_sd)
+    by_frequency = np.log(frequency / data.frequency) / data.frequency_sd
+    by_damping = np.log(np.maximum(damping[known], 1e-9) / data.damping[known]) / data.damping_sd[known]
+    return np.concatenate([by_frequency, by_damping])
+
+
+# ---------------------------------------------------------------- making one
+
+
+def campaign_model(spindle: Spindle, campaign: Campaign, tests: Sequence[TestData]) -> CampaignModel:
+    """The model of a campaign whose tests are `tests`."""
+    scenes = tuple(measured_at(spindle, campaign.points, d.test.frf) for d in tests)
+    present = tuple(of_scene(spindle))
+    reference = matrices(operating_point(spindle, Condition(spindle.reference_temperature), present).chain)
+    highest = max(float(d.frequency.max()) for d in tests)
+    modes = reference_modes(reference, 2 * np.pi * 1.15 * highest)
+    modes = replace(modes, omega=modes.omega[:MOST_MODES], damping=modes.damping[:MOST_MODES], weighted=modes.weighted[:, :MOST_MODES])
+    build = tuple(toleranced(spindle))
+    lines = [d for d in tests if isinstance(d, LineData)]
+    channels = max((d.value.shape[0] for d in lines), default=0)
+    names = [d.test.id for d in tests]
+    parameters = nuisances(spindle, build, names, bool(lines), channels, modes.omega)
+    return CampaignModel(spindle, tuple(tests), scenes, build, parameters, modes, present)
+
+
+def expected_noise(spindle: Spindle) -> Noise:
+    """The scene's own measuring accuracy."""
+    return Noise(spindle.hammer.noise_of_value, spindle.hammer.noise_of_largest)

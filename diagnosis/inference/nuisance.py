@@ -1,0 +1,99 @@
+"""What a fit may move beside the effects asked about: build tolerances, measuring errors, and how a model is constantly a little wrong.
+
+Every nuisance parameter is counted in its own prior standard deviations, so that all priors are N(0, 1) at the reference widths.
+
+`stiffness discrepancy` and `damping discrepancy` are the model's own constant errors (Kennedy & O'Hagan, *J. R. Statist. Soc. B* 63
+(2001) 425), as a random symmetric matrix in the coordinates of the reference modes (Soize, *Probab. Eng. Mech.* 15 (2000) 277):
+K + sum_ij e_ij w_i w_j (M f_i)(M f_j)^T with mass-normalised modes f of the reference condition. It is the same at every condition: it moves
+frequencies and mixes shapes, never their changes, and it is smooth where modes coincide. A drifting discrepancy is a much smaller one of each
+mode in each test: what laws that hold only nearly leave. The size of each is learned from the data.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import eigh
+
+from thermospindle.model.machine import Spindle
+from thermospindle.model.rotor.chain import Matrices
+from thermospindle.model.tolerance import Toleranced
+from thermospindle.model.types import Array
+
+BUILD, TEMPERATURE, GAIN, DRIFT, EXPANSION = "build", "temperature", "gain", "gain drift", "thermal expansion"
+STIFFNESS, DAMPING = "stiffness discrepancy", "damping discrepancy"
+STIFFNESS_DRIFT, DAMPING_DRIFT = "drifting stiffness discrepancy", "drifting damping discrepancy"
+STIFFNESS_SD = 1e-3  # relative error of a frequency at the reference width
+DAMPING_SD = 0.03  # relative error of a damping ratio at the reference width
+STIFFNESS_DRIFT_SD, DAMPING_DRIFT_SD = 1e-4, 0.01  # of one mode in one test, at the reference width
+DRIFT_SD = 1e-3  # of one channel's gain from test to test, at the reference width
+EXPANSION_SD = {"radial motion of the rings": 3e-3, "axial motion of the rings": 3e-3, "growth of the grooves": 0.03}
+"""Relative errors of thermal motions, the same at all temperatures: two honest finite-element programs differ by a thousandth in the motions, and
+in whether a groove grows with its ring's free strain or follows its face."""
+
+
+
+@dataclass(frozen=True)
+class Nuisance:
+    """One nuisance parameter; `sd` is one prior standard deviation in its own unit (relative or K).
+
+    `index` is the number of the toleranced parameter (build), the channel (gain), or unused; `modes` the pair of a discrepancy.
+    """
+
+    kind: str
+    name: str
+    sd: float
+    test: int | None = None
+    index: int = -1
+    modes: tuple[int, int] = (-1, -1)
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceModes:
+    """Undamped modes of the reference condition: angular frequencies (m,), damping ratios (m,), M f (n, m) over the named dofs."""
+
+    omega: Array
+    damping: Array
+    weighted: Array
+    dofs: tuple[tuple[str, str], ...]
+
+    def over(self, dofs: Sequence[tuple[str, str]]) -> Array:
+        """M f over other dofs: zero for those that the reference has not."""
+        place = {dof: i for i, dof in enumerate(self.dofs)}
+        return np.array([self.weighted[place[dof]] if dof in place else np.zeros(len(self.omega)) for dof in dofs])
+
+
+def reference_modes(linear: Matrices, highest: float) -> ReferenceModes:
+    """Modes below `highest` (rad/s) of the undamped, standing reference."""
+    squares, vectors = eigh(linear.stiffness, linear.mass)
+    omega = np.sqrt(np.maximum(squares, 0.0))
+    keep = (omega > 1e-3 * omega.max()) & (omega < highest)
+    modal = vectors[:, keep]
+    damping = np.einsum("ni,nm,mi->i", modal, (linear.damping + linear.damping.T) / 2, modal) / (2 * omega[keep])
+    return ReferenceModes(omega[keep], np.maximum(damping, 1e-4), linear.mass @ modal, linear.dofs)
+
+
+def nuisances(
+    spindle: Spindle, build: Sequence[Toleranced], tests: Sequence[str], with_lines: bool, channels: int, omega: Array
+) -> tuple[Nuisance, ...]:
+    """All nuisance parameters of a campaign with `tests` (ids): those of FRF lines only where a test has any."""
+    t = spindle.tolerances
+    found = [Nuisance(BUILD, p.name, p.sd, index=i) for i, p in enumerate(build)]
+    found += [Nuisance(EXPANSION, name, sd, index=i) for i, (name, sd) in enumerate(EXPANSION_SD.items())]
+    found += [Nuisance(TEMPERATURE, f"temperature of {name}", t.temperature, test=k) for k, name in enumerate(tests)]
+    for i in range(len(omega)):
+        for j in range(i, len(omega)):
+            of = f"mode {i + 1}" if i == j else f"modes {i + 1} and {j + 1}"
+            if i == j or with_lines:
+                found.append(Nuisance(STIFFNESS, f"stiffness discrepancy of {of}", STIFFNESS_SD, modes=(i, j)))
+                found.append(Nuisance(DAMPING, f"damping discrepancy of {of}", DAMPING_SD, modes=(i, j)))
+    for k, name in enumerate(tests):
+        for i in range(len(omega)):
+            found.append(Nuisance(STIFFNESS_DRIFT, f"frequency of mode {i + 1} in {name}", STIFFNESS_DRIFT_SD, test=k, modes=(i, i)))
+            found.append(Nuisance(DAMPING_DRIFT, f"damping of mode {i + 1} in {name}", DAMPING_DRIFT_SD, test=k, modes=(i, i)))
+    if with_lines:
+        found += [Nuisance(GAIN, f"gain of channel {c + 1}", t.gain, index=c) for c in range(channels)]
+        found += [Nuisance(DRIFT, f"gain of channel {c + 1} in {name}", DRIFT_SD, test=k, index=c) for k, name in enumerate(tests) for c in range(channels)]
+    return tuple(found)

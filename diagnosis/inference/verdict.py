@@ -1,0 +1,218 @@
+"""From the evidence of all hypotheses to a verdict: posterior probabilities, and the answer with the least expected loss.
+
+Loss of an answer, in units of a set that holds the truth: a wrong name costs ten times as much and a false alarm twenty times; to say
+"nothing" of a spindle that lacks something five times, as much as a set without the truth in it does beyond its own cost. Prior odds are even
+between nothing missing and something missing; within the catalogue every effect is as likely as another, two at once a quarter
+as likely as one, and something that is in no catalogue a seventh.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import comb
+
+import numpy as np
+
+from thermospindle.diagnosis.data.lines import LineData
+from thermospindle.diagnosis.inference import nuisance as kinds_of
+from thermospindle.diagnosis.inference.evidence import left_out
+from thermospindle.diagnosis.inference.fit import Problem
+from thermospindle.diagnosis.inference.model import CampaignModel
+from thermospindle.diagnosis.inference.search import Hypothesis, Search
+
+PRIOR = {"none": 0.5, "one": 0.33, "two": 0.08, "free": 0.05, "two free": 0.02, "one and free": 0.02}
+WRONG, FALSE_ALARM, MISSED, SET, HALF = 10.0, 20.0, 5.0, 1.0, 3.0
+ENOUGH = 0.95  # posterior probability that a set holds the truth
+LARGEST = 6  # names in a set, beyond which it says little
+NUMERICS = (1e-4, 0.01)  # drift of frequencies and of damping that two honest programs may differ by
+LAGS, SMALL = 12, 0.05  # lines over which residuals are compared, and the correlation that chance makes
+SPREAD = 3.0  # temperatures within so many tolerances of each other are one condition
+
+Names = tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """An explanation of the catalogue, or a free form: ln evidence over the model without effects and posterior probability."""
+
+    hypothesis: Hypothesis
+    names: Names
+    free: bool
+    delta_evidence: float
+    probability: float
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """`word` is none, identified, ambiguous, two effects or unexplained; `effects` what it names; `losses` the expected loss of every answer
+    weighed. `candidates` of the catalogue and `free` ones with the most probable first."""
+
+    word: str
+    effects: Names
+    reason: str
+    candidates: tuple[Candidate, ...]
+    free: tuple[Candidate, ...]
+    probability_none: float
+    probability_unknown: float
+    losses: Mapping[str, float]
+    held_out_before: float
+    held_out_after: float
+    accepted: Hypothesis
+
+
+def decide(found: Search) -> Verdict:
+    """The verdict with the least expected loss."""
+    named_count = len({s.mechanism.name for s in found.screened if not s.mechanism.free and s.visibility > 0}) or 1
+    free_count = len({s.mechanism.name for s in found.screened if s.mechanism.free and s.visibility > 0}) or 1
+    base = found.base.evidence.ln
+    correlated = inflation(found.model, found.hypotheses[0])
+    rows = [(h, _prior(h, named_count, free_count) + (h.evidence.ln - base) / correlated) for h in found.hypotheses]
+    top = max(w for _, w in rows)
+    total = np.log(sum(np.exp(w - top) for _, w in rows)) + top
+    every = [
+        Candidate(h, tuple(h.names), h.free, h.evidence.ln - base, float(np.exp(w - total))) for h, w in rows if h.mechanisms
+    ]
+    every.sort(key=lambda c: (-c.probability, -c.delta_evidence))
+    candidates = tuple(c for c in every if not c.free)
+    free = tuple(c for c in every if c.free)
+    none = float(np.exp(next(w for h, w in rows if not h.mechanisms) - total))
+    adrift = _adrift(found.base)  # nothing named, and yet more drifts than two honest programs differ by: that is something
+    if adrift:
+        free = (*free, Candidate(found.base, ("every mode",), True, 0.0, none))
+        free = tuple(sorted(free, key=lambda c: -c.probability))
+        none = 0.0
+    unknown = sum(c.probability for c in free)
+    word, effects, losses = _least_loss(candidates, none, free)
+    accepted = _accepted(found, word, effects, candidates)
+    groups = conditions_of(found)
+    before = left_out(found.model, found.base.fit, found.base.evidence, groups)
+    after = left_out(found.model, accepted.fit, accepted.evidence, groups)
+    reason = _reason(found, word, effects, candidates, free, none, before, after)
+    return Verdict(word, effects, reason, candidates, free, none, unknown, losses, before, after, accepted)
+
+
+def inflation(model: CampaignModel, best: Hypothesis) -> float:
+    """By how much neighbouring lines say the same: 1 + 2 sum of the autocorrelation of the residuals that the best explanation leaves.
+
+    One for noise. What a model misses is smooth over lines, and so many numbers are then worth fewer (Bartlett 1946; Bayley &
+    Hammersley, *J. R. Statist. Soc. Suppl.* 8 (1946) 184): ln evidence is divided by it.
+    """
+    problem, total, square = Problem(model, best.mechanisms), np.zeros(LAGS), 0.0
+    for t, data in enumerate(model.tests):
+        if not isinstance(data, LineData):
+            continue
+        r = problem.residual(t, best.fit.point).reshape(-1, data.value.shape[-1])
+        square += float(np.mean(r * r)) if r.size else 0.0
+        total += [float(np.mean(r[:, k:] * r[:, :-k])) if r.shape[1] > k else 0.0 for k in range(1, LAGS + 1)]
+    if square <= 0.0:
+        return 1.0
+    correlation = total / square
+    seen = np.cumprod(correlation > SMALL).astype(bool)  # up to where it is lost in chance
+    return float(1 + 2 * correlation[seen].sum())
+
+
+def _adrift(h: Hypothesis) -> bool:
+    """Whether the modes drift from test to test by more than the model's own numerics."""
+    sizes = h.evidence.learned.sizes
+    return sizes.get(kinds_of.STIFFNESS_DRIFT, 0.0) > NUMERICS[0] or sizes.get(kinds_of.DAMPING_DRIFT, 0.0) > NUMERICS[1]
+
+
+def _prior(h: Hypothesis, named: int, free: int) -> float:
+    """ln prior probability of one hypothesis: its kind's, shared out evenly."""
+    frees = sum(m.free for m in h.mechanisms)
+    count = len(h.mechanisms)
+    if count == 0:
+        return float(np.log(PRIOR["none"]))
+    if count == 1:
+        return float(np.log(PRIOR["free"] / free) if frees else np.log(PRIOR["one"] / named))
+    if frees == 0:
+        return float(np.log(PRIOR["two"] / max(comb(named, 2), 1)))
+    return float(np.log(PRIOR["two free"] / max(comb(free, 2), 1)) if frees == 2 else np.log(PRIOR["one and free"] / (named * free)))
+
+
+def _least_loss(candidates: Sequence[Candidate], none: float, free: Sequence[Candidate]) -> tuple[str, Names, dict[str, float]]:
+    unknown = [c for c in free if all(m.free for m in c.hypothesis.mechanisms)]  # also the model whose every mode drifts
+    beside = [c for c in free if not all(m.free for m in c.hypothesis.mechanisms)]  # a named effect and something unknown
+    something = 1 - none
+    losses: dict[str, float] = {"none": MISSED * something}
+    answers: dict[str, tuple[str, Names]] = {"none": ("none", ())}
+    p_unknown, p_beside = sum(c.probability for c in unknown), sum(c.probability for c in beside)
+
+    def named_loss(own: set[str]) -> float:
+        """Of naming one effect, or two: half right where one of two is named, or one beside something unknown."""
+        loss = FALSE_ALARM * none + WRONG * p_unknown
+        for c in candidates:
+            hit = own & set(c.names)
+            loss += c.probability * (0.0 if own == set(c.names) else HALF if hit else WRONG)
+        return loss + sum(c.probability * (HALF if own & {m.name for m in c.hypothesis.mechanisms if not m.free} else WRONG) for c in beside)
+
+    for c in candidates[:8]:
+        key = " + ".join(c.names)
+        losses[key], answers[key] = named_loss(set(c.names)), ("identified" if len(c.names) == 1 else "two effects", c.names)
+    chosen, share = list[Candidate](), 0.0
+    for c in candidates:
+        if share >= ENOUGH * something or len({n for k in chosen for n in k.names}) >= LARGEST:
+            break
+        chosen.append(c)
+        share += c.probability
+    names = tuple(dict.fromkeys(n for c in chosen for n in c.names))
+    if len(names) > 1:
+        outside = sum(c.probability for c in candidates) - share
+        key = "one of " + ", ".join(names)
+        losses[key] = FALSE_ALARM * none + SET * share * (1 + 0.1 * max(len(names) - 3, 0)) + (SET + MISSED) * (outside + p_unknown) + HALF * p_beside
+        answers[key] = ("ambiguous", names)
+    losses["unexplained"] = FALSE_ALARM * none + SET * 2 * sum(c.probability for c in candidates) + SET * p_beside
+    answers["unexplained"] = ("unexplained", ())
+    best = min(losses, key=lambda k: losses[k])
+    return *answers[best], losses
+
+
+def _accepted(found: Search, word: str, effects: Names, candidates: Sequence[Candidate]) -> Hypothesis:
+    """The hypothesis by which errors after the verdict are told: the best that it names."""
+    if word in ("none", "unexplained"):
+        return found.base
+    return next(c.hypothesis for c in candidates if set(c.names) <= set(effects))
+
+
+def conditions_of(found: Search) -> list[list[int]]:
+    """Numbers of the tests of every temperature, those within the thermometer's own scatter together."""
+    temperature = np.array([d.condition.temperature for d in found.model.tests])
+    order = np.argsort(temperature, kind="stable")
+    near = SPREAD * found.model.spindle.tolerances.temperature
+    groups: list[list[int]] = []
+    for t in order:
+        if groups and temperature[t] - temperature[groups[-1][-1]] <= near:
+            groups[-1].append(int(t))
+        else:
+            groups.append([int(t)])
+    return groups
+
+
+def _reason(found: Search, word: str, effects: Names, candidates, free, none: float, before: float, after: float) -> str:
+    n, chi2 = found.base.fit.count, found.base.evidence.chi2
+    if word == "none":
+        best = f"; the best effect, {' + '.join(candidates[0].names)}, has a probability of {candidates[0].probability:.1%}" if candidates else ""
+        return f"Tolerances and measuring errors explain the data: chi2 is {chi2 / n:.2f} a number for {n} numbers{best}."
+    lead = candidates[0] if candidates else None
+    if word == "unexplained":
+        place = "nothing tried explains them"
+        if free and free[0].hypothesis.mechanisms:
+            place = f"{' and '.join(free[0].names)} would have to drift ({free[0].delta_evidence:.0f} in ln evidence)"
+        elif free:
+            drift = found.base.evidence.learned.sizes[kinds_of.STIFFNESS_DRIFT]
+            place = f"every mode drifts from test to test, by {drift:.1g} of its frequency, more than two honest programs differ by"
+        rival = f"; the best of the catalogue, {' + '.join(lead.names)}, reaches {lead.delta_evidence:.0f}" if lead else ""
+        return f"No effect of the catalogue explains the data as well as free drift does: {place}{rival} (chi2 without effects: {chi2 / n:.2f} a number)."
+    assert lead is not None
+    named = " + ".join(effects)
+    checked = f"; conditions left out are predicted with {after:.2f} instead of {before:.2f} standard errors"
+    if word == "ambiguous":
+        rows = [c for c in candidates if set(c.names) <= set(effects)]
+        share = sum(c.probability for c in rows)
+        return f"One of {', '.join(effects)} explains the data (together {share:.0%} probable); no one of them is probable enough to be named{checked}."
+    disagreement = ", which does not confirm it" if after > 0.9 * before else ""
+    rest = 1 - lead.probability
+    odds = "all else together is less probable than 1 in 1000" if rest < 1e-3 else f"all else together has a probability of {rest:.1%}"
+    word_of = "are both needed" if word == "two effects" else "is the explanation"
+    return f"{named} {word_of}: {lead.delta_evidence:.0f} in ln evidence over the model without effects, {odds}{checked}{disagreement}."

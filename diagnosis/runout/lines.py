@@ -1,0 +1,263 @@
+"""What a runout test shows: amplitude and phase of every known line at every probe with standard errors, and lines that theory does not know.
+
+Lines are fitted by least squares at their known frequencies; lines too near to be told apart in the record are one, seen at its middle. What is left of
+the record around a line gives its standard error. The cage turns a little faster or slower than computed, since a contact angle is not exact: one
+relative change of d cos(angle) / D of all bearings is found from the record first. In a spectrum the squares of a line's bins are added up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermospindle.diagnosis.data.observe import condition_of
+from thermospindle.model.bearing.kinematics import Kinematics, Line, lines, row_kinematics
+from thermospindle.model.errors import BadInput
+from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.types import Array, ComplexArray
+from thermospindle.sim.campaign.campaign import Campaign, Test
+from thermospindle.sim.campaign.runout_record import WINDOWS, RunoutRecord
+from thermospindle.sim.operating import operating_point
+from thermospindle.sim.running.lines import fit
+
+MULTIPLE = 4  # of the number of balls and of even ball orders: highest lines looked for
+TOGETHER = 0.5  # bins: lines of a time record nearer than this are one; of a spectrum those that share bins
+REACH = {"none": 1, "hann": 2, "flattop": 4}  # bins on either side that hold a line of a spectrum
+OF_BINS = 0.04  # relative error of an amplitude from bins
+AROUND = 15  # bins on either side from which the floor around a line is told
+SLIPS = np.linspace(-0.006, 0.006, 49)  # relative changes of d cos(angle) / D that are tried
+SLIP_SD = 0.002  # how well a contact angle is believed, as that change
+FORM, LEAKS = 0.015, 0.03  # relative error of a line's form, and of what it leaks into its neighbours, however well its frequency is known
+APART = 6e-4  # how far the bearings' slips may differ from the common one
+STANDS_OUT = 30.0  # squared amplitude over the median around it from which a peak is a line: chance of 1e-9 a bin
+STRONG = 0.03  # of the strongest line of its probe: an unexplained line is at least so strong
+MOST = 12  # unexplained lines looked for
+
+Key = tuple[str, str, int, str, str]
+"""What names a line at every speed and temperature: bearing, cause, order, name, direction."""
+
+
+def key_of(line: Line) -> Key:
+    return line.bearing, line.cause, line.order, line.name, line.direction
+
+
+@dataclass(frozen=True, eq=False)
+class SeenLine:
+    """Lines of theory told as one: `phasor` (probes,) m at `frequency` (Hz) and standard errors `sd` (probes,), E|error|^2 = sd^2."""
+
+    frequency: float
+    lines: tuple[Line, ...]
+    phasor: ComplexArray
+    sd: Array
+
+
+@dataclass(frozen=True)
+class StrangeLine:
+    """A line that no line of theory explains."""
+
+    test: str
+    frequency: float  # Hz
+    order: float  # of the turning frequency
+    amplitude: float  # m, at the probe where it is strongest
+    node: int
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """One test: `slip` is the relative change of d cos(angle) / D found; `phased` whether the probes' phases mean something."""
+
+    test: Test
+    condition: Condition
+    nodes: tuple[int, ...]
+    seen: tuple[SeenLine, ...]
+    strange: tuple[StrangeLine, ...]
+    slip: float
+    phased: bool
+
+
+def runout_tests(campaign: Campaign) -> Campaign:
+    """The campaign with its runout tests alone."""
+    return replace(campaign, tests=tuple(t for t in campaign.tests if t.runout is not None))
+
+
+def modal_tests(campaign: Campaign) -> Campaign:
+    """The campaign with its modal tests alone."""
+    return replace(campaign, tests=tuple(t for t in campaign.tests if t.frf is not None or t.modes))
+
+
+def look(spindle: Spindle, test: Test) -> Seen:
+    """The lines of a runout test. `BadInput` where the record cannot hold the lines of the balls."""
+    record, condition = test.runout, condition_of(test)
+    assert record is not None
+    point = operating_point(spindle, condition)
+    kin = row_kinematics(point.spindle, point.state)
+    known = lines(point.spindle, kin, MULTIPLE)
+    first = max(line.frequency for line in lines(point.spindle, kin, 1))
+    if record.highest < 1.1 * first:
+        raise BadInput(
+            f"tests.{test.id}: runout holds nothing above {record.highest:.4g} Hz; the first lines of the balls reach {first:.4g} Hz, and a tenth more is needed"
+        )
+    limit = record.highest / (1.1 if record.kind == "time" else 1.02)
+    power = _power(record)
+    slip = _slip(point.spindle, kin, record, power, limit)
+    known = [line for line in lines(point.spindle, slipped(kin, slip), MULTIPLE) if line.frequency < limit]
+    together = TOGETHER if record.kind == "time" else 2.0 * REACH[record.window] + 1
+    clusters = _clusters(known, together / record.length)
+    frequency = np.array([float(np.mean(sorted({g.frequency for g in cluster}))) for cluster in clusters])
+    turning = abs(condition.speed) / (2 * np.pi)
+    if record.kind == "time":
+        phasor, sd, left = _fitted(record, frequency)
+        strange = _strange(test, record, left, frequency, np.abs(phasor).max(axis=1), turning, limit)
+    else:
+        phasor, sd = _summed(record, frequency)
+        sd = np.hypot(sd, OF_BINS * np.abs(phasor))
+        strange = ()
+    further = lines(point.spindle, slipped(kin, slip + APART), MULTIPLE)
+    moved = {key_of(g): g.frequency for g in further}
+    astray = [max(abs(moved.get(key_of(g), g.frequency) - g.frequency) for g in cluster) for cluster in clusters]
+    sd = np.sqrt(sd**2 + _form(clusters, frequency, np.abs(phasor), record.length, np.array(astray)) ** 2)
+    found = tuple(SeenLine(float(f), tuple(c), phasor[:, i], sd[:, i]) for i, (f, c) in enumerate(zip(frequency, clusters, strict=True)))
+    return Seen(test, condition, record.nodes, found, strange, slip, record.phased)
+
+
+def slipped(kin: Mapping[str, Kinematics], slip: float) -> dict[str, Kinematics]:
+    """Cage and ball speeds with d cos(angle) / D changed by a relative `slip` in every bearing."""
+
+    def of(k: Kinematics) -> Kinematics:
+        gamma = (2 * k.cage - k.inner - k.outer) / (k.outer - k.inner)
+        changed = gamma * (1 + slip)
+        cage = (k.inner * (1 - changed) + k.outer * (1 + changed)) / 2
+        return replace(k, cage=cage, spin=k.spin * (1 - changed**2) / (1 - gamma**2))
+
+    return {name: of(k) for name, k in kin.items()}
+
+
+def _clusters(known: list[Line], near: float) -> list[list[Line]]:
+    """Lines in order of frequency, those within `near` (Hz) of the one before together."""
+    found: list[list[Line]] = []
+    for line in sorted(known, key=lambda g: g.frequency):
+        if found and line.frequency - found[-1][-1].frequency <= near:
+            found[-1].append(line)
+        else:
+            found.append([line])
+    return found
+
+
+def _form(clusters: list[list[Line]], frequency: Array, size: Array, length: float, astray: Array) -> Array:
+    """Errors (probes, k) of lines of `size` (probes, k) that are not of noise: frequencies `astray` (k,) Hz, lines that beat, neighbours that leak."""
+    spread = np.array([c[-1].frequency - c[0].frequency for c in clusters]) * length
+    off = astray * length
+    apart = np.abs(frequency[:, None] - frequency) * length
+    np.fill_diagonal(apart, np.inf)
+    leaked = size**2 @ ((LEAKS + off)[:, None] / np.maximum(apart, 0.5)) ** 2
+    return np.asarray(np.sqrt((size * (FORM + 1 - np.sinc(spread / 2) * np.sinc(off))) ** 2 + leaked))
+
+
+# ---------------------------------------------------------------- the cage
+
+
+def _power(record: RunoutRecord) -> tuple[Array, Array]:
+    """Frequency (m,) and squared amplitude over its median around (m,), summed over probes, finely interpolated for a time record."""
+    if record.kind == "spectrum":
+        frequency, value = record.axis, np.abs(record.value) ** 2
+    else:
+        n = record.value.shape[1]
+        centred = (record.value - record.value.mean(axis=1, keepdims=True)) * np.hanning(n + 1)[:-1]
+        value = np.abs(np.fft.rfft(centred, 8 * n)) ** 2
+        frequency = np.fft.rfftfreq(8 * n, record.step)
+    floor = np.median(value, axis=1, keepdims=True)
+    return frequency, np.asarray((value / floor).sum(axis=0))
+
+
+def _slip(spindle: Spindle, kin: Mapping[str, Kinematics], record: RunoutRecord, power: tuple[Array, Array], limit: float) -> float:
+    """The slip at which the lines of the balls are strongest, with its prior; 0 for a spectrum, whose bins are no finer than their lines."""
+    if record.kind == "spectrum":
+        return 0.0
+
+    def score(slip: float) -> float:
+        at = {g.frequency for g in lines(spindle, slipped(kin, slip), MULTIPLE) if g.frequency < limit and g.bearing}
+        return float(np.log1p(np.interp(sorted(at), *power)).sum()) - 0.5 * (slip / SLIP_SD) ** 2
+
+    scores = np.array([score(s) for s in SLIPS])
+    best = int(np.clip(scores.argmax(), 1, len(SLIPS) - 2))
+    low, middle, high = scores[best - 1 : best + 2]
+    bend = low - 2 * middle + high
+    return float(SLIPS[best] + (0.5 * (low - high) / bend * (SLIPS[1] - SLIPS[0]) if bend < 0 else 0.0))
+
+
+# ---------------------------------------------------------------- a time record
+
+
+def _fitted(record: RunoutRecord, frequency: Array) -> tuple[ComplexArray, Array, Array]:
+    """Phasors (probes, k), standard errors (probes, k) and what is left of the record (probes, n)."""
+    try:
+        found = fit(record.axis, record.value, frequency)
+    except ValueError as error:
+        raise BadInput(f"runout: {error}; a longer record is needed") from None
+    n, length = record.value.shape[1], record.length
+    square = np.abs(np.fft.rfft(found.residual)) ** 2 * 4 / n**2
+    bins = np.arange(square.shape[1]) / length
+    floor = np.array([_floor(square, bins, f, frequency, length) for f in frequency]).T
+    overlap = np.sinc((frequency[:, None] - frequency) * length)
+    return found.phasor, np.sqrt(floor * np.diag(np.linalg.inv(overlap))), found.residual
+
+
+def _floor(square: Array, bins: Array, f: float, fitted: Array, length: float) -> Array:
+    """Mean squared amplitude (probes,) of the bins around f that hold no fitted line: their median over ln 2."""
+    near = np.abs(bins - f) < AROUND / length
+    free = near & (np.abs(bins[:, None] - fitted).min(axis=1) > 0.6 / length)
+    chosen = free if free.sum() >= 5 else near
+    return np.asarray(np.median(square[:, chosen], axis=1) / np.log(2))
+
+
+def _strange(
+    test: Test, record: RunoutRecord, left: Array, fitted: Array, strongest: Array, turning: float, limit: float
+) -> tuple[StrangeLine, ...]:
+    """Peaks of the rest that stand out of their surroundings and lie at no fitted line, strongest first."""
+    n, length = left.shape[1], record.length
+    window = np.hanning(n + 1)[:-1]
+    amplitude = np.abs(np.fft.rfft(left * window)) * 2 / window.sum()
+    frequency = np.fft.rfftfreq(n, record.step)
+    free: NDArray[np.bool_] = (
+        (np.abs(frequency[:, None] - fitted).min(axis=1) > 3 / length) & (frequency > 3 / length) & (frequency < limit)
+    )
+    found: list[StrangeLine] = []
+    for i in np.argsort(-(amplitude / strongest[:, None]).max(axis=0) * free):
+        if len(found) == MOST or not free[i]:
+            break
+        probe = int((amplitude[:, i] / strongest).argmax())
+        around = amplitude[probe, max(0, i - AROUND) : i + AROUND + 1]
+        near = any(abs(g.frequency - frequency[i]) < 4 / length for g in found)
+        if amplitude[probe, i] < STRONG * strongest[probe]:
+            break
+        if not near and amplitude[probe, i] ** 2 > STANDS_OUT * float(np.median(around)) ** 2:
+            order = float(frequency[i]) / turning
+            found.append(StrangeLine(test.id, float(frequency[i]), order, float(amplitude[probe, i]), record.nodes[probe]))
+    return tuple(found)
+
+
+# ---------------------------------------------------------------- a spectrum
+
+
+def _summed(record: RunoutRecord, frequency: Array) -> tuple[ComplexArray, Array]:
+    """Amplitudes from the squares of the bins around each line less the floor's, with the phase of the highest bin; standard errors."""
+    reach, bandwidth = REACH[record.window], WINDOWS[record.window]
+    square = np.abs(record.value) ** 2
+    phasor, sd = np.zeros((len(record.nodes), len(frequency)), complex), np.zeros((len(record.nodes), len(frequency)))
+    places = np.rint((frequency - record.axis[0]) / record.step).astype(int)
+    taken = np.zeros(square.shape[1], bool)
+    for place in places:
+        taken[max(0, place - reach) : place + reach + 1] = True
+    for k, place in enumerate(places):
+        low, high = max(0, place - reach), min(square.shape[1], place + reach + 1)
+        around = np.arange(max(0, place - 2 * AROUND), min(square.shape[1], place + 2 * AROUND + 1))
+        free = around[~taken[around]]
+        floor = np.median(square[:, free if len(free) >= 5 else around], axis=1) / np.log(2)
+        total = np.maximum(square[:, low:high].sum(axis=1) - (high - low) * floor, 0.0) / bandwidth
+        top = square[:, low:high].sum(axis=0).argmax() + low
+        phasor[:, k] = np.sqrt(total) * np.exp(1j * np.angle(record.value[:, top]))
+        sd[:, k] = np.sqrt(floor * (high - low) / bandwidth)
+    return phasor, sd

@@ -1,0 +1,180 @@
+"""What every possible imperfection of a spindle would show at the probes of runout tests, and how large each is likely to be.
+
+A *source* is one kind of imperfection seen in one line: an unbalance, a wave of one order on one race, radial or axial, the sizes of the balls
+of a row, their waves, a cage. What a source shows is linear in its complex amplitude. That amplitude is unknown: a scene's imperfections are
+one draw, of which another spindle of the drawing has only the size. Its likely size (rms) is the scene's own, pooled over rings, bearings and orders,
+races falling as 1/order and balls as 1/order^2 as in `model.imperfections.drawn`; where a scene has none of a kind, that of its grade "high precision".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from thermospindle.diagnosis.runout.lines import MULTIPLE, Key, Seen, key_of
+from thermospindle.model.drawn import GRADES
+from thermospindle.model.imperfections import Imperfections, RowImperfections, Wave
+from thermospindle.model.machine import Point, Spindle
+from thermospindle.model.rotor.chain import motion_rows
+from thermospindle.model.tolerance import toleranced
+from thermospindle.model.types import Array, ComplexArray
+from thermospindle.sim.effects.effect import Effect, Values
+from thermospindle.sim.operating import OperatingPoint, operating_point
+from thermospindle.sim.running.excitation import at_speed, chain_response, excitation
+
+GRADE = GRADES["high precision"]
+ECCENTRIC = 0.1e-6  # m, rms eccentricity of a race where the scene tells none
+CAGE = 4e-9  # kg m, rms unbalance of a cage where the scene tells none: 0.5 g that is 8 um off centre
+FIRST, SECOND = "first", "second"
+"""Two sources share a line of a race (a radial and an axial wave) and of the turning part (static and couple unbalance)."""
+
+SourceKey = tuple[Key, str]
+
+
+@dataclass(frozen=True, eq=False)
+class Sources:
+    """`shown[source]` (tests, probes) m per unit amplitude, `by_tolerance[source]` (parameters, tests, probes) its derivative by the relative
+    build parameters `names` with standard deviations `sd`; `likely[source]` the rms amplitude (m, kg m, kg m2); `points` of the tests."""
+
+    shown: Mapping[SourceKey, ComplexArray]
+    by_tolerance: Mapping[SourceKey, ComplexArray]
+    likely: Mapping[SourceKey, float]
+    names: tuple[str, ...]
+    sd: Array
+    points: tuple[OperatingPoint, ...]
+    probes: tuple[tuple[Point, ...], ...]
+
+
+def sources(spindle: Spindle, seen: Sequence[Seen], points: Sequence[Point]) -> Sources:
+    """All sources of a spindle in runout tests whose probes are among `points`."""
+    by_node = {p.node: p for p in points}
+    probes = [tuple(by_node[n] for n in s.nodes) for s in seen]
+    width = max(len(p) for p in probes)
+    nominal = [operating_point(spindle, s.condition) for s in seen]
+    shown = _all(spindle, nominal, probes, width)
+    build = toleranced(spindle)
+    by_tolerance = {key: np.zeros((len(build), *value.shape), complex) for key, value in shown.items()}
+    for k, parameter in enumerate(build):
+        step = 0.3 * parameter.sd
+        other = parameter.apply(spindle, step)
+        moved = _all(other, [operating_point(other, s.condition) for s in seen], probes, width)
+        for key, value in moved.items():
+            by_tolerance[key][k] = (value - shown[key]) / step
+    likely = {key: _likely(spindle, nominal[0].imperfections, key) for key in shown}
+    return Sources(
+        shown, by_tolerance, likely, tuple(p.name for p in build), np.array([p.sd for p in build]), tuple(nominal), tuple(probes)
+    )
+
+
+def _all(spindle: Spindle, at: Sequence[OperatingPoint], probes: Sequence[Sequence[Point]], width: int) -> dict[SourceKey, ComplexArray]:
+    found: dict[SourceKey, ComplexArray] = {}
+    for which, unit in units(spindle).items():
+        for t, point in enumerate(at):
+            for key, value in phasors(point, unit, probes[t]).items():
+                found.setdefault((key, which), np.zeros((len(at), width), complex))[t, : len(value)] = value
+    return found
+
+
+def phasors(point: OperatingPoint, imperfections: Imperfections, probes: Sequence[Point]) -> dict[Key, ComplexArray]:
+    """Phasors (probes,) m of every line that imperfections would excite at a point."""
+    forces = at_speed(excitation(point, imperfections), 1.0)
+    moved = chain_response(point.chain, forces)
+    rows = np.array([np.array(p.direction) @ motion_rows(point.chain, p.body, p.position)[:3] for p in probes])
+    return {key_of(line): rows @ one for line, one in zip(forces.line, moved, strict=True)}
+
+
+def scatter(spindle: Spindle, point: OperatingPoint, probes: Sequence[Point]) -> dict[Key, Array]:
+    """Variance (probes,) m2 of every line among spindles of this drawing: what its sources of their likely sizes show."""
+    found: dict[Key, Array] = {}
+    for source, value in _all(spindle, [point], [probes], len(probes)).items():
+        found[source[0]] = (
+            found.get(source[0], np.zeros(len(probes))) + np.abs(_likely(spindle, point.imperfections, source) * value[0]) ** 2
+        )
+    return found
+
+
+def units(spindle: Spindle) -> dict[str, Imperfections]:
+    """Imperfections in which every source has the amplitude 1."""
+    body = next(b for b in spindle.structure.bodies if b.turns)
+    first, second = {}, {}
+    for b in spindle.bearings:
+        orders = [1, *(k * b.balls + by for k in range(1, MULTIPLE + 1) for by in (-1, 0, 1))]
+        waves = tuple(Wave(n, 1.0, 0.0) for n in orders)
+        balls = (tuple(Wave(n, 1.0, 0.0) for n in range(2, 2 * MULTIPLE + 1, 2)), *[()] * (b.balls - 1))
+        first[b.name] = RowImperfections(waves, (), waves, (), (1.0, *[0.0] * (b.balls - 1)), balls, 1.0)
+        second[b.name] = RowImperfections((), waves, (), waves)
+    return {FIRST: Imperfections(1.0, body.z, bearings=first), SECOND: Imperfections(couple_unbalance=1.0, bearings=second)}
+
+
+def of_effect(found: Sources, effect: Effect, values: Values) -> dict[SourceKey, complex]:
+    """Amplitudes of the sources that make up an effect: what its own function adds to a spindle without imperfections.
+
+    Within a line the parts of the sources come from the phasors at the probes of all tests, least squares.
+    """
+    if effect.imperfections is None:
+        return {}
+    shown: dict[Key, ComplexArray] = {}
+    width = next(iter(found.shown.values())).shape
+    for t, point in enumerate(found.points):
+        made = effect.imperfections(point.spindle, point.condition, values, Imperfections())
+        for key, value in phasors(point, made, found.probes[t]).items():
+            shown.setdefault(key, np.zeros(width, complex))[t, : len(value)] = value
+    amplitudes: dict[SourceKey, complex] = {}
+    for key, value in shown.items():
+        own = [(key, which) for which in (FIRST, SECOND) if (key, which) in found.shown]
+        if not own:
+            continue
+        basis = np.array([found.shown[s].ravel() for s in own]).T
+        size = np.linalg.norm(basis, axis=0)
+        part = np.linalg.lstsq(basis / size, value.ravel(), rcond=1e-10)[0] / size
+        amplitudes |= {
+            s: complex(a) for s, a in zip(own, part, strict=True) if abs(a) > 1e-9 * np.abs(part * size).max() / size[own.index(s)]
+        }
+    return amplitudes
+
+
+# ---------------------------------------------------------------- how large
+
+
+def _likely(spindle: Spindle, made: Imperfections, source: SourceKey) -> float:
+    """The rms amplitude of a source: the scene's level of its kind, or what the scene and its effects have of it, whichever is more."""
+    (bearing, cause, order, _, _), which = source
+    scene = spindle.imperfections
+    if cause == "unbalance":
+        body = next(b for b in spindle.structure.bodies if b.turns)
+        static = 0.5 * body.mass * GRADE.balance / spindle.nominal_speed
+        span = max(b.z for b in spindle.bearings) - min(b.z for b in spindle.bearings)
+        told = [scene.unbalance or static, made.unbalance]
+        if which == SECOND:
+            told = [scene.couple_unbalance or 0.5 * span * static, made.couple_unbalance + made.unbalance * abs(made.unbalance_z - body.z)]
+        return max(told)
+    row, rows = made.row(bearing), [scene.row(b.name) for b in spindle.bearings]
+    if cause == "cage unbalance":
+        return max(_rms([r.cage_unbalance for r in rows]) or CAGE, row.cage_unbalance)
+    balls = spindle.bearing(bearing).balls
+    if cause == "ball size":
+        level = _rms([d for r in rows for d in r.ball_diameter]) or GRADE.ball_lot / np.sqrt(12)
+        return float(
+            max(level * np.sqrt(balls), np.linalg.norm(np.subtract(row.ball_diameter or (0.0,), np.mean(row.ball_diameter or (0.0,)))))
+        )
+    if cause == "ball waviness":
+        level = _rms([w.amplitude * (w.order / 2) ** 2 for r in rows for waves in r.ball_waves for w in waves if w.order % 2 == 0])
+        level = (level or 0.2 * GRADE.ball_form) * (order / 2) ** -2.0
+        own = [w.amplitude for waves in row.ball_waves for w in waves if w.order == order]
+        return float(max(level * np.sqrt(balls), np.linalg.norm(own) if own else 0.0))
+    kind = f"{cause.split()[0]}_{'radial' if which == FIRST else 'axial'}"
+    own = [w.amplitude for w in getattr(row, kind) if w.order == order]
+    return max(_race_level(rows, kind[6:], order), float(np.sum(own)))
+
+
+def _race_level(rows: Sequence[RowImperfections], direction: str, order: int) -> float:
+    waves = [w for r in rows for ring in ("inner", "outer") for w in getattr(r, f"{ring}_{direction}")]
+    if order == 1:
+        return _rms([w.amplitude for w in waves if w.order == 1]) or (ECCENTRIC if direction == "radial" else 0.1 * ECCENTRIC)
+    return (_rms([w.amplitude * w.order / 2 for w in waves if w.order > 1]) or GRADE.race) * 2.0 / order
+
+
+def _rms(values: Sequence[float]) -> float:
+    return float(np.sqrt(np.mean(np.square(values)))) if len(values) else 0.0

@@ -1,0 +1,355 @@
+"""Which imperfection of a running spindle is larger than its scene lets expect: unbalance, a race and its order, a ball, a cage.
+
+Effects are compared by evidence with all tolerances free, and one of five verdicts is given. The data are the lines of runout
+tests (`runout_lines`); without an effect every imperfection has an unknown amplitude of the size the scene tells (`runout_sources`); an effect adds one of its
+own size, and what cannot be continuous (order, ring, bearing) is tried choice by choice: a *variant*. Everything falls apart into families of lines
+(`runout_fit`), so that an effect is fitted to the lines it can move alone. Parameters that runout cannot tell (phases at an unknown start) stay typical.
+
+Lines in a record that theory does not know are unexplained whatever the rest says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+from scipy.stats import chi2 as chi_squared
+
+from thermospindle.diagnosis.runout.fit import Family, FamilyFit, families, fit_family, merged
+from thermospindle.diagnosis.runout.lines import Seen, StrangeLine, look, runout_tests
+from thermospindle.diagnosis.runout.sources import SourceKey, Sources, of_effect, sources
+from thermospindle.diagnosis.search.screening import CLEAR
+from thermospindle.model.machine import Spindle
+from thermospindle.model.types import Array
+from thermospindle.sim.campaign.campaign import Campaign
+from thermospindle.sim.effects import CATALOGUE, of_scene
+from thermospindle.sim.effects.effect import Effect
+
+AHEAD = 5.0  # ln evidence by which it must lead every rival to be identified
+MISFIT = 1e-4  # probability below which a misfit is not chance
+FALLS = 1 / 3  # held-out error ratio that counts as a clear fall
+WORTH = 4.0  # chi2 of the sources of a variant, fitted without it, from which it is worth a fit of its own
+SLACK = 1.5  # chi2 a number up to which a misfit is laid to the errors of lines, which are known but roughly
+ONE = 1e-3  # of the typical size, at which an effect's sources are told: they are linear in it
+
+
+@dataclass(frozen=True, eq=False)
+class Variant:
+    """One choice of an effect's discrete parameters; `amplitudes` of its sources a unit of its first parameter; `parts` numbers of its families."""
+
+    effect: Effect
+    values: Mapping[str, float]
+    amplitudes: Mapping[SourceKey, complex]
+    parts: tuple[int, ...]
+
+    @property
+    def prior(self) -> float:
+        return self.effect.parameters[0].prior_sd
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """Variants fitted together: `size` and `size_sd` of each; evidence over the model without effects; chi2 of all lines with priors."""
+
+    variants: tuple[Variant, ...]
+    size: Array
+    size_sd: Array
+    delta_evidence: float
+    chi2: float
+    probability: float = 0.0
+    held_out_ratio: float = 1.0
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        return tuple(v.effect.name for v in self.variants)
+
+    @property
+    def believable(self) -> bool:
+        limits = [v.effect.parameters[0].limits for v in self.variants]
+        return all(low < s < high for s, (low, high) in zip(self.size, limits, strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class RunoutDiagnosis:
+    """The verdict; `base` are the fits of all families without effects; `smallest` the size of each effect the data could show at `CLEAR`."""
+
+    verdict: str
+    effects: tuple[str, ...]
+    reason: str
+    explanations: tuple[Explanation, ...]
+    seen: tuple[Seen, ...]
+    found: Sources
+    families: tuple[Family, ...]
+    base: tuple[FamilyFit, ...]
+    smallest: Mapping[str, float]
+    strange: tuple[StrangeLine, ...]
+    held_out_before: float
+    held_out_after: float
+
+    @property
+    def chi2(self) -> float:
+        return sum(f.chi2 for f in self.base)
+
+    @property
+    def count(self) -> int:
+        return sum(f.count for f in self.families)
+
+
+def diagnose_runout(
+    spindle: Spindle, campaign: Campaign, catalogue: Sequence[Effect] = CATALOGUE, progress: Callable[[str], None] = lambda done: None
+) -> RunoutDiagnosis:
+    """The diagnosis of the runout tests of a campaign; effects that the scene has already are left as they are."""
+    seen = []
+    for test in runout_tests(campaign).tests:
+        seen.append(look(spindle, test))
+        progress(f"{test.id}: {len(seen[-1].seen)} lines")
+    found = sources(spindle, seen, campaign.points)
+    parts = families(seen, found)
+    base = [fit_family(f) for f in parts]
+    progress("lines fitted without any effect")
+    present = {effect.name for effect, _ in of_scene(spindle)}
+    effects = [e for e in catalogue if e.imperfections is not None and e.name not in present]
+    tried = [v for e in effects for v in variants(e, found, parts)]
+    fits = [_fitted((v,), parts, base, worth=True) for v in tried]
+    best = _best_of_each(fits)
+    progress(f"{len(fits)} variants of {len(effects)} effects tried")
+    pairs = _pairs(best, tried, parts, base)
+    return _verdict(seen, found, parts, base, effects, fits, best, pairs)
+
+
+def variants(effect: Effect, found: Sources, parts: Sequence[Family]) -> list[Variant]:
+    """Every choice of the effect's discrete parameters that shows in some line, each once."""
+    main = effect.parameters[0]
+    small = main.neutral + ONE * (main.typical - main.neutral)
+    told: dict[tuple[tuple[SourceKey, complex], ...], Variant] = {}
+    for chosen in product(*[p.choices or (p.typical,) for p in effect.parameters[1:]]):
+        values = {main.name: small, **{p.name: v for p, v in zip(effect.parameters[1:], chosen, strict=True)}}
+        amplitudes = {s: a / (small - main.neutral) for s, a in of_effect(found, effect, values).items()}
+        own = tuple(i for i, f in enumerate(parts) if any(source in amplitudes for source, _ in f.source))
+        largest = max((abs(a) for a in amplitudes.values()), default=1.0)
+        key = tuple((s, complex(np.round(amplitudes[s] / largest, 6))) for s in sorted(amplitudes))
+        if own and key not in told:
+            told[key] = Variant(effect, {k: v for k, v in values.items() if k != main.name}, amplitudes, own)
+    return list(told.values())
+
+
+def _fitted(chosen: Sequence[Variant], parts: Sequence[Family], base: Sequence[FamilyFit], worth: bool = False) -> Explanation:
+    """The fit of variants to the families they move; the others stay. With `worth` one that cannot gain anything is told at size zero."""
+    own = sorted({i for v in chosen for i in v.parts})
+    family = merged([parts[i] for i in own])
+    b = [family.of_effect(v.amplitudes) for v in chosen]
+    before_evidence, before_chi2 = sum(base[i].evidence for i in own), sum(base[i].chi2 for i in own)
+    total = sum(f.chi2 for f in base)
+    amplitude = np.concatenate([base[i].amplitude for i in own])
+    if worth and 2 * float(np.sum(np.abs(amplitude[b[0] != 0]) ** 2)) < WORTH and before_chi2 < chi_squared.isf(0.01, family.count):
+        size = np.linalg.norm(b[0][b[0] != 0] / family.likely[b[0] != 0]) * chosen[0].prior
+        return Explanation(
+            tuple(chosen), np.zeros(1), np.full(1, chosen[0].prior / np.hypot(1, size)), -float(np.log(np.hypot(1, size))), total
+        )
+    fit = fit_family(family, b, [v.prior for v in chosen])
+    # turned by half a turn an effect is the same: nothing foretells its phase
+    return Explanation(tuple(chosen), np.abs(fit.size), fit.size_sd, fit.evidence - before_evidence, total - before_chi2 + fit.chi2)
+
+
+def _of_any_size(found: Explanation, parts: Sequence[Family], base: Sequence[FamilyFit]) -> Explanation:
+    """The same variant where every size within its limits is believed: what the lines alone say of it."""
+    v = found.variants[0]
+    family = merged([parts[i] for i in v.parts])
+    fit = fit_family(family, [family.of_effect(v.amplitudes)], [v.effect.parameters[0].limits[1]])
+    gained = fit.evidence - sum(base[i].evidence for i in v.parts)
+    return replace(found, size=np.abs(fit.size), size_sd=fit.size_sd, delta_evidence=gained)
+
+
+def _best_of_each(fits: Sequence[Explanation]) -> list[Explanation]:
+    best: dict[str, Explanation] = {}
+    for f in fits:
+        name = f.effects[0]
+        if name not in best or f.delta_evidence > best[name].delta_evidence:
+            best[name] = f
+    return sorted(best.values(), key=lambda f: -f.delta_evidence)
+
+
+def _pairs(best: Sequence[Explanation], tried: Sequence[Variant], parts: Sequence[Family], base: Sequence[FamilyFit]) -> list[Explanation]:
+    """The best single with each other effect: its best variant alone, and those that share lines with the single."""
+    if not best or best[0].delta_evidence < CLEAR:
+        return []
+    first = best[0].variants[0]
+    found: dict[str, Explanation] = {}
+    for other in tried:
+        if other.effect.name == first.effect.name:
+            continue
+        alone = next(f for f in best if f.effects[0] == other.effect.name)
+        if other is alone.variants[0] or set(other.parts) & set(first.parts):
+            pair = _fitted((first, other), parts, base)
+            if other.effect.name not in found or pair.delta_evidence > found[other.effect.name].delta_evidence:
+                found[other.effect.name] = pair
+    return sorted(found.values(), key=lambda f: -f.delta_evidence)
+
+
+# ---------------------------------------------------------------- held out
+
+
+def _pull(rows: Family, explained: Explanation | None) -> tuple[float, int]:
+    """Squared error of lines as the scene foretells them, or the scene with an effect of a given size, in its standard errors, and how many numbers.
+
+    What the scene has besides is of its likely size. Phases are those that suit the data best: nothing foretells them.
+    """
+    total, count = 0.0, 0
+    for t in np.unique(rows.test):
+        for frequency in np.unique(rows.frequency[rows.test == t]):
+            together = (rows.test == t) & (rows.frequency == frequency)
+            each = [together] if rows.phased[together].all() else [together & (rows.node == n) for n in np.unique(rows.node[together])]
+            for chosen in each:  # probes without phases each by itself
+                one, n = _pull_of(rows.only(chosen), explained)
+                total, count = total + one, count + n
+    return total, count
+
+
+def _pull_of(own: Family, explained: Explanation | None) -> tuple[float, int]:
+    """As `_pull`, of one line in one test."""
+    scene = np.diag(own.sd**2).astype(complex)
+    for same in np.unique(own.phase, axis=1).T:
+        column = own.shown * np.all(own.phase == same[:, None], axis=0) * own.likely
+        scene += column @ column.conj().T
+    whiten = np.linalg.inv(np.linalg.cholesky(scene))
+    left = whiten @ own.value
+    if explained is not None:
+        b = sum(
+            (s * own.of_effect(v.amplitudes) for v, s in zip(explained.variants, explained.size, strict=True)),
+            np.zeros(len(own.likely), complex),
+        )
+        for g in np.unique(own.phase):
+            shown = whiten @ ((own.shown * (own.phase == g)) @ b)
+            left = left - shown * np.exp(1j * np.angle(np.vdot(shown, left)))
+    return 2 * float(np.vdot(left, left).real), 2 * len(left)
+
+
+def held_out(found: Explanation, parts: Sequence[Family]) -> tuple[float, float]:
+    """Rms error of conditions left out one after the other: by the scene alone, and with the effects fitted to all others."""
+    family = merged([parts[i] for i in sorted({i for v in found.variants for i in v.parts})])
+    before, after, count = 0.0, 0.0, 0
+    for t in np.unique(family.test):
+        out = family.test == t
+        if out.all():
+            continue
+        rest = family.only(~out)
+        fit = fit_family(rest, [rest.of_effect(v.amplitudes) for v in found.variants], [v.prior for v in found.variants])
+        one, n = _pull(family.only(out), None)
+        before, after, count = before + one, after + _pull(family.only(out), replace(found, size=fit.size))[0], count + n
+    if count == 0:
+        return float("nan"), float("nan")
+    return float(np.sqrt(before / count)), float(np.sqrt(after / count))
+
+
+# ---------------------------------------------------------------- verdict
+
+
+def _smallest(effects: Sequence[Effect], tried: Sequence[Explanation], found: Sources, parts: Sequence[Family]) -> dict[str, float]:
+    """Size of each effect's most visible variant from which it would stand out at `CLEAR`: sqrt(2 CLEAR) standard deviations of what the scene may have of
+    the same lines, with the errors of the lines. Where it shares its line with something larger, it adds to that as chance has their angle: square to it, it
+    shows less."""
+    smallest: dict[str, float] = {}
+    for effect in effects:
+        sizes = []
+        for e in tried:
+            v = e.variants[0]
+            if v.effect is effect:
+                information = 0.0
+                for i in v.parts:
+                    f = parts[i]
+                    b = f.of_effect(v.amplitudes)
+                    information += _information(f, b)
+                sizes.append(np.sqrt(2 * CLEAR / information) if information > 0 else np.inf)
+        smallest[effect.name] = float(min(sizes, default=np.inf))
+    return smallest
+
+
+def _information(f: Family, b: np.ndarray) -> float:
+    """Inverse variance of an effect's size when phases are known: with what the spindle has besides of its sources, and the errors."""
+    column = f.shown * f.likely
+    cover = np.diag(f.sd**2).astype(complex) + column @ column.conj().T
+    moved = f.shown @ b
+    return float(2 * np.vdot(moved, np.linalg.solve(cover, moved)).real)
+
+
+def _rejected(chi2: float, count: int) -> bool:
+    return bool(chi_squared.sf(chi2 / SLACK, count) < MISFIT)
+
+
+def _verdict(
+    seen: Sequence[Seen],
+    found: Sources,
+    parts: Sequence[Family],
+    base: Sequence[FamilyFit],
+    effects: Sequence[Effect],
+    fits: Sequence[Explanation],
+    best: Sequence[Explanation],
+    pairs: Sequence[Explanation],
+) -> RunoutDiagnosis:
+    count, chi2 = sum(f.count for f in parts), sum(f.chi2 for f in base)
+    strange = tuple(sorted((g for s in seen for g in s.strange), key=lambda g: -g.amplitude))
+    first = best[0] if best else None
+    candidates = sorted([*best, *(f for f in fits if first and f not in best and first.delta_evidence - f.delta_evidence < AHEAD), *pairs],
+                        key=lambda f: -f.delta_evidence)  # fmt: skip
+    # a second effect is believed in beforehand as little as the verdict asks of it
+    logs = np.array([0.0, *(c.delta_evidence - CLEAR * (len(c.variants) - 1) for c in candidates)])
+    weights = np.exp(logs - logs.max())
+    candidates = [replace(c, probability=float(w / weights.sum())) for c, w in zip(candidates, weights[1:], strict=True)]
+    candidates.sort(key=lambda c: -c.probability)
+    needed = [p for p in pairs if first and p.delta_evidence - first.delta_evidence > CLEAR]
+    leading = needed[:1] or ([first] if first else [])
+    before, after = (np.nan, np.nan)
+    if leading and leading[0].delta_evidence > CLEAR:
+        before, after = held_out(leading[0], parts)
+        ratio = after / before if np.isfinite(before) else 1.0
+        candidates = [replace(c, held_out_ratio=ratio) if c.variants == leading[0].variants else c for c in candidates]
+
+    def answer(verdict: str, names: Sequence[str], reason: str) -> RunoutDiagnosis:
+        return RunoutDiagnosis(
+            verdict, tuple(names), reason, tuple(candidates), tuple(seen), found, tuple(parts), tuple(base),
+            _smallest(effects, fits, found, parts), strange, before, after,
+        )  # fmt: skip
+
+    if strange:
+        where = ", ".join(f"{g.frequency:.1f} Hz ({g.order:.3f} orders, {1e9 * g.amplitude:.3g} nm)" for g in strange[:4])
+        return answer("unexplained", (), f"The records hold lines that no imperfection has: {where}.")
+    rejected = _rejected(chi2, count)
+    if first is None or not leading or leading[0].delta_evidence < CLEAR:
+        if rejected:
+            worst = max(range(len(parts)), key=lambda i: base[i].chi2 / parts[i].count)
+            return answer("unexplained", (), f"The lines are not those of the scene (misfit {chi2:.0f} for {count} numbers), most at "
+                          f"{parts[worst].frequency[0]:.1f} Hz, and no effect explains that.")  # fmt: skip
+        gained = (
+            f"the best effect, {first.effects[0]}, gains {first.delta_evidence:.1f} in ln evidence" if first else "no effect can be tried"
+        )
+        return answer("none", (), f"Imperfections of the size the scene tells explain all lines (misfit {chi2:.0f} for {count} numbers); {gained} "
+                      f"where {CLEAR:g} is asked.")  # fmt: skip
+    chosen = leading[0]
+    if _rejected(chosen.chi2, count):
+        return answer("unexplained", (), f"The lines are not those of the scene (misfit {chi2:.0f} for {count} numbers), and even with "
+                      f"{' + '.join(chosen.effects)} a misfit of {chosen.chi2:.0f} is left.")  # fmt: skip
+    fall = f"; on left-out conditions the error goes from {before:.2f} to {after:.2f} standard errors" if np.isfinite(before) else ""
+    if needed:
+        return answer("two effects", chosen.effects, f"{chosen.effects[0]} and {chosen.effects[1]} are both needed: without the second "
+                      f"{chosen.delta_evidence - first.delta_evidence:.1f} in ln evidence are lost{fall}.")  # fmt: skip
+    rivals = [c for c in best if first.delta_evidence - c.delta_evidence < AHEAD]
+    unusual = [c for c in (_of_any_size(e, parts, base) for e in best if e not in rivals and set(e.variants[0].parts) & set(first.variants[0].parts))
+               if c.believable and first.delta_evidence - c.delta_evidence < AHEAD]  # fmt: skip
+    if unusual and first.believable:
+        names = sorted({n for c in [*rivals, *unusual] for n in c.effects})
+        sizes = ", ".join(f"{c.effects[0]} ({c.size[0]:.3g} {c.variants[0].effect.parameters[0].unit})" for c in unusual)
+        return answer("ambiguous", names, f"{first.effects[0]} leads, but by its likely size alone: of an unusual size {sizes} would explain the "
+                      f"lines within {AHEAD:g} in ln evidence of it, or better{fall}.")  # fmt: skip
+    if len(rivals) > 1 or not first.believable:
+        names = sorted({n for c in rivals for n in c.effects})
+        return answer("ambiguous", names, f"{', '.join(names)} explain the lines within {AHEAD:g} in ln evidence of each other{fall}.")
+    falls = (
+        ""
+        if not np.isfinite(before) or after < FALLS * before
+        else ", less than threefold, since the size an imperfection has is foretold but roughly"
+    )
+    return answer(
+        "identified", first.effects, f"{first.effects[0]} leads every other explanation by more than {AHEAD:g} in ln evidence{fall}{falls}."
+    )

@@ -1,0 +1,15 @@
+"""Rolling bearings: point contact, one ball, one row, the pair in equilibrium, and what follows from them.
+
+===============  =======================================================================================================
+ball_row         one ball row: forces, contact loss and the exact 5x5 tangent stiffness under any load
+heavy_ball       one ball with inertia between its two races: where its centre settles, and the stiffness it shows the
+                 outer ring
+hertz            Hertz point contact with exact elliptic integrals
+kinematics       how fast cage and balls turn, and at which frequencies a running spindle is excited
+pair             the two ball rows against each other: axial equilibrium of the hub at a temperature, and the bearing
+                 states that follow
+springs          balls as springs between points of two bodies: what a ball-by-ball bearing element is made of
+stiffness_table  the stiffness table: bearing properties over temperature and speed, as a CSV with units in its header
+                 and its provenance above
+===============  =======================================================================================================
+"""

@@ -1,0 +1,197 @@
+"""One ball row: forces, contact loss and the exact 5x5 tangent stiffness under any load.
+
+A ball pulls the two groove curvature centres together: a spring in tension along the line between them, force
+K deformation**1.5 beyond the unloaded distance and none below (Jones 1960; Harris 1991, ch. 9). Ball j sits at azimuth
+psi_j in its own r-z plane; the outer ring's displacement relative to the inner, (x, y, z, tilt_x, tilt_y), moves the outer
+centre there by u_r = x cos + y sin and u_z = z + arm (tilt_x sin - tilt_y cos). Forces are those needed on the outer ring.
+
+With ball inertia the ball centre is an unknown of its own (`model.bearing.heavy_ball`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import hypot, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize, root
+
+from thermospindle.model.bearing.heavy_ball import LEAST_STRETCH, Balance, BallInertia, HeavyBall, settled
+from thermospindle.model.bearing.hertz import in_series
+from thermospindle.model.errors import NoEquilibrium
+from thermospindle.model.types import Array
+
+
+@dataclass(frozen=True)
+class BallRow:
+    """Geometry and contact constants of a row with centred rings.
+
+    `radial`, `axial`: components (m) of the distance of the groove curvature centres, inner minus outer in r, outer minus inner
+    in z; the sign of `axial` is the direction in which moving the outer ring loads the row.
+    `inner_length`, `outer_length`: groove radius less ball radius (m), the unloaded distances ball centre to groove centre.
+    `inner_constant`, `outer_constant`: Hertz constants (N/m^1.5). `arm`: lever of a tilt (m).
+    """
+
+    balls: int
+    radial: float
+    axial: float
+    inner_length: float
+    outer_length: float
+    inner_constant: float
+    outer_constant: float
+    arm: float
+    inertia: BallInertia | None = None
+
+    @cached_property
+    def constant(self) -> float:
+        """Load-deflection constant of both contacts in series (N/m^1.5)."""
+        return in_series(self.inner_constant, self.outer_constant)
+
+    @property
+    def unloaded_distance(self) -> float:
+        return self.inner_length + self.outer_length
+
+    @property
+    def azimuths(self) -> Array:
+        return 2 * np.pi * np.arange(self.balls) / self.balls
+
+
+@dataclass(frozen=True)
+class RowForce:
+    """Answer of a row at one displacement; per-ball arrays have shape (balls,)."""
+
+    force: Array  # (5,) N, N m: on the outer ring, to hold it there
+    tangent: Array  # (5, 5) its exact derivative
+    ball_force: Array  # (balls,) N, at the inner contact
+    outer_ball_force: Array  # (balls,) N
+    inner_angle: Array  # (balls,) rad
+    outer_angle: Array  # (balls,) rad
+    deformation: Array  # (balls,) m, both contacts together, negative: play
+
+    @property
+    def in_contact(self) -> NDArray[np.bool_]:
+        return self.ball_force > 0
+
+
+def kinematics(row: BallRow) -> Array:
+    """Rows (balls, 2, 5) that take the outer ring's displacement to (u_r, u_z) at each ball."""
+    c, s = np.cos(row.azimuths), np.sin(row.azimuths)
+    o, i = np.zeros_like(c), np.ones_like(c)
+    return np.stack([np.stack([c, s, o, o, o], -1), np.stack([o, o, i, row.arm * s, -row.arm * c], -1)], 1)
+
+
+def centre_line(row: BallRow, displacement: Array) -> Array:
+    """Vector (balls, 2) from inner to outer groove centre, (r, z) components (m)."""
+    return np.array([-row.radial, row.axial]) + kinematics(row) @ displacement
+
+
+def energy(row: BallRow, displacement: Array) -> float:
+    """Elastic energy (J) without ball inertia: sum of 2/5 K deformation**2.5."""
+    stretch = np.linalg.norm(centre_line(row, displacement), axis=1) - row.unloaded_distance
+    return float(0.4 * row.constant * np.sum(np.maximum(stretch, 0.0) ** 2.5))
+
+
+def respond(row: BallRow, displacement: Array | None = None) -> RowForce:
+    """Force and tangent stiffness at a displacement (5,) of the outer ring relative to the inner; centred rings by default."""
+    u = np.zeros(5) if displacement is None else np.asarray(displacement, float)
+    line = centre_line(row, u)
+    local = _with_inertia(row, line) if _heavy(row) else _massless(row, line)
+    force, stiffness, inner, outer, inner_angle, outer_angle, deformation = local
+    b = kinematics(row)
+    return RowForce(
+        np.einsum("jik,ji->k", b, force),
+        np.einsum("jik,jil,jlm->km", b, stiffness, b),
+        inner,
+        outer,
+        inner_angle,
+        outer_angle,
+        deformation,
+    )
+
+
+def centred_axial_force(row: BallRow, movement: float = 0.0) -> float:
+    """Axial force (N) needed on the outer ring of a row with centred rings when it has moved by `movement` (m), as `respond` has it."""
+    axial = row.axial + movement
+    if _heavy(row):
+        return row.balls * _settled(row, np.array([[-row.radial, axial]]))[0].on_outer[1]
+    length = hypot(row.radial, axial)
+    deformation = max(length - row.unloaded_distance, 0.0)
+    return row.balls * row.constant * deformation**1.5 * axial / length
+
+
+def _heavy(row: BallRow) -> bool:
+    return row.inertia is not None and row.inertia.share != 0.0
+
+
+def _massless(row: BallRow, line: Array) -> tuple[Array, ...]:
+    """Force (balls, 2) and stiffness (balls, 2, 2) of balls without inertia: f = F e, k = F' e e^T + F/L (1 - e e^T)."""
+    length = np.linalg.norm(line, axis=1)
+    e = line / length[:, None]
+    deformation = length - row.unloaded_distance
+    pressed = np.maximum(deformation, 0.0)
+    force = row.constant * pressed**1.5
+    along = 1.5 * row.constant * np.sqrt(pressed)
+    ee = e[:, :, None] * e[:, None, :]
+    stiffness = along[:, None, None] * ee + (force / length)[:, None, None] * (np.eye(2) - ee)
+    angle = np.arctan2(np.abs(e[:, 1]), -e[:, 0])
+    return force[:, None] * e, stiffness, force, force, angle, angle, deformation
+
+
+def _with_inertia(row: BallRow, line: Array) -> tuple[Array, ...]:
+    """As `_massless`, with the centre of every ball an unknown of its own; balls on the same line, as of centred rings, are one."""
+    balances = _settled(row, line)
+    stiffness = {id(b): np.reshape(b.stiffness(), (2, 2)) for b in balances}
+    told = np.array([(*b.on_outer, b.inner, b.outer, b.inner_angle, b.outer_angle, b.deformation) for b in balances]).T
+    return told[:2].T, np.array([stiffness[id(b)] for b in balances]), *told[2:]
+
+
+def _settled(row: BallRow, line: Array) -> list[Balance]:
+    """The balance of every ball, (balls,), at `line` (balls, 2)."""
+    assert row.inertia is not None
+    ball = HeavyBall(row.inner_length, row.outer_length, row.inner_constant, row.outer_constant, row.inertia)
+    lines = [(r, z) for r, z in line.tolist()]
+    different = dict.fromkeys(lines)
+    stretch = max(LEAST_STRETCH, max(hypot(r, z) for r, z in different) - row.unloaded_distance)
+    tolerance, least = 1e-12 * row.constant * stretch**1.5, 1e-9 * row.constant * sqrt(stretch)
+    found = {at: settled(ball, at, tolerance, least) for at in different}
+    return [found[at] for at in lines]
+
+
+# ---------------------------------------------------------------- loads
+
+
+def displacement_under(row: BallRow, load: Array) -> Array:
+    """Displacement (5,) of the outer ring under a load (5,) (N, N m) on it.
+
+    Without ball inertia the total potential is convex and is minimised with its exact Hessian (trust region); the answer, or
+    the start for balls with inertia, is finished by Powell's hybrid method on the force balance.
+    Raises `NoEquilibrium` when the row cannot carry the load.
+    """
+    load = np.asarray(load, float)
+    massless = replace(row, inertia=None)
+    unit = 1e-6 / np.array([1, 1, 1, row.arm, row.arm])
+    work = 1e-6 * max(float(np.linalg.norm(load * unit)) / 1e-6, 1e-6)
+
+    def potential(v: Array) -> float:
+        return (energy(massless, v * unit) - float(load @ (v * unit))) / work
+
+    def gradient(v: Array) -> Array:
+        return (respond(massless, v * unit).force - load) * unit / work
+
+    def hessian(v: Array) -> Array:
+        return respond(massless, v * unit).tangent * np.outer(unit, unit) / work + 1e-12 * np.eye(5)
+
+    start = np.sign(load) * np.array([1.0, 1.0, 1.0, 0.1, 0.1])
+    found = minimize(potential, start, jac=gradient, hess=hessian, method="trust-exact", options={"gtol": 1e-9, "maxiter": 500})
+    end = root(
+        lambda v: (respond(row, v * unit).force - load) * unit / work,
+        found.x,
+        jac=lambda v: respond(row, v * unit).tangent * np.outer(unit, unit) / work,
+        options={"xtol": 1e-13},
+    )
+    residual = float(np.linalg.norm(end.fun))
+    if residual > 1e-6:
+        raise NoEquilibrium(f"the row cannot carry the load {load.tolist()}; the best displacement leaves {residual:.1e} of it")
+    return end.x * unit

@@ -1,0 +1,193 @@
+"""One ball with inertia between its two races: where its centre settles, and the stiffness it shows the outer ring.
+
+Centrifugal force and gyroscopic moment make the inner and outer contact angles differ (Jones 1960; Harris 1991, Eqs. 9.9-9.25,
+outer-race control). The ball's centre c and the outer groove's centre l are measured from the inner groove's, in the ball's r-z
+plane. With phi the outer contact angle, e = (-cos phi, sin phi) from the ball to the outer groove and t = de/dphi across it,
+
+    resultant on the ball  R = -F_i c/|c| + P + (C, 0) = 0,    force on the outer ring  P = F_o e - 2 M / D t.
+
+C and M depend on phi alone and dphi = t . (dl - dc) / |l - c|, so with S_i, J, G the derivatives of F_i c/|c|, P, P + (C, 0) by
+their own argument: dR/dc = -(S_i + G), dR/dl = G, and the ring sees k = J (S_i + G)^-1 S_i.
+
+With M the friction is no derivative of an energy, so k, the exact derivative of P, is not symmetric: for a row of the reference spindle the
+radial-tilt entries differ by 7e-9 of their size at 7200 rpm, 7e-5 at 30,000, as the fourth power of the speed.
+
+Plain numbers: a ball takes a few steps of a few operations, less than one call of an array library.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import atan2, hypot, pi, sqrt
+from typing import NamedTuple
+
+from thermospindle.model.errors import NoEquilibrium
+
+Vector = tuple[float, float]
+Matrix = tuple[float, float, float, float]
+"""(rr, rz, zr, zz)."""
+
+STEPS = 100
+HALVINGS = 30
+LONGEST = 2e-6  # m, of one step
+LEAST_STRETCH = 0.02e-6  # m, pressed into the races at the start
+
+
+@dataclass(frozen=True)
+class BallInertia:
+    """What makes a ball heavy at speed; `share` scales centrifugal force and gyroscopic moment (0 none, 1 full)."""
+
+    diameter: float
+    pitch_diameter: float
+    density: float
+    inner_speed: float  # rad/s
+    outer_speed: float
+    share: float = 1.0
+
+    @property
+    def mass(self) -> float:
+        return pi / 6 * self.density * self.diameter**3
+
+    def loads(self, cosine: float, sine: float) -> tuple[float, float, float, float]:
+        """Centrifugal force C (N), its derivative by the outer contact angle, gyroscopic moment M (N m) and its derivative.
+
+        Kinematics after Harris 1991, ch. 8: rolling at both races, outer-race control, tan beta = sin a / (cos a + gamma), the inner
+        angle taken equal to the outer. A ball that spins with w about an axis at beta to z while it orbits with the cage's speed has
+        dH/dt = cage z x H = J w cage sin(beta) about the direction of travel. Rolling makes w (cos a cos beta + sin a sin beta) equal
+        to the rings' relative speed over gamma / (1 + gamma cos a) + gamma / (1 - gamma cos a); with beta put in, what is left of
+        w sin(beta) is relative sin a (1 - gamma cos a) / (2 gamma).
+        """
+        gamma = self.diameter / self.pitch_diameter
+        lag, lead = 1 - gamma * cosine, 1 + gamma * cosine
+        relative = self.outer_speed - self.inner_speed
+        cage = (self.inner_speed * lag + self.outer_speed * lead) / 2
+        cage_slope = -gamma * sine * relative / 2
+        orbit = self.share * self.mass * self.pitch_diameter / 2
+        polar = self.share * self.mass * self.diameter**2 / 10 * relative / (2 * gamma)
+        moment_slope = polar * (cage_slope * sine * lag + cage * (cosine * lag + gamma * sine**2))
+        return orbit * cage**2, 2 * orbit * cage * cage_slope, polar * cage * sine * lag, moment_slope
+
+
+@dataclass(frozen=True)
+class HeavyBall:
+    """A ball with inertia and its two contacts, as in `ball_row.BallRow`: unloaded lengths (m), Hertz constants (N/m^1.5)."""
+
+    inner_length: float
+    outer_length: float
+    inner_constant: float
+    outer_constant: float
+    inertia: BallInertia
+
+
+class Balance(NamedTuple):
+    """Forces on a ball at one place of its centre, (r, z) components (N), and their derivatives (N/m): S_i, J and G above."""
+
+    resultant: Vector
+    on_outer: Vector
+    inner: float
+    outer: float
+    inner_angle: float
+    outer_angle: float
+    deformation: float
+    by_inner: Matrix
+    by_outer: Matrix
+    by_line: Matrix
+
+    @property
+    def off(self) -> float:
+        """Size of the resultant (N)."""
+        return hypot(*self.resultant)
+
+    def stiffness(self) -> Matrix:
+        """J (S_i + G)^-1 S_i: what the outer ring sees of the ball, whose centre follows it."""
+        s, j, g = self.by_inner, self.by_outer, self.by_line
+        inverse = _inverse((s[0] + g[0], s[1] + g[1], s[2] + g[2], s[3] + g[3]))
+        return _product(j, _product(inverse, s))
+
+
+def settled(ball: HeavyBall, line: Vector, tolerance: float, least: float) -> Balance:
+    """The balance of a ball at rest, its resultant below `tolerance` (N), for the outer groove's centre at `line` (m).
+
+    The energy of the two contacts less the work of the centrifugal force is convex, so a Newton step that is halved until the
+    resultant falls finds its minimum; the gyroscopic friction is a small addition. `least` (N/m) is added to the stiffness of the
+    step, for a ball that touches nothing. Raises `NoEquilibrium`.
+    """
+    share = (ball.inner_constant / ball.outer_constant) ** (2 / 3)
+    length = hypot(*line)
+    stretch = max(length - ball.inner_length - ball.outer_length, LEAST_STRETCH)
+    reach = (ball.inner_length + stretch / (1 + share)) / length
+    r, z = line[0] * reach, line[1] * reach
+    here = balance(ball, (r, z), line)
+    for _ in range(STEPS):
+        off = here.off
+        if off < tolerance:
+            return here
+        s, g = here.by_inner, here.by_line
+        inverse = _inverse((s[0] + g[0] + least, s[1] + g[1], s[2] + g[2], s[3] + g[3] + least))
+        step_r = inverse[0] * here.resultant[0] + inverse[1] * here.resultant[1]
+        step_z = inverse[2] * here.resultant[0] + inverse[3] * here.resultant[1]
+        factor = min(1.0, LONGEST / max(hypot(step_r, step_z), 1e-30))
+        for _ in range(HALVINGS):
+            trial = (r + factor * step_r, z + factor * step_z)
+            here = balance(ball, trial, line)
+            if here.off <= off + tolerance:
+                break
+            factor /= 2
+        r, z = trial
+    raise NoEquilibrium(f"ball centres did not settle; the largest residual is {here.off:.2g} N")
+
+
+def balance(ball: HeavyBall, centre: Vector, line: Vector) -> Balance:
+    """Forces on a ball with its centre at `centre` (m), and their derivatives."""
+    inner_length, (ir, iz), inner, inner_along = _contact(centre, ball.inner_length, ball.inner_constant)
+    gap = (line[0] - centre[0], line[1] - centre[1])
+    outer_length, (er, ez), outer, outer_along = _contact(gap, ball.outer_length, ball.outer_constant)
+    cosine, sine = -er, ez
+    centrifugal, centrifugal_slope, moment, moment_slope = ball.inertia.loads(cosine, sine)
+    # outer-race control: the friction that turns the ball's angular momentum acts at the outer contact, 2 M / D across it
+    grip = 2 / ball.inertia.diameter if outer > 0 else 0.0
+    friction, friction_slope = grip * moment, grip * moment_slope
+    on_outer = (outer * er - friction * sine, outer * ez - friction * cosine)
+    # across (sine, cosine) turns into (cosine, -sine) with the angle, which turns by across / length for a movement of the line
+    turn_r, turn_z = -friction_slope * sine - friction * cosine, -friction_slope * cosine + friction * sine
+    angle_r, angle_z = sine / outer_length, cosine / outer_length
+    spring = _spring((er, ez), outer_along, outer / outer_length)
+    by_outer = (spring[0] + turn_r * angle_r, spring[1] + turn_r * angle_z, spring[2] + turn_z * angle_r, spring[3] + turn_z * angle_z)
+    return Balance(
+        (on_outer[0] - inner * ir + centrifugal, on_outer[1] - inner * iz),
+        on_outer,
+        inner,
+        outer,
+        atan2(abs(iz), -ir),
+        atan2(abs(ez), -er),
+        inner_length - ball.inner_length + outer_length - ball.outer_length,
+        _spring((ir, iz), inner_along, inner / inner_length),
+        by_outer,
+        (by_outer[0] + centrifugal_slope * angle_r, by_outer[1] + centrifugal_slope * angle_z, by_outer[2], by_outer[3]),
+    )
+
+
+def _contact(vector: Vector, unloaded: float, constant: float) -> tuple[float, Vector, float, float]:
+    """Length (m) and direction of a line between centres, contact force K d^1.5 (N) and its slope (N/m)."""
+    length = hypot(*vector)
+    pressed = max(length - unloaded, 0.0)
+    root = constant * sqrt(pressed)
+    return length, (vector[0] / length, vector[1] / length), root * pressed, 1.5 * root
+
+
+def _spring(e: Vector, along: float, across: float) -> Matrix:
+    """along e e^T + across (1 - e e^T)."""
+    rr, rz, zz = e[0] * e[0], e[0] * e[1], e[1] * e[1]
+    more = along - across
+    return across + more * rr, more * rz, more * rz, across + more * zz
+
+
+def _inverse(m: Matrix) -> Matrix:
+    determinant = m[0] * m[3] - m[1] * m[2]
+    if determinant == 0.0:
+        raise NoEquilibrium("a ball touches neither race and nothing holds it")
+    return m[3] / determinant, -m[1] / determinant, -m[2] / determinant, m[0] / determinant
+
+
+def _product(a: Matrix, b: Matrix) -> Matrix:
+    return a[0] * b[0] + a[1] * b[2], a[0] * b[1] + a[1] * b[3], a[2] * b[0] + a[3] * b[2], a[2] * b[1] + a[3] * b[3]

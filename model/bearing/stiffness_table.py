@@ -1,0 +1,116 @@
+"""The stiffness table: bearing properties over temperature and speed, as a CSV with units in its header and its provenance above."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from thermospindle.model.bearing.pair import PairState
+from thermospindle.model.cells import cell, name_of
+from thermospindle.model.errors import BadInput, OutsideRange
+from thermospindle.model.types import Array
+from thermospindle.model.units import RPM
+
+COLUMNS = {
+    "contact_angle_deg": lambda b: np.degrees(b.contact_angle),
+    "outer_contact_angle_deg": lambda b: np.degrees(b.outer_contact_angle),
+    "deformation_um": lambda b: b.deformation * 1e6,
+    "contact_force_N": lambda b: b.contact_force,
+    "ball_stiffness_N_per_m": lambda b: b.ball_stiffness,
+    "preload_N": lambda b: b.preload,
+    "radial_stiffness_N_per_m": lambda b: b.radial_stiffness,
+    "axial_stiffness_N_per_m": lambda b: b.axial_stiffness,
+    "tilt_stiffness_N_m_per_rad": lambda b: b.tilt_stiffness,
+    "coupling_stiffness_N_per_rad": lambda b: b.coupling_stiffness,
+}
+"""Property of a bearing state behind every column."""
+
+
+@dataclass(frozen=True, eq=False)
+class StiffnessTable:
+    """Bearing properties on a grid: `values[bearing][column]` has shape (temperatures, speeds), in the column's unit.
+
+    `unloads` says at which temperature (C) a bearing first loses contact on the grid, None where it never does.
+    `provenance` is what the table was made from: scene, its hash, program versions.
+    """
+
+    temperature: Array  # (n,) C, rising
+    speed: Array  # (m,) rad/s, rising
+    values: Mapping[str, Mapping[str, Array]]
+    unloads: Mapping[str, float | None]
+    provenance: Mapping[str, str]
+
+    def at(self, bearing: str, column: str, temperature: float, speed: float = 0.0) -> float:
+        """Property at a condition, shape-preserving cubic (PCHIP) between the grid's conditions.
+
+        Raises `OutsideRange` outside the grid: nothing is extrapolated.
+        """
+        over_speed = [_between(self.temperature, v, temperature, "temperature", "C") for v in self.values[bearing][column].T]
+        return _between(self.speed / RPM, np.array(over_speed), speed / RPM, "speed", "rpm")
+
+
+def _between(grid: Array, values: Array, where: float, name: str, unit: str) -> float:
+    if not grid[0] - 1e-9 <= where <= grid[-1] + 1e-9:
+        raise OutsideRange(f"the table spans {name} {grid[0]:g} to {grid[-1]:g} {unit} and was asked at {where:g} {unit}")
+    if len(grid) == 1:
+        return float(values[0])
+    return float(PchipInterpolator(grid, values)(np.clip(where, grid[0], grid[-1])))
+
+
+def tabulate(states: Sequence[Sequence[PairState]], unloads: Mapping[str, float | None], provenance: Mapping[str, str]) -> StiffnessTable:
+    """Table of pair states on a grid: `states[i][j]` at temperature i and speed j."""
+    names = [b.name for b in states[0][0].bearings]
+
+    def column(name: str, read) -> Array:
+        return np.array([[float(read(state.bearing(name))) for state in row] for row in states])
+
+    return StiffnessTable(
+        np.array([row[0].condition.temperature for row in states]),
+        np.array([state.condition.speed for state in states[0]]),
+        {name: {key: column(name, read) for key, read in COLUMNS.items()} for name in names},
+        dict(unloads),
+        dict(provenance),
+    )
+
+
+def write_table(table: StiffnessTable, path: Path) -> None:
+    """CSV: a comment line of provenance (JSON), one of unloading, a header with units, a row a bearing and condition."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        file.write(f"# provenance: {json.dumps(dict(table.provenance))}\n")
+        file.write(f"# unloads_C: {json.dumps(dict(table.unloads))}\n")
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["bearing", "temperature_C", "speed_rpm", *COLUMNS])
+        for name, columns in table.values.items():
+            for i, t in enumerate(table.temperature):
+                for j, speed in enumerate(table.speed):
+                    writer.writerow([cell(name), repr(float(t)), repr(float(speed / RPM)), *(repr(float(columns[c][i, j])) for c in COLUMNS)])
+
+
+def read_table(path: Path) -> StiffnessTable:
+    """The table of a CSV made by `write_table`; `BadInput` where it is not one."""
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+        provenance = json.loads(lines[0].removeprefix("# provenance: "))
+        unloads = json.loads(lines[1].removeprefix("# unloads_C: "))
+        rows = list(csv.DictReader(lines[2:]))
+        temperature = np.unique([float(r["temperature_C"]) for r in rows])
+        rpm = np.unique([float(r["speed_rpm"]) for r in rows])
+        values: dict[str, dict[str, Array]] = {}
+        for row in rows:
+            where = np.searchsorted(temperature, float(row["temperature_C"])), np.searchsorted(rpm, float(row["speed_rpm"]))
+            for column in COLUMNS:
+                grid = values.setdefault(name_of(row["bearing"]), {}).setdefault(column, np.full((len(temperature), len(rpm)), np.nan))
+                grid[where] = float(row[column])
+    except (OSError, UnicodeDecodeError, RecursionError, IndexError, KeyError, ValueError, TypeError) as error:
+        raise BadInput(f"{path}: not a stiffness table as spindle writes it: {type(error).__name__} {error}") from None
+    if not values or any(np.isnan(grid).any() for columns in values.values() for grid in columns.values()):
+        raise BadInput(f"{path}: the table has gaps; every bearing needs a row for each temperature and speed")
+    if not all(np.isfinite(a).all() for a in (temperature, rpm, *(grid for columns in values.values() for grid in columns.values()))):
+        raise BadInput(f"{path}: holds an infinite number; only finite ones are allowed")
+    return StiffnessTable(temperature, rpm * RPM, values, unloads, provenance)

@@ -1,0 +1,28 @@
+"""What goes wrong in one sentence: the command line prints it and ends with exit code 2."""
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class BadInput(ValueError):
+    """A file, key, value or option that cannot be used; the message names it and says what is allowed."""
+
+
+class OutsideRange(ValueError):
+    """A table or law was asked outside the range it was made for."""
+
+
+class NoEquilibrium(RuntimeError):
+    """A bearing, or a set of bearings, finds no balance of its forces."""
+
+
+class NotConverged(RuntimeError):
+    """A numerical method did not reach the accuracy asked of it."""
+
+
+def instead(word: str, known: Iterable[str]) -> str:
+    """What to say after an unknown `word`: the known one it is most like, or all that are known."""
+    names = list(known)
+    part = [name for name in names if word and (name.startswith(word) or word.startswith(name))]
+    near = [*part, *get_close_matches(word, names, n=1)]
+    return f"did you mean {near[0]}?" if near else f"allowed are {', '.join(names) or 'none'}"

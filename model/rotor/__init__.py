@@ -1,0 +1,11 @@
+"""The rotor-base structure: masses of the section, the chain of bodies and elements, its modes, and the same as a MuJoCo model.
+
+========  ==============================================================================================================
+chain     the rotor-base chain: rigid bodies joined by compliant elements, and its matrices M, C, G, K
+elements  the bearing elements of the time simulation
+look      what a spindle looks like: cut-away bodies of its section, and the visual part of its MuJoCo model
+mjcf      the rotor-base chain as a MuJoCo model
+modes     modes and exact FRFs of a linearised spindle
+section   the axisymmetric section: which region owns which rectangle, and the mass and inertia that follow
+========  ==============================================================================================================
+"""

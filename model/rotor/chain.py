@@ -1,0 +1,172 @@
+"""The rotor-base chain: rigid bodies joined by compliant elements, and its matrices M, C, G, K.
+
+Small motions about the loaded state. Every body has its centre of mass on the spindle axis and moves in some of
+x, y, z, tilt_x, tilt_y; a point of it at position p is displaced by u + tilt x (p - centre). A turning body adds the gyroscopic
+moment -Ip speed tilt_rate_y about x and +Ip speed tilt_rate_x about y on the right-hand side (Genta, *Dynamics of Rotating
+Systems*, 2005, Eq. 2.23 in real coordinates), as C + G with G skew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from thermospindle.model.bearing.pair import PairState
+from thermospindle.model.machine import MOVES, Body, Point, Spindle, Structure
+from thermospindle.model.types import Array
+
+
+@dataclass(frozen=True)
+class Element:
+    """Stiffness and damping (5, 5) between two bodies (or the ground) at height `z` on the axis; `b` moves relative to `a`.
+
+    `slides` names a body on `b` that moves along the axis by itself, a ring on its preload spring: the element feels its axial motion
+    and the rest of b's.
+    """
+
+    name: str
+    group: str
+    a: str
+    b: str
+    z: float
+    stiffness: Array
+    damping: Array
+    slides: str = ""
+
+
+Layout = tuple[tuple[str, float, tuple[str, ...]], ...]
+"""Name, height and moves of every body."""
+
+
+@dataclass(frozen=True)
+class RotorBase:
+    bodies: tuple[Body, ...]
+    elements: tuple[Element, ...]
+    speed: float  # rad/s
+
+    @cached_property
+    def dofs(self) -> tuple[tuple[str, str], ...]:
+        """(body, move) of every degree of freedom, in order."""
+        return tuple((b.name, move) for b in self.bodies for move in b.moves)
+
+    @cached_property
+    def layout(self) -> Layout:
+        """What the motion of points depends on."""
+        return tuple((b.name, b.z, b.moves) for b in self.bodies)
+
+    def body(self, name: str) -> Body:
+        return next(b for b in self.bodies if b.name == name)
+
+
+@dataclass(frozen=True)
+class Matrices:
+    """M, C + G (gyroscopic terms included) and K of a linearised spindle, all (n, n), with the dofs' names."""
+
+    mass: Array
+    damping: Array
+    stiffness: Array
+    dofs: tuple[tuple[str, str], ...]
+
+
+def rotor_base(spindle: Spindle, state: PairState) -> RotorBase:
+    """The chain at one condition: the structure's joints and the bearings, one of them behind its preload spring where that has a rate."""
+    structure = spindle.structure
+    joints = [joint_element(structure, i) for i in range(len(structure.joints))]
+    bearings = [
+        Element(b.name, "bearings", structure.inner_body, structure.outer_body, b.z, b.stiffness, b.damping) for b in state.bearings
+    ]
+    chain = RotorBase(structure.bodies, (*joints, *bearings), state.condition.speed)
+    spring = spindle.pair.spring
+    return chain if spring is None or spring.rate is None else sprung(chain, spring.ring_of, spring.rate, spring.mass)
+
+
+def sprung(chain: RotorBase, name: str, rate: float, mass: float) -> RotorBase:
+    """The chain with the ring of bearing `name` on a lossless axial spring of `rate` (N/m); it moves across the axis and tilts with its body.
+
+    A ring without mass is condensed: K - K_z K_z^T / (rate + k_zz), damping to first order of complex stiffness.
+    """
+    own = next(e for e in chain.elements if e.name == name)
+    if mass > 0.0:
+        body = chain.body(own.b)
+        ring = Body(f"{name} sprung ring", mass, (0.0, 0.0, 0.0), own.z, ("z",), False, ())
+        stiffness = np.diag([0.0, 0.0, rate, 0.0, 0.0])
+        spring = Element(f"{name} preload spring", "bearings", body.name, ring.name, own.z, stiffness, np.zeros((5, 5)))
+        elements = [replace(e, slides=ring.name) if e is own else e for e in chain.elements]
+        return replace(chain, bodies=(*chain.bodies, ring), elements=(*elements, spring))
+    pass_on = np.eye(5)
+    pass_on[:, 2] -= own.stiffness[:, 2] / (rate + own.stiffness[2, 2])
+    stiffness = pass_on @ own.stiffness
+    condensed = replace(own, stiffness=(stiffness + stiffness.T) / 2, damping=pass_on @ own.damping @ pass_on.T)
+    return replace(chain, elements=tuple(condensed if e is own else e for e in chain.elements))
+
+
+def joint_element(structure: Structure, index: int) -> Element:
+    joint = structure.joints[index]
+    stiffness = np.diag(joint.stiffness)
+    damping = 2 * joint.damping_ratio / (2 * np.pi * structure.damping_frequency) * stiffness
+    return Element(joint.name, joint.group, *joint.bodies, joint.z, stiffness, damping)
+
+
+def motion_rows(chain: RotorBase, name: str, position: Sequence[float]) -> Array:
+    """Rows (5, n) that give the displacement and tilt of the material point of a body at `position` (3,); read only."""
+    return _motion_rows(chain.layout, name, (position[0], position[1], position[2]))
+
+
+@lru_cache(maxsize=1024)
+def _motion_rows(layout: Layout, name: str, position: tuple[float, float, float]) -> Array:
+    rows = np.zeros((5, sum(len(moves) for _, _, moves in layout)))
+    start = 0
+    for body, height, moves in layout:
+        if body == name:
+            x, y, z = position[0], position[1], position[2] - height
+            lever = np.eye(5)  # displacement from a unit motion: tilt x (p - centre)
+            lever[1:3, 3] = -z, y
+            lever[[0, 2], 4] = z, -x
+            rows[:, start : start + len(moves)] = lever[:, [MOVES.index(m) for m in moves]]
+        start += len(moves)
+    rows.flags.writeable = False
+    return rows
+
+
+def element_rows(chain: RotorBase, element: Element) -> Array:
+    """Rows (5, n) of the relative motion an element resists; read only."""
+    return _element_rows(chain.layout, element.a, element.b, element.z, element.slides)
+
+
+@lru_cache(maxsize=1024)
+def _element_rows(layout: Layout, a: str, b: str, z: float, slides: str) -> Array:
+    end = _motion_rows(layout, b, (0.0, 0.0, z))
+    if slides:
+        end = end.copy()
+        end[2] = _motion_rows(layout, slides, (0.0, 0.0, z))[2]
+    rows = end - _motion_rows(layout, a, (0.0, 0.0, z))
+    rows.flags.writeable = False
+    return rows
+
+
+def point_row(chain: RotorBase, point: Point) -> Array:
+    """Row (n,) of the displacement of a measuring point along its direction."""
+    return np.array(point.direction) @ motion_rows(chain, point.body, point.position)[:3]
+
+
+def matrices(chain: RotorBase) -> Matrices:
+    """M, C + G, K assembled element by element (independent of MuJoCo)."""
+    n = len(chain.dofs)
+    mass, damping, stiffness = np.zeros(n), np.zeros((n, n)), np.zeros((n, n))
+    index = {dof: i for i, dof in enumerate(chain.dofs)}
+    for body in chain.bodies:
+        inertia = dict(zip(MOVES, (body.mass, body.mass, body.mass, *body.inertia[:2]), strict=True))
+        for move in body.moves:
+            mass[index[body.name, move]] = inertia[move]
+        if body.turns:
+            i, j = index[body.name, "tilt_x"], index[body.name, "tilt_y"]
+            damping[i, j] += body.inertia[2] * chain.speed
+            damping[j, i] -= body.inertia[2] * chain.speed
+    for element in chain.elements:
+        rows = element_rows(chain, element)
+        damping += rows.T @ element.damping @ rows
+        stiffness += rows.T @ element.stiffness @ rows
+    return Matrices(np.diag(mass), damping, stiffness, chain.dofs)

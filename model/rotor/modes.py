@@ -1,0 +1,159 @@
+"""Modes and exact FRFs of a linearised spindle.
+
+With state (q, q'), poles and left and right vectors come from one eigenproblem of size 2n, and every FRF is the sum of its modal
+terms: H(omega) = sum over all 2n poles of (row phi)(psi^H column) / (i omega - lambda).
+Sources: Genta, *Dynamics of Rotating Systems* (2005), ch. 5; Ewins, *Modal Testing* (2000), 2.5-2.8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from thermospindle.model.machine import MOVES, Spindle
+from thermospindle.model.rotor.chain import Matrices, RotorBase, element_rows, matrices, motion_rows, point_row
+from thermospindle.model.types import Array, ComplexArray
+from thermospindle.model.units import HERTZ
+
+FREE = 5e-8
+"""Of the largest pole: what oscillates slower is a free body's rounding error."""
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One mode: pole = -damping_ratio w + i w sqrt(1 - damping_ratio^2) with w = 2 pi frequency.
+
+    `shape` (n,) complex over the dofs, largest element 1; `energy`: share of the strain energy in every element, sum 1;
+    `kind`: axial, rocking or lateral; `whirl`: forward, backward or none, from the turning body's tilts.
+    """
+
+    frequency: float  # Hz, undamped
+    damping_ratio: float
+    kind: str
+    whirl: str
+    energy: Mapping[str, float]
+    shape: ComplexArray
+    pole: complex
+
+    def damped_frequency(self) -> float:
+        return abs(self.pole.imag) / (2 * np.pi)
+
+
+@dataclass(frozen=True)
+class Poles:
+    """All 2n poles (rad/s) with right vectors (n, 2n) and left vectors (2n, n) scaled so that H = right / (i w - pole) left."""
+
+    value: ComplexArray
+    right: ComplexArray
+    left: ComplexArray
+
+
+def poles(linear: Matrices) -> Poles:
+    """Poles and vectors of M q'' + C q' + K q = f."""
+    n = len(linear.mass)
+    inverse = np.linalg.inv(linear.mass)
+    state = np.zeros((2 * n, 2 * n))
+    state[:n, n:] = np.eye(n)
+    state[n:, :n] = -inverse @ linear.stiffness
+    state[n:, n:] = -inverse @ linear.damping
+    scale = np.concatenate([np.ones(n), np.full(n, np.sqrt(np.trace(-state[n:, :n]) / n))])  # balances q against q'
+    value, vectors = np.linalg.eig(state * scale / scale[:, None])
+    vectors = vectors * scale[:, None]
+    left = np.linalg.inv(vectors)[:, n:] @ inverse
+    return Poles(value, vectors[:n], left)
+
+
+def frf(linear: Matrices, response: Array, reference: Array, frequency: Array | ComplexArray, kind: str = "receptance") -> ComplexArray:
+    """Exact FRF (n_resp, n_ref, n_freq) between response rows (n_resp, n) and force rows (n_ref, n) at `frequency` (Hz).
+
+    `kind`: receptance m/N, mobility (m/s)/N, accelerance (m/s2)/N.
+    """
+    p = poles(linear)
+    at_response = np.atleast_2d(response) @ p.right
+    at_reference = p.left @ np.atleast_2d(reference).T
+    s = 2j * np.pi * np.asarray(frequency)
+    residues = at_response[:, None, :] * at_reference.T[None, :, :]
+    # a pole and its conjugate add up to a term with real numerators, which halves the work on the lines
+    upper, real = p.value.imag > 0, p.value.imag == 0
+    pole, residue = p.value[upper], residues[:, :, upper]
+    term = 1 / (s * (s - 2 * pole.real[:, None]) + np.abs(pole[:, None]) ** 2)
+    value = (2 * residue.real) @ (s * term) - (2 * (residue * pole.conj()).real) @ term
+    if real.any():
+        value += residues[:, :, real] @ (1 / (s - p.value[real][:, None]))
+    return value * s ** {"receptance": 0, "mobility": 1, "accelerance": 2}[kind]
+
+
+def point_rows(spindle: Spindle, chain: RotorBase, nodes: tuple[int, ...] | None = None) -> Array:
+    """Rows (n_points, n) of the scene's measuring points, in the order of `nodes` (all by default)."""
+    chosen = spindle.points if nodes is None else tuple(spindle.point(n) for n in nodes)
+    return np.array([point_row(chain, p) for p in chosen])
+
+
+def modes(chain: RotorBase, linear: Matrices | None = None, highest: float = np.inf) -> list[Mode]:
+    """Oscillating modes below `highest` (Hz) in order of frequency; `linear` defaults to the chain's own matrices."""
+    linear = linear or matrices(chain)
+    p = poles(linear)
+    found = oscillating(p, highest)
+    shapes = p.right[:, found]
+    shapes = shapes / shapes[np.argmax(np.abs(shapes), axis=0), np.arange(len(found))]
+    strain = np.array([_quadratic(element_rows(chain, e) @ shapes, e.stiffness) for e in chain.elements])
+    strain = strain / strain.sum(axis=0)
+    kind = kinds(linear, shapes)
+    return [
+        Mode(
+            frequency=float(abs(p.value[i]) / (2 * np.pi)),
+            damping_ratio=float(-p.value[i].real / abs(p.value[i])),
+            kind=kind[m],
+            whirl="none" if kind[m] == "axial" else _whirl(chain, shapes[:, m]),
+            energy={e.name: float(share) for e, share in zip(chain.elements, strain[:, m], strict=True)},
+            shape=shapes[:, m],
+            pole=complex(p.value[i]),
+        )
+        for m, i in enumerate(found)
+    ]
+
+
+def oscillating(p: Poles, highest: float = np.inf) -> list[int]:
+    """Indices of the oscillating poles below `highest` (Hz), one of each conjugate pair, in order of frequency.
+
+    A body that nothing holds, as a hub whose bearings have lost contact, moves without oscillating: its double pole at zero comes
+    out as a pair of the size sqrt(rounding) of the largest pole.
+    """
+    size = np.abs(p.value)
+    order = np.argsort(size, kind="stable")
+    return [int(i) for i in order if p.value[i].imag > FREE * size.max() and size[i] < HERTZ * highest]
+
+
+def _quadratic(vectors: ComplexArray, matrix: Array) -> Array:
+    return np.real(np.sum(vectors.conj() * (matrix @ vectors), axis=0))
+
+
+def kinds(linear: Matrices, shapes: ComplexArray) -> tuple[str, ...]:
+    """Kind of every shape (n, m): axial when most kinetic energy is along z, else rocking when most of the rest is in tilts, else lateral."""
+    kinetic = np.diag(linear.mass)[:, None] * np.abs(shapes) ** 2
+    share = {move: kinetic[[i for i, (_, own) in enumerate(linear.dofs) if own == move]].sum(axis=0) for move in MOVES}
+    axial = share["z"] > 0.5 * kinetic.sum(axis=0)
+    rocking = share["tilt_x"] + share["tilt_y"] > share["x"] + share["y"]
+    return tuple("axial" if a else "rocking" if r else "lateral" for a, r in zip(axial, rocking, strict=True))
+
+
+def _whirl(chain: RotorBase, shape: ComplexArray) -> str:
+    """Sense in which the turning body's axis circulates: tilt_y a quarter period behind tilt_x is forward for +z speed."""
+    turning = next((b for b in chain.bodies if b.turns), None)
+    if turning is None:
+        return "none"
+    tilt = motion_rows(chain, turning.name, (0.0, 0.0, turning.z))[3:] @ shape
+    circulation = -float(np.imag(np.conj(tilt[0]) * tilt[1])) * np.sign(chain.speed)
+    if abs(circulation) < 0.02 * float(np.sum(np.abs(tilt) ** 2)):
+        return "none"
+    return "forward" if circulation > 0 else "backward"
+
+
+def group_energy(chain: RotorBase, mode: Mode) -> dict[str, float]:
+    """Strain energy shares summed over the elements' groups (base, flange, bearings, ...), in chain order."""
+    shares: dict[str, float] = {}
+    for element in chain.elements:
+        shares[element.group] = shares.get(element.group, 0.0) + mode.energy[element.name]
+    return shares

@@ -1,0 +1,170 @@
+"""Tables of a file that people write: number types, units, laws over temperature, and what is said of the first thing wrong."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from difflib import get_close_matches
+from pathlib import Path
+from types import UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+import numpy as np
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, Strict, ValidationError, model_validator
+
+from thermospindle.model import machine as m
+from thermospindle.model.errors import BadInput
+
+LARGEST, SMALLEST = 1e15, 1e-15  # of any number of a file: products of a few stay within what can be computed with
+
+
+def _within_reach(value: float) -> float:
+    if not (value == 0 or SMALLEST <= abs(value) <= LARGEST):
+        raise ValueError(f"the size of a number must lie between {SMALLEST:g} and {LARGEST:g}")
+    return value
+
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False), AfterValidator(_within_reach)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False), AfterValidator(_within_reach)]
+Finite = Annotated[float, Field(allow_inf_nan=False), AfterValidator(_within_reach)]
+Share = Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)]
+Place = Annotated[float, Field(ge=-1e4, le=1e4, allow_inf_nan=False)]
+"""mm: a spindle fits into ten metres."""
+Radius = Annotated[float, Field(ge=0, le=1e4, allow_inf_nan=False)]
+"""mm."""
+Temperature = Annotated[float, Field(gt=-273.15, le=5000, allow_inf_nan=False)]
+"""C."""
+Name = Annotated[str, Field(min_length=1, max_length=200)]
+
+
+def _rising(span: tuple[float, float]) -> tuple[float, float]:
+    if not span[0] < span[1]:
+        raise ValueError("the first number must be smaller than the second")
+    return span
+
+
+# tables are strict, so that a number in quotes is none; only a TOML array may stand for a tuple of numbers
+Span = Annotated[tuple[Place, Place], Strict(False), AfterValidator(_rising)]
+Radii = Annotated[tuple[Radius, Place], Strict(False), AfterValidator(_rising)]
+Band = Annotated[tuple[NotNegative, Positive], Strict(False), AfterValidator(_rising)]
+"""Hz."""
+TemperatureSpan = Annotated[tuple[Temperature, Temperature], Strict(False), AfterValidator(_rising)]
+Both = Annotated[tuple[NotNegative, NotNegative], Strict(False)]
+Position = Annotated[tuple[Place, Place, Place], Strict(False)]
+TwoNames = Annotated[tuple[str, str], Strict(False)]
+
+
+class Table(BaseModel):
+    """A table of the file: unknown keys are refused; `origin`, `source` and `origins` say where its numbers come from."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    origin: Literal["printed", "assumed", "calibrated"] | None = None
+    source: str = ""
+    origins: dict[str, Literal["printed", "assumed", "calibrated"]] = {}
+
+
+class LawTable(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    temperature_C: list[Temperature] = Field(min_length=1, max_length=1000)
+    value: list[Positive] = Field(min_length=1, max_length=1000)
+
+    @model_validator(mode="after")
+    def _one_value_a_temperature(self) -> LawTable:
+        if len(self.temperature_C) != len(self.value) or np.any(np.diff(self.temperature_C) <= 0):
+            raise ValueError("temperature_C must rise and have as many entries as value")
+        return self
+
+    def law(self, unit: float) -> m.Law:
+        return m.Law(tuple(self.temperature_C), tuple(unit * v for v in self.value))
+
+
+def _constant(value: Any) -> Any:
+    return value if isinstance(value, dict | LawTable) else {"temperature_C": [0.0], "value": [value]}
+
+
+LawValue = Annotated[LawTable, BeforeValidator(_constant)]
+"""A number, or a table of `temperature_C` and `value`."""
+
+
+def values_within(low: float, high: float) -> AfterValidator:
+    """Every value of a law between two numbers, in the unit of its key."""
+
+    def check(law: LawTable) -> LawTable:
+        for value in law.value:
+            if not low <= value <= high:
+                raise ValueError(f"{value:g}: must lie between {low:g} and {high:g}")
+        return law
+
+    return AfterValidator(check)
+
+
+def read_toml(file: Path) -> dict[str, Any]:
+    """The tables of a TOML file; `BadInput` for what is none, or is written so that it cannot be read."""
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8"))
+    except RecursionError:
+        raise BadInput(f"{file}: its tables are nested too deep to be read") from None
+    except ValueError as error:  # of TOML, of UTF-8, of numbers with thousands of digits
+        raise BadInput(f"{file}: not a TOML file: {error}") from None
+
+
+def first_error(where: str | Path, raw: Any, form: type[BaseModel], error: ValidationError) -> str:
+    """One sentence for the first thing pydantic found wrong in a file of `form`: a misspelt key before the one then missing.
+
+    Entries of a list of tables go by their id, node or name.
+    """
+    problem = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
+    location = problem["loc"]
+    words, value = [], raw
+    for part in location:
+        try:
+            value = value[part]
+        except (KeyError, IndexError, TypeError):
+            value = None
+        entry = value if isinstance(part, int) and isinstance(value, Mapping) else {}
+        called = next((entry[key] for key in ("id", "node", "name") if key in entry), part)
+        words.append(called if isinstance(called, str) else _shown(called))
+    key = ".".join(words)
+    match problem["type"]:
+        case "extra_forbidden":
+            allowed = _allowed_keys(form, location[:-1])
+            near = get_close_matches(str(location[-1]), allowed, n=1)
+            meant = f"; did you mean {near[0]}?" if near else ""
+            return f"{where}: {key}: unknown key; allowed here: {', '.join(allowed)}{meant}"
+        case "missing":
+            return f"{where}: {key}: missing, and has no default"
+        case _:
+            message = problem["msg"].removeprefix("Value error, ")
+            given = "" if isinstance(problem["input"], Mapping | LawTable) else f" = {_shown(problem['input'])}"
+            told = f"{key}{given}: {message[0].lower()}{message[1:]}".removeprefix(": ")
+            return f"{where}: {told}"
+
+
+def _shown(value: Any) -> str:
+    """A value as a message quotes it: no numbers of thousands of digits, no endless text."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):
+        return f"a {type(value).__name__} too long to be written"
+    return text if len(text) <= 200 else f"{text[:200]}..."
+
+
+def _allowed_keys(form: Any, path: tuple[str | int, ...]) -> list[str]:
+    """Keys of the table at `path`, read off the models."""
+    table = form
+    for part in path:
+        if isinstance(part, int):
+            continue
+        fields = getattr(table, "model_fields", None)
+        table = _table_in(fields[part].annotation if fields and part in fields else get_args(table)[1])
+    return list(table.model_fields)
+
+
+def _table_in(annotation: Any) -> Any:
+    """The pydantic model inside an annotation (a list's or union's member), or the annotation itself."""
+    if get_origin(annotation) is list:
+        return _table_in(get_args(annotation)[0])
+    if get_origin(annotation) in (Union, UnionType, Annotated):
+        inner = [_table_in(a) for a in get_args(annotation)]
+        return next((a for a in inner if isinstance(a, type) and issubclass(a, BaseModel)), annotation)
+    return annotation

@@ -1,0 +1,79 @@
+"""The form of a scene file: convection, heat sources, air gaps and bearing friction."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated
+
+from pydantic import Field
+
+from thermospindle.model import machine as m
+from thermospindle.model.scene.fields import LawTable, LawValue, Name, NotNegative, Positive, Table, TwoNames
+from thermospindle.model.units import RPM
+
+
+class Convection(Table):
+    regions: list[str] = Field(min_length=1)
+    coefficient_W_per_m2_K: Positive
+
+
+class Source(Table):
+    name: Name
+    regions: list[str] = Field(min_length=1)
+    power_W: NotNegative
+    speed_rpm: Annotated[float, Field(ge=1e-3, le=1e8)]
+    exponent: Annotated[float, Field(ge=0, le=10)]
+
+
+class Gap(Table):
+    regions: TwoNames
+    coefficient_W_per_m2_K: NotNegative
+
+
+class Friction(Table):
+    f0: NotNegative
+    f1: NotNegative
+    kinematic_viscosity_mm2_per_s: LawValue
+    conductance_W_per_K: NotNegative
+
+
+STILL_AIR, MOVED_AIR = 10.0, 40.0  # W/(m2 K): free convection from standing faces, and that of a face that turns
+GREASE = Friction(
+    f0=2.0,
+    f1=0.0003,
+    conductance_W_per_K=0.05,
+    kinematic_viscosity_mm2_per_s=LawTable(
+        temperature_C=[-20.0, 0.0, 20.0, 40.0, 60.0, 80.0, 100.0, 120.0], value=[1110.0, 209.0, 63.1, 26.0, 13.2, 7.79, 5.1, 3.6]
+    ),
+)
+"""Assumed where a scene says nothing: a greased angular contact row (Palmgren; Harris, ch. 14) with a base oil of 26 mm2/s at 40 C."""
+
+
+class Thermal(Table):
+    """Cooling, heat and friction. A scene without `convection` has still air about its standing regions and moved air about the turning
+    ones; without `friction` a light grease. `model.scene.defaults` says so in the provenance."""
+
+    convection: list[Convection] = Field(default_factory=list)
+    sources: list[Source] = Field(default_factory=list)
+    gaps: list[Gap] = Field(default_factory=list)
+    friction: Friction = GREASE
+
+    def thermal(self, regions: Sequence[m.Region]) -> m.Thermal:
+        """`regions` are those of the section, cooled as assumed where no convection is told."""
+        f = self.friction
+        told = tuple(m.Convection(regions=tuple(c.regions), coefficient=c.coefficient_W_per_m2_K) for c in self.convection)
+        assumed = tuple(
+            m.Convection(regions=tuple(g.name for g in regions if g.part == part), coefficient=film)
+            for part, film in (("stationary", STILL_AIR), ("rotating", MOVED_AIR))
+        )
+        return m.Thermal(
+            convections=told or assumed,
+            sources=tuple(
+                m.HeatSource(name=s.name, regions=tuple(s.regions), power=s.power_W, speed=s.speed_rpm * RPM, exponent=s.exponent)
+                for s in self.sources
+            ),
+            gaps=tuple(m.AirGap(regions=g.regions, coefficient=g.coefficient_W_per_m2_K) for g in self.gaps),
+            friction=m.Friction(
+                f0=f.f0, f1=f.f1, viscosity=f.kinematic_viscosity_mm2_per_s.law(1e-6), conductance=f.conductance_W_per_K
+            ),
+        )

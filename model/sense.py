@@ -1,0 +1,63 @@
+"""Limits of sense: conditions and states that can be computed but that no real spindle bears. They warn, they refuse nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from thermospindle.model.bearing.pair import BearingState
+from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.units import MM, RPM
+
+COLDEST, HOTTEST = -40.0, 120.0
+"""C. Below, rolling-bearing greases no longer lubricate; above, bearing steel that is not stabilised grows (SKF, Rolling bearings, 2018)."""
+FASTEST = 2.5e6
+"""mm rev/min, speed times pitch diameter: what ball bearings reach with ceramic balls and oil-air (Abele et al., CIRP Annals 59, 2010)."""
+DEEPEST = 0.01
+"""Deformation of both contacts over the ball's diameter. The static capacity of ISO 76, 4.2 GPa, is reached at about a third of it."""
+
+
+def of_conditions(spindle: Spindle, conditions: Sequence[Condition]) -> list[str]:
+    """What is doubtful about operating conditions: temperatures that bearings do not bear, speeds that none has reached."""
+    said = []
+    for condition in _extremes(conditions):
+        if not COLDEST <= condition.temperature <= HOTTEST:
+            said.append(
+                f"{condition.temperature:g} C lies outside {COLDEST:g} to {HOTTEST:g} C, where bearing steel keeps its size and grease "
+                "its function; the materials are taken as the scene has them"
+            )
+    fastest = max(abs(c.speed) for c in conditions)
+    for b in spindle.bearings:
+        reached = fastest / RPM * b.pitch_diameter / MM
+        if reached > FASTEST:
+            said.append(
+                f"{fastest / RPM:g} rpm means a speed factor n dm of {reached:.3g} mm rev/min in the {b.name} bearing; ball bearings "
+                f"end at about {FASTEST:.2g}"
+            )
+    return said
+
+
+def of_states(spindle: Spindle, states: Iterable[Sequence[BearingState]]) -> list[str]:
+    """What is doubtful about loaded bearings, given all bearings of every state."""
+    deepest: dict[str, float] = {}
+    for state in states:
+        for b in state:
+            deepest[b.name] = max(deepest.get(b.name, 0.0), b.deformation)
+    return of_depths(spindle, deepest)
+
+
+def of_depths(spindle: Spindle, deepest: Mapping[str, float]) -> list[str]:
+    """Balls pressed deeper into their races than steel stays elastic; `deepest` is the deformation (m) of both contacts, by bearing."""
+    return [
+        f"the balls of the {name} bearing are pressed in by {depth / spindle.bearing(name).ball_diameter:.1%} of their diameter; beyond "
+        f"{DEEPEST:.0%} no bearing stays elastic, and Hertz's theory does not hold"
+        for name, depth in deepest.items()
+        if depth > DEEPEST * spindle.bearing(name).ball_diameter
+    ]
+
+
+def _extremes(conditions: Sequence[Condition]) -> list[Condition]:
+    """The coldest and the hottest condition, once where they are the same."""
+    coldest, hottest = (int(pick([c.temperature for c in conditions])) for pick in (np.argmin, np.argmax))
+    return [conditions[i] for i in dict.fromkeys((coldest, hottest))]

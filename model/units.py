@@ -1,0 +1,16 @@
+"""Units in which people write and read; everything inside is SI. Multiply to come in, divide to go out."""
+
+import numpy as np
+
+RPM = 2 * np.pi / 60
+"""rad/s of one revolution per minute."""
+HERTZ = 2 * np.pi
+"""rad/s of one cycle per second."""
+DEGREE = np.pi / 180
+"""rad."""
+MINUTE = 60.0
+"""s."""
+MM, UM, NM = 1e-3, 1e-6, 1e-9
+"""m."""
+TO_MM, TO_UM, TO_NM = 1e3, 1e6, 1e9
+"""A length in m, to show."""

@@ -1,0 +1,111 @@
+"""Files and folders that are written whole or not at all.
+
+Everything is written in a hidden work folder beside its place and moved there when it is complete. What stood there before is moved
+into the same work folder first and deleted last, so at every moment the old or the new one can be had: when the program is killed
+between the two moves, the next writer at that place moves the old one back. A lock that dies with its process tells the work
+folder of a killed run from that of one still running.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from glob import escape
+from pathlib import Path
+
+from thermospindle.model.errors import BadInput
+
+try:
+    import fcntl
+except ImportError:  # Windows: without locks of folders, what killed runs left is not told from what others write, and stays
+    fcntl = None  # type: ignore[assignment]
+
+NEW, OLD = "new", "old"
+"""Folders of a work folder: what is being written, and what it replaces; the thing in each has the name of its place."""
+
+
+@contextmanager
+def whole(path: Path) -> Iterator[Path]:
+    """Where to write the file or folder that shall stand at `path`: it is moved there when the block ends well, removed otherwise.
+
+    The block must make it, a file or a folder; what stands at `path` then is replaced. The folder of `path` must exist. OSError, as
+    the system has it, where nothing can be written; a `BadInput` of the block names `path` and not the work folder.
+    """
+    path = Path(path).absolute()
+    _tidy(path)
+    work, lock = _work_folder(path)
+    try:
+        new = work / NEW / path.name
+        new.parent.mkdir()
+        try:
+            yield new
+        except BadInput as error:
+            raise BadInput(str(error).replace(str(new), str(path))) from None
+        _exchange(path, new, work / OLD / path.name)
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+        if lock is not None:
+            os.close(lock)
+
+
+def _exchange(path: Path, new: Path, old: Path) -> None:
+    """Put `new` in the place of `path`; `old` keeps what stood there, and goes back if `new` cannot be moved."""
+    if not path.is_dir():
+        os.replace(new, path)
+        return
+    old.parent.mkdir()
+    os.replace(path, old)
+    try:
+        os.replace(new, path)
+    except BaseException:
+        os.replace(old, path)
+        raise
+
+
+def _prefix(path: Path) -> str:
+    """Begin of the names of work folders for `path`: short enough for any file system."""
+    return f".{path.name[:80]}.spindle-"
+
+
+def _work_folder(path: Path) -> tuple[Path, int | None]:
+    """A new work folder and its lock; made again where another writer took it for a dead one's before it was locked."""
+    while True:
+        work = Path(tempfile.mkdtemp(prefix=_prefix(path), dir=path.parent))
+        lock = _lock(work)
+        if fcntl is None or (lock is not None and work.exists()):
+            return work, lock
+        if lock is not None:
+            os.close(lock)
+
+
+def _tidy(path: Path) -> None:
+    """Put back what killed runs had moved away, and remove their work folders."""
+    for work in path.parent.glob(f"{escape(_prefix(path))}*"):
+        lock = _lock(work)
+        if lock is None:
+            continue  # another process is writing there
+        try:
+            for old in (work / OLD).glob("*"):
+                if not (place := path.parent / old.name).exists():
+                    os.replace(old, place)
+            shutil.rmtree(work, ignore_errors=True)
+        finally:
+            os.close(lock)
+
+
+def _lock(work: Path) -> int | None:
+    """A descriptor that holds the lock of a work folder until it is closed or the process ends; None where another has it."""
+    if fcntl is None:
+        return None
+    descriptor = -1
+    try:
+        descriptor = os.open(work, os.O_RDONLY)
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        if descriptor >= 0:
+            os.close(descriptor)
+        return None
+    return descriptor

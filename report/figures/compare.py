@@ -1,0 +1,208 @@
+"""Pictures of a comparison: map of residuals, FRFs over each other, FDAC, likeness by band and by FRF. Every function returns a figure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.lines import Line2D
+
+from thermospindle.diagnosis.compare.compare import Comparison, PairedMode, TestComparison
+from thermospindle.diagnosis.compare.correlation import Correlation, Pair
+from thermospindle.model.types import Array
+from thermospindle.model.units import RPM
+from thermospindle.report.figures.common import INK, PALE, STYLE, cells, colour, residual_bar, residual_norm, signed_short
+
+FDAC_LINES = 260  # about, of an FDAC map
+UNITS = {"receptance": "m/N", "mobility": "(m/s)/N", "accelerance": "(m/s²)/N"}
+
+
+def figures(c: Comparison) -> dict[str, Figure]:
+    """All pictures that the campaign has data for, by the name of their file."""
+    drawn: dict[str, Figure] = {}
+    if any(t.modes for t in c.tests):
+        drawn["pulls"] = residual_map(c)
+    if with_frfs(c):
+        drawn |= {"frfs": overlay(c), "bands": by_band(c), "channels": by_frf(c), "fdac": fdac_maps(c)}
+    return drawn
+
+
+def with_frfs(c: Comparison) -> list[tuple[TestComparison, Correlation]]:
+    return [(t, t.correlation) for t in c.tests if t.correlation is not None]
+
+
+def label(t: TestComparison, line: str = "\n") -> str:
+    """A test in two short lines: temperature, and speed, level and repeat where they say something."""
+    words = [f"{t.test.temperature:g} °C"]
+    words += [f"{t.test.speed / RPM:.0f} rpm"] if t.test.speed else []
+    words += [f"{t.test.level:g} N"] if t.test.level else []
+    words += [f"no. {t.test.repeat}"] if t.test.repeat > 1 else []
+    return line.join(words)
+
+
+@rc_context(STYLE)
+def residual_map(c: Comparison) -> Figure:
+    """Errors in standard errors, mode by test, frequencies and dampings; what has no partner stands below."""
+    modes = {m.number: f"{m.number} {m.kind}" for t in c.tests for m in sorted(t.modes, key=lambda m: m.number)}
+    modes = dict(sorted(modes.items()))
+    measures: list[tuple[str, Callable[[PairedMode], float | None]]] = [("Frequency", lambda m: m.pull)]
+    if any(m.damping_pull is not None for t in c.tests for m in t.modes):
+        measures.append(("Damping ratio", lambda m: m.damping_pull))
+    wide = max(4.6, 1.5 + 0.72 * len(c.tests))
+    figure = _figure(min(11.0, wide * len(measures)) if len(measures) > 1 else wide, 1.9 + 0.3 * (len(modes) + 2))
+    panels = figure.subplots(1, len(measures), squeeze=False, sharey=True)[0]
+    grids = [_grid(c, list(modes), value) for _, value in measures]
+    largest = max(float(np.nanmax(np.abs(g), initial=0.0)) for g in grids)
+    norm = residual_norm(largest)
+    for axes, grid, (title, _) in zip(panels, grids, measures, strict=True):
+        cells(axes, grid, norm, "RdBu_r", signed_short)
+        axes.set_title(f"{title}: computed − measured")
+        axes.set_xticks(range(len(c.tests)), [label(t) for t in c.tests], fontsize=7.5)
+    panels[0].set_yticks(range(len(modes) + 2), [*modes.values(), "only measured", "only computed"])
+    for k, t in enumerate(c.tests):
+        for row, lost in enumerate((t.missing, t.extra)):
+            panels[0].text(k, len(modes) + row, str(len(lost)) if lost else "–", ha="center", va="center", fontsize=8, color=INK)
+    for axes in panels:
+        axes.set_ylim(len(modes) + 1.5, -0.5)
+        axes.axhline(len(modes) - 0.5, color=INK, lw=0.8)
+    residual_bar(figure, norm, list(panels), shrink=0.9, pad=0.015, aspect=25)
+    return figure
+
+
+def _figure(width: float, height: float) -> Figure:
+    figure = Figure(figsize=(width, height))
+    engine = figure.get_layout_engine()
+    assert isinstance(engine, ConstrainedLayoutEngine)  # STYLE asks for it
+    engine.set(w_pad=0.06, h_pad=0.07)
+    return figure
+
+
+def _grid(c: Comparison, modes: Sequence[int], value: Callable[[PairedMode], float | None]) -> Array:
+    """Values (modes, tests), NaN where there is none."""
+    grid = np.full((len(modes), len(c.tests)), np.nan)
+    for k, t in enumerate(c.tests):
+        for m in t.modes:
+            number = value(m)
+            grid[modes.index(m.number), k] = np.nan if number is None else number
+    return grid
+
+
+@rc_context(STYLE)
+def overlay(c: Comparison) -> Figure:
+    """Measured and computed FRFs over each other, a row a test, a column a driving point."""
+    tests = with_frfs(c)
+    every = [t.test.temperature for t, _ in tests]
+    pairs = shown_pairs(tests[0][1])
+    figure = _figure(10.3, 0.9 + 1.35 * len(tests))
+    panels = figure.subplots(len(tests), len(pairs), squeeze=False, sharex=True, sharey="col")
+    for (t, found), row in zip(tests, panels, strict=True):
+        for pair, axes in zip(pairs, row, strict=True):
+            ij = found.pairs.get(pair)
+            if ij is None:
+                axes.set_axis_off()
+                continue
+            axes.plot(found.frequency, decibel(found.measured[ij]), color=colour(t.test.temperature, every), lw=2.4, alpha=0.55)
+            axes.plot(found.frequency, decibel(found.computed[ij]), color=INK, lw=0.8, ls=(0, (4, 2)))
+        row[0].set_ylabel(label(t))
+    for k, pair in enumerate(pairs):
+        panels[0, k].set_title(f"H({pair[0]},{pair[1]})" + (" driving point" if pair[0] == pair[1] else ""))
+        panels[-1, k].set_xlabel("frequency, Hz")
+        panels[-1, k].set_xlim(tests[0][1].frequency[0], tests[0][1].frequency[-1])
+    quantity = tests[0][1].beside.measured.quantity
+    figure.supylabel(f"{quantity}, dB re 1 {UNITS[quantity]}", fontsize=8.5)
+    handles = [Line2D([], [], color=colour(t, every), lw=2.4, alpha=0.55, label=f"measured, {t:g} °C") for t in sorted(set(every))]
+    handles.append(Line2D([], [], color=INK, lw=0.8, ls=(0, (4, 2)), label="computed"))
+    figure.legend(handles=handles, loc="outside upper right", ncols=min(len(handles), 6))
+    return figure
+
+
+def shown_pairs(found: Correlation) -> list[Pair]:
+    """Driving points, or the loudest FRF where there is none."""
+    driving = [p for p in found.pairs if p[0] == p[1]]
+    loudest = max(found.pairs, key=lambda p: float(np.linalg.norm(found.measured[found.pairs[p]])))
+    return driving[:3] or [loudest]
+
+
+def decibel(value: np.ndarray) -> Array:
+    return np.asarray(20 * np.log10(np.maximum(np.abs(value), 1e-15)), float)
+
+
+@rc_context(STYLE)
+def by_band(c: Comparison) -> Figure:
+    """CSAC, CSF and the shift by FDAC, test by band."""
+    tests = with_frfs(c)
+    edges = sorted({(round(b.low, 6), round(b.high, 6)) for _, found in tests for b in found.bands})
+    values: dict[str, Array] = {name: np.full((len(tests), len(edges)), np.nan) for name in ("csac", "csf", "shift")}
+    for i, (_, found) in enumerate(tests):
+        for b in found.bands:
+            place = i, edges.index((round(b.low, 6), round(b.high, 6)))
+            numbers = (b.csac, b.csf, np.nan if b.shift is None else 100 * b.shift)
+            for grid, value in zip(values.values(), numbers, strict=True):
+                grid[place] = value
+    figure = _figure(10.3, 1.7 + 0.3 * len(tests))
+    panels = figure.subplots(1, 3, sharey=True)
+    far = max(1.0, float(np.nanmax(np.abs(values["shift"]), initial=0.0)))
+    looks: list[tuple[str, Normalize, str, Callable[[float], str]]] = [
+        ("Shape: mean CSAC", Normalize(0, 1), "YlGnBu", lambda v: f"{v:.2f}"),
+        ("Amplitude: mean CSF", Normalize(0, 1), "YlGnBu", lambda v: f"{v:.2f}"),
+        ("Shift of the model, %, by FDAC", Normalize(-far, far), "RdBu_r", lambda v: f"{v:+.1f}"),
+    ]
+    for axes, grid, (title, norm, colours, text) in zip(panels, values.values(), looks, strict=True):
+        picture = cells(axes, grid, norm, colours, text, 6.5)
+        axes.set_title(title)
+        axes.set_xticks(range(len(edges)), [f"{a:.0f}–{b:.0f}" for a, b in edges], fontsize=7, rotation=90)
+        axes.set_xlabel("band, Hz")
+        figure.colorbar(picture, ax=axes, shrink=0.9, pad=0.02, aspect=22).outline.set_visible(False)
+    panels[0].set_yticks(range(len(tests)), [label(t, ", ") for t, _ in tests])
+    return figure
+
+
+@rc_context(STYLE)
+def by_frf(c: Comparison) -> Figure:
+    """FRAC and CSF of every FRF over all its lines, FRF by test; grey where symmetry forbids an answer."""
+    tests = with_frfs(c)
+    pairs = list(dict.fromkeys(p for _, found in tests for p in found.pairs))
+    grids = [np.full((len(pairs), len(tests)), np.nan) for _ in range(2)]
+    for j, (_, found) in enumerate(tests):
+        for pair, shape in found.whole.by_frf.items():
+            for grid, value in zip(grids, (shape.frac, shape.csf), strict=True):
+                grid[pairs.index(pair), j] = np.nan if value is None else value
+    figure = _figure(10.3, 1.5 + 0.24 * len(pairs))
+    panels = figure.subplots(1, 2, sharey=True)
+    for axes, grid, title in zip(panels, grids, ("Shape: FRAC", "Amplitude: CSF"), strict=True):
+        picture = cells(axes, grid, Normalize(0, 1), "YlGnBu", lambda v: f"{v:.2f}", 7.0)
+        axes.set_title(title)
+        axes.set_xticks(range(len(tests)), [label(t) for t, _ in tests], fontsize=7.5)
+    panels[0].set_yticks(range(len(pairs)), [f"H({r},{h})" for r, h in pairs])
+    figure.colorbar(picture, ax=list(panels), shrink=0.9, pad=0.015, aspect=25).outline.set_visible(False)
+    return figure
+
+
+@rc_context(STYLE)
+def fdac_maps(c: Comparison) -> Figure:
+    """FDAC of the tests with the best and the worst CSAC: computed over measured frequency."""
+    tests = sorted(with_frfs(c), key=lambda pair: -np.nan_to_num(pair[1].whole.csac))
+    chosen = tests if len(tests) < 2 else [tests[0], tests[-1]]
+    figure = _figure(4.9 * len(chosen) + 0.5, 4.4)
+    panels = figure.subplots(1, len(chosen), squeeze=False)[0]
+    for axes, (t, found) in zip(panels, chosen, strict=True):
+        some = range(0, len(found.frequency), max(1, len(found.frequency) // FDAC_LINES))
+        lines = found.frequency[list(some)]
+        picture = axes.pcolormesh(lines, lines, found.fdac(some, some), cmap="YlGnBu", vmin=0, vmax=1, shading="nearest", rasterized=True)
+        axes.axline((lines[0], lines[0]), slope=1, color=PALE, lw=0.7)
+        shifts: Mapping[tuple[float, float], float] = {(b.low, b.high): b.shift for b in found.bands if b.shift is not None}
+        for (low, high), shift in shifts.items():
+            axes.plot([low, high], np.array([low, high]) * (1 + shift), color="#c9371c", lw=1.4)
+        words = "" if found.whole.shift is None else f", shift {100 * found.whole.shift:+.2f} %".replace("-", "−")
+        axes.set_title(f"{label(t, ', ')}{words}")
+        axes.set(xlabel="measured frequency, Hz", ylabel="computed frequency, Hz", aspect="equal")
+        axes.set(xlim=(lines[0], lines[-1]), ylim=(lines[0], lines[-1]))
+        axes.grid(False)
+    bar = figure.colorbar(picture, ax=list(panels), shrink=0.85, pad=0.02)
+    bar.set_label("FDAC")
+    bar.outline.set_visible(False)
+    return figure

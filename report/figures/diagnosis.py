@@ -1,0 +1,127 @@
+"""Pictures of a diagnosis: how far every explanation leads, its law as the data have it, what would have to drift, and the error left."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from thermospindle.diagnosis.inference.verdict import Candidate
+from thermospindle.diagnosis.verdict import Diagnosis
+from thermospindle.model.machine import Condition
+from thermospindle.model.types import Array
+from thermospindle.model.units import RPM
+from thermospindle.report.figures.common import INK, STYLE
+
+NAMED, OTHER, FREE = "#1f6f5c", "#8c9aa8", "#d9b36c"
+MOST = 10  # explanations, and three drifts
+
+
+def figures(d: Diagnosis) -> dict[str, Figure]:
+    """All pictures of a diagnosis, by the name of their file."""
+    drawn = {"errors": errors(d)}
+    if d.verdict.candidates or d.drifts:
+        drawn["explanations"] = explanations(d)
+    lead = leading(d)
+    if lead is not None:
+        drawn["law"] = law(d, lead)
+    if d.drifts:
+        drawn["drift"] = drifts(d)
+    return drawn
+
+
+def leading(d: Diagnosis) -> Candidate | None:
+    """The candidate whose law is shown: the best of those the verdict names."""
+    return next((c for c in d.verdict.candidates if d.verdict.effects and set(c.names) <= set(d.verdict.effects)), None)
+
+
+@rc_context(STYLE)
+def explanations(d: Diagnosis) -> Figure:
+    """ln evidence of explanations over the model without effects; free forms beside those of the catalogue."""
+    best = sorted((*d.verdict.candidates[:MOST], *d.verdict.free[:4]), key=lambda c: -c.delta_evidence)[: MOST + 2]
+    value = np.array([c.delta_evidence for c in best])
+    paint = [FREE if c.free else NAMED if d.verdict.effects and set(c.names) <= set(d.verdict.effects) else OTHER for c in best]
+    figure = Figure(figsize=(8.6, 0.85 + 0.27 * len(best)), layout="constrained")
+    axes = figure.add_subplot()
+    axes.barh(range(len(best)), value, height=0.66, color=paint)
+    low, high = min(float(value.min()), 0.0), max(float(value.max()), 1.0)
+    low = max(low, -0.2 * high)
+    for y, v in enumerate(value):
+        axes.text(max(v, 0.0) + 0.012 * (high - low), y, f"{v:+.1f}".replace("-", "−") if abs(v) < 1000 else f"{v:+.0f}", va="center", fontsize=8, color=INK)
+    axes.axvline(0, color=INK, lw=0.8)
+    axes.set_yticks(range(len(best)), [" + ".join(c.names) + (" (drifts)" if c.free else "") for c in best])
+    axes.set(xlim=(1.05 * low, high + 0.14 * (high - low)), ylim=(len(best) - 0.4, -0.6))
+    axes.set_xlabel("ln evidence over the model without effects")
+    axes.set_title("How far every explanation leads")
+    axes.grid(visible=False, axis="y")
+    axes.tick_params(axis="y", length=0)
+    return figure
+
+
+@rc_context(STYLE)
+def law(d: Diagnosis, c: Candidate) -> Figure:
+    """The size of every effect of a candidate in each test: constant where the effect's law holds."""
+    count = len(c.hypothesis.mechanisms)
+    figure = Figure(figsize=(8.6, 2.4 * count + 0.3), layout="constrained")
+    conditions = [t.condition for t in d.search.model.tests]
+    for k, m in enumerate(c.hypothesis.mechanisms):
+        axes = figure.add_subplot(count, 1, k + 1)
+        own = c.hypothesis.evidence
+        _over_temperature(axes, conditions, own.sizes[k], np.sqrt(np.maximum(np.diag(own.size_covariance[k]), 0.0)))
+        unit = "" if m.size.unit == "1" else f", {m.size.unit}"
+        axes.set_ylabel(f"{m.size.name}{unit}")
+        axes.set_title(f"{m.name}: its size in every test (a level line is the effect's own law)")
+    return figure
+
+
+@rc_context(STYLE)
+def drifts(d: Diagnosis) -> Figure:
+    """What would have to change from test to test, without any catalogue."""
+    shown = d.drifts[:3]
+    figure = Figure(figsize=(8.6, 2.3 * len(shown) + 0.3), layout="constrained")
+    for k, p in enumerate(shown):
+        axes = figure.add_subplot(len(shown), 1, k + 1)
+        _over_temperature(axes, p.conditions, p.change, p.sd)
+        axes.set_ylabel(f"change, {'%' if p.unit == '%' else 'µm'}")
+        axes.set_title(f"{p.element}: {p.gain:.0f} in ln evidence")
+    return figure
+
+
+def _over_temperature(axes: Axes, conditions: Sequence[Condition], value: Array, sd: Array) -> None:
+    """Values with one standard error over temperature, a line and marker for each speed."""
+    speeds = sorted({c.speed for c in conditions})
+    for k, speed in enumerate(speeds):
+        own = [i for i, c in enumerate(conditions) if c.speed == speed]
+        own.sort(key=lambda i: conditions[i].temperature)
+        axes.errorbar(
+            [conditions[i].temperature + 0.4 * k for i in own], value[own], sd[own], fmt="o-s-^-D-v-"[2 * (k % 5) : 2 * (k % 5) + 2],
+            color=(NAMED, "#a0741a", "#7a3d8f", "#555f6b", "#2166ac")[k % 5], ms=4, lw=1.0, capsize=2, label=f"{speed / RPM:.0f} rpm",
+        )  # fmt: skip
+    axes.set_xlabel("temperature, °C")
+    axes.legend(frameon=False, fontsize=8, ncols=min(len(speeds), 5))
+
+
+@rc_context(STYLE)
+def errors(d: Diagnosis) -> Figure:
+    """chi2 a number of every test, with tolerances fitted and with what the verdict names."""
+    tests = d.search.model.tests
+    told: list[tuple[str, Any, str]] = [("tolerances fitted", d.search.base, OTHER)]
+    if d.verdict.accepted is not d.search.base:
+        told.append((" + ".join(d.verdict.accepted.names), d.verdict.accepted, NAMED))
+    figure = Figure(figsize=(8.6, 2.6), layout="constrained")
+    axes = figure.add_subplot()
+    width = 0.8 / len(told)
+    for k, (label, h, paint) in enumerate(told):
+        value = [b[0] / t.count for b, t in zip(h.fit.by_test, tests, strict=True)]
+        axes.bar(np.arange(len(tests)) + (k - (len(told) - 1) / 2) * width, value, width=width, color=paint, label=label)
+    axes.axhline(1.0, color=INK, lw=0.8, ls="--")
+    axes.set_xticks(range(len(tests)), [t.test.id for t in tests], rotation=30 if len(tests) > 6 else 0)
+    axes.set_ylabel("chi² a number")
+    axes.set_title("Error left in every test (1 is noise alone)")
+    axes.legend(frameon=False, fontsize=8)
+    axes.grid(visible=False, axis="x")
+    return figure

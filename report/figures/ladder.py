@@ -1,0 +1,143 @@
+"""Pictures of the ladder: the error on every rung, and residuals by mode and test on the first rung and on the top."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from thermospindle.diagnosis.data.features import Data
+from thermospindle.diagnosis.data.observe import Observation
+from thermospindle.diagnosis.ladder.ladder import Ladder
+from thermospindle.diagnosis.ladder.rung import Rung
+from thermospindle.model.types import Array
+from thermospindle.model.units import RPM
+from thermospindle.report.figures.common import PALE, STYLE, broken, cells, logarithmic, residual_bar, residual_norm, signed_short, svg
+
+ERROR, HELD_OUT = "#b3402a", "#2166ac"
+
+
+@dataclass(frozen=True, eq=False)
+class PullMap:
+    """(computed - measured) / standard error by mode (row) and test (column), NaN where not measured; `damping` None without any."""
+
+    modes: list[str]
+    tests: list[str]
+    frequency: Array
+    damping: Array | None
+
+
+def pull_map(found: Ladder, rung: Rung) -> PullMap:
+    """The pulls of a rung."""
+    return pulls(found.theory.data, found.mode, found.kinds, rung.residual)
+
+
+def pulls(data: Data, mode: np.ndarray, kinds: Mapping[int, str], residual: Array) -> PullMap:
+    """The pulls of all modes that have a number, tests in order of speed and temperature; `mode` (n,) is zero where there is none."""
+    order = sorted(range(len(data.observations)), key=lambda t: _place(data.observations[t]))
+    column = {t: k for k, t in enumerate(order)}
+    row = {number: k for k, number in enumerate(kinds)}
+    maps = {what: np.full((len(row), len(order)), np.nan) for what in ("frequency", "damping")}
+    for k, f in enumerate(data.features):
+        if f.what in maps and mode[k]:
+            maps[f.what][row[int(mode[k])], column[f.test]] = -residual[k] / data.sd[k]
+    damping = maps["damping"] if np.isfinite(maps["damping"]).any() else None
+    return PullMap([f"{n} {kind}" for n, kind in kinds.items()], _tests([data.observations[t] for t in order]), maps["frequency"], damping)
+
+
+def _place(o: Observation) -> tuple[float, float, str]:
+    return abs(o.condition.speed), o.condition.temperature, o.test.id
+
+
+def _tests(observations: list[Observation]) -> list[str]:
+    """Temperature, and speed where there are several; the id of the test where that says too little."""
+    speeds = {o.condition.speed for o in observations}
+    labels = [f"{o.condition.temperature:g} °C" + (f", {o.condition.speed / RPM:.0f} rpm" if len(speeds) > 1 else "") for o in observations]
+    return labels if len(set(labels)) == len(labels) else [o.test.id for o in observations]
+
+
+def figure(found: Ladder) -> Figure:
+    first, last = (pull_map(found, r) for r in (found.rungs[0], found.top))
+    rows = 1 if first.damping is None else 2
+    tall = 0.32 * len(first.modes) + 0.75
+    drawn = Figure(figsize=(10.0, 3.1 + rows * tall))
+    parts: Any = drawn.subfigures(2, 1, height_ratios=[3.1, rows * tall])
+    _errors(parts[0].subplots(), found)
+    draw_maps(parts[1], [(found.rungs[0].name, first), (found.top.name, last)])
+    return drawn
+
+
+def _errors(axes: Axes, found: Ladder) -> None:
+    place = np.arange(len(found.rungs))
+    for values, colour, marker, label, up in (
+        ([r.held_out for r in found.rungs], HELD_OUT, "s", "left-out temperatures", True),
+        ([r.error for r in found.rungs], ERROR, "o", "all data", False),
+    ):
+        axes.plot(place, values, color=colour, marker=marker, label=label, zorder=3)
+        for x, r in enumerate(found.rungs):
+            if up and r.fitted is None:
+                continue  # both are the same there, written once
+            above = up if r.held_out != r.error else not up
+            if r.held_out < r.error:
+                above = not up
+            shift = (0, 7) if above or r.fitted is None else (0, -14)
+            axes.annotate(
+                _short(values[x]), (x, values[x]), xytext=shift, textcoords="offset points", ha="center", color=colour, fontsize=8
+            )
+    axes.axhline(1.0, color=PALE, lw=0.9, ls="--", zorder=1, label="errors of the data")
+    logarithmic(axes)
+    low = min(1.0, *(min(r.error, r.held_out) for r in found.rungs))
+    high = max(max(r.error, r.held_out) for r in found.rungs)
+    span = max(np.log10(high / low), 0.5)
+    axes.set_ylim(low / 10 ** (0.16 * span), high * 10 ** (0.16 * span))
+    axes.set_xlim(-0.5, len(place) - 0.5)
+    axes.set_xticks(place, [broken(r.name) for r in found.rungs])
+    axes.set_ylabel("rms residual, standard errors")
+    axes.set_title("The error on every rung")
+    axes.legend(loc="upper right")
+    axes.grid(visible=False, axis="x")
+
+
+def draw_maps(part: Any, rungs: Sequence[tuple[str, PullMap]]) -> None:
+    """Maps of residuals beside each other in a figure or a part of one, each below its name; dampings below frequencies."""
+    rows = 1 if rungs[0][1].damping is None else 2
+    norm = residual_norm(max(float(np.nanmax(np.abs(m.frequency))) for _, m in rungs))
+    grid = part.subplots(rows, len(rungs), squeeze=False)
+    for k, (name, pulls) in enumerate(rungs):
+        for i, (what, values) in enumerate((("frequencies", pulls.frequency), ("damping ratios", pulls.damping))[:rows]):
+            assert values is not None
+            axes = grid[i][k]
+            cells(axes, values, norm, "RdBu_r", signed_short)
+            axes.set_xticks(range(len(pulls.tests)), [t.replace(", ", "\n").removesuffix(" rpm") for t in pulls.tests], fontsize=7.5)
+            axes.set_yticks(range(len(pulls.modes)), pulls.modes if k == 0 else [])
+            axes.set_title(f"{name}: {what}")
+            if i == rows - 1 and any(t.endswith(" rpm") for t in pulls.tests):
+                axes.set_xlabel("temperature, and below it speed in rpm")
+        grid[0][0].set_ylabel("mode")
+    residual_bar(part, norm, grid, shrink=0.9, pad=0.01)
+
+
+def _short(value: float) -> str:
+    return f"{value:.0f}" if value >= 99.5 else (f"{value:.1f}" if value >= 9.95 else f"{value:.2f}")
+
+
+def picture(found: Ladder) -> str:
+    """The figure as an SVG element for a page."""
+    with rc_context(STYLE):
+        return svg(figure(found), "ladder", "Error on every rung of the ladder, and residuals on the first and the last")
+
+
+def write(found: Ladder, path: Path) -> None:
+    """The figure as a file of its own, by its ending (.svg or .png), on white."""
+    with rc_context({**STYLE, "figure.facecolor": "white", "savefig.facecolor": "white"}):
+        buffer = io.BytesIO()
+        metadata = {"Date": None} if path.suffix == ".svg" else None
+        figure(found).savefig(buffer, format=path.suffix[1:], dpi=130, metadata=metadata)
+    path.write_bytes(buffer.getvalue())

@@ -1,0 +1,262 @@
+"""Figures of a resonance map: Campbell diagram, the same over temperature, coincidences over both, and runout along both."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from thermospindle.model.bearing.kinematics import Line
+from thermospindle.model.units import RPM
+from thermospindle.report.figures.common import INK, PALE, STYLE, svg
+from thermospindle.report.figures.warmup import MODES, name_ends, spread
+from thermospindle.sim.resonance.map import Coincidence, LineTrack, ResonanceMap, Track, strongest
+from thermospindle.sim.resonance.point import key
+
+WHIRL = {"forward": "#c9371c", "backward": "#2166ac", "none": "#1f8a70"}
+CAUSES = {
+    "unbalance": INK,
+    "inner waviness": "#a0741a",
+    "outer waviness": "#7a3d8f",
+    "ball waviness": "#2e7d6b",
+    "ball size": "#b0457b",
+    "cage unbalance": "#555f6b",
+}
+SIZE = (9.6, 6.2)  # inches
+LINES = 9  # drawn in a diagram
+CURVES = 14  # drawn in the map
+
+
+def write_figures(found: ResonanceMap, folder: Path) -> None:
+    """`campbell.png`, `temperature.png`, `coincidences.png`, `nrro.png`."""
+    with rc_context({**STYLE, "savefig.facecolor": "white"}):
+        for name, figure in figures(found).items():
+            figure.savefig(folder / f"{name}.png", dpi=150)
+
+
+def figures_svg(found: ResonanceMap) -> dict[str, str]:
+    with rc_context(STYLE):
+        return {name: svg(figure, f"map-{name}", name) for name, figure in figures(found).items()}
+
+
+def figures(found: ResonanceMap) -> dict[str, Figure]:
+    return {"campbell": campbell(found), "temperature": over_temperature(found), "coincidences": both(found), "nrro": runout(found)}
+
+
+def drawn_lines(found: ResonanceMap) -> list[LineTrack]:
+    """The lines of the strongest coincidences and the unbalance, one bearing for each."""
+    tracks = {key(t.line): t for t in found.lines}
+    chosen: dict[tuple, LineTrack] = {}
+    at_nominal = [c for c in found.coincidences if c.at_nominal_speed]
+    for c in [*strongest(at_nominal), *strongest(found.coincidences)]:
+        chosen.setdefault((c.line.cause, c.line.order, c.line.direction, c.line.whirl), tracks[key(c.line)])
+    first = [t for t in found.lines if t.line.cause == "unbalance"]
+    return first + list(chosen.values())[:LINES]
+
+
+def campbell(found: ResonanceMap, at: int | None = None, size: tuple[float, float] = SIZE) -> Figure:
+    """Natural frequencies and the strongest lines over speed, at the nominal temperature or at that of index `at`; axes are the same
+    at all temperatures."""
+    figure = Figure(figsize=size)
+    axes = figure.subplots()
+    t0 = found.nominal_index[0] if at is None else at
+    speed = found.speeds / RPM
+    top = 1.12 * np.nanmax([m.frequency for m in found.modes])
+    axes.set(xlim=(0, speed[-1]), ylim=(0, top))
+    for mode in found.modes:
+        _draw_mode(axes, speed, mode.frequency[t0], mode)
+    leaving: list[tuple[float, str, str]] = []
+    ends, names, paints = [], [], []
+    for track in drawn_lines(found):
+        values, paint = track.frequency[t0], CAUSES[track.line.cause]
+        axes.plot(speed, values, color=paint, lw=0.9, ls="--" if track.line.whirl < 0 else "-")
+        if values[-1] > top:
+            leaving.append((float(np.interp(top, values, speed)), _named(track.line), paint))
+        else:
+            ends.append(float(values[-1]))
+            names.append(_named(track.line))
+            paints.append(paint)
+    ends += [float(m.frequency[t0, -1]) for m in found.modes]
+    names += [f"mode {m.number} {m.kind}" for m in found.modes]
+    paints += [WHIRL[m.whirl] for m in found.modes]
+    name_ends(axes, np.array(ends), names, paints)
+    _name_tops(axes, leaving)
+    tracks = {key(t.line) for t in drawn_lines(found)}
+    strength = {(key(c.line), c.mode.number): c.strength for c in strongest(found.coincidences) if key(c.line) in tracks}
+    marked = [
+        (s / RPM, float(np.interp(s, found.speeds, curve.mode.frequency[t0])), strength[key(curve.line), curve.mode.number])
+        for curve in found.curves
+        if (key(curve.line), curve.mode.number) in strength
+        for s in curve.speed[curve.temperature == found.temperatures[t0]]
+    ]
+    _mark(axes, marked)
+    axes.axvline(found.nominal.speed / RPM, color=PALE, lw=1.0, ls=":")
+    axes.set(xlabel="speed, rpm", ylabel="frequency, Hz")
+    figure.suptitle(f"Campbell diagram at {found.temperatures[t0]:.4g} °C", x=0.01, ha="left", fontweight="bold", fontsize=9.5)
+    figure.legend(handles=_key(found), loc="outside lower center", ncols=round(size[0] / 1.65), fontsize=7.5)
+    return figure
+
+
+def over_temperature(found: ResonanceMap, size: tuple[float, float] = SIZE, key_below: bool = True) -> Figure:
+    """Natural frequencies and the lines among them over temperature, at the nominal speed."""
+    figure = Figure(figsize=size)
+    axes = figure.subplots()
+    _, s0 = found.nominal_index
+    values = np.array([m.frequency[:, s0] for m in found.modes])
+    low, high = 0.93 * np.nanmin(values), 1.05 * np.nanmax(values)
+    axes.set(xlim=(found.temperatures[0], found.temperatures[-1]), ylim=(low, high))
+    inside = [t for t in found.lines if np.nanmin(t.frequency[:, s0]) > low and np.nanmax(t.frequency[:, s0]) < high]
+    best: dict[tuple, LineTrack] = {}
+    for t in sorted(inside, key=lambda t: -t.amplitude):
+        best.setdefault((t.line.cause, t.line.order, t.line.direction, t.line.whirl), t)
+    shown = list(best.values())[:LINES]
+    crossing = [c for c in found.coincidences if c.at_nominal_speed]
+    for t in found.lines:
+        if any(key(c.line) == key(t.line) for c in crossing) and t not in shown:
+            shown.append(t)
+    for mode in found.modes:
+        _draw_mode(axes, found.temperatures, mode.frequency[:, s0], mode)
+    for t in shown:
+        axes.plot(found.temperatures, t.frequency[:, s0], color=CAUSES[t.line.cause], lw=0.9, ls="--" if t.line.whirl < 0 else "-")
+    ends = [*(m.frequency[-1, s0] for m in found.modes), *(t.frequency[-1, s0] for t in shown)]
+    names = [*(f"mode {m.number} {m.kind}" for m in found.modes), *(f"{_named(t.line)} {t.line.bearing}" for t in shown)]
+    paints = [*(WHIRL[m.whirl] for m in found.modes), *(CAUSES[t.line.cause] for t in shown)]
+    name_ends(axes, np.array(ends), names, paints)
+    _mark(axes, [(c.condition.temperature, c.frequency, c.strength) for c in crossing])
+    axes.set(xlabel="temperature, °C", ylabel="frequency, Hz")
+    title = f"Natural frequencies and the strongest lines among them at {found.nominal.speed / RPM:.0f} rpm"
+    figure.suptitle(title, x=0.01, ha="left", fontweight="bold", fontsize=9.5)
+    if key_below:
+        figure.legend(handles=_key(found), loc="outside lower center", ncols=6, fontsize=7.5)
+    return figure
+
+
+def both(found: ResonanceMap, size: tuple[float, float] = SIZE, key_below: bool = True) -> Figure:
+    """Where the strongest lines meet a mode, as curves over speed and temperature."""
+    figure = Figure(figsize=size)
+    axes = figure.subplots()
+    axes.set(xlim=(0, found.speeds[-1] / RPM), ylim=(found.temperatures[0], found.temperatures[-1]))
+    named: list[tuple[float, str, str]] = []
+    chosen = strongest([c for c in found.coincidences if c.at_nominal_speed])
+    chosen += [c for c in strongest(found.coincidences) if all(_pair(c) != _pair(k) for k in chosen)]
+    used = set()
+    for c in chosen[:CURVES]:
+        curve = next(k for k in found.curves if key(k.line) == key(c.line) and k.mode.number == c.mode.number)
+        order = np.argsort(curve.temperature)
+        paint = MODES[(c.mode.number - 1) % len(MODES)]
+        used.add(c.mode.number)
+        axes.plot(curve.speed[order] / RPM, curve.temperature[order], color=paint, lw=1.2)
+        if curve.temperature.max() > found.temperatures[-1] - 1e-9:
+            named.append((float(curve.speed[order][-1] / RPM), f"{c.line.name}, {c.mode.number}", paint))
+        else:
+            end = (curve.speed[order][-1] / RPM, curve.temperature[order][-1])
+            axes.annotate(f"{c.line.name}, {c.mode.number}", end, (4, 2), textcoords="offset points", fontsize=7.5, color=paint)
+    _name_tops(axes, named)
+    _mark(axes, [(c.condition.speed / RPM, c.condition.temperature, c.strength) for c in chosen[:CURVES] if c.at_nominal_speed])
+    axes.axvline(found.nominal.speed / RPM, color=PALE, lw=1.0, ls=":")
+    axes.axhline(found.nominal.temperature, color=PALE, lw=1.0, ls=":")
+    axes.plot(found.nominal.speed / RPM, found.nominal.temperature, "s", color=INK, ms=5, clip_on=False)
+    axes.set(xlabel="speed, rpm", ylabel="temperature, °C")
+    figure.suptitle("Where the strongest lines meet a mode (line, mode number)", x=0.01, ha="left", fontweight="bold", fontsize=9.5)
+    if key_below:
+        handles = [
+            Line2D([], [], color=MODES[(m.number - 1) % len(MODES)], label=f"mode {m.number} {m.kind}")
+            for m in found.modes
+            if m.number in used
+        ]
+        handles += [Line2D([], [], color=INK, marker="s", ls="", ms=5, label="nominal"), _circle()]
+        figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=7.5)
+    return figure
+
+
+def runout(found: ResonanceMap) -> Figure:
+    """Nonrepeatable runout of the linear response along temperature and along speed, with the coincidences passed on the way."""
+    figure = Figure(figsize=(9.6, 4.4))
+    left, right = figure.subplots(1, 2)
+    t_nominal, n_nominal = found.nominal.temperature, found.nominal.speed / RPM
+    at_speed = [c for c in found.coincidences if c.at_nominal_speed]
+    at_temperature = [c for c in found.coincidences if abs(c.condition.temperature - t_nominal) < 1e-6]
+    panels = (
+        (left, found.nrro_temperature, 1.0, at_speed, lambda c: c.condition.temperature, f"temperature at {n_nominal:.0f} rpm, °C"),
+        (right, found.nrro_speed, 1 / RPM, at_temperature, lambda c: c.condition.speed / RPM, f"speed at {t_nominal:g} °C, rpm"),
+    )
+    for axes, along, unit, crossed, place, label in panels:
+        x, values = unit * along[:, 0], along[:, 1:]
+        for column, name, paint in ((0, "radial", "#7a3d8f"), (1, "axial", "#a0741a")):
+            axes.plot(x, 1e9 * values[:, column], color=paint, label=name)
+        for c in strongest(crossed)[:6]:
+            axes.axvline(place(c), color=PALE, lw=0.8, ls=":")
+        axes.set(xlabel=label, ylabel="nonrepeatable runout (NRRO) of the hub, nm rms", xlim=(x[0], x[-1]))
+        axes.set_ylim(0, 1.25e9 * values.max() or 1.0)
+        _name_tops(axes, [(place(c), f"{c.line.name}, {c.mode.number}", PALE) for c in strongest(crossed)[:6]])
+        axes.legend(loc="upper left" if axes is right else "lower left")
+    return figure
+
+
+def _named(line: Line) -> str:
+    """A line's name, with the order of a race wave."""
+    return f"{line.name} ({line.order})" if line.cause in ("inner waviness", "outer waviness") else line.name
+
+
+def _pair(c: Coincidence) -> tuple[str, int, str, int, int]:
+    return c.line.cause, c.line.order, c.line.direction, c.line.whirl, c.mode.number
+
+
+def _draw_mode(axes: Axes, x: np.ndarray, values: np.ndarray, mode: Track) -> None:
+    axes.plot(x, values, color=WHIRL[mode.whirl], lw=1.9)
+
+
+def _mark(axes: Axes, marked: Sequence[tuple[float, float, float]]) -> None:
+    """A ring at every coincidence (x, y, strength), larger for a stronger one."""
+    if marked:
+        x, y, strength = np.array(marked).T
+        size = 14 + 90 * np.sqrt(strength / (strength.max() or 1.0))
+        axes.scatter(x, y, s=size, facecolors="none", edgecolors=INK, lw=1.0, zorder=5)
+
+
+def _name_tops(axes: Axes, named: list[tuple[float, str, str]], size: float = 7.5) -> None:
+    """Upright names above lines that leave through the top, moved apart along it."""
+    if not named:
+        return
+    low, high = axes.get_xlim()
+    figure = axes.figure
+    assert isinstance(figure, Figure)
+    spec = axes.get_subplotspec()
+    columns = spec.get_geometry()[1] if spec else 1
+    width = 0.75 * figure.get_size_inches()[0] / columns * 72
+    wanted = np.array([(x - low) / (high - low) for x, _, _ in named])
+    for start, place, (_, name, paint) in zip(wanted, spread(wanted, 1.35 * size / width), named, strict=True):
+        axes.annotate(
+            name,
+            xy=(start, 1.0),
+            xytext=(place, 1.03),
+            xycoords="axes fraction",
+            textcoords="axes fraction",
+            rotation=90,
+            ha="center",
+            va="bottom",
+            fontsize=size,
+            color=INK if paint == PALE else paint,
+            annotation_clip=False,
+            arrowprops={"arrowstyle": "-", "color": paint, "lw": 0.5, "shrinkA": 0, "shrinkB": 0, "relpos": (0.5, 0.0)},
+        )
+
+
+def _key(found: ResonanceMap) -> list[Line2D]:
+    handles = [
+        Line2D([], [], color=WHIRL[w], lw=1.9, label=f"mode, {'whirls ' + w if w != 'none' else 'axial or standing'}")
+        for w in dict.fromkeys(m.whirl for m in found.modes)
+    ]
+    causes = dict.fromkeys(t.line.cause for t in drawn_lines(found))
+    handles += [Line2D([], [], color=CAUSES[c], lw=0.9, label=c) for c in causes]
+    handles += [Line2D([], [], color=INK, lw=0.9, ls="--", label="line that whirls backward"), _circle()]
+    return handles
+
+
+def _circle() -> Line2D:
+    return Line2D([], [], color=INK, marker="o", mfc="none", ls="", label="coincidence")

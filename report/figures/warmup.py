@@ -1,0 +1,152 @@
+"""Figures of a warm-up: temperatures, preload, friction heat and natural frequencies over time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from thermospindle.model.types import Array
+from thermospindle.model.units import MINUTE
+from thermospindle.report.figures.common import BEARINGS, PALE, STYLE, svg
+from thermospindle.sim.warmup import Warmup
+
+PARTS = {"stationary": "#3b6ea5", "rotating": "#c2622d"}
+MODES = ("#1f8a70", "#7a3d8f", "#a0741a", "#3b6ea5", "#c9371c", "#555f6b", "#d18a0f", "#b0457b")
+
+
+def figure_png(warmup: Warmup, path: Path) -> None:
+    with rc_context({**STYLE, "savefig.facecolor": "white"}):
+        figure(warmup).savefig(path, dpi=150)
+
+
+def figure_svg(warmup: Warmup) -> str:
+    with rc_context(STYLE):
+        return svg(figure(warmup), "warmup", "temperatures, preload, friction and natural frequencies over time")
+
+
+def figure(warmup: Warmup) -> Figure:
+    """Four panels over time in minutes; every line is named at its end."""
+    drawn = Figure(figsize=(9.6, 7.0))
+    panels = drawn.subplots(2, 2, sharex=True)
+    minutes = warmup.times / MINUTE
+    bearings = [b.name for b in warmup.spindle.bearings]
+    parts = {g.name: g.part for g in warmup.spindle.regions}
+    regions = list(warmup.moments[0].temperatures)
+    temperature = np.array([[m.temperatures[g] for g in regions] for m in warmup.moments])
+    axes = panels[0, 0]
+    for series, name in zip(temperature.T, regions, strict=True):
+        axes.plot(minutes, series, color=PARTS[parts[name]], lw=1.0)
+    groups = _alike(temperature, [parts[g] for g in regions])
+    names = [_group_name([regions[k] for k in group], parts) for group in groups]
+    ends = np.array([temperature[-1, group].mean() for group in groups])
+    name_ends(axes, ends, names, [PARTS[parts[regions[group[0]]]] for group in groups])
+    axes.set(title="Region temperatures", ylabel="temperature, °C")
+    for part, paint in PARTS.items():
+        axes.plot([], [], color=paint, label=f"{part} part")
+    axes.legend(loc="lower right")
+    preload = np.array([[m.preload[b] for b in bearings] for m in warmup.moments])
+    if warmup.speed:
+        third = np.array([[1e3 * m.friction[b] for b in bearings] for m in warmup.moments])
+        about = ("Friction heat of each bearing", "friction heat, mW")
+    else:
+        third = np.degrees([[m.point.state.bearing(b).contact_angle for b in bearings] for m in warmup.moments])
+        about = ("Contact angle", "contact angle, degrees")
+    for axes, values, title, label in ((panels[0, 1], preload, "Preload", "preload, N"), (panels[1, 0], third, *about)):
+        same = bool(np.ptp(values, axis=1).max() < 1e-6 * np.abs(values).max())
+        for k, series in enumerate(values.T[:1] if same else values.T):
+            paint, _, dashes = BEARINGS[k % len(BEARINGS)]
+            axes.plot(minutes, series, color=paint, ls=dashes, lw=1.5)
+        names = ["both bearings"] if same else bearings
+        name_ends(axes, values[-1, : len(names)], names, [BEARINGS[k % len(BEARINGS)][0] for k in range(len(names))])
+        axes.set(title=title, ylabel=label)
+    axes = panels[1, 1]
+    shift = warmup.frequencies - warmup.frequencies[0]
+    names = [f"{k} {m.kind} {f:.0f}" for k, (m, f) in enumerate(zip(warmup.modes, warmup.frequencies[0], strict=True), 1)]
+    paints = [MODES[k % len(MODES)] for k in range(len(names))]
+    for series, paint in zip(shift.T, paints, strict=True):
+        axes.plot(minutes, series, color=paint)
+    name_ends(axes, shift[-1], names, paints)
+    axes.axhline(0.0, color=PALE, lw=0.6)
+    axes.set(title="Natural frequencies (names: Hz at the start)", ylabel="change since the start, Hz")
+    for axes in panels[1]:
+        axes.set_xlabel("time, min")
+    for axes in panels.flat:
+        axes.set_xlim(0, minutes[-1])
+    return drawn
+
+
+def _alike(series: Array, parts: Sequence[str]) -> list[list[int]]:
+    """Columns of `series` that stay within a fortieth of its span of each other and are of the same part, together."""
+    groups: list[list[int]] = []
+    near = np.ptp(series) / 40
+    for k in range(series.shape[1]):
+        for group in groups:
+            if parts[group[0]] == parts[k] and np.abs(series[:, group[0]] - series[:, k]).max() < near:
+                group.append(k)
+                break
+        else:
+            groups.append([k])
+    return groups
+
+
+def _group_name(names: Sequence[str], parts: Mapping[str, str]) -> str:
+    part = parts[names[0]]
+    if len(names) > 2 and len(names) == sum(p == part for p in parts.values()):
+        return f"all {len(names)} rotating" if part == "rotating" else f"all {len(names)} stationary"
+    return ", ".join(names) if len(names) < 3 else f"{names[0]} and {len(names) - 1} more"
+
+
+def name_ends(axes: Axes, ends: Array, names: Sequence[str], colours: Sequence[str], size: float = 7.5) -> None:
+    """Names beside the right ends of lines, moved apart where they would overlap; a thin line leads to a name that moved."""
+    used = [k for k in range(len(names)) if np.isfinite(ends[k])]
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high)
+    figure = axes.figure
+    assert isinstance(figure, Figure)
+    spec = axes.get_subplotspec()
+    rows = spec.get_geometry()[0] if spec else 1
+    height = 0.8 * figure.get_size_inches()[1] / rows * 72  # points, about
+    at = spread((np.array([ends[k] for k in used]) - low) / (high - low), 1.25 * size / height)
+    for k, place in zip(used, at, strict=True):
+        start = (ends[k] - low) / (high - low)
+        axes.annotate(
+            names[k],
+            xy=(1.0, start),
+            xytext=(1.035, place),
+            xycoords="axes fraction",
+            textcoords="axes fraction",
+            va="center",
+            fontsize=size,
+            color=colours[k],
+            annotation_clip=False,
+            arrowprops={"arrowstyle": "-", "color": colours[k], "lw": 0.5, "shrinkA": 0, "shrinkB": 0, "relpos": (0.0, 0.5)},
+        )
+
+
+def spread(wanted: Array, gap: float) -> Array:
+    """Places near the `wanted` ones (any order), at least `gap` apart and, where they all fit, within 0 and 1.
+
+    Neighbours that are too close become a block about their mean: least squares under the order of the places.
+    """
+    order = np.argsort(wanted, kind="stable")
+    blocks: list[tuple[float, int]] = []  # (sum of wanted - offset, count)
+    for value in wanted[order]:
+        block = (float(value), 1)
+        while (
+            blocks and blocks[-1][0] / blocks[-1][1] + gap * (blocks[-1][1] - 1) / 2 + gap > block[0] / block[1] - gap * (block[1] - 1) / 2
+        ):
+            last = blocks.pop()
+            block = (last[0] + block[0], last[1] + block[1])
+        blocks.append(block)
+    places = np.concatenate([total / count + gap * (np.arange(count) - (count - 1) / 2) for total, count in blocks])
+    places = np.clip(places, gap * np.arange(len(places)), None)
+    top = max(1.0, gap * (len(places) - 1))
+    places = np.clip(places, None, top - gap * np.arange(len(places))[::-1])
+    answer = np.empty_like(places)
+    answer[order] = places
+    return answer

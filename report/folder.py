@@ -1,0 +1,86 @@
+"""Output folders: written whole or not at all, and replaced only where they hold nothing but what spindle wrote."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from thermospindle.model.errors import BadInput
+from thermospindle.model.whole import whole
+
+MARK = "made-by-spindle.json"
+"""File that every output folder holds: how it was made, its answer, and a digest of every file that was written beside it."""
+
+COMMAND: ContextVar[str] = ContextVar("COMMAND", default="")
+"""The command line that a verb was called by; empty where it was called from Python."""
+
+
+@contextmanager
+def whole_folder(path: Path) -> Iterator[Path]:
+    """A temporary folder beside `path` that takes its place when the block ends well, and vanishes when it does not.
+
+    Raises `BadInput` if something stands at `path` that spindle did not write, or that was changed since.
+    """
+    path = path.resolve()
+    _refuse_foreign(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with whole(path) as folder:
+        folder.mkdir()
+        yield folder
+
+
+def mark(folder: Path, options: Mapping[str, Any], answer: Mapping[str, Any]) -> None:
+    """Write the mark of an output folder, when all its files stand, and into its pages with what they were made and when."""
+    if any(folder.glob("*.html")):
+        from thermospindle.report.page.report import stamp
+
+        stamp(folder, COMMAND.get() or _call(options), datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"))
+    told = {"options": dict(options), "answer": dict(answer), "files": {name: digest(folder / name) for name in _entries(folder)}}
+    (folder / MARK).write_text(json.dumps(told, indent=1, default=str), encoding="utf-8")
+
+
+def _call(options: Mapping[str, Any]) -> str:
+    """The call of a verb's function from Python."""
+    said = (f"{name}={(str(value) if isinstance(value, Path) else value)!r}" for name, value in options.items() if name != "verb")
+    return f"{options['verb']}({', '.join(said)})"
+
+
+def _refuse_foreign(path: Path) -> None:
+    if not path.exists() and not path.is_symlink():
+        return
+    if not path.is_dir() or (any(path.iterdir()) and not (path / MARK).is_file()):
+        raise BadInput(f"--out {path}: holds something that spindle did not write; name a new or empty folder")
+    written = _written(path)
+    for name in _entries(path):
+        if name != MARK and name not in written:
+            raise BadInput(f"--out {path}: holds {name}, which spindle did not write; name a new or empty folder, or take it out")
+        if name != MARK and digest(path / name) != written[name]:
+            raise BadInput(f"--out {path}: {name} was changed since spindle wrote it; name a new or empty folder, or take it out")
+
+
+def _written(path: Path) -> dict[str, str]:
+    """Digests by name that the mark of a folder lists; none of a mark that cannot be read."""
+    try:
+        files = json.loads((path / MARK).read_text(encoding="utf-8"))["files"]
+        return {str(name): str(value) for name, value in files.items()}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return {}
+
+
+def _entries(folder: Path) -> list[str]:
+    """Everything in a folder that is no folder itself, by its path from there; links are not followed."""
+    return sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_symlink() or not p.is_dir())
+
+
+def digest(file: Path) -> str:
+    """A name for what a file holds; of what is no file, for where it points."""
+    if file.is_symlink() or not file.is_file():
+        return "no file"
+    with file.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()[:16]

@@ -1,0 +1,108 @@
+"""What all Rerun logs are written with: the file, whole or not at all, and series, numbers and bodies in it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rerun as rr
+
+from thermospindle.model.errors import BadInput
+from thermospindle.model.rotor.look import RegionMesh
+from thermospindle.model.types import Array
+from thermospindle.model.units import TO_MM
+from thermospindle.model.whole import whole
+from thermospindle.report.log.blueprint import at
+from thermospindle.report.log.content import Peak
+from thermospindle.report.log.read import APPLICATION
+from thermospindle.sim.identification.frf import Frf
+
+
+@contextmanager
+def whole_log(path: Path) -> Iterator[tuple[rr.RecordingStream, Path]]:
+    """A recording, and the file to save it to, which gets the name `path` when all has gone well and is removed otherwise.
+
+    Rerun's errors are raised here; else it prints them and goes on, and the log would lack something. BadInput if the folder of `path`
+    does not exist.
+    """
+    path = Path(path)
+    if not path.parent.is_dir():
+        raise BadInput(f"{path}: its folder does not exist")
+    before = rr.strict_mode()
+    rr.set_strict_mode(True)
+    try:
+        with whole(path) as file:
+            recording = rr.RecordingStream(APPLICATION, send_properties=False)
+            try:
+                yield recording, file
+            finally:
+                recording.disconnect()
+    finally:
+        rr.set_strict_mode(before)
+
+
+# ---------------------------------------------------------------- numbers
+
+
+def any_values(named: dict[str, Any]) -> rr.AnyValues:
+    return rr.AnyValues(**named)
+
+
+def number_column(name: str, numbers: Array) -> rr.ComponentColumnList:
+    columns: dict[str, Any] = {name: numbers}
+    return rr.AnyValues.columns(**columns)
+
+
+def over_frequency(frequency: Array) -> rr.TimeColumn:
+    """The timeline `frequency`, in whole Hz."""
+    return rr.TimeColumn("frequency", sequence=np.round(frequency).astype(int))
+
+
+def log_frf_numbers(recording: rr.RecordingStream, id: str, order: int, temperature: float, speed: float, frf: Frf) -> None:
+    """The FRFs of one test (C, rad/s) as computed, a row a line with the values of all (response, reference) pairs in it."""
+    pairs = frf.value.shape[0] * frf.value.shape[1]
+    arrays = {"real": frf.value.real, "imaginary": frf.value.imag, "coherence": frf.coherence, "standard_error": frf.sd}
+    columns = [*rr.AnyValues.columns(frequency_Hz=frf.frequency)]
+    for name, array in arrays.items():
+        if array is not None:
+            flat = np.ascontiguousarray(array.reshape(pairs, -1).T).ravel()
+            columns += number_column(name, flat).partition(np.full(len(frf.frequency), pairs))
+    recording.send_columns(at("numbers", id), [over_frequency(frf.frequency)], columns)
+    about = {"id": id, "order": order, "temperature_C": temperature, "speed_rad_per_s": speed, "quantity": frf.quantity}
+    about |= {"response_nodes": frf.response_nodes, "reference_nodes": frf.reference_nodes}
+    recording.log(at("numbers", id, "about"), any_values(about), static=True)
+
+
+def log_peak_numbers(recording: rr.RecordingStream, peaks: Sequence[Peak]) -> None:
+    values = {name: [getattr(p, name) for p in peaks] for name in Peak.__dataclass_fields__}
+    recording.log("numbers/peaks", any_values(values), static=True)
+
+
+# ---------------------------------------------------------------- for the eye
+
+
+def log_curve(
+    recording: rr.RecordingStream, entity: str, times: rr.TimeColumn, numbers: Array, look: rr.SeriesLines | rr.SeriesPoints
+) -> None:
+    recording.log(entity, look, static=True)
+    recording.send_columns(entity, [times], rr.Scalars.columns(scalars=numbers))
+
+
+def curve_look(colour: Any, name: str, width: float = 1.0) -> rr.SeriesLines:
+    """Without Rerun's aggregation, which averages neighbouring points and so lowers peaks."""
+    return rr.SeriesLines(colors=[colour], names=name, widths=width, aggregation_policy=rr.components.AggregationPolicy.Off)
+
+
+def log_mesh(recording: rr.RecordingStream, entity: str, mesh: RegionMesh) -> None:
+    """A part of a body, in mm."""
+    vertices, triangles, normals = mesh.shaded()
+    shape = rr.Mesh3D(
+        vertex_positions=TO_MM * vertices,
+        triangle_indices=triangles,
+        vertex_normals=normals,
+        albedo_factor=(255 * np.array(mesh.rgba)).astype(np.uint8),
+    )
+    recording.log(entity, shape, static=True)

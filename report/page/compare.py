@@ -1,0 +1,119 @@
+"""The comparison as sections of the HTML report, and its own folder: report, pictures as SVG and PNG, Rerun log."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from markupsafe import Markup
+from matplotlib import rc_context
+
+from thermospindle.diagnosis.compare.compare import Comparison
+from thermospindle.model.machine import Spindle
+from thermospindle.report.figures.common import STYLE, svg
+from thermospindle.report.figures.compare import figures, label
+from thermospindle.report.log.compare import FrfsBeside, write_comparison_log
+from thermospindle.report.page.report import Section, page
+from thermospindle.report.typeset import minus, signed
+
+WORDS = {
+    "pulls": (
+        "Residuals of every mode in every test",
+        "Computed less measured, in standard errors of the measurement: estimator, repeats, temperature and the model's own "
+        "numerical floor. Grey: not paired with any mode within the believable error. Below: how many modes only one side has.",
+    ),
+    "frfs": ("FRFs over each other", "Measured FRFs (coloured) and those of the model (dashed) at the same points, lines and window."),
+    "bands": (
+        "Likeness by band",
+        "Means over the lines of third-octave bands. CSAC compares the shape of all FRFs at a line and is blind to a scale, CSF amplitude "
+        "too. The shift by FDAC: by how much the computed frequencies must come down to be most like the measured ones (FDAC); grey where no shift "
+        "is better than another.",
+    ),
+    "channels": ("Likeness by FRF", "Every FRF over all its lines. Grey: symmetry forbids an answer, so there is nothing to compare."),
+    "fdac": (
+        "FDAC",
+        "Likeness of the computed FRFs at one frequency with the measured ones at another, for the tests that agree best and worst. "
+        "A ridge off the thin diagonal is a model whose frequencies are off; red: the shift found in each band.",
+    ),
+}
+
+
+def sections(c: Comparison) -> list[Section]:
+    """What the comparison adds to a report: the map of residuals and errors in a table, then what its FRFs say, where it has any."""
+    found: list[Section] = []
+    with rc_context(STYLE):
+        drawn = {name: svg(figure, f"compare-{name}", WORDS[name][0]) for name, figure in figures(c).items()}
+    modal = "".join(_figure(drawn[name], name) for name in ("pulls",) if name in drawn)
+    found.append(("Measured beside computed", _summary(c) + modal + _table(c)))
+    spectral = [name for name in ("frfs", "bands", "channels", "fdac") if name in drawn]
+    if spectral:
+        found.append(("FRFs, measured and computed", "".join(f"<h3>{WORDS[n][0]}</h3>{_figure(drawn[n], n)}" for n in spectral)))
+    return found
+
+
+def write_comparison(c: Comparison, spindle: Spindle, folder: Path) -> None:
+    """`report.html`, a PNG and an SVG of every picture, and, where there are FRFs, `compare.rrd`, in a folder that exists."""
+    conditions = f"the conditions of {len(c.tests)} test{'s' if len(c.tests) > 1 else ''}: {c.campaign}"
+    (folder / "report.html").write_text(page(spindle, conditions, sections(c), "Comparison"), encoding="utf-8")
+    with rc_context(STYLE):
+        for name, figure in figures(c).items():
+            for kind in ("svg", "png"):
+                figure.savefig(folder / f"{name}.{kind}", dpi=150, facecolor="white", metadata={"Date": None} if kind == "svg" else None)
+    shown = [FrfsBeside(t.test, found.beside.measured, found.computed) for t in c.tests if (found := t.correlation) is not None]
+    if shown:
+        peaks = {t.test.id: [(m.number, m.kind, m.measured, m.sd, m.computed) for m in t.modes] for t in c.tests}
+        write_comparison_log(spindle, c.campaign, shown, peaks, folder / "compare.rrd")
+
+
+def _figure(drawn: str, name: str) -> str:
+    return f'<figure class="chart wide">{drawn}<figcaption>{WORDS[name][1]}</figcaption></figure>'
+
+
+def _summary(c: Comparison) -> str:
+    modes = [m for t in c.tests for m in t.modes]
+    words = [
+        f"<p>{Markup.escape(c.campaign)} beside the scene {Markup.escape(c.spindle)}: rms residual <b>{c.rms_pull:.3g} standard errors</b>"
+    ]
+    if modes:
+        pulls = [(m.pull, f"{signed(m.error, 2)} Hz", m) for m in modes]
+        pulls += [
+            (m.damping_pull, f"{signed(100 * (m.damping_computed - m.damping_measured), 3)} % of damping", m)
+            for m in modes
+            if m.damping_pull is not None and m.damping_measured is not None
+        ]
+        pull, error, worst = max(pulls, key=lambda row: abs(row[0]))
+        words.append(f", the largest that of mode {worst.number} ({worst.kind}), {signed(pull, 1)} standard errors or {error}")
+    words.append(".</p>")
+    remarks = [f"{label(t, ', ')}: {what} {', '.join(f'{f:.1f}' for f in values)} Hz" for t in c.tests
+            for what, values in (("measured, not computed (a mode the model lacks, or a false pole):", t.missing), ("computed, not measured:", t.extra))
+            if values]  # fmt: skip
+    remarks += list(c.crossings)
+    return "".join(words) + ("<ul>" + "".join(f"<li>{minus(str(Markup.escape(x)))}</li>" for x in remarks) + "</ul>" if remarks else "")
+
+
+def _table(c: Comparison) -> str:
+    head = (
+        "test", "mode", "kind", "measured, Hz", "computed, Hz", "error, Hz", "error, %", "error, s.e.",
+        "damping, %", "computed, %", "MAC",
+    )  # fmt: skip
+    rows: list[str] = []
+    for t in c.tests:
+        for k, m in enumerate(t.modes):
+            damping = "–" if m.damping_measured is None else f"{100 * m.damping_measured:.3f}"
+            cells = [
+                label(t, ", ") if k == 0 else "", str(m.number), m.kind, f"{m.measured:.2f} <small>± {m.sd:.2g}</small>", f"{m.computed:.2f}",
+                signed(m.error, 2), signed(100 * m.error / m.measured, 2), signed(m.pull, 1), damping, f"{100 * m.damping_computed:.3f}",
+                "–" if m.mac is None else f"{m.mac:.3f}" + ("*" if m.close else ""),
+            ]  # fmt: skip
+            rows.append(_row("td", cells, ' class="rule"' if k == 0 and rows else ""))
+    starred = any(m.close and m.mac is not None for t in c.tests for m in t.modes)
+    note = " * Close modes: share of the measured shape in the plane of the computed ones." if starred else ""
+    caption = f"<caption>Every mode of every test, with one standard error. MAC: modal assurance criterion.{note}</caption>"
+    return (
+        f'<div class="scroll"><table id="compared">{caption}<thead>{_row("th", head)}</thead><tbody>{"".join(rows)}</tbody></table></div>'
+    )
+
+
+def _row(kind: str, cells: Sequence[str], look: str = "") -> str:
+    text = "".join(f"<{kind}{' class=left' if i in (0, 2) else ''}>{cell}</{kind}>" for i, cell in enumerate(cells))
+    return f"<tr{look}>{text}</tr>"

@@ -1,0 +1,183 @@
+"""The diagnosis as sections of an HTML page, and the files of its folder: page, pictures as SVG and PNG."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+
+from thermospindle.diagnosis.verdict import Diagnosis
+from thermospindle.report.figures.common import STYLE, svg
+from thermospindle.report.figures.diagnosis import figures
+from thermospindle.report.page.report import Section, page
+from thermospindle.report.text.diagnosis import plan_words
+from thermospindle.report.typeset import minus, prose, with_error
+
+CAPTIONS = {
+    "errors": "Mean square of the whitened residuals of every test's FRF lines: one is noise alone.",
+    "explanations": "Green: what the verdict names. Amber: free forms, which drift without a law. All tolerances are fitted anew with each.",
+    "law": "The size of the effect as each test has it, with one standard error: where it is level, the effect's own law over temperature and "
+    "speed holds; where it is not, this is the law that the data have.",
+    "drift": "What would have to change in every test, with one standard error, where no effect is named.",
+}
+UNSEEN = 0.9  # standard error over that of the tolerance, from which the data say nothing of a parameter
+
+
+def sections(d: Diagnosis, answer: dict[str, Any], drawn: dict[str, Figure] | None = None) -> list[Section]:
+    """Titles and HTML; `answer` is the JSON answer of the diagnosis."""
+    drawn = figures(d) if drawn is None else drawn
+    with rc_context(STYLE):
+        shown = {name: _figure(svg(f, f"diagnosis-{name}", CAPTIONS[name]), CAPTIONS[name]) for name, f in drawn.items()}
+    found = [("Verdict", _verdict(answer) + shown["errors"])]
+    found.append(("Explanations", shown.get("explanations", "") + _candidates(answer)))
+    if "law" in shown:
+        found.append(("The law that the data have", shown["law"]))
+    words = "<ul>" + "".join(f"<li>{prose(w)}</li>" for w in answer["misfit"]["words"]) + "</ul>"
+    found.append(("Without any catalogue", words + shown.get("drift", "")))
+    if answer["next_test"]:
+        found.append(("Which test would decide", _tests(answer)))
+    found.append(("What these data pin down", _tolerances(answer)))
+    found.append(("What these data could have shown", _detectable(answer)))
+    return found
+
+
+def write_diagnosis(d: Diagnosis, answer: dict[str, Any], folder: Path) -> None:
+    """`report.html`, and every picture as SVG and PNG, into a folder that exists."""
+    drawn = figures(d)
+    count = len(d.search.model.tests)
+    conditions = f"the conditions of {count} test{'s' if count > 1 else ''}: {answer['campaign']}"
+    text = page(d.spindle, conditions, sections(d, answer, drawn), "Diagnosis")
+    (folder / "report.html").write_text(text, encoding="utf-8")
+    with rc_context(STYLE):
+        for name, figure in drawn.items():
+            figure.set_layout_engine("none")  # laid out for the page already
+            figure.savefig(folder / f"{name}.svg", facecolor="white", metadata={"Date": None})
+            figure.savefig(folder / f"{name}.png", dpi=130, facecolor="white")
+
+
+def _verdict(answer: dict[str, Any]) -> str:
+    named = f": {', '.join(answer['effects'])}" if answer["effects"] else ""
+    error = answer["error"]
+    rows = [
+        [("all tests", 0), (f"{error['before']:.2f}", 1), (f"{error['after']:.2f}", 1)],
+        [("temperatures left out one after the other", 0), (f"{error['held_out_before']:.2f}", 1), (f"{error['held_out_after']:.2f}", 1)],
+    ]
+    grid = _grid("Error, rms in standard errors: with tolerances fitted, and with what the verdict names.", ["", "before", "after"], rows)
+    card = f'<div class="cards"><div class="card"><span>verdict</span><b>{escape(answer["verdict"] + named)}</b></div></div>'
+    said = "".join(f"<p>{prose(answer[key])}</p>" for key in ("reason", "would_change"))
+    free = f"<p>Without any catalogue: {prose(answer['misfit']['words'][0])}</p>" if answer["misfit"]["rejected"] else ""
+    return card + said + free + grid
+
+
+CANDIDATES = (
+    "ln evidence and error are against the model without effects; probability among everything tried: no effect, one, two, and free drift. "
+    "Two effects at once are believed less beforehand."
+)
+
+
+def _candidates(answer: dict[str, Any]) -> str:
+    head = ["effects", "ln evidence", "probability", "error, %", "value", "", "unit", "believable"]
+    rows: list[list[tuple[str, int]]] = []
+    for c in answer["candidates"]:
+        for k, (name, v) in enumerate(c["parameters"].items()):
+            first = k == 0
+            value, _, sd = _with_error(v["value"], v["sd"]).partition(" <small>")
+            rows.append(
+                [
+                    (escape(" + ".join(c["effects"])) if first else "", 0),
+                    (minus(_evidence(c["delta_evidence"])) if first else "", 1),
+                    (f"{c['probability']:.3f}" if first else "", 1),
+                    (f"{100 * c['held_out_error_ratio']:.0f}" if first else "", 1),
+                    (escape(name.split(".", 1)[1]) if len(c["effects"]) == 1 else escape(name), 0),
+                    (value + (f" <small>{sd}" if sd else ""), 1),
+                    (_unit(v["unit"]), 0),
+                    (("yes" if c["believable"] else "no, at a limit") if first else "", 0),
+                ]
+            )
+    return _grid(CANDIDATES, head, rows)
+
+
+def _tests(answer: dict[str, Any]) -> str:
+    parts = []
+    for t in answer["next_test"]:
+        times = "" if t["repeats"] == 1 else f"; {t['repeats']} of them make it 100 to 1"
+        first, second = (escape(s) for s in t["separates"])
+        words = f"<h3>A test {escape(plan_words(t['condition']))}</h3><p>It tells {first} from {second} with odds of {_odds(t['odds'])} to 1{times}; most by {prose(t['tells'])}.</p>"
+        most = max(len(rows) for rows in t["predicted"].values())
+        rows = [
+            [(escape(name), 0), *((_with_error(r["frequency_Hz"], r["sd_Hz"], 1), 1) for r in told), *[("", 1)] * (most - len(told))]
+            for name, told in t["predicted"].items()
+        ]
+        parts.append(words + _grid("What each predicts of it, Hz.", ["", *(f"mode {k}" for k in range(1, most + 1))], rows))
+    return "".join(parts)
+
+
+def _odds(odds: float) -> str:
+    return f"{odds:.3g}" if odds < 9.99e5 else "more than a million"
+
+
+def _tolerances(answer: dict[str, Any]) -> str:
+    rows = []
+    for name, t in answer["tolerances"].items():
+        share = t["sd"] / t["prior_sd"]
+        scale, unit = (1.0, "K") if name.startswith("temperature of") else (100.0, "%")
+        rows.append(
+            [
+                (escape(name), 0), (_signed(t["value"] / t["prior_sd"]), 1), (f"{share:.2f}", 1),
+                (_signed(scale * t["value"]), 1), (f"{scale * t['prior_sd']:.2f}", 1), (unit, 0),
+                ("cannot be seen" if share > UNSEEN else "", 0),
+            ]
+        )  # fmt: skip
+    head = ["", "fitted, s.d.", "its error, s.d.", "fitted", "tolerance, s.d.", "unit", ""]
+    return _grid("Build tolerances and measuring errors, fitted with their standard deviations as prior.", head, rows)
+
+
+def _detectable(answer: dict[str, Any]) -> str:
+    rows = [
+        [
+            (escape(name), 0), (escape(row["parameter"]), 0), (f"{row['size']:.2g}", 1), (_unit(row["unit"]), 0),
+            ("not visible at a typical size" if name in answer["invisible"] else "", 0),
+        ]
+        for name, row in sorted(answer["detectable_in"].items())
+    ]  # fmt: skip
+    caption = "Size from which each effect would have been told from the tolerances, which are fitted anew beside it: first order about the fit without effects."
+    return _grid(caption, ["effect", "parameter", "smallest", "unit", ""], rows)
+
+
+def _signed(value: float) -> str:
+    return minus(f"{round(value, 2) + 0.0:+.2f}")  # never -0.00
+
+
+def _evidence(value: float) -> str:
+    return f"{value:+.1f}" if abs(value) < 1000 else f"{value:+.0f}"
+
+
+def _unit(unit: str) -> str:
+    return "" if unit == "1" else escape(unit)
+
+
+def _with_error(value: float, sd: float, digits: int = 3) -> str:
+    """A value with its error, very large and small ones as powers of ten; what was chosen, not fitted, has none."""
+    if sd == 0.0:
+        return minus(f"{value:g}")
+    if 1e-3 <= max(abs(value), sd) < 1e5:
+        return str(with_error((value, sd), digits=digits))
+    return minus(f"{value:.3g}") + f" <small>± {sd:.1g}</small>"
+
+
+def _figure(drawn: str, caption: str) -> str:
+    return f'<figure class="chart wide">{drawn}<figcaption>{caption}</figcaption></figure>'
+
+
+def _grid(caption: str, head: Sequence[str], rows: Sequence[Sequence[tuple[str, int]]]) -> str:
+    """A table; a cell is its HTML and whether it is a number, set right."""
+    words = [not row[1] for row in rows[0]] if rows else [True] * len(head)
+    top = "".join(f"<th{' class=left' if left else ''}>{escape(h)}</th>" for h, left in zip(head, words, strict=True))
+    body = "".join("<tr>" + "".join(f"<td{'' if number else ' class=left'}>{text}</td>" for text, number in row) + "</tr>" for row in rows)
+    return (
+        f'<div class="scroll"><table><caption>{escape(caption)}</caption><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
+    )

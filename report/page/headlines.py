@@ -1,0 +1,131 @@
+"""What a reader of a report should see at once: headlines, and where the model does not meet the measurement, in sentences."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from thermospindle.model.machine import Spindle
+from thermospindle.report.figures.common import Peaks
+from thermospindle.report.page.comparison import Table
+from thermospindle.sim.identification.numbering import temperature_of
+from thermospindle.sim.run import Run
+
+CERTAIN = 2.0  # standard errors beyond which a difference is called one
+CLOSE = 0.05  # relative distance of neighbours whose splitting is compared
+
+
+def headlines(run: Run, table: Table) -> list[tuple[str, str, str]]:
+    """(what, number, explanation): preload, bearing angle and stiffness, and how far the modes of each flexibility move."""
+    cold, hot = table.temperatures
+    first, last = (next(s.point.state for s in run.steps if temperature_of(s) == t) for t in (cold, hot))
+    preload = [s.bearings[0].preload for s in (first, last)]
+    if cold == hot:
+        return [("Preload", f"{preload[0]:.1f} N", f"at {cold:g} °C")]
+    pairs = list(zip(first.bearings, last.bearings, strict=True))[::-1]
+    angle = " / ".join(f"{np.degrees(b.contact_angle - a.contact_angle):+.2f}" for a, b in pairs)
+    radial = " / ".join(_change(a.radial_stiffness, b.radial_stiffness) for a, b in pairs)
+    axial = " / ".join(_change(a.axial_stiffness, b.axial_stiffness) for a, b in pairs)
+    names = " / ".join(b.name for _, b in pairs) + " bearing"
+    cards = [
+        (
+            "Preload",
+            f"{preload[0]:.1f} → {preload[1]:.1f} N",
+            f"{100 * preload[1] / preload[0]:.0f} % of it is left at {hot:g} °C",
+        ),
+        ("Contact angle", f"{angle} degrees", f"{names}, from {cold:g} to {hot:g} °C"),
+        ("Radial bearing stiffness", radial, f"{names}; axial {axial}"),
+    ]
+    groups: dict[tuple[str, str], list[int]] = {}
+    for row in table.rows:
+        named = (row.published_flexibility, "as published") if row.published_flexibility else (row.flexibility, "by the model")
+        groups.setdefault(named, []).append(row.number)
+    for (name, by), numbers in groups.items():
+        shifts = ", ".join(f"{s[0]:+.1f}" for n in numbers if (s := table.shift("computed", n)))
+        modes = f"Mode{'s' if len(numbers) > 1 else ''} {_listed(numbers)}"
+        cards.append((f"{modes}: {name}, {by}", f"{shifts} Hz", f"computed shift from {cold:g} to {hot:g} °C"))
+    return cards
+
+
+def _change(before: float, after: float) -> str:
+    return f"{100 * (after / before - 1):+.0f} %" if before else "from nothing"
+
+
+def misses(table: Table) -> list[str]:
+    """Sentences on where the model does not meet the measurement, and on what else disagrees; every number is computed."""
+    measured, own, paper = (table.of(source, table.temperatures[0]) for source in ("measured", "computed", "published"))
+    if own is None:
+        return []
+    sentences: list[str] = []
+    if measured is not None and set(measured.value) & set(own.value):
+        sentences += [*_frequency_misses(table, measured, own), *_shift_misses(table, measured.label)]
+        if paper is not None and (both := [n for n in paper.value if n in measured.value and n in own.value]):
+            far, near = (max(abs(paper.value[n][0] - other.value[n][0]) for n in both) for other in (measured, own))
+            sentences.append(
+                f"The published analysis misses the measurement too, by up to {far:.1f} Hz at {own.temperature:g} °C; "
+                f"it differs from the model by at most {near:.1f} Hz."
+            )
+    for name in dict.fromkeys(r.published_flexibility for r in table.rows if r.published_flexibility):
+        other = [r for r in table.rows if r.published_flexibility == name and r.flexibility.rstrip("s") not in name]
+        shares = (f"mode {r.number}: {r.flexibility} {100 * r.share:.0f} %, bearings {100 * r.bearing_share:.0f} %" for r in other)
+        if other:
+            sentences.append(
+                f"The publication names “{name}” as the main flexibility of modes for which most of the model's strain energy "
+                f"sits elsewhere ({'; '.join(shares)})."
+            )
+    return sentences
+
+
+def _frequency_misses(table: Table, measured: Peaks, own: Peaks) -> Iterator[str]:
+    """The largest miss at the first temperature, and neighbours of one kind whose distance is missed."""
+    kinds = {r.number: r.kind for r in table.rows}
+    off = {n: own.value[n][0] - f for n, (f, _) in measured.value.items() if n in own.value}
+    worst = max(off, key=lambda n: abs(off[n]))
+    f, miss = measured.value[worst][0], off[worst]
+    yield (
+        f"The largest miss at {own.temperature:g} °C is mode {worst} ({kinds[worst]}): computed {own.value[worst][0]:.1f} Hz, "
+        f"measured {f:.1f} Hz, {abs(miss):.1f} Hz or {100 * abs(miss) / f:.1f} % too {'high' if miss > 0 else 'low'}. "
+        f"Over all {len(off)} measured modes the difference runs from {min(off.values()):+.1f} to {max(off.values()):+.1f} Hz."
+    )
+    for a, b in pairwise(sorted(off, key=lambda n: measured.value[n][0])):
+        apart, mine = (p.value[b][0] - p.value[a][0] for p in (measured, own))
+        error = np.hypot(measured.value[a][1], measured.value[b][1])
+        if kinds[a] == kinds[b] and apart < CLOSE * measured.value[a][0] and abs(apart - mine) > CERTAIN * error:
+            yield f"Modes {a} and {b} ({kinds[a]}) are measured {apart:.1f} Hz apart, computed {mine:.1f} Hz."
+
+
+def calibration(spindle: Spindle) -> str:
+    """A sentence on the scene's calibrated numbers, with the reason that the scene gives; empty if there are none."""
+    sources = Counter(p.source for p in spindle.provenance.values() if p.origin == "calibrated")
+    reasons = "; ".join(filter(None, sources))
+    return f"Agreement is partly made: {sources.total()} of the scene's numbers are calibrated ({reasons})." if sources else ""
+
+
+def _shift_misses(table: Table, label: str) -> Iterator[str]:
+    """Sentences on shifts that differ by more than `CERTAIN` standard errors of the measured one."""
+    cold, hot = table.temperatures
+    sure = []
+    for row in table.rows:
+        measured, own = table.shift(label, row.number), table.shift("computed", row.number)
+        if measured and own and abs(measured[0] - own[0]) > CERTAIN * measured[1]:
+            sure.append((row.number, row.kind, *measured, own[0]))
+    for number, kind, value, error, own_value in sure:
+        if value * own_value < 0:
+            verbs = ("rises", "falls") if value > 0 else ("falls", "rises")
+            yield (
+                f"From {cold:g} to {hot:g} °C mode {number} ({kind}) {verbs[0]} by {abs(value):.1f} ± {error:.1f} Hz "
+                f"when measured and {verbs[1]} by {abs(own_value):.1f} Hz when computed."
+            )
+    for further, words in ((True, "further"), (False, "less far")):
+        same_way = [(n, m, c) for n, _, m, _, c in sure if m * c > 0 and (abs(m) > abs(c)) == further]
+        if same_way:
+            each = "; ".join(f"mode {n}: {m:+.1f} against {c:+.1f} Hz" for n, m, c in same_way)
+            modes = _listed([n for n, _, _ in same_way])
+            yield f"Measured frequencies move {words} than computed ones in modes {modes} ({each})."
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    return " and ".join(filter(None, [", ".join(map(str, numbers[:-1])), str(numbers[-1])]))

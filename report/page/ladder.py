@@ -1,0 +1,41 @@
+"""The ladder as a section of the report, and the files of its output folder."""
+
+from __future__ import annotations
+
+from html import escape
+from pathlib import Path
+
+from thermospindle.diagnosis.ladder.ladder import Ladder
+from thermospindle.report.figures import ladder as ladder_plots
+from thermospindle.report.text.ladder import sentences
+from thermospindle.report.text.ladder_table import COLUMNS, LEGEND, cells
+from thermospindle.report.typeset import prose
+
+
+def section(found: Ladder) -> tuple[str, str]:
+    """Title and HTML for `report.page.report.write_report`."""
+    head = "".join(f"<th{' class=left' if k == 0 else ''}>{escape(c).replace(chr(10), '<br>')}</th>" for k, c in enumerate(COLUMNS))
+    body = "".join(
+        "<tr>" + "".join(f"<td{' class=left' if k == 0 else ''}>{prose(c)}</td>" for k, c in enumerate(cells(r))) + "</tr>"
+        for r in found.rungs
+    )
+    grid = (
+        f'<div class="scroll"><table><caption>{escape(LEGEND)}</caption><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+    )
+    figure = f'<figure class="chart wide">{ladder_plots.picture(found)}<figcaption>Above: the error on every rung, of all data and of each '
+    figure += f"temperature predicted from the others. Below: residuals of every mode in every test on the first rung and on '{escape(found.top.name)}'.</figcaption></figure>"
+    words = "".join(f"<p>{prose(s)}</p>" for s in sentences(found))
+    return f"The ladder: {found.campaign.title}", figure + grid + words
+
+
+def write_ladder(found: Ladder, folder: Path) -> None:
+    """`ladder.svg`, `ladder.rrd` and `report.html` into an existing folder."""
+    from thermospindle.report.log.ladder import write_ladder_log
+    from thermospindle.report.log.ladder_content import shown
+    from thermospindle.report.page.report import page
+
+    ladder_plots.write(found, folder / "ladder.svg")
+    count = len(found.theory.data.observations)
+    conditions = f"the conditions of {count} test{'s' if count > 1 else ''}: {found.campaign.title}"
+    (folder / "report.html").write_text(page(found.spindle, conditions, [section(found)], "Ladder"), encoding="utf-8")
+    write_ladder_log(shown(found), folder / "ladder.rrd")

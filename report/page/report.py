@@ -1,0 +1,214 @@
+"""The report of a run: one HTML file that needs no network, measured beside computed.
+
+It is a list of sections, (title, HTML); other modules add theirs through `extra_sections`. Numbers are prepared here, drawn in
+`report.figures.common` and set in `report.html.j2`. The same run gives the same file;
+the command line adds when and how it was made (`stamp`).
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup, escape
+
+from thermospindle.model.bearing.pair import BearingState
+from thermospindle.model.machine import Spindle
+from thermospindle.model.rotor.modes import frf, group_energy, point_rows
+from thermospindle.model.scene.reading import content_hash, load
+from thermospindle.model.units import RPM
+from thermospindle.model.whole import whole
+from thermospindle.report.figures import common as plots
+from thermospindle.report.figures.common import Curve
+from thermospindle.report.page.comparison import SAME_TEMPERATURE, compared
+from thermospindle.report.page.headlines import calibration, headlines, misses
+from thermospindle.report.typeset import minus, signed, with_error
+from thermospindle.sim.identification.numbering import identified, in_band, same_speed, temperature_of
+from thermospindle.sim.operating import provenance
+from thermospindle.sim.run import Run, Step
+from thermospindle.thermal.expansion import influence
+from thermospindle.thermal.temperature import region_temperatures
+
+Section = tuple[str, str]
+"""Title and HTML of one section."""
+
+MADE = "<!-- made by -->"
+"""Where `stamp` writes the command and the date."""
+
+def write_report(run: Run, path: Path, extra_sections: Sequence[Section] = ()) -> None:
+    """Write the report to `path`, whole or not at all."""
+    with whole(Path(path)) as file:
+        file.write_text(html(run, extra_sections), encoding="utf-8")
+
+
+def html(run: Run, extra_sections: Sequence[Section] = ()) -> str:
+    """The report as text; `extra_sections` stand between the results and the account of where they come from."""
+    run = replace(run, steps=tuple(sorted(run.steps, key=temperature_of)))
+    every = [*results(run), *extra_sections, *background(run)]
+    return page(run.spindle, _conditions(run), every, "Run")
+
+
+def page(spindle: Spindle, conditions: str, sections: Sequence[Section], kind: str = "") -> str:
+    """A page of the report's look with any sections, at `conditions` in words; `kind` (Run, Comparison, ...) begins its title."""
+    return str(_page().page(spindle, conditions, [(title, Markup(body)) for title, body in sections], kind, Markup(MADE)))
+
+
+def stamp(folder: Path, command: str, date: str) -> None:
+    """Write into the pages of a folder, below their titles, with which command and when they were made."""
+    line = f'<p class="under"><code>{escape(command)}</code>, {escape(date)}</p>'
+    for file in folder.glob("*.html"):
+        file.write_text(file.read_text(encoding="utf-8").replace(MADE, line, 1), encoding="utf-8")
+
+
+def results(run: Run) -> list[Section]:
+    """Computed results beside measured and published ones."""
+    page, table = _page(), compared(run)
+    cold, hot = table.temperatures
+    steps = [s for s in run.steps if temperature_of(s) in (cold, hot)]
+    picture = plots.comparison("modes", table.labels(), table.peaks, cold, hot) if cold != hot and table.rows else ""
+    fig8 = plots.responses("frf", driving_points(run, steps), table.peaks, run.spindle.hammer.band)
+    hottest = max(run.steps, key=lambda s: abs(temperature_of(s) - run.spindle.reference_temperature)).point
+    drawing, scale = plots.section("section", hottest)
+    return [
+        ("In short", page.short(headlines(run, table), misses(table), calibration(run.spindle), table)),
+        ("Natural frequencies", page.frequencies(table, Markup(picture), table.sources())),
+        ("Frequency response", page.responses(Markup(fig8), run, steps, table)),
+        ("Bearings over temperature", page.bearings(bearing_figures(run), run)),
+        ("Thermal deformation", page.deformation(Markup(drawing), scale, hottest)),
+        ("All modes", page.modes([(s, identified(s), in_band(s)) for s in run.steps], group_energy)),
+    ]
+
+
+def background(run: Run) -> list[Section]:
+    """How the results were made, and from which numbers."""
+    page, spindle, last = _page(), run.spindle, run.steps[-1].point
+    mesh = influence(spindle, temperatures=region_temperatures(spindle, last.condition.temperature))
+    origins = Counter(p.origin for p in spindle.provenance.values())
+    values, unchanged = values_of_file(spindle)
+    return [
+        ("The virtual test", page.acquisition(run.steps[0].test)),
+        ("Finite element meshes", page.meshes(mesh, last.condition.temperature)),
+        ("Where the numbers come from", page.origins(spindle, origins, values, unchanged)),
+        ("Versions", page.versions(provenance(spindle))),
+    ]
+
+
+# ---------------------------------------------------------------- figures
+
+
+def driving_points(run: Run, steps: Sequence[Step]) -> dict[str, list[Curve]]:
+    """Exact, virtually tested and measured mobility at every hammer point, by title.
+
+    The exact one is evaluated under the test's exponential window, which evaluates an FRF at i omega + decay.
+    """
+    panels = {}
+    for letter, node in zip("abcdefgh", run.spindle.hammer.hammer_nodes, strict=False):
+        point = run.spindle.point(node)
+        curves = []
+        for step in steps:
+            estimate, decay = step.test.estimate.h1, step.test.estimate.window_decay
+            lines = np.linspace(estimate.frequency[0], estimate.frequency[-1], 1600)
+            row = point_rows(run.spindle, step.point.chain, (node,))
+            shifted = np.asarray(lines - 1j * decay / (2 * np.pi) if decay else lines)
+            exact = frf(step.point.linear, row, row, shifted, kind="mobility")[0, 0]
+            curves.append(Curve("exact", temperature_of(step), lines, exact))
+            i, j = estimate.response_nodes.index(node), estimate.reference_nodes.index(node)
+            coherence = None if estimate.coherence is None else estimate.coherence[i, j]
+            curves.append(Curve("test", temperature_of(step), estimate.frequency, estimate.value[i, j], coherence))
+            curves += _measured_curves(run, step, node)
+        axis = "xyz"[int(np.argmax(np.abs(point.direction)))]
+        panels[f"{letter}) struck and measured on the {point.body}: point {node} ({point.name}), along {axis}"] = curves
+    return panels
+
+
+def _measured_curves(run: Run, step: Step, node: int) -> Iterator[Curve]:
+    for test in (t for c in run.measured for t in c.tests if t.frf is not None):
+        near = abs(test.temperature - temperature_of(step)) <= SAME_TEMPERATURE and same_speed(test, run)
+        if near and node in test.frf.response_nodes and node in test.frf.reference_nodes:  # type: ignore[union-attr]
+            h = test.frf
+            assert h is not None
+            value = h.value[h.response_nodes.index(node), h.reference_nodes.index(node)]
+            power = {"receptance": 1, "mobility": 0, "accelerance": -1}[h.quantity]
+            used = h.frequency > 0
+            yield Curve("measured", temperature_of(step), h.frequency[used], value[used] * (2j * np.pi * h.frequency[used]) ** power)
+
+
+def bearing_figures(run: Run) -> list[tuple[str, Markup]]:
+    """Bearing states over temperature: (caption, SVG)."""
+    temperature = [temperature_of(s) for s in run.steps]
+    figures: tuple[tuple[str, str, str, Mapping[str, Callable[[BearingState], float]]], ...] = (
+        ("angle", "Contact angle.", "contact angle, degrees", {"": lambda b: np.degrees(b.contact_angle)}),
+        (
+            "deformation",
+            "Deformation of one ball, both contacts.",
+            "deformation, µm",
+            {"": lambda b: b.deformation * 1e6},
+        ),
+        ("force", "Contact force of one ball.", "contact force, N", {"": lambda b: b.contact_force}),
+        ("ball", "Stiffness of one ball.", "ball stiffness, N/µm", {"": lambda b: b.ball_stiffness * 1e-6}),
+        ("preload", "Preload, the axial force of a bearing.", "preload, N", {"": lambda b: b.preload}),
+        (
+            "stiffness",
+            "Radial and axial stiffness of one bearing.",
+            "bearing stiffness, N/µm",
+            {"radial": lambda b: b.radial_stiffness * 1e-6, "axial": lambda b: b.axial_stiffness * 1e-6},
+        ),
+    )
+    states = {b.name: [s.point.state.bearing(b.name) for s in run.steps] for b in run.spindle.bearings}
+    answer = []
+    for key, caption, label, quantities in figures:
+        curves = {name: {b: [float(value(s)) for s in states[b]] for b in states} for name, value in quantities.items()}
+        answer.append((caption, Markup(plots.trend(key, temperature, curves, label, from_zero=key != "angle"))))
+    return answer
+
+
+# ---------------------------------------------------------------- numbers of the scene
+
+
+def values_of_file(spindle: Spindle) -> tuple[dict[str, Any], bool]:
+    """Numbers of the scene file by the keys of `spindle.provenance`, and whether the spindle still is the file's."""
+    if spindle.file is None or not spindle.file.is_file():
+        return {}, True
+    values: dict[str, Any] = {}
+
+    def walk(node: Any, key: str) -> None:
+        if isinstance(node, Mapping):
+            for name, value in node.items():
+                walk(value, f"{key}.{name}" if key else name)
+        elif isinstance(node, list) and node and isinstance(node[0], Mapping):
+            for index, value in enumerate(node):
+                walk(value, f"{key}.{value.get('name', value.get('node', index))}")
+        elif key in spindle.provenance:
+            values[key] = node
+
+    walk(tomllib.loads(spindle.file.read_text(encoding="utf-8")), "")
+    return values, content_hash(load(spindle.file)) == content_hash(spindle)
+
+
+# ---------------------------------------------------------------- the page
+
+
+def _page() -> Any:
+    """The macros of the template."""
+    environment = Environment(
+        loader=FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"signed": signed, "with_error": with_error, "minus": minus}
+    environment.globals |= {"RPM": RPM, "degrees": np.degrees}
+    return environment.get_template("report.html.j2").module
+
+
+def _conditions(run: Run) -> str:
+    temperatures = ", ".join(f"{temperature_of(s):g}" for s in run.steps)
+    speed = run.steps[0].point.condition.speed / RPM
+    return f"{temperatures} °C, " + (f"{speed:.0f} rpm" if speed else "at rest")

@@ -1,0 +1,129 @@
+"""A comparison as JSON and in terminal tables."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from thermospindle.diagnosis.compare.compare import Comparison, PairedMode, TestComparison
+from thermospindle.diagnosis.compare.correlation import Band
+from thermospindle.model.units import RPM
+from thermospindle.report.text.grid import show_grid
+
+
+def comparison_json(c: Comparison) -> dict[str, Any]:
+    return {
+        "spindle": c.spindle,
+        "campaign": c.campaign,
+        "tests": [_test_json(t) for t in c.tests],
+        "comac": {str(node): value for node, value in c.comac.items()},
+        "crossings": list(c.crossings),
+        "rms_pull": c.rms_pull if np.isfinite(c.rms_pull) else None,
+    }
+
+
+def _test_json(t: TestComparison) -> dict[str, Any]:
+    return {
+        "id": t.test.id,
+        "temperature_C": t.test.temperature,
+        "speed_rpm": t.test.speed / RPM,
+        "modes": [_mode_json(m) for m in t.modes],
+        "missing_Hz": list(t.missing),
+        "extra_Hz": list(t.extra),
+        "frac": {f"{response},{reference}": value for (response, reference), value in t.frac.items()},
+        "correlation": None if t.correlation is None else _band_json(t.correlation.whole),
+        "bands": [] if t.correlation is None else [_band_json(b) for b in t.correlation.bands],
+    }
+
+
+def _band_json(b: Band) -> dict[str, Any]:
+    """Means over the lines of a band; the shift is by how much computed frequencies lie above measured ones."""
+    numbers = {"csac": b.csac, "csf": b.csf, "fdac": b.fdac}
+    return {
+        "low_Hz": b.low,
+        "high_Hz": b.high,
+        "lines": b.lines,
+        **{name: value if np.isfinite(value) else None for name, value in numbers.items()},
+        "shift_percent": None if b.shift is None else 100 * b.shift,
+        "frfs": {f"{response},{reference}": {"frac": s.frac, "csf": s.csf} for (response, reference), s in b.by_frf.items()},
+    }
+
+
+def _mode_json(m: PairedMode) -> dict[str, Any]:
+    return {
+        "mode": m.number,
+        "kind": m.kind,
+        "measured_Hz": m.measured,
+        "sd_Hz": m.sd,
+        "computed_Hz": m.computed,
+        "error_Hz": m.error,
+        "error_percent": 100 * m.error / m.measured,
+        "pull": m.pull,
+        "damping_measured": m.damping_measured,
+        "damping_sd": m.damping_sd,
+        "damping_computed": m.damping_computed,
+        "damping_pull": m.damping_pull,
+        "mac": m.mac,
+        "close": m.close,
+    }
+
+
+def show_comparison(console: Console, c: Comparison) -> None:
+    """One table of modes, one line a test for what has no partner, one table of FRAC and COMAC by point."""
+    console.print(f"{c.campaign} beside scene {c.spindle}: rms residual {c.rms_pull:.3g} standard errors", highlight=False, markup=False)
+    columns = (
+        "test", "mode", "kind", "measured\nHz", "+-", "computed\nHz", "error\nHz", "error\n%", "error\ns.e.",
+        "damping\n%", "computed\n%", "error\ns.e.", "MAC",
+    )  # fmt: skip
+    rows = []
+    for t in c.tests:
+        for m in t.modes:
+            damping = "" if m.damping_measured is None else f"{100 * m.damping_measured:.3f}"
+            damping_error = "" if m.damping_pull is None else f"{m.damping_pull:+.1f}"
+            mac = "" if m.mac is None else f"{m.mac:.3f}" + ("*" if m.close else "")
+            error = (f"{m.error:+.2f}", f"{100 * m.error / m.measured:+.2f}", f"{m.pull:+.1f}")
+            name = t.test.id if m is t.modes[0] else ""
+            frequencies = (f"{m.measured:.2f}", f"{m.sd:.2f}", f"{m.computed:.2f}")
+            beside = (damping, f"{100 * m.damping_computed:.3f}", damping_error, mac)
+            rows.append([name, str(m.number), m.kind, *frequencies, *error, *beside])
+    show_grid(console, "Modes, computed - measured", columns, rows, ("test", "kind"), keys=3)
+    if any(m.close and m.mac is not None for t in c.tests for m in t.modes):
+        console.print("* close modes: share of the measured shape in the plane of the computed ones")
+    for t in c.tests:
+        for what, values in (("measured, not computed", t.missing), ("computed, not measured", t.extra)):
+            if values:
+                console.print(f"{t.test.id}: {what}: {', '.join(f'{f:.1f}' for f in values)} Hz", highlight=False)
+    for line in c.crossings:
+        console.print(line, highlight=False)
+    if any(t.correlation for t in c.tests):
+        _show_frfs(console, c)
+    if c.comac:
+        references = sorted({reference for t in c.tests for _, reference in t.frac})
+        rows = []
+        for node, comac in c.comac.items():
+            cells = []
+            for r in references:
+                known = [v for t in c.tests if (v := t.frac.get((node, r))) is not None]
+                cells.append(f"{min(known):.3f}" if known else "-")
+            rows.append([str(node), "-" if comac is None else f"{comac:.4f}", *cells])
+        title = "COMAC, and smallest FRAC of all tests by hammer point"
+        show_grid(console, title, ("node", "COMAC", *(f"hammer {r}" for r in references)), rows)
+
+
+def _show_frfs(console: Console, c: Comparison) -> None:
+    """One line a test: likeness of all FRFs, and the band that is least alike."""
+    rows = []
+    for t in c.tests:
+        if t.correlation is not None:
+            worst = min(t.correlation.bands, key=lambda b: b.csf, default=t.correlation.whole)
+            w = t.correlation.whole
+            cells = (f"{w.csac:.3f}", f"{w.csf:.3f}", f"{w.fdac:.3f}", _percent(w.shift), f"{worst.low:.0f}-{worst.high:.0f}")
+            rows.append([t.test.id, *cells, f"{worst.csac:.3f}", f"{worst.csf:.3f}", _percent(worst.shift)])
+    columns = ("test", "CSAC", "CSF", "FDAC", "shift\n%", "least alike\nHz", "CSAC", "CSF", "shift\n%")
+    show_grid(console, "FRFs, means over lines", columns, rows, ("test",))
+
+
+def _percent(shift: float | None) -> str:
+    return "-" if shift is None else f"{100 * shift:+.2f}"

@@ -1,0 +1,54 @@
+"""The catalogue of effects in words: the list, and one effect explained."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+
+from thermospindle.sim.effects.effect import Effect
+
+
+def summary(effect: Effect) -> dict[str, Any]:
+    main = effect.parameters[0]
+    parameter = {"parameter": main.name, "unit": main.unit, "neutral": main.neutral, "typical": main.typical}
+    return {"name": effect.name, "title": effect.title} | parameter
+
+
+def show_effects(console: Console, catalogue: Sequence[Effect], refused: Mapping[str, str] = {}) -> None:
+    """The catalogue as a table; `refused` says of effects by name why they cannot be in a scene."""
+    grid = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
+    for column in ("effect", "what it is", "main parameter", "typical", "unit"):
+        grid.add_column(column, justify="right" if column == "typical" else "left", no_wrap=column == "effect")
+    for e in map(summary, catalogue):
+        grid.add_row(e["name"], e["title"], e["parameter"], f"{e['typical']:g}", e["unit"])
+    console.print(grid)
+    for name, why in refused.items():
+        console.print(f"{name}: {why}", markup=False, highlight=False)
+    console.print("spindle effects NAME explains one; spindle add SCENE NAME --out NEW_SCENE adds it.", highlight=False)
+
+
+def show_effect(console: Console, effect: Effect, refused: str = "") -> None:
+    def tell(what: str, text: str) -> None:
+        console.print(f"\n{what}:", style="bold")
+        console.print(text, markup=False, highlight=False)
+
+    console.print(f"{effect.name}: {effect.title}", style="bold", highlight=False)
+    tell("Equation", effect.equation)
+    console.print("\nParameters:", style="bold")
+    grid = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
+    for column in ("name", "unit", "neutral", "typical", "prior s.d.", "limits"):
+        grid.add_column(column, justify="left" if column in ("name", "unit") else "right")
+    for p in effect.parameters:
+        grid.add_row(p.name, p.unit, f"{p.neutral:g}", f"{p.typical:g}", f"{p.prior_sd:g}", f"{p.limits[0]:g} to {p.limits[1]:g}")
+    console.print(grid)
+    for p in effect.parameters:
+        console.print(f"{p.name}: {p.meaning}. Source: {p.source}.", markup=False, highlight=False)
+    tell("What one sees", effect.sees)
+    tell("What it resembles", ", ".join(effect.resembles))
+    tell("Where it is valid", effect.valid)
+    if refused:
+        tell("In this scene", refused)

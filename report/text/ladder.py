@@ -1,0 +1,157 @@
+"""What a ladder shows, in sentences with numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from thermospindle.diagnosis.inference.next_test import in_words
+from thermospindle.diagnosis.ladder.ladder import TOLERANCES, Ladder
+from thermospindle.diagnosis.ladder.rung import Rung, determined
+from thermospindle.diagnosis.search.screening import CLEAR
+
+CERTAIN = 1000.0  # odds, beyond which models are not to be trusted so far
+STRETCHED = 2.0  # standard deviations from which a tolerance is named
+MOST = 5  # things named in one sentence
+CLOSE = 0.05  # relative distance of two modes that are called a pair
+WRONG = 3.0  # standard errors from which a shift or a split is called wrong
+
+
+def sentences(found: Ladder) -> list[str]:
+    """What the ladder shows, in words with numbers."""
+    return [s for s in (_forms(found), _tolerances(found), *_effects(found), _counted(found), *remaining(found), *_tests(found)) if s]
+
+
+def _forms(found: Ladder) -> str:
+    drawn = [r for r in found.rungs if r.fitted is None]
+    shifts = all(r.rms_shift_Hz is not None for r in drawn)
+    told = [
+        f"{r.rms_shift_Hz if shifts else r.rms_Hz:.1f} Hz with {r.name}" + (f" ({'; '.join(r.lost_contact)})" if r.lost_contact else "")
+        for r in drawn
+    ]
+    ranked = sorted(found.forms, key=lambda f: -f[3])
+    lead = ranked[0][3] - ranked[1][3]
+    verb = "leads" if lead > CLEAR else "does not clearly lead"
+    free = f"With all tolerances free, {ranked[0][0]} {verb} {ranked[1][0]} by {evidence(lead)} in ln evidence"
+    return f"As drawn, {'shifts' if shifts else 'frequencies'} are wrong by {', '.join(told)} (rms). {free}."
+
+
+def _tolerances(found: Ladder) -> str:
+    drawn, r = found.rung("axial equilibrium"), found.rung(TOLERANCES)
+    far = [(n, x / sd) for n, x, sd in zip(found.theory.names, r.nuisance, found.theory.sd, strict=True) if abs(x / sd) > STRETCHED]
+    far.sort(key=lambda pair: -abs(pair[1]))
+    more = f" and {len(far) - MOST} more" if len(far) > MOST else ""
+    paid = (
+        f"; beyond {STRETCHED:g} standard deviations are {', '.join(f'{n} ({x:+.1f})' for n, x in far[:MOST])}{more}"
+        if far
+        else "; none goes far"
+    )
+    return f"The tolerances take the error from {drawn.error:.2f} to {r.error:.2f} standard errors{paid}."
+
+
+def _effects(found: Ladder) -> Iterator[str]:
+    for r in (r for r in found.rungs if r.effects):
+        below = found.rung(r.above)
+        gain = r.evidence - below.evidence
+        change = f"error {below.error:.2f} -> {r.error:.2f}, held out {below.held_out:.2f} -> {r.held_out:.2f}, tolerances "
+        change += f"{below.stretch:.2f} -> {r.stretch:.2f} s.d., ln evidence {evidence(gain, '+')}"
+        if gain > CLEAR:
+            told = "is supported"
+        elif gain > 0:
+            told = f"is not established: {CLEAR:g} in ln evidence is asked"
+        else:
+            told = "is not asked for by these data"
+        name = r.effects[-1] if r.name.startswith("+") else " + ".join(r.effects)
+        yield f"{name} {told} ({change})."
+    if found.diagnosis is not None:
+        yield f"Diagnosis: {found.diagnosis.verdict.word}. {found.diagnosis.verdict.reason}"
+
+
+def _counted(found: Ladder) -> str:
+    top = found.top
+    assert top.fitted is not None  # tolerances are always fitted
+    numbers, parameters = len(found.theory.data.value), len(found.theory.sd) + sum(len(v) for v in top.values.values())
+    told = (
+        f"Rung {top.name!r} has {parameters} parameters, all with priors, and {numbers} numbers, which decide {determined(found.theory, top.fitted):.1f} "
+        "combinations of them"
+    )
+    if parameters >= numbers:
+        told += "; with fewer numbers than parameters the data identify none of them alone: each value is a belief that the data moved"
+    return told + "."
+
+
+def remaining(found: Ladder) -> Iterator[str]:
+    """What is wrong with shifts and pairs, as drawn and on the top rung."""
+    for r in dict.fromkeys((found.rung("axial equilibrium"), found.top)):
+        wrong = [*[told for _, told in sorted(_wrong_shifts(found, r), reverse=True)[:MOST]], *_wrong_splits(found, r)]
+        if wrong:
+            yield f"Left over on rung {r.name!r}: {'; '.join(wrong)}."
+        elif r.fitted is not None:
+            yield f"Left over on rung {r.name!r}: no shift and no split wrong by more than {WRONG:g} standard errors."
+
+
+def _numbers(found: Ladder, r: Rung) -> dict[tuple[int, int], tuple[float, float, float]]:
+    """(measured Hz, computed Hz, sd Hz) by test and mode number."""
+    data = found.theory.data
+    told = {}
+    for k, f in enumerate(data.features):
+        if f.what == "frequency" and found.mode[k]:
+            measured = float(np.exp(data.value[k]))
+            told[f.test, int(found.mode[k])] = (measured, measured * float(np.exp(-r.residual[k])), measured * float(data.sd[k]))
+    return told
+
+
+def _ends(found: Ladder) -> tuple[int, int]:
+    """The coldest and the hottest test at the lowest speed."""
+    where = [(abs(o.condition.speed), o.condition.temperature, t) for t, o in enumerate(found.theory.data.observations)]
+    slow = [w for w in where if w[0] == min(where)[0]]
+    return min(slow)[2], max(slow)[2]
+
+
+def _wrong_shifts(found: Ladder, r: Rung) -> Iterator[tuple[float, str]]:
+    """By how many standard errors, and in words."""
+    numbers, (cold, hot) = _numbers(found, r), _ends(found)
+    for mode, kind in found.kinds.items():
+        if cold != hot and (cold, mode) in numbers and (hot, mode) in numbers:
+            (m0, c0, s0), (m1, c1, s1) = numbers[cold, mode], numbers[hot, mode]
+            sd = float(np.hypot(s0, s1))
+            if abs((c1 - c0) - (m1 - m0)) > WRONG * sd:
+                told = (
+                    "moves the other way" if (m1 - m0) * (c1 - c0) < 0 else ("moves more" if abs(m1 - m0) > abs(c1 - c0) else "moves less")
+                )
+                pull = abs((c1 - c0) - (m1 - m0)) / sd
+                yield pull, f"mode {mode} ({kind}) {told} than computed, {m1 - m0:+.1f} +- {sd:.2g} Hz against {c1 - c0:+.1f}"
+
+
+def _wrong_splits(found: Ladder, r: Rung) -> Iterator[str]:
+    numbers, cold = _numbers(found, r), _ends(found)[0]
+    for one, two in pairwise(found.kinds):
+        pair = [numbers[cold, m] for m in (one, two) if (cold, m) in numbers]
+        if len(pair) == 2 and "axial" not in (found.kinds[one], found.kinds[two]):
+            (m0, c0, s0), (m1, c1, s1) = pair
+            sd = float(np.hypot(s0, s1))
+            if abs(m1 - m0) < CLOSE * m0 and abs((c1 - c0) - (m1 - m0)) > WRONG * sd:
+                where = found.theory.data.observations[cold].test.id
+                yield f"modes {one} and {two} lie {m1 - m0:.1f} +- {sd:.2g} Hz apart in {where}, computed {c1 - c0:.1f}"
+
+
+def _tests(found: Ladder) -> Iterator[str]:
+    """The test that separates two explanations best, and the mode in which it shows most."""
+    for t in found.tests[:1]:
+        one, two = max(zip(*t.predictions, strict=True), key=lambda m: abs(m[0].frequency - m[1].frequency) / np.hypot(m[0].sd, m[1].sd))
+        yield (
+            f"A test {in_words(t.condition)} would tell {t.separates[0]} from {t.separates[1]}, at odds of {_odds(t.odds)} to 1 if either is "
+            f"right: a mode would lie at {one.frequency:.1f} +- {one.sd:.2g} Hz or at {two.frequency:.1f} +- {two.sd:.2g} Hz."
+        )
+
+
+def _odds(odds: float) -> str:
+    return f"{odds:.2g}" if odds < CERTAIN else f"more than {CERTAIN:g}"
+
+
+def evidence(value: float, sign: str = "") -> str:
+    if abs(value) < 0.05:
+        return "0.0"
+    return f"{value:{sign}.1f}" if abs(value) < 1e5 else f"{value:{sign}.2e}"

@@ -1,0 +1,206 @@
+"""What `spindle map` says: JSON, sentences, terminal table, CSV and a section of the report."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from thermospindle.model.cells import cells
+from thermospindle.model.types import Array
+from thermospindle.model.units import RPM
+from thermospindle.report.figures.resonance import figures_svg, write_figures
+from thermospindle.report.text.grid import show_grid
+from thermospindle.report.typeset import prose
+from thermospindle.sim.operating import provenance
+from thermospindle.sim.resonance.map import Coincidence, ResonanceMap, strongest
+
+SHOWN = 18  # coincidences in the terminal and the report
+
+
+def map_json(found: ResonanceMap) -> dict[str, Any]:
+    """Coincidences; modes over the grid [temperature][speed]; lines at the nominal condition; runout along both axes."""
+    return {
+        "nominal": {"temperature_C": found.nominal.temperature, "speed_rpm": found.nominal.speed / RPM},
+        "sentences": sentences(found),
+        "coincidences": [_coincidence_json(c) for c in found.coincidences],
+        "modes": [{"mode": m.number, "kind": m.kind, "whirl": m.whirl, "frequency_Hz": _numbers(m.frequency)} for m in found.modes],
+        "lines": [
+            {
+                "line": t.line.name,
+                "bearing": t.line.bearing,
+                "cause": t.line.cause,
+                "order": t.line.order,
+                "direction": t.line.direction,
+                "whirl": t.line.whirl,
+                "amplitude_um": 1e6 * t.amplitude,
+                "frequency_Hz": t.line.frequency,
+            }
+            for t in found.lines
+        ],
+        "grid": {"temperature_C": found.temperatures.tolist(), "speed_rpm": (found.speeds / RPM).tolist()},
+        "nrro_um": {
+            "over_speed": _runout_json(found.nrro_speed, "speed_rpm", 1 / RPM),
+            "over_temperature": _runout_json(found.nrro_temperature, "temperature_C", 1.0),
+        },
+        "imperfections": "of the scene" if found.drawn_from is None else f"drawn with seed {found.drawn_from}",
+        "provenance": provenance(found.spindle),
+    }
+
+
+def _coincidence_json(c: Coincidence) -> dict[str, Any]:
+    return {
+        "line": c.line.name,
+        "mode": c.mode.number,
+        "temperature_C": c.condition.temperature,
+        "speed_rpm": c.condition.speed / RPM,
+        "frequency_Hz": c.frequency,
+        "mode_frequency_Hz": c.mode_frequency,
+        "bearing": c.line.bearing,
+        "cause": c.line.cause,
+        "order": c.line.order,
+        "direction": c.line.direction,
+        "line_whirl": {1: "forward", -1: "backward", 0: "none"}[c.line.whirl],
+        "mode_kind": c.mode.kind,
+        "mode_whirl": c.mode.whirl,
+        "sense": c.sense,
+        "strength_um": 1e6 * c.strength,
+        "strength_um_per_unit": 1e6 * c.unit_strength,
+        "unit": "g mm" if c.line.cause in ("unbalance", "cage unbalance") else "um",
+        "margin_percent": 100 * c.margin,
+        "nrro_um": 1e6 * c.nrro,
+        "at_nominal_speed": c.at_nominal_speed,
+    }
+
+
+def _runout_json(along: Array, name: str, unit: float) -> dict[str, list[float]]:
+    place, radial, axial = along.T
+    return {name: (unit * place).tolist(), "radial": (1e6 * radial).tolist(), "axial": (1e6 * axial).tolist()}
+
+
+def _numbers(values: Array) -> list[Any]:
+    return [[float(v) if np.isfinite(v) else None for v in row] for row in values]
+
+
+def sentences(found: ResonanceMap) -> list[str]:
+    """One sentence for every line that crosses a mode at the nominal speed, strongest first; else that none does, and the nearest."""
+    rpm = f"{found.nominal.speed / RPM:g} rpm"
+    low, high = found.temperatures[0], found.temperatures[-1]
+    crossed = [c for c in found.coincidences if c.at_nominal_speed]
+    if not crossed:
+        excited = [c for c in found.coincidences if c.strength > 0] or list(found.coincidences)
+        apart = min(excited, key=lambda c: abs(c.margin), default=None)
+        near = f"; nearest is {_line(apart)}, {100 * apart.margin:+.1f} % from {_mode(apart)}" if apart else ""
+        return [f"This spindle at {rpm} crosses no line between {low:g} and {high:g} C{near}."]
+    said = []
+    for c in crossed:
+        start = int(np.argmin(np.abs(found.nrro_temperature[:, 0] - found.nominal.temperature)))
+        before = found.nrro_temperature[start, 2 if c.line.direction == "axial" else 1]
+        said.append(
+            f"This spindle at {rpm} crosses {_line(c)} at {c.condition.temperature:.1f} C with {_mode(c)} at {c.frequency:.1f} Hz; "
+            f"{c.line.direction} NRRO (nonrepeatable runout) is {1e9 * c.nrro:.1f} nm rms there and {1e9 * before:.1f} nm at {found.nominal.temperature:g} C."
+        )
+    return said
+
+
+def _line(c: Coincidence) -> str:
+    order = f" of order {c.line.order}" if c.line.order else ""
+    where = f" of the {c.line.bearing} bearing" if c.line.bearing else ""
+    return f"{c.line.name} ({c.line.cause}{order}{where})"
+
+
+def _mode(c: Coincidence) -> str:
+    whirl = "" if c.mode.whirl == "none" else f", {c.mode.whirl}"
+    return f"mode {c.mode.number} ({c.mode.kind}{whirl})"
+
+
+def show_map(console: Console, found: ResonanceMap) -> None:
+    for said in sentences(found):
+        console.print(said, highlight=False)
+    console.print()
+    title = f"Coincidences from {found.temperatures[0]:g} to {found.temperatures[-1]:g} C, up to {found.speeds[-1] / RPM:g} rpm, strongest first"
+    columns = ("line", "wave", "bearing", "mode", "T\nC", "speed\nrpm", "f\nHz", "strong\nnm", "NRRO\nnm rms", "margin\n%")
+    show_grid(console, title, columns, [_cells(c) for c in strongest(found.coincidences)[:SHOWN]], columns[:4], keys=4)
+    whose = (
+        "the scene's imperfections"
+        if found.drawn_from is None
+        else f"plausible imperfections (seed {found.drawn_from}; the scene names none)"
+    )
+    console.print(
+        f"{len(found.coincidences)} in all. Strength: amplitude of the mode at the hub under {whose}. "
+        f"Margin: of the line from the mode at {found.nominal.temperature:g} C, {found.nominal.speed / RPM:g} rpm.",
+        highlight=False,
+    )
+
+
+def _cells(c: Coincidence) -> list[str]:
+    cause = c.line.cause.replace("waviness", str(c.line.order)) if c.line.order else c.line.cause
+    mode = f"{c.mode.number} {c.mode.kind}" + {"none": "", "forward": " fw", "backward": " bw"}[c.mode.whirl]
+    numbers = (
+        f"{c.condition.temperature:.1f}",
+        f"{c.condition.speed / RPM:.0f}",
+        f"{c.frequency:.1f}",
+        f"{1e9 * c.strength:.1f}",
+        f"{1e9 * c.nrro:.1f}",
+        f"{100 * c.margin:+.1f}",
+    )
+    return [c.line.name, cause, c.line.bearing, mode, *numbers]
+
+
+def write_map(found: ResonanceMap, folder: Path) -> None:
+    """`coincidences.csv`, `modes.csv` over the grid, and the figures."""
+    about = "# " + ", ".join(f"{k} {v}" for k, v in provenance(found.spindle).items()) + "\n"
+    coincidences = [_coincidence_json(c) for c in found.coincidences]
+    with (folder / "coincidences.csv").open("w", newline="", encoding="utf-8") as file:
+        file.write(about)
+        names = list(coincidences[0]) if coincidences else ["line", "mode", "temperature_C", "speed_rpm", "frequency_Hz"]
+        writer = csv.DictWriter(file, names, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(dict(zip(names, cells(row.values()), strict=True)) for row in coincidences)
+    with (folder / "modes.csv").open("w", newline="", encoding="utf-8") as file:
+        file.write(about)
+        rows = csv.writer(file, lineterminator="\n")
+        rows.writerow(["temperature_C", "speed_rpm", *(f"mode {m.number} {m.kind}_Hz" for m in found.modes)])
+        for i, t in enumerate(found.temperatures):
+            for j, s in enumerate(found.speeds):
+                rows.writerow([repr(float(t)), repr(float(s / RPM)), *(repr(float(m.frequency[i, j])) for m in found.modes)])
+    write_figures(found, folder)
+
+
+def map_section(found: ResonanceMap) -> tuple[str, str]:
+    """Title and HTML of a report section."""
+    said = "".join(f"<p>{prose(s)}</p>" for s in sentences(found))
+    head = "".join(
+        f"<th{' class=left' if k < 4 else ''}>{h}</th>"
+        for k, h in enumerate(
+            (
+                "line",
+                "wave and order",
+                "bearing",
+                "mode",
+                "°C",
+                "rpm",
+                "Hz",
+                "strength, nm",
+                "NRRO (nonrepeatable runout), nm rms",
+                "margin, %",
+            )
+        )
+    )
+    body = "".join(
+        "<tr>" + "".join(f"<td{' class=left' if k < 4 else ''}>{prose(cell)}</td>" for k, cell in enumerate(_cells(c))) + "</tr>"
+        for c in strongest(found.coincidences)[:SHOWN]
+    )
+    drawings = figures_svg(found)
+    captions = {
+        "campbell": "Campbell diagram: natural frequencies and lines over speed.",
+        "temperature": "The same over temperature at the nominal speed.",
+        "coincidences": "Where lines meet modes, over both.",
+        "nrro": "Nonrepeatable runout along temperature and speed, linear response.",
+    }
+    pictures = "".join(f'<figure class="chart wide">{drawings[k]}<figcaption>{captions[k]}</figcaption></figure>' for k in captions)
+    table = f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+    return "Resonance map", said + table + pictures

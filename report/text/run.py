@@ -1,0 +1,241 @@
+"""What the command line says: the JSON objects, the terminal tables, and the files of a run's folder."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from thermospindle.model.bearing.stiffness_table import StiffnessTable, write_table
+from thermospindle.model.rotor import mjcf
+from thermospindle.model.rotor.modes import Mode, group_energy
+from thermospindle.model.units import RPM
+from thermospindle.report.log.read import Log
+from thermospindle.report.log.run import write_log
+from thermospindle.report.page.report import write_report
+from thermospindle.report.text.grid import show_grid
+from thermospindle.sim.campaign.campaign import Campaign, write_campaign
+from thermospindle.sim.identification.numbering import identified, measured_rows, numbered
+from thermospindle.sim.operating import OperatingPoint, provenance, stiffness_table
+from thermospindle.sim.run import Run, Step, as_campaign
+
+JSON_COLUMNS = (
+    "contact_angle_deg",
+    "deformation_um",
+    "contact_force_N",
+    "ball_stiffness_N_per_m",
+    "preload_N",
+    "radial_stiffness_N_per_m",
+    "axial_stiffness_N_per_m",
+    "tilt_stiffness_N_m_per_rad",
+    "coupling_stiffness_N_per_rad",
+)
+
+
+# ---------------------------------------------------------------- JSON
+
+
+def table_json(table: StiffnessTable) -> dict[str, Any]:
+    """Lists over temperature at the first speed; with several speeds each entry of `speeds` holds its own."""
+
+    def at(speed: int) -> dict[str, Any]:
+        return {name: {c: v[c][:, speed].tolist() for c in JSON_COLUMNS} for name, v in table.values.items()}
+
+    answer = {"temperature_C": table.temperature.tolist(), "bearings": at(0), "unloads_C": dict(table.unloads)}
+    if len(table.speed) > 1:
+        answer["speeds"] = [{"speed_rpm": s / RPM, "bearings": at(i)} for i, s in enumerate(table.speed.tolist())]
+    return answer | {"provenance": dict(table.provenance)}
+
+
+def modes_json(point: OperatingPoint, highest: float) -> dict[str, Any]:
+    return {
+        "temperature_C": point.condition.temperature,
+        "speed_rpm": point.condition.speed / RPM,
+        "status": point.state.status,
+        "modes": [_mode_json(point, m) for m in point.modes if m.frequency <= highest],
+    }
+
+
+def _mode_json(point: OperatingPoint, mode: Mode) -> dict[str, Any]:
+    return {
+        "frequency_Hz": mode.frequency,
+        "damping_ratio": mode.damping_ratio,
+        "kind": mode.kind,
+        "whirl": mode.whirl,
+        "energy": group_energy(point.chain, mode),
+        "energy_by_element": dict(mode.energy),
+    }
+
+
+def impact_json(step: Step) -> dict[str, Any]:
+    m = step.identified
+    rows = zip(m.frequency, m.frequency_sd, m.damping, m.damping_sd, strict=True)
+    keys = ("frequency_Hz", "frequency_sd_Hz", "damping_ratio", "damping_ratio_sd")
+    return {
+        "temperature_C": step.point.condition.temperature,
+        "speed_rpm": step.point.condition.speed / RPM,
+        "modes": [dict(zip(keys, map(float, row), strict=True)) for row in rows],
+    }
+
+
+def run_json(run: Run) -> dict[str, Any]:
+    highest = run.spindle.hammer.band[1]
+    return {
+        "provenance": provenance(run.spindle),
+        "conditions": [modes_json(s.point, highest) | {"identified": impact_json(s)["modes"]} for s in run.steps],
+    }
+
+
+# ---------------------------------------------------------------- files
+
+
+def campaign_of(run: Run) -> Campaign:
+    return as_campaign(run, f"virtual tests of {run.spindle.title}"[:80])
+
+
+def write_campaign_of(run: Run, folder: Path) -> None:
+    write_campaign(campaign_of(run), folder)
+
+
+def write_modes(point: OperatingPoint, folder: Path) -> None:
+    """`modes.csv` and the MuJoCo model `spindle.xml` of one operating point."""
+    (folder / "spindle.xml").write_text(mjcf.xml(point.spec(looks=True)), encoding="utf-8")
+    _write_modes_csv([point], folder / "modes.csv")
+
+
+def _write_modes_csv(points: list[OperatingPoint], path: Path) -> None:
+    elements = [e.name for e in points[0].chain.elements]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        shares = [f"energy_share_{name}" for name in elements]
+        writer.writerow(["temperature_C", "speed_rpm", "mode", "kind", "whirl", "frequency_Hz", "damping_ratio", *shares])
+        for point in points:
+            for i, m in enumerate(point.modes, 1):
+                where = (point.condition.temperature, point.condition.speed / RPM)
+                energy = [m.energy[name] for name in elements]
+                writer.writerow([*where, i, m.kind, m.whirl, m.frequency, m.damping_ratio, *energy])
+
+
+def write_run(run: Run, folder: Path, progress: Callable[[str], None]) -> None:
+    """Everything a run leaves behind: tables, model, campaign, report, Rerun log."""
+    temperatures = [s.point.condition.temperature for s in run.steps]
+    write_table(stiffness_table(run.spindle, temperatures, [run.steps[0].point.condition.speed]), folder / "table.csv")
+    points = [s.point for s in run.steps]
+    _write_modes_csv(points, folder / "modes.csv")
+    for point in points:
+        name = f"spindle_{point.condition.temperature:g}C.xml"
+        (folder / name).write_text(mjcf.xml(point.spec(looks=True)), encoding="utf-8")
+    progress("tables and MuJoCo models written")
+    write_campaign_of(run, folder / "campaign")
+    progress("campaign written")
+    write_report(run, folder / "report.html")
+    progress("report written")
+    write_log(run, folder / "run.rrd")
+    progress("Rerun log written")
+
+
+def write_frf_tables(log: Log, folder: Path) -> None:
+    """One CSV a test: frequency and the real and imaginary part of every FRF."""
+    for test, frf in log.frfs.items():
+        names = [f"H({i},{j})" for i in frf.response_nodes for j in frf.reference_nodes]
+        with (folder / f"{test}.csv").open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(["frequency_Hz", *(f"{part} {name} ({frf.quantity})" for name in names for part in ("re", "im"))])
+            flat = frf.value.reshape(len(names), -1)
+            for line, column in zip(frf.frequency, flat.T, strict=True):
+                writer.writerow([repr(float(line)), *(repr(float(v)) for z in column for v in (z.real, z.imag))])
+    (folder / "contents.json").write_text(json.dumps({"scene": log.scene, "entities": list(log.entities)}, indent=1))
+
+
+# ---------------------------------------------------------------- terminal
+
+
+def show_table(console: Console, table: StiffnessTable) -> None:
+    columns = (
+        "T\nC", "speed\nrpm", "bearing", "angle\ndeg", "deform.\num", "ball\nforce\nN", "ball k\nN/um", "preload\nN", "k_RR\nN/um", "k_AA\nN/um",
+    )  # fmt: skip
+    rows = []
+    scale = (1, 1, 1, 1e-6, 1, 1e-6, 1e-6)
+    digits = (2, 3, 3, 3, 2, 2, 3)
+    for i, temperature in enumerate(table.temperature):
+        for j, speed in enumerate(table.speed):
+            for name, values in table.values.items():
+                cells = zip(JSON_COLUMNS, scale, digits, strict=False)
+                row = [f"{values[c][i, j] * s:.{d}f}" for c, s, d in cells]
+                rows.append([f"{temperature:g}", f"{speed / RPM:g}", name, *row])
+    show_grid(console, "Bearing state", columns, rows, ("bearing",), keys=3)
+    for name, where in table.unloads.items():
+        if where is not None:
+            console.print(f"{name} bearing loses contact at {where:.2f} C")
+
+
+def show_modes(console: Console, answer: dict[str, Any], point: OperatingPoint) -> None:
+    groups = list(answer["modes"][0]["energy"]) if answer["modes"] else []
+    title = f"Modes at {answer['temperature_C']:g} C, {answer['speed_rpm']:g} rpm (bearings {answer['status']})"
+    columns = ("mode", "f\nHz", "damping\n%", "kind", "whirl", *(f"{g}\n%" for g in groups))
+    rows = []
+    for i, m in enumerate(answer["modes"], 1):
+        shares = [f"{100 * m['energy'][g]:.1f}" for g in groups]
+        rows.append([str(i), f"{m['frequency_Hz']:.2f}", f"{100 * m['damping_ratio']:.3f}", m["kind"], m["whirl"], *shares])
+    show_grid(console, title, columns, rows, ("kind", "whirl"), keys=2)
+    console.print("The last columns share each mode's strain energy between the element groups.")
+
+
+def show_impact(console: Console, step: Step) -> None:
+    condition = step.point.condition
+    title = f"Impact test at {condition.temperature:g} C, {condition.speed / RPM:g} rpm: identified modes beside the model's own"
+    rows = []
+    m = step.identified
+    computed = {k: step.point.modes[i] for i, k in identified(step).items()}
+    for i, (f, sf, z, sz) in enumerate(zip(m.frequency, m.frequency_sd, m.damping, m.damping_sd, strict=True)):
+        exact = computed.get(i)
+        own = ("-", "-") if exact is None else (f"{exact.frequency:.2f}", f"{100 * exact.damping_ratio:.3f}")
+        rows.append([f"{f:.2f}", f"{sf:.2f}", f"{100 * z:.3f}", f"{100 * sz:.3f}", *own])
+    show_grid(console, title, ("f\nHz", "+-", "damping\n%", "+-", "model f\nHz", "model damping\n%"), rows)
+
+
+def show_run(console: Console, run: Run, out: Path) -> None:
+    temperatures = [s.point.condition.temperature for s in run.steps]
+    show_table(console, stiffness_table(run.spindle, temperatures, [run.steps[0].point.condition.speed]))
+    console.print()
+    highest = run.spindle.hammer.band[1]
+    numbers, beside = numbered(run), measured_rows(run)
+    identified_modes = [identified(step) for step in run.steps]
+    measured = [t for c in run.measured for t in c.tests if t.id in beside]
+    own, peaks = list[list[str]](), list[list[str]]()
+    first = run.steps[0].point
+    for number, mode in enumerate((m for m in first.modes if m.frequency <= highest), 1):
+        followed = [next((i for i, n in of_step.items() if n == number), None) for of_step in numbers]
+        found = [None if i is None else step.point.modes[i] for i, step in zip(followed, run.steps, strict=True)]
+        frequency = ["-" if m is None else f"{m.frequency:.1f}" for m in found]
+        shift = "-" if found[-1] is None else f"{found[-1].frequency - mode.frequency:+.1f}"
+        group = max(group_energy(first.chain, mode).items(), key=lambda item: item[1])[0]
+        rows = [beside[t.id].get(number - 1) for t in measured]
+        own.append([str(number), mode.kind, group, *frequency, shift, *(f"{row.frequency:.0f}" if row else "" for row in rows)])
+        cells = []
+        for i, step, pairs in zip(followed, run.steps, identified_modes, strict=True):
+            k = pairs.get(i) if i is not None else None
+            cells.append("-" if k is None else f"{step.identified.frequency[k]:.2f}\n+- {step.identified.frequency_sd[k]:.3f}")
+        peaks.append([str(number), *cells])
+    every = [f"{t:g} C" for t in temperatures]
+    title = "Natural frequencies of the model, Hz" + (", and what was measured" if measured else "")
+    columns = ("mode", "kind", "main\nflexibility", *every, "shift", *(f"measured\n{t.temperature:g} C" for t in measured))
+    show_grid(console, title, columns, own, ("kind", "main\nflexibility"), keys=3)
+    console.print()
+    show_grid(console, "Modal peaks of the virtual hammer test, Hz +- standard error", ("mode", *every), peaks)
+    if any("-" in row for row in peaks):
+        console.print(f"-: no peak was found. {_struck(run)}")
+    console.print(f"\n{out}: report.html, run.rrd, table.csv, modes.csv, spindle_*.xml, campaign/", highlight=False, soft_wrap=True)
+    console.print(f"Open in a browser: {(out / 'report.html').resolve().as_uri()}", highlight=False, soft_wrap=True)
+
+
+def _struck(run: Run) -> str:
+    """Why a mode may stay unseen: where and along which axes the hammer strikes."""
+    points = [run.spindle.point(node) for node in run.spindle.hammer.hammer_nodes]
+    places = ", ".join(f"node {p.node} along {'xyz'[int(np.argmax(np.abs(p.direction)))]}" for p in points)
+    return f"The hammer strikes {places}: a mode that does not move there, or lies too near a stronger one, shows no peak of its own."

@@ -1,0 +1,216 @@
+"""What `spindle runout` says and writes: the JSON object, the terminal table, CSV files, figures, and a section for the report.
+
+The repeatable part (RRO) is made of the lines at whole multiples of the turning frequency, the nonrepeatable one (NRRO) is the rest of the
+record; `averaged` holds the same values with the RRO from averaging over the record's revolutions, which lets some of the other lines through.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+from rich.console import Console
+
+from thermospindle.model.cells import cells
+from thermospindle.model.machine import Spindle
+from thermospindle.model.units import RPM, TO_UM
+from thermospindle.report.figures.common import STYLE, svg
+from thermospindle.report.figures.runout import motion_figure, spectrum_figure
+from thermospindle.report.log.runout import write_runout_log
+from thermospindle.report.text.grid import grid, show_grid
+from thermospindle.sim.operating import provenance
+from thermospindle.sim.running.lines import FoundLine
+from thermospindle.sim.running.revolutions import ErrorMotion
+from thermospindle.sim.running.runout import AXIAL, Runout, X
+from thermospindle.sim.running.waterfall import run_up, waterfall
+
+STATISTICS = {
+    "rro_um": "peak to valley of the repeatable part (lines at whole orders)",
+    "nrro_um": "peak to valley of the nonrepeatable part over the whole record",
+    "total_um": "peak to valley of the record",
+    "rro_rms_um": "root mean square of the repeatable part about its mean",
+    "nrro_rms_um": "root mean square of the nonrepeatable part",
+    "nrro_6_sigma_um": "six standard deviations of the nonrepeatable part",
+    "total_error_um": "total error motion, ISO 230-7 / ASME B89.3.4, fixed sensitive direction",
+    "synchronous_error_um": "synchronous error motion, about the least-squares circle when radial",
+    "asynchronous_error_um": "asynchronous error motion: widest band of all revolutions at one angle",
+    "once_per_revolution_um": "part once per revolution, zero to peak",
+}
+MAIN = {"radial": X, "axial": AXIAL}
+"""The probe each direction is quoted from; the others are under `probes`."""
+SHOWN = 14  # lines in the terminal
+
+
+def _quoted(m: ErrorMotion) -> dict[str, float]:
+    values = (
+        m.repeatable, m.nonrepeatable, m.total, m.repeatable_rms, m.nonrepeatable_rms, m.six_sigma,
+        m.total_error, m.synchronous_error, m.asynchronous_error, m.eccentricity,
+    )  # fmt: skip
+    return {name: TO_UM * v for name, v in zip(STATISTICS, values, strict=True)}
+
+
+def runout_json(runout: Runout, path: str, element: str, seed: int | None) -> dict[str, Any]:
+    """The answer: values by direction, the lines strongest first, every probe, and how they were made."""
+    quoted = {name: _quoted(m) for name, m in runout.values().items()}
+    averaged = {name: _quoted(m) for name, m in runout.values(runout.averaged).items()}
+    leaked = dict(zip(quoted, (TO_UM * runout.leaked).tolist(), strict=True))
+    condition = runout.point.condition
+    time = runout.averaged.time
+    return {
+        "temperature_C": condition.temperature,
+        "speed_rpm": condition.speed / RPM,
+        "status": runout.point.state.status,
+        "seconds": runout.averaged.count / abs(runout.turning),
+        "revolutions": runout.averaged.count,
+        "samples_per_revolution": len(time) // runout.averaged.count,
+        "path": path,
+        "element": element,
+        "imperfections": "of the scene" if seed is None else f"drawn from seed {seed}",
+        **{name: {d: quoted[probe][name] for d, probe in MAIN.items()} for name in STATISTICS},
+        "averaged": {
+            **{
+                name: {d: averaged[probe][name] for d, probe in MAIN.items()} for name in ("rro_um", "nrro_um", "rro_rms_um", "nrro_rms_um")
+            },
+            "leakage_um": {d: leaked[probe] for d, probe in MAIN.items()},
+        },
+        "statistics": STATISTICS | {"leakage_um": "most by which other lines can have changed the averaged RRO, zero to peak"},
+        "lines": [line_json(line) for line in runout.lines],
+        "probes": {
+            p.name: {"body": p.body, "position_mm": [1e3 * x for x in p.position], "direction": list(p.direction), **quoted[p.name]}
+            for p in runout.signals.probes
+        },
+        "provenance": provenance(runout.point.spindle),
+    }
+
+
+def line_json(line: FoundLine) -> dict[str, Any]:
+    """One line; `cause` is that of the largest share, "unexplained" where theory has none."""
+    first = line.causes[0] if line.causes else None
+    return {
+        "frequency_Hz": line.frequency,
+        "order": line.order,
+        "amplitude_um": TO_UM * line.amplitude,
+        "direction": line.direction,
+        "cause": first.cause if first else "unexplained",
+        "bearing": first.bearing if first else "",
+        "waviness_order": first.order if first else 0,
+        "name": first.name if first else f"{line.order:.5g}x",
+        "repeatable": line.repeatable,
+        "whirl": line.whirl,
+        "forward_um": TO_UM * line.forward,
+        "backward_um": TO_UM * line.backward,
+        "predicted_um": TO_UM * line.predicted,
+        "causes": [
+            {"bearing": c.bearing, "cause": c.cause, "order": c.order, "name": c.name, "amplitude_um": TO_UM * share}
+            for c, share in zip(line.causes, line.shares, strict=True)
+        ],
+    }
+
+
+# ---------------------------------------------------------------- terminal
+
+
+def show_runout(console: Console, answer: dict[str, Any]) -> None:
+    title = f"Runout at {answer['temperature_C']:g} C, {answer['speed_rpm']:g} rpm, {answer['revolutions']} revolutions, um"
+    title += f" (bearings {answer['status']})"
+    table = grid(title, ("", "radial\n(hub x)", "axial"), words=("",))
+    for key, meaning in STATISTICS.items():
+        table.add_row(meaning, *(f"{answer[key][d]:.4f}" for d in MAIN))
+    console.print(table)
+    console.print()
+    if not answer["lines"]:
+        return
+    columns = ("Hz", "orders", "direction", "um", "whirl", "line", "cause", "bearing")
+    rows = []
+    for row in answer["lines"][:SHOWN]:
+        numbers = (f"{row['frequency_Hz']:.2f}", f"{row['order']:.3f}", row["direction"], f"{row['amplitude_um']:.4f}", row["whirl"])
+        bearings = list(dict.fromkeys(c["bearing"] for c in row["causes"] if c["bearing"]))
+        rows.append([*numbers, row["name"], row["cause"], ", ".join(bearings)])
+    show_grid(console, f"Strongest lines of {len(answer['lines'])}", columns, rows, (*columns[4:], "direction"), keys=2)
+
+
+# ---------------------------------------------------------------- files
+
+
+def write_runout(runout: Runout, spindle: Spindle, answer: dict[str, Any], folder: Path, progress: Callable[[str], None]) -> None:
+    """`record.csv`, `repeatable.csv`, `lines.csv`, both figures as SVG and PNG, and the log `runout.rrd` with a waterfall of the `spindle`
+    (as its scene has it, without what its effects change)."""
+    _write_record(runout, folder / "record.csv")
+    _write_repeatable(runout, folder / "repeatable.csv")
+    with (folder / "lines.csv").open("w", newline="", encoding="utf-8") as file:
+        names = [k for k in line_json(runout.lines[0]) if k != "causes"] if runout.lines else ["frequency_Hz"]
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(names)
+        writer.writerows(cells(row[k] for k in names) for row in answer["lines"])
+    progress("tables written")
+    with rc_context(STYLE):
+        for name, figure in (("motion", motion_figure(runout)), ("spectrum", spectrum_figure(runout))):
+            figure.savefig(folder / f"{name}.png", dpi=130, facecolor="white")
+            figure.savefig(folder / f"{name}.svg", dpi=130, facecolor="white", metadata={"Date": None})
+    progress("figures written")
+    condition = runout.point.condition
+    write_runout_log(runout, waterfall(spindle, condition.temperature, run_up(condition.speed)), folder / "runout.rrd")
+    progress("Rerun log written")
+
+
+def _write_record(runout: Runout, path: Path) -> None:
+    """Every sample of the whole revolutions: time, angle, revolution, all probes, and the hub's nonrepeatable parts."""
+    cut, probes = runout.by_lines, runout.signals.probes
+    revolution, place = np.divmod(np.arange(len(cut.time)), len(cut.angle))
+    angle = cut.angle[place] + 2 * np.pi * revolution
+    columns = [cut.time, angle, revolution, *TO_UM * cut.value.reshape(len(probes), -1), *TO_UM * cut.nonrepeatable[:3].reshape(3, -1)]
+    names = ["time_s", "angle_rad", "revolution", *(f"{p.name}_um" for p in probes), *(f"{p.name}_nrro_um" for p in probes[:3])]
+    _table(path, names, columns)
+
+
+def _write_repeatable(runout: Runout, path: Path) -> None:
+    """RRO of every probe over one revolution: by lines, and averaged."""
+    probes = runout.signals.probes
+    columns = [runout.by_lines.angle, *TO_UM * runout.by_lines.repeatable, *TO_UM * runout.averaged.repeatable]
+    names = [f"{p.name}_{how}_um" for how in ("rro", "averaged") for p in probes]
+    _table(path, ["angle_rad", *names], columns)
+
+
+def _table(path: Path, names: list[str], columns: list[Any]) -> None:
+    header = ",".join(name.replace(" ", "_") for name in names)
+    np.savetxt(path, np.array(columns).T, fmt="%.9g", delimiter=",", header=header, comments="")
+
+
+# ---------------------------------------------------------------- report
+
+
+def runout_section(runout: Runout, answer: dict[str, Any]) -> tuple[str, str]:
+    """A section of the report: title and HTML."""
+    rows = "".join(
+        f'<tr><td class="left">{escape(meaning)}</td>' + "".join(f"<td>{1e3 * answer[key][d]:.2f}</td>" for d in MAIN) + "</tr>"
+        for key, meaning in STATISTICS.items()
+    )
+    named = "".join(
+        f"<tr><td>{g['frequency_Hz']:.2f}</td><td>{g['order']:.3f}</td><td class='left'>{g['direction']}</td>"
+        f"<td>{1e3 * g['amplitude_um']:.2f}</td><td class='left'>{escape(g['name'])}</td>"
+        f"<td class='left'>{escape(' '.join(w for w in (g['bearing'], g['cause']) if w))}</td></tr>"
+        for g in answer["lines"][:SHOWN]
+    )
+    text = (
+        f"<p>{answer['revolutions']} revolutions at {answer['temperature_C']:g} °C and {answer['speed_rpm']:.6g} rpm, bearings {answer['status']}, "
+        f"imperfections {answer['imperfections']}. The repeatable part is made of the lines at whole multiples of the turning frequency.</p>"
+        '<div class="scroll"><table><thead><tr><th class="left">nm</th><th>radial (hub x)</th><th>axial</th></tr></thead>'
+        f"<tbody>{rows}</tbody></table></div>"
+        f"{_figure(motion_figure(runout), 'motion', 'Orbit of the hub, and its error motion over the angle of the turning part.')}"
+        f"{_figure(spectrum_figure(runout), 'spectrum', 'Amplitude over frequency; a mark is a line fitted at its known frequency.')}"
+        '<div class="scroll"><table><thead><tr><th>Hz</th><th>orders</th><th class="left">direction</th><th>nm</th>'
+        f'<th class="left">line</th><th class="left">cause</th></tr></thead><tbody>{named}</tbody></table></div>'
+    )
+    return "Runout", text
+
+
+def _figure(figure: Figure, key: str, caption: str) -> str:
+    with rc_context(STYLE):
+        picture = svg(figure, f"runout-{key}", caption)
+    return f'<figure class="chart wide">{picture}<figcaption>{caption}</figcaption></figure>'

@@ -1,0 +1,161 @@
+"""The diagnosis of runout told: as JSON with the keys of `diagnosis.verdict`, and in the terminal."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from thermospindle.diagnosis.runout.sources import SourceKey
+from thermospindle.diagnosis.runout.verdict import Explanation, RunoutDiagnosis
+from thermospindle.diagnosis.search.screening import CLEAR
+from thermospindle.model.units import RPM, TO_UM
+from thermospindle.sim.effects.effect import Effect
+
+SHOWN = 12  # candidates
+LARGE = 3.0  # likely sizes from which what a source has is told
+UNITS = {"unbalance": ("g mm", 1e6), "cage unbalance": ("g mm", 1e6)}
+"""Unit of a source and its size in SI's; nm for all others."""
+
+
+def runout_diagnosis_json(d: RunoutDiagnosis, catalogue: tuple[Effect, ...]) -> dict[str, Any]:
+    best = d.explanations[0] if d.explanations else None
+    accepted = next((e for e in d.explanations if e.effects == d.effects), best) if d.verdict not in ("none", "unexplained") else None
+    before = float(np.sqrt(d.chi2 / d.count))
+    told = {e.name: e for e in catalogue}
+    unseen = [n for n, e in told.items() if n not in d.smallest or d.smallest[n] > max(abs(v) for v in e.parameters[0].limits)]
+    return {
+        "verdict": d.verdict,
+        "effects": list(d.effects),
+        "reason": d.reason,
+        "would_change": would_change(d),
+        "candidates": [_candidate(e) for e in d.explanations[:SHOWN]],
+        "invisible": sorted(unseen),
+        "detectable": {name: size for name, size in d.smallest.items() if np.isfinite(size)},
+        "error": {
+            "before": before,
+            "after": float(np.sqrt(accepted.chi2 / d.count)) if accepted else before,
+            "held_out_before": _number(d.held_out_before),
+            "held_out_after": _number(d.held_out_after if accepted else d.held_out_before),
+        },
+        "where": where(d),
+        "next_test": [],
+        "unexplained_lines": [
+            {"test": g.test, "frequency_Hz": g.frequency, "order": g.order, "amplitude_um": TO_UM * g.amplitude, "node": g.node}
+            for g in d.strange
+        ],
+        "tests": [
+            {
+                "id": s.test.id,
+                "temperature_C": s.condition.temperature,
+                "speed_rpm": s.condition.speed / RPM,
+                "lines": len(s.seen),
+                "slip": s.slip,
+            }
+            for s in d.seen
+        ],
+    }
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _candidate(e: Explanation) -> dict[str, Any]:
+    parameters = {}
+    for v, size, sd in zip(e.variants, e.size, e.size_sd, strict=True):
+        main, *others = v.effect.parameters
+        parameters[f"{v.effect.name}.{main.name}"] = {"value": float(size), "sd": float(sd), "unit": main.unit}
+        for p in others:
+            # choices were compared; what runout from an unknown start cannot tell keeps its typical value and its prior
+            parameters[f"{v.effect.name}.{p.name}"] = {"value": v.values[p.name], "sd": 0.0 if p.choices else p.prior_sd, "unit": p.unit}
+    return {
+        "effects": list(e.effects),
+        "delta_evidence": e.delta_evidence,
+        "probability": e.probability,
+        "held_out_error_ratio": _number(e.held_out_ratio),
+        "parameters": parameters,
+        "believable": e.believable,
+    }
+
+
+def source_words(source: SourceKey) -> tuple[str, str]:
+    """Where a source is, and the line it shows."""
+    (bearing, cause, order, name, direction), _ = source
+    place = f"{bearing} bearing, {cause}" if bearing else "turning part, unbalance"
+    return place + (f" of order {order}" if order else ""), f"{name}, {direction}"
+
+
+def where(d: RunoutDiagnosis) -> list[dict[str, Any]]:
+    """Sources that have far more than the scene tells, without any effect: which, how large against its likely size, in which line."""
+    found: dict[tuple[str, str], dict[str, Any]] = {}
+    for family, fit in zip(d.families, d.base, strict=True):
+        for (source, test), likely, z in zip(family.source, family.likely, np.abs(fit.amplitude), strict=True):
+            if z > LARGE:
+                place, line = source_words(source)
+                unit, factor = UNITS.get(source[0][1], ("nm", 1e9))
+                told = found.setdefault((place, line), {"element": place, "change": [], "with": line, "relative": 0.0})
+                at = {} if test is None else {"test": d.seen[test].test.id}
+                told["change"].append({**at, "amplitude": float(factor * likely * z), "likely": float(factor * likely), "unit": unit})
+                told["relative"] = max(told["relative"], float(z))
+    return sorted(found.values(), key=lambda w: -w["relative"])[:SHOWN]
+
+
+def would_change(d: RunoutDiagnosis) -> str:
+    """What would make this verdict another one, in a sentence."""
+    if d.verdict == "none":
+        return "An imperfection larger than these records could have hidden would change that; how large that is, is listed for each."
+    if d.strange:
+        return "An excitation that turns or sounds at these frequencies and is none of a bearing's or of an unbalance's would explain them; the catalogue has none."
+    if d.verdict == "unexplained":
+        return "Longer records, or probes in another plane, would tell which lines are not as computed."
+    speeds = {round(s.condition.speed / RPM) for s in d.seen}
+    one = (
+        " With one speed alone, what grows with speed cannot be told from what does not: a test at another speed would."
+        if len(speeds) == 1
+        else ""
+    )
+    rivals = [e for e in d.explanations if set(e.effects) - set(d.effects) and len(e.effects) <= len(d.effects)]
+    rival = (
+        f"{' + '.join(rivals[0].effects)}, {rivals[0].delta_evidence - d.explanations[0].delta_evidence:.0f} in ln evidence"
+        if rivals
+        else "none"
+    )
+    return f"Records that the next best explanation ({rival}) foretells better would change that.{one}"
+
+
+def show_runout_diagnosis(console: Console, answer: dict[str, Any]) -> None:
+    named = f": {', '.join(answer['effects'])}" if answer["effects"] else ""
+    console.print(f"[bold]runout: {answer['verdict']}{named}[/bold]")
+    console.print(answer["reason"], highlight=False)
+    console.print(answer["would_change"], highlight=False)
+    error = answer["error"]
+    console.print(f"rms pull {error['before']:.2f} -> {error['after']:.2f}", highlight=False)
+    if answer["verdict"] not in ("none",):
+        console.print("\nBest explanations (ln evidence over the scene's own imperfections):")
+        for c in answer["candidates"][:5]:
+            values = ", ".join(
+                f"{k.split('.')[1]} {v['value']:.4g}"
+                + (f" +- {v['sd']:.2g}" if v["sd"] else "")
+                + (f" {v['unit']}" if v["unit"] != "1" else "")
+                for k, v in c["parameters"].items()
+            )
+            console.print(
+                f"  {' + '.join(c['effects'])}: {c['delta_evidence']:+.1f}, probability {c['probability']:.3f}; {values}", highlight=False
+            )
+        if answer["where"]:
+            console.print("\nWithout any catalogue, larger than the scene tells:")
+            for w in answer["where"][:5]:
+                c = w["change"][0]
+                console.print(
+                    f"  {w['element']} ({w['with']}): {c['amplitude']:.3g} {c['unit']}, {w['relative']:.1f} times its likely size",
+                    highlight=False,
+                )
+    for g in answer["unexplained_lines"]:
+        console.print(
+            f"  {g['test']}: {g['frequency_Hz']:.1f} Hz, {g['order']:.3f} orders, {g['amplitude_um']:.3g} um at node {g['node']}",
+            highlight=False,
+        )
+    small = ", ".join(f"{k} {v:.2g}" for k, v in sorted(answer["detectable"].items()))
+    console.print(f"\nSmallest size these records would have shown ({CLEAR:g} in ln evidence): {small}", highlight=False)

@@ -1,0 +1,179 @@
+"""What `spindle warmup` says: JSON, terminal table, CSV, figures, and a section of the report."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from thermospindle.model.cells import cells
+from thermospindle.model.types import Array
+from thermospindle.model.units import MINUTE, RPM
+from thermospindle.report.figures.warmup import figure_png, figure_svg
+from thermospindle.report.text.grid import show_grid
+from thermospindle.report.typeset import minus
+from thermospindle.sim.operating import provenance
+from thermospindle.sim.warmup import Moment, Warmup, energy
+
+LINES = 16  # of the terminal table
+
+
+def warmup_json(warmup: Warmup) -> dict[str, Any]:
+    """Series over `time_s`; a row of `frequencies_Hz` holds all followed modes at one time, null where one was lost.
+
+    `preload_N` is the first bearing's, `friction_W` all bearings' together; `bearings` has each its own.
+    """
+    moments = warmup.moments
+    first = warmup.spindle.bearings[0].name
+    return {
+        "start_C": warmup.start,
+        "air_C": warmup.air,
+        "speed_rpm": warmup.speed / RPM,
+        "time_s": warmup.times.tolist(),
+        "temperature_C": {g: [m.temperatures[g] for m in moments] for g in moments[0].temperatures},
+        "preload_N": [m.preload[first] for m in moments],
+        "friction_W": [sum(m.friction.values()) for m in moments],
+        "frequencies_Hz": _numbers(warmup.frequencies),
+        "modes": [{"kind": m.kind, "whirl": m.whirl} for m in warmup.modes],
+        "bearings": {
+            b.name: {
+                "temperature_C": [m.bearing_temperatures[b.name] for m in moments],
+                "preload_N": [m.preload[b.name] for m in moments],
+                "contact_angle_deg": [float(np.degrees(m.point.state.bearing(b.name).contact_angle)) for m in moments],
+                "friction_W": [m.friction[b.name] for m in moments],
+            }
+            for b in warmup.spindle.bearings
+        },
+        "status": moments[-1].point.state.status,
+        "steady": _steady_json(warmup, first),
+        "time_constant_s": warmup.time_constant,
+        "energy_J": energy(warmup),
+        "left_out_effects": list(warmup.left_out),
+        "provenance": provenance(warmup.spindle),
+    }
+
+
+def _steady_json(warmup: Warmup, first: str) -> dict[str, Any]:
+    steady = warmup.steady
+    return {
+        "temperature_C": dict(steady.temperatures),
+        "bearing_temperature_C": dict(steady.bearing_temperatures),
+        "preload_N": steady.preload[first],
+        "friction_W": sum(steady.friction.values()),
+        "frequencies_Hz": _numbers(warmup.steady_frequencies),
+        "status": steady.point.state.status,
+    }
+
+
+def _numbers(values: Array) -> list[Any]:
+    """Nested lists with None where a value is not a number."""
+    return [_numbers(v) if isinstance(v, np.ndarray) else (float(v) if np.isfinite(v) else None) for v in values]
+
+
+def rows(warmup: Warmup) -> tuple[list[str], list[list[float]]]:
+    """Header with units and one row a time, for the CSV."""
+    bearings = [b.name for b in warmup.spindle.bearings]
+    regions = list(warmup.moments[0].temperatures)
+    header = ["time_s", *(f"temperature of {g}_C" for g in regions)]
+    for name, unit in (("temperature", "C"), ("preload", "N"), ("contact angle", "deg"), ("friction", "W")):
+        header += [f"{name} of {b} bearing_{unit}" for b in bearings]
+    header += [f"mode {k} {m.kind}_Hz" for k, m in enumerate(warmup.modes, 1)]
+    body = []
+    for time, moment, frequency in zip(warmup.times, warmup.moments, warmup.frequencies, strict=True):
+        row = [float(time), *(moment.temperatures[g] for g in regions)]
+        row += [moment.bearing_temperatures[b] for b in bearings] + [moment.preload[b] for b in bearings]
+        row += [float(np.degrees(moment.point.state.bearing(b).contact_angle)) for b in bearings]
+        body.append(row + [moment.friction[b] for b in bearings] + frequency.tolist())
+    return header, body
+
+
+def write_warmup(warmup: Warmup, folder: Path) -> None:
+    """`warmup.csv` (a comment line of provenance, a header with units, all steps) and `warmup.png`."""
+    header, body = rows(warmup)
+    with (folder / "warmup.csv").open("w", newline="", encoding="utf-8") as file:
+        file.write("# " + ", ".join(f"{k} {v}" for k, v in provenance(warmup.spindle).items()) + "\n")
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(cells(header))
+        writer.writerows([repr(v) for v in row] for row in body)
+    figure_png(warmup, folder / "warmup.png")
+
+
+def show_warmup(console: Console, warmup: Warmup) -> None:
+    soak = "" if warmup.air == warmup.start else f" in air of {warmup.air:g} C"
+    title = f"Warm-up of {warmup.spindle.name} from {warmup.start:g} C{soak} at {warmup.speed / RPM:g} rpm"
+    lost = lost_contact(warmup)
+    if lost:
+        console.print(f"{lost[0].upper()}{lost[1:]}.\n", highlight=False)
+    bearings = [b.name for b in warmup.spindle.bearings]
+    columns = ["time\nmin", *(f"{b}\nC" for b in bearings), "coolest\nC", "hottest\nC", "preload\nN", "friction\nmW"]
+    columns += [f"f{k}\nHz" for k in range(1, len(warmup.modes) + 1)]
+    rows = [
+        [f"{warmup.times[k] / MINUTE:.2f}", *_cells(warmup.moments[k], bearings, warmup.frequencies[k])] for k in _shown(warmup.times)
+    ]
+    show_grid(console, title, columns, [*rows, ["steady", *_cells(warmup.steady, bearings, warmup.steady_frequencies)]])
+    kinds = ", ".join(f"f{k} {m.kind}" for k, m in enumerate(warmup.modes, 1))
+    console.print(f"Bearings, coolest and hottest region; {kinds}.")
+    total = energy(warmup)
+    console.print(
+        f"Slowest time constant {warmup.time_constant:.0f} s. Heat of the whole time: motor {total['motor']:.1f} J and bearings "
+        f"{total['friction']:.1f} J in, convection {total['convection']:.1f} J out, {total['stored']:.1f} J stored."
+    )
+    if warmup.left_out:
+        console.print(f"Left out, since region temperatures are computed here: {', '.join(warmup.left_out)}.")
+
+
+def lost_contact(warmup: Warmup) -> str:
+    """From when on which bearings are without contact, and so without preload and stiffness; empty where none ever is."""
+    lost = [(t, m) for t, m in zip(warmup.times, warmup.moments, strict=True) if not _all_loaded(m)]
+    if lost:
+        time, moment = lost[0]
+        return f"from {time / MINUTE:.3g} min on the {moment.point.state.status}: they carry no preload then, and frequencies are of a loose spindle"
+    if not _all_loaded(warmup.steady):
+        return f"in the steady state, after the times computed, the {warmup.steady.point.state.status}"
+    return ""
+
+
+def _all_loaded(moment: Moment) -> bool:
+    return all(b.in_contact for b in moment.point.state.bearings)
+
+
+def _cells(moment: Moment, bearings: Sequence[str], frequency: Array) -> list[str]:
+    regions = moment.temperatures.values()
+    temperatures = [*(moment.bearing_temperatures[b] for b in bearings), min(regions), max(regions)]
+    return [
+        *(f"{t:.2f}" for t in temperatures),
+        f"{moment.preload[bearings[0]]:.3f}",
+        f"{1e3 * sum(moment.friction.values()):.0f}",
+        *("-" if np.isnan(f) else f"{f:.1f}" for f in frequency),
+    ]
+
+
+def _shown(times: Array) -> list[int]:
+    """Some of the times: the first, the last, and about evenly in the square root between."""
+    wanted = times[-1] * np.linspace(0, 1, LINES) ** 2
+    return sorted({int(np.argmin(np.abs(times - t))) for t in wanted})
+
+
+def warmup_section(warmup: Warmup) -> tuple[str, str]:
+    """Title and HTML of a report section."""
+    last, total = warmup.steady, energy(warmup)
+    bearings = ", ".join(f"{b} {t:.1f}" for b, t in last.bearing_temperatures.items())
+    first = warmup.spindle.bearings[0].name
+    shifts = ", ".join(
+        f"mode {k} ({escape(m.kind)}) {b - a:+.1f}"
+        for k, (m, a, b) in enumerate(zip(warmup.modes, warmup.frequencies[0], warmup.steady_frequencies, strict=True), 1)
+    )
+    about = (
+        f"<p>From {warmup.start:g} °C in air of {warmup.air:g} °C at {warmup.speed / RPM:.0f} rpm. The slowest time constant is "
+        f"{warmup.time_constant:.0f} s. In the steady state the bearings are at {escape(bearings)} °C, the preload is "
+        f"{last.preload[first]:.2f} N (at the start {warmup.moments[0].preload[first]:.2f} N) and bearing friction "
+        f"{1e3 * sum(last.friction.values()):.0f} mW; natural frequencies move by {shifts} Hz.</p>"
+        f"<p>Heat: motor {total['motor']:.1f} J, bearings {total['friction']:.1f} J in; convection {total['convection']:.1f} J out; "
+        f"stored {total['stored']:.1f} J.</p>"
+    )
+    return "Warm-up", f'{minus(about)}<figure class="chart wide">{figure_svg(warmup)}</figure>'

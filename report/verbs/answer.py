@@ -1,0 +1,91 @@
+"""What all verbs share: the answer, the scene with its effects, a progress bar, the output folder."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from thermospindle.model.errors import BadInput
+from thermospindle.model.machine import Spindle
+from thermospindle.model.scene.reading import load
+from thermospindle.report.folder import mark, whole_folder
+from thermospindle.sim.effects.effect import Effect
+from thermospindle.sim.effects.rules import equipped
+
+STEPS = 5  # of temperature over a scene's range, unless a verb is told others
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a verb found: `values` for a script, with a list `warnings` of sentences, and `show`, which prints the same for a person."""
+
+    values: dict[str, Any]
+    show: Callable[[Console], None]
+
+
+def answered(
+    values: Mapping[str, Any],
+    show: Callable[[Console], None],
+    out: Path | None,
+    asked: Mapping[str, Any],
+    write: Callable[[Path, dict[str, Any]], None] = lambda folder, values: None,
+    warnings: Sequence[str] = (),
+) -> Answer:
+    """The answer with its warnings; where `out` is given, the folder that `write` fills, marked with what was `asked`."""
+    told = {**values, "warnings": list(dict.fromkeys(warnings))}
+    if out is not None:
+        with whole_folder(Path(out)) as folder:
+            write(folder, told)
+            mark(folder, asked, told)
+    return Answer(told, show)
+
+
+def with_effects(scene: Path, effect_files: Sequence[Path]) -> tuple[Spindle, tuple[Effect, ...]]:
+    """The spindle of a scene with its effects found, a user's own among them; and every effect there is."""
+    return equipped(load(scene), effect_files)
+
+
+def temperatures_or_range(temperatures: Sequence[float] | None, spindle: Spindle, steps: int = STEPS) -> list[float]:
+    """The temperatures (C) asked for; where none are, so many over the range of the scene."""
+    return np.linspace(*spindle.temperatures, steps).tolist() if temperatures is None else list(temperatures)
+
+
+def temperature_or_reference(temperature: float | None, spindle: Spindle) -> float:
+    """The temperature (C) asked for, or the reference temperature of the scene."""
+    return spindle.reference_temperature if temperature is None else temperature
+
+
+def with_hammer(spindle: Spindle, hits: int | None, level: float | None) -> Spindle:
+    """The spindle with another number of hits and another peak force (N) of its hammer test, where given."""
+    if level is not None and level <= 0:
+        raise BadInput(f"--level {level:g}: the hammer's peak force must be positive")
+    changes = {key: value for key, value in (("hits", hits), ("level", level)) if value is not None}
+    return replace(spindle, hammer=replace(spindle.hammer, **changes))  # type: ignore[arg-type]
+
+
+@contextmanager
+def progress_bar(steps: int) -> Iterator[Callable[[str], None]]:
+    """A function that takes what has been done, and moves a bar of so many steps on standard error."""
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn())
+    console = Console(stderr=True, markup=False)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("starting", total=steps)
+        yield lambda done: bar.update(task, advance=1, description=done)
+
+
+def write_json(name: str, more: Callable[[Path], None] = lambda folder: None) -> Callable[[Path, dict[str, Any]], None]:
+    """What fills an output folder with the answer as the file `name`, and with what `more` writes."""
+
+    def write(folder: Path, values: dict[str, Any]) -> None:
+        (folder / name).write_text(json.dumps(values, indent=1), encoding="utf-8")
+        more(folder)
+
+    return write

@@ -1,0 +1,87 @@
+"""The verb `compare`: a campaign beside a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from thermospindle.diagnosis.compare.before_after import BeforeAfter, held_out, show_before_after
+from thermospindle.diagnosis.compare.compare import compare as beside
+from thermospindle.diagnosis.data.observe import observe
+from thermospindle.diagnosis.runout.compare import (
+    compare_runout,
+    errors_of,
+    runout_comparison_json,
+    show_errors,
+    show_runout_comparison,
+)
+from thermospindle.diagnosis.runout.lines import modal_tests
+from thermospindle.model.machine import Spindle
+from thermospindle.report.page.compare import write_comparison
+from thermospindle.report.text.compare import comparison_json, show_comparison
+from thermospindle.report.verbs.answer import Answer, answered, progress_bar, with_effects, write_json
+from thermospindle.sim.campaign.campaign import Campaign, read_campaign
+
+
+def compare(
+    scene: Path,
+    campaign: Path,
+    before: Path | None = None,
+    held_out_tests: Sequence[str] = (),
+    effect_files: Sequence[Path] = (),
+    out: Path | None = None,
+) -> Answer:
+    """Modes, dampings, shapes and FRFs of a campaign beside the scene; with `before`, another scene, whether the error fell."""
+    asked = dict(locals()) | {"verb": "compare"}
+    spindle, whole = with_effects(scene, effect_files)[0], read_campaign(campaign)
+    earlier = with_effects(before, effect_files)[0] if before else None
+    unseen = held_out(spindle, whole, held_out_tests)
+    turning = _of_runout(spindle, earlier, whole, unseen)
+    tests = modal_tests(whole)
+    if turning and not tests.tests:
+        values = {"spindle": spindle.name, "campaign": whole.title, **turning[0]}
+        return answered(values, turning[1], out, asked, write_json("comparison.json"))
+    with progress_bar((3 if earlier else 2) * len(tests.tests)) as progress:
+        observed = observe(tests, spindle, progress)
+        comparison = beside(spindle, tests, observed, progress)
+        both = BeforeAfter(beside(earlier, tests, observed, progress) if earlier else comparison, comparison, unseen)
+    values = comparison_json(comparison)
+    if earlier:
+        values |= {"error": both.errors(), "held_out": list(unseen)}
+    if turning:
+        values |= {"runout": turning[0]}
+
+    def show(console: Console) -> None:
+        show_comparison(console, comparison)
+        if earlier:
+            show_before_after(console, both)
+        if turning:
+            turning[1](console)
+
+    write = write_json("comparison.json", lambda folder: write_comparison(comparison, spindle, folder))
+    return answered(values, show, out, asked, write)
+
+
+def _of_runout(
+    spindle: Spindle, before: Spindle | None, campaign: Campaign, unseen: Sequence[str]
+) -> tuple[dict[str, Any], Callable[[Console], None]] | None:
+    """The runout tests of a campaign beside the scene, None where it has none; with `before` the errors of both scenes."""
+    if not any(test.runout for test in campaign.tests):
+        return None
+    with progress_bar(len(campaign.tests) * (2 if before else 1)) as progress:
+        found = compare_runout(spindle, campaign, progress)
+        earlier = compare_runout(before, campaign, progress) if before else None
+    values = runout_comparison_json(found)
+    errors = errors_of(earlier, found, unseen) if earlier else None
+    if errors:
+        values |= {"error": errors, "held_out": list(unseen)}
+
+    def show(console: Console) -> None:
+        show_runout_comparison(console, found)
+        if errors:
+            show_errors(console, errors)
+
+    return values, show

@@ -1,0 +1,102 @@
+"""The verbs `diagnose` and `draft`: which physics a scene lacks, and an effect of one's own from what drifts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from thermospindle.diagnosis import verdict
+from thermospindle.diagnosis.compare.before_after import without
+from thermospindle.diagnosis.data.observe import observe
+from thermospindle.diagnosis.draft import draft as drafted
+from thermospindle.diagnosis.runout.lines import modal_tests
+from thermospindle.diagnosis.runout.verdict import diagnose_runout
+from thermospindle.diagnosis.search.predicted import outcomes
+from thermospindle.model.errors import BadInput
+from thermospindle.model.machine import Spindle
+from thermospindle.model.scene.reading import content_hash
+from thermospindle.model.whole import whole
+from thermospindle.report.page.diagnosis import write_diagnosis
+from thermospindle.report.text.diagnosis import diagnosis_json, show_diagnosis
+from thermospindle.report.text.runout_diagnosis import runout_diagnosis_json, show_runout_diagnosis
+from thermospindle.report.verbs.answer import Answer, answered, progress_bar, with_effects, write_json
+from thermospindle.sim.campaign.campaign import Campaign, read_campaign
+from thermospindle.sim.effects.effect import Effect
+from thermospindle.sim.effects.own import effect_of
+
+
+def diagnose(
+    scene: Path,
+    campaign: Path,
+    held_out_tests: Sequence[str] = (),
+    predictions: Path | None = None,
+    effect_files: Sequence[Path] = (),
+    out: Path | None = None,
+) -> Answer:
+    """Which physics the scene lacks to explain a campaign; `predictions` is an earlier diagnosis: did what it predicted come true?"""
+    asked = dict(locals()) | {"verb": "diagnose"}
+    (spindle, catalogue), whole = with_effects(scene, effect_files), without(read_campaign(campaign), held_out_tests)
+    turning = _of_runout(spindle, catalogue, whole)
+    tests = modal_tests(whole)
+    where = {"campaign": tests.title, "scene_hash": content_hash(spindle)}
+    if turning and not tests.tests:
+        return answered(turning[0] | where, turning[1], out, asked, write_json("diagnosis.json"))
+    with progress_bar(len(tests.tests) + verdict.STEPS) as progress:
+        found = verdict.diagnose(spindle, tests, catalogue, progress)
+    values = diagnosis_json(found) | where
+    if predictions:
+        values |= {"predictions": [asdict(o) for o in outcomes(predictions, observe(tests, spindle))]}
+    if turning:
+        values |= {"runout": turning[0]}
+
+    def show(console: Console) -> None:
+        show_diagnosis(console, values)
+        if turning:
+            turning[1](console)
+
+    def write(folder: Path, told: dict[str, Any]) -> None:
+        write_json("diagnosis.json")(folder, told)
+        write_diagnosis(found, told, folder)
+
+    return answered(values, show, out, asked, write)
+
+
+def draft(diagnosis: Path, name: str | None = None, element: str | None = None, out: Path | None = None) -> Answer:
+    """An effect file from what a diagnosis found to drift, the simplest law that fits it; `out` is the file to write."""
+    if out is None:
+        raise BadInput("--out: draft needs the effect file to write, as in --out my_effect.py")
+    out = Path(out)
+    if out.suffix != ".py":
+        raise BadInput(f"--out {out}: is no Python file; an effect file ends in .py")
+    if out.exists():
+        raise BadInput(f"--out {out}: is there already; a draft overwrites nothing")
+    called = name or out.stem
+    if not called.isidentifier():
+        raise BadInput(f"--name {called}: is no name of an effect; letters, digits and underscores are allowed")
+    text = drafted(Path(diagnosis), called, element)
+    with whole(out) as file:
+        file.write_text(text, encoding="utf-8")
+    effect = effect_of(out)
+    values = {"effect": called, "file": str(out), "equation": effect.equation, "parameters": effect.typical(), "warnings": []}
+
+    def show(console: Console) -> None:
+        console.print(f"{out}: {effect.title}; {effect.equation}")
+        console.print(f"Read it, edit it, then: spindle add SCENE {called} --effect {out} --out NEW_SCENE")
+
+    return Answer(values, show)
+
+
+def _of_runout(
+    spindle: Spindle, catalogue: tuple[Effect, ...], campaign: Campaign
+) -> tuple[dict[str, Any], Callable[[Console], None]] | None:
+    """The diagnosis of the runout tests of a campaign; None where it has none."""
+    tests = sum(test.runout is not None for test in campaign.tests)
+    if not tests:
+        return None
+    with progress_bar(tests + 2) as progress:
+        values = runout_diagnosis_json(diagnose_runout(spindle, campaign, catalogue, progress), catalogue)
+    return values, lambda console: show_runout_diagnosis(console, values)

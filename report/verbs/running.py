@@ -1,0 +1,139 @@
+"""The verbs `runout`, `warmup` and `map`: the turning spindle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from thermospindle.model import sense
+from thermospindle.model.drawn import drawn
+from thermospindle.model.errors import BadInput
+from thermospindle.model.machine import Condition
+from thermospindle.model.units import MINUTE, RPM
+from thermospindle.report.log.map import write_map_log
+from thermospindle.report.text.resonance import map_json, show_map, write_map
+from thermospindle.report.text.runout import runout_json, show_runout, write_runout
+from thermospindle.report.text.warmup import lost_contact, show_warmup, warmup_json, write_warmup
+from thermospindle.report.verbs.answer import (
+    Answer,
+    answered,
+    progress_bar,
+    temperature_or_reference,
+    temperatures_or_range,
+    with_effects,
+)
+from thermospindle.sim.operating import operating_point
+from thermospindle.sim.resonance.map import ResonanceMap, resonance_map
+from thermospindle.sim.running.runout import runout as simulated_runout
+from thermospindle.sim.running.runout import with_imperfections
+from thermospindle.sim.warmup import warm_up
+
+STEPS_OF_TEMPERATURE, STEPS_OF_SPEED = 21, 41  # of a resonance map
+
+
+def runout(
+    scene: Path,
+    speed_rpm: float,
+    temperature: float | None = None,
+    seconds: float | None = None,
+    seed: int | None = None,
+    element: str = "linear",
+    path: str = "simulated",
+    effect_files: Sequence[Path] = (),
+    out: Path | None = None,
+) -> Answer:
+    """Repeatable and nonrepeatable runout of the turning spindle and its lines; `seed` draws imperfections instead of the scene's.
+
+    A folder holds tables, figures and a Rerun log with a waterfall.
+    """
+    asked = dict(locals()) | {"verb": "runout"}
+    spindle, _ = with_effects(scene, effect_files)
+    if seed is not None:
+        spindle = with_imperfections(spindle, drawn(spindle, seed))
+    with progress_bar(5) as progress:
+        point = operating_point(spindle, Condition(temperature_or_reference(temperature, spindle), speed_rpm * RPM))
+        found = simulated_runout(point, seconds, element, path)
+        progress("record analysed")
+        values = runout_json(found, path, element, seed)
+        doubts = sense.of_conditions(spindle, [point.condition]) + sense.of_states(spindle, [point.state.bearings])
+        if not found.lines:
+            doubts.append(
+                "the scene names no imperfections, so nothing moves; --seed 1 draws plausible ones, and the table [imperfections] of the "
+                "scene holds its own"
+            )
+
+        def write(folder: Path, told: dict[str, Any]) -> None:
+            write_runout(found, spindle, told, folder, progress)
+
+        return answered(values, lambda console: show_runout(console, values), out, asked, write, doubts)
+
+
+def warmup(
+    scene: Path,
+    temperature: float | None = None,
+    speed_rpm: float | None = None,
+    minutes: float | None = None,
+    soak: float | None = None,
+    effect_files: Sequence[Path] = (),
+    out: Path | None = None,
+) -> Answer:
+    """From a uniform `temperature` (C) at a speed, the scene's nominal one or 0 for a `soak` in air of another temperature; a folder holds CSV and figure."""
+    asked = dict(locals()) | {"verb": "warmup"}
+    if minutes is not None and minutes <= 0:
+        raise BadInput(f"--minutes {minutes:g}: a warm-up lasts longer than nothing; name a positive number")
+    spindle, _ = with_effects(scene, effect_files)
+    speed = (0.0 if soak is not None else spindle.nominal_speed) if speed_rpm is None else speed_rpm * RPM
+    duration = None if minutes is None else MINUTE * minutes
+    with progress_bar(3) as progress:
+        found = warm_up(spindle, speed, temperature_or_reference(temperature, spindle), soak, duration, progress=progress)
+    points = [m.point for m in (*found.moments, found.steady)]
+    lost = lost_contact(found)
+    doubts = sense.of_conditions(spindle, [p.condition for p in points]) + sense.of_states(spindle, [p.state.bearings for p in points])
+    return answered(
+        warmup_json(found),
+        lambda console: show_warmup(console, found),
+        out,
+        asked,
+        lambda folder, _: write_warmup(found, folder),
+        [*([lost] if lost else []), *doubts],
+    )
+
+
+def resonances(
+    scene: Path,
+    temperature: float | None = None,
+    speed_rpm: float | None = None,
+    temperatures: Sequence[float] | None = None,
+    speeds_rpm: Sequence[float] | None = None,
+    multiples: int = 3,
+    effect_files: Sequence[Path] = (),
+    out: Path | None = None,
+) -> Answer:
+    """The verb `map`: natural frequencies against every bearing and unbalance line; a folder holds tables, figures and a Rerun log."""
+    asked = dict(locals()) | {"verb": "map"}
+    if speed_rpm is not None and speed_rpm <= 0:
+        raise BadInput(f"--speed {speed_rpm:g}: the nominal speed of a map must be positive")
+    spindle, _ = with_effects(scene, effect_files)
+    speed = spindle.nominal_speed if speed_rpm is None else speed_rpm * RPM
+    nominal = Condition(temperature_or_reference(temperature, spindle), speed)
+    grid = temperatures_or_range(temperatures, spindle, STEPS_OF_TEMPERATURE)
+    speeds = [s * RPM for s in speeds_rpm] if speeds_rpm else np.linspace(0, 2 * speed, STEPS_OF_SPEED).tolist()
+    with progress_bar(3) as progress:
+        found = resonance_map(spindle, grid, speeds, nominal, multiples, progress=progress)
+    conditions = [nominal, *(Condition(t, s) for t in grid for s in speeds)]
+    return answered(
+        map_json(found),
+        lambda console: show_map(console, found),
+        out,
+        asked,
+        lambda folder, _: _write_map(found, folder),
+        sense.of_conditions(spindle, conditions),
+    )
+
+
+def _write_map(found: ResonanceMap, folder: Path) -> None:
+    write_map(found, folder)
+    write_map_log(found, folder / "map.rrd")

@@ -1,0 +1,247 @@
+"""Campaigns of tests, measured or virtual: a folder with `campaign.toml` and, a test, a UFF file of FRFs, rows of modes, or runout.
+
+`read_campaign` refuses what cannot be used, `write_campaign` writes a folder whole or not at all, in the same form. Units are in
+the keys of the file and SI in the dataclasses; temperatures are C, angular speeds rad/s, natural frequencies Hz.
+"""
+
+from __future__ import annotations
+
+import csv
+import tomllib
+from collections.abc import Mapping
+from dataclasses import asdict, astuple, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from thermospindle.model.cells import cells, name_of
+from thermospindle.model.errors import BadInput
+from thermospindle.model.machine import Point
+from thermospindle.model.scene.fields import first_error, read_toml
+from thermospindle.model.units import MINUTE, MM, RPM
+from thermospindle.model.whole import whole
+from thermospindle.sim.campaign.form import MODE_COLUMNS, ModeTable, checked, in_unit, toml
+from thermospindle.sim.campaign.runout_record import RunoutRecord, read_runout, same, write_runout
+from thermospindle.sim.campaign.uff import LARGEST, axis_number, read_frf, write_frf
+from thermospindle.sim.identification.frf import LIMITS, Frf, Limits, check_frf
+
+
+@dataclass(frozen=True)
+class ModeRow:
+    """One identified mode of one test; None where the table is empty."""
+
+    test: str
+    mode: int
+    kind: str
+    frequency: float  # Hz
+    frequency_sd: float  # Hz, one standard deviation
+    damping_ratio: float | None = None
+    damping_ratio_sd: float | None = None
+
+
+@dataclass(frozen=True)
+class Noise:
+    """What the makers of a campaign state: standard deviation of an FRF line, relative to its value and to the largest value
+    of its reference."""
+
+    of_value: float
+    of_largest: float
+
+
+@dataclass(frozen=True)
+class Test:
+    """One test in one operating condition: of modes, of runout, or both."""
+
+    __test__ = False  # not one of pytest's
+
+    id: str
+    temperature: float  # C
+    speed: float  # rad/s, positive about +z
+    level: float | None = None  # N, peak force of the hammer
+    soak_time: float | None = None  # s
+    repeat: int = 1  # which repetition of the same condition
+    conditions: Mapping[str, Any] = field(default_factory=dict)  # anything else that was noted, as in the file
+    frf: Frf | None = None
+    modes: tuple[ModeRow, ...] = ()
+    window_decay: float = 0.0  # 1/s, damping that an exponential window exp(-decay t) has left in the FRFs
+    runout: RunoutRecord | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True)
+class Campaign:
+    title: str
+    spindle: str  # name of the scene
+    quantity: str  # receptance, mobility or accelerance; displacement where there is runout alone
+    points: tuple[Point, ...]
+    tests: tuple[Test, ...]
+    noise: Noise | None = None
+    note: str = ""
+    folder: Path | None = field(default=None, compare=False)
+
+
+# ---------------------------------------------------------------- reading
+
+
+def read_campaign(folder: Path, limits: Limits = LIMITS) -> Campaign:
+    """The campaign of a folder. Raises `BadInput`, one sentence naming file, key or set, value and what is allowed."""
+    folder = Path(folder)
+    file = folder / "campaign.toml"
+    if not file.is_file():
+        raise BadInput(f"{folder}: no campaign there; expected a folder with campaign.toml")
+    raw = read_toml(file)
+    table = checked(file, raw)
+    points = tuple(p.point() for p in table.points)
+    rows = _read_modes(folder / table.modes, [t.id for t in table.tests]) if table.modes else []
+    tests = []
+    for t in table.tests:
+        speed, soak = t.speed_rpm * RPM, None if t.soak_time_min is None else t.soak_time_min * MINUTE
+        frf = read_frf(folder / t.frf, table.quantity, points) if t.frf else None
+        modes = tuple(row for row in rows if row.test == t.id)
+        if frf is None and not modes and not t.runout:
+            raise BadInput(f"{file}: tests.{t.id}: has neither frf nor rows in a table of modes nor runout; one of them is needed")
+        runout = read_runout(folder / t.runout, points, speed, t.spectrum_window) if t.runout else None
+        if frf is not None:
+            _check_size(folder / str(t.frf), frf)
+            check_frf(folder / str(t.frf), frf, speed, limits)
+        tests.append(
+            Test(t.id, t.temperature_C, speed, t.hammer_level_N, soak, t.repeat, t.conditions, frf, modes, t.window_decay_1_per_s, runout)
+        )
+    noise = Noise(table.noise.of_value, table.noise.of_largest) if table.noise else None
+    return Campaign(table.title, table.spindle, table.quantity, points, tuple(tests), noise, table.note, folder)
+
+
+def _check_size(file: Path, frf: Frf) -> None:
+    """Refuse values whose squares would overflow: a NaN passes every check of physics that asks whether a share is above its limit."""
+    for array in (frf.value, frf.sd):
+        if array is not None and not np.abs(array).max() <= LARGEST:
+            raise BadInput(f"{file}: holds {np.abs(array).max():.3g}: no structure answers so; the file is damaged")
+
+
+def _read_modes(file: Path, tests: list[str]) -> list[ModeRow]:
+    if not file.is_file():
+        raise BadInput(f"{file}: no such file")
+    try:
+        reader = csv.reader(file.read_text(encoding="utf-8").splitlines(), strict=True)
+        lines = [(reader.line_num, line) for line in reader]
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise BadInput(f"{file}: not a CSV file in UTF-8: {error}") from None
+    if not lines or tuple(lines[0][1]) != MODE_COLUMNS:
+        raise BadInput(f"{file}: line 1: the columns must be {','.join(MODE_COLUMNS)}")
+    rows: list[ModeRow] = []
+    for number, line in lines[1:]:
+        where = f"{file}: line {number}"
+        if len(line) != len(MODE_COLUMNS):
+            raise BadInput(f"{where}: has {len(line)} cells; {len(MODE_COLUMNS)} are needed")
+        raw = {key: name_of(text) if key in ("test", "kind") else text for key, text in zip(MODE_COLUMNS, line, strict=True) if text}
+        try:
+            row = ModeRow(*dict(ModeTable.model_validate(raw)).values())
+        except ValidationError as error:
+            raise BadInput(first_error(where, raw, ModeTable, error)) from None
+        if row.test not in tests:
+            raise BadInput(f"{where}: test = {row.test!r}: no such test; allowed are {', '.join(tests)}")
+        if row.damping_ratio is None and row.damping_ratio_sd is not None:
+            raise BadInput(f"{where}: damping_ratio_sd = {row.damping_ratio_sd}: without a damping_ratio it must be empty")
+        if (row.test, row.mode) in [(r.test, r.mode) for r in rows]:
+            raise BadInput(f"{where}: mode = {row.mode}: test {row.test} has this mode already; each stands once")
+        rows.append(row)
+    return rows
+
+
+# ---------------------------------------------------------------- writing
+
+
+def write_campaign(campaign: Campaign, folder: Path, replace: bool = False, limits: Limits = LIMITS) -> None:
+    """Write the folder of a campaign, whole or not at all: beside its place first, then moved there.
+
+    Each test's FRFs go to `<id>.uff`, its runout to `<id>_runout.csv`, all modes to `modes.csv`. Raises `BadInput` for what `read_campaign` would refuse, and for a
+    folder that is not empty, unless `replace` is set and it holds a campaign, which is then lost.
+    """
+    folder = Path(folder).absolute()
+    occupied = folder.exists() and (not folder.is_dir() or any(folder.iterdir()))
+    if occupied and not (replace and (folder / "campaign.toml").is_file()):
+        raise BadInput(f"{folder}: is not empty; a campaign is written to a new or empty folder, or may replace a campaign if told so")
+    text = _toml_text(campaign)
+    checked(folder / "campaign.toml", tomllib.loads(text))
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with whole(folder) as partial:
+        _write_files(campaign, partial, text, limits)
+
+
+def _write_files(campaign: Campaign, folder: Path, text: str, limits: Limits) -> None:
+    """Make the folder of a campaign, `text` its campaign.toml, and read it back: what would not come back the same is refused."""
+    folder.mkdir()
+    (folder / "campaign.toml").write_text(text, encoding="utf-8")
+    if any(test.modes for test in campaign.tests):
+        _write_modes(folder / "modes.csv", campaign)
+    for test in campaign.tests:
+        if test.frf is not None:
+            if test.frf.quantity != campaign.quantity:
+                raise BadInput(f"{folder}: tests.{test.id}: FRFs of {test.frf.quantity} in a campaign of {campaign.quantity}")
+            write_frf(folder / f"{test.id}.uff", test.frf, campaign.points, campaign.title, test.id)
+        if test.runout is not None:
+            write_runout(folder / f"{test.id}_runout.csv", test.runout)
+    again = read_campaign(folder, limits)
+    if not all(same(a.runout, b.runout) for a, b in zip(again.tests, campaign.tests, strict=True)):
+        raise BadInput(f"{folder}: a runout record would not read back; it needs finite numbers at even steps")
+    if _exact(again) != _exact(campaign):
+        raise BadInput(
+            f"{folder}: would not read back bit for bit; FRFs must be complex128 and float64, modes those of their test, "
+            "directions along an axis"
+        )
+
+
+def _exact(campaign: Campaign) -> list[tuple[Any, ...]]:
+    """What must read back bit for bit; speed, soak time and positions may have no exact number in the file's units."""
+    points = [(p.node, p.name, p.body, p.direction) for p in campaign.points]
+    return points + [(t.id, t.temperature, t.level, t.repeat, t.window_decay, t.conditions, t.frf, t.modes) for t in campaign.tests]
+
+
+def _write_modes(file: Path, campaign: Campaign) -> None:
+    with file.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(MODE_COLUMNS)
+        for test in campaign.tests:
+            writer.writerows(cells(astuple(row)) for row in test.modes)
+
+
+def _toml_text(campaign: Campaign) -> str:
+    modes = "modes.csv" if any(t.modes for t in campaign.tests) else None
+    head = {
+        "title": campaign.title,
+        "spindle": campaign.spindle,
+        "quantity": campaign.quantity,
+        "note": campaign.note,
+        "modes": modes,
+    }
+    noise = [] if campaign.noise is None else [("[noise]", asdict(campaign.noise))]
+    points = [
+        {
+            "node": p.node,
+            "name": p.name,
+            "body": p.body,
+            "position_mm": [in_unit(x, MM) for x in p.position],
+            "direction": "-+"[axis_number(p.direction) > 0] + "XYZ"[abs(axis_number(p.direction)) - 1],
+        }
+        for p in campaign.points
+    ]
+    tests = [
+        {
+            "id": t.id,
+            "temperature_C": t.temperature,
+            "speed_rpm": in_unit(t.speed, RPM),
+            "frf": None if t.frf is None else f"{t.id}.uff",
+            "runout": None if t.runout is None else f"{t.id}_runout.csv",
+            "spectrum_window": t.runout.window if t.runout is not None and t.runout.kind == "spectrum" else None,
+            "hammer_level_N": t.level,
+            "soak_time_min": None if t.soak_time is None else in_unit(t.soak_time, MINUTE),
+            "repeat": t.repeat,
+            "window_decay_1_per_s": t.window_decay or None,
+            "conditions": t.conditions or None,
+        }
+        for t in campaign.tests
+    ]
+    tables = [("", head), *noise, *(("[[points]]", p) for p in points), *(("[[tests]]", t) for t in tests)]
+    lines = [[name, *(f"{k} = {toml(v)}" for k, v in table.items() if v not in (None, ""))] for name, table in tables]
+    return "\n\n".join("\n".join(block).strip() for block in lines) + "\n"

@@ -1,0 +1,194 @@
+"""What a physical effect is: a file with its equation, parameters and pure functions that change what one step of the chain sees.
+
+A condition flows  spindle -> region temperatures -> ring motions -> bearing pair -> rotor-base chain -> measurement;  an effect changes
+any of these, and at its neutral values it changes nothing, exactly. Effects are applied in the order of the scene. No other code
+knows an effect by name: where it seemed to need to, the state would lack a field.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+from thermospindle.model.bearing.pair import PairState
+from thermospindle.model.imperfections import Imperfections
+from thermospindle.model.machine import Condition, RingMotion, Spindle
+from thermospindle.model.rotor.chain import RotorBase
+from thermospindle.model.types import Array
+
+Values = Mapping[str, float]
+Question = Callable[[Spindle], str | None]
+"""Asked of a spindle: None where all is well, else why not."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of an effect: a readable row.
+
+    `typical` is a plausible size where the effect is present; `prior_sd` the width of what one believes before measuring, about
+    `neutral`; values outside `limits` are not physical. A parameter that counts or names something has `choices`: no other values mean
+    anything, and a fit tries them one by one.
+    """
+
+    name: str
+    unit: str
+    neutral: float
+    typical: float
+    prior_sd: float
+    limits: tuple[float, float]
+    meaning: str
+    source: str
+    choices: tuple[float, ...] = ()
+    counts: str = ""  # "bearings": its choices are the numbers of a spindle's bearings, from 0
+
+
+REFERENCE_HUB = 0.0259
+"""kg, the turning mass of the spindle for which absolute sizes in the catalogue are written; a spindle twice as long has eight times it."""
+
+
+def mass_ratio(spindle: Spindle) -> float:
+    """Turning mass over that of the reference spindle."""
+    return spindle.turning.mass / REFERENCE_HUB
+
+
+def fitted_to(effect: Effect, spindle: Spindle) -> Effect:
+    """The effect with its parameters as plausible for a spindle: sizes in its scale, to two digits, and a choice for each of its bearings.
+
+    Limits only widen. On the reference spindle it is the effect itself, and so is one that has been fitted already.
+    """
+    factors = effect.sized(spindle) if effect.sized else {}
+    rows = tuple(_fitted(p, factors.get(p.name, 1.0), len(spindle.bearings)) for p in effect.parameters)
+    return effect if rows == effect.parameters else replace(effect, parameters=rows, sized=None)
+
+
+def _fitted(p: Parameter, factor: float, bearings: int) -> Parameter:
+    if p.counts == "bearings":
+        numbers = tuple(float(k) for k in range(bearings))
+        return replace(p, choices=numbers, limits=(0.0, max(numbers[-1], 1.0)), typical=min(p.typical, numbers[-1]))
+    if float(f"{factor:.1e}") == 1.0:
+        return p
+
+    def scaled(value: float) -> float:
+        return p.neutral + float(f"{factor * (value - p.neutral):.1e}")
+
+    low, high = (scaled(limit) for limit in p.limits)
+    limits = (min(low, p.limits[0]), max(high, p.limits[1]))
+    return replace(p, typical=scaled(p.typical), prior_sd=float(f"{factor * p.prior_sd:.1e}"), limits=limits)
+
+
+def refusal(effect: Effect, spindle: Spindle) -> str | None:
+    """Why an effect is not to be added to a spindle, or looked for in its tests; None where it may."""
+    if effect.idle and (why := effect.idle(spindle)):
+        return f"nothing to act on here: {why}"
+    if effect.outside and (why := effect.outside(spindle)):
+        return f"outside its validity here: {why}"
+    return None
+
+
+def scale_parameter(typical: float, prior_sd: float, limits: tuple[float, float], meaning: str, source: str) -> Parameter:
+    """The size of an effect in units of what its formula gives: 0 nothing, 1 all of it."""
+    return Parameter("scale", "1", 0.0, typical, prior_sd, limits, meaning, source)
+
+
+def direction_parameter(prior_sd: float, half_turn: float, meaning: str) -> Parameter:
+    """A direction (deg) of which nothing is known; `half_turn` is where it comes back to itself from either side."""
+    return Parameter("direction", "deg", 0.0, 0.0, prior_sd, (-half_turn, half_turn), meaning, "unknown before measuring: any")
+
+
+def bearing_parameter(source: str) -> Parameter:
+    """Which bearing holds an imperfection."""
+    meaning = "0 the first bearing of the scene (the lowest one), 1 the second, and so on"
+    return Parameter("bearing", "1", 0.0, 1.0, 1.0, (0.0, 1.0), meaning, source, choices=(0.0, 1.0), counts="bearings")
+
+
+def channel_parameter(meaning: str) -> Parameter:
+    """Which response channel is meant, counted from 1; 0 for the ordinary case of many."""
+    source = "a whole group of channels is assumed; one alone where a sensor or its amplifier is set wrongly"
+    return Parameter("channel", "1", 0.0, 0.0, 1.0, (0.0, 16.0), meaning, source, choices=tuple(float(c) for c in range(17)))
+
+
+def phase_parameter(meaning: str) -> Parameter:
+    """An azimuth (deg) of which nothing is known."""
+    source = "any azimuth is as likely as another: the standard deviation is that of a uniform angle"
+    return Parameter("phase", "deg", 0.0, 60.0, 104.0, (-180.0, 180.0), meaning, source)
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """The measuring chain: what is read of the chain's motion, and how.
+
+    A measured mobility is gain exp(-i omega delay) H(i omega + decay) with H between the reference and response rows.
+    """
+
+    response_rows: Array  # (n_resp, n)
+    reference_rows: Array  # (n_ref, n)
+    gain: Array  # (n_resp,)
+    delay: Array  # (n_resp,) s
+    decay: float  # 1/s, damping an uncorrected exponential window adds
+
+
+Sizes = Callable[[Spindle], Mapping[str, float]]
+"""Factors by parameter name: how much larger than on the reference spindle a size is plausible."""
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A physical effect. Each function may be left out; `Values` hold every parameter.
+
+    `spindle(spindle, condition, values)` the drawing itself at a condition: materials, structure, preload, bearings;
+    `temperatures(spindle, condition, values, by_region)` region temperatures (C);
+    `motions(spindle, condition, values, by_bearing)` thermal and other ring motions;
+    `pair(spindle, condition, values, state)` bearing states;
+    `chain(spindle, condition, values, chain)` bodies and elements;
+    `imperfections(spindle, condition, values, imperfections)` what excites the running spindle;
+    `measurement(spindle, condition, values, chain, measurement)` the measuring chain.
+
+    `form_error` is the share of its own size by which the formula may be wrong, `damping_form_error` the same for what it does to damping:
+    nobody's law of a bond or a film is exact to a percent, and a law of its losses is worth far less.
+
+    `idle(spindle)` says why the effect has nothing to act on in a spindle, `outside(spindle)` why that spindle is outside its validity; None
+    where neither is so (`refusal` asks both). `sized(spindle)` gives what is plausible for a machine of that size: factors by parameter
+    name, of typical size, prior and limits, for sizes that are written for the reference spindle.
+    """
+
+    name: str
+    title: str
+    equation: str
+    parameters: tuple[Parameter, ...]
+    sees: str  # what one sees of it
+    resembles: tuple[str, ...]  # effects it is easily confused with
+    valid: str  # where it is valid
+    spindle: Callable[[Spindle, Condition, Values], Spindle] | None = None
+    temperatures: Callable[[Spindle, Condition, Values, dict[str, float]], dict[str, float]] | None = None
+    motions: Callable[[Spindle, Condition, Values, dict[str, RingMotion]], dict[str, RingMotion]] | None = None
+    pair: Callable[[Spindle, Condition, Values, PairState], PairState] | None = None
+    chain: Callable[[Spindle, Condition, Values, RotorBase], RotorBase] | None = None
+    imperfections: Callable[[Spindle, Condition, Values, Imperfections], Imperfections] | None = None
+    measurement: Callable[[Spindle, Condition, Values, RotorBase, Measurement], Measurement] | None = None
+    form_error: float = 0.05
+    damping_form_error: float = 0.5
+    idle: Question | None = None
+    outside: Question | None = None
+    sized: Sizes | None = None
+
+    def neutral(self) -> dict[str, float]:
+        return {p.name: p.neutral for p in self.parameters}
+
+    def typical(self) -> dict[str, float]:
+        return {p.name: p.typical for p in self.parameters}
+
+    def typical_list(self) -> list[float]:
+        """Typical values in the order of the parameters."""
+        return [p.typical for p in self.parameters]
+
+
+HOOKS: Mapping[str, type] = {
+    "spindle": Spindle,
+    "temperatures": dict,
+    "motions": dict,
+    "pair": PairState,
+    "chain": RotorBase,
+    "imperfections": Imperfections,
+    "measurement": Measurement,
+}
+"""What each function of an effect returns; the dicts keep the keys that they are given."""

@@ -1,0 +1,70 @@
+"""What a scene's parts are for, and the changes that several effects make to them.
+
+A joint, body or region has a role where its scene gives it one; nothing is guessed from names, positions or volumes. An effect that finds
+no part of its role has nothing to act on, and says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from thermospindle.model.machine import Body, Joint, Region, Spindle
+
+
+def joints(spindle: Spindle, role: str) -> list[str]:
+    """Names of the joints with a role: mount (holds the base on the ground), plate (base against seat) or flange (holds the shaft)."""
+    return [j.name for j in spindle.structure.joints if j.role == role]
+
+
+def body(spindle: Spindle, role: str) -> Body | None:
+    """The body with a role (base, seat, shaft or hub); the first of several, None without one."""
+    return next((b for b in spindle.structure.bodies if b.role == role), None)
+
+
+def regions(spindle: Spindle, role: str) -> list[Region]:
+    """The section's regions with a role: shaft, hub, insert (bonded into the hub) or support (what holds the shaft)."""
+    return [g for g in spindle.regions if g.role == role]
+
+
+def materials(spindle: Spindle, role: str) -> tuple[str, ...]:
+    """Names of the materials of the regions with a role, each once."""
+    return tuple(dict.fromkeys(g.material for g in regions(spindle, role)))
+
+
+def lacking(kind: str, *roles: str) -> str:
+    """Why an effect has nothing to act on."""
+    return f"the scene has no {kind} with role {' or '.join(map(repr, roles))}"
+
+
+def with_stiffness(spindle: Spindle, factor: Mapping[str, float], tilt: Mapping[str, float] | None = None) -> Spindle:
+    """The spindle with the stiffness of the joints named in `factor` multiplied, that against tilt by `tilt` (the same by default).
+
+    The damping ratio stays, so that damping follows stiffness. The same spindle where `factor` is empty.
+    """
+    if not factor:
+        return spindle
+    tilt = factor if tilt is None else tilt
+    changed = tuple(_scaled(j, factor[j.name], tilt[j.name]) if j.name in factor else j for j in spindle.structure.joints)
+    return replace(spindle, structure=replace(spindle.structure, joints=changed))
+
+
+def _scaled(joint: Joint, factor: float, tilt: float) -> Joint:
+    x, y, z, tilt_x, tilt_y = joint.stiffness
+    return replace(joint, stiffness=(factor * x, factor * y, factor * z, tilt * tilt_x, tilt * tilt_y))
+
+
+def with_mass(body: Body, mass: float, z: float, inertia: tuple[float, float, float]) -> Body:
+    """The body with another one rigidly on it, of centre of mass at height `z` on the axis and its own `inertia` (x, y, z)."""
+    total = body.mass + mass
+    centre = (body.mass * body.z + mass * z) / total
+    steiner = body.mass * (body.z - centre) ** 2 + mass * (z - centre) ** 2
+    about = (body.inertia[0] + inertia[0] + steiner, body.inertia[1] + inertia[1] + steiner, body.inertia[2] + inertia[2])
+    return replace(body, mass=total, z=centre, inertia=about)
+
+
+def beyond(value: float, play: float) -> float:
+    """What is left of a value, of either sign, after a play."""
+    return float(np.sign(value) * max(abs(value) - play, 0.0))

@@ -1,0 +1,12 @@
+"""Effects on temperature and expansion.
+
+==================  ====================================================================================================
+expansion_mismatch  the hub's material, or that of the bearing rings or the shaft, expands more or less than its data
+                    sheet says
+loose_inserts       yoke and magnet hold the hub's expansion back less than bonded rings would: a weak bond, or left out
+soak_lag            parts short of chamber temperature: the rotating part, reached by air only, has risen less than the
+                    shaft and the balls
+thermal_gradient    the running bearings heat themselves: their friction leaves shaft and inner rings hotter than the
+                    hub
+==================  ====================================================================================================
+"""

@@ -1,0 +1,159 @@
+"""The running bearings heat themselves: their friction leaves shaft and inner rings hotter than the hub.
+
+Palmgren's torque at the lubricant's own temperature makes the heat, steady conduction spreads it. The heat equation is linear,
+so the rise of every region for 1 W in each bearing is solved once for a spindle and kept.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import splu
+
+from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.types import Array
+from thermospindle.sim.effects.effect import Effect, Parameter, Values, scale_parameter
+from thermospindle.thermal import conduction, friction
+from thermospindle.thermal.influence import influence, raceways
+
+
+@dataclass(frozen=True)
+class Conduction:
+    """A spindle as its conduction sees it: equal `key`, equal temperature rise for 1 W."""
+
+    key: tuple
+    spindle: Spindle = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True, eq=False)
+class UnitRise:
+    """Steady rise (K) for 1 W of friction in each bearing: of every region, and of the bearings themselves."""
+
+    regions: tuple[str, ...]
+    region: Array  # (bearings, regions)
+    bearing: Array  # (bearings, bearings), symmetric
+
+
+def temperatures(spindle: Spindle, condition: Condition, values: Values, by_region: dict[str, float]) -> dict[str, float]:
+    scale = values["scale"]
+    if scale == 0.0 or condition.speed == 0.0:
+        return by_region
+    unit = unit_rise(spindle)
+    rise = heat(spindle, condition, unit) @ unit.region
+    outer = [unit.regions.index(b.outer_ring) for b in spindle.bearings]
+    rise = rise - (1 - values["common_share"]) * rise[outer].mean()
+    if values["level_share"]:
+        rise = rise + values["level_share"] * (levelled(spindle, unit.regions, rise) - rise)
+    return by_region | {name: by_region[name] + scale * float(dt) for name, dt in zip(unit.regions, rise, strict=True)}
+
+
+def levelled(spindle: Spindle, regions: tuple[str, ...], rise: Array) -> Array:
+    """The `rise` (regions,) if each part were at one temperature, the mean of the bearing rings in it; a part without rings as it is."""
+    part = np.array([spindle.region(name).part for name in regions])
+    rings = [regions.index(name) for b in spindle.bearings for name in (b.inner_ring, b.outer_ring)]
+    level = rise.copy()
+    for p in set(part[rings]):
+        level[part == p] = rise[[r for r in rings if part[r] == p]].mean()
+    return level
+
+
+def heat(spindle: Spindle, condition: Condition, unit: UnitRise) -> Array:
+    """Friction heat (bearings,) in W: H = Palmgren(T + unit rise H), by fixed-point steps, which contract as G dH/dT > -1.
+
+    RuntimeError where they do not: a bearing that runs so hot that its viscosity falls by half in the rise itself.
+    """
+    law, load = spindle.thermal.friction, spindle.pair.preload
+    made = np.zeros(len(spindle.bearings))
+    for _ in range(100):
+        warm = condition.temperature + made @ unit.bearing
+        last, made = (
+            made,
+            np.array([friction.heat(law, b, condition.speed, float(t), load) for b, t in zip(spindle.bearings, warm, strict=True)]),
+        )
+        if np.abs((made - last) @ unit.bearing).max() < 1e-9:
+            return made
+    raise RuntimeError("bearing friction and temperature did not settle")
+
+
+def unit_rise(spindle: Spindle) -> UnitRise:
+    """Solved once for each section, set of conductivities and cooling."""
+    conductivity = tuple(spindle.materials[g.material].conductivity for g in spindle.regions)
+    rings = tuple(raceways(spindle, b) for b in spindle.bearings)
+    thermal = spindle.thermal
+    key = (spindle.regions, conductivity, rings, thermal.convections, thermal.gaps, thermal.friction.conductance)
+    return _unit_rise(Conduction(key, spindle))
+
+
+@lru_cache(maxsize=8)
+def _unit_rise(question: Conduction) -> UnitRise:
+    model = conduction.model(question.spindle, influence(question.spindle).sections)
+    if not model.film.any():
+        raise ValueError("a spindle without convection has no steady temperature")
+    rise = splu(csc_array(model.conductance), permc_spec="MMD_AT_PLUS_A").solve(np.ascontiguousarray(model.bearing.T)).T
+    means = [model.field(r).region_means() for r in rise]
+    regions = tuple(means[0])
+    return UnitRise(regions, np.array([[m[name] for name in regions] for m in means]), rise @ model.bearing.T)
+
+
+EFFECT = Effect(
+    name="thermal_gradient",
+    title="Bearing friction heats the running spindle, the shaft and inner rings most",
+    equation=(
+        "T_region = T + scale ((1 - level_share) D_region + level_share mean D_rings of its part), "
+        "D = R - (1 - common_share) mean R_outer rings, R = sum_b G_region,b H_b with "
+        "K G = (1 W in bearing b), K the steady conduction and convection matrix; "
+        "H_b = (M0 + M1) speed at the lubricant's temperature T + sum_c G_bc H_c; "
+        "M0 = 1e-7 f0 (nu n)^(2/3) d_m^3, M1 = f1 P1 d_m (Palmgren; Harris, Rolling Bearing Analysis, 4th ed. 2001)"
+    ),
+    parameters=(
+        scale_parameter(
+            typical=1.0,
+            prior_sd=0.7,
+            limits=(0.0, 4.0),
+            meaning="temperature rise by bearing friction in units of the one computed from the scene's Palmgren and cooling data",
+            source="Palmgren's f0 spreads by about 2 for greased bearings (Harris 2001); convection is known no better",
+        ),
+        Parameter(
+            "common_share",
+            "1",
+            neutral=0.0,
+            typical=0.0,
+            prior_sd=0.5,
+            limits=(0.0, 1.0),
+            meaning=(
+                "share of the outer rings' own rise that a test's temperature leaves out: 0 the test tells the hub's temperature, "
+                "1 that of the air far from it"
+            ),
+            source="a matter of where the thermometer sits; 0 keeps what is a gradient",
+        ),
+        Parameter(
+            "level_share",
+            "1",
+            neutral=0.0,
+            typical=0.0,
+            prior_sd=0.5,
+            limits=(0.0, 1.0),
+            meaning=(
+                "share by which the rise is levelled within each part that holds bearing rings: 0 the field as conduction computes it, "
+                "1 each part at one temperature, the mean of its rings"
+            ),
+            source=(
+                "where heat flows inside a part (fits, grease, air) is known no better, and what the bearings see is mostly the "
+                "difference of the parts"
+            ),
+        ),
+    ),
+    sees=(
+        "only at speed: inner rings run hotter than outer ones, which loads the bearings again, so bearing modes rise with speed "
+        "beside their split, most in a cold chamber where the grease is stiff; a common rise (common_share) takes most of it back"
+    ),
+    resembles=("lubricant_film", "ring_growth", "ball_inertia", "soak_lag"),
+    valid=(
+        "steady state, reached after the spindle's time constant (minutes); bearings under their reference preload; "
+        "no motor heat; below the temperature at which the viscosity table ends"
+    ),
+    temperatures=temperatures,
+)

@@ -1,0 +1,9 @@
+"""The virtual impact-hammer test: MuJoCo in time, acquisition as a laboratory does it, FRFs with standard errors.
+
+========  ==============================================================================================================
+estimate  FRFs from force and response records: windows, H1, H2, coherence, and the standard error of every line
+pulse     hammer pulses: force over time as controls known before the simulation starts
+test      the virtual impact-hammer test: MuJoCo in time, acquisition as a laboratory does it, and FRFs with standard
+          errors
+========  ==============================================================================================================
+"""

@@ -1,0 +1,208 @@
+"""The virtual impact-hammer test: MuJoCo in time, acquisition as a laboratory does it, and FRFs with standard errors.
+
+Every hit is a full time simulation (RK4); all hits run side by side in C (`mujoco.rollout`), no Python between steps. Forces are
+controls held over a step: the force channel is that of the held force, so no half step of delay is left in the FRF. What is left of the hold
+are its images about the rate of integration, folded back where the velocity is read once a step: for a mass, whose velocity falls as 1/f,
+a part (pi f step)^2 / 3 of the FRF, 0.3 % at 6 kHz and 5 us.
+"""
+
+from __future__ import annotations
+
+import copy
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from typing import TypeVar
+
+import mujoco
+import numpy as np
+from mujoco.rollout import Rollout
+from scipy.signal import resample_poly
+
+from thermospindle.model.errors import BadInput
+from thermospindle.model.machine import HammerTest
+from thermospindle.model.types import Array
+from thermospindle.sim.effects.effect import Measurement
+from thermospindle.sim.hammer.estimate import Estimate, Windows, estimate
+from thermospindle.sim.hammer.pulse import Hit, check_band, draw_hits, force, pulse_duration
+from thermospindle.sim.operating import OperatingPoint
+
+T = TypeVar("T")
+
+MARGIN = 64  # samples of quiet simulated past the record, so that the anti-alias filter ends outside it
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """What the analyser sampled, noise included: time (n,) s, force (references, hits, n) N, velocity
+    (references, hits, responses, n) m/s."""
+
+    time: Array
+    force: Array
+    velocity: Array
+
+
+@dataclass(frozen=True, eq=False)
+class ImpactTest:
+    """A virtual impact test at one operating point."""
+
+    point: OperatingPoint
+    settings: HammerTest
+    element: str
+    record: Record
+    estimate: Estimate
+
+
+def impact_tests(
+    points: Sequence[OperatingPoint],
+    settings: HammerTest | None = None,
+    element: str = "linear",
+    seed: int = 0,
+    noise: bool = True,
+    progress: Callable[[str], None] = lambda done: None,
+) -> list[ImpactTest]:
+    """Impact tests at several operating points of one spindle, with as many hits side by side as there are cores.
+
+    `settings` default to the scene's. `element` is a bearing element of `model.rotor.mjcf`. The same seed gives the same test.
+    `progress` is told when a point is done.
+    """
+    test = settings or points[0].spindle.hammer
+    check_band(test, str(points[0].spindle.file or points[0].spindle.name))
+    every, steps = sampling(test)
+    for point in points:
+        check_step(point, test.step)
+    at_once = max(1, (os.cpu_count() or 1) // (test.hits * len(test.hammer_nodes)))
+    results = []
+    for batch in batched(enumerate(points), at_once):
+        hits = [[draw_hits(test, np.random.default_rng([seed, i, node])) for node in test.hammer_nodes] for i, _ in batch]
+        models = [p.model if element == "linear" else p.spec(element).compile() for _, p in batch]
+        simulated = simulate([_with_step(model, test.step) for model in models], test, hits, steps)
+        for (i, point), (held, velocity) in zip(batch, simulated, strict=True):
+            random = np.random.default_rng([seed, i]) if noise else None
+            record = acquire(test, held, velocity, every, random, point.measurement)
+            results.append(ImpactTest(point, test, element, record, estimate_of(test, point, record)))
+            progress(f"{point.condition.temperature:g} C: {held.shape[0] * held.shape[1]} hits simulated")
+    return results
+
+
+def batched(items: Iterable[T], size: int) -> Iterator[list[T]]:
+    """Lists of up to `size` items, in order."""
+    iterator = iter(items)
+    while batch := list(islice(iterator, size)):
+        yield batch
+
+
+def sampling(test: HammerTest) -> tuple[int, int]:
+    """Integration steps a sample, and steps of a whole record with its margin."""
+    every = round(1 / (test.sample_rate * test.step))
+    if abs(every * test.sample_rate * test.step - 1) > 1e-6:
+        raise BadInput(
+            f"hammer_test.step_us = {test.step * 1e6:g}: must divide the sampling interval of {1e6 / test.sample_rate:g} us into whole steps"
+        )
+    return every, (round(test.record_length * test.sample_rate) + MARGIN) * every
+
+
+def check_step(point: OperatingPoint, step: float) -> None:
+    """Refuse a step at which Runge-Kutta 4 would be unstable: |pole| step < 2.78 on the imaginary axis (Hairer & Wanner, IV.2)."""
+    limit = 2.7 / max(abs(m.pole) for m in point.modes)
+    if step > limit:
+        raise BadInput(
+            f"{point.spindle.file or point.spindle.name}: hammer_test.step_us = {step * 1e6:g}: too long for the stiffest mode; "
+            f"at most {limit * 1e6:.2f} us is stable"
+        )
+
+
+def simulate(
+    models: Sequence[mujoco.MjModel], test: HammerTest, hits: Sequence[Sequence[Sequence[Hit]]], steps: int
+) -> list[tuple[Array, Array]]:
+    """Held force (references, hits, steps) and velocity (references, hits, responses, steps) of every model's hits, all at once in C.
+
+    `hits[model][reference]` are the hits on one hammer node.
+    """
+    held = np.array([[[force(hit, test.step, steps) for hit in row] for row in own] for own in hits])
+    count, references, repeats = held.shape[:3]
+    control = np.zeros((count, references, repeats, steps, models[0].nu))
+    for r, node in enumerate(test.hammer_nodes):
+        control[:, r, :, :, models[0].actuator(f"hammer{node}").id] = held[:, r]
+    state = np.array([loaded_state(model) for model in models])
+    threads = min(os.cpu_count() or 1, count * references * repeats)
+    many = [model for model in models for _ in range(references * repeats)]
+    with Rollout(nthread=threads) as pool:
+        data = [mujoco.MjData(models[0]) for _ in range(threads)]
+        start = np.repeat(state, references * repeats, axis=0)
+        _, sensors = pool.rollout(many, data, start, control.reshape(len(many), steps, -1))
+    velocity = np.moveaxis(sensors.reshape(count, references, repeats, steps, -1), 4, 3)
+    return list(zip(held, velocity, strict=True))
+
+
+def _with_step(model: mujoco.MjModel, step: float) -> mujoco.MjModel:
+    """The model with the integration step of the test's settings, which need not be the scene's."""
+    own = copy.copy(model)
+    own.opt.timestep = step
+    return own
+
+
+def loaded_state(model: mujoco.MjModel) -> Array:
+    """MuJoCo's full physics state of the keyframe "loaded"."""
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("loaded").id)
+    state = np.empty(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS))
+    mujoco.mj_getState(model, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+    return state
+
+
+def acquire(
+    test: HammerTest,
+    held: Array,
+    velocity: Array,
+    every: int,
+    random: np.random.Generator | None,
+    measurement: Measurement | None = None,
+) -> Record:
+    """Anti-alias filter, sampling, what the measuring chain does to the channels (gain, delay, a window nobody noted), sensor noise.
+
+    Velocity sensors read at the start of a step, the force is held from there to the next: half a step apart, which an exact
+    shift in frequency takes out. The same linear-phase filter runs over both channels.
+    """
+    n = held.shape[-1]
+    frequency = np.fft.rfftfreq(n, test.step)
+    hold = np.exp(-1j * np.pi * frequency * test.step) * np.sinc(frequency * test.step)
+    applied = np.fft.irfft(np.fft.rfft(held) * hold, n)
+    samples = round(test.record_length * test.sample_rate)
+    sampled_force = resample_poly(applied, 1, every, axis=-1)[..., :samples]
+    sampled_velocity = resample_poly(velocity, 1, every, axis=-1)[..., :samples]
+    if measurement is not None:
+        spectrum = np.fft.rfft(sampled_velocity)
+        late = np.exp(-2j * np.pi * np.fft.rfftfreq(samples, 1 / test.sample_rate) * measurement.delay[:, None])
+        sampled_velocity = np.fft.irfft(spectrum * measurement.gain[:, None] * late, samples)
+        window = np.exp(-measurement.decay * np.arange(samples) / test.sample_rate)
+        sampled_force, sampled_velocity = sampled_force * window, sampled_velocity * window
+    if random is not None:
+        sampled_velocity = _with_noise(test, sampled_velocity, random)
+    return Record(np.arange(samples) / test.sample_rate, sampled_force, sampled_velocity)
+
+
+def _with_noise(test: HammerTest, velocity: Array, random: np.random.Generator) -> Array:
+    """Vibrometer noise of a size that leaves the scene's noise on the FRF averaged over all hits, independent line by line.
+
+    One part is white, relative to the largest line of a hammer; the other is proportional to the line itself (speckle, scatter of the
+    hit), made by shaping random numbers with the spectrum of the record. The force channel is taken as quiet: behind its window a
+    hammer's noise is far below both.
+    """
+    hits, n = velocity.shape[1], velocity.shape[-1]
+    spectrum = np.abs(np.fft.rfft(velocity))
+    frequency = np.fft.rfftfreq(n, 1 / test.sample_rate)
+    band = (frequency >= test.band[0]) & (frequency <= test.band[1])
+    largest = spectrum[..., band].max(axis=(1, 2, 3), keepdims=True)
+    size = np.sqrt(test.noise_of_value**2 * spectrum**2 + test.noise_of_largest**2 * largest**2) * np.sqrt(hits / 2)
+    noise = size * (random.standard_normal(spectrum.shape) + 1j * random.standard_normal(spectrum.shape))
+    return velocity + np.fft.irfft(noise, n)
+
+
+def estimate_of(test: HammerTest, point: OperatingPoint, record: Record) -> Estimate:
+    """FRFs of a record with the scene's windows, in the scene's band."""
+    decay = -np.log(test.exponential_end) / test.record_length
+    windows = Windows(pulse_duration(test) + 1e-3, float(decay))
+    nodes = tuple(p.node for p in point.spindle.points)
+    return estimate(record.time, record.force, record.velocity, windows, test.band, nodes, test.hammer_nodes)

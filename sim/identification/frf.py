@@ -1,0 +1,162 @@
+"""FRFs of one modal test, and the physical checks that measured and virtual ones must pass before anything is built on them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from thermospindle.model.errors import BadInput
+
+TO_POWER = {"receptance": 1j, "mobility": 1.0, "accelerance": -1j}
+"""What an FRF may be, with the phase that turns it to mobility."""
+
+
+@dataclass(frozen=True, eq=False)
+class Frf:
+    """The FRFs of one test, motion along each response point's direction over force along each reference point's direction.
+
+    Equal means equal bit for bit. The sign of zeros in `value` is dropped: it means nothing, and UFF readers do not keep it.
+    """
+
+    frequency: np.ndarray  # (n,), Hz
+    value: np.ndarray  # (responses, references, n), complex, SI: m/N, (m/s)/N or (m/s2)/N
+    response_nodes: tuple[int, ...]
+    reference_nodes: tuple[int, ...]
+    quantity: str  # receptance, mobility or accelerance
+    coherence: np.ndarray | None = None  # like value, real, 0 to 1
+    sd: np.ndarray | None = None  # like value, real, its unit: standard error sqrt(E |error|^2) of each complex value
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "value", self.value + 0.0)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Frf) and all(_same(getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
+
+
+def _same(a: Any, b: Any) -> bool:
+    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
+        return a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
+    return type(a) is type(b) and bool(a == b)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What FRFs must keep to be accepted; the reasons stand at the checks."""
+
+    coherence: float = 0.8  # smallest median, weighted by the size of the FRF
+    reciprocity: float = 0.15  # largest |H_ij - H_ji| over the mean |H|, root mean squares over the lines
+    negative_power: float = 0.01  # largest share of a driving point's strong lines that give power back
+
+
+LIMITS = Limits()
+FLOOR = 1e-3  # of the largest FRF of a test: its noise where no standard error is told, five times the 0.02 % of a good vibrometer
+SILENT = 0.02  # of the strongest answer to a hammer; below it symmetry forbids an answer, and noise alone has no coherence
+
+
+def check_frf(where: str | Path, frf: Frf, speed: float, limits: Limits = LIMITS) -> None:
+    """Refuse (`BadInput`) FRFs with gaps, poor coherence, the wrong time direction, or that no passive structure can have.
+
+    `where` is the file for the message, `speed` in rad/s.
+    """
+    for i, response in enumerate(frf.response_nodes):
+        if not frf.value[i].any():
+            raise BadInput(f"{where}: response {response}: zero on every line; a dead channel is not allowed")
+        for j, reference in enumerate(frf.reference_nodes):
+            key, value = f"{where}: H({response},{reference})", frf.value[i, j]
+            _check_gaps(key, frf.frequency, value)
+            if frf.coherence is not None:
+                answers = np.linalg.norm(value) > SILENT * np.linalg.norm(frf.value[:, j], axis=-1).max()
+                _check_coherence(key, frf.coherence[i, j], np.abs(value), limits if answers else replace(limits, coherence=0.0))
+            if frf.sd is not None and not np.all(frf.sd[i, j] > 0):
+                raise BadInput(f"{key}: standard error = {frf.sd[i, j].min():g}: must be positive on every line")
+            _check_direction_of_time(key, value)
+            if response == reference:
+                _check_driving_point(key, frf.frequency, value * TO_POWER[frf.quantity], _noise(frf, i, j), limits)
+    if speed == 0:
+        _check_reciprocity(where, frf, limits)
+
+
+def _noise(frf: Frf, i: int, j: int) -> np.ndarray:
+    """Noise (n,) of an FRF: its standard errors, and `FLOOR` of the test's largest value where it has none (a single hit)."""
+    floor = FLOOR * np.abs(frf.value).max()
+    sd = np.full(len(frf.frequency), np.inf) if frf.sd is None else frf.sd[i, j]
+    return np.where(np.isfinite(sd), sd, floor)
+
+
+def _check_gaps(key: str, frequency: np.ndarray, value: np.ndarray) -> None:
+    """No line filled with zero (but 0 Hz, and an FRF that is zero throughout by symmetry), no value held over five lines."""
+    zero = (value == 0) & (frequency > 0)
+    if zero.any() and value.any():
+        raise BadInput(f"{key}: zero on {zero.sum()} lines, the first at {frequency[zero][0]:g} Hz; gaps are not allowed")
+    held = np.convolve(np.diff(value) == 0, np.ones(4), "valid") == 4
+    if held.any() and value.any():
+        raise BadInput(f"{key}: the same value on five lines from {frequency[np.argmax(held)]:g} Hz; held values are not allowed")
+
+
+def _check_coherence(key: str, coherence: np.ndarray, size: np.ndarray, limits: Limits) -> None:
+    """The median weighted by |H|: low coherence at an antiresonance is no fault, at the resonances it is."""
+    if not np.all((coherence >= 0) & (coherence <= 1)):
+        raise BadInput(f"{key}: coherence from {coherence.min():g} to {coherence.max():g}; allowed is 0 to 1")
+    order = np.argsort(coherence)
+    weight = np.cumsum(size[order])
+    median = coherence[order][np.searchsorted(weight, weight[-1] / 2)]
+    if median < limits.coherence:
+        raise BadInput(f"{key}: coherence = {median:.3g} (median weighted by |H|); at least {limits.coherence:g} is allowed")
+
+
+def _check_direction_of_time(key: str, value: np.ndarray) -> None:
+    """A structure answers after the blow: the impulse response lies at t > 0, a conjugated FRF's at t < 0.
+
+    Needs no resonance of its own at this point and no speed. Left out is |t| below the resolution of the Hann-weighted band,
+    where prompt (mass-like) answers lie. Noise alone, as where symmetry forbids an answer, has half its energy on each side,
+    scattering as 0.6/sqrt(n); the limit is five of these above, so that few lines decide nothing.
+    """
+    n = len(value)
+    if n < 16 or not value.any():
+        return
+    energy = np.abs(np.fft.ifft(value * np.hanning(n + 2)[1:-1])) ** 2
+    after, before = energy[4 : n // 2].sum(), energy[n - n // 2 + 1 : n - 3].sum()
+    share, limit = before / (before + after), 0.5 + 3 / np.sqrt(n)
+    if share > limit:
+        raise BadInput(
+            f"{key}: {share:.0%} of the impulse response lies before the blow: the FRF is conjugated; allowed is {limit:.0%}, "
+            "with time dependence exp(+i omega t)"
+        )
+
+
+def _check_driving_point(key: str, frequency: np.ndarray, mobility: np.ndarray, noise: np.ndarray, limits: Limits) -> None:
+    """A force does positive work on a passive structure where it acts: Re(mobility) > 0.
+
+    Only lines above a tenth of the largest count, and only below -0.3 |mobility|, a phase error of 17 degrees beyond 90. Lines below ten
+    times their `noise` (n,) do not count: three standard errors of it would turn them so far.
+    """
+    strong = (np.abs(mobility) >= 0.1 * np.abs(mobility).max()) & (np.abs(mobility) > 10 * noise)
+    negative = strong & (mobility.real < -0.3 * np.abs(mobility))
+    share = negative.sum() / max(strong.sum(), 1)
+    if share > limits.negative_power:
+        peak = frequency[np.argmax(np.abs(mobility) * negative)]
+        raise BadInput(
+            f"{key}: the driving point's mobility has a negative real part on {share:.0%} of its strong lines, the strongest at "
+            f"{peak:g} Hz; allowed is {limits.negative_power:.0%} (a wrong sign, or another point than the hammer's)"
+        )
+
+
+def _check_reciprocity(where: str | Path, frf: Frf, limits: Limits) -> None:
+    """At rest H_ij = H_ji; gyroscopic systems are not reciprocal. Ten standard deviations of two 1 % channel gains are allowed.
+
+    Three times what noise makes of the difference is allowed beside it: where symmetry forbids an answer, both are noise alone.
+    """
+    both = [node for node in frf.reference_nodes if node in frf.response_nodes]
+    for a, b in combinations(both, 2):
+        places = [(frf.response_nodes.index(r), frf.reference_nodes.index(q)) for r, q in ((a, b), (b, a))]
+        (ab, ba), noise = (frf.value[p] for p in places), np.linalg.norm([_noise(frf, *p) for p in places])
+        size = (np.linalg.norm(ab) + np.linalg.norm(ba)) / 2
+        if np.linalg.norm(ab - ba) > np.hypot(limits.reciprocity * size, 3 * noise):
+            difference = np.linalg.norm(ab - ba) / size
+            raise BadInput(
+                f"{where}: H({a},{b}) and H({b},{a}) differ by {difference:.0%} at rest; reciprocity allows {limits.reciprocity:.0%}"
+            )

@@ -1,0 +1,285 @@
+"""Modes of a measured matrix of frequency response functions, with standard errors.
+
+Nobody clicks: `extract` starts from nothing, adds poles while the likelihood pays for them (`sim.identification.poles`), imposes that the residue matrix
+of a mode has rank one, and takes the errors from the information of everything fitted. All lines and references count, each with
+its own noise. Conventions: H(w) ~ exp(i w t), poles in rad/s with positive imaginary part, R = shape participation^T in receptance,
+standard deviation of a complex number: sd^2 = E|e|^2 (half of it in each of the two parts).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import median_filter
+
+from thermospindle.model.types import Array, ComplexArray
+from thermospindle.sim.identification.pairing import mac as mac
+from thermospindle.sim.identification.poles import (
+    Fit,
+    Lines,
+    believed,
+    better,
+    information,
+    project,
+    realise,
+    refine,
+    removal,
+    search,
+    split,
+    varied,
+)
+
+KINDS = {"receptance": 0, "mobility": 1, "accelerance": 2}
+FAINT = 4.0
+"""A mode is reported if its squared shape, weighted by its information, exceeds this many times what the information criterion asks."""
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Modes in the order of frequency. m modes, n_resp responses, n_ref references.
+
+    `chi2` is per degree of freedom; where it exceeds one the errors contain its root. `status` says in words how far they can be trusted.
+    """
+
+    frequency: Array  # (m,) Hz, undamped: |pole| / 2 pi
+    damping: Array  # (m,) -Re pole / |pole|
+    covariance: Array  # (2m, 2m) of [frequency, damping]
+    shape: ComplexArray  # (m, n_resp), the largest component is 1
+    shape_sd: Array  # (m, n_resp)
+    residues: ComplexArray  # (m, n_resp, n_ref) R of the receptance: its unit times 1/s
+    chi2: float
+    chi2_function: Array  # (n_resp, n_ref) mean square of the weighted residual of each function
+    lines: tuple[float, float, int]  # Hz, Hz, number of lines used
+    rank_one: bool  # whether residues are shape x participation; else each is free
+    status: str
+
+    @property
+    def frequency_sd(self) -> Array:
+        """(m,) Hz."""
+        return np.sqrt(np.diag(self.covariance)[: len(self.frequency)])
+
+    @property
+    def damping_sd(self) -> Array:
+        """(m,)"""
+        return np.sqrt(np.diag(self.covariance)[len(self.frequency) :])
+
+
+def noise_model(frf: ArrayLike, relative: float, floor: float) -> Array:
+    """Standard deviation (n_resp, n_ref, n) of `frf`: `relative` of the value and `floor` of the largest response to that reference.
+
+    The two parts are independent, so they add as squares.
+    """
+    size = np.abs(np.asarray(frf))
+    return np.hypot(relative * size, floor * size.max(axis=(0, 2), keepdims=True))
+
+
+def scatter(frf: ArrayLike, window: int = 41) -> Array:
+    """Standard deviation (n_resp, n_ref, n) estimated from `frf` itself, without any model: from line to line.
+
+    A line less the mean of its neighbours has the variance 3/2 sd^2, and the median of the modulus of complex noise is sd sqrt(ln 2). The
+    median over `window` lines passes over resonances narrower than half of it; there, what was found relative to the value counts if it is
+    larger, the value being cleared of noise first.
+    """
+    frf = np.asarray(frf)
+    step = np.abs(frf[..., 1:-1] - (frf[..., :-2] + frf[..., 2:]) / 2) / np.sqrt(1.5 * np.log(2))
+    size = np.abs(frf[..., 1:-1])
+    absolute, relative = (median_filter(x, (1, 1, window), mode="nearest") for x in (step, step / size))
+    larger = relative * np.sqrt(np.maximum(size**2 - 4 * absolute**2, 0))
+    return np.pad(np.maximum(absolute, larger), ((0, 0), (0, 0), (1, 1)), mode="edge")
+
+
+def extract(
+    frequency: ArrayLike,
+    frf: ArrayLike,
+    frf_sd: ArrayLike | None = None,
+    *,
+    band: tuple[float, float] | None = None,
+    kind: str = "mobility",
+    window_decay: float = 0.0,
+) -> Modes:
+    """Modes within `band` (Hz, all lines if None) of `frf` (n_resp, n_ref, n) at `frequency` (n,) Hz, with noise `frf_sd` of that shape.
+
+    Without `frf_sd` it is taken from the `scatter` of neighbouring lines, as the status records. Lines at 0 Hz are left out. Records
+    under an exponential window exp(-window_decay t), 1/s, give H at s = i w + window_decay, and are taken so. Not reported
+    are modes out of the band or with a damping that is not `BELIEVED`, not known better than to their half-width, or `FAINT`.
+    Raises ValueError if shapes do not agree or numbers are unusable.
+    """
+    frequency, frf = np.asarray(frequency, float), np.asarray(frf, complex)
+    if kind not in KINDS:
+        raise ValueError(f"kind {kind!r} is none of {', '.join(KINDS)}")
+    if frf.ndim != 3 or frequency.shape != frf.shape[2:]:
+        raise ValueError(f"frf {frf.shape} is not (responses, references, lines) for {frequency.shape} frequencies")
+    low, high = band or (frequency[0], frequency[-1])
+    used = (frequency >= low) & (frequency <= high) & (frequency > 0)
+    given = frf_sd is not None
+    sd = np.broadcast_to(np.asarray(frf_sd, float), frf.shape)[..., used] if given else scatter(frf[..., used])
+    frequency, frf = frequency[used], frf[..., used]
+    if len(frequency) < 12 or (np.diff(frequency) <= 0).any():
+        raise ValueError(f"{len(frequency)} lines above 0 Hz in the band: at least 12 in rising order are needed")
+    if not (np.isfinite(frf).all() and np.isfinite(sd).all() and (sd > 0).all()):
+        raise ValueError("the FRF must be finite and its noise finite and positive at every line")
+    unit = 2 * np.pi * np.sqrt(frequency[0] * frequency[-1])
+    lines = Lines((window_decay + 2j * np.pi * frequency) / unit, frf, np.sqrt(2) / sd, KINDS[kind])
+
+    return _modes(*_accepted(lines, search(lines)), unit, given, frf.shape[:2])
+
+
+def _accepted(lines: Lines, found: Fit) -> tuple[Lines, Fit, bool, list[tuple[complex, complex]]]:
+    """The poles found as modes: as they are where the data accept them so, else those at one place with one shape merged.
+
+    The free residues of two modes nearly at one place are mixed, and look alike before rank one is imposed on them.
+    """
+    free, twice = merge(lines, found)
+    if twice and min(lines.frf.shape[:2]) > 1:  # else any residues are of rank one
+        as_found = impose_rank_one(lines, found)
+        if as_found[2]:
+            return *as_found, []
+    return *impose_rank_one(lines, free), twice
+
+
+def impose_rank_one(lines: Lines, free: Fit) -> tuple[Lines, Fit, bool]:
+    """The fit with R = shape participation^T for the believed poles in the band, and whether the data accept it.
+
+    It is refused if chi-square rises by more than five standard deviations over what the constraints alone cost. Then poles whose
+    residues are far from rank one are tried as two modes at nearly one place each, and if that does not help, residues stay free:
+    every function is a response of its own to one reference.
+    """
+    responses, references, n = lines.frf.shape
+    first = believed(lines, free.poles)
+    if not first.any():
+        return lines, free, True
+    if min(responses, references) > 1:
+        for trial in (make() for make in (lambda: free, lambda: split(lines, free))):
+            fit = refine(lines, start_rank_one(lines, trial), 1e-3)
+            constraints = trial.unknowns - fit.unknowns
+            accepted = (fit.chi2 - trial.chi2) / trial.scale() < constraints + 5 * np.sqrt(2 * constraints)
+            if accepted and not same_mode(lines, fit.poles[: len(fit.shape)], fit.shape, 0.95).any():
+                return lines, fit, True
+    flat = Lines(lines.s, lines.frf.reshape(-1, 1, n), lines.weight.reshape(-1, 1, n), lines.power)
+    free = refine(lines, free, 1e-3)
+    poles = np.append(free.poles[first], free.poles[~first])
+    return flat, project(flat, poles, free.residues[first], np.ones((first.sum(), 1), complex)), min(responses, references) == 1
+
+
+def merge(lines: Lines, free: Fit) -> tuple[Fit, list[tuple[complex, complex]]]:
+    """One pole instead of two at one place with one shape; and for each such pair the pole kept and how far its place is spread.
+
+    Such a pair is one mode that was not the same in all functions: it moved between the references, or is not linear. The spread is
+    the standard deviation of two places that have the weights of their residues. Where one pole, refined alone, does as well, the second was no
+    more than a step of the search, and nothing is spread.
+    """
+    spread: list[tuple[complex, complex]] = []
+    while True:
+        shape = np.linalg.svd(free.residues.reshape(-1, *lines.frf.shape[:2]))[0][:, :, 0]
+        pairs = np.argwhere(same_mode(lines, free.poles, shape, 0.8) & believed(lines, free.poles))
+        if not len(pairs):
+            return free, spread
+        weaker, kept = sorted(pairs[0], key=lambda r: removal(free)[r])
+        size = np.linalg.norm(free.residues[[weaker, kept]], axis=1) / np.linalg.norm(free.residues[[weaker, kept]], axis=1).sum()
+        both, free = free, refine(lines, project(lines, np.delete(free.poles, weaker)))
+        if better(lines, both, free):
+            spread.append((both.poles[kept], (both.poles[weaker] - both.poles[kept]) * np.sqrt(size.prod())))
+
+
+def same_mode(lines: Lines, poles: ComplexArray, shape: ComplexArray, alike: float) -> NDArray[np.bool_]:
+    """(m, m), upper triangle: pairs of poles closer than their half-width or a line, with shapes (m, n_resp) that are `alike` by MAC."""
+    width = np.maximum((poles.real[:, None] + poles.real) / -2, np.diff(lines.s.imag).min())
+    return np.triu((np.abs(poles[:, None] - poles) < width) & (mac(shape, shape) > alike), 1)
+
+
+def start_rank_one(lines: Lines, free: Fit) -> Fit:
+    """The believed modes as products of shape and participation, overlapping ones together, from a fit with free residues."""
+    responses, references, _ = lines.frf.shape
+    first = believed(lines, free.poles)
+    rising = np.flatnonzero(first)[np.argsort(np.abs(free.poles[first]))]
+    edge, width = np.abs(free.poles[rising]), -free.poles[rising].real
+    apart = np.flatnonzero(edge[1:] - edge[:-1] > width[1:] + width[:-1]) + 1
+    parts = [realise(free.poles[i], free.residues[i].reshape(-1, responses, references)) for i in np.split(rising, apart)]
+    poles, shape, participation = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return project(lines, np.append(poles, free.poles[~first]), shape, participation)
+
+
+def _modes(
+    lines: Lines,
+    fit: Fit,
+    rank_one: bool,
+    twice: list[tuple[complex, complex]],
+    unit: float,
+    given: bool,
+    functions: tuple[int, int],
+) -> Modes:
+    """Physical units, standard errors, and the choice of what is reported."""
+    responses, references = functions
+    m, a, width = len(fit.poles), *fit.shape.shape
+    # inverse of the information matrix by its eigenvectors, scaled to a unit diagonal first: parameters differ by many powers of ten
+    matrix, _ = information(lines, fit)
+    size = np.sqrt(np.abs(np.diag(matrix)))
+    known, directions = np.linalg.eigh(matrix / size / size[:, None])
+    directions = directions / size[:, None] / np.sqrt(np.maximum(known, 1e-12))  # what is not known at all gets a huge error
+    covariance = directions @ directions.T * fit.scale()
+    half = len(size) // 2  # unknowns are complex: real parts first, then imaginary ones
+
+    poles = fit.poles[:a]
+    radius, angle = np.abs(poles), np.exp(1j * np.angle(poles))
+    # d|p| and d(-Re p / |p|) by Re p and Im p of the pole p = |p| exp(i angle)
+    to_frequency = np.hstack([np.diag(angle.real), np.diag(angle.imag)]) * unit / (2 * np.pi)
+    to_damping = np.hstack([np.diag(-(angle.imag**2) / radius), np.diag(angle.real * angle.imag / radius)])
+    jacobian = np.vstack([to_frequency, to_damping])
+    both = np.r_[0:a, half : half + a]
+    frequency, damping = radius * unit / (2 * np.pi), -angle.real
+    spread = jacobian @ covariance[both[:, None], both] @ jacobian.T
+
+    residues = np.einsum("ri,rk->rik", fit.shape, fit.participation).reshape(a, responses, references)
+    shape, shape_sd, weight = np.zeros((a, responses), complex), np.zeros((a, responses)), np.zeros(a)
+    for r in range(a):
+        # shape as the references excite it together: the leading right singular vector weighs them by their participation
+        weights = np.linalg.svd(residues[r])[2][0].conj()
+        gather = np.eye(width) if width == responses else np.kron(np.eye(responses), weights)
+        raw = gather @ fit.shape[r]
+        largest = np.abs(raw).argmax()
+        shape[r] = raw / raw[largest]
+        shape[r, largest] = 1
+        # derivative of raw / raw[largest], so the standard errors are those of the normalised shape
+        relative = (gather - np.outer(shape[r], gather[largest])) / raw[largest]
+        x = np.searchsorted(varied(fit), m + r * width + np.arange(width))
+        real, imag = np.ix_(x, x), np.ix_(half + x, half + x)
+        cross = covariance[np.ix_(half + x, x)]
+        hermitian = covariance[real] + covariance[imag] + 1j * (cross - cross.T)
+        shape_sd[r] = np.sqrt(np.einsum("ij,jk,ik->i", relative, hermitian, relative.conj()).real.clip(0))
+        x, known = np.append(x, half + x), np.append(fit.shape[r].real, fit.shape[r].imag)
+        weight[r] = known @ matrix[np.ix_(x, x)] @ known / fit.scale()
+
+    sd = np.sqrt(np.diag(spread))
+    cost = 2 * (fit.shape.shape[1] + fit.participation.shape[1]) * np.log(lines.count)
+    sure = (sd[:a] < damping * frequency) & (sd[a:] < damping / 2) & (weight > FAINT * cost)
+    moved = 0
+    for pole, offset in twice:
+        near = np.flatnonzero(np.abs(poles - pole) < -pole.real)
+        if len(near) == 1:  # else the two turned out to be modes of different shape
+            way = jacobian[:, [near[0], a + near[0]]] @ [offset.real, offset.imag]
+            spread += np.outer(way, way)
+            moved += 1
+    keep = np.flatnonzero(sure)[np.argsort(frequency[sure])]
+    kept = np.append(keep, a + keep)
+    chi2 = fit.chi2 / (lines.count - fit.unknowns)
+    words = ["noise as given" if given else "noise estimated from neighbouring lines"]
+    words += [f"chi-square {chi2:.3g} per degree of freedom" + (", errors enlarged by its root" if chi2 > 1 else "")]
+    words += [] if rank_one else ["residues of rank one refused by the data, left free"]
+    words += [f"{moved} modes at two places with one shape, errors enlarged by their distance"] if moved else []
+    words += [f"{np.sum(~sure)} faint or uncertain poles not reported"] if not sure.all() else []
+    edges = np.round(lines.s.imag[[0, -1]] * unit / (2 * np.pi), 6)
+    return Modes(
+        frequency[keep],
+        damping[keep],
+        spread[kept[:, None], kept],
+        shape[keep],
+        shape_sd[keep],
+        residues[keep] * unit ** (1 - lines.power),
+        chi2,
+        (np.abs(fit.residual) ** 2).mean(1).reshape(responses, references) / 2,
+        (float(edges[0]), float(edges[1]), len(lines.s)),
+        rank_one,
+        "; ".join(words),
+    )

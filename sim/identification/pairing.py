@@ -1,0 +1,190 @@
+"""Which mode of one set is which of another: one cost, one assignment, and the policies of those who ask.
+
+Let a and b be modes with frequencies f and shapes phi. A pair costs
+
+    1 - MAC(phi_a, phi_b)  +  (1 - S) / 2  +  |ln(f_b / f_a) / width|^power  +  a penalty for another kind,
+
+and all pairs are chosen at once, so that their total cost, plus `alone` for every two modes that stay alone, is least (an assignment
+problem). S, the likeness of subspaces, counts only where a policy has a `mixing` distance: modes closer than that turn within the space
+they span with the least change of the structure, so that no single shape of a close pair can be trusted. A `Policy` holds these numbers;
+who needs others makes another one, with the reason beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import linear_sum_assignment
+
+from thermospindle.model.rotor.modes import Mode
+from thermospindle.model.types import Array, ComplexArray
+
+
+@dataclass(frozen=True)
+class Policy:
+    """What makes two modes the same.
+
+    `power` 2 forgives small frequency changes; 1 keeps a few that lie far off from moving all the others by one place.
+    """
+
+    width: float  # natural logarithm of a frequency ratio that costs as much as shapes without likeness
+    power: int = 2
+    alone: float = 1e6  # cost of a pair from which both modes rather stay alone; the default pairs as many as there are
+    limit: float = np.inf  # |ln frequency ratio| from which a chosen pair is dropped again
+    mixing: float = 0.0  # relative distance below which modes mix their shapes, so that the space they span counts too
+    other_kind: float = 0.0  # penalty of a pair of which one mode is axial and the other is not; infinity forbids it
+    kind: float = 0.0  # penalty of a pair of different kinds, where shapes are not known
+
+
+FOLLOWED = Policy(width=0.1)
+"""Modes of one model at two conditions: as many as there are go on; modes that cross keep their shapes."""
+FOLLOWED_BY_KIND = Policy(width=0.1, other_kind=np.inf)
+"""The same, and what is axial stays axial."""
+IDENTIFIED = Policy(width=0.02, limit=0.02)
+"""Modes identified in a virtual test, and those of the model that was tested: they differ by the identification's error only."""
+MEASURED = Policy(width=0.3, alone=1.25, mixing=0.03)
+"""Modes measured at two conditions, of which either may lack some; shapes without likeness in spaces without likeness cost 1.5."""
+COMPARED = Policy(width=0.08, power=1, alone=4.0, kind=3.0)
+"""Measured modes and those of a model that may be wrong."""
+NEARBY = Policy(width=1e-3, power=1)
+"""Modes of one model at conditions so close that frequencies hardly move, as for a difference quotient."""
+
+
+@dataclass(frozen=True, eq=False)
+class ModeSet:
+    """Modes of one condition. m modes at n places: `frequency` (m,) Hz, `shape` (m, n) or None, `kind` (m,) or none known."""
+
+    frequency: Array
+    shape: ComplexArray | None = None
+    kind: Sequence[str] = ()
+
+
+def mac(a: ArrayLike, b: ArrayLike) -> Array:
+    """Modal assurance criterion (ma, mb) of complex shapes (ma, n) and (mb, n): |a^H b|^2 / (a^H a b^H b); zero for a shape that is zero.
+
+    Allemang & Brown, Proc. 1st IMAC (1982) 110.
+    """
+    first, second = (x / np.maximum(np.linalg.norm(x, axis=1, keepdims=True), 1e-300) for x in (np.asarray(a), np.asarray(b)))
+    return np.asarray(np.abs(first.conj() @ second.T) ** 2, float)
+
+
+def subspace_mac(frequency: Array, shape: ComplexArray, others: ComplexArray, mixing: float) -> Array:
+    """Part (m, o) of each of `others` (o, n) that lies in the space spanned by each mode (m, n) and those within `mixing` of it."""
+    rows = []
+    for f in frequency:
+        basis = np.linalg.qr(shape[np.abs(frequency / f - 1) < mixing].T)[0]
+        rows.append((np.abs(basis.conj().T @ others.T) ** 2).sum(0) / (np.abs(others) ** 2).sum(1))
+    return np.reshape(rows, (len(frequency), len(others)))
+
+
+def cost(a: ModeSet, b: ModeSet, policy: Policy) -> Array:
+    """Cost (ma, mb) of every pair. Without shapes on either side, kinds stand for them."""
+    ratio = np.log(b.frequency / np.asarray(a.frequency)[:, None])
+    total = np.abs(ratio / policy.width) ** policy.power
+    if a.shape is not None and b.shape is not None:
+        total += 1 - mac(a.shape, b.shape)
+        if policy.mixing:
+            # the larger of: b in the space of a's neighbours, a in the space of b's
+            space = subspace_mac(a.frequency, a.shape, b.shape, policy.mixing)
+            back = subspace_mac(b.frequency, b.shape, a.shape, policy.mixing).T
+            total += (1 - np.maximum(space, back)) / 2
+    elif policy.kind:
+        total += policy.kind * (np.array(a.kind)[:, None] != np.array(b.kind)[None, :])
+    if policy.other_kind:
+        axial = [np.array([k == "axial" for k in modes.kind], bool) for modes in (a, b)]
+        total[axial[0][:, None] != axial[1]] += policy.other_kind
+    return total
+
+
+def pairs(a: ModeSet, b: ModeSet, policy: Policy) -> NDArray[np.intp]:
+    """(p, 2) indices of the same mode in `a` and in `b`; modes without a partner are left out.
+
+    The matrix is padded so that each mode may also be left alone, at half of `alone`, which makes it an assignment without conditions.
+    """
+    na, nb = len(a.frequency), len(b.frequency)
+    if not na or not nb:
+        return np.zeros((0, 2), np.intp)
+    padded = np.full((na + nb, na + nb), policy.alone / 2)
+    padded[:na, :nb], padded[na:, nb:] = cost(a, b, policy), 0.0
+    rows, columns = linear_sum_assignment(padded)
+    chosen = np.stack([rows, columns], 1)[(rows < na) & (columns < nb)]
+    distance = np.abs(np.log(b.frequency[chosen[:, 1]] / a.frequency[chosen[:, 0]]))
+    return np.asarray(chosen[distance < policy.limit], np.intp)
+
+
+def partners(a: ModeSet, b: ModeSet, policy: Policy) -> NDArray[np.intp]:
+    """(ma,) index into `b` of the partner of every mode of `a`, -1 without one."""
+    return as_partners(pairs(a, b, policy), len(a.frequency))
+
+
+def as_partners(paired: NDArray[np.intp], count: int) -> NDArray[np.intp]:
+    """Pairs (p, 2) as the partner (count,) of every first one, -1 without one."""
+    partner = np.full(count, -1)
+    partner[paired[:, 0]] = paired[:, 1]
+    return partner
+
+
+def in_order(partner: NDArray[np.intp], a: ModeSet, b: ModeSet, close: float, trusted: float | None = None) -> NDArray[np.intp]:
+    """Partners (ma,) with those of close modes put in the order of their frequencies.
+
+    Modes of `a`, whose frequencies rise, that are less than `close` apart (ln frequency) and whose partners are not axial turn in their
+    plane, and their shapes there are chance. `trusted`: groups of which every member's 1 - MAC with its partner is less stay as they
+    are, for modes with reliable shapes may cross.
+    """
+    partner = np.array(partner)
+    free = np.array([i for i, j in enumerate(partner) if j >= 0 and b.kind[j] != "axial"], int)
+    if not len(free):
+        return partner
+    for group in np.split(free, np.flatnonzero(np.diff(np.log(a.frequency[free])) > close) + 1):
+        if trusted is not None and a.shape is not None and b.shape is not None:
+            unlike = 1 - np.diag(mac(a.shape[group], b.shape[partner[group]]))
+            if (unlike < trusted).all():
+                continue
+        partner[group] = partner[group][np.argsort(b.frequency[partner[group]])]
+    return partner
+
+
+def track(conditions: Sequence[ModeSet], policy: Policy = MEASURED) -> NDArray[np.intp]:
+    """(conditions, tracks) index of each mode in each condition, -1 where it was not found.
+
+    Every condition is paired with the latest appearance of each track, so neighbours in the list should be neighbours in nature.
+    """
+    table = np.zeros((0, 0), np.intp)
+    shapes = [np.asarray(c.shape) for c in conditions]
+    frequency, shape = np.zeros(0), np.zeros((0, shapes[0].shape[1]), complex)
+    for modes, own in zip(conditions, shapes, strict=True):
+        row = partners(ModeSet(frequency, shape), modes, policy)
+        new = np.setdiff1d(np.arange(len(modes.frequency)), row)
+        table = np.pad(table, ((0, 0), (0, len(new))), constant_values=-1)
+        table = np.vstack([table.reshape(-1, len(row) + len(new)), np.append(row, new)])
+        found = np.flatnonzero(row >= 0)
+        frequency[found], shape[found] = modes.frequency[row[found]], own[row[found]]
+        frequency, shape = np.append(frequency, modes.frequency[new]), np.vstack([shape, own[new]])
+    return table
+
+
+# ---------------------------------------------------------------- modes of a model
+
+
+def weighted(mass: Array, modes: Sequence[Mode]) -> ModeSet:
+    """Modes of a model with their shapes times the root of its diagonal mass (n, n): then the MAC of two modes of one model is zero."""
+    root = np.sqrt(np.diag(mass))
+    return ModeSet(np.array([m.frequency for m in modes]), np.array([m.shape * root for m in modes]), [m.kind for m in modes])
+
+
+def follow(mass: Array, first: Sequence[Mode], then: Sequence[Mode], policy: Policy = FOLLOWED) -> list[int]:
+    """Index into `then` of the partner of every mode of `first`, both of a model with the mass matrix (n, n); -1 without one."""
+    return [int(j) for j in partners(weighted(mass, first), weighted(mass, then), policy)]
+
+
+def by_kind(known: Sequence[tuple[str, float]], kinds: Sequence[str]) -> dict[int, int]:
+    """Index among computed modes, whose `kinds` stand in order of frequency, by index of each `known` (kind, frequency): the
+    k-th of a kind is the k-th of this kind. For modes measured or published without shapes."""
+    found: dict[int, int] = {}
+    for kind in dict.fromkeys(k for k, _ in known):
+        own = sorted((i for i, (k, _) in enumerate(known) if k == kind), key=lambda i: known[i][1])
+        found |= dict(zip(own, (i for i, k in enumerate(kinds) if k == kind), strict=False))
+    return dict(sorted(found.items()))

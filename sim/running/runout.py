@@ -1,0 +1,236 @@
+"""Runout of a turning spindle: what probes at points in space see, what of it repeats, which lines it holds and why.
+
+A probe is fixed in space and looks at a part of the spindle: across the axis at the side of the hub, and along the axis at its centre, near the top
+of it, besides the scene's own measuring points. The looked-at surface is round and true, so that the probe shows the axis and nothing
+else. Signals come from a running simulation (`measured`) or, for the steady state of the same condition, from the exact harmonic answer of the
+linear model (`linear`). Both paths show the same; the first also shows what a ball-by-ball bearing adds.
+
+Quoted as RRO and NRRO are peak to valley values of the record: the more revolutions, the larger the NRRO's, since its lines
+come into step sooner or later, so a value goes with its number of revolutions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from thermospindle.model.bearing.kinematics import Line, lines, row_kinematics
+from thermospindle.model.errors import BadInput
+from thermospindle.model.imperfections import Imperfections
+from thermospindle.model.machine import Point, Spindle
+from thermospindle.model.rotor.chain import RotorBase, motion_rows
+from thermospindle.model.types import Array, ComplexArray
+from thermospindle.sim.operating import OperatingPoint
+from thermospindle.sim.running.excitation import Harmonics, harmonics, response
+from thermospindle.sim.running.lines import Fit, FoundLine, find_lines
+from thermospindle.sim.running.revolutions import (
+    ErrorMotion,
+    Revolutions,
+    error_motion,
+    from_orders,
+    leakage,
+    revolutions,
+    turning_frequency,
+)
+from thermospindle.sim.running.run import RunningRecord, run_spindle
+
+X, Y, AXIAL = "hub x", "hub y", "hub axial"
+BELOW_TOP = 0.1  # of the height of the hub's highest region: where the radial probes look
+SHORTEST, REVOLUTIONS = 0.5, 12
+"""A record lasts at least half a second and so many revolutions, unless asked for otherwise."""
+SAMPLE_RATE = 20000.0  # Hz, ten samples a period of the highest lines of a small spindle
+
+
+@dataclass(frozen=True)
+class Probe:
+    """A displacement probe fixed in space: it looks along `direction` (unit vector) at `position` (m) of a body."""
+
+    name: str
+    body: str
+    position: tuple[float, float, float]
+    direction: tuple[float, float, float]
+
+    @property
+    def radial(self) -> bool:
+        """Whether it looks across the axis."""
+        return abs(self.direction[2]) < 0.5
+
+    def row(self, chain: RotorBase) -> Array:
+        """Row (n,) of the displacement it sees of the chain's motion."""
+        return np.asarray(np.array(self.direction) @ motion_rows(chain, self.body, self.position)[:3])
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """What the probes see: `value` (probes, n) m at `time` (n,) s, when the turning part stands at `angle` (n,) rad, and the whole motion
+    (n, dofs) of the chain from which they see it."""
+
+    probes: tuple[Probe, ...]
+    time: Array
+    angle: Array
+    value: Array
+    motion: Array
+
+    def of(self, name: str) -> Array:
+        """The signal (n,) of a probe."""
+        return np.asarray(self.value[[p.name for p in self.probes].index(name)])
+
+
+@dataclass(frozen=True, eq=False)
+class Runout:
+    """One record of whole revolutions analysed. `lines`: of the hub's three probes, strongest first; `fit`: of all."""
+
+    point: OperatingPoint
+    signals: Signals
+    turning: float  # Hz, signed
+    averaged: Revolutions  # RRO by averaging over the revolutions
+    lines: tuple[FoundLine, ...]
+    fit: Fit
+
+    def values(self, cut: Revolutions | None = None) -> dict[str, ErrorMotion]:
+        """What is quoted of every probe, by name; of the RRO by lines, or of another."""
+        cut = self.by_lines if cut is None else cut
+        return {p.name: error_motion(cut, i, p.radial) for i, p in enumerate(self.signals.probes)}
+
+    @cached_property
+    def by_lines(self) -> Revolutions:
+        """The same revolutions with the RRO made of the lines at whole orders alone, which the other lines do not leak into."""
+        rate = abs(self.turning)
+        orders = np.round(self.fit.frequency / rate).astype(int)
+        whole = np.abs(self.fit.frequency - orders * rate) < 1e-9 * rate
+        start = np.sign(self.turning) * (self.signals.angle[0] - 2 * np.pi * self.turning * self.signals.time[0])
+        at_zero = self.fit.phasor[:, whole] * np.exp(-1j * orders[whole] * start)
+        mean = self.fit.mean[:, None] + from_orders(self.averaged.angle, at_zero, orders[whole].tolist())
+        return replace(self.averaged, repeatable=mean)
+
+    @cached_property
+    def leaked(self) -> Array:
+        """Largest (probes,) m by which lines between the whole orders can have changed the averaged RRO: the sum of what each leaves in it."""
+        orders = self.fit.frequency / abs(self.turning)
+        gain = np.where(np.abs(orders - np.round(orders)) < 1e-9, 0.0, np.abs(leakage(orders, self.averaged.count)))
+        return np.asarray(np.abs(self.fit.phasor) @ gain)
+
+
+# ---------------------------------------------------------------- probes
+
+
+def hub_probes(spindle: Spindle) -> tuple[Probe, Probe, Probe]:
+    """Across the axis along x and y, at the side of the turning body's highest region a tenth of its height below the top, and along the
+    axis, at the centre of its top face."""
+    body = next((b for b in spindle.structure.bodies if b.turns), None)
+    if body is None or not body.regions:
+        raise BadInput(f"{spindle.file or spindle.name}: structure.bodies: runout needs a turning body made of section regions, to look at")
+    top = max((spindle.region(name) for name in body.regions), key=lambda g: (g.z[1], g.r[1]))
+    radius, height = top.r[1], top.z[1] - BELOW_TOP * (top.z[1] - top.z[0])
+    return (
+        Probe(X, body.name, (radius, 0.0, height), (1.0, 0.0, 0.0)),
+        Probe(Y, body.name, (0.0, radius, height), (0.0, 1.0, 0.0)),
+        Probe(AXIAL, body.name, (0.0, 0.0, top.z[1]), (0.0, 0.0, 1.0)),
+    )
+
+
+def all_probes(spindle: Spindle) -> tuple[Probe, ...]:
+    """The hub's three probes, then one at every measuring point of the scene."""
+
+    def at(p: Point) -> Probe:
+        return Probe(f"{p.node} {p.name}", p.body, p.position, p.direction)
+
+    return (*hub_probes(spindle), *(at(p) for p in spindle.points))
+
+
+def probe_rows(point: OperatingPoint, probes: Sequence[Probe]) -> Array:
+    """Rows (probes, n) of what probes see of the chain's motion."""
+    return np.array([p.row(point.chain) for p in probes])
+
+
+# ---------------------------------------------------------------- signals
+
+
+def measured(record: RunningRecord, probes: Sequence[Probe]) -> Signals:
+    """What probes see in a running simulation."""
+    value = probe_rows(record.point, probes) @ record.displacement.T
+    return Signals(tuple(probes), record.time, record.angle, value, record.displacement)
+
+
+def linear(point: OperatingPoint, probes: Sequence[Probe], time: Array, excited: Harmonics | None = None) -> Signals:
+    """What probes see in the steady state of the linear model, at `time` (n,) s."""
+    excited = harmonics(point) if excited is None else excited
+    motion = np.zeros((len(time), len(point.chain.dofs)))
+    for phasor, frequency in zip(response(point, excited), excited.frequency, strict=True):
+        turned = 2 * np.pi * frequency * time
+        motion += np.outer(np.cos(turned), phasor.real) - np.outer(np.sin(turned), phasor.imag)
+    return Signals(tuple(probes), time, point.condition.speed * time, probe_rows(point, probes) @ motion.T, motion)
+
+
+def whole_turns(point: OperatingPoint) -> int:
+    """Default number of revolutions of a record: between once and twice the shortest record, where the lines leak least into their mean."""
+    rate = abs(point.condition.speed) / (2 * np.pi)
+    fewest = int(np.ceil(max(SHORTEST * rate, REVOLUTIONS) - 1e-9))
+    known, phasor = _known(point)
+    size = np.abs(phasor @ probe_rows(point, hub_probes(point.spindle)).T).max(axis=1)
+    orders = np.array([line.frequency for line in known]) / rate
+    size[np.abs(orders - np.round(orders)) < 1e-9] = 0.0
+    counts = range(fewest, 2 * fewest + 1)
+    return min(counts, key=lambda count: float(size @ np.abs(leakage(orders, count))))
+
+
+def sampling_rate(point: OperatingPoint) -> float:
+    """Lowest sample rate (Hz) the integration step divides, of at least 20 kHz and eight samples a period of the highest line looked for."""
+    wanted = max(SAMPLE_RATE, 8 * max(line.frequency for line in _known(point)[0]))
+    step = point.spindle.hammer.step
+    return 1 / (step * max(1, int(1 / (wanted * step) + 1e-9)))
+
+
+# ---------------------------------------------------------------- analysis
+
+
+def analyse(point: OperatingPoint, signals: Signals) -> Runout:
+    """Runout, lines and their causes of a record at constant speed, whose first probes are the hub's, and whose clock starts with the turning
+    part at angle 0 (else the predicted sums of lines that beat are those of another moment).
+
+    ValueError if the speed is not constant or the record is shorter than a revolution or too coarse for the lines looked for.
+    """
+    turning = turning_frequency(signals.time, signals.angle)
+    cut = revolutions(signals.time, signals.angle, signals.value)
+    known, phasor = _known(point)
+    predicted = phasor @ probe_rows(point, signals.probes[:3]).T
+    whole = slice(int(np.searchsorted(signals.time, signals.time[0] + cut.count / abs(turning) * (1 - 1e-12))))
+    found, fitted = find_lines(signals.time[whole], signals.value[:, whole], turning, known, predicted)
+    return Runout(point, signals, turning, cut, found, fitted)
+
+
+def _known(point: OperatingPoint) -> tuple[tuple[Line, ...], ComplexArray]:
+    """All lines of theory, those that the point's imperfections excite first, and their phasors (lines, dofs) m: 0 for the others."""
+    excited = harmonics(point)
+    theory = lines(point.spindle, row_kinematics(point.spindle, point.state))
+    others = [line for line in theory if line not in set(excited.line)]
+    nothing = np.zeros((len(others), len(point.chain.dofs)))
+    return (*excited.line, *others), np.vstack([response(point, excited), nothing])
+
+
+def runout(point: OperatingPoint, seconds: float | None = None, element: str = "linear", path: str = "simulated") -> Runout:
+    """Runout at an operating point from a record of `seconds`; `path` is simulated (MuJoCo) or linear (harmonic answer).
+
+    BadInput at rest, and for a record shorter than two revolutions.
+    """
+    speed = point.condition.speed
+    if speed == 0:
+        raise BadInput("--speed 0: a spindle at rest has no runout; give a speed in rpm")
+    turn = 2 * np.pi / abs(speed)
+    if seconds is not None and seconds < 2 * turn:
+        raise BadInput(f"--seconds {seconds:g}: at {60 / turn:g} rpm the record needs at least two revolutions, {2 * turn:.3g} s")
+    count = whole_turns(point) if seconds is None else int(seconds / turn + 1e-9)
+    rate, probes = sampling_rate(point), all_probes(point.spindle)
+    samples = int(np.ceil(count * turn * rate)) + 2  # the last revolution ends between two samples
+    if path == "linear":
+        return analyse(point, linear(point, probes, np.arange(samples) / rate))
+    [record] = run_spindle([point], samples / rate, rate, element=element)
+    return analyse(point, measured(record, probes))
+
+
+def with_imperfections(spindle: Spindle, imperfections: Imperfections) -> Spindle:
+    """The spindle with other imperfections than the scene's."""
+    return replace(spindle, imperfections=imperfections)

@@ -1,0 +1,219 @@
+"""`python -m tests.blind.score FILE ...`: what a diagnosis is worth where the truth is known, printed and written to docs/blind.txt.
+
+Shares have Clopper and Pearson's 95 % interval (*Biometrika* 26 (1934) 404). The log score is the mean of ln of the probability that was stated
+for the truth, no less than ln 0.001 each (Good, *J. R. Statist. Soc. B* 14 (1952) 107). A hidden piece counts as visible where its change of the
+FRFs is at least twice sqrt(10) standard errors, after what tolerances could take of it: sqrt(10) is 5 in ln evidence.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+from collections import Counter
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from scipy.stats import binomtest
+
+from tests.blind.study import KINDS, RESULTS, ROOT, read
+
+Row = dict[str, Any]
+OUTCOMES = ("right", "in the set", "half", "unexplained", "missed", "wrong", "false alarm", "error")
+VISIBLE = 2 * np.sqrt(10.0)
+LEAST = 1e-3
+BINS = (0.0, 0.2, 0.5, 0.8, 0.95, 0.99, 1.0)
+DOCS = ROOT / "docs" / "blind.txt"
+
+
+def outcome(row: Row) -> str:
+    """right: nothing said of nothing, all names of what is hidden, or `unexplained` of what is in no catalogue; half: one of two, and no
+    other; unexplained: of what a name stands for; wrong: any name that is none of the truth's, or a set without all of it."""
+    verdict, named = row["verdict"], set(row["effects"])
+    if verdict == "error":
+        return "error"
+    if row["kind"] == "nothing":
+        return "right" if verdict == "none" else "false alarm"
+    if verdict == "none":
+        return "missed"
+    if row["kind"] == "outside":
+        return "right" if verdict == "unexplained" else "wrong"
+    if verdict == "unexplained":
+        return "unexplained"
+    there = [bool(named & set(names)) for names in row["truth"]]
+    if verdict == "ambiguous":
+        return "in the set" if all(there) else "half" if any(there) else "wrong"
+    if named <= {n for names in row["truth"] for n in names}:
+        return "right" if all(there) else "half"
+    return "wrong"
+
+
+def visible(row: Row) -> bool:
+    return bool(row["visibility"]) and min(row["visibility"]) >= VISIBLE
+
+
+def element_found(row: Row) -> bool:
+    """Whether the first free-form answer is of the element that changes: either name begins the other, or holds it."""
+    if not row["drifts"]:
+        return False
+    told = row["drifts"][0][0]
+    return any(e.split()[0] in told or told.split()[0] in e for e in row["elements"])
+
+
+def truth_probability(row: Row) -> float:
+    """What was stated for the truth: nothing, something unknown, or candidates whose names are all right and all of the truth's."""
+    if row["kind"] == "nothing":
+        return float(row["probability"]["none"])
+    if row["kind"] == "outside":
+        return float(row["probability"]["unknown"])
+    return float(sum(c["probability"] for c in row["candidates"] if true_names(row, c["effects"])))
+
+
+def true_names(row: Row, names: Sequence[str]) -> bool:
+    return len(names) == len(row["truth"]) and all(set(names) & set(t) for t in row["truth"])
+
+
+def most_probable(row: Row) -> tuple[float, bool]:
+    """The most probable answer's stated probability, and whether it is true."""
+    answers = [(row["probability"]["none"], row["kind"] == "nothing"), (row["probability"]["unknown"], row["kind"] == "outside")]
+    answers += [(c["probability"], row["kind"] in ("one", "two") and true_names(row, c["effects"])) for c in row["candidates"]]
+    return max(answers, key=lambda a: a[0])
+
+
+def interval(k: int, n: int) -> tuple[float, float]:
+    """Clopper and Pearson's, 95 %."""
+    found = binomtest(k, n).proportion_ci(0.95, "exact")
+    return float(found.low), float(found.high)
+
+
+def share(rows: Sequence[Row], true: Callable[[Row], bool]) -> str:
+    if not rows:
+        return "none yet"
+    k = sum(map(true, rows))
+    low, high = interval(k, len(rows))
+    return f"{k} of {len(rows)} ({k / len(rows):.0%}; {low:.0%} to {high:.0%})"
+
+
+def failure(row: Row) -> str:
+    """One line: what was hidden, what was said, and what can be seen of why."""
+    hidden = " + ".join(
+        f"{h} {s:.3g} {u} ({law}; {v:.0f} sd)"
+        for h, s, u, law, v in zip(row["hidden"], row["sizes"], row["units"], row["laws"], row["visibility"], strict=True)
+    )
+    said = " ".join([row["verdict"], *row["effects"]])
+    if row["verdict"] == "error":
+        return f"{row['seed']} {Path(row['scene']).name}: {hidden or 'nothing'}: {row['error']}"
+    why = [f"rms {row['rms'][0]:.1f} > {row['rms'][1]:.1f}"]
+    right = next((i for i, c in enumerate(row["candidates"]) if row["truth"] and true_names(row, c["effects"])), None)
+    if row["kind"] in ("one", "two"):
+        best = max((c["delta_evidence"] for c in row["candidates"]), default=0.0)
+        why.append(
+            "truth no candidate"
+            if right is None
+            else f"truth is number {right + 1}, {row['candidates'][right]['delta_evidence'] - best:.0f} from the best name"
+        )
+    if row["drifts"]:
+        why.append("drifts " + ", ".join(f"{e} {g:.0f}" for e, g in row["drifts"][:2]))
+    return f"{row['seed']} {Path(row['scene']).name}: {hidden or 'nothing'}: {said} [{'; '.join(why)}; {_world(row)}]"
+
+
+def _world(row: Row) -> str:
+    w, r = row["world"], row["record"]
+    told = [
+        f"stiffness {w['stiffness_error']:.1%} and damping {w['damping_error']:.1%} of modes wrong",
+        f"grooves {w['grooves_follow_faces']:.1f}",
+        "weak mode" if w["weak_mode"] else "no weak mode",
+    ]
+    return ", ".join(
+        [
+            *told,
+            f"{r['kind']}, {r['told']} told, leakage {row['leakage']:.1f} sd",
+            f"frequencies learned as {row['learned']['frequency_discrepancy']:.1%} wrong",
+        ]
+    )
+
+
+def show(console: Console, rows: Sequence[Row]) -> None:
+    rows = sorted(rows, key=lambda r: r["seed"])
+    without = sorted({w for r in rows for w in r.get("without", [])})
+    commits = ", ".join(sorted({r["commit"] for r in rows}))
+    console.print(
+        f"{len(rows)} campaigns, seeds {_ranges([r['seed'] for r in rows])}, commit {commits}"
+        + (f", without {', '.join(without)}" if without else "")
+    )
+    grid = Table("hidden", "campaigns", *OUTCOMES, "log score")
+    for kind in (*KINDS, "all"):
+        own = [r for r in rows if kind in ("all", r["kind"])]
+        count = Counter(map(outcome, own))
+        score = f"{np.mean([np.log(max(truth_probability(r), LEAST)) for r in own]):.2f}" if own else ""
+        grid.add_row(kind, str(len(own)), *(str(count[o] or "") for o in OUTCOMES), score)
+    console.print(grid)
+    told = [r for r in rows if r["verdict"] != "error"]
+    inside = [r for r in told if r["kind"] in ("one", "two")]
+    seen = [r for r in inside if visible(r)]
+    outside = [r for r in told if r["kind"] == "outside" and visible(r)]
+    sets = [r for r in told if r["verdict"] == "ambiguous"]
+    console.print(f"error instead of an answer: {share(rows, lambda r: r['verdict'] == 'error')}")
+    console.print(
+        f"false alarm, nothing hidden: {share([r for r in told if r['kind'] == 'nothing'], lambda r: outcome(r) == 'false alarm')}"
+    )
+    console.print(f"  with a name: {share([r for r in told if r['kind'] == 'nothing'], lambda r: bool(r['effects']))}")
+    console.print(f"truth in the verdict, visible: {share(seen, lambda r: outcome(r) in ('right', 'in the set'))}")
+    console.print(f"  one hidden: {share([r for r in seen if r['kind'] == 'one'], lambda r: outcome(r) in ('right', 'in the set'))}")
+    console.print(f"  two hidden: {share([r for r in seen if r['kind'] == 'two'], lambda r: outcome(r) in ('right', 'in the set'))}")
+    console.print(f"wrong name, something of the catalogue hidden: {share(inside, lambda r: outcome(r) == 'wrong')}")
+    console.print(f"unexplained, outside and visible: {share(outside, lambda r: outcome(r) == 'right')}")
+    console.print(f"  and the right element first: {share(outside, lambda r: outcome(r) == 'right' and element_found(r))}")
+    console.print(f"sets of at most three: {share(sets, lambda r: len(r['effects']) <= 3)}")
+    for scene in sorted({r["scene"] for r in rows}):
+        own = [r for r in rows if r["scene"] == scene]
+        console.print(f"right or in the set, {Path(scene).name}: {share(own, lambda r: outcome(r) in ('right', 'in the set'))}")
+    table = Table("most probable answer's probability", "campaigns", "mean stated", "came true")
+    said = [most_probable(r) for r in told]
+    for low, high in pairwise(BINS):
+        own_bin = [a for a in said if low <= a[0] < high or (high == 1.0 and a[0] >= 1.0)]
+        if own_bin:
+            k = sum(true for _, true in own_bin)
+            a, b = interval(k, len(own_bin))
+            table.add_row(f"{low:g} to {high:g}", str(len(own_bin)), f"{np.mean([p for p, _ in own_bin]):.3f}", f"{k} ({a:.0%} to {b:.0%})")
+    console.print(table)
+    if seconds := [r["seconds"] for r in rows]:
+        console.print(f"seconds a diagnosis: median {np.median(seconds):.0f}, largest {max(seconds):.0f}")
+    if sets:
+        console.print(f"names in a set: {dict(sorted(Counter(len(r['effects']) for r in sets).items()))}")
+    console.print("\nfailures:")
+    for r in rows:
+        if outcome(r) not in ("right", "in the set"):
+            console.print(f"- {outcome(r)}: {failure(r)}", markup=False)
+
+
+def _ranges(seeds: Sequence[int]) -> str:
+    found: list[list[int]] = []
+    for s in sorted(seeds):
+        if found and s == found[-1][1] + 1:
+            found[-1][1] = s
+        else:
+            found.append([s, s])
+    return ", ".join(f"{a} to {b}" if b > a else str(a) for a, b in found)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("files", type=Path, nargs="*", default=[RESULTS])
+    parser.add_argument("--out", type=Path, default=DOCS)
+    options = parser.parse_args()
+    rows = read(options.files)
+    if not rows:
+        raise SystemExit(f"{', '.join(map(str, options.files))}: no rows there; python -m tests.blind.study --seeds A B makes some")
+    show(Console(width=160), rows)
+    text = io.StringIO()
+    show(Console(file=text, width=160), rows)
+    options.out.write_text(text.getvalue(), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

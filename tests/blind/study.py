@@ -1,0 +1,165 @@
+"""`python -m tests.blind.study --seeds A B [--out FILE.jsonl]`: campaigns A to B - 1, made and diagnosed, a line of JSON each.
+
+A seed is a campaign, wherever and whenever it is run: scene, tests, world, hidden physics and noise follow from it. Seeds that are in the file
+already are passed over, so that the study can be stopped and goes on where it was.
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import argparse
+import json
+import subprocess
+import time
+import traceback
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tests.blind.hidden import Hidden, Mechanism, mechanisms
+from tests.blind.world import Made, Plan, World, campaign, described, plans, visibility
+from thermospindle.diagnosis.verdict import diagnose
+from thermospindle.model.machine import Spindle
+from thermospindle.model.scene.reading import load
+from thermospindle.report.text.diagnosis import diagnosis_json
+from thermospindle.sim.effects import CATALOGUE, usable
+
+ROOT = Path(__file__).parents[2]
+SCENES = ("scenes/hdd_2003", "tests/scenes/symmetric", "tests/scenes/inner_turning_spring")
+RESULTS = ROOT / "out" / "blind" / "results.jsonl"
+KINDS = ("nothing", "one", "two", "outside")
+SHARES = (1 / 3, 1 - 1 / 3 - 2 / 5, 1 / 5, 1 / 5)
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """What a seed stands for."""
+
+    seed: int
+    kind: str
+    scene: str
+    spindle: Spindle
+    tests: tuple[Plan, ...]
+    hidden: tuple[Hidden, ...]
+
+    def made(self, without: Sequence[str] = ()) -> Made:
+        """The campaign, or one that is the same but for differences of the world left out (fields of `World`)."""
+        made = campaign(self.spindle, self.tests, self.hidden, self.seed)
+        if not without:
+            return made
+        plain = {name: getattr(World(), name) for name in without}
+        return campaign(self.spindle, self.tests, self.hidden, self.seed, replace(made.world, **plain), made.record)
+
+
+def draw(seed: int) -> Drawn:
+    random = np.random.default_rng([seed, 67])
+    kind, scene = str(random.choice(KINDS, p=SHARES)), str(random.choice(SCENES))
+    spindle = load(ROOT / scene)
+    tests = plans(random, spindle)
+    every = mechanisms(spindle, [e.name for e in usable(spindle, CATALOGUE)])
+    named, unnamed = [m for m in every if m.names], [m for m in every if not m.names]
+    chosen: list[Mechanism] = []
+    if kind == "outside":
+        chosen = [unnamed[random.integers(len(unnamed))]]
+    elif kind != "nothing":
+        chosen = [named[random.integers(len(named))]]
+        while len(chosen) < (2 if kind == "two" else 1):
+            other = named[random.integers(len(named))]
+            if set(other.names).isdisjoint(chosen[0].names):
+                chosen.append(other)
+    places = [p.place(spindle) for p in tests]
+    return Drawn(seed, kind, scene, spindle, tests, tuple(m.drawn(random, places) for m in chosen))
+
+
+def judge(seed: int, without: Sequence[str] = ()) -> dict[str, Any]:
+    """Make and diagnose one campaign; an exception of the diagnosis is an outcome too, the verdict `error`."""
+    drawn = draw(seed)
+    row: dict[str, Any] = {
+        "seed": seed,
+        "without": list(without),
+        "kind": drawn.kind,
+        "scene": drawn.scene,
+        "tests": [[p.temperature, round(p.speed * 30 / np.pi)] for p in drawn.tests],
+        "hidden": [h.mechanism for h in drawn.hidden],
+        "sizes": [h.size for h in drawn.hidden],
+        "units": [h.unit for h in drawn.hidden],
+        "laws": [h.law.kind for h in drawn.hidden],
+        "amounts": [[h.amount(p.place(drawn.spindle)) for p in drawn.tests] for h in drawn.hidden],
+        "truth": [list(h.names) for h in drawn.hidden],
+        "elements": [h.element for h in drawn.hidden],
+    }
+    made = drawn.made(without)
+    row |= described(made, drawn.spindle) | {"visibility": visibility(made, drawn.spindle) if drawn.hidden else []}
+    start = time.perf_counter()
+    try:
+        told = diagnosis_json(diagnose(drawn.spindle, made.campaign))
+    except Exception as error:
+        row |= {"verdict": "error", "effects": [], "error": f"{type(error).__name__}: {error}", "trace": traceback.format_exc()[-800:]}
+        return row | {"probability": {"none": 0.0, "unknown": 0.0}, "candidates": [], "drifts": [], "seconds": time.perf_counter() - start}
+    return row | {
+        "verdict": told["verdict"],
+        "effects": told["effects"],
+        "reason": told["reason"],
+        "probability": told["probability"],
+        "candidates": [{k: c[k] for k in ("effects", "probability", "delta_evidence", "chi2_per_number")} for c in told["candidates"]],
+        "drifts": [[p["element"], p["delta_evidence"]] for p in told["where"]],
+        "rms": [told["error"]["before"], told["error"]["after"]],
+        "held_out": [told["error"]["held_out_before"], told["error"]["held_out_after"]],
+        "learned": told["learned"],
+        "noise": sorted(set(told["noise"].values())),
+        "seconds": time.perf_counter() - start,
+    }
+
+
+def commit() -> str:
+    """The commit the study is of, with a + where files differ from it."""
+
+    def git(*words: str) -> str:
+        return subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=False).stdout.strip()
+
+    return git("rev-parse", "--short", "HEAD") + ("+" if git("status", "--porcelain", "--untracked-files=no") else "")
+
+
+def read(files: Sequence[Path]) -> list[dict[str, Any]]:
+    """All rows; a line that was cut off in writing is none."""
+    rows = []
+    for file in files:
+        for line in file.read_text(encoding="utf-8").splitlines() if file.exists() else []:
+            try:
+                rows.append(json.loads(line))
+            except json.JSONDecodeError:
+                continue
+    return rows
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--seeds", type=int, nargs=2, required=True, metavar=("A", "B"))
+    parser.add_argument("--out", type=Path, default=RESULTS)
+    parser.add_argument(
+        "--without", nargs="+", default=[], choices=[f.name for f in fields(World) if f.name != "seed"], help="of the world"
+    )
+    options = parser.parse_args()
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    at = commit()
+    done = {(r["seed"], tuple(r["without"])) for r in read([options.out])}
+    for seed in range(*options.seeds):
+        if (seed, tuple(options.without)) in done:
+            continue
+        row = judge(seed, options.without) | {"commit": at}
+        with options.out.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(row) + "\n")
+        hidden = " + ".join(f"{h} {s:.3g} {u}" for h, s, u in zip(row["hidden"], row["sizes"], row["units"], strict=True)) or "nothing"
+        print(
+            f"{seed} {Path(row['scene']).name}: {hidden}: {row['verdict']} {' '.join(row['effects'])} ({row['seconds']:.0f} s)", flush=True
+        )
+
+
+if __name__ == "__main__":
+    main()

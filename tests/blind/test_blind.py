@@ -1,0 +1,166 @@
+"""The blind study's own world: nothing of its own switched on it is the product's model, every hidden mechanism is seen, seeds repeat."""
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from tests.blind.hidden import law, mechanisms
+from tests.blind.score import element_found, interval, most_probable, outcome, show, truth_probability
+from tests.blind.study import SCENES, draw
+from tests.blind.world import Record, World, answer, campaign, visibility
+from tests.conftest import ROOT
+from thermospindle.model.machine import Condition
+from thermospindle.model.scene.reading import load
+from thermospindle.sim.effects import CATALOGUE, usable
+from thermospindle.sim.operating import operating_point
+
+LINES = np.arange(400.0, 6000.0, 20.0)
+WARM = 50.0
+
+
+@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize(("temperature", "share"), [(20.0, 0.0), (55.0, 0.0), (60.0, 1.0)])
+def test_with_nothing_of_its_own_the_world_is_the_model(scene, temperature, share):
+    """Another solver of the balance, matrices instead of MuJoCo, line by line instead of modes: the same FRF."""
+    spindle = load(ROOT / scene)
+    condition = Condition(temperature, share * spindle.nominal_speed)
+    ours, theirs = answer(spindle, condition, World()).frf(LINES), operating_point(spindle, condition, ()).frf(LINES)
+    assert np.abs(ours - theirs).max() < 1e-8 * np.abs(theirs).max()
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_every_hidden_mechanism_changes_the_frf_and_none_at_size_zero(scene):
+    spindle = load(ROOT / scene)
+    condition = Condition(WARM, spindle.nominal_speed)
+    plain = answer(spindle, condition, World()).frf(LINES)
+    for m in mechanisms(spindle, ()):
+        seen = np.abs(answer(spindle, condition, World(), [m.of_size(1.0)]).frf(LINES) - plain).max() / np.abs(plain).max()
+        absent = np.abs(answer(spindle, condition, World(), [m.of_size(1.0, lambda place: 0.0)]).frf(LINES) - plain).max()
+        assert seen > 1e-3, m.name
+        full = answer(spindle, condition, World(stiffness_error=1e-3, damping_error=0.01), [m.of_size(0.5)]).frf(LINES)
+        assert np.isfinite(full).all(), m.name
+        assert absent < 1e-9 * np.abs(plain).max(), m.name
+
+
+def test_every_difference_of_the_world_changes_the_frf():
+    spindle = load(ROOT / SCENES[0])
+    base = answer(spindle, Condition(WARM), World()).frf(LINES)
+    differences = [
+        World(mesh=1e-3),
+        World(constant_kept=True),
+        World(grooves_follow_faces=1.0),
+        World(weak_mode=(1e-4, 1500.0, 0.02)),
+        World(stiffness_error=3e-3),
+        World(damping_error=0.03),
+    ]
+    for world in differences:
+        assert np.abs(answer(spindle, Condition(WARM), world).frf(LINES) - base).max() > 1e-5 * np.abs(base).max(), world
+
+
+def test_a_long_record_leaks_nothing_and_a_short_one_does():
+    at = answer(load(ROOT / SCENES[0]), Condition(20.0), World())
+    exact = at.frf(LINES)
+    errors = [np.abs(at.transformed(LINES, Record("rectangular", length)) - exact).max() / np.abs(exact).max() for length in (1.0, 0.05)]
+    assert errors[0] < 1e-9
+    assert errors[1] > 1e-3
+
+
+def test_a_window_is_damping_and_repeats_tell_the_noise():
+    """The mean of many campaigns' hits is the FRF under the window, and the standard errors come true."""
+    spindle = load(ROOT / SCENES[0])
+    tests = draw(0).tests[:1]
+    record = Record("exponential", 0.3, 0.05, 8, "sd")
+    made = campaign(spindle, tests, (), 3, World(), record)
+    again = campaign(spindle, tests, (), 3, World(), Record("exponential", 0.3, 0.05, 8, "sd", times=1e-6))
+    error = made.campaign.tests[0].frf.value - again.campaign.tests[0].frf.value
+    sd = made.campaign.tests[0].frf.sd
+    assert made.campaign.tests[0].window_decay == pytest.approx(np.log(20) / 0.3)
+    assert np.sqrt(np.mean(np.abs(error) ** 2) / np.mean(sd**2)) == pytest.approx(1.0, abs=0.05)
+
+
+def test_laws_are_one_at_their_largest_and_nothing_at_the_reference():
+    places = [(20.0, 0.0), (35.0, 0.0), (60.0, 0.0), (60.0, 1.0)]
+    for seed in range(100):
+        own = law(np.random.default_rng(seed), places)
+        values = [own(p) for p in places]
+        assert max(map(abs, values)) == pytest.approx(1.0)
+        assert values[0] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("seed", [1, 4])
+def test_a_seed_is_a_campaign(seed):
+    one, two = (draw(seed).made().campaign for _ in range(2))
+    assert [t.id for t in one.tests] == [t.id for t in two.tests]
+    assert all(a.frf == b.frf for a, b in zip(one.tests, two.tests, strict=True))
+    other = draw(seed + 1).made().campaign
+    assert one.tests[0].frf != other.tests[0].frf
+
+
+def test_what_is_hidden_has_right_answers_of_the_catalogue_or_none():
+    names = {e.name for e in CATALOGUE}
+    for scene in SCENES:
+        spindle = load(ROOT / scene)
+        own = {e.name for e in usable(spindle, CATALOGUE)}
+        every = mechanisms(spindle, sorted(names))
+        assert {n for m in every for n in m.names} <= names
+        assert any(not set(m.names) & own for m in every)
+    kinds = [draw(seed).kind for seed in range(60)]
+    assert set(kinds) == {"nothing", "one", "two", "outside"}
+
+
+def test_visibility_grows_with_size_and_gains_hide_a_gain():
+    drawn = draw(2)
+    m = next(m for m in mechanisms(drawn.spindle, ()) if m.name == "bearing damping")
+    small, large = (visibility(campaign(drawn.spindle, drawn.tests, [m.of_size(s)], 5), drawn.spindle, 40)[0] for s in (0.0, 1.0))
+    assert 0 < small < large
+    gain = next(m for m in mechanisms(drawn.spindle, ()) if m.name == "sensor gain").of_size(0.0)
+    assert visibility(campaign(drawn.spindle, drawn.tests, [gain], 5), drawn.spindle, 40)[0] < 2.0
+
+
+def row(kind, verdict, effects=(), truth=(), none=0.0, unknown=0.0, candidates=(), drifts=(), elements=()):
+    names = [{"effects": list(e), "probability": p, "delta_evidence": 10 * p, "chi2_per_number": 1.0} for e, p in candidates]
+    return {
+        "seed": 1, "commit": "x", "kind": kind, "scene": SCENES[0], "hidden": ["h"] * len(truth), "sizes": [1.0] * len(truth),
+        "units": ["%"] * len(truth), "laws": ["linear"] * len(truth), "truth": [list(t) for t in truth], "elements": list(elements),
+        "visibility": [100.0] * len(truth), "leakage": 0.0, "learned": {"frequency_discrepancy": 0.01}, "verdict": verdict, "effects": list(effects), "probability": {"none": none, "unknown": unknown},
+        "candidates": names, "drifts": [list(d) for d in drifts], "rms": [1.0, 1.0], "seconds": 1.0, "error": "E",
+        "world": {"stiffness_error": 0.001, "damping_error": 0.01, "grooves_follow_faces": 0.0, "weak_mode": None}, "record": {"kind": "line", "told": "nothing"},
+    }  # fmt: skip
+
+
+SCORED = [
+    (row("nothing", "none", none=0.97), "right", 0.97),
+    (row("nothing", "identified", ["a"], none=0.01, candidates=[(["a"], 0.99)]), "false alarm", 0.01),
+    (row("one", "identified", ["a"], [["a", "b"]], candidates=[(["a"], 0.7), (["b"], 0.2), (["c"], 0.1)]), "right", 0.9),
+    (row("one", "ambiguous", ["a", "c"], [["a"]], candidates=[(["a"], 0.5), (["c"], 0.5)]), "in the set", 0.5),
+    (row("one", "identified", ["c"], [["a"]], candidates=[(["c"], 1.0)]), "wrong", 0.0),
+    (row("one", "two effects", ["a", "c"], [["a"]], candidates=[(["a", "c"], 1.0)]), "wrong", 0.0),
+    (row("one", "unexplained", [], [["a"]], unknown=1.0), "unexplained", 0.0),
+    (row("one", "none", [], [["a"]], none=1.0), "missed", 0.0),
+    (row("two", "two effects", ["a", "c"], [["a"], ["c"]], candidates=[(["a", "c"], 0.9)]), "right", 0.9),
+    (row("two", "identified", ["a"], [["a"], ["c"]], candidates=[(["a"], 0.9)]), "half", 0.0),
+    (row("outside", "unexplained", [], [[]], unknown=0.8, drifts=[("plate damping", 9.0)], elements=["plate damping"]), "right", 0.8),
+    (row("outside", "identified", ["a"], [[]], candidates=[(["a"], 0.9)], elements=["plate"]), "wrong", 0.0),
+    (row("one", "error", [], [["a"]]), "error", 0.0),
+]
+
+
+@pytest.mark.parametrize(("told", "expected", "probability"), SCORED)
+def test_the_score_of_a_verdict(told, expected, probability):
+    assert outcome(told) == expected
+    assert truth_probability(told) == pytest.approx(probability)
+
+
+def test_the_table_of_scores():
+    rows = [r | {"seed": i} for i, (r, _, _) in enumerate(SCORED)]
+    console = Console(record=True, width=160)
+    with console.capture() as captured:
+        show(console, rows)
+    text = captured.get()
+    assert "13 campaigns, seeds 0 to 12" in text
+    assert "false alarm, nothing hidden: 1 of 2" in text
+    assert text.count("\n- ") == 8
+    assert element_found(SCORED[10][0])
+    assert not element_found(SCORED[11][0])
+    assert most_probable(SCORED[0][0]) == (0.97, True)
+    assert interval(0, 59)[1] == pytest.approx(1 - 0.025 ** (1 / 59))  # nothing of n: 1 - (alpha / 2)^(1 / n)

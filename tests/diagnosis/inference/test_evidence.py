@@ -1,0 +1,158 @@
+"""The evidence of linear toys, whose integrals are known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal, norm
+
+from thermospindle.diagnosis.inference.evidence import (
+    Learned,
+    evidence,
+    left_out,
+)  # fmt: skip
+from thermospindle.diagnosis.inference.fit import Fit
+from thermospindle.diagnosis.inference.mechanism import REFERENCE_DEPARTURE, REFERENCE_WIDTH, Mechanism, size_covariance
+from thermospindle.diagnosis.inference.nuisance import (
+    BUILD,
+    DAMPING,
+    DAMPING_SD,
+    DRIFT,
+    DRIFT_SD,
+    STIFFNESS,
+    STIFFNESS_SD,
+    TEMPERATURE,
+    Nuisance,
+)
+from thermospindle.model.machine import Condition
+from thermospindle.sim.effects.effect import Effect, Parameter
+
+CONDITIONS = [Condition(20.0), Condition(40.0), Condition(60.0)]
+
+
+@dataclass(frozen=True)
+class Toy:
+    """y_t = J_t p + errors of unit variance, in `rows` numbers a test; p = [nuisances, whitened sizes]."""
+
+    model: SimpleNamespace
+    fit: Fit
+    jacobians: list[np.ndarray]
+    y: list[np.ndarray]
+    mechanisms: tuple[Mechanism, ...]
+
+    def prior(self, stiffness: float, damping: float, drift: float, own=()) -> np.ndarray:
+        size = {STIFFNESS: stiffness / STIFFNESS_SD, DAMPING: damping / DAMPING_SD, DRIFT: drift / DRIFT_SD}
+        n = len(self.model.parameters)
+        whole = np.zeros((len(self.fit.point), len(self.fit.point)))
+        whole[:n, :n] = np.diag([size.get(p.kind, 1.0) ** 2 for p in self.model.parameters])
+        for m, root, (width, departure) in zip(self.mechanisms, self.fit.roots, own, strict=True):
+            inverse = np.linalg.inv(root)
+            whole[n:, n:] = inverse @ size_covariance(CONDITIONS, width * m.size.prior_sd, departure) @ inverse.T
+        return whole
+
+    def ln(self, prior: np.ndarray, errors: float = 1.0) -> float:
+        """ln of the integral of likelihood times prior; the evidence leaves out (2 pi)^(-n/2)."""
+        jacobian, y = np.concatenate(self.jacobians), np.concatenate(self.y)
+        covariance = errors**2 * np.eye(len(y)) + jacobian @ prior @ jacobian.T
+        return float(multivariate_normal(np.zeros(len(y)), covariance).logpdf(y) + len(y) / 2 * np.log(2 * np.pi))
+
+
+def toy(seed: int, stiffness: float, hidden: float | None = None, limits=(-50.0, 50.0), rows: int = 40, errors: float = 1.0) -> Toy:
+    """Data drawn with a discrepancy of the size `stiffness`, and, with a mechanism in the fit, a `hidden` size in every test."""
+    random = np.random.default_rng(seed)
+    parameters = [Nuisance(BUILD, f"b{i}", 0.01) for i in range(3)] + [Nuisance(STIFFNESS, f"k{i}", STIFFNESS_SD, modes=(i, i)) for i in range(8)]
+    parameters += [Nuisance(DAMPING, f"c{i}", DAMPING_SD, modes=(i, i)) for i in range(2)]
+    parameters += [Nuisance(TEMPERATURE, f"t{t}", 0.2, test=t) for t in range(3)] + [Nuisance(DRIFT, f"g{t}", DRIFT_SD, test=t) for t in range(3)]
+    mechanisms, roots = (), ()
+    if hidden is not None:
+        size = Parameter("size", "1", 1.0, 1.5, 0.4, limits, "", "")
+        mechanisms = (Mechanism(Effect("toy", "", "", (size,), "", (), ""), {}, ()),)
+        roots = (np.linalg.cholesky(size_covariance(CONDITIONS, REFERENCE_WIDTH * size.prior_sd, REFERENCE_DEPARTURE)),)
+    n = len(parameters)
+    p = np.array([stiffness / STIFFNESS_SD if q.kind == STIFFNESS else 1.0 if q.kind in (BUILD, TEMPERATURE) else 0.0 for q in parameters])
+    p = np.concatenate([p * random.standard_normal(n), *([np.linalg.solve(r, np.full(3, hidden - 1.0)) for r in roots])])
+    own_of_test = np.array([q.test is None for q in parameters])
+    jacobians, y = [], []
+    for t in range(3):
+        j = random.standard_normal((rows, n)) * np.where(own_of_test | np.array([q.test == t for q in parameters]), 1.0, 0.0)
+        j[:, [q.kind == STIFFNESS for q in parameters]] *= 5  # the smallest size shows by about five standard errors
+        j = np.concatenate([j, *[2 * random.standard_normal((rows, 1)) * r[t][None, :] for r in roots]], axis=1)
+        jacobians.append(j)
+        y.append(j @ p + errors * random.standard_normal(rows))
+    point = p + 0.3 * random.standard_normal(len(p))  # the quadratic is the same about any point
+    by_test = tuple((float((j @ point - v) @ (j @ point - v)), j.T @ (j @ point - v), j.T @ j) for j, v in zip(jacobians, y, strict=True))
+    tests = tuple(SimpleNamespace(condition=c, count=rows) for c in CONDITIONS)
+    fit = Fit(
+        mechanisms, point, np.zeros((len(mechanisms), 3)), ((),) * len(mechanisms), roots, sum(b[0] for b in by_test),
+        np.sum([b[1] for b in by_test], axis=0), np.sum([b[2] for b in by_test], axis=0), by_test, 3 * rows, None, 1.0,
+    )  # fmt: skip
+    return Toy(SimpleNamespace(parameters=tuple(parameters), tests=tests), fit, jacobians, y, mechanisms)
+
+
+@pytest.mark.parametrize("errors", [1.0, 1.3])
+@pytest.mark.parametrize("sizes", [(0.0, 0.0, 0.0), (1e-3, 0.03, 1e-3), (1e-2, 0.1, 0.0)])
+def test_one_choice_of_priors_is_the_gaussian_integral(sizes, errors):
+    made = toy(1, 1e-3)
+    found = evidence(made.model, made.fit, Learned(dict(zip((STIFFNESS, DAMPING, DRIFT), sizes, strict=True)), errors, (), ()))
+    assert found.ln == pytest.approx(made.ln(made.prior(*sizes), errors), abs=1e-6)
+
+
+def test_mean_and_covariance_are_the_posterior():
+    made = toy(3, 1e-3, hidden=1.6)
+    found = evidence(made.model, made.fit)
+    learned = found.learned
+    prior = made.prior(*(learned.sizes[k] for k in (STIFFNESS, DAMPING, DRIFT)), list(zip(learned.widths, learned.departures, strict=True)))
+    jacobian, y = np.concatenate(made.jacobians), np.concatenate(made.y)
+    gain = prior @ jacobian.T @ np.linalg.inv(learned.errors**2 * np.eye(len(y)) + jacobian @ prior @ jacobian.T)
+    assert found.mean == pytest.approx(gain @ y, abs=1e-5)
+    assert found.covariance == pytest.approx(prior - gain @ jacobian @ prior, abs=1e-5)
+    left = jacobian @ (gain @ y) - y
+    assert found.chi2 == pytest.approx(left @ left, rel=1e-6)
+    root = made.fit.roots[0]
+    assert found.sizes[0] == pytest.approx(1.0 + root @ (gain @ y)[-3:], abs=1e-5)
+    assert np.all(np.abs(found.sizes[0] - 1.6) < 5 * np.sqrt(np.diag(found.size_covariance[0])))
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-4, 1e-3, 1e-2])
+def test_the_size_of_the_discrepancy_is_learned(size):
+    """Of twenty campaigns at least eighteen learn the size that they were drawn with; drift and damping, of which there is none, none."""
+    right = [evidence(made.model, made.fit).learned for made in (toy(seed, size) for seed in range(20))]
+    assert sum(learned.sizes[STIFFNESS] == size for learned in right) >= 18
+    assert sum(learned.sizes[DAMPING] == 0.0 and learned.sizes[DRIFT] == 0.0 for learned in right) >= 14
+
+
+def test_errors_larger_than_stated_are_learned():
+    for seed in range(5):
+        made = toy(seed, 0.0, rows=200, errors=1.5)
+        assert evidence(made.model, made.fit).learned.errors == pytest.approx(1.5, rel=0.1)
+        fine = toy(seed, 0.0, rows=200)
+        assert evidence(fine.model, fine.fit).learned.errors < 1.1
+
+
+def test_a_size_of_one_sign_has_half_a_prior():
+    """Twice the probability of the sign that limits allow: for a size well on that side ln 2, on the other far less than nothing."""
+    free, bound = toy(4, 0.0, hidden=1.6), toy(4, 0.0, hidden=1.6, limits=(1.0, 50.0))
+    assert evidence(bound.model, bound.fit).ln - evidence(free.model, free.fit).ln == pytest.approx(np.log(2), abs=1e-2)
+    wrong = toy(4, 0.0, hidden=0.4, limits=(1.0, 50.0))
+    other = toy(4, 0.0, hidden=0.4)
+    assert evidence(wrong.model, wrong.fit).ln - evidence(other.model, other.fit).ln < norm.logcdf(-5)
+
+
+@pytest.mark.parametrize("hidden", [None, 1.6])
+def test_what_is_left_out_is_predicted_from_the_rest(hidden):
+    """Against a fit of the other tests anew, group by group."""
+    made = toy(5, 1e-3, hidden)
+    found = evidence(made.model, made.fit)
+    learned = found.learned
+    prior = made.prior(*(learned.sizes[k] for k in (STIFFNESS, DAMPING, DRIFT)), list(zip(learned.widths, learned.departures, strict=True)))
+    groups = [[0], [1, 2]]
+    total = 0.0
+    for group in groups:
+        jacobian, y = (np.concatenate([v[t] for t in range(3) if t not in group]) for v in (made.jacobians, made.y))
+        p = prior @ jacobian.T @ np.linalg.solve(learned.errors**2 * np.eye(len(y)) + jacobian @ prior @ jacobian.T, y)
+        total += sum(float(np.sum((made.jacobians[t] @ p - made.y[t]) ** 2)) for t in group)
+    assert left_out(made.model, made.fit, found, groups) == pytest.approx(np.sqrt(total / made.fit.count), rel=1e-4)
+    assert np.isnan(left_out(made.model, made.fit, found, [[0, 1, 2]]))

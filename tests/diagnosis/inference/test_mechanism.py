@@ -1,0 +1,124 @@
+"""Mechanisms, their laws as priors, and sizes beyond their limits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.virtual_campaign import mode_campaign, model_of, virtual_campaign
+from thermospindle.diagnosis.inference.fit import Problem
+from thermospindle.diagnosis.inference.freeform import free_forms
+from thermospindle.diagnosis.inference.mechanism import Mechanism, likeness, size_covariance, variants
+from thermospindle.model.machine import Condition
+from thermospindle.model.units import RPM
+from thermospindle.sim.effects import usable
+
+CONDITIONS = [Condition(20.0), Condition(20.0), Condition(40.0, 7200 * RPM), Condition(60.0), Condition(60.0, 0.0, 100.0), Condition(60.0, 0.0, 1.0, 60.0)]
+
+
+@pytest.mark.parametrize("departure", [0.0, 0.1, 1.0])
+def test_sizes_have_a_proper_prior(departure):
+    """Positive definite with repeats among the tests; without departures one number; correlation falls with distance, and is 1 at none."""
+    covariance = size_covariance(CONDITIONS, 2.0, departure)
+    assert np.array_equal(covariance, covariance.T)
+    values = np.linalg.eigvalsh(covariance)
+    assert values.min() > 0
+    np.linalg.cholesky(covariance)
+    assert np.diag(covariance) == pytest.approx(4.0 * (1 + departure**2), rel=1e-6)
+    if departure == 0.0:
+        assert values[-2] < 1e-8 * values[-1]
+    else:
+        assert values[-2] > 1e-3 * departure**2 * values[-1]
+
+
+def test_departures_are_alike_where_conditions_are():
+    like = likeness(CONDITIONS)
+    assert like[0, 1] == 1.0
+    assert like[0, 3] == pytest.approx(np.exp(-1.0))  # 40 K
+    assert like[0, 2] < like[0, 3] * np.exp(0.5)  # 20 K and 7200 rpm
+    assert like[3, 4] < 1
+    assert like[3, 5] < 1
+    assert np.linalg.eigvalsh(like).min() > -1e-12
+
+
+def test_a_variant_for_every_choice(spindle):
+    for e in usable(spindle):
+        found = variants(e)
+        chosen = [p for p in e.parameters[1:] if p.choices]
+        shares = 0 if chosen else sum(p.limits == (0.0, 1.0) and p.prior_sd > 0 for p in e.parameters[1:])
+        assert len(found) == np.prod([len(p.choices) for p in chosen], dtype=int) + 2 * shares  # and each share at either end
+        assert len({tuple(m.choices.items()) for m in found}) == len(found)
+        for m in found:
+            assert set(m.values(1.0, [0.0] * len(m.shape))) <= {p.name for p in e.parameters}
+            assert m.values(1.5, [0.0] * len(m.shape))[e.parameters[0].name] == 1.5
+
+
+@pytest.fixture(scope="module")
+def model(spindle):
+    campaign = virtual_campaign(spindle, [Condition(20.0), Condition(50.0, 7200 * RPM)], 1, frequency=np.arange(400.0, 6000.1, 80.0))
+    return model_of(spindle, campaign)
+
+
+def vector(problem: Problem, mechanism: Mechanism, sizes) -> np.ndarray:
+    p = np.zeros(problem.length)
+    z = np.linalg.solve(problem.roots[0], np.asarray(sizes) - mechanism.size.neutral)
+    p[problem.nuisances : problem.nuisances + len(z)] = z
+    return p
+
+
+def test_neutral_sizes_change_nothing(spindle, model):
+    """Exactly, for every effect of the catalogue and every free form."""
+    for m in [*(v for e in usable(spindle) for v in variants(e)[:1]), *free_forms(spindle)]:
+        problem = Problem(model, [m])
+        for t in (0, 1):
+            assert np.array_equal(problem.residual(t, np.zeros(problem.length)), model.residual(t, np.zeros(problem.nuisances), [])), m.name
+
+
+def test_values_at_neutral_go_through_the_effect_unchanged(spindle, model):
+    """A free form that is applied, not left out, at no change: the same to rounding."""
+    for m in free_forms(spindle):
+        for t in (0, 1):
+            with_it = model.residual(t, np.zeros(len(model.parameters)), [(m.effect, m.values(0.0, []))])
+            without = model.residual(t, np.zeros(len(model.parameters)), [])
+            assert with_it == pytest.approx(without, abs=1e-6 * np.abs(without).max()), m.name
+
+
+@pytest.mark.parametrize("name", ["preload_loss", "lubricant_film", "thermal_gradient"])
+def test_beyond_its_limits_a_size_goes_straight_on(spindle, model, name):
+    """Continuous at the limit, and three equal steps beyond it change the residuals equally, along the slope inside."""
+    found = {e.name: e for e in usable(spindle)}
+    m = variants(found[name])[0]
+    problem = Problem(model, [m])
+    limit, step = m.size.limits[0], m.size.prior_sd
+    if m.size.limits[0] < m.size.neutral - 5 * step:
+        step = 0.02 * abs(limit)
+    r = [problem.residual(1, vector(problem, m, [m.size.neutral, limit - k * step])) for k in (0, 1, 2, 3, 1e-6)]
+    first, second, third = r[1] - r[0], r[2] - r[1], r[3] - r[2]
+    assert np.linalg.norm(first) > 0
+    assert second == pytest.approx(first, abs=1e-6 * np.abs(first).max())
+    assert third == pytest.approx(first, abs=1e-6 * np.abs(first).max())
+    assert r[4] == pytest.approx(r[0], abs=1e-5 * np.abs(first).max())
+    inside = problem.residual(1, vector(problem, m, [m.size.neutral, limit + 0.02 * m.size.prior_sd]))
+    slope, beyond = (inside - r[0]) / (0.02 * m.size.prior_sd), (r[0] - r[1]) / step
+    assert np.linalg.norm(slope - beyond) < 0.05 * np.linalg.norm(slope)
+
+
+@pytest.mark.parametrize("table", [False, True])
+def test_derivatives_by_sizes(spindle, model, table):
+    """Whitened sizes of two mechanisms beside each other, the second test's depending on the first's: against differences."""
+    used = model_of(spindle, mode_campaign(spindle, [Condition(20.0), Condition(50.0, 7200 * RPM)], 1)) if table else model
+    named = next(v for e in usable(spindle) if e.name == "preload_loss" for v in variants(e))
+    free = next(m for m in free_forms(spindle) if m.name == "bearings damping")
+    problem = Problem(used, [named, free])
+    random = np.random.default_rng(4)
+    p = 0.1 * random.standard_normal(problem.length)
+    rates = used.rates(problem.parts(p)[0], problem.effects_of(p))
+    for t in (0, 1):
+        _, jacobian, numbers = problem.linearised(t, p, rates)
+        for i in numbers[numbers >= problem.nuisances]:
+            up, down = p.copy(), p.copy()
+            up[i] += 1e-3
+            down[i] -= 1e-3
+            wanted = (problem.residual(t, up) - problem.residual(t, down)) / 2e-3
+            found = jacobian[:, list(numbers).index(i)]
+            assert np.linalg.norm(found - wanted) <= 2e-2 * np.linalg.norm(wanted) + 1e-9

@@ -1,0 +1,133 @@
+"""Derivatives of the campaign's model against differences of its residuals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.conftest import ROOT
+from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, truth, virtual_campaign
+from thermospindle.diagnosis.inference.nuisance import BUILD, DAMPING, DRIFT, EXPANSION, GAIN, STIFFNESS, TEMPERATURE
+from thermospindle.model.machine import Condition
+from thermospindle.model.scene.reading import load
+from thermospindle.model.units import RPM
+
+CONDITIONS = (Condition(20.0), Condition(45.0, 7200 * RPM))
+FREQUENCY = np.arange(400.0, 6000.1, 40.0)
+KINDS = (BUILD, EXPANSION, TEMPERATURE, GAIN, DRIFT, STIFFNESS, DAMPING)
+SCENES = {"reference": ROOT / "scenes" / "hdd_2003", "symmetric": ROOT / "tests" / "scenes" / "symmetric"}
+
+
+@pytest.fixture(scope="module", params=SCENES)
+def scene(request):
+    return load(SCENES[request.param])
+
+
+def made(scene, **changes):
+    """A model of two tests, and nuisance values one to two standard deviations from the drawing."""
+    errors = drawn(scene, 2, 3)
+    model = model_of(scene, virtual_campaign(scene, CONDITIONS, 3, errors=errors, frequency=FREQUENCY, **changes))
+    return model, truth(model, errors) + 0.7 * np.random.default_rng(11).standard_normal(len(model.parameters))
+
+
+def differences(model, t, x, numbers, step=2e-3):
+    """Central differences (N, k) of the residuals."""
+    columns = []
+    for i in numbers:
+        up, down = x.copy(), x.copy()
+        up[i] += step
+        down[i] -= step
+        columns.append((model.residual(t, up, []) - model.residual(t, down, [])) / (2 * step))
+    return np.array(columns).T
+
+
+def worst_by_kind(model, t, x):
+    """Largest error of a derivative over the length of that derivative, for every kind of nuisance parameter."""
+    rates = model.rates(x, [[] for _ in model.tests])
+    r, jacobian, numbers = model.jacobian(t, x, [], rates)
+    assert np.array_equal(r, model.residual(t, x, []))
+    assert len(set(numbers)) == len(numbers)
+    wanted = differences(model, t, x, numbers)
+    length = np.linalg.norm(wanted, axis=0)
+    error = np.linalg.norm(jacobian - wanted, axis=0) / np.maximum(length, 1e-3 * np.median(length))
+    kinds = np.array([model.parameters[i].kind for i in numbers])
+    return {k: error[kinds == k].max() for k in KINDS if k in kinds}
+
+
+@pytest.mark.parametrize(("quantity", "decay"), [("mobility", 0.0), ("accelerance", 15.0), ("receptance", 15.0)])
+def test_derivatives_of_lines(scene, quantity, decay):
+    """Every nuisance parameter, at speed and warm: build, rings and temperature to the error of one-sided steps of matrices, the rest exactly."""
+    model, x = made(scene, quantity=quantity, window_decay=decay)
+    worst = worst_by_kind(model, 1, x)
+    assert set(worst) == set(KINDS)
+    for kind in (GAIN, DRIFT, STIFFNESS, DAMPING):
+        assert worst[kind] < 1e-4, kind
+    for kind in (BUILD, EXPANSION, TEMPERATURE):
+        assert worst[kind] < 5e-3, kind
+
+
+def test_parameters_of_other_tests_do_not_move_a_test(scene):
+    """What the derivatives leave out moves nothing: temperature and drift of the other test."""
+    model, x = made(scene)
+    rates = model.rates(x, [[], []])
+    for t in (0, 1):
+        _, _, numbers = model.jacobian(t, x, [], rates)
+        others = [i for i in range(len(x)) if i not in set(numbers)]
+        assert others
+        assert {model.parameters[i].test for i in others} == {1 - t}
+        assert not differences(model, t, x, others).any()
+
+
+def test_derivatives_of_mode_tables():
+    """ln frequency and ln damping, by perturbation of the poles; at rest, where members of a pair must not swap from one side to the other, and at speed."""
+    scene = load(SCENES["reference"])
+    for damping in (True, False):
+        model = model_of(scene, mode_campaign(scene, CONDITIONS, 3, damping=damping))
+        x = 0.3 * np.random.default_rng(2).standard_normal(len(model.parameters))
+        for t in (0, 1):
+            assert max(worst_by_kind(model, t, x).values()) < 5e-3
+
+
+@pytest.mark.parametrize(("name", "size", "values"), [("channel_delay", 30.0, {"skew": 0.1}), ("hammer_position", 1.5, {"axis": 0.0, "node": 0.0})])
+def test_column_of_a_measuring_effect(scene, name, size, values):
+    """What moves rows, gains or delays: against central differences of the residual itself."""
+    model, x = made(scene)
+    chosen = effect(name)
+    first = chosen.parameters[0]
+    whole = {p.name: p.neutral for p in chosen.parameters} | {k: v for k, v in values.items() if k in {p.name for p in chosen.parameters}}
+    step = 1e-3 * first.prior_sd
+
+    def at(value):
+        return [(chosen, {**whole, first.name: value})]
+
+    wanted = (model.residual(1, x, at(size + step)) - model.residual(1, x, at(size - step))) / (2 * step)
+    found = model.column(1, x, at(size), at(size + step), step)
+    assert np.linalg.norm(wanted) > 0
+    assert np.linalg.norm(found - wanted) < 2e-3 * np.linalg.norm(wanted)
+
+
+def test_column_of_an_effect_on_matrices(scene):
+    """The exact derivative of the FRF by a difference of matrices: with a step a hundred times as large it is as good."""
+    model, x = made(scene)
+    lost = effect("preload_loss")
+    share = lost.parameters[1]
+
+    def at(value):
+        return [(lost, {"loss": value, share.name: share.neutral})]
+
+    wanted = (model.residual(1, x, at(0.1 + 1e-4)) - model.residual(1, x, at(0.1 - 1e-4))) / 2e-4
+    found = model.column(1, x, at(0.1), at(0.1 + 2e-3), 2e-3)
+    secant = (model.residual(1, x, at(0.1 + 2e-3)) - model.residual(1, x, at(0.1))) / 2e-3
+    assert np.linalg.norm(found - wanted) < 5e-3 * np.linalg.norm(wanted)
+    assert np.linalg.norm(found - wanted) < 0.5 * np.linalg.norm(secant - wanted)
+
+
+def test_the_truth_leaves_noise(scene):
+    """At what was drawn chi2 is 1 a number, for lines and for tables: model, window, quantity and gains are those of the virtual test."""
+    errors = drawn(scene, 2, 5)
+    for quantity, decay in (("mobility", 0.0), ("accelerance", 15.0)):
+        model = model_of(scene, virtual_campaign(scene, CONDITIONS, 5, errors=errors, quantity=quantity, window_decay=decay))
+        x = truth(model, errors)
+        r = np.concatenate([model.residual(t, x, []) for t in (0, 1)])
+        assert np.mean(r**2) == pytest.approx(1.0, abs=0.06)
+        assert np.mean(np.concatenate([model.residual(t, 0 * x, []) for t in (0, 1)]) ** 2) > 10

@@ -1,0 +1,140 @@
+"""Verdicts from hand-made searches: what follows from probabilities and the stated loss."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from thermospindle.diagnosis.inference.evidence import Evidence, Learned
+from thermospindle.diagnosis.inference.fit import Fit
+from thermospindle.diagnosis.inference.mechanism import Mechanism
+from thermospindle.diagnosis.inference.search import Hypothesis, Screened, Search
+from thermospindle.diagnosis.inference.verdict import FALSE_ALARM, MISSED, WRONG, Verdict, conditions_of, decide
+from thermospindle.model.machine import Condition
+from thermospindle.sim.effects.effect import Effect, Parameter
+
+CONDITIONS = (Condition(20.0), Condition(40.0))
+SIZE = Parameter("size", "1", 0.0, 1.0, 1.0, (-9.0, 9.0), "", "")
+
+
+def mechanism(name: str) -> Mechanism:
+    """A free form where the name starts with `~`."""
+    return Mechanism(Effect(name, "", "", (SIZE,), "", (), ""), {}, (), free=name.startswith("~"))
+
+
+def hypothesis(names: tuple[str, ...], ln: float) -> Hypothesis:
+    n, count = 2 * len(names), 100
+    by_test = tuple((50.0, np.zeros(n), np.zeros((n, n))) for _ in CONDITIONS)
+    fit = Fit(
+        tuple(mechanism(k) for k in names), np.zeros(n), np.zeros((len(names), 2)), ((),) * len(names), (np.eye(2),) * len(names), 100.0,
+        np.zeros(n), np.zeros((n, n)), by_test, count, None, 1.0,
+    )  # fmt: skip
+    learned = Learned({}, 1.0, (1.0,) * len(names), (0.1,) * len(names))
+    sizes = np.zeros((len(names), 2))
+    return Hypothesis(fit, Evidence(-1000.0 + ln, learned, np.zeros(n), np.eye(n), sizes, np.zeros((len(names), 2, 2)), 100.0))
+
+
+def made(gains: dict[str | tuple[str, ...], float], catalogue: int = 30, forms: int = 20) -> Search:
+    """A search that found `gains` in ln evidence over the model without effects; so many mechanisms were screened."""
+    spindle = SimpleNamespace(tolerances=SimpleNamespace(temperature=0.2))
+    tests = tuple(SimpleNamespace(condition=c, count=50) for c in CONDITIONS)
+    model = SimpleNamespace(parameters=(), tests=tests, spindle=spindle)
+    none = hypothesis((), 0.0)
+    others = [hypothesis((k,) if isinstance(k, str) else k, v) for k, v in gains.items()]
+    screened = [Screened(mechanism(f"effect_{i}"), 0.0, np.zeros(2), 1.0) for i in range(catalogue)]
+    screened += [Screened(mechanism(f"~form_{i}"), 0.0, np.zeros(2), 1.0) for i in range(forms)]
+    return Search(model, none, tuple(sorted([none, *others], key=lambda h: -h.evidence.ln)), tuple(screened))
+
+
+def total(v: Verdict) -> float:
+    return v.probability_none + sum(c.probability for c in (*v.candidates, *v.free))
+
+
+CASES = {
+    "nothing tried": ({}, "none", ()),
+    "nothing gained": ({"a": -1.0, "b": 0.5, "~x": 1.0}, "none", ()),
+    "one leads": ({"a": 40.0, "b": 20.0, "~x": 10.0}, "identified", ("a",)),
+    "two alike": ({"a": 40.0, "b": 40.0, "c": 5.0}, "ambiguous", {"a", "b"}),
+    "three alike": ({"a": 40.0, "b": 40.0, "c": 39.5}, "ambiguous", {"a", "b", "c"}),
+    "two at once": ({"a": 40.0, "b": 20.0, ("a", "b"): 90.0}, "two effects", {"a", "b"}),
+    "a second of no use": ({"a": 40.0, ("a", "b"): 41.0}, "identified", ("a",)),
+    "free drift leads": ({"a": 40.0, "~x": 70.0}, "unexplained", ()),
+    "free drift alone": ({"~x": 70.0, "~y": 60.0}, "unexplained", ()),
+    "two drift": ({"a": 10.0, ("~x", "~y"): 70.0}, "unexplained", ()),
+    "free drift near behind": ({"a": 40.0, "~x": 30.0}, "identified", ("a",)),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_words(case):
+    gains, word, effects = CASES[case]
+    v = decide(made(gains))
+    assert v.word == word
+    assert (set(v.effects) if isinstance(effects, set) else v.effects) == effects
+    assert total(v) == pytest.approx(1.0, abs=1e-9)
+    assert v.losses[min(v.losses, key=lambda k: v.losses[k])] == min(v.losses.values())
+    assert v.reason
+
+
+def test_probabilities_are_bayes():
+    """Even odds of nothing; 0.33 over thirty effects, 0.05 over twenty forms, 0.08 over 435 pairs, times the evidence."""
+    v = decide(made({"a": 3.0, "b": 1.0, "~x": 4.0, ("a", "b"): 6.0}))
+    weight = {
+        "": 0.5,
+        "a": 0.33 / 30 * np.exp(3),
+        "b": 0.33 / 30 * np.exp(1),
+        "~x": 0.05 / 20 * np.exp(4),
+        "ab": 0.08 / 435 * np.exp(6),
+    }
+    share = {k: w / sum(weight.values()) for k, w in weight.items()}
+    assert v.probability_none == pytest.approx(share[""])
+    assert v.probability_unknown == pytest.approx(share["~x"])
+    assert {"".join(c.names): c.probability for c in (*v.candidates, *v.free)} == pytest.approx({k: s for k, s in share.items() if k})
+
+
+def test_a_false_alarm_costs_what_is_stated():
+    """One effect against nothing: named from where MISSED P(something) exceeds FALSE_ALARM P(nothing), found by bisection."""
+    low, high = 0.0, 30.0
+    for _ in range(40):
+        middle = (low + high) / 2
+        low, high = (low, middle) if decide(made({"a": middle})).word == "identified" else (middle, high)
+    at = decide(made({"a": high}))
+    assert (1 - at.probability_none) / at.probability_none == pytest.approx(FALSE_ALARM / MISSED, rel=1e-3)
+    assert decide(made({"a": low - 0.01})).word == "none"
+
+
+def test_a_wrong_name_costs_ten_times_a_set():
+    """Two effects, nothing else possible: the first is named alone from where WRONG P(second) is less than the set's own cost, one."""
+    words = {lead: decide(made({"a": 60.0 + lead, "b": 60.0})) for lead in np.arange(0.0, 5.0, 0.05)}
+    for lead, v in words.items():
+        rest = 1 / (1 + np.exp(lead))
+        if abs(WRONG * rest - 1) > 0.05:
+            assert v.word == ("ambiguous" if WRONG * rest > 1 else "identified"), lead
+    assert {v.word for v in words.values()} == {"ambiguous", "identified"}
+
+
+def test_the_order_of_hypotheses_does_not_matter():
+    search = made({"a": 12.0, "b": 11.0, "~x": 9.0, ("a", "c"): 10.0})
+    turned = replace(search, hypotheses=search.hypotheses[::-1])
+    first, second = decide(search), decide(turned)
+    assert (first.word, first.effects) == (second.word, second.effects)
+    assert first.losses == pytest.approx(second.losses)
+
+
+def test_enormous_evidence_is_still_finite():
+    """A lead of a million, and a loss of a million: no overflow, probabilities that sum to one."""
+    v = decide(made({"a": 1e6, "b": -1e6}))
+    assert v.word == "identified"
+    assert total(v) == pytest.approx(1.0)
+    assert np.isfinite(list(v.losses.values())).all()
+
+
+def test_conditions_within_the_thermometers_scatter_are_one():
+    search = made({})
+    at = (20.0, 20.4, 60.0, 20.1, 59.5)
+    tests = tuple(SimpleNamespace(condition=Condition(t), count=1) for t in at)
+    search = replace(search, model=SimpleNamespace(tests=tests, spindle=search.model.spindle))
+    assert [sorted(g) for g in conditions_of(search)] == [[0, 1, 3], [2, 4]]

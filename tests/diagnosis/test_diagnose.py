@@ -1,0 +1,79 @@
+"""The whole diagnosis on campaigns with a known answer: another program's, and mode tables drawn from the model with a hidden effect."""
+
+import json
+
+import numpy as np
+import pytest
+
+from tests.conftest import DATA
+from thermospindle.diagnosis.inference.verdict import conditions_of
+from thermospindle.diagnosis.verdict import diagnose
+from thermospindle.model.machine import Condition
+from thermospindle.report.text.diagnosis import diagnosis_json
+from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Test, read_campaign
+from thermospindle.sim.effects import by_name
+from thermospindle.sim.operating import operating_point
+
+
+def tables(spindle, effects, highest=2600.0, seed=1):
+    """Mode tables at 20, 40 and 60 C of the spindle as drawn with effects, with errors of frequencies (5e-5) and damping ratios (1 %)."""
+    random = np.random.default_rng(seed)
+    tests = []
+    for t in (20.0, 40.0, 60.0):
+        modes = [m for m in operating_point(spindle, Condition(t), effects).modes if m.frequency < highest]
+        rows = []
+        for i, m in enumerate(modes, 1):
+            f, z = m.frequency * (1 + 5e-5 * random.standard_normal()), m.damping_ratio * (1 + 0.01 * random.standard_normal())
+            rows.append(ModeRow(f"T{t:g}", i, m.kind, f, 5e-5 * m.frequency, z, 0.01 * m.damping_ratio))
+        tests.append(Test(f"T{t:g}", t, 0.0, modes=tuple(rows)))
+    return Campaign("made", spindle.name, "mobility", spindle.points, tuple(tests))
+
+
+def test_nothing_is_named_where_nothing_is_hidden(nothing_missing):
+    """FRFs of a program with its own finite elements, bearings and matrices."""
+    verdict = nothing_missing.verdict
+    assert (verdict.word, verdict.effects) == ("none", ())
+    assert verdict.accepted is nothing_missing.search.base
+    assert nothing_missing.tests == ()
+    assert verdict.losses["none"] == min(verdict.losses.values())
+
+
+def test_probabilities_add_up_to_one(nothing_missing):
+    verdict = nothing_missing.verdict
+    total = verdict.probability_none + verdict.probability_unknown + sum(c.probability for c in verdict.candidates)
+    assert total == pytest.approx(1.0, abs=1e-9)
+
+
+def test_every_test_is_left_out_once(nothing_missing):
+    groups = conditions_of(nothing_missing.search)
+    tests = nothing_missing.campaign.tests
+    assert sorted(t for g in groups for t in g) == list(range(len(tests)))
+    assert [{tests[t].temperature for t in g} for g in groups] == [{20.0}, {40.0}, {60.0}]
+
+
+def test_json_says_what_could_have_been_shown(nothing_missing):
+    answer = json.loads(json.dumps(diagnosis_json(nothing_missing), allow_nan=False))
+    assert answer["verdict"] == "none"
+    assert set(answer["detectable"]) <= {"soak_lag", "channel_delay"}
+    assert 0 < answer["detectable"]["soak_lag"] < 0.2  # FRFs of five tests show a hub that lags by a fifth
+    assert answer["misfit"]["rejected"] is False
+    assert sum(s["count"] for s in answer["misfit"]["shares"]["test"]) == answer["misfit"]["count"]
+    assert answer["error"]["before"] == answer["error"]["after"] < 1.5
+
+
+@pytest.mark.slow
+def test_a_hidden_effect_is_named_with_its_size(spindle):
+    lag = by_name("soak_lag")
+    found = diagnose(
+        spindle, tables(spindle, [(lag, lag.typical() | {"hub_share": 0.2})]), (lag, by_name("grease_damping"), by_name("magnetic_pull"))
+    )
+    assert (found.verdict.word, found.verdict.effects) == ("identified", ("soak_lag",))
+    assert found.verdict.held_out_after < found.verdict.held_out_before / 3
+    size = diagnosis_json(found)["candidates"][0]["parameters"]["soak_lag.hub_share"]
+    assert size["value"] == pytest.approx(0.2, abs=max(5 * size["sd"], 0.02))
+
+
+@pytest.mark.slow
+def test_a_softening_bond_of_another_program(spindle):
+    found = diagnose(spindle, read_campaign(DATA / "foreign_bond"))
+    assert (found.verdict.word, found.verdict.effects) == ("identified", ("bond_softening",))

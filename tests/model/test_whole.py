@@ -1,0 +1,85 @@
+"""Written whole or not at all: what fails, what is killed, and what is left of it."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from thermospindle.model.errors import BadInput
+from thermospindle.model.whole import whole
+
+ROOT = Path(__file__).parents[2]
+
+
+def write(path: Path, text: str) -> None:
+    """A folder with one file."""
+    with whole(path) as folder:
+        folder.mkdir()
+        (folder / "text").write_text(text)
+
+
+def test_a_folder_and_a_file_replace_what_stood_there(tmp_path):
+    for text in ("old", "new"):
+        write(tmp_path / "folder", text)
+        with whole(tmp_path / "file") as file:
+            file.write_text(text)
+    assert (tmp_path / "folder" / "text").read_text() == (tmp_path / "file").read_text() == "new"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "folder"]
+
+
+def test_the_old_one_stays_when_writing_fails(tmp_path):
+    write(tmp_path / "a", "old")
+    with pytest.raises(BadInput, match=rf"^{tmp_path}/a/text: is wrong$"), whole(tmp_path / "a") as folder:  # noqa: PT012
+        folder.mkdir()
+        raise BadInput(f"{folder}/text: is wrong")
+    assert (tmp_path / "a" / "text").read_text() == "old"
+    assert [p.name for p in tmp_path.iterdir()] == ["a"]
+
+
+@pytest.mark.parametrize("when", [1, 2, 3])
+def test_the_old_or_the_new_one_can_be_had_after_a_kill(tmp_path, when):
+    """Killed before the first, second and third move of a replacement; the next writer puts the old one back and clears away."""
+    write(tmp_path / "a", "old")
+    script = f"""
+import os, signal, sys
+from pathlib import Path
+from thermospindle.model import whole
+replace, moves = os.replace, []
+def counted(*paths):
+    moves.append(paths)
+    if len(moves) == {when}:
+        os.kill(os.getpid(), signal.SIGKILL)
+    replace(*paths)
+whole.os.replace = counted
+with whole.whole(Path(sys.argv[1])) as folder:
+    folder.mkdir()
+    (folder / "text").write_text("new")
+"""
+    code = subprocess.run([sys.executable, "-c", script, tmp_path / "a"], cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)}).returncode
+    moved = 2  # the old one away, the new one in
+    assert code == (0 if when > moved else -9)
+    left = [p for p in tmp_path.iterdir() if p.name != "a"]
+    assert len(left) == (0 if when > moved else 1)
+    with pytest.raises(KeyboardInterrupt), whole(tmp_path / "a"):  # noqa: PT012
+        assert (tmp_path / "a" / "text").read_text() == ("new" if when > moved else "old")
+        raise KeyboardInterrupt
+    assert [p.name for p in tmp_path.iterdir()] == ["a"]
+
+
+def test_work_of_a_living_process_is_left_alone(tmp_path):
+    with whole(tmp_path / "a") as first:
+        first.write_text("first")
+        with whole(tmp_path / "a") as second:
+            second.write_text("second")
+        assert first.read_text() == "first"
+    assert (tmp_path / "a").read_text() == "first"
+
+
+def test_names_that_are_patterns_or_long(tmp_path):
+    for name in ("a[1]*?", "n" * 250):
+        for text in ("old", "new"):
+            write(tmp_path / name, text)
+        assert (tmp_path / name / "text").read_text() == "new"
+    assert len(list(tmp_path.iterdir())) == 2

@@ -1,0 +1,179 @@
+"""Pictures, report and folder of a comparison, read back."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from matplotlib import rc_context
+from rich.console import Console
+
+from thermospindle.diagnosis.compare.compare import compare
+from thermospindle.diagnosis.data.observe import observe
+from thermospindle.model.machine import Condition
+from thermospindle.report.figures.common import STYLE, svg
+from thermospindle.report.figures.compare import figures, label, shown_pairs
+from thermospindle.report.log.read import read_log
+from thermospindle.report.page.compare import sections, write_comparison
+from thermospindle.report.text.compare import show_comparison
+from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Noise, Test
+from thermospindle.sim.identification.frf import Frf
+from thermospindle.sim.operating import operating_point
+
+LINES = np.arange(400.0, 6000.0, 4.0)
+
+
+@pytest.fixture(scope="module")
+def campaign(spindle):
+    """The model's own FRFs with every frequency 1 % low, cold and hot."""
+    tests = []
+    for t, speed in ((20.0, 0.0), (60.0, 754.0)):
+        value = operating_point(spindle, Condition(t, speed)).frf(LINES * 1.01)
+        sd = 0.003 * np.abs(value) + 2e-4 * np.abs(value).max()
+        error = sd * np.random.default_rng(1).standard_normal((2, *value.shape)) / np.sqrt(2)
+        frf = Frf(LINES, value + error[0] + 1j * error[1], tuple(p.node for p in spindle.points), (1, 2), "mobility", sd=sd)
+        tests.append(Test(f"T{t:g}", t, speed, frf=frf))
+    return Campaign("1 % low & <slow>", spindle.name, "mobility", spindle.points, tuple(tests), Noise(0.003, 2e-4))
+
+
+@pytest.fixture(scope="module")
+def found(spindle, campaign):
+    return compare(spindle, campaign)
+
+
+@pytest.fixture(scope="module")
+def folder(spindle, found, tmp_path_factory):
+    path = tmp_path_factory.mktemp("comparison")
+    write_comparison(found, spindle, path)
+    return path
+
+
+class Cells(HTMLParser):
+    """The cells of the table of modes; fails where tags do not close in order."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.cells: list[str] = []
+        self.feed(text)
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        if tag not in {"meta", "br", "img", "path", "use", "rect", "image"}:
+            self.open.append(tag)
+        if tag == "td":
+            self.cells.append("")
+
+    def handle_endtag(self, tag):
+        if tag not in {"path", "use", "rect", "image"}:
+            assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if "td" in self.open:
+            self.cells[-1] += data
+
+
+def test_the_whole_is_one_percent_low(found):
+    for test in found.tests:
+        assert [100 * m.error / m.measured for m in test.modes] == pytest.approx([1.0] * len(test.modes), abs=0.15)
+        assert len(test.modes) >= 7
+        assert test.correlation.whole.shift == pytest.approx(0.01, abs=5e-4)
+        assert test.missing == test.extra == ()
+
+
+def test_the_folder(folder):
+    names = ("pulls", "frfs", "bands", "channels", "fdac")
+    assert {p.name for p in folder.iterdir()} == {"report.html", "compare.rrd", *(f"{n}.{k}" for n in names for k in ("svg", "png"))}
+    for name in names:
+        assert (folder / f"{name}.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+        assert "<svg" in (folder / f"{name}.svg").read_text(encoding="utf-8")
+
+
+def test_the_report_tells_every_mode(found, folder):
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    cells = Cells(text).cells
+    for test in found.tests:
+        for m in test.modes:
+            assert f"{m.computed:.2f}" in cells
+            assert any(cell.startswith(f"{m.measured:.2f} ±") for cell in cells)
+    assert "1 % low &amp; &lt;slow&gt;" in text
+    assert "<slow>" not in text
+    assert not re.search(r'(?:src|href)="(?!#|data:)', text)  # needs no network
+    ids = re.findall(r' id="([^"]+)"', text)
+    assert len(ids) == len(set(ids))
+
+
+def test_close_modes_are_starred(found, folder):
+    """As in the terminal, with what the star means."""
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    close = [f"{m.mac:.3f}*" for t in found.tests for m in t.modes if m.close]
+    assert close
+    assert [cell for cell in Cells(text).cells if cell.endswith("*")] == close
+    assert "* Close modes: share of the measured shape" in text
+    assert "<title>Comparison: " in text
+
+
+def test_sections_have_the_form_of_the_report(found):
+    told = sections(found)
+    assert [title for title, _ in told] == ["Measured beside computed", "FRFs, measured and computed"]
+    assert all("<svg" in body for _, body in told)
+
+
+def test_the_pull_map_shows_the_pulls(found):
+    """Every number of the picture is a pull of the comparison, to its printed digits."""
+    with rc_context(STYLE):
+        text = svg(figures(found)["pulls"], "k", "pulls")
+    for test in found.tests:
+        for m in test.modes:
+            shown = f"{m.pull:+.1f}" if abs(m.pull) < 9.95 else f"{m.pull:+.0f}"
+            assert f">{shown.replace('-', '−')}<" in text
+
+
+def test_the_log_reads_back(found, folder, campaign):
+    contents = read_log(folder / "compare.rrd")
+    assert list(contents.frfs) == ["T20", "T20 computed", "T60", "T60 computed"]
+    for test, of in zip(campaign.tests, found.tests, strict=True):
+        assert contents.frfs[test.id] == test.frf
+        assert np.array_equal(contents.frfs[f"{test.id} computed"].value, of.correlation.computed)
+    assert {p.source for p in contents.peaks} == {"measured", "computed"}
+    told = sorted(p.frequency for p in contents.peaks if p.source == "measured" and p.test == "T20")
+    assert told == [m.measured for m in found.tests[0].modes]
+    assert contents.blueprint
+    assert contents.timelines == ("frequency",)
+    level = "/frf/T20/hammer\\ 1\\,\\ response\\ 1/level"
+    assert {f"{level}/measured", f"{level}/computed", f"{level}/modes_measured"} <= set(contents.entities)
+
+
+def test_a_table_of_modes_has_no_frfs_to_show(spindle, tmp_path):
+    rows = (ModeRow("t", 1, "axial", 1002.0, 0.1), ModeRow("t", 2, "rocking", 1300.0, 0.1))
+    campaign = Campaign("table", spindle.name, "mobility", spindle.points, (Test("t", 20.0, 0.0, modes=rows),))
+    found = compare(spindle, campaign)
+    assert set(figures(found)) == {"pulls"}
+    write_comparison(found, spindle, tmp_path)
+    assert {p.name for p in tmp_path.iterdir()} == {"report.html", "pulls.svg", "pulls.png"}
+    assert "1300.0 Hz" in (tmp_path / "report.html").read_text(encoding="utf-8").replace("\u00a0", " ")
+
+
+def test_a_test_without_modes_is_shown(spindle, campaign, tmp_path):
+    """Nothing found in the FRFs: they are still compared, and the pictures drawn."""
+    empty = observe(Campaign("n", spindle.name, "mobility", (), (replace(campaign.tests[0], frf=None),)), spindle)[0]
+    found = compare(spindle, replace(campaign, tests=campaign.tests[:1]), [replace(empty, test=campaign.tests[0])])
+    assert found.tests[0].modes == ()
+    write_comparison(found, spindle, tmp_path)
+    assert "frfs.png" in {p.name for p in tmp_path.iterdir()}
+
+
+def test_people_read_likeness_by_test(found):
+    console = Console(width=120, record=True, file=open("/dev/null", "w"))  # noqa: SIM115
+    show_comparison(console, found)
+    text = console.export_text()
+    assert "CSAC" in text
+    assert "+1.00" in text
+
+
+def test_labels_and_pairs(found, campaign):
+    assert [label(t, ", ") for t in found.tests] == ["20 °C", "60 °C, 7200 rpm"]
+    assert shown_pairs(found.tests[0].correlation) == [(n, n) for n in campaign.tests[0].frf.reference_nodes]

@@ -1,0 +1,137 @@
+"""The diagnosis told: its page says what its JSON says, the pictures show its numbers, and every file is there."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from html import unescape
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from tests.conftest import SCENE
+from thermospindle.cli import main
+from thermospindle.diagnosis.inference.evidence import evidence
+from thermospindle.diagnosis.inference.fit import fit
+from thermospindle.diagnosis.inference.mechanism import variants
+from thermospindle.diagnosis.inference.next_test import ModePrediction, NextTest
+from thermospindle.diagnosis.inference.search import Hypothesis
+from thermospindle.diagnosis.inference.verdict import Candidate
+from thermospindle.model.machine import Condition
+from thermospindle.model.scene.reading import content_hash, load
+from thermospindle.model.tolerance import toleranced
+from thermospindle.report.figures.diagnosis import errors, explanations, law
+from thermospindle.report.page.diagnosis import sections, write_diagnosis
+from thermospindle.report.text.diagnosis import diagnosis_json, show_diagnosis
+from thermospindle.sim.effects import by_name, of_scene
+
+
+@pytest.fixture(scope="module")
+def told(nothing_missing):
+    """A diagnosis as if a hub that lags had been taken for its explanation, and its answer."""
+    search, (lag, *_) = nothing_missing.search, variants(by_name("soak_lag"))
+    base = search.base
+    start = np.concatenate([base.fit.point, np.zeros(len(search.model.tests) + len(lag.shape))])
+    fitted = fit(search.model, [lag], start, base.fit.rates, (1.0,))
+    hypothesis = Hypothesis(fitted, evidence(search.model, fitted))
+    best = Candidate(hypothesis, ("soak_lag",), False, hypothesis.evidence.ln - base.evidence.ln, 0.9)
+    one, other = (ModePrediction(*row) for row in ((1000.0, 0.5, 0.01), (1010.0, 0.5, 0.01)))
+    test = NextTest(Condition(70.0), ("soak_lag", "<free>"), 1e6, 1, "the mode near 1000 Hz, which differs by 10.0 Hz", ((one,), (other,)))
+    verdict = replace(nothing_missing.verdict, word="identified", effects=("soak_lag",), candidates=(best,), accepted=hypothesis)
+    found = replace(nothing_missing, verdict=verdict, tests=(test,))
+    return found, diagnosis_json(found) | {"campaign": "lag & <haste>"}
+
+
+def cells(section):
+    """Rows of text of all tables of a section."""
+    rows = re.findall(r"<tr>(.*?)</tr>", section)
+    return [[unescape(re.sub(r"<[^>]+>", "", c)) for c in re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row)] for row in rows]
+
+
+def test_the_page_says_what_the_json_says(told):
+    answer = told[1]
+    by_title = dict(sections(*told))
+    verdict = by_title["Verdict"]
+    assert f"{answer['verdict']}: {answer['effects'][0]}" in verdict
+    assert f"{answer['error']['before']:.2f}" in verdict
+    assert f"{answer['error']['held_out_after']:.2f}" in verdict
+    rows = cells(by_title["Explanations"])
+    assert rows[1][0] == "soak_lag"
+    tolerances = {row[0]: row for row in cells(by_title["What these data pin down"])}
+    for name, t in answer["tolerances"].items():
+        unit = 1 if name.startswith("temperature of") else 100
+        assert float(tolerances[name][4]) == pytest.approx(unit * t["prior_sd"], abs=0.006)
+        assert (tolerances[name][6] == "cannot be seen") == (t["sd"] > 0.9 * t["prior_sd"])
+    assert {row[0] for row in cells(by_title["What these data could have shown"])[1:]} == set(answer["detectable"])
+
+
+def test_what_a_test_would_show(told):
+    found, answer = told
+    section = dict(sections(*told))["Which test would decide"]
+    assert "more than a million" in section
+    assert [row[1:] for row in cells(section)] == [["mode 1"], ["1000.0 ± 0.5"], ["1010.0 ± 0.5"]]
+    assert cells(section)[2][0] == "<free>"
+    assert "Which test would decide" not in dict(sections(found, answer | {"next_test": []}))
+
+
+def test_bars_are_the_evidence_and_the_error(told):
+    found, _ = told
+    axes = explanations(found).axes[0]
+    shown = (*found.verdict.candidates[:10], *found.verdict.free[:4])
+    assert [bar.get_width() for bar in axes.patches] == sorted((c.delta_evidence for c in shown), reverse=True)[: len(axes.patches)]
+    bars = errors(found).axes[0].patches
+    by_test = [b[0] / t.count for b, t in zip(found.search.base.fit.by_test, found.search.model.tests, strict=True)]
+    assert [b.get_height() for b in bars[: len(by_test)]] == pytest.approx(by_test)
+    assert len(bars) == 2 * len(by_test)  # with tolerances, and with what is named
+
+
+def test_the_law_is_that_of_the_data(told):
+    found, answer = told
+    best = found.verdict.candidates[0]
+    drawn = np.concatenate([line.get_ydata() for line in law(found, best).axes[0].lines if line.get_label() == "_nolegend_" or line.get_marker() in "os^"])
+    for row in answer["candidates"][0]["law"]["soak_lag"]:
+        assert np.min(np.abs(drawn - row["size"])) < 1e-12
+
+
+def test_files(told, tmp_path):
+    write_diagnosis(*told, tmp_path)
+    pictures = {f.stem for f in tmp_path.iterdir()} - {"report"}
+    assert {"errors", "explanations", "law"} <= pictures
+    assert {p.name for p in tmp_path.iterdir()} == {"report.html"} | {f"{n}.{kind}" for n in pictures for kind in ("svg", "png")}
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "lag &amp; &lt;haste&gt;" in page
+    assert "<haste>" not in page
+    assert "<free>" not in page
+    assert page.count("<svg") == len(pictures)
+    identities = re.findall(r'id="([^"]+)"', page)
+    assert len(identities) == len(set(identities))
+
+
+def test_the_terminal_tells_drifts_only_where_something_is_missing(told, nothing_missing, capsys):
+    console = Console(width=2000)
+    show_diagnosis(console, told[1])
+    text = capsys.readouterr().out
+    assert text.index("Without any catalogue") < text.index(told[1]["misfit"]["words"][0])
+    assert "with odds of more than a million to 1" in text
+    show_diagnosis(console, diagnosis_json(nothing_missing))
+    text = capsys.readouterr().out
+    assert "Without any catalogue" not in text
+    assert "Smallest size these data would have shown" in text
+
+
+def test_add_takes_what_it_fitted(told, spindle, tmp_path, capsys):
+    """The answer as it is written, taken by `spindle add`: the effect's value and every build tolerance, none of tests or channels."""
+    answer = told[1] | {"scene_hash": content_hash(spindle)}
+    (tmp_path / "diagnosis.json").write_text(json.dumps(answer))
+    arguments = ["add", str(SCENE), "soak_lag", "--from", str(tmp_path / "diagnosis.json"), "--out", str(tmp_path / "new"), "--json"]
+    assert main(arguments) == 0
+    capsys.readouterr()
+    built = load(tmp_path / "new")
+    fitted = answer["candidates"][0]["parameters"]["soak_lag.hub_share"]["value"]
+    assert {e.name: v["hub_share"] for e, v in of_scene(built)} == {"soak_lag": pytest.approx(fitted, rel=1e-7)}
+    names = {p.name for p in toleranced(spindle)}
+    assert built.build.deviations == pytest.approx({n: answer["tolerances"][n]["value"] for n in names}, rel=1e-7)
+    assert set(built.build.deviations) == names
+    assert built.build.tests == tuple(t.id for t in told[0].campaign.tests)

@@ -1,0 +1,55 @@
+"""Output folders are replaced only where they hold nothing but what spindle wrote."""
+
+import json
+import shutil
+
+import pytest
+
+from thermospindle.model.errors import BadInput
+from thermospindle.report.folder import MARK, mark, whole_folder
+
+
+def write(out, **files):
+    with whole_folder(out) as folder:
+        for name, text in files.items():
+            (folder / name).write_text(text)
+        mark(folder, {"verb": "test"}, {"answer": 1})
+
+
+def test_an_own_folder_is_replaced_whole(tmp_path):
+    write(tmp_path / "o", a="1", b="2")
+    write(tmp_path / "o", b="3")
+    assert {p.name: p.read_text() for p in (tmp_path / "o").iterdir() if p.name != MARK} == {"b": "3"}
+    assert set(json.loads((tmp_path / "o" / MARK).read_text())) == {"options", "answer", "files"}
+
+
+def test_files_of_others_are_never_deleted(tmp_path):
+    write(tmp_path / "o", a="1")
+    for place in (tmp_path / "o" / "mine.txt", tmp_path / "o" / "deep" / "mine.txt"):
+        place.parent.mkdir(exist_ok=True)
+        place.write_text("precious")
+        with pytest.raises(BadInput, match=r"mine\.txt, which spindle did not write"):
+            write(tmp_path / "o", a="2")
+        assert place.read_text() == "precious"
+        place.unlink()
+    write(tmp_path / "o", a="2")
+
+
+def test_a_file_that_was_edited_is_not_overwritten(tmp_path):
+    write(tmp_path / "o", a="1")
+    (tmp_path / "o" / "a").write_text("edited by hand")
+    with pytest.raises(BadInput, match="a was changed since spindle wrote it"):
+        write(tmp_path / "o", a="2")
+
+
+def test_a_copied_mark_does_not_make_a_folder_ours(tmp_path):
+    write(tmp_path / "o", a="1")
+    home = tmp_path / "home"
+    home.mkdir()
+    (home / "thesis.tex").write_text("precious")
+    shutil.copy(tmp_path / "o" / MARK, home / MARK)
+    with pytest.raises(BadInput, match=r"thesis\.tex, which spindle did not write"):
+        write(home, a="1")
+    (home / MARK).write_text("{}")
+    with pytest.raises(BadInput, match="did not write"):
+        write(home, a="1")

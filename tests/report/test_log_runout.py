@@ -1,0 +1,218 @@
+"""The log of a turning spindle: what goes in comes out, the model and the orbit move as computed, and it is not large."""
+
+from __future__ import annotations
+
+import json
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rerun as rr
+from rerun.chunk import RrdReader
+from scipy.spatial.transform import Rotation
+
+from thermospindle.cli import main
+from thermospindle.model.bearing.kinematics import row_kinematics
+from thermospindle.model.errors import BadInput
+from thermospindle.model.imperfections import Imperfections
+from thermospindle.model.machine import Condition
+from thermospindle.model.units import TO_MM
+from thermospindle.report.figures.runout import RANGE, polar_figure, waterfall_figure
+from thermospindle.report.log.read import describe, read_log
+from thermospindle.report.log.runout import log_signals, orbit_pieces, write_runout_log
+from thermospindle.sim.operating import operating_point
+from thermospindle.sim.posing import cage_turns, frame_indices, turning_poses
+from thermospindle.sim.running.runout import X, Y, runout, with_imperfections
+from thermospindle.sim.running.waterfall import LineSpectrum, on_grid, run_up, waterfall
+
+SPEED = 7200 * np.pi / 30
+
+
+@pytest.fixture(scope="module")
+def record(spindle):
+    return runout(operating_point(spindle, Condition(40.0, SPEED)), 0.25, path="linear")
+
+
+@pytest.fixture(scope="module")
+def spectra(spindle):
+    return waterfall(spindle, 40.0, run_up(SPEED))
+
+
+@pytest.fixture(scope="module")
+def file(record, spectra, tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("log") / "runout.rrd"
+    write_runout_log(record, spectra, path)
+    return path
+
+
+def test_numbers_come_back_bit_for_bit(record, spectra, file):
+    contents = read_log(file)
+    cut = record.by_lines
+    assert np.array_equal(contents.signals[3:], 1e9 * cut.nonrepeatable[:3].reshape(3, -1))
+    assert np.array_equal(contents.signals[:3], 1e9 * np.tile(cut.repeatable[:3], cut.count))
+    assert contents.signals[:3] + contents.signals[3:] == pytest.approx(1e9 * cut.value[:3].reshape(3, -1), abs=1e-9)
+    assert [contents.about[k] for k in ("temperature_C", "speed_rad_per_s", "revolutions")] == [40.0, SPEED, cut.count]
+    assert contents.blueprint
+    assert {"time", "speed"} <= set(contents.timelines)
+    assert contents.quoted[X]["asynchronous_error"] == record.values()[X].asynchronous_error
+    assert set(contents.quoted) == {p.name for p in record.signals.probes}
+    assert [g["frequency"] for g in contents.rows("/numbers/lines")] == [g.frequency for g in record.lines]
+    assert [g["cause"] for g in contents.rows("/numbers/lines")] == [g.causes[0].cause for g in record.lines]
+    assert len(contents.waterfall) == len(spectra)
+    for own, other in zip(contents.waterfall, spectra, strict=True):
+        assert own["speed_rad_per_s"] == other.speed
+        for name in ("frequency", "radial", "axial", "natural"):
+            assert np.array_equal(own[name], getattr(other, name))
+
+
+def test_a_logged_value_costs_at_most_25_bytes(record, file, tmp_path):
+    """The whole file, model and drawings included, over the values of its series: RRO and NRRO of three probes at every sample."""
+    values = 6 * record.averaged.value[0].size
+    alone = tmp_path / "signals.rrd"
+    recording = rr.RecordingStream("thermospindle", send_properties=False)
+    recording.save(alone)
+    log_signals(recording, record)
+    recording.disconnect()
+    assert alone.stat().st_size / values < 14
+    longer = runout(record.point, 0.5, path="linear")
+    write_runout_log(longer, [], tmp_path / "longer.rrd")
+    write_runout_log(record, [], tmp_path / "shorter.rrd")
+    grown = (tmp_path / "longer.rrd").stat().st_size - (tmp_path / "shorter.rrd").stat().st_size
+    assert grown / (6 * longer.averaged.value[0].size - values) < 25
+    assert (tmp_path / "longer.rrd").stat().st_size / (6 * longer.averaged.value[0].size) < 25
+
+
+def test_series_are_sent_in_columns(file):
+    """One row a sample in few chunks, not a chunk a sample."""
+    chunks: dict[str, int] = {}
+    for chunk in RrdReader(file).stream():
+        chunks[chunk.entity_path] = chunks.get(chunk.entity_path, 0) + 1
+    assert read_log(file).entities["/signals"] > 4000
+    assert chunks["/signals"] <= 10
+    assert chunks["/orbit/growing"] <= 10
+    assert chunks["/model/hub"] <= 10
+
+
+def test_the_drawn_hub_stands_where_the_probe_sees_it(record):
+    """The material point under a probe, turned by the spin and moved by the pose, lies where the probe's signal says, enlarged."""
+    moved, factor = turning_poses(record, 0.0004)
+    assert factor >= 10
+    translation, turn = moved["hub"]
+    frames = frame_indices(record)
+    angle = record.signals.angle[frames]
+    for name, axis in ((X, 0), (Y, 1)):
+        probe = next(p for p in record.signals.probes if p.name == name)
+        at_rest = Rotation.from_euler("z", -angle[:, None]).apply(TO_MM * np.array(probe.position))
+        drawn = translation + Rotation.from_quat(turn).apply(at_rest)
+        seen = (drawn[:, axis] - TO_MM * probe.position[axis]) / (TO_MM * factor)
+        largest = np.abs(record.signals.of(name)).max()
+        assert seen == pytest.approx(record.signals.of(name)[frames], abs=1e-3 * largest)  # of second order in the enlarged tilt
+    still = moved["base"][1]
+    assert np.abs(still[:, 2]).max() < 1e-12  # the base does not spin
+
+
+def test_balls_go_round_with_the_cage(record):
+    kin = row_kinematics(record.point.spindle, record.point.state)["upper"]
+    turned = np.unwrap(Rotation.from_quat(cage_turns(record)["upper"]).as_euler("zyx")[:, 0])
+    time = record.signals.time[frame_indices(record)]
+    assert (turned[-1] - turned[0]) / (time[-1] - time[0]) == pytest.approx(kin.cage, rel=1e-9)
+    assert kin.cage / (2 * np.pi) == pytest.approx(69.44, abs=0.01)
+
+
+def test_the_orbit_grows_without_gaps(record):
+    cut = record.by_lines
+    x, y = (cut.value[i].ravel() for i in (0, 1))
+    pieces, ends = orbit_pieces(x, y, len(cut.angle))
+    assert len(pieces) == len(ends) >= 8 * cut.count - 1
+    for before, after in pairwise(pieces):
+        assert np.array_equal(before[-1], after[0])
+    whole = np.concatenate([pieces[0], *(p[1:] for p in pieces[1:])])
+    assert np.array_equal(whole, 1e9 * np.stack([x, -y], axis=1))
+
+
+def test_the_waterfall_at_the_speed_of_the_record_has_its_lines(record, spectra):
+    own = next(s for s in spectra if s.speed == pytest.approx(SPEED))
+    for g in record.lines[:6]:
+        near = np.abs(own.frequency - g.frequency) < 2.5  # the record of a quarter second tells as one what lies within half a bin of 4 Hz
+        amplitude = (own.radial if g.direction == "radial" else own.axial)[near]
+        assert amplitude.max() <= g.amplitude * 1.6
+        assert amplitude.sum() >= g.amplitude * (1 - 1e-6)
+
+
+def test_unbalance_grows_with_the_square_of_the_speed_far_below_resonance(spindle):
+    unbalanced = with_imperfections(spindle, Imperfections(unbalance=1e-8, unbalance_z=0.01))
+    slow, fast = waterfall(unbalanced, 20.0, [SPEED / 4, SPEED / 2])
+    assert slow.frequency == pytest.approx([30.0])
+    assert fast.radial[0] / slow.radial[0] == pytest.approx(4.0, rel=2e-3)  # 60 Hz against a first rocking mode at 1.8 kHz: 1.001
+
+
+def test_spectra_are_drawn_at_their_frequencies_and_levels():
+    made = LineSpectrum(100.0, np.array([100.0, 400.0]), np.array([1.0, 1e-1]), np.array([0.0, 1.0]), np.array([250.0]))
+    grid = np.linspace(0, 500, 501)
+    assert np.flatnonzero(on_grid(made, grid, "radial")).tolist() == [100, 400]
+    assert np.flatnonzero(on_grid(made, grid, "axial")).tolist() == [400]
+    curve = waterfall_figure([made], "radial", (6.0, 4.0)).axes[0].lines[0]
+    height = curve.get_ydata() - curve.get_ydata().min()
+    peaks = np.flatnonzero(height > 0)
+    assert curve.get_xdata()[peaks] == pytest.approx([100.0, 400.0], abs=0.5)
+    assert height[peaks[0]] / height[peaks[1]] == pytest.approx(RANGE / (RANGE - 20))
+
+
+def test_the_polar_plot_holds_the_band(record):
+    lines = {line.get_label(): line.get_ydata() for line in polar_figure(record, (4.0, 3.0)).axes[0].lines}
+    mean = lines["repeatable part (RRO)"]
+    text = polar_figure(record, (4.0, 3.0)).axes[0].texts[0].get_text()
+    quoted = record.values()[X]
+    assert f"asynchronous {1e9 * quoted.asynchronous_error:.3g} nm" in text
+    assert 1e-9 * np.ptp(mean) == pytest.approx(quoted.synchronous_error, rel=1e-6, abs=1e-15)
+
+
+# ---------------------------------------------------------------- reading, refusing
+
+
+def test_inspect_tells_what_is_in_it(file, capsys):
+    assert main(["inspect", str(file)]) == 0
+    told = capsys.readouterr().out
+    assert "turning at 7200 rpm, 40 C, 30 revolutions" in told
+    assert "with a blueprint" in told
+    assert "waterfall of 25 speeds" in told
+    assert main(["inspect", str(file), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert len(answer["nonrepeatable_nm"][0]) == len(answer["repeatable_nm"][2]) > 4000
+    assert answer["waterfall"][19]["speed_rpm"] == pytest.approx(7200)
+
+
+def test_a_log_without_waterfall_is_read(record, tmp_path):
+    write_runout_log(record, [], tmp_path / "plain.rrd")
+    contents = read_log(tmp_path / "plain.rrd")
+    assert contents.waterfall == []
+    assert "waterfall of" not in describe(contents)
+
+
+def test_a_log_without_its_record_is_refused(tmp_path):
+    """The property says a record of runout, and there is none."""
+    recording = rr.RecordingStream("thermospindle", send_properties=False)
+    recording.save(tmp_path / "runout.rrd")
+    recording.send_property("runout", rr.AnyValues(title="t", scene="s"))
+    recording.disconnect()
+    with pytest.raises(BadInput, match=r"runout\.rrd: is not a whole log of thermospindle: /signals is missing"):
+        read_log(tmp_path / "runout.rrd")
+
+
+@pytest.mark.parametrize("share", [0.01, 0.5, 0.95])
+def test_a_file_cut_short_is_refused(share, file, tmp_path):
+    whole = file.read_bytes()
+    path = tmp_path / "cut.rrd"
+    path.write_bytes(whole[: int(share * len(whole))])
+    with pytest.raises(BadInput, match=r"cut\.rrd"):
+        read_log(path)
+
+
+def test_nothing_is_left_half_written(record, tmp_path, monkeypatch):
+    with pytest.raises(BadInput, match="its folder does not exist"):
+        write_runout_log(record, [], tmp_path / "absent" / "runout.rrd")
+    monkeypatch.setattr("thermospindle.report.log.runout.summary", lambda runout: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        write_runout_log(record, [], tmp_path / "runout.rrd")
+    assert list(tmp_path.iterdir()) == []

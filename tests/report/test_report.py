@@ -1,0 +1,320 @@
+"""The report: its numbers are the run's, it needs no network, and it works for other scenes, temperatures and measurements."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+
+from tests.made_campaign import other_campaign
+from thermospindle.model.rotor.modes import group_energy
+from thermospindle.model.scene.reading import content_hash
+from thermospindle.report.figures import common as plots
+from thermospindle.report.page.comparison import compared
+from thermospindle.report.page.headlines import misses
+from thermospindle.report.page.report import background, html, stamp, write_report
+from thermospindle.sim.campaign.campaign import ModeRow
+from thermospindle.sim.run import Run
+
+VOID = {"meta", "br", "img", "link", "hr", "input"}
+
+
+class Page(HTMLParser):
+    """Tables by their id as rows of cell texts, all references, all ids; fails where tags do not close in order."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.tables: dict[str, list[list[str]]] = {}
+        self.rows: list[list[str]] = []
+        self.references: list[str] = []
+        self.ids: list[str] = []
+        self.items: list[str] = []
+        self.tags: list[str] = []
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = dict(attrs)
+        self.tags.append(tag)
+        self.references += [value or "" for key, value in attrs if key in ("src", "href", "xlink:href", "action", "data")]
+        self.ids += [value for key, value in attrs if key == "id" and value]
+        if tag == "table":
+            self.rows = self.tables.setdefault(given.get("id") or "", [])
+        elif tag == "tr":
+            self.rows.append([])
+        elif tag in ("td", "th"):
+            self.rows[-1].append("")
+        elif tag == "li":
+            self.items.append("")
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.handle_starttag(tag, attrs)
+        if tag not in VOID:
+            self.open.pop()
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if {"td", "th"} & set(self.open):
+            self.rows[-1][-1] += data
+        if "li" in self.open:
+            self.items[-1] += data
+
+
+def number(cell: str) -> float:
+    """The number a cell begins with."""
+    found = re.match(r"\s*([+−]?[\d.]+)", cell)
+    assert found, cell
+    return float(found.group(1).replace("−", "-"))
+
+
+@pytest.fixture(scope="module")
+def text(run: Run) -> str:
+    return html(run)
+
+
+@pytest.fixture(scope="module")
+def page(text: str) -> Page:
+    return Page(text)
+
+
+# ---------------------------------------------------------------- numbers
+
+
+def test_the_table_of_frequencies_holds_the_numbers_of_the_run(run: Run, page: Page):
+    """Measured, published and computed columns, mode by mode; the model has three modes more in the band than were measured."""
+    rows = [row for row in page.tables["frequencies"] if row and row[0].isdigit()]
+    cold, hot = (step.point.modes for step in run.steps)
+    measured = {(r.test, r.mode): r.frequency for t in run.measured[0].tests for r in t.modes}
+    assert len(rows) == sum(m.frequency < 6000 for m in cold) == 8
+    for i, row in enumerate(rows):
+        assert row[1] == cold[i].kind
+        computed = [number(cell) for cell in row[9:12]]
+        exact = [cold[i].frequency, hot[i].frequency, hot[i].frequency - cold[i].frequency]
+        assert computed == pytest.approx(exact, abs=0.0501)
+        if i < 5:
+            values = [measured["T20", i + 1], measured["T60", i + 1]]
+            assert [number(c) for c in row[3:6]] == pytest.approx([*values, values[1] - values[0]], abs=0.0501)
+            assert "± 1.4" in row[5]  # two frequencies, 1 Hz each
+        else:
+            assert row[3:9] == ["–"] * 6
+    assert [number(row[6]) for row in rows[:5]] == [1002, 1545, 1795, 1821, 2010]
+    assert [number(row[8]) for row in rows[:5]] == [-1, -3, -24, -21, -14]
+
+
+def test_identified_frequencies_stand_in_the_row_of_their_mode(run: Run, page: Page):
+    """Within the identification's band, and with the standard error of a shift from both temperatures."""
+    rows = [row for row in page.tables["frequencies"] if row and row[0].isdigit()]
+    for i in (0, 1):
+        for k, cell in enumerate(rows[i][12:14]):
+            seen = run.steps[k].identified
+            nearest = int(np.argmin(np.abs(seen.frequency - run.steps[k].point.modes[i].frequency)))
+            error = float(cell.split("±")[1])
+            assert number(cell) == pytest.approx(seen.frequency[nearest], abs=error / 2)
+            assert error == pytest.approx(seen.frequency_sd[nearest], rel=0.35)  # one digit is printed
+    assert rows[4][12] == "–"
+
+
+def test_differences_from_the_measurement(run: Run, page: Page):
+    """The paper's own analysis and the model, less the measured column."""
+    rows = [row for row in page.tables["misses"] if row and row[0].isdigit()]
+    assert [number(row[2]) for row in rows] == [-21, -7, 57, 33, -58]
+    assert [number(row[4]) for row in rows] == [-4, -1, 4, 6, 5]
+    cold = run.steps[0].point.modes
+    exact = [cold[i].frequency - f for i, f in enumerate((1023, 1552, 1738, 1788, 2068))]
+    assert [number(row[5]) for row in rows] == pytest.approx(exact, abs=0.0501)
+
+
+def test_bearing_table(run: Run, page: Page):
+    """Every quantity of the figures, both bearings at both temperatures."""
+    rows = [row for row in page.tables["bearings"] if row and row[1] in ("upper", "lower")]
+    assert len(rows) == 4
+    for row in rows:
+        step = next(s for s in run.steps if s.point.condition.temperature == float(row[0]))
+        b = step.point.state.bearing(row[1])
+        exact = [np.degrees(b.contact_angle), b.deformation * 1e6, b.contact_force, b.ball_stiffness * 1e-6]
+        exact += [b.preload, b.radial_stiffness * 1e-6, b.axial_stiffness * 1e-6]
+        assert [number(c) for c in row[2:9]] == pytest.approx(exact, abs=0.000501)
+
+
+def test_mode_table(run: Run, page: Page):
+    """Frequency, damping and shares of strain energy of every mode in the band, temperature by temperature."""
+    rows = [row for row in page.tables["modes"] if row and row[0] in ("20", "60")]
+    modes = [(s, m) for s in run.steps for m in s.point.modes if m.frequency < 6000]
+    assert len(rows) == len(modes)
+    for row, (step, mode) in zip(rows, modes, strict=True):
+        assert number(row[4]) == pytest.approx(mode.frequency, abs=0.00501)
+        assert number(row[6]) == pytest.approx(100 * mode.damping_ratio, abs=0.000501)
+        shares = [100 * share for share in group_energy(step.point.chain, mode).values()]
+        assert [number(c) for c in row[8:]] == pytest.approx(shares, abs=0.0501)
+
+
+def test_says_what_is_missed(run: Run, page: Page):
+    """Split of the rocking pair, direction of mode 1, larger shifts of the bearing modes, and what carries them."""
+    said = " ".join(page.items).replace("\u00a0", " ")
+    assert "The largest miss at 20 °C is mode 5 (axial): computed 2010.0 Hz, measured 2068.0 Hz, 58.0 Hz or 2.8 % too low" in said
+    assert "Modes 3 and 4 (rocking) are measured 50.0 Hz apart, computed 26.0 Hz" in said
+    assert "mode 1 (axial) rises by 3.0 ± 1.4 Hz when measured and falls by 1.7 Hz when computed" in said
+    assert "move further than computed ones in modes 3, 4 and 5" in said
+    assert "names “ball bearing”" in said
+
+
+def test_sources_and_settings(run: Run, page: Page, text: str):
+    """Provenance of every number with the file's value, the scene's hash, the acquisition, and the meshes."""
+    origins = {row[0]: row[1:] for row in page.tables["origins"]}
+    assert {key for key in origins if key != "number"} == set(run.spindle.provenance)
+    assert origins["bearing_pair.preload_N"][:2] == ["16.0", "printed"]
+    assert ["scene hash", content_hash(run.spindle)] in page.tables["versions"]
+    assert ["hits averaged per point", "1"] in page.tables["acquisition"]
+    assert ["sample rate", "25000 Hz"] in page.tables["acquisition"]
+    assert [row[0] for row in page.tables["meshes"]] == ["part", "stationary", "rotating"]
+    assert "differs from its file" not in text
+
+
+# ---------------------------------------------------------------- the file
+
+
+def test_needs_no_network(page: Page, text: str):
+    """No scripts; references point into the file or hold their data; no address in style sheets."""
+    assert "script" not in page.tags
+    assert all(r.startswith(("#", "data:image/png;base64,")) for r in page.references)
+    assert not re.search(r"url\((?!#)|@import|https?://", text)
+    targets = {r[1:] for r in page.references if r.startswith("#")} | set(re.findall(r"url\(#([^)]+)\)", text))
+    assert targets <= set(page.ids)
+    assert len(page.ids) == len(set(page.ids))
+    assert len(text.encode()) < 3e6
+
+
+def test_same_run_same_file_written_whole(run: Run, text: str, tmp_path: Path):
+    """Byte for byte, nothing else left in the folder, and the old file kept when a new one cannot be made."""
+    path = tmp_path / "report.html"
+    write_report(run, path)
+    assert path.read_text(encoding="utf-8") == text
+    with pytest.raises(IndexError):
+        write_report(replace(run, steps=()), path)
+    assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
+    assert path.read_text(encoding="utf-8") == text
+
+
+def test_extra_sections(run: Run):
+    """Stand in the given order between results and background; their HTML is kept, their titles are escaped."""
+    made = html(replace(run, steps=run.steps[:1]), [("Runout <&>", '<p id="runout">1 &lt; 2</p>'), ("Diagnosis", "<p>none</p>")])
+    titles = re.findall(r"<h2>(.*?)</h2>", made)
+    place = titles.index("Runout &lt;&amp;&gt;")
+    assert titles[place - 1 : place + 3] == ["All modes", "Runout &lt;&amp;&gt;", "Diagnosis", "The virtual test"]
+    assert '<p id="runout">1 &lt; 2</p>' in made
+
+
+def test_title_command_and_date(run: Run, text: str, tmp_path: Path):
+    """The kind of page begins its title; the command line's stamp stands below it, escaped and once, and nothing else changes."""
+    assert f"<title>Run: {run.spindle.title}</title>" in text
+    assert not re.search(r"<(fig)?caption>(Table|Fig\.) \d|numbered as in Table", text)  # of the paper
+    (tmp_path / "report.html").write_text(text, encoding="utf-8")
+    stamp(tmp_path, "spindle run 'a <b>' --out x", "2026-01-02 03:04 UTC")
+    made = (tmp_path / "report.html").read_text(encoding="utf-8")
+    line = '<p class="under"><code>spindle run &#39;a &lt;b&gt;&#39; --out x</code>, 2026-01-02 03:04 UTC</p>'
+    assert made == text.replace("<!-- made by -->", line)
+    assert made.index("</h1>") < made.index(line) < made.index("<section")
+
+
+# ---------------------------------------------------------------- other scenes, temperatures, measurements
+
+
+@pytest.mark.parametrize("chosen", [slice(0, 1), slice(0, 2)], ids=["one temperature", "two"])
+def test_without_measurements_or_file(run: Run, chosen: slice):
+    spindle = replace(run.spindle, file=None)
+    page = Page(html(Run(spindle, run.steps[chosen], ())))
+    rows = [row for row in page.tables["frequencies"] if row and row[0].isdigit()]
+    assert len(rows) == 8
+    assert "misses" not in page.tables
+    assert number(rows[0][3]) == pytest.approx(run.steps[0].point.modes[0].frequency, abs=0.0501)
+
+
+def test_measured_elsewhere_is_named_not_shown(run: Run):
+    """A campaign at temperatures that the run does not have."""
+    campaign = other_campaign([ModeRow("a", 1, "axial", 1010.0, 1.0)], temperature=35.0)
+    spindle = replace(run.spindle, file=None)
+    table = compared(Run(spindle, run.steps, (campaign,)))
+    assert table.elsewhere == ("measured at 35 °C",)
+    assert set(table.sources()) == {"computed", "identified"}
+    assert misses(table) == []
+
+
+def test_changed_spindle_is_told(run: Run):
+    """Values of the file are not passed off as the run's."""
+    changed = replace(run.spindle, reference_temperature=21.0)
+    said = {title: str(body) for title, body in background(Run(changed, run.steps, ()))}
+    assert "differs from its file" in said["Where the numbers come from"]
+
+
+# ---------------------------------------------------------------- pictures
+
+
+def test_exaggeration_is_a_round_number_that_fits(run: Run):
+    """The largest displacement is drawn as at most 6 % of the section, and not less than a third of that."""
+    point = run.steps[-1].point
+    _, scale = plots.section("key", point)
+    mantissa = scale / 10 ** np.floor(np.log10(scale))
+    assert mantissa == pytest.approx(round(mantissa))
+    assert round(mantissa) in (1, 2, 5)
+    _, still = plots.section("key", run.steps[0].point)
+    assert still == 1.0  # nothing moves at the reference temperature
+
+
+def test_temperature_colours_go_from_cold_to_hot():
+    assert plots.colour(20, (20, 60)) == "#2166ac"
+    assert plots.colour(60, (20, 60)) == "#c9371c"
+    assert plots.colour(20, (20,)) == "#2166ac"
+
+
+def test_svg_for_a_page():
+    """Ids are only those referred to, with the figure's own beginning; two figures of one page share none; text stays text."""
+    drawn = []
+    for key in ("a", "b"):
+        with rc_context(plots.STYLE):
+            figure = Figure(figsize=(3, 2))
+            axes = figure.subplots()
+            axes.plot([0, 1], [0, 1], "o-", color="#c9371c", label="line")
+            axes.legend()
+            drawn.append(plots.svg(figure, key, "a <figure>"))
+    ids = [set(re.findall(r' id="([^"]+)"', text)) for text in drawn]
+    references = [set(re.findall(r'(?:url\(|href=")#([^")]+)', text)) for text in drawn]
+    assert ids[0]
+    assert ids == references
+    assert not ids[0] & ids[1]
+    assert all(name.startswith("a-") for name in ids[0])
+    assert re.sub(r'(["#])a-', r"\1b-", drawn[0]) == drawn[1]
+    assert ">line</text>" in drawn[0]
+    assert "stroke: #c9371c" in drawn[0]
+    assert 'aria-label="a &lt;figure&gt;"' in drawn[0]
+    assert "<metadata" not in drawn[0]
+
+
+def test_a_level_curve_has_no_offset_axis():
+    """A contact angle that stays 25 degrees but for its last digits: ticks are plain numbers around 25, not 0.00 and an offset."""
+    text = plots.trend("k", [20.0, 60.0], {"": {"lower": [25.0, 25.00004], "upper": [25.0, 25.0]}}, "contact angle, degrees", False)
+    ticks = [float(t.replace("−", "-")) for t in re.findall(r">([−+\d.e]+)</text>", text)]
+    assert "e" not in "".join(re.findall(r">([−+\d.e]+)</text>", text))
+    assert len([t for t in ticks if 24 < t < 26]) >= 3
+
+
+def test_residuals_have_one_scale():
+    """Ticks are plain numbers; one standard error is pale on every page."""
+    figure = Figure()
+    norm = plots.residual_norm(4.0)
+    assert (norm.vmin, norm.vmax) == (-30.0, 30.0)
+    assert abs(float(norm(1.0)) - 0.5) < 0.15
+    plots.residual_bar(figure, norm, figure.subplots())
+    figure.canvas.draw()
+    assert [t.get_text() for t in figure.axes[1].get_yticklabels()] == ["−10", "−3", "0", "3", "10"]

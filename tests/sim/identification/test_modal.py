@@ -1,0 +1,396 @@
+"""Modes come out of noisy FRFs by themselves, all and no others, with standard errors that come true, and are followed across conditions.
+
+The reference is a matrix model of the data sheet's chain (`reference/hdd_2003.md`), its bearing stiffness written out from the sheet's
+numbers: nothing of `model` or `sim` but the code under test.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyuff
+import scipy.stats as st
+
+from tests.conftest import SCENE
+from thermospindle.model.machine import Condition
+from thermospindle.model.scene.reading import load
+from thermospindle.model.tolerance import toleranced
+from thermospindle.model.units import RPM
+from thermospindle.sim.identification.modal import Modes, extract, merge, noise_model, scatter
+from thermospindle.sim.identification.pairing import mac
+from thermospindle.sim.identification.poles import Lines, project
+from thermospindle.sim.operating import operating_point
+from thermospindle.thermal.expansion import expand
+
+DATA = Path(__file__).parents[2] / "data"
+WIDE = np.arange(400.0, 6001.0, 2.0)
+
+
+# ---- the reference spindle as matrices: base z | seat z, tilts | shaft x y z, tilts | hub x y z, tilts
+
+
+def solid(*rings):
+    """Mass, centre, transverse and polar inertia of rings (inner and outer radius, bottom, top in mm, density)."""
+    r0, r1, z0, z1 = np.array([ring[:4] for ring in rings]).T * 1e-3
+    m = np.array([ring[4] for ring in rings]) * np.pi * (r1**2 - r0**2) * (z1 - z0)
+    z = (z0 + z1) / 2
+    centre = m @ z / m.sum()
+    transverse = m / 12 * (3 * (r0**2 + r1**2) + (z1 - z0) ** 2) + m * (z - centre) ** 2
+    return m.sum(), centre, transverse.sum(), (m / 2 * (r0**2 + r1**2)).sum()
+
+
+SHAFT = solid((0, 2.5, -3, 19, 7800), (2.5, 3.752, 3.5, 6.5, 7800), (2.5, 3.752, 15, 18, 7800))
+HUB = solid(
+    (6.5, 7.5, 3, 10, 2700),
+    (6.5, 12.5, 10, 20, 2700),
+    (7.5, 16, 5, 8, 2700),
+    (14.5, 16, 1, 5, 7700),
+    (13, 14.5, 1, 5, 7500),
+    (5.349, 6.5, 3.5, 6.5, 7800),
+    (5.349, 6.5, 15, 18, 7800),
+)
+
+
+def bearing(side: int) -> np.ndarray:
+    """5x5 stiffness of ten balls at 24.51 deg under 16 N: springs along the contact lines, their tension across (verification.md)."""
+    stiffness, deflection, distance, angle, arm = 3.5632e9, 1.0542e-6, 101.63e-6, np.radians(24.51), 4.55e-3
+    along = np.array([-np.cos(angle), side * np.sin(angle)])
+    tension = stiffness * deflection**1.5 / (distance + deflection)
+    ball = 1.5 * stiffness * deflection**0.5 * np.outer(along, along) + tension * (np.eye(2) - np.outer(along, along))
+    at = [np.array([[c, s, 0, 0, 0], [0, 0, 1, arm * s, -arm * c]]) for c, s in ((np.cos(p), np.sin(p)) for p in np.arange(10) * np.pi / 5)]
+    return sum(a.T @ ball @ a for a in at)
+
+
+def spindle(speed: float = 0.0, softness: float = 1.0):
+    """Mass, damping with gyroscopic terms, and stiffness (14, 14) at `speed` rad/s with bearings `softness` times as stiff."""
+    mass = np.diag([0.8, 0.099839, 2.0e-5, 2.0e-5, *[SHAFT[0]] * 3, *[SHAFT[2]] * 2, *[HUB[0]] * 3, *[HUB[2]] * 2])
+
+    def motion(part, z=0.0):  # of the point of a part on the axis at height z
+        rows = np.zeros((5, 14))
+        if part == "base":
+            rows[2, 0] = 1
+        elif part == "seat":
+            rows[[2, 3, 4], [1, 2, 3]] = 1
+            rows[0, 3], rows[1, 2] = z, -z
+        elif part:
+            first, arm = (4, z - SHAFT[1]) if part == "shaft" else (9, z - HUB[1])
+            rows[range(5), range(first, first + 5)] = 1
+            rows[0, first + 4], rows[1, first + 3] = arm, -arm
+        return rows
+
+    springs = [
+        (motion("base"), motion(""), np.diag([0, 0, 6.7484e7, 0, 0]), 0.006),
+        (motion("seat"), motion("base"), np.diag([0, 0, 7.1734e6, 23539, 2.0e5]), 0.008),
+        (motion("shaft", 1e-3), motion("seat", 1e-3), np.diag([5e7, 5e7, 3.375e6, 699.93, 699.93]), 0.010),
+        (motion("hub", 16.5e-3), motion("shaft", 16.5e-3), softness * bearing(1), 0.020),
+        (motion("hub", 5e-3), motion("shaft", 5e-3), softness * bearing(-1), 0.020),
+    ]
+    parts = [((a - b).T @ k @ (a - b), zeta) for a, b, k, zeta in springs]
+    damping = sum(2 * zeta * k / (2 * np.pi * 1500) for k, zeta in parts)
+    damping[12, 13] += HUB[3] * speed
+    damping[13, 12] -= HUB[3] * speed
+    return mass, damping, sum(k for k, _ in parts)
+
+
+def sensors() -> np.ndarray:
+    """(7, 14) displacements of the data sheet's points; hammers act on the first and the second."""
+    rows, arm = np.zeros((7, 14)), 15e-3 - HUB[1]
+    rows[0, [11, 13]], rows[1, [11, 12]] = (1, -12e-3), (1, 12e-3)
+    rows[2, [9, 13]], rows[3, [10, 12]] = (1, arm), (1, -arm)
+    rows[4, [1, 3]], rows[5, [1, 2]], rows[6, 0] = (1, -20e-3), (1, 20e-3), 1
+    return rows
+
+
+def eigen(mass, damping, stiffness, rows):
+    """Frequencies (Hz), damping ratios and shapes (m, n_resp) of the poles in the upper half plane, rising."""
+    n = len(mass)
+    values, vectors = np.linalg.eig(np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(mass, np.hstack([stiffness, damping]))]]))
+    order = [i for i in np.argsort(np.abs(values)) if values[i].imag > 0]
+    return np.abs(values[order]) / (2 * np.pi), -values[order].real / np.abs(values[order]), (rows @ vectors[:n, order]).T
+
+
+def mobility(frequency, matrices, rows, hammers):
+    s = 2j * np.pi * np.asarray(frequency)[:, None, None]
+    mass, damping, stiffness = matrices
+    x = np.linalg.solve(s**2 * mass + s * damping + stiffness, np.broadcast_to(hammers.T, (len(s), *hammers.T.shape)))
+    return np.moveaxis(s * (rows @ x), 0, 2)
+
+
+def noisy(frf, seed, relative=0.005, floor=0.0002):
+    """With complex noise of E|e|^2 = sd^2, and the standard deviation as one would take it from the noisy values."""
+    e = np.random.default_rng(seed).standard_normal((2, *frf.shape))
+    measured = frf + noise_model(frf, relative, floor) * (e[0] + 1j * e[1]) / np.sqrt(2)
+    return measured, noise_model(measured, relative, floor)
+
+
+def reference(frequency, speed=0.0):
+    return mobility(frequency, spindle(speed), sensors(), sensors()[[0, 1]])
+
+
+def distance(modes: Modes, frequency, damping) -> float:
+    """Squared error of all frequencies and dampings in units of their covariance: chi-square of 2m degrees of freedom."""
+    error = np.append(modes.frequency - frequency, modes.damping - damping)
+    return float(error @ np.linalg.solve(modes.covariance, error))
+
+
+# ---- the reference scene
+
+
+def test_matrix_model_is_the_data_sheets():
+    """Table 2, analysed column at 20 C."""
+    frequency, *_ = eigen(*spindle(), sensors())
+    assert frequency[:5] == pytest.approx([1002, 1545, 1795, 1821, 2010], abs=0.5)
+
+
+@pytest.mark.parametrize("rpm", [0, 7200])
+@pytest.mark.parametrize(("step", "relative"), [(1, 0.005), (3, 0.005), (1, 0.02)])
+def test_reference_scene(rpm, step, relative):
+    """All eight modes of the band and no other, the five of Table 2 within 0.5 Hz and 5 %, and all within their covariance (p = 1e-5)."""
+    frequency, damping, shape = (x[:8] for x in eigen(*spindle(rpm * RPM), sensors()))
+    lines = WIDE[::step]
+    modes = extract(lines, *noisy(reference(lines, rpm * RPM), 1, relative))
+    assert len(modes.frequency) == 8
+    assert modes.rank_one
+    assert np.abs(modes.frequency - frequency)[:5].max() < 0.5
+    assert np.abs(modes.damping / damping - 1)[:5].max() < 0.05
+    assert distance(modes, frequency, damping) < st.chi2.ppf(1 - 1e-5, 16)
+    assert modes.chi2 == pytest.approx(1, abs=5 * np.sqrt(2 / (28 * len(lines))) + 2 * relative)  # weights come from noisy values
+    single = [0, 1, 2, 3, 4, 7]
+    assert np.diag(mac(modes.shape, shape))[single].min() > 0.99
+    pair_found, pair_known = (np.linalg.qr(x[5:7].T)[0] for x in (modes.shape, shape))  # noise turns a close pair within its space
+    assert np.linalg.svd(pair_found.conj().T @ pair_known)[1].min() > 0.99
+
+
+def test_standard_errors_come_true():
+    """Twelve realisations in a narrower band (seven modes, one pair of them 2.4 Hz apart at 5 % damping): the squared errors in units of
+    the stated covariance are chi-square of 168 degrees of freedom, so errors stated 20 % wrong either way are caught."""
+    lines = np.arange(1150.0, 6001.0, 5.0)
+    exact = reference(lines)
+    frequency, damping, shape = (x[1:8] for x in eigen(*spindle(), sensors()))
+    total, shapes = 0.0, []
+    for seed in range(12):
+        modes = extract(lines, *noisy(exact, seed))
+        assert len(modes.frequency) == 7
+        total += distance(modes, frequency, damping)
+        largest = (np.arange(7), np.abs(modes.shape).argmax(1))
+        error = np.abs(modes.shape - shape / shape[largest][:, None])
+        shapes.append((error / np.where(modes.shape_sd > 0, modes.shape_sd, np.inf)) ** 2)
+    low, high = st.chi2.ppf([0.001, 0.999], 168)
+    assert low < total < high
+    assert np.mean(shapes) * 7 / 6 == pytest.approx(1, abs=0.2)  # one of seven components is 1 by definition; some 1000 numbers
+
+
+@pytest.mark.parametrize("seeds", [range(2), pytest.param(range(2, 12), marks=pytest.mark.slow)], ids=["two", "ten"])
+def test_a_pair_near_the_end_of_a_narrow_band(seeds):
+    """1650 to 5000 Hz: modes at 1002, 1545 and 5551 Hz lie outside, and the pair 2.4 Hz apart, as wide as 5 % of its frequency, near the upper end. It is
+    never told as one mode (in 5 of 12 realisations it was, before `split` left poles with free residues unrefined), and the errors cover what modes
+    outside do."""
+    lines = np.arange(1650.0, 5001.0, 5.0)
+    exact = reference(lines)
+    frequency, damping, _ = (x[2:7] for x in eigen(*spindle(), sensors()))
+    total = 0.0
+    for seed in seeds:
+        modes = extract(lines, *noisy(exact, seed))
+        assert len(modes.frequency) == 5
+        total += distance(modes, frequency, damping)
+    low, high = st.chi2.ppf([0.001, 0.999], 10 * len(seeds))
+    assert low < total < high
+
+
+@pytest.mark.parametrize(("hammer", "excited"), [(0, [0, 1, 3, 4, 6]), (1, [0, 1, 2, 4, 5, 7])])
+def test_one_hammer_gives_what_it_excites(hammer, excited):
+    """By symmetry a hammer on the x axis leaves tilts about x alone, and the reverse: those modes cannot be found and must not be."""
+    frequency, damping, _ = (x[excited] for x in eigen(*spindle(), sensors()))
+    exact = mobility(WIDE, spindle(), sensors(), sensors()[[hammer]])
+    modes = extract(WIDE, *noisy(exact, 2))
+    assert len(modes.frequency) == len(excited)
+    assert distance(modes, frequency, damping) < st.chi2.ppf(1 - 1e-5, 2 * len(excited))
+
+
+@pytest.mark.parametrize(
+    ("band", "inside"),
+    [((400, 1990), 4), ((400, 2020), 5), ((1010, 2000), 3), ((1700, 1900), 2), ((4000, 5000), 2), ((2100, 2300), 0), ((600, 800), 0)],
+)
+def test_modes_outside_the_band_are_not_reported(band, inside):
+    """Even if a mode lies only 8 Hz (a quarter of its width) beyond the edge; it must not spoil the others either."""
+    frequency, damping, _ = eigen(*spindle(), sensors())
+    known = (frequency > band[0]) & (frequency < band[1])
+    modes = extract(WIDE, *noisy(reference(WIDE), 3), band=band)
+    assert len(modes.frequency) == inside == known.sum()
+    if inside:
+        assert distance(modes, frequency[known], damping[known]) < st.chi2.ppf(1 - 1e-5, 2 * inside)
+
+
+def test_noise_alone_has_no_modes():
+    frf, _ = noisy(np.ones((7, 2, len(WIDE))), 4, 1.0, 0.0)
+    assert len(extract(WIDE, frf - 1, np.ones(frf.shape)).frequency) == 0
+
+
+def test_noise_that_is_not_known_is_taken_from_the_lines():
+    frequency, damping, _ = (x[:8] for x in eigen(*spindle(), sensors()))
+    modes = extract(WIDE, noisy(reference(WIDE), 5)[0])
+    assert len(modes.frequency) == 8
+    assert "estimated" in modes.status
+    assert distance(modes, frequency, damping) < st.chi2.ppf(1 - 1e-5, 16)
+
+
+# ---- closed forms
+
+
+@pytest.mark.parametrize("decay", [0.0, 15.0])
+@pytest.mark.parametrize(("kind", "power"), [("receptance", 0), ("mobility", 1), ("accelerance", 2)])
+def test_one_mass_on_a_spring(kind, power, decay):
+    """f = sqrt(k/m) / 2 pi, zeta = c / (2 sqrt(k m)), R = 1 / (2 i m w_d), also under an exponential window: exp(-decay t) x(t) has the
+    Laplace transform X(s + decay)."""
+    m, c, k = 0.3, 12.0, 0.3 * (2 * np.pi * 500) ** 2
+    f = np.arange(300.0, 800.0)
+    s = decay + 2j * np.pi * f
+    frf = (s**power / (m * s**2 + c * s + k))[None, None]
+    modes = extract(f, frf, noise_model(frf, 1e-3, 1e-4), kind=kind, window_decay=decay)
+    zeta = c / (2 * np.sqrt(k * m))
+    assert modes.frequency == pytest.approx([500], rel=1e-6)
+    assert modes.damping == pytest.approx([zeta], rel=1e-4)
+    assert modes.residues[0, 0, 0] == pytest.approx(1 / (2j * m * np.sqrt(k / m * (1 - zeta**2))), rel=1e-4)
+
+
+def tilting(speed, f, stiffness=(1200.0, 1200.0), c=4e-3):
+    """Rigid rotor, It 1e-5, Ip 1.6e-5 kg m2, on tilt springs: three sensors, two exciters."""
+    rows = np.array([[1.0, 0.0], [0.0, 1.0], [0.6, 0.8]])
+    matrices = (1e-5 * np.eye(2), c * np.eye(2) + 1.6e-5 * speed * np.array([[0, 1], [-1, 0]]), np.diag(stiffness))
+    return matrices, rows, mobility(f, matrices, rows, rows[:2])
+
+
+def test_gyroscopic_pair():
+    """1842.096 / 1650.096 Hz at 7200 rpm (verification.md, undamped), whirling in circles against and with the rotation."""
+    _, _, frf = tilting(7200 * RPM, WIDE, c=4e-4)
+    modes = extract(WIDE, *noisy(frf, 6))
+    assert modes.frequency == pytest.approx([1650.096, 1842.096], abs=0.02)
+    assert np.abs(modes.shape[:, 1] / modes.shape[:, 0]) == pytest.approx([1, 1], abs=0.01)
+    assert (modes.shape[:, 1] / modes.shape[:, 0]).imag[0] * (modes.shape[:, 1] / modes.shape[:, 0]).imag[1] == pytest.approx(-1, abs=0.02)
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.002])
+def test_two_modes_at_one_place(apart):
+    """A pole with residues of rank two is two modes: exactly coincident, or 1.7 Hz apart with half-widths of 32 Hz."""
+    matrices, rows, frf = tilting(0.0, WIDE, (1200.0, 1200.0 * (1 + apart)))
+    modes = extract(WIDE, *noisy(frf, 7))
+    frequency, damping, _ = eigen(*matrices, rows)
+    assert len(modes.frequency) == 2
+    assert np.abs(modes.frequency - frequency).max() < 5 * modes.frequency_sd.max() < 0.5
+    assert np.abs(modes.damping / damping - 1).max() < 0.01
+
+
+def test_mode_that_moves_between_hammers_is_one_mode():
+    """A 0.5 Hz drift while the hammer changes place must not make two modes, and the error must own up to it."""
+    f = np.arange(300.0, 800.0)
+    s = 2j * np.pi * f
+    one = np.array([1.0, -0.4, 0.7])
+    h = [s / (s**2 + 0.01 * w * s + w**2) for w in (2 * np.pi * 500.0, 2 * np.pi * 500.5)]
+    modes = extract(f, *noisy(np.stack([np.outer(one, h[0]), np.outer(0.8 * one, h[1])], 1), 8))
+    assert len(modes.frequency) == 1
+    assert 500 < modes.frequency[0] < 500.5
+    assert modes.frequency_sd[0] > 0.2
+    assert "two places" in modes.status
+
+
+def test_a_second_pole_that_the_data_do_not_ask_for_is_no_drift():
+    """The search may leave two poles on one mode. One alone fits as well: then nothing moved, and the error is that of one mode."""
+    f = np.arange(300.0, 800.0)
+    s = 2j * np.pi * f
+    one = np.array([1.0, -0.4, 0.7])
+    w = 2 * np.pi * 500.0
+    frf, sd = noisy(np.stack([np.outer(one, s / (s**2 + 0.01 * w * s + w**2))] * 2, 1), 9)
+    lines = Lines(s / w, frf, np.sqrt(2) / sd, 1)
+    pole = -0.005 + 1j * np.sqrt(1 - 0.005**2)
+    kept, spread = merge(lines, project(lines, pole + np.array([-4e-4j, 4e-4j])))
+    assert len(kept.poles) == 1
+    assert kept.poles[0] == pytest.approx(pole, abs=2e-5)
+    assert spread == []
+
+
+def test_noise_model_and_scatter():
+    frf = np.array([[[3 + 4j, 0.1], [1, 2]]])
+    assert noise_model(frf, 0.01, 0.002)[0, 0] == pytest.approx([np.hypot(0.05, 0.01), np.hypot(0.001, 0.01)])
+    e = np.random.default_rng(0).standard_normal((2, 3, 1, 20001))
+    assert scatter(2 * (e[0] + 1j * e[1]), 401).mean((1, 2)) == pytest.approx([2 * np.sqrt(2)] * 3, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"kind": "stiffness"}, "kind 'stiffness'"),
+        ({"frequency": np.arange(5.0)}, "responses, references, lines"),
+        ({"band": (10.0, 15.0)}, "at least 12"),
+        ({"frf_sd": np.zeros((1, 1, 100))}, "positive"),
+        ({"frf": np.full((1, 1, 100), np.nan)}, "finite"),
+    ],
+)
+def test_unusable_input_is_refused(change, message):
+    given = {"frequency": np.arange(100.0), "frf": np.ones((1, 1, 100)), "frf_sd": np.ones((1, 1, 100))} | change
+    with pytest.raises(ValueError, match=message):
+        extract(**given)
+
+
+# ---- measurements of others
+
+
+@pytest.mark.parametrize(("campaign", "test"), [("foreign_bond", "T60_n7200"), ("foreign_bond", "T60_n0"), ("foreign_none", "T20_n0")])
+def test_campaigns_of_another_program(campaign, test):
+    """Noise as in its data sheet (which gives one a weight to a few per cent: weights come from noisy values)."""
+    sets = pyuff.UFF(str(DATA / campaign / f"{test}.uff")).read_sets()
+    frf = np.zeros((7, 2, len(sets[0]["x"])), complex)
+    for x in sets:
+        frf[x["rsp_node"] - 1, [1, 2].index(x["ref_node"])] = x["data"]
+    modes = extract(sets[0]["x"], frf, noise_model(frf, 0.004, 0.0002))
+    assert len(modes.frequency) == 8
+    assert modes.rank_one
+    assert modes.chi2 == pytest.approx(1, abs=0.03)
+    assert modes.chi2_function == pytest.approx(np.ones((7, 2)), abs=5 / np.sqrt(len(sets[0]["x"])))
+
+
+def test_measured_beam():
+    """Six bending modes; a seventh, at 901 Hz and in the third FRF mainly, is in the data and not in beam theory. Damping is so small that
+    most peaks are two lines wide."""
+    path = DATA / "pyuff" / "beam_frf"
+    frf = np.array([[[complex(x) for x in (path / f"meas_point_{i}.txt").read_text().split()]] for i in (1, 2, 3)])
+    modes = extract(np.arange(frf.shape[2]), frf, kind="accelerance", band=(20, 999))
+    bending = np.abs(modes.frequency - 901) > 2
+    assert modes.frequency[bending] == pytest.approx([52, 142, 279, 460, 687, 959], abs=1)
+    assert (modes.frequency_sd[bending] < 0.02).all()
+    assert "estimated" in modes.status
+
+
+# ---- which mode is which
+
+
+def warm_spindle_off_its_drawing():
+    """Noisy FRFs at 30 C of a spindle drawn from its tolerances, whose turning part lags 2 % behind; the seed is the one it was met with."""
+    spindle = built = load(SCENE)
+    random = np.random.default_rng([1004, 29])
+    for parameter in toleranced(spindle):
+        built = parameter.apply(built, parameter.sd * random.standard_normal())
+    gain = 1 + 0.01 * random.standard_normal(len(spindle.points))
+    for told in (20.0, 30.0):  # the test before it took its share of the random numbers
+        true = told + spindle.tolerances.temperature * random.standard_normal()
+        lag = 0.005 * 50**0.382 * (true - 20)
+        regions = {g.name: true - lag * (g.part == "rotating") for g in spindle.regions}
+        exact = operating_point(built, Condition(true), (), lambda s, regions=regions: expand(s, regions)).frf(WIDE)
+        own, common = (random.standard_normal((2, *exact.shape)) / np.sqrt(2) for _ in range(2))
+        largest = np.abs(exact).max(axis=(0, 2), keepdims=True)
+        value = exact + 0.004 * np.abs(exact) * (own[0] + 1j * own[1]) + 0.0002 * largest * (common[0] + 1j * common[1])
+    return value * gain[:, None, None]
+
+
+def test_a_pair_with_nearly_the_same_frequency_stays_two():
+    """Eight modes, two of them 1.8 Hz apart: free residues of such a pair are mixed and look alike, its rank-one shapes do not.
+
+    The test at 30 C of a virtual campaign in which it was met; expected are the poles of the model behind the FRF.
+    """
+    value = warm_spindle_off_its_drawing()
+    found = extract(WIDE, value, noise_model(value, 0.004, 0.0002), kind="mobility")
+    assert found.rank_one
+    assert len(found.frequency) == 8
+    assert found.frequency[6] - found.frequency[5] == pytest.approx(1.8, abs=1.0)
+    assert found.chi2 < 1.1

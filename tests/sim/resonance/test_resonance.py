@@ -1,0 +1,303 @@
+"""The resonance map: crossings against a closed form, exactness, direction and sense of whirl, strength, and what it tells."""
+
+import json
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from thermospindle.cli import main
+from thermospindle.model.bearing.kinematics import lines, row_kinematics
+from thermospindle.model.errors import BadInput
+from thermospindle.model.machine import Body, Condition
+from thermospindle.model.rotor.modes import modes
+from thermospindle.model.units import RPM
+from thermospindle.report.log.map import write_map_log
+from thermospindle.report.log.read import describe, log_json, read_log
+from thermospindle.report.text.resonance import map_json, map_section, sentences
+from thermospindle.sim.operating import operating_point
+from thermospindle.sim.resonance.map import resonance_map, strongest
+from thermospindle.sim.resonance.point import Exact, key, nrro_rms
+from thermospindle.sim.running.excitation import harmonics, response
+from thermospindle.sim.running.runout import hub_probes, runout
+
+SCENE = Path(__file__).parents[3] / "scenes" / "hdd_2003"
+NOMINAL = Condition(20.0, 7200 * RPM)
+
+
+@pytest.fixture(scope="module")
+def found(spindle):
+    return resonance_map(spindle, np.linspace(20, 60, 9), np.linspace(0, 14400, 17) * RPM, NOMINAL)
+
+
+@pytest.fixture(scope="module")
+def light(spindle):
+    """The reference under a quarter of its preload: warm, little of it is left, and its modes fall through lines that the reference's never meet."""
+    return replace(spindle, pair=replace(spindle.pair, preload=4.2))
+
+
+@pytest.fixture(scope="module")
+def met(light):
+    """The map of the lightly loaded spindle, up to a temperature just beyond where 30 (fo-fc) + fo meets the forward rocking mode."""
+    return resonance_map(light, np.linspace(20, 58.5, 8), np.linspace(6000, 8400, 3) * RPM, NOMINAL)
+
+
+@pytest.fixture(scope="module")
+def rigid(spindle):
+    """A hub that only tilts, on its two bearings and a shaft that does not move: one isotropic rotor, without damping."""
+    hub = spindle.structure.body("hub")
+    tilting = Body("hub", 0.05, (1e-5, 1e-5, 1.6e-5), 0.012, ("tilt_x", "tilt_y"), True, hub.regions)
+    held = replace(spindle.structure.body("shaft"), moves=())
+    bearings = tuple(replace(b, damping_ratio=0.0) for b in spindle.bearings)
+    return replace(spindle, bearings=bearings, structure=replace(spindle.structure, bodies=(held, tilting), joints=()))
+
+
+def tilt_stiffness(point):
+    """Of both bearings about the hub's centre, N m/rad: with lever a = z_bearing - z, k_t + 2 a k_x,ty + a^2 k_x (about y)."""
+    total = 0.0
+    for b in point.state.bearings:
+        lever = b.z - 0.012
+        total += b.stiffness[4, 4] + 2 * lever * b.stiffness[0, 4] + lever**2 * b.stiffness[0, 0]
+    return total
+
+
+def crossing_speed(k, c, whirl, transverse=1e-5, polar=1.6e-5):
+    """Speed (rad/s) at which c times it meets a tilting mode: It (c n)^2 - whirl Ip n (c n) = k (Genta 2005, Eq. 2.23)."""
+    return np.sqrt(k / (transverse * c**2 - whirl * polar * c))
+
+
+@pytest.mark.parametrize(("hertz", "whirl"), [(1842.096, 1), (1650.096, -1)])
+def test_closed_form_meets_the_published_rotor(hertz, whirl):
+    """The formula these tests use gives 7200 rpm for the lines that pass 1842.096 and 1650.096 Hz there, k 1200 N m/rad."""
+    assert crossing_speed(1200.0, hertz / 120.0, whirl) / RPM == pytest.approx(7200.0, rel=1e-6)
+
+
+def test_crossings_of_a_rigid_rotor(rigid):
+    """Every coincidence of the isotropic rotor is where the closed form puts it, and the senses do not mix."""
+    own = resonance_map(rigid, [20.0, 40.0, 60.0], np.linspace(0, 30000, 31) * RPM, Condition(20.0, 9000 * RPM), highest=1e4)
+    radial = [c for c in own.coincidences if c.line.direction == "radial"]
+    assert len(radial) >= 20
+    assert {c.mode.whirl for c in radial} == {"forward", "backward"}
+    for c in radial:
+        assert c.line.whirl == {"forward": 1, "backward": -1}[c.mode.whirl]
+        assert c.sense == pytest.approx(1.0, abs=1e-9)
+        point = operating_point(rigid, c.condition)
+        multiple = c.frequency * 2 * np.pi / c.condition.speed
+        assert c.condition.speed == pytest.approx(crossing_speed(tilt_stiffness(point), multiple, c.line.whirl), rel=1e-5)
+    found = {key(c.line) for c in radial}
+    stiffness = [tilt_stiffness(operating_point(rigid, Condition(t, 9000 * RPM))) for t in own.temperatures]
+    grid = own.nominal_index[1]
+    for t in own.lines:  # none that crosses inside the grid, at whichever temperature, is missing, and no other is there
+        if t.line.direction == "radial" and t.line.whirl > 0 and t.line.frequency > 500:
+            multiple = t.frequency[:, grid] / (own.speeds[grid] / (2 * np.pi))
+            crosses = [1e-5 * c > 1.6e-5 and crossing_speed(k, c, 1) < 30000 * RPM for k, c in zip(stiffness, multiple, strict=True)]
+            assert (key(t.line) in found) == any(crosses)
+
+
+def test_every_coincidence_is_exact(spindle, found):
+    """At the listed condition the line and a mode of that kind are within 0.1 Hz, seen by operating points of their own."""
+    assert len(found.coincidences) > 80
+    for c in found.coincidences[::3]:
+        point = operating_point(spindle, c.condition)
+        line = next(x for x in lines(point.spindle, row_kinematics(point.spindle, point.state)) if key(x) == key(c.line))
+        near = min(modes(point.chain), key=lambda m: abs(m.frequency - line.frequency))
+        assert line.frequency == pytest.approx(c.frequency, abs=1e-6)
+        assert near.frequency == pytest.approx(line.frequency, abs=0.1)
+        assert (near.kind == "axial") == (line.direction == "axial")
+
+
+def test_no_sign_change_is_missed_at_the_nominal_speed(light, met):
+    """On a finer temperature axis, by modes sorted into kinds: as many radial crossings as the map lists, sense allowed."""
+    listed = [c for c in met.coincidences if c.at_nominal_speed and c.line.direction == "radial"]
+    seen = []
+    for t in np.linspace(20, 58.5, 78):
+        point = operating_point(light, Condition(t, NOMINAL.speed))
+        here = {key(x): x.frequency for x in lines(light, row_kinematics(light, point.state)) if x.direction == "radial"}
+        across = {(m.kind, m.whirl): m.frequency for m in modes(point.chain)[:7] if m.kind != "axial"}
+        seen.append({(k, m): here[k] - across[m] for k in here for m in across if k[4] == {"forward": 1, "backward": -1}[m[1]]})
+    crossed = [pair for a, b in pairwise(seen) for pair in a if a[pair] * b[pair] < 0]
+    assert sorted(crossed) == sorted((key(c.line), (c.mode.kind, c.mode.whirl)) for c in listed)
+    assert {c.line.bearing for c in listed} == {"lower", "upper"}
+    assert {(c.line.name, c.line.order, c.mode.number) for c in listed} == {("30 (fo-fc) + fo", 31, 4)}
+
+
+def test_strength_is_the_peak_of_the_response(spindle, found):
+    """At a coincidence the mode's own part is most of what the exact linear model answers to that line, mode apart from others."""
+    c = next(c for c in strongest(found.coincidences) if c.line.name == "2 fb" and c.mode.number == 1)
+    point = operating_point(spindle, c.condition)
+    forces = harmonics(point)
+    n = next(n for n, line in enumerate(forces.line) if key(line) == key(c.line))
+    axial = hub_probes(spindle)[2].row(point.chain)
+    assert abs(response(point, forces)[n] @ axial) == pytest.approx(c.strength, rel=0.02)
+    damping = min(modes(point.chain), key=lambda m: abs(m.frequency - c.frequency)).damping_ratio
+    assert 0.003 < damping < 0.02
+    off = operating_point(spindle, replace(c.condition, speed=c.condition.speed * 1.05))
+    beside = abs(response(off, harmonics(off))[n] @ axial)
+    assert beside == pytest.approx(c.strength * 2 * damping / (1.05**2 - 1), rel=0.3)
+
+
+def test_growth_of_runout_through_a_crossing(met):
+    """Radial NRRO rises towards the crossing at the nominal speed and falls beyond, and its peak is that of the coincidence."""
+    c = next(c for c in met.coincidences if c.at_nominal_speed)
+    place, radial, _ = met.nrro_temperature.T
+    peak = int(np.argmax(radial))
+    assert place[peak] == pytest.approx(c.condition.temperature, abs=0.5)
+    assert radial[peak] == pytest.approx(c.nrro, rel=0.01)
+    assert radial[peak] > 1.5 * radial[0]
+    assert radial[-1] < 0.95 * radial[peak]
+
+
+def test_nrro_by_the_sum_of_lines(spindle):
+    """The same rms from phasors collected in another way: a dense record in time of one bearing's lines."""
+    turning = NOMINAL.speed / (2 * np.pi)
+    point = operating_point(spindle, Condition(35.0, NOMINAL.speed))
+    own = point.imperfections
+    only = replace(own, unbalance=0.0, couple_unbalance=0.0, bearings={"lower": own.bearings["lower"]})
+    alone = replace(point, spindle=replace(spindle, imperfections=only))
+    forces = harmonics(alone)
+    seen = response(alone, forces) @ np.array([p.row(alone.chain) for p in hub_probes(spindle)]).T
+    apart = [n for n, f in enumerate(forces.frequency) if abs(f / turning - round(f / turning)) > 1e-6]
+    time = np.arange(200_000) / 20_011.0
+    x, y, z = (sum((seen[n, k] * np.exp(2j * np.pi * forces.frequency[n] * time)).real for n in apart) for k in range(3))
+    radial, axial = nrro_rms(Exact(alone, {}, {}, 3))
+    assert radial == pytest.approx(np.sqrt((x.var() + y.var()) / 2), rel=5e-3)
+    assert axial == pytest.approx(z.std(), rel=5e-3)
+
+
+def test_axial_lines_leave_rocking_modes_alone(found):
+    for c in found.coincidences:
+        assert (c.line.direction == "axial") == (c.mode.kind == "axial")
+        assert 0.01 <= c.sense <= 1.0
+
+
+def test_sense_of_a_nearly_standing_mode(spindle):
+    """The base holds the two rocking modes d = 26 Hz apart, turning drives them to s: of a mode's force the share (1 + sqrt(1 - d^2/s^2)) / 2 whirls
+    with it, the rest against it (two coupled oscillators, Genta 2005, sec. 2.4). Slowly turning, lines of either sense excite both. So at the upper
+    bearing, far from where the modes pivot; at the lower one the hub moves not quite alike about x and y."""
+    slow = resonance_map(spindle, [20.0, 25.0], np.linspace(0, 3600, 7) * RPM, Condition(20.0, 1800 * RPM), multiples=8)
+    standing = [c for c in slow.coincidences if c.mode.number in (3, 4) and c.line.bearing == "upper"]
+    assert {(c.mode.number, c.line.whirl) for c in standing} == {(3, 1), (3, -1), (4, 1), (4, -1)}
+    at_rest = np.subtract(*[slow.modes[m].frequency[0, 0] for m in (3, 2)])
+    for c in standing:
+        low, high = [m.frequency for m in modes(operating_point(spindle, c.condition).chain) if m.kind == "rocking"][:2]
+        with_it = (1 + np.sqrt(1 - (at_rest / (high - low)) ** 2)) / 2
+        assert c.sense == pytest.approx(with_it if c.line.whirl == (-1, 1)[c.mode.number - 3] else 1 - with_it, abs=0.015)
+
+
+def test_without_imperfections_a_plausible_set_is_drawn(spindle):
+    from thermospindle.model.imperfections import Imperfections
+
+    plain = resonance_map(replace(spindle, imperfections=Imperfections()), [20.0, 60.0], [0.0, 14400 * RPM], NOMINAL)
+    assert plain.drawn_from == 0
+    assert max(c.strength for c in plain.coincidences) > 1e-9
+
+
+def test_grids_that_make_no_map(spindle):
+    with pytest.raises(BadInput, match="two different"):
+        resonance_map(spindle, [20.0], [0.0, 700.0], NOMINAL)
+    with pytest.raises(BadInput, match="negative"):
+        resonance_map(spindle, [20.0, 30.0], [-700.0, 700.0], NOMINAL)
+
+
+def test_answer_as_json(met):
+    answer = map_json(met)
+    first = answer["coincidences"][0]
+    for name in ("line", "mode", "temperature_C", "speed_rpm", "frequency_Hz", "bearing", "cause", "strength_um", "margin_percent"):
+        assert name in first
+    assert first["speed_rpm"] == pytest.approx(7200.0)
+    assert np.shape(answer["modes"][0]["frequency_Hz"]) == (len(answer["grid"]["temperature_C"]), len(answer["grid"]["speed_rpm"]))
+    said = sentences(met)
+    assert said[0].startswith("This spindle at 7200 rpm crosses 30 (fo-fc) + fo (outer waviness of order 31 of the upper bearing)")
+    assert f"{first['temperature_C']:.1f} C" in said[0]
+    title, html = map_section(met)
+    assert title == "Resonance map"
+    assert html.count("<svg") == 4
+
+
+def test_sentence_without_a_crossing(spindle):
+    near = resonance_map(spindle, [20.0, 22.0], [7000 * RPM, 7300 * RPM], NOMINAL)
+    assert "crosses no line between 20 and 22 C; nearest is 20 (fo-fc)" in sentences(near)[0]
+
+
+# ------------------------------------------------------------------ log and command line
+
+
+def test_log_gives_the_map_back(found, tmp_path):
+    """Grid and natural frequencies bit for bit, coincidences as told; a timeline for each axis, and a blueprint."""
+    write_map_log(found, tmp_path / "map.rrd")
+    read = read_log(tmp_path / "map.rrd")
+    assert read.kind == "map"
+    temperatures, speeds, modes = read.grid
+    assert np.array_equal(temperatures, found.temperatures)
+    assert np.array_equal(speeds, found.speeds)
+    for m, track in enumerate(found.modes):
+        assert np.array_equal(modes[:, m], track.frequency)
+    told = map_json(found)["coincidences"]
+    assert read.rows("/numbers/coincidences") == told
+    assert {"temperature, 0.01 C", "speed"} <= set(read.timelines)
+    assert read.blueprint
+    assert f"{len(told)} coincidences" in describe(read)
+    assert log_json(read)["modes_Hz"][0][0][0] == found.modes[0].frequency[0, 0]
+
+
+def test_log_without_its_numbers_is_refused(found, tmp_path):
+    write_map_log(found, tmp_path / "map.rrd")
+    whole = read_log(tmp_path / "map.rrd")
+    for entity in ("/numbers/modes", "/numbers/speeds"):
+        less = replace(whole, columns={k: v for k, v in whole.columns.items() if k != entity})
+        with pytest.raises(BadInput, match=rf"map.rrd: is not a whole log of thermospindle: .*{entity}"):
+            log_json(less)
+    with pytest.raises(BadInput, match="folder"):
+        write_map_log(found, tmp_path / "none" / "map.rrd")
+
+
+def test_map_from_the_command_line(tmp_path, capsys):
+    scene, out = str(SCENE), tmp_path / "out"
+    grid = ["--temperatures", "20", "50", "--speeds", "5000", "8000"]
+    assert main(["map", scene, *grid, "--speed", "7200", "--json", "--out", str(out)]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["grid"]["speed_rpm"] == pytest.approx([5000.0, 7200.0, 8000.0])
+    assert any(c["line"] == "30 fc" and c["mode"] == 5 for c in answer["coincidences"])
+    assert {p.name for p in out.iterdir()} >= {"coincidences.csv", "modes.csv", "campbell.png", "temperature.png", "map.rrd"}
+    assert main(["inspect", str(out / "map.rrd"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["coincidences"] == answer["coincidences"]
+    assert main(["map", scene, "--speed", "0"]) == 2
+    assert "--speed 0" in capsys.readouterr().err
+
+
+def test_runout_grows_when_simulated(light, met):
+    """MuJoCo's time domain at the nominal condition and at the crossing shows what the linear model says of the same record, and that grows as the
+    map tells.
+
+    The map adds the two bearings' lines as squares, which is the mean over all places of the cages. In one record they stand somewhere: where two
+    bearings at one temperature have lines at one frequency, these beat for far longer than the record.
+    """
+    c = next(c for c in met.coincidences if c.at_nominal_speed)
+    seen = []
+    for condition in (NOMINAL, c.condition):
+        point = operating_point(light, condition)
+        simulated, exact = (runout(point, 0.5, path=path).by_lines.nonrepeatable[:2].std() for path in ("simulated", "linear"))
+        assert simulated == pytest.approx(exact, rel=0.005)
+        seen.append(simulated)
+    start = int(np.argmin(np.abs(met.nrro_temperature[:, 0] - NOMINAL.temperature)))
+    assert seen[1] / seen[0] == pytest.approx(c.nrro / met.nrro_temperature[start, 1], rel=0.1)
+
+
+def test_map_takes_the_mean_over_the_places_of_the_cages(spindle):
+    """At 6050 rpm and 20 C, 30 fc of both bearings is one frequency near the backward rocking mode. Where one cage stands against the other turns the
+    phases of its lines: the mean square over all of that is the map's, and one place can differ from it by more than a tenth."""
+    point = operating_point(spindle, Condition(20.0, 6050 * RPM))
+    forces, turning = harmonics(point), 6050 / 60
+    seen = response(point, forces) @ np.array([p.row(point.chain) for p in hub_probes(spindle)[:2]]).T
+    squares = []
+    for angle in np.linspace(0, 2 * np.pi, 24, endpoint=False):
+        together: dict[float, np.ndarray] = {}
+        for line, frequency, one in zip(forces.line, forces.frequency, seen, strict=True):
+            if abs(frequency / turning - round(frequency / turning)) > 1e-6:
+                at = round(float(frequency), 6)
+                together[at] = together.get(at, 0) + one * np.exp(1j * angle * (line.bearing == "upper"))
+        squares.append(sum((np.abs(x) ** 2).sum() / 4 for x in together.values()))
+    assert np.sqrt(np.mean(squares)) == pytest.approx(nrro_rms(Exact(point, {}, {}, 3))[0], rel=1e-6)
+    assert np.abs(np.sqrt(squares) / np.sqrt(np.mean(squares)) - 1).max() > 0.1

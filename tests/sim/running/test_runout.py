@@ -1,0 +1,456 @@
+"""Runout: closed forms of the quoted values, two ways to part RRO and NRRO, and two paths to the record."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from thermospindle.cli import main
+from thermospindle.model.bearing.kinematics import Line, row_kinematics
+from thermospindle.model.drawn import drawn
+from thermospindle.model.errors import BadInput
+from thermospindle.model.imperfections import Imperfections, RowImperfections, Wave
+from thermospindle.model.machine import Condition
+from thermospindle.model.rotor.chain import motion_rows
+from thermospindle.model.units import RPM
+from thermospindle.report.figures.runout import motion_figure, spectrum_figure, spread
+from thermospindle.report.text.runout import runout_json, runout_section, write_runout
+from thermospindle.sim.operating import operating_point
+from thermospindle.sim.running import runout as running
+from thermospindle.sim.running.lines import find_lines, fit
+from thermospindle.sim.running.revolutions import error_motion, leakage, revolutions, turning_frequency
+from thermospindle.sim.running.run import run_spindle
+from thermospindle.sim.running.runout import AXIAL, X, Y, all_probes, hub_probes, linear, measured, runout, whole_turns, with_imperfections
+
+RATE, TURNING = 20000.0, 120.0
+SCENE = Path(__file__).parents[3] / "scenes" / "hdd_2003"
+
+
+def times(count: int, turning: float = TURNING) -> np.ndarray:
+    return np.arange(int(count / turning * RATE) + 2) / RATE
+
+
+def line(frequency: float, direction: str = "radial", whirl: int = 1, name: str = "") -> Line:
+    return Line("upper", "ball waviness", 2, name or f"{frequency:g}", direction, whirl, frequency)
+
+
+def made(lines: list[Line], phasor: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Record (probes, n) of lines with phasors (lines, probes)."""
+    turned = np.exp(2j * np.pi * np.outer([g.frequency for g in lines], time))
+    return np.asarray((phasor.T @ turned).real)
+
+
+def circle(radius: complex, whirl: int) -> list[complex]:
+    """Phasors along x, y and z of a circular motion counterclockwise (whirl +1) or clockwise."""
+    return [radius, -1j * whirl * radius, 0.0]
+
+
+# ---------------------------------------------------------------- revolutions
+
+
+def test_resampling_by_angle_finds_the_signal_between_the_samples():
+    time = times(20)
+    angle = 2 * np.pi * TURNING * time
+    cut = revolutions(time, angle, np.cos(2 * np.pi * 1900.0 * time + 0.3)[None])
+    assert cut.count == 20
+    assert cut.value.reshape(-1) == pytest.approx(np.cos(2 * np.pi * 1900.0 * cut.time + 0.3), abs=1e-4)  # ten samples a period
+    place = (2 * np.pi * TURNING * cut.time).reshape(20, -1) - 2 * np.pi * np.arange(20)[:, None]
+    assert place == pytest.approx(np.broadcast_to(cut.angle, place.shape), abs=1e-9)
+
+
+def test_the_error_of_resampling_falls_with_the_sixth_power_of_the_step():
+    errors = []
+    for rate in (10e3, 20e3):
+        time = np.arange(int(0.1 * rate)) / rate
+        cut = revolutions(time, 2 * np.pi * TURNING * time, np.cos(2 * np.pi * 1500.0 * time)[None], 96)
+        middle = slice(200, 900)  # splines are less exact at their ends
+        errors.append(np.abs(cut.value.reshape(-1) - np.cos(2 * np.pi * 1500.0 * cut.time))[middle].max())
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(6, abs=0.7)
+
+
+def test_a_record_that_speeds_up_is_cut_by_angle_and_refused_where_the_speed_must_be_constant():
+    time = np.arange(4000) / RATE
+    angle = 2 * np.pi * (100 * time + 200 * time**2)
+    cut = revolutions(time, angle, np.cos(3 * angle)[None])
+    assert cut.value[0] == pytest.approx(np.broadcast_to(np.cos(3 * cut.angle), cut.value[0].shape), abs=1e-6)
+    with pytest.raises(ValueError, match="not constant"):
+        turning_frequency(time, angle)
+    with pytest.raises(ValueError, match="does not go one way"):
+        revolutions(time, np.cos(angle), angle[None])
+    with pytest.raises(ValueError, match="less than one revolution"):
+        revolutions(time[:20], angle[:20], angle[None, :20])
+
+
+def test_variances_of_both_parts_add_up_whatever_the_record():
+    random = np.random.default_rng(1)
+    time = times(13)
+    value = random.standard_normal((2, len(time))) + np.cos(2 * np.pi * TURNING * time) + 5.0
+    cut = revolutions(time, 2 * np.pi * TURNING * time, value)
+    total = cut.value.var(axis=(1, 2))
+    assert cut.repeatable.var(axis=1) + cut.nonrepeatable.var(axis=(1, 2)) == pytest.approx(total, rel=1e-12)
+    assert np.abs(cut.nonrepeatable.mean(axis=1)).max() < 1e-12  # nothing of it repeats
+
+
+@pytest.mark.parametrize("count", [7, 60])
+@pytest.mark.parametrize("orders", [0.579, 4.207, 5.0098, 6.0, 7.0])
+def test_leakage_is_the_mean_over_the_revolutions(orders, count):
+    steps = np.arange(count) - (count - 1) / 2
+    assert leakage(orders, count) == pytest.approx(np.exp(2j * np.pi * orders * steps).mean().real, abs=1e-12)
+
+
+def test_the_averaged_part_is_the_true_one_and_what_leaks_into_it():
+    count, time = 60, times(60)
+    lines = [line(TURNING), line(2 * TURNING), line(69.4), line(601.2), line(504.7)]
+    size = np.array([[1.0], [0.3j], [0.8], [0.5 + 0.2j], [0.4]])
+    cut = revolutions(time, 2 * np.pi * TURNING * time, made(lines, size, time))
+    orders = np.array([g.frequency for g in lines]) / TURNING
+    gain = leakage(orders, count) * np.exp(1j * np.pi * orders * (count - 1))
+    expected = ((size[:, 0] * gain)[:, None] * np.exp(1j * np.outer(orders, cut.angle))).real.sum(axis=0)
+    assert cut.repeatable[0] == pytest.approx(expected, abs=1e-7)
+    assert abs(gain[3]) > 0.5  # 2 fb - fc lies a hundredth of an order from 5, and sixty revolutions hardly tell
+
+
+def test_error_motion_values_of_known_plots():
+    angle = 2 * np.pi * TURNING * times(40)
+    once, twice, half = 3.0 * np.cos(angle + 0.4), 2.0 * np.cos(2 * angle), 0.5 * np.cos(1.5 * angle)
+    cut = revolutions(times(40), angle, np.array([once + twice + half, once]))
+    radial, axial = error_motion(cut, 0, True), error_motion(cut, 1, False)
+    assert radial.eccentricity == pytest.approx(3.0, rel=1e-6)
+    assert radial.synchronous_error == pytest.approx(4.0, rel=2e-3)  # the 1x is taken away; sampled every 2 degrees
+    assert radial.asynchronous_error == pytest.approx(1.0, rel=2e-3)  # +-0.5 in every other revolution
+    assert radial.total_error == pytest.approx(np.ptp((twice + half)[: len(angle) // 2]), rel=2e-3)
+    assert radial.repeatable_rms == pytest.approx(np.sqrt(3.0**2 / 2 + 2.0**2 / 2), rel=1e-6)
+    assert radial.six_sigma == pytest.approx(6 * 0.5 / np.sqrt(2), rel=1e-6)
+    assert axial.synchronous_error == pytest.approx(6.0, rel=2e-3)  # the axial 1x stays
+    assert axial.nonrepeatable == pytest.approx(0.0, abs=1e-6)
+
+
+# ---------------------------------------------------------------- lines
+
+
+def test_lines_closer_than_a_bin_and_an_unknown_one_are_found():
+    time = times(60)
+    known = [line(TURNING, name="1x"), line(600.79, whirl=-1), line(602.4), line(670.32, "axial"), line(504.73)]
+    size = np.array([circle(1.0, 1), circle(0.5j, -1), circle(0.3, 1), [0, 0, 0.7], circle(0.0, 1)])
+    value = made(known, size, time) + made([line(931.37)], np.array([[0.05, -0.02j, 0.0]]), time)
+    found, best = find_lines(time, value, TURNING, known, size)
+    told = {round(g.frequency, 2): g for g in found}
+    assert list(told) == [120.0, 670.32, 600.79, 602.4, 931.37]  # strongest first; the line without amplitude is not there
+    for g, expected in zip(found, (1.0, 0.7, 0.5, 0.3, 0.05), strict=True):
+        assert g.amplitude == pytest.approx(expected, rel=1e-4)
+    assert [g.whirl for g in found] == ["forward", "-", "backward", "forward", "forward"]
+    assert [g.repeatable for g in found] == [True, False, False, False, False]
+    assert [[c.name for c in g.causes] for g in found] == [["1x"], ["670.32"], ["600.79"], ["602.4"], []]
+    assert told[931.37].forward == pytest.approx(0.035, rel=1e-3)
+    assert told[931.37].backward == pytest.approx(0.015, rel=1e-3)
+    assert np.abs(best.residual).max() < 1e-5
+
+
+def test_causes_at_one_frequency_are_told_together_with_their_shares():
+    time = times(60)
+    known = [line(600.79, name="lower"), line(600.85, name="upper"), line(600.79, name="absent")]
+    size = np.array([circle(0.2, 1), circle(0.5j, 1), circle(0.0, 1)])
+    [found], _ = find_lines(time, made(known, size, time), TURNING, known, size)
+    assert [c.name for c in found.causes] == ["upper", "lower"]
+    assert found.shares == pytest.approx((0.5, 0.2))
+    assert found.amplitude == pytest.approx(found.predicted, rel=1e-6)
+
+
+def test_noise_makes_no_lines():
+    time = times(60)
+    random = np.random.default_rng(2)
+    value = made([line(TURNING)], np.array([circle(1.0, 1)]), time) + 0.3 * random.standard_normal((3, len(time)))
+    value[2] += np.cos(2 * np.pi * 300.5 * time)
+    found, best = find_lines(time, value, TURNING, [line(TURNING, name="1x")], np.array([circle(1.0, 1)]))
+    assert {(round(g.frequency, 1), bool(g.causes)) for g in found if g.amplitude > 0.05} == {(120.0, True), (300.5, False)}
+    assert best.residual.std() == pytest.approx(0.3, rel=0.02)
+
+
+def test_more_lines_than_samples_and_too_slow_a_record_are_refused():
+    time = times(1)
+    with pytest.raises(ValueError, match="cannot be estimated"):
+        fit(time, np.zeros((3, len(time))), np.arange(1.0, 100.0))
+    with pytest.raises(ValueError, match="sampled too slowly"):
+        find_lines(time, np.zeros((3, len(time))), TURNING, [line(9500.0)], np.zeros((1, 3), complex))
+
+
+# ---------------------------------------------------------------- probes
+
+
+def test_probes_see_the_hub_at_their_places(spindle):
+    point = operating_point(spindle, Condition(20.0, 7200 * RPM))
+    chain, (x, y, axial) = point.chain, hub_probes(spindle)
+    assert [p.radial for p in (x, y, axial)] == [True, True, False]
+    z, centre = x.position[2], chain.body("hub").z
+    assert z == pytest.approx(19e-3)  # a tenth of the hub body's 10 mm below its top
+    tilt = np.array([move == "tilt_y" and body == "hub" for body, move in chain.dofs], float) * 1e-6
+    assert x.row(chain) @ tilt == pytest.approx(1e-6 * (z - centre))
+    assert y.row(chain) @ tilt == 0
+    assert axial.row(chain) @ tilt == 0  # on the axis
+    four = next(p for p in all_probes(spindle) if p.name == "4 hub_side90")
+    assert four.row(chain) == pytest.approx(motion_rows(chain, "hub", (0.0, 12.5e-3, 15e-3))[1])
+
+
+# ---------------------------------------------------------------- whole records
+
+
+@pytest.fixture(scope="module")
+def imperfect(spindle):
+    return with_imperfections(spindle, drawn(spindle, 3))
+
+
+@pytest.fixture(scope="module")
+def hot_point(imperfect):
+    return operating_point(imperfect, Condition(40.0, 7200 * RPM))
+
+
+@pytest.fixture(scope="module")
+def found(hot_point):
+    return runout(hot_point, path="linear")
+
+
+def test_default_record_is_the_one_with_the_least_leakage(hot_point, found):
+    count = whole_turns(hot_point)
+    assert 60 <= count <= 120
+    assert found.averaged.count == count
+    short = runout(hot_point, 60 / 120, path="linear")
+    assert found.leaked[0] < 0.5 * short.leaked[0]
+
+
+def test_both_ways_to_part_the_record_agree_within_the_leakage(found):
+    away = found.averaged.repeatable - found.by_lines.repeatable
+    assert np.all(np.abs(away).max(axis=1) <= found.leaked * (1 + 1e-6) + 1e-15)
+    assert found.leaked[0] < 0.1 * np.ptp(found.by_lines.nonrepeatable[0])
+    rms = [v.nonrepeatable_rms for v in (found.values()[X], found.values(found.averaged)[X])]
+    assert rms[0] == pytest.approx(rms[1], rel=0.01)
+
+
+def test_variance_of_the_record_is_the_sum_of_both_parts(found):
+    for name, m in found.values(found.averaged).items():
+        assert m.repeatable_rms**2 + m.nonrepeatable_rms**2 == pytest.approx(m.total_rms**2, rel=1e-12), name
+    m = found.values()[X]  # lines between whole orders are not quite orthogonal to the whole ones in a finite record
+    assert m.repeatable_rms**2 + m.nonrepeatable_rms**2 == pytest.approx(m.total_rms**2, rel=1e-3)
+
+
+def test_sum_of_the_squared_lines_is_the_variance(found):
+    """Parseval: half the squares of forward and backward radii, for x and y together."""
+    across = sum(g.forward**2 + g.backward**2 for g in found.lines if g.direction == "radial")
+    values = found.values()
+    assert across == pytest.approx(values[X].total_rms ** 2 + values[Y].total_rms ** 2, rel=0.02)
+    along = sum(g.amplitude**2 for g in found.lines if g.direction == "axial") / 2
+    assert along == pytest.approx(values[AXIAL].total_rms ** 2, rel=0.05)  # pairs of lines that beat are told as one
+
+
+def test_every_line_of_the_harmonic_answer_comes_back_with_its_cause(found):
+    assert len(found.lines) > 20
+    for g in found.lines:
+        assert g.causes, g.frequency
+        assert g.amplitude == pytest.approx(g.predicted, rel=1e-3)
+        assert all(abs(c.frequency - g.frequency) < 1.0 for c in g.causes)
+    assert [g.amplitude for g in found.lines] == sorted((g.amplitude for g in found.lines), reverse=True)
+    assert np.abs(found.fit.residual[:3]).max() < 1e-6 * np.ptp(found.signals.value[0])
+
+
+def test_the_running_simulation_and_the_harmonic_answer_show_the_same(hot_point, found):
+    simulated = runout(hot_point, seconds=0.2)
+    n = len(simulated.signals.time)
+    own, other = simulated.signals.value, found.signals.value[:, :n]
+    assert own.std() > 0
+    assert np.sqrt(((own - other) ** 2).mean(axis=1)) == pytest.approx(np.zeros(len(own)), abs=1e-3 * other[0].std())
+    exact = {(round(g.frequency, 6), g.direction): g for g in found.lines}
+    for g in simulated.lines[:8]:
+        assert g.amplitude == pytest.approx(g.predicted, rel=2e-3)
+    assert any((round(g.frequency, 6), g.direction) in exact for g in simulated.lines)
+    assert not [g for g in simulated.lines if not g.causes]
+
+
+def test_turning_backwards_mirrors_the_whirl(imperfect):
+    unbalanced = with_imperfections(imperfect, Imperfections(unbalance=1e-8, unbalance_z=0.01))
+    for speed in (7200, -7200):
+        point = operating_point(unbalanced, Condition(20.0, speed * RPM))
+        found = runout(point, 0.25, path="linear")
+        [only] = found.lines
+        assert (only.frequency, only.repeatable, only.whirl) == (pytest.approx(120.0), True, "forward")
+        assert only.causes[0].cause == "unbalance"
+        assert only.backward < 0.05 * only.forward  # the seat's two stiffnesses make the circle an ellipse
+        turns = np.unwrap(np.angle(found.signals.of(X) + 1j * found.signals.of(Y)))
+        assert np.sign(turns[-1] - turns[0]) == np.sign(speed)
+        assert found.values()[X].nonrepeatable < 1e-6 * found.values()[X].repeatable
+
+
+@pytest.mark.parametrize("begin", [0.0, 53 / RATE], ids=["clock starts with the record", "clock starts before"])
+@pytest.mark.parametrize("speed", [7200, -7200])
+def test_a_record_may_begin_anywhere_in_a_turn(imperfect, speed, begin):
+    """Both ways of finding the RRO stand at the angle of the turning part, wherever time and angle of the record begin."""
+    unbalanced = with_imperfections(imperfect, Imperfections(unbalance=1e-8, unbalance_z=0.01))
+    point = operating_point(unbalanced, Condition(20.0, speed * RPM))
+    whole = linear(point, all_probes(point.spindle), np.arange(4000) / RATE)
+    later = replace(
+        whole, time=whole.time[53:] - 53 / RATE + begin, angle=whole.angle[53:], value=whole.value[:, 53:], motion=whole.motion[53:]
+    )
+    found = running.analyse(point, later)
+    size = np.ptp(found.averaged.repeatable[0])
+    assert found.by_lines.repeatable == pytest.approx(found.averaged.repeatable, abs=1e-6 * size)
+    assert found.averaged.angle[0] == pytest.approx(2 * np.pi * 120 * 53 / RATE)  # in the sense of turning
+    x = found.averaged.repeatable[0]
+    heavy = found.averaged.angle[int(np.argmax(x))] % (2 * np.pi)
+    response = running.analyse(point, whole).averaged
+    assert heavy == pytest.approx(response.angle[int(np.argmax(response.repeatable[0]))] % (2 * np.pi), abs=0.06)  # two samples
+
+
+def test_orders_that_cancel_leave_no_line(spindle):
+    """All race orders but k Z and k Z +- 1, and odd ball orders: nothing; at the frequencies at which they pass, nothing either."""
+    balls = spindle.bearings[0].balls
+    silent = tuple(Wave(n, 1e-7, 0.3 * n) for n in range(2, 3 * balls) if n % balls not in (0, 1, balls - 1))
+    odd = tuple(tuple(Wave(n, 1e-7, 0.7 * j * n) for n in (3, 5)) for j in range(balls))
+    row = RowImperfections(inner_radial=silent, inner_axial=silent, outer_radial=silent, outer_axial=silent, ball_waves=odd)
+    heard = replace(row, outer_radial=(*silent, Wave(balls + 1, 1e-7, 0.0)))
+    point = operating_point(with_imperfections(spindle, Imperfections(bearings={"upper": heard})), Condition(40.0, 7200 * RPM))
+    [record] = run_spindle([point], 0.2, RATE)
+    signals = measured(record, hub_probes(spindle))
+    kin = row_kinematics(spindle, point.state)["upper"]
+    passing = {abs(w.order * (kin.ring(r) - kin.cage) + s * kin.cage) for w in silent for r in ("inner", "outer") for s in (-1, 0, 1)}
+    spinning = {abs(n * kin.spin + s * kin.cage) for n in (3, 5) for s in (-1, 0, 1)}
+    [only] = runout(point, 0.2, path="linear").lines
+    forbidden = np.array(sorted(f / (2 * np.pi) for f in passing | spinning if abs(f / (2 * np.pi) - only.frequency) > 5.0))
+    apart = forbidden[np.concatenate([[True], np.diff(forbidden) > 3.0])]
+    best = fit(signals.time, signals.value, np.sort(np.append(apart, only.frequency)))
+    strength = np.abs(best.phasor[:2]).max(axis=0)
+    there = np.abs(best.frequency - only.frequency) < 1e-9
+    assert strength[there][0] == pytest.approx(only.amplitude, rel=2e-2)
+    assert len(apart) > 20
+    assert strength[~there].max() < 1e-4 * strength[there][0]
+
+
+# ---------------------------------------------------------------- figures, files, command line
+
+
+def test_labels_are_apart_and_close_to_their_lines():
+    wanted = np.array([10.0, 11.0, 12.0, 80.0])
+    places = spread(wanted, 5.0, 0.0, 100.0)
+    assert np.diff(places).min() >= 5.0 - 1e-12
+    assert places == pytest.approx([6.0, 11.0, 16.0, 80.0])
+    assert spread(np.array([99.0, 99.5]), 5.0, 0.0, 100.0) == pytest.approx([95.0, 100.0])
+    assert np.diff(spread(np.linspace(0, 1, 40), 5.0, 0.0, 100.0)) == pytest.approx(np.full(39, 100 / 39))
+
+
+def test_figures_name_the_lines(found):
+    texts = [t.get_text() for axes in spectrum_figure(found).axes for t in axes.texts]
+    assert any(t.startswith("2 fb + fc\nball waviness") for t in texts)
+    assert any("1x" in t or "unbalance" in t for t in texts)  # the repeatable line is always named
+    motion = motion_figure(found)
+    assert motion.axes[0].get_title(loc="left") == f"Orbit, {found.averaged.count} revolutions"
+
+
+def test_command_line_answers_and_writes(tmp_path, capsys):
+    out = tmp_path / "runout"
+    call = [
+        "runout",
+        str(SCENE),
+        "--speed",
+        "7200",
+        "--temperature",
+        "40",
+        "--seed",
+        "3",
+        "--path",
+        "linear",
+        "--seconds",
+        "0.25",
+        "--json",
+    ]
+    assert main([*call, "--out", str(out)]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["revolutions"] == 30
+    assert set(answer["rro_um"]) == set(answer["nrro_um"]) == {"radial", "axial"}
+    assert answer["nrro_um"]["radial"] > answer["nrro_rms_um"]["radial"] > 0
+    amplitudes = [g["amplitude_um"] for g in answer["lines"]]
+    assert amplitudes == sorted(amplitudes, reverse=True)
+    assert answer["status"] == "in contact"
+    assert {"frequency_Hz", "amplitude_um", "direction", "cause"} <= set(answer["lines"][0])
+    assert set(answer["statistics"]) > set(answer) & set(answer["statistics"])
+    with (out / "record.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    x = np.array([float(row["hub_x_um"]) for row in rows])
+    rest = np.array([float(row["hub_x_nrro_um"]) for row in rows])
+    assert np.ptp(x) == pytest.approx(answer["total_um"]["radial"], rel=1e-6)
+    assert rest.std() == pytest.approx(answer["nrro_rms_um"]["radial"], rel=1e-3)
+    assert {"record.csv", "repeatable.csv", "lines.csv", "motion.png", "motion.svg", "spectrum.png", "spectrum.svg"} <= {
+        f.name for f in out.iterdir()
+    }
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [(["--speed", "0"], "--speed 0"), (["--speed", "7200", "--seconds", "0.01"], "at least two revolutions")],
+)
+def test_what_cannot_be_used_is_one_sentence(options, words, capsys):
+    assert main(["runout", str(SCENE), *options]) == 2
+    told = capsys.readouterr().err.strip()
+    assert words in told
+    assert len(told.splitlines()) == 1
+
+
+def test_the_speed_must_be_given(capsys):
+    with pytest.raises(SystemExit) as stopped:
+        main(["runout", str(SCENE)])
+    assert stopped.value.code == 2
+    assert "--speed" in capsys.readouterr().err
+
+
+def test_a_spindle_without_sections_to_look_at_is_refused(spindle):
+    bodies = tuple(replace(b, regions=()) if b.turns else b for b in spindle.structure.bodies)
+    with pytest.raises(BadInput, match="turning body made of section regions"):
+        running.hub_probes(replace(spindle, structure=replace(spindle.structure, bodies=bodies)))
+
+
+def test_a_perfect_spindle_runs_true(spindle, tmp_path):
+    """No lines, no runout, and files that say so."""
+    perfect = with_imperfections(spindle, Imperfections())
+    found = runout(operating_point(perfect, Condition(20.0, 7200 * RPM)), 0.1)
+    assert found.lines == ()
+    assert found.values()[X].total < 1e-15
+    answer = runout_json(found, "simulated", "linear", None)
+    json.dumps(answer, allow_nan=False)
+    write_runout(found, perfect, answer, tmp_path, lambda done: None)
+    assert (tmp_path / "runout.rrd").is_file()
+    assert (tmp_path / "lines.csv").read_text() == "frequency_Hz\n"
+
+
+def test_the_inner_ring_may_turn_instead(spindle):
+    """A shaft that turns in standing outer rings: the cage goes slower than half speed, and lines move with it."""
+    shaft = replace(spindle.structure.body("shaft"), turns=True)
+    hub = replace(spindle.structure.body("hub"), turns=False)
+    bodies = tuple({"shaft": shaft, "hub": hub}.get(b.name, b) for b in spindle.structure.bodies)
+    turned = replace(spindle, structure=replace(spindle.structure, bodies=bodies), pair=replace(spindle.pair, turning_ring="inner"))
+    row = RowImperfections(ball_diameter=tuple(1e-7 * np.cos(2 * np.pi * np.arange(10) / 10)))
+    point = operating_point(with_imperfections(turned, Imperfections(bearings={"upper": row})), Condition(20.0, 7200 * RPM))
+    [only] = runout(point, 0.25, path="linear").lines
+    assert only.causes[0].name == "fc"
+    assert only.frequency == pytest.approx(120.0 - 69.527, rel=1e-4)  # the cage seen from the other ring
+    assert hub_probes(turned)[0].body == "shaft"
+
+
+def test_the_report_section_holds_figures_and_lines(found):
+    title, html = runout_section(found, runout_json(found, "linear", "linear", 3))
+    assert title == "Runout"
+    assert html.count("<svg") == html.count("</svg>") == 2
+    assert f"{found.lines[0].frequency:.2f}" in html
+    assert "asynchronous" in html
+
+
+def test_signals_of_a_given_harmonic_answer(hot_point):
+    from thermospindle.sim.running.excitation import harmonics
+
+    forces = harmonics(hot_point)
+    time = np.arange(50) / RATE
+    one = replace(forces, line=forces.line[:1], frequency=forces.frequency[:1], force=forces.force[:1])
+    other = replace(forces, line=forces.line[1:], frequency=forces.frequency[1:], force=forces.force[1:])
+    probes = hub_probes(hot_point.spindle)
+    parts = linear(hot_point, probes, time, one).value + linear(hot_point, probes, time, other).value
+    assert parts == pytest.approx(linear(hot_point, probes, time).value, abs=1e-15)

@@ -1,0 +1,1 @@
+"""Thermospindle: from temperature to the modal peaks of a spindle, and from measurements to the physics a model lacks."""
