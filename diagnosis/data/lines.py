@@ -109,7 +109,7 @@ def _smooth_sd(value: ComplexArray, sd: Array) -> Array:
 
 def _basis(k: int, p: int = NODES) -> tuple[Array, Array, Array]:
     """Orthonormal polynomials (k, p) on k equally spaced lines; Gauss nodes (p,) in lines from the first, and their weights (p,)."""
-    x = np.arange(k) - (k - 1) / 2
+    x = np.arange(float(k)) - (k - 1) / 2
     j = np.arange(1, p)
     off = np.sqrt(j**2 * (k**2 - j**2) / (4 * (4 * j**2 - 1.0)))  # Gram polynomials: Gautschi 2004, Table 1.2 (discrete Chebyshev)
     nodes, vectors = np.linalg.eigh(np.diag(off, 1) + np.diag(off, -1))
