@@ -8,6 +8,14 @@ class BadInput(ValueError):
     """A file, key, value or option that cannot be used; the message names it and says what is allowed."""
 
 
+class Unanswered(BadInput):
+    """Several things that only the user knows, asked for at once: `items` are sentences, `head` says what they are for."""
+
+    def __init__(self, head: str, items: Iterable[str], tail: str = "") -> None:
+        self.head, self.items, self.tail = head, tuple(items), tail
+        super().__init__(" ".join([head, *(f"({k}) {item};" for k, item in enumerate(self.items, 1)), tail]).rstrip("; "))
+
+
 class OutsideRange(ValueError):
     """A table or law was asked outside the range it was made for."""
 

@@ -10,6 +10,7 @@ identification/  FRFs and their checks, poles by maximum likelihood, modes, whic
 posing           how the bodies of the MuJoCo model stand when modes swing or the spindle turns, for pictures of motion
 run              the whole chain at several temperatures
 campaign/        campaigns of tests, measured or virtual
+importing/       a laboratory's own files as a campaign
 running/         the running spindle: excitation, its run, runout and its lines
 resonance/       natural frequencies against bearing and unbalance lines
 warmup           from cold start to steady state

@@ -21,7 +21,7 @@ from math import inf, isfinite
 from pathlib import Path
 from typing import Any, NoReturn
 
-from thermospindle.model.errors import BadInput, NoEquilibrium, NotConverged, OutsideRange, instead
+from thermospindle.model.errors import BadInput, NoEquilibrium, NotConverged, OutsideRange, Unanswered, instead
 from thermospindle.model.rotor.elements import ELEMENTS
 from thermospindle.report.folder import COMMAND
 
@@ -34,6 +34,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one verb; returns 0, 2 for what cannot be used, read or written, 130 when stopped."""
     try:
         return _run(sys.argv[1:] if arguments is None else list(arguments))
+    except Unanswered as error:
+        print(f"spindle: {error.head}", *(f"  {k}. {item}" for k, item in enumerate(error.items, 1)), error.tail, sep="\n", file=sys.stderr)
+        return 2
     except (BadInput, OutsideRange, NoEquilibrium, NotConverged) as error:
         return _refused(str(error))
     except BrokenPipeError:  # whoever read the output has enough of it
@@ -228,6 +231,10 @@ def _parser() -> tuple[_Parser, dict[str, argparse.ArgumentParser]]:
     )  # fmt: skip
     several(report)
     hammer(report)
+    bring = verb("import", ("importing", "bring"), "a campaign from your own files: UFF, CSV, .mat, .npz; FRFs, time records or tables of modes", what="")
+    bring.add_argument("files", metavar="FILE", nargs="+", type=Path)
+    bring.add_argument("--mapping", type=Path, metavar="FILE.toml", help="what the files do not tell; a new file is written as a form to fill in")
+    bring.add_argument("--scene", type=Path, metavar="SCENE", help="the spindle that was tested; its measuring points are known by node and name")
     compare = verb("compare", ("compare", "compare"), "a campaign beside the scene: modes, dampings, shapes and FRFs, and one number for the whole")
     compare.add_argument("campaign", metavar="CAMPAIGN", type=Path)
     compare.add_argument("--before", type=Path, metavar="SCENE", help="the scene as it was, to see whether the error fell")

@@ -9,6 +9,7 @@ catalogue  effects, add
 chain      run, impact, simulate, report
 compare    compare
 diagnose   diagnose
+importing  import
 inspect    inspect
 ladder     ladder
 running    runout, warmup, map

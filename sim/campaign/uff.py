@@ -33,6 +33,7 @@ from thermospindle.sim.identification.frf import Frf
 
 STANDARD_ERROR, AXIS = "standard error", "frequency axis"
 LARGEST = 1e15  # of any value in any unit; sums of squares of larger ones would overflow
+A_LINE = 6  # numbers on a line of an ASCII set
 NODES = {"response": ("rsp_node", "rsp_dir"), "reference": ("ref_node", "ref_dir")}
 
 
@@ -60,10 +61,11 @@ QUANTITIES = {"receptance": 8, "mobility": 11, "accelerance": 12}
 """The specific data type of an FRF's numerator."""
 
 
-def read_uff(path: Path) -> list[dict[str, Any]]:
+def read_uff(path: Path, padded: bool = False) -> list[dict[str, Any]]:
     """Every set of a UFF file in its order, as pyuff's dictionaries; 'type' is the dataset, the only key of an unknown one.
 
-    Node numbers are integers. Bytes of the headers that are not UTF-8 become U+FFFD.
+    Node numbers are integers. Bytes of the headers that are not UTF-8 become U+FFFD. With `padded`, zeros that fill a last line of values
+    beyond the number of the header, as some analysers write them, are left out.
     """
     if not path.is_file():
         raise BadInput(f"{path}: no such file")
@@ -82,6 +84,8 @@ def read_uff(path: Path) -> list[dict[str, Any]]:
         except Exception as error:
             _raise_hidden(error)
             raise BadInput(f"{where}: cannot be read as dataset {dataset}; it is damaged, or not in the published form") from None
+        if dataset == 58 and padded and 0 < len(content["data"]) - content["num_pts"] < A_LINE and not content["data"][content["num_pts"] :].any():
+            content |= {key: content[key][: content["num_pts"]] for key in ("data", "x")}
         if dataset == 58 and len(content["data"]) != content["num_pts"]:
             raise BadInput(f"{where}: holds {len(content['data'])} values, its header says {content['num_pts']}")
         if dataset == 58 and content.get("fp_format", 2) != 2:

@@ -1,0 +1,99 @@
+"""The verb `import`: a campaign from a laboratory's own files, or one list of what they do not tell."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from thermospindle.model.errors import BadInput, Unanswered
+from thermospindle.model.units import RPM
+from thermospindle.model.whole import whole
+from thermospindle.report.verbs.answer import Answer, with_effects
+from thermospindle.sim.campaign.campaign import Campaign, write_campaign
+from thermospindle.sim.importing.assemble import campaign_of, read
+from thermospindle.sim.importing.mapping import read_mapping
+from thermospindle.sim.importing.template import template
+
+
+def bring(
+    files: Sequence[Path],
+    mapping: Path | None = None,
+    scene: Path | None = None,
+    effect_files: Sequence[Path] = (),
+    out: Path | None = None,
+) -> Answer:
+    """The campaign folder `out` from measured files; a `mapping` that is not there is written as a form to fill in.
+
+    Raises `Unanswered` with everything that the files and the mapping leave open.
+    """
+    files = [Path(f) for f in files]
+    fresh = mapping is not None and not Path(mapping).exists()
+    if out is None and not fresh:
+        raise BadInput("--out: import needs the campaign folder to write, or --mapping with a new file")
+    if out is not None and Path(out).exists() and (not Path(out).is_dir() or any(Path(out).iterdir())):
+        raise BadInput(f"--out {out}: is not empty; a campaign is written to a new or empty folder")
+    spindle = with_effects(scene, effect_files)[0] if scene is not None else None
+    form = read_mapping(None if fresh else mapping)
+    found = read(files, form, spindle)
+    if fresh and mapping is not None:
+        with whole(Path(mapping)) as file:
+            file.write_text(template(found, files, spindle), encoding="utf-8")
+    if out is None:
+        return _form_written(Path(str(mapping)), [f"{q.about}: {q.key}: {q.text}" for q in found.questions])
+    try:
+        campaign, notes = campaign_of(found, form, spindle, files, mapping)
+    except Unanswered as error:
+        raise Unanswered(error.head, error.items, f"{mapping} is written: {error.tail}" if fresh else error.tail) from None
+    write_campaign(campaign, Path(out))
+    return _written(campaign, Path(out), notes, None if scene is None else Path(scene))
+
+
+def _form_written(mapping: Path, open_: list[str]) -> Answer:
+    values: dict[str, Any] = {"mapping": str(mapping), "open": open_, "warnings": []}
+
+    def show(console: Console) -> None:
+        console.print(f"{mapping} is written: {len(open_)} answers are open in it.", highlight=False)
+        for k, item in enumerate(open_, 1):
+            console.print(f"  {k}. {item}", highlight=False)
+        console.print(f"Then: spindle import FILES --mapping {mapping} --out CAMPAIGN", highlight=False)
+
+    return Answer(values, show)
+
+
+def _written(campaign: Campaign, out: Path, notes: list[str], scene: Path | None) -> Answer:
+    values: dict[str, Any] = {
+        "campaign": str(out),
+        "spindle": campaign.spindle,
+        "quantity": campaign.quantity,
+        "points": [{"node": p.node, "name": p.name} for p in campaign.points],
+        "tests": [
+            {
+                "id": t.id,
+                "temperature_C": t.temperature,
+                "speed_rpm": t.speed / RPM,
+                "responses": [] if t.frf is None else [*t.frf.response_nodes],
+                "references": [] if t.frf is None else [*t.frf.reference_nodes],
+                "lines": 0 if t.frf is None else len(t.frf.frequency),
+                "modes": len(t.modes),
+            }
+            for t in campaign.tests
+        ],
+        "notes": notes,
+        "warnings": [],
+    }
+
+    def show(console: Console) -> None:
+        count = len(campaign.tests)
+        console.print(f"{out}: a campaign of {count} test{'s' * (count != 1)} for {campaign.spindle}, checked and read back.", highlight=False)
+        for t in values["tests"]:
+            frfs = f"{len(t['responses'])} x {len(t['references'])} FRFs of {t['lines']} lines" if t["lines"] else ""
+            modes = f"{t['modes']} modes" if t["modes"] else ""
+            console.print(f"  {t['id']}: {t['temperature_C']:g} C, {t['speed_rpm']:g} rpm: {', '.join(x for x in (frfs, modes) if x)}", highlight=False)
+        for note in notes:
+            console.print(f"  {note}", highlight=False)
+        console.print(f"Next: spindle compare {scene or campaign.spindle} {out}", highlight=False)
+
+    return Answer(values, show)

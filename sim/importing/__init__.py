@@ -1,0 +1,18 @@
+"""A laboratory's own files as a campaign: UFF/UNV, text tables, `.npz`, `.mat`, time records, and tables of modes.
+
+`assemble.read` reads every file as a mapping says and collects what is open; `assemble.campaign_of` makes the campaign, or raises
+everything that is open at once; `template.template` writes the mapping as a form to fill in. SI inside, as in `sim.campaign`.
+
+=========  =============================================================================================================
+assemble   from files and a mapping to a campaign, or to everything that is still open, at once
+files/     what is in a file of each kind
+frfs       from placed curves to the FRFs of one test: SI, one quantity, common lines, running-speed lines out, checks
+mapping    the form of a mapping file
+measured   what files hold before anything is decided about it: curves, time records, modes, places, questions
+peaks      modes of FRFs that are magnitudes alone
+places     which point of the campaign each end of a curve is
+records    time records: hits found and judged, windows, FRFs with coherence and standard errors
+template   the mapping as a form to fill in
+units      units as laboratories write them
+=========  =============================================================================================================
+"""

@@ -1,0 +1,270 @@
+"""From files and a mapping to a campaign, or to everything that is still open, at once."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+import numpy as np
+
+from thermospindle.model.errors import BadInput, Unanswered
+from thermospindle.model.machine import Point, Spindle
+from thermospindle.model.units import MINUTE, RPM
+from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Test
+from thermospindle.sim.importing import units
+from thermospindle.sim.importing.files.reading import content
+from thermospindle.sim.importing.frfs import Placed, frf_of
+from thermospindle.sim.importing.mapping import FileForm, MappingForm, TestForm, settings_of
+from thermospindle.sim.importing.measured import Content, Curve, End, ModeLine, Motion, Question, listed
+from thermospindle.sim.importing.peaks import from_peaks
+from thermospindle.sim.importing.places import place, points_of, unplaced
+from thermospindle.sim.importing.records import frfs_of
+
+
+@dataclass(frozen=True, eq=False)
+class Read:
+    """All files as read: `tests` by id with the curves, modes and window of each, `notes`, and what is open."""
+
+    contents: tuple[Content, ...]
+    curves: dict[str, list[Curve]]
+    modes: dict[str, list[ModeLine]]
+    window: dict[str, float]
+    ends: tuple[tuple[str, End], ...]  # of what file, every end that is not placed
+    points: dict[int, Point]
+    notes: tuple[str, ...]
+    questions: tuple[Question, ...]
+
+    @property
+    def tests(self) -> list[str]:
+        return list(dict.fromkeys([*self.curves, *self.modes]))
+
+
+def read(files: Sequence[Path], form: MappingForm, scene: Spindle | None) -> Read:
+    """Read every file as the mapping says; what it does not say is among the questions. Raises `BadInput` for damaged files."""
+    if len({f.resolve() for f in files}) < len(files):
+        raise BadInput(f"{listed(f.name for f in files)}: a file is named twice")
+    unused = [t.file for t in form.files if not any(settings_of(MappingForm(files=[t]), f).model_fields_set - {"file", "columns", "leave_out"} or _fits(t, f) for f in files)]
+    if unused:
+        raise BadInput(f"mapping: files: file = {unused[0]!r}: is none of {listed(f.name for f in files)}")
+    settings = {f: settings_of(form, f) for f in files}
+    contents = [content(f, settings[f]) for f in files]
+    points, questions = points_of(form, scene)
+    notes = [n for c in contents for n in c.notes]
+    questions += [q for c in contents for q in c.questions]
+    curves: dict[str, list[Curve]] = {}
+    modes: dict[str, list[ModeLine]] = {}
+    window: dict[str, float] = {}
+    coherence: dict[str, dict[tuple[End, End], np.ndarray]] = {}
+    for c in contents:
+        own = settings[c.file].test or plain(c.file.stem)
+        if not (c.curves or c.motions or c.modes or c.places or c.coherence or c.questions):
+            raise BadInput(f"{c.file}: holds no FRF, no time record, no modes and no geometry")
+        if c.curves or c.questions or c.motions:
+            curves.setdefault(own, []).extend(_turned(x, settings[c.file]) for x in c.curves)
+        coherence.setdefault(own, {}).update(c.coherence)
+        for m in c.modes:
+            modes.setdefault(m.test or own, []).append(m)
+    curves = {test: [_with(x, coherence.get(test, {})) for x in every] for test, every in curves.items()}
+    groups, open_records = _records(contents, settings)
+    questions += open_records
+    for (test, label), group in groups.items():
+        made = frfs_of(group, label, form.records)
+        notes += made.notes
+        questions += made.questions
+        curves.setdefault(test, []).extend(made.curves)
+        if made.window_decay > 0 and abs(window.setdefault(test, made.window_decay) / made.window_decay - 1) > 1e-9:
+            questions.append(Question(f"test {test}", "hit_length_s", "one length for all hits, so that one window fits all its FRFs"))
+    for every in curves.values():
+        for x in every:
+            if x.magnitude_only and np.min(x.value) < 0:
+                questions.append(Question(x.file.name, "columns", f"the imaginary part beside {x.where}: its values are real and some negative, so they are no magnitude"))
+    own_curves = [(x.file.name, x) for every in curves.values() for x in every if not x.magnitude_only]
+    blank = sorted({(name, key) for name, x in own_curves for key in ("response", "reference") if not getattr(x, key).label})
+    for key in ("response", "reference"):
+        if of := [name for name, k in blank if k == key]:
+            questions.append(Question(listed(of), key, f"the point that {'answered' if key == 'response' else 'was hit'}: {key} = node or name"))
+    ends = tuple((n, e) for n, x in own_curves for e in (x.response, x.reference) if place(e, form, points) is None)
+    questions += unplaced(ends, points, scene)
+    questions += _units(own_curves, settings)
+    found = Read(tuple(contents), curves, modes, window, ends, points, tuple(notes), ())
+    questions += _conditions(found, form, scene)
+    return Read(tuple(contents), curves, modes, window, ends, points, tuple(notes), _together(questions))
+
+
+def _together(questions: Sequence[Question]) -> tuple[Question, ...]:
+    """Each thing asked once, for all files at a time."""
+    about: dict[tuple[str, str], list[str]] = {}
+    for q in questions:
+        about.setdefault((q.key, q.text), []).append(q.about)
+    return tuple(Question(listed(dict.fromkeys(of)), key, text) for (key, text), of in about.items())
+
+
+def _fits(table: FileForm, file: Path) -> bool:
+    return fnmatchcase(file.name, table.file) or fnmatchcase(str(file), table.file)
+
+
+def plain(stem: str) -> str:
+    """The name of a test from that of a file."""
+    return re.sub(r"[^A-Za-z0-9._+-]+", "_", stem).strip("._") or "test"
+
+
+def _turned(curve: Curve, settings: FileForm) -> Curve:
+    return replace(curve, value=curve.value.conj()) if settings.conjugate else curve
+
+
+def _with(curve: Curve, coherence: dict[tuple[End, End], np.ndarray]) -> Curve:
+    """The curve with the coherence of its ends, from whichever file of its test."""
+    own = coherence.get((curve.response, curve.reference))
+    return curve if own is None or own.shape != curve.value.shape else replace(curve, coherence=own)
+
+
+Records = dict[tuple[str, End], list[tuple[Path, list[Motion]]]]
+
+
+def _records(contents: Sequence[Content], settings: dict[Path, FileForm]) -> tuple[Records, list[Question]]:
+    """Time records by test and hammer point; force and responses of one hit may be in files of their own, of the same test."""
+    groups: Records = {}
+    questions: list[Question] = []
+    apart: dict[str, list[Content]] = {}
+    for c in contents:
+        if not c.motions or c.questions:
+            continue
+        test = settings[c.file].test or plain(c.file.stem)
+        kinds = {m.force for m in c.motions}
+        if len(kinds) == 1:
+            apart.setdefault(test, []).append(c)
+        elif sum(m.force for m in c.motions) > 1:
+            questions.append(Question(c.file.name, "columns", "which one of its force channels is the hammer's"))
+        else:
+            _add(groups, test, c.file, list(c.motions))
+    for test, own in apart.items():
+        motions = [m for c in own for m in c.motions]
+        names = listed(c.file.name for c in own)
+        if sum(m.force for m in motions) == 1 and len(motions) > 1:
+            _add(groups, test, own[0].file, motions)
+        else:
+            lacking = "response" if all(m.force for m in motions) else "force"
+            questions.append(Question(names, "test", f"the {lacking} record that goes with them: files of one hit have the same test"))
+    return groups, questions
+
+
+def _add(groups: Records, test: str, file: Path, motions: list[Motion]) -> None:
+    groups.setdefault((test, next(m.end for m in motions if m.force)), []).append((file, motions))
+
+
+def _units(curves: list[tuple[str, Curve]], settings: dict[Path, FileForm]) -> list[Question]:
+    """What units and quantities leave open, once a file."""
+    open_: dict[tuple[str, str], list[str]] = {}
+    for name, curve in curves:
+        if isinstance(fault := scaled(curve, settings[curve.file]), str):
+            key, _, text = fault.partition(": ")
+            open_.setdefault((key, text), []).append(name)
+    return [Question(listed(dict.fromkeys(names)), key, text) for (key, text), names in open_.items()]
+
+
+def scaled(curve: Curve, settings: FileForm) -> tuple[str, float] | str:
+    """(quantity, factor to SI) of a curve, or the key and the sentence of what is open."""
+    told = units.of_frf(curve.unit) if curve.unit else None
+    if curve.unit and told is None:
+        return f'unit: a known unit of its FRFs, as in unit = "(m/s^2)/N"; {curve.unit!r} is none'
+    if told is None:
+        said = f"; its header says {curve.quantity}" if curve.quantity else ""
+        return f'unit: the unit of its FRFs, as in unit = "(m/s^2)/N", "m/N", "g/N", "(mm/s)/N"{said}'
+    if not curve.quantity or curve.quantity == told[0]:
+        return told
+    if settings.unit and settings.quantity:
+        return f"quantity: quantity = {settings.quantity!r} or unit = {settings.unit!r}, which is that of a {told[0]}"
+    if settings.quantity and (factor := units.length_factor(curve.unit)) is not None:
+        return curve.quantity, factor  # settled: the label's unit of time is wrong, its length and force are taken
+    if settings.unit:
+        return told
+    return f"quantity: which quantity its FRFs are: called {curve.quantity}, with the unit {curve.unit!r} of a {told[0]}"
+
+
+def _conditions(found: Read, form: MappingForm, scene: Spindle | None) -> list[Question]:
+    """What tests and the campaign as a whole leave open."""
+    forms = {t.id: t for t in form.tests}
+    questions = []
+    for id_ in forms:
+        if id_ not in found.tests and found.tests:
+            raise BadInput(f"mapping: tests: id = {id_!r}: no file makes such a test; there are {listed(found.tests)}")
+    for key, text in (("temperature_C", "the temperature of the spindle, C"), ("speed_rpm", "the speed, rpm (0 at rest)")):
+        missing = [t for t in found.tests if t not in forms or getattr(forms[t], key) is None]
+        if missing:
+            questions.append(Question(f"test{'s' * (len(missing) > 1)} {listed(missing)}", key, text))
+    if form.spindle is None and scene is None:
+        questions.append(Question("the campaign", "spindle", "the name of its scene (or --scene SCENE)"))
+    rows = [m for every in found.modes.values() for m in every]
+    if any(m.frequency_sd is None for m in rows) and form.frequency_sd_Hz is None:
+        questions.append(
+            Question("the campaign", "frequency_sd_Hz", "how sure the frequencies of its modes are, one standard deviation in Hz (a line's width at most)")
+        )
+    return questions
+
+
+def campaign_of(found: Read, form: MappingForm, scene: Spindle | None, files: Sequence[Path], mapping: Path | None) -> tuple[Campaign, list[str]]:
+    """The campaign of all files, and what was done to them. Raises `Unanswered` with all that is open, `BadInput` for FRFs that no structure has."""
+    if found.questions:
+        count = len(found.questions)
+        head = f"{count} thing{'s are' if count > 1 else ' is'} not told by the files:"
+        tail = f"answer them in {mapping}" if mapping else "--mapping NEW.toml writes a form to answer them in"
+        raise Unanswered(head, [f"{q.about}: {q.key}: {q.text}" for q in found.questions], tail)
+    if not found.tests:
+        raise BadInput(f"{listed(f.name for f in files)}: hold no FRF, time record or mode; geometry alone is no campaign")
+    forms = {t.id: t for t in form.tests}
+    settings = {c.file: settings_of(form, c.file) for c in found.contents}
+    notes = list(found.notes)
+    placed = {t: [p for c in curves if (p := _placed(c, form, found.points, settings[c.file])) is not None] for t, curves in found.curves.items()}
+    said = [p.quantity for every in placed.values() for p in every]
+    quantity: str = form.quantity or (max(said, key=said.count) if said else "mobility")
+    tests = tuple(_test(t, forms[t], found, placed.get(t, []), quantity, form, notes) for t in found.tests)
+    used = {n for t in tests if t.frf for n in (*t.frf.response_nodes, *t.frf.reference_nodes)}
+    points = tuple(p for node, p in sorted(found.points.items()) if node in used)
+    title = form.title or f"imported from {listed((f.name for f in files), 3)}"
+    note = "\n".join(x for x in (form.note, *notes) if x)
+    spindle = form.spindle or (scene.name if scene else "")
+    return Campaign(title, spindle, quantity, points, tests, None, note), notes
+
+
+def _placed(curve: Curve, form: MappingForm, points: dict[int, Point], settings: FileForm) -> Placed | None:
+    """A complex curve between points; None for a magnitude, which makes modes, and for what the mapping leaves out."""
+    if curve.magnitude_only:
+        return None
+    (response, a), (reference, b) = (place(e, form, points) or (0, 1) for e in (curve.response, curve.reference))
+    told = scaled(curve, settings)
+    assert not isinstance(told, str)
+    names = {f"H({r},{q})" for r in (response, curve.response.label) for q in (reference, curve.reference.label)}
+    if names & {n.replace(" ", "") for n in settings.leave_out}:
+        return None
+    return Placed(curve, response, reference, told[0], told[1] * a * b)
+
+
+def _test(id_: str, told: TestForm, found: Read, placed: list[Placed], quantity: str, form: MappingForm, notes: list[str]) -> Test:
+    assert told.temperature_C is not None
+    assert told.speed_rpm is not None
+    speed = told.speed_rpm * RPM
+    frf = None
+    if placed:
+        frf, more = frf_of(id_, placed, quantity, form.band_Hz, speed, told.averages)
+        notes += more
+        if not any(r in frf.reference_nodes for r in frf.response_nodes):
+            notes.append(f"test {id_}: no response at a hammer point: signs and directions of its FRFs cannot be checked")
+    lines = list(found.modes.get(id_, []))
+    sizes = [c for c in found.curves.get(id_, []) if c.magnitude_only]
+    if sizes:
+        peaks, more = from_peaks(sizes, speed)
+        files = listed(dict.fromkeys(c.file.name for c in sizes), 3)
+        notes += [*more, f"{files}: magnitudes without phase: {len(peaks)} peaks become modes of unknown kind, no FRF is kept"]
+        lines += peaks
+        if not peaks and frf is None:
+            raise BadInput(f"{files}: magnitudes without phase, and no peak in them that a mode explains; a table of modes by hand can be imported")
+    rows = tuple(
+        ModeRow(id_, k, m.kind, m.frequency, m.frequency_sd or form.frequency_sd_Hz or 0.0, m.damping_ratio, m.damping_ratio_sd)
+        for k, m in enumerate(sorted(lines, key=lambda m: m.frequency), 1)
+    )
+    soak = None if told.soak_time_min is None else told.soak_time_min * MINUTE
+    decay = told.window_decay_1_per_s + found.window.get(id_, 0.0)
+    return Test(id_, told.temperature_C, speed, told.hammer_level_N, soak, told.repeat, told.conditions, frf, rows, decay)

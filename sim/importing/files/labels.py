@@ -1,0 +1,96 @@
+"""What a column is, read off its heading or told by the mapping: `H(3,1) real`, `frequency`, `force`, `response 3`, `coherence(3,1)`."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+
+from thermospindle.sim.importing import units
+from thermospindle.sim.importing.measured import End
+
+PARTS = {
+    "real": "real", "re": "real", "imaginary": "imaginary", "imag": "imaginary", "im": "imaginary", "img": "imaginary",
+    "magnitude": "magnitude", "mag": "magnitude", "abs": "magnitude", "amplitude": "magnitude", "amp": "magnitude", "modulus": "magnitude",
+    "db": "decibel", "decibel": "decibel", "decibels": "decibel", "phase": "phase", "arg": "phase", "angle": "phase", "complex": "complex",
+}  # fmt: skip
+AXES = {"frequency": "frequency", "freq": "frequency", "f": "frequency", "frequenz": "frequency", "fréquence": "frequency", "time": "time", "t": "time", "zeit": "time"}
+FUNCTIONS = ("h", "frf", "h1", "h2", "hv", "g", "tf")
+COHERENCE = ("coherence", "coh", "gamma2", "γ2", "γ²")
+FORCES = ("force", "hammer", "excitation", "kraft", "impact")
+RESPONSES = ("response", "acceleration", "accelerometer", "accel", "acc", "velocity", "vibrometer", "vel", "displacement", "disp")
+ROLES = 'frequency, time, "H(3,1)" with real, imaginary, magnitude, decibel or phase behind it, coherence(3,1), sd(3,1), force, response 3, ignore'
+"""What may stand in `columns` of a mapping."""
+
+
+NOWHERE = End()
+
+
+@dataclass(frozen=True)
+class Role:
+    """`kind`: frequency, time, H, coherence, sd, force, response or ignore; `part` of an H; `unit` as written in brackets."""
+
+    kind: str
+    part: str = ""
+    response: End = NOWHERE
+    reference: End = NOWHERE
+    unit: str = ""
+
+
+def role_of(heading: str) -> Role | None:
+    """The role that a heading tells; None where it tells none."""
+    text, unit = _without_unit(heading.strip())
+    low = text.lower().strip(" :_-")
+    if low in AXES:
+        return Role(AXES[low], unit=unit)
+    if low in ("hz", "s", "sec"):
+        return Role("frequency" if low == "hz" else "time", unit=low)
+    if low in ("ignore", ""):
+        return Role("ignore") if low else None
+    pair = re.search(r"\(\s*([^(),;/|]+?)\s*[,;/|]\s*([^(),;/|]+?)\s*\)", text)
+    ends = (end(pair[1]), end(pair[2])) if pair else (End(), End())
+    rest = text[: pair.start()] + " " + text[pair.end() :] if pair else text
+    words = [w for w in re.split(r"[^A-Za-zéγ²0-9]+", rest.lower()) if w]
+    told = Role("H", "", *ends, unit)
+    if any(w in COHERENCE for w in words):
+        return replace(told, kind="coherence")
+    if words[:1] in (["sd"], ["stderr"]) or words[:2] == ["standard", "error"]:
+        return replace(told, kind="sd")
+    part = next((PARTS[w] for w in words if w in PARTS), "")
+    frf = (bool(words) and words[0] in FUNCTIONS) or (pair is not None and bool(part))
+    if frf or (part and set(words) <= set(PARTS)):
+        left = [w for w in words if w not in PARTS and w not in FUNCTIONS]
+        if left and pair is None:  # "FRF-1 real": one of several, of which the heading tells no pair
+            of = re.sub(rf"(?i)\b({'|'.join(PARTS)})\b", "", text).strip(" _-:")
+            told = replace(told, response=End(name=of))
+        return replace(told, part=part or "complex")
+    number = next((int(w) for w in words if w.isdigit()), 0)
+    for kind, known in (("force", FORCES), ("response", RESPONSES)):
+        if any(w.rstrip("0123456789") in known for w in words):
+            glued = next((re.sub(r"\D", "", w) for w in words if w.rstrip("0123456789") in known), "")
+            place = end(pair[1]) if pair else End(number or int(glued or 0))
+            name = re.fullmatch(r"\s*\w+?\s+([A-Za-z]\w*|\d+:[+-][XYZ])\s*", text)
+            if not place.label and name and not name[1].isdigit():
+                place = end(name[1])
+            return Role(kind, "", place if kind == "response" else End(), place if kind == "force" else End(), unit)
+    return None
+
+
+def end(text: str) -> End:
+    """An end as people write it: 3, "3:+Z", "3Z", "3+Z", "hub_top0"."""
+    match = re.fullmatch(r"(\d+)\s*:?\s*(?:([+-]?)\s*([XYZxyz]))?\s*([+-]?)", text.strip())
+    if match is None:
+        return End(name=text.strip())
+    axis = match[3].upper() if match[3] else ""
+    return End(int(match[1]), ((match[2] or match[4] or "+") + axis) if axis else "")
+
+
+def _without_unit(text: str) -> tuple[str, str]:
+    """The heading, and the unit in square or round brackets at its end."""
+    match = re.search(r"\s*\[([^\[\]]*)\]\s*$", text)
+    if match is None and (match := re.search(r"\s+\((.+)\)\s*$", text)) is None:
+        match = re.search(r"(?<=\w)\((Hz|s|N|dB|deg|rad|°|g|V)\)\s*$", text)
+    if match is None or (re.search(r"[,;|]", match[1]) is not None):
+        return text, ""
+    inside = match[1].strip()
+    known = inside in ("Hz", "kHz", "s", "ms", "dB", "deg", "°", "rad", "-", "1", "V") or units.of_frf(inside) or units.of_response(inside) or units.of_force(inside)
+    return (text[: match.start()], inside) if known or match[0].strip().startswith("[") else (text, "")

@@ -1,0 +1,72 @@
+"""Tables of modes that somebody picked by hand: the easiest start of a campaign. A frequency a row is enough."""
+
+from __future__ import annotations
+
+import csv
+import re
+from pathlib import Path
+
+from thermospindle.model.errors import BadInput
+from thermospindle.sim.importing.files.text import COMMENT, text_of
+from thermospindle.sim.importing.measured import Content, ModeLine
+
+COLUMNS = {
+    "test": "test", "condition": "test", "mode": "mode", "no": "mode", "number": "mode", "kind": "kind", "type": "kind",
+    "frequency": "frequency", "frequency_hz": "frequency", "f": "frequency", "f_hz": "frequency", "freq": "frequency",
+    "frequency_sd_hz": "sd", "frequency_sd": "sd", "sd": "sd", "sd_hz": "sd", "damping_ratio": "damping", "damping": "damping", "zeta": "damping",
+    "damping_ratio_sd": "damping_sd", "damping_%": "percent", "damping_percent": "percent", "zeta_%": "percent",
+}  # fmt: skip
+"""Headings in small letters, with blanks and brackets as _: what they are."""
+
+
+def headings(file: Path) -> tuple[list[str], str, int] | None:
+    """What each column of a table of modes is, its separator and the line of its headings; None where the file is no such table."""
+    for number, line in enumerate(text_of(file).splitlines()):
+        plain = COMMENT.sub("", line)
+        if not plain.strip():
+            continue
+        for separator in ("\t", ";", ","):
+            named = [COLUMNS.get(re.sub(r"[\s()\[\]]+", "_", cell.strip().strip('"').lower()).strip("_"), "") for cell in plain.split(separator)]
+            if "frequency" in named and {"mode", "kind", "damping", "percent", "test", "sd"} & {*named}:
+                return named, separator, number
+        if not line.lstrip().startswith(("#", "%")):
+            return None
+    return None
+
+
+def from_modes(file: Path) -> Content:
+    """The modes of a table. Raises `BadInput` naming the line for what is no number, or no possible one."""
+    found = headings(file)
+    assert found is not None
+    named, separator, first = found
+    modes = []
+    rows = csv.reader(text_of(file).splitlines(), delimiter=separator)
+    for number, cells in enumerate(rows):
+        if number <= first or not any(c.strip() for c in cells) or cells[0].lstrip().startswith("#"):
+            continue
+        where = f"{file}: line {number + 1}"
+        if len(cells) > len(named):
+            raise BadInput(f"{where}: has {len(cells)} cells, the headings are {len(named)}")
+        told = {name: cell.strip() for name, cell in zip(named, cells, strict=False) if name and cell.strip()}
+        frequency = _number(where, told, "frequency", separator)
+        if frequency is None or not frequency > 0:
+            raise BadInput(f"{where}: frequency = {told.get('frequency', '')!r}: a positive number in Hz is needed")
+        damping = _number(where, told, "damping", separator)
+        if (percent := _number(where, told, "percent", separator)) is not None:
+            damping = percent / 100
+        if damping is not None and not 0 < damping < 1:
+            raise BadInput(f"{where}: damping = {damping:g}: a ratio above 0 and below 1 is allowed; in percent under the heading damping_%")
+        sd, damping_sd = (_number(where, told, key, separator) for key in ("sd", "damping_sd"))
+        modes.append(ModeLine(told.get("test", ""), told.get("kind", "unknown"), frequency, sd, damping, damping_sd if damping else None))
+    if not modes:
+        raise BadInput(f"{file}: has headings of a table of modes and no mode below them")
+    return Content(file, modes=tuple(modes))
+
+
+def _number(where: str, told: dict[str, str], key: str, separator: str) -> float | None:
+    if key not in told:
+        return None
+    try:
+        return float(told[key].replace(",", ".") if separator != "," else told[key])
+    except ValueError:
+        raise BadInput(f"{where}: {key} = {told[key]!r}: is no number") from None

@@ -1,0 +1,148 @@
+"""Tables of numbers in text files: any usual separator, decimal point or comma, complex cells, headings and units above the numbers."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from thermospindle.model.errors import BadInput
+
+SEPARATORS = ("\t", ";", ",", None)  # None: any white space
+COMMENT = re.compile(r"^\s*(#|%|//|!)+\s?")
+LARGEST_FILE = 400e6  # bytes
+
+
+@dataclass(frozen=True, eq=False)
+class TextTable:
+    """`heading` and `unit` of each column ("" where there is none), `values` (rows, columns), `words`: cells that are no numbers."""
+
+    file: Path
+    heading: tuple[str, ...]
+    unit: tuple[str, ...]
+    values: np.ndarray
+    preamble: tuple[str, ...]  # lines above the headings
+
+
+def text_of(file: Path) -> str:
+    """The text of a file in UTF-8, UTF-16 or, where it is neither, Latin 1."""
+    if file.stat().st_size > LARGEST_FILE:
+        raise BadInput(f"{file}: {file.stat().st_size / 1e6:.0f} MB of text; at most {LARGEST_FILE / 1e6:.0f} are read: export it as .npz or UFF 58b")
+    data = file.read_bytes()
+    if b"\0" in data[:4000] and not data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise BadInput(f"{file}: is no text; UFF, CSV and other text tables, .npz and .mat are read")
+    for encoding in ("utf-16" if data.startswith((b"\xff\xfe", b"\xfe\xff")) else "utf-8-sig", "latin-1"):
+        try:
+            return data.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+    raise BadInput(f"{file}: is no text")
+
+
+def read_table(file: Path) -> TextTable:
+    """The one table of numbers of a text file. Raises `BadInput` where there is none, or where a line among the numbers has other cells."""
+    lines = [(number, line) for number, line in enumerate(text_of(file).splitlines(), 1) if line.strip(" \t;,")]
+    separator, comma = _manner(file, [line for _, line in lines])
+    rows, first = _numbers(file, lines, separator, comma)
+    width = len(rows[0])
+    above = [COMMENT.sub("", line) for _, line in lines[:first]]
+    told = [cells for line in above if len(cells := _headings(line, separator)) == width or _fits(cells, width)]
+    rows_above = [(*cells, *[""] * width)[:width] for cells in told]
+    unit: tuple[str, ...] = ("",) * width
+    heading = tuple(c.strip() for c in rows_above[-1]) if rows_above else unit
+    if len(rows_above) > 1 and _are_units(rows_above[-1]):
+        heading, unit = tuple(c.strip() for c in rows_above[-2]), heading
+    dtype = complex if any(isinstance(c, complex) for c in rows[0]) or any(isinstance(c, complex) for c in rows[-1]) else float
+    try:
+        values = np.array(rows, dtype)
+    except (TypeError, ValueError):
+        values = np.array(rows, complex)
+    return TextTable(file, heading, unit, values, tuple(above))
+
+
+def _headings(line: str, separator: str | None) -> list[str]:
+    """The cells of a line of headings; a separator within brackets or quotes, as in H(3,1), is none."""
+    if separator is None:
+        return line.split()
+    outside = re.findall(rf'(?:"[^"]*"|\([^()]*\)|\[[^\[\]]*\]|[^{separator}"])*(?:{separator}|$)', line)
+    return [cell.removesuffix(separator).strip().strip('"') for cell in (outside[:-1] if outside and not outside[-1] else outside)] + (
+        [""] if line.rstrip("\n").endswith(separator) else []
+    )
+
+
+def _fits(cells: list[str], width: int) -> bool:
+    """Headings over columns that end in a separator, or with an empty last unit."""
+    return len(cells) == width + 1 and not cells[-1].strip()
+
+
+def _are_units(cells: tuple[str, ...]) -> bool:
+    known = re.compile(r"^[\[(]*(Hz|kHz|s|sec|ms|N|lbf|kN|mN|g|V|deg|°|rad|dB.*|1|-|.*/.*|m|mm|um|µm)[\])]*(\(N\))?$", re.IGNORECASE)
+    return all(known.match(c.strip()) or not c.strip() for c in cells) and any(c.strip() for c in cells)
+
+
+def _manner(file: Path, lines: list[str]) -> tuple[str | None, bool]:
+    """Separator and decimal comma by which most of the last lines are numbers, in most columns."""
+    sample = lines[-60:]
+    best, found = (0, 0), None
+    for separator in SEPARATORS:
+        for comma in (False, True):
+            if comma and separator == ",":
+                continue
+            parsed = [_parse(_cells(line, separator), comma) for line in sample]
+            width = len(parsed[-1] or ()) if parsed else 0
+            score = (sum(p is not None and len(p) == width for p in parsed), width)
+            if width and score > best:
+                best, found = score, (separator, comma)
+    if found is None:
+        raise BadInput(f"{file}: holds no table of numbers; columns separated by tabs, semicolons, commas or spaces are read")
+    return found
+
+
+def _cells(line: str, separator: str | None) -> list[str]:
+    cells = [c.strip().strip('"') for c in line.split(separator)]
+    return cells[:-1] if len(cells) > 1 and not cells[-1] else cells
+
+
+def _parse(cells: list[str], comma: bool) -> list[float | complex] | None:
+    try:
+        return [_number(c, comma) for c in cells]
+    except ValueError:
+        return None
+
+
+def _number(text: str, comma: bool) -> float | complex:
+    if comma:
+        if "." in text:
+            raise ValueError(text)
+        text = text.replace(",", ".")
+    elif "_" in text:
+        raise ValueError(text)
+    try:
+        return float(text)
+    except ValueError:
+        plain = text.strip("()").replace(" ", "").replace("i", "j").replace("*", "")
+        return complex(plain)
+
+
+def _numbers(file: Path, lines: list[tuple[int, str]], separator: str | None, comma: bool) -> tuple[list[list[float | complex]], int]:
+    """The rows of the last block of numbers, and the index of its first line."""
+    rows: list[list[float | complex]] = []
+    for index in range(len(lines) - 1, -1, -1):
+        number, line = lines[index]
+        row = _parse(_cells(line, separator), comma)
+        if row is None or (rows and len(row) != len(rows[-1])):
+            if row is not None and rows and len(row) > 1:
+                raise BadInput(f"{file}: line {number}: has {len(row)} numbers, the lines after it {len(rows[-1])}; each must have as many")
+            if not rows:
+                raise BadInput(f"{file}: line {number}: {line.strip()[:60]!r} stands below the numbers; nothing may follow them")
+            break
+        rows.append(row)
+    else:
+        index = -1
+    rows.reverse()
+    for at, row in enumerate(rows):
+        if not np.all(np.isfinite(row)):
+            raise BadInput(f"{file}: line {lines[index + 1 + at][0]}: NaN or infinite; only finite numbers are allowed")
+    return rows, index + 1

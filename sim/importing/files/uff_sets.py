@@ -1,0 +1,136 @@
+"""UFF/UNV files of any laboratory: FRFs and time records (58, 58b), geometry (15, 2411), modes (55, 2414), units (164)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from thermospindle.sim.campaign.uff import FORCE, KINDS, read_uff
+from thermospindle.sim.importing import units
+from thermospindle.sim.importing.files.labels import end
+from thermospindle.sim.importing.mapping import FileForm
+from thermospindle.sim.importing.measured import Content, Curve, End, ModeLine, Motion, Question
+
+FRF, COHERENCE, RECORD = 4, 6, 1
+AXES = {0: "", 1: "+X", 2: "+Y", 3: "+Z", -1: "-X", -2: "-Y", -3: "-Z"}
+LEFT = {2: "auto spectrum", 3: "cross spectrum", 9: "power spectral density", 12: "spectrum", 0: "unnamed function"}
+RATIO = {8: "m/N", 11: "(m/s)/N", 12: "(m/s^2)/N"}
+
+
+def from_uff(file: Path, settings: FileForm) -> Content:
+    """The content of a UFF file. Raises `BadInput` for what is damaged; sets that are of no use here are named in the notes."""
+    sets = read_uff(file, padded=True)
+    system = next((s for s in sets if s["type"] == 164), None)
+    curves: list[Curve] = []
+    motions: list[Motion] = []
+    modes: list[ModeLine] = []
+    questions: list[Question] = []
+    coherence: dict[tuple[End, End], np.ndarray] = {}
+    places: dict[int, tuple[float, float, float]] = {}
+    left: dict[str, int] = {}
+    for number, record in enumerate(sets, 1):
+        where = f"set {number}"
+        if where in settings.leave_out:
+            continue
+        kind = int(record["type"])
+        if kind == 58:
+            function = record["func_type"]
+            ends = _end(record, "rsp", settings.response), _end(record, "ref", settings.reference)
+            if function == FRF:
+                curve, asked = _curve(file, where, record, ends, system, settings)
+                curves.append(curve)
+                questions += asked
+            elif function == COHERENCE:
+                coherence[ends] = np.asarray(np.real(record["data"]), float)
+            elif function == RECORD:
+                motions.append(_motion(file, where, record, ends))
+            elif record["id2"].strip() not in ("standard error", "frequency axis"):
+                name = LEFT.get(function, f"function of type {function}")
+                left[name] = left.get(name, 0) + 1
+        elif kind in (15, 2411):
+            scale = 1 / float(system["length"]) if system else 1.0
+            nodes, xyz = _nodes(record)
+            places |= {int(n): tuple(float(v) * scale for v in p) for n, p in zip(nodes, xyz, strict=True)}  # type: ignore[misc]
+        elif kind in (55, 2414) and (mode := _mode(record)) is not None:
+            modes.append(mode)
+        elif kind not in (151, 164, 18, 82, 2412):
+            left[f"dataset {kind}"] = left.get(f"dataset {kind}", 0) + 1
+    notes = [f"{file.name}: {count} x {name} left out: not used by a campaign" for name, count in left.items()]
+    return Content(file, tuple(curves), _joined(motions), tuple(modes), places, coherence, tuple(notes), tuple(questions))
+
+
+def _end(record: Mapping[str, Any], side: str, told: str | int | None) -> End:
+    node, direction, name = int(record[f"{side}_node"]), AXES.get(int(record[f"{side}_dir"]), ""), record[f"{side}_ent_name"].strip()
+    if node == 0 and told is not None:
+        return end(str(told))
+    if node == 0 and name not in ("", "NONE"):
+        return End(0, direction, name)
+    return End(node, direction)
+
+
+def _curve(
+    file: Path, where: str, record: Mapping[str, Any], ends: tuple[End, End], system: Mapping[str, Any] | None, settings: FileForm
+) -> tuple[Curve, list[Question]]:
+    """One FRF, and what its units and its quantity leave open or say against each other."""
+    number, below = record["ordinate_spec_data_type"], record["orddenom_spec_data_type"]
+    top, bottom = (record[f"{side}_axis_units_lab"].strip() for side in ("ordinate", "orddenom"))
+    word = record["ordinate_axis_lab"].strip()
+    top, bottom = ("" if t == "NONE" else t for t in (top, bottom))
+    joined = f"({top})/{bottom}" if top and bottom else top
+    typed = units.OF_TYPE.get(number, "") if below in (FORCE, 0) else ""
+    unit = settings.unit or joined
+    questions: list[Question] = []
+    if not unit and not joined and typed and system is not None:
+        scale = float(system["force"]) / float(system["length"])
+        value = np.asarray(record["data"]) * scale
+        return Curve(file, where, *ends, np.asarray(record["x"], float), value, settings.quantity or typed, RATIO[number]), []
+    said = {"type": typed, "unit": (units.of_frf(joined) or ("",))[0], "label": units.named(word)}
+    heard = {q for q in said.values() if q}
+    if not settings.quantity and len(heard) > 1:
+        words = f"its header says {KINDS[number].name}, " if typed else ""
+        words += f"its label {word!r} is that of a {said['label']}, " if said["label"] else ""
+        words += f"its unit {joined!r} that of a {said['unit']}" if said["unit"] else "its unit says nothing"
+        questions.append(Question(file.name, "quantity", f"which quantity its FRFs are: {words}"))
+    quantity = settings.quantity or (heard.pop() if len(heard) == 1 else "")
+    return Curve(file, where, *ends, np.asarray(record["x"], float), np.asarray(record["data"]), quantity, unit), questions
+
+
+def _motion(file: Path, where: str, record: Mapping[str, Any], ends: tuple[End, End]) -> Motion:
+    label = record["ordinate_axis_units_lab"].strip()
+    force = record["ordinate_spec_data_type"] == FORCE or units.of_force(label) is not None or "force" in record["ordinate_axis_lab"].lower()
+    x = np.asarray(record["x"], float)
+    step = float(record["abscissa_inc"]) if record.get("abscissa_inc") else float(x[1] - x[0])
+    value = np.asarray(np.real(record["data"]), float)[None]
+    return Motion(file, where, ends[0], force, step, value, "" if label == "NONE" else label)
+
+
+def _joined(motions: list[Motion]) -> tuple[Motion, ...]:
+    """Records of one channel that follow each other in a file are its hits."""
+    found: dict[tuple[End, bool], Motion] = {}
+    for m in motions:
+        key = (m.end, m.force)
+        if key in found and found[key].value.shape[-1] == m.value.shape[-1]:
+            found[key] = replace(found[key], value=np.concatenate([found[key].value, m.value]))
+        else:
+            found[key] = m
+    return tuple(found.values())
+
+
+def _nodes(record: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    return np.asarray(record["node_nums"], int), np.stack([np.asarray(record[k], float) for k in "xyz"], axis=-1)
+
+
+def _mode(record: Mapping[str, Any]) -> ModeLine | None:
+    """Frequency and viscous damping of a set of modal data; None where it is a static shape or holds none."""
+    if "eig" in record:
+        pole = complex(record["eig"])
+        if pole.imag > 0:
+            return ModeLine("", "unknown", abs(pole) / (2 * np.pi), None, -pole.real / abs(pole) if pole.real < 0 else None)
+    normal = record.get("analysis_type") == 2
+    frequency = float(record.get("freq", record.get("record12_field2", 0.0)) or 0.0) if normal else 0.0  # 2414: record 12 holds them
+    damping = float(record.get("modal_damp_vis", record.get("record12_field5", 0.0)) or 0.0)
+    return ModeLine("", "unknown", frequency, None, damping if 0 < damping < 1 else None) if frequency > 0 else None

@@ -1,0 +1,110 @@
+"""What a laboratory's files hold, before anything is decided about it: curves, time records, modes, places, and open questions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from thermospindle.model.types import Array
+
+
+@dataclass(frozen=True)
+class End:
+    """Where a file says that a channel sat: a node (0: not told), a direction like "+Z" ("": not told), a name ("": none)."""
+
+    node: int = 0
+    direction: str = ""
+    name: str = ""
+
+    @property
+    def label(self) -> str:
+        """What a mapping calls it: its name, or node and direction like "5:+Z"; "" where nothing is told."""
+        return self.name or ":".join([str(self.node)] * (self.node > 0) + [self.direction] * bool(self.direction))
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """One FRF as a file has it: `value` (n,) complex, or real where it is a magnitude alone; `unit` and `quantity` "" where not told."""
+
+    file: Path
+    where: str  # "set 3", "columns 2 and 3": for messages
+    response: End
+    reference: End
+    frequency: Array  # (n,) Hz
+    value: np.ndarray
+    quantity: str = ""
+    unit: str = ""
+    coherence: Array | None = None
+    sd: Array | None = None  # unit of the value
+
+    @property
+    def magnitude_only(self) -> bool:
+        return not np.iscomplexobj(self.value)
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """One channel over time: hammer force or response; `value` (hits, n), one row where the record was not divided yet."""
+
+    file: Path
+    where: str
+    end: End
+    force: bool
+    step: float  # s
+    value: Array
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class ModeLine:
+    """One mode of a table that somebody made; None and "" where it does not say."""
+
+    test: str
+    kind: str
+    frequency: float  # Hz
+    frequency_sd: float | None = None
+    damping_ratio: float | None = None
+    damping_ratio_sd: float | None = None
+
+
+@dataclass(frozen=True)
+class Question:
+    """What a file does not tell: `key` of which table of the mapping answers it, and a sentence why."""
+
+    about: str  # file, test or point
+    key: str
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class Content:
+    """All that was found in one file."""
+
+    file: Path
+    curves: tuple[Curve, ...] = ()
+    motions: tuple[Motion, ...] = ()
+    modes: tuple[ModeLine, ...] = ()
+    places: dict[int, tuple[float, float, float]] = field(default_factory=dict)  # m, by node
+    coherence: dict[tuple[End, End], Array] = field(default_factory=dict)  # of FRFs that may be in another file of the test
+    notes: tuple[str, ...] = ()
+    questions: tuple[Question, ...] = ()
+
+
+def even(values: Array) -> float:
+    """The step of a rising, evenly spaced axis; 0 where it is none. Text files round: two percent of a step and six digits are allowed."""
+    steps = np.diff(values)
+    if len(steps) == 0 or not np.all(np.isfinite(values)):
+        return 0.0
+    step = (values[-1] - values[0]) / len(steps)
+    straight = values[0] + step * np.arange(len(values))
+    near = np.abs(values - straight) <= 0.02 * step + 2e-5 * np.abs(values).max()
+    return float(step) if step > 0 and near.all() and (steps > 0).all() else 0.0
+
+
+def listed(words: Iterable[object], most: int = 8) -> str:
+    """Words with commas between them; the first of many."""
+    every = [str(w) for w in words]
+    return ", ".join(every[:most]) + (f" and {len(every) - most} more" if len(every) > most else "")

@@ -1,0 +1,87 @@
+"""Modes of FRFs that are magnitudes alone: peaks that several of them share, each fitted by one mode."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.signal import find_peaks
+
+from thermospindle.model.types import Array
+from thermospindle.sim.importing.measured import Curve, ModeLine
+
+PROMINENCE = 2.0  # of a peak over the valleys beside it, as a ratio
+SHARED = 0.2  # of the FRFs of a test that must show a peak at one place, two at least where there are several
+TOGETHER = 1.5  # lines between peaks of different FRFs that are one mode's
+AROUND = 12  # lines on each side of a peak that its fit sees, at most
+LEAST_SD = 0.05  # of a line: what one number a line can tell of a frequency at best
+HEAVY = 0.2  # damping ratio from which a hump is no mode
+
+
+def from_peaks(curves: Sequence[Curve], speed: float) -> tuple[list[ModeLine], list[str]]:
+    """Modes of a test's magnitudes: each peak is fitted by |a / (1 - r^2 + 2 i z r) + b|, r = f / f0, in every FRF that shows it.
+
+    Frequency and damping are the medians over these FRFs, standard errors their scatter over the root of their number, 0.05 of a line at
+    least; of a peak in fewer than three FRFs those of the fit. Shapes and close pairs are beyond magnitudes. At a speed (rad/s) peaks at its
+    multiples are no modes: the notes name them.
+    """
+    found: dict[float, list[tuple[float, float, ModeLine]]] = {}
+    step = float(np.median(np.diff(curves[0].frequency)))
+    for curve in curves:
+        size = np.asarray(curve.value, float)
+        tops, _ = find_peaks(np.log(np.maximum(size, 1e-9 * size.max())), prominence=np.log(PROMINENCE))
+        for top in tops.tolist():
+            if (mode := _fitted(curve.frequency, size, top, step)) is not None:
+                found.setdefault(mode.frequency, []).append((mode.frequency, size[top], mode))
+    every = [row for key in sorted(found) for row in found[key]]
+    groups: list[list[ModeLine]] = []
+    for frequency, _, mode in every:
+        if groups and frequency - groups[-1][-1].frequency <= TOGETHER * step and frequency - groups[-1][0].frequency <= 3 * step:
+            groups[-1].append(mode)
+        else:
+            groups.append([mode])
+    least = max(min(2, len(curves)), SHARED * len(curves))
+    modes, notes, turning = [], [], abs(speed) / (2 * np.pi)
+    for group in groups:
+        if len(group) < least:
+            continue
+        mode = _median(group, step)
+        nearest = turning * max(round(mode.frequency / turning), 1) if turning else -np.inf
+        if abs(mode.frequency - nearest) <= step:
+            notes.append(f"{curves[0].file.name}: the peak at {mode.frequency:.5g} Hz is a multiple of the running speed, no mode")
+        else:
+            modes.append(mode)
+    return modes, notes
+
+
+def _median(group: Sequence[ModeLine], step: float) -> ModeLine:
+    """One mode of those that several FRFs show; 1.25 sd / sqrt(n) is the standard error of a median."""
+    frequency = np.array([m.frequency for m in group])
+    damping = np.array([m.damping_ratio for m in group if m.damping_ratio is not None])
+    n = len(group)
+    sd = 1.25 * float(np.std(frequency, ddof=1)) / np.sqrt(n) if n >= 3 else max(m.frequency_sd or 0.0 for m in group)
+    told = len(damping) >= 3 or (n < 3 and len(damping) == n)
+    spread = 1.25 * float(np.std(damping, ddof=1)) / np.sqrt(len(damping)) if len(damping) >= 3 else max((m.damping_ratio_sd or 0.0 for m in group), default=0.0)
+    ratio = float(np.median(damping)) if told else None
+    return ModeLine("", "unknown", float(np.median(frequency)), max(sd, LEAST_SD * step), ratio, max(spread, 0.02 * ratio) if ratio else None)
+
+
+def _fitted(frequency: Array, size: Array, top: int, step: float) -> ModeLine | None:
+    """One mode on a constant through the lines about a peak above a third of it, seven at least."""
+    near = np.arange(max(top - AROUND, 0), min(top + AROUND + 1, len(size)))
+    lines = [k for k in near if size[k] > 0.3 * size[top] or abs(k - top) <= 3]
+    x, y = frequency[lines], size[lines] / size[top]
+
+    def left(p: Array) -> Array:
+        r = x / (p[0] * frequency[top])
+        return np.abs(p[2] / (1 - r**2 + 2j * np.exp(p[1]) * r) + p[3] + 1j * p[4]) - y
+
+    fit = least_squares(left, [1.0, np.log(0.01), 0.02, 0.0, 0.0], x_scale=[1e-3, 1.0, 0.1, 0.1, 0.1], max_nfev=200)
+    damping, found = float(np.exp(fit.x[1])), float(fit.x[0] * frequency[top])
+    if abs(found - frequency[top]) > 2 * step or not 1e-6 < damping < HEAVY or len(lines) < 7:
+        return None
+    covariance = np.linalg.pinv(fit.jac.T @ fit.jac) * 2 * fit.cost / max(len(lines) - 5, 1)
+    sd, relative = float(np.sqrt(covariance[0, 0]) * frequency[top]), float(np.sqrt(covariance[1, 1]))
+    told = relative < 0.5
+    return ModeLine("", "unknown", found, max(sd, LEAST_SD * step), damping if told else None, damping * relative if told else None)

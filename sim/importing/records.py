@@ -1,0 +1,220 @@
+"""Hammer tests as time records: hits found and judged, windows, and FRFs with coherence and standard errors by `sim.hammer.estimate`.
+
+A hit is taken out where a channel was overloaded (its extreme reached three times exactly, or beyond what the mapping says), where the hammer
+struck twice, and where the record ends before it begins; the notes name each. H1, H2 and Hv (their geometric mean, with the phase of H1)
+are Bendat & Piersol, *Random Data* (2010), ch. 6; Rocklin, Crowley and Vold (IMAC 1985) for Hv.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from thermospindle.model.types import Array
+from thermospindle.sim.hammer.estimate import Windows, estimate
+from thermospindle.sim.hammer.pulse import PRE_TRIGGER
+from thermospindle.sim.importing import units
+from thermospindle.sim.importing.mapping import RecordForm
+from thermospindle.sim.importing.measured import Curve, End, Motion, Question, listed
+
+TOUCHING = 0.05  # of a hit's peak, above which the hammer touches
+WEAK = 0.15  # of the strongest hit of a record; weaker ones are no hits
+NOISE = 6.0  # standard deviations of the force's noise, which no second pulse is
+DECAYED = 1e-3  # of its peak, to which a response has fallen at the end of a record that needs no exponential window
+ENDS_AT = 0.01  # value of the exponential window at the end of a record that needs one
+REACH = 0.1  # of the largest force spectrum, down to which the hammer excites
+HELD = 3  # samples at exactly the extreme that tell an overload
+STEPS = 200  # of quantisation within an extreme, below which held samples tell nothing
+
+
+@dataclass(frozen=True, eq=False)
+class Hit:
+    """One hit: `force` (n,) and `response` (channels, n), `PRE_TRIGGER` before it; `where` names it."""
+
+    where: str
+    force: Array
+    response: Array
+
+
+@dataclass(frozen=True, eq=False)
+class FromRecords:
+    """FRFs made of time records, the damping (1/s) of the window left in them, and what was done and asked."""
+
+    curves: tuple[Curve, ...]
+    window_decay: float
+    hits: int
+    notes: tuple[str, ...]
+    questions: tuple[Question, ...]
+
+
+def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form: RecordForm) -> FromRecords:
+    """The FRFs of all records that one hammer point made, each file with its force and responses."""
+    notes: list[str] = []
+    name = listed(path.name for path, _ in files)
+    ends = [m.end for m in files[0][1] if not m.force]
+    if any([m.end for m in motions if not m.force] != ends for _, motions in files):
+        question = Question(name, "test", "other responses than the files of the same hammer point beside them: a test = \"...\" of their own")
+        return FromRecords((), 0.0, 0, (), (question,))
+    scales, questions = _scales(name, files[0][1])
+    steps = {m.step for _, motions in files for m in motions}
+    if max(steps) > min(steps) * (1 + 1e-6):
+        questions.append(Question(name, "sample_rate_Hz", f"one sampling rate; its records have {listed(f'{1 / s:g} Hz' for s in sorted(steps))}"))
+    if questions:
+        return FromRecords((), 0.0, 0, (), tuple(questions))
+    step = min(steps)
+    hits = [hit for path, motions in files for hit in _hits(path, motions, step, form)]
+    good = []
+    for hit in hits:
+        if (fault := _fault(hit, ends, step, form)) is None:
+            good.append(hit)
+        else:
+            notes.append(f"{hit.where}: left out, {fault}")
+    if not good:
+        what = f"all {len(hits)} hits are left out ({'; '.join(n.split(': left out, ')[-1] for n in notes[:3])})" if hits else "no hit is found in its force"
+        return FromRecords((), 0.0, 0, tuple(notes), (Question(name, "records", f"a usable hit: {what}; double_hit_share and overload set what is refused"),))
+    n = min(len(h.force) for h in good)
+    force: Array = np.array([[h.force[:n] for h in good]], float) * scales[0]
+    response: Array = np.array([[h.response[:, :n] for h in good]]) * np.array(scales[1:])[:, None]
+    end = form.exponential_end or _needed(response)
+    decay = -np.log(end) / (n * step)
+    band = (form.band_Hz[0], form.band_Hz[1]) if form.band_Hz else _band(force, step)
+    contact = max(_contact(f, step) for f in force[0])
+    windows = Windows(contact + 1e-3, float(decay))
+    found = estimate(step * np.arange(float(n)), force, response, windows, band, tuple(range(len(ends))), (0,))
+    if len(good) == 1:
+        notes.append(f"{name}: a single hit: FRFs without coherence and standard errors")
+    of = {"H1": found.h1.value, "H2": found.h2, "Hv": np.sqrt(np.abs(found.h1.value) * np.abs(found.h2)) * np.exp(1j * np.angle(found.h1.value))}
+    curves = []
+    for i, end_of in enumerate(ends):
+        motion = [m for m in files[0][1] if not m.force][i]
+        told = units.of_response(motion.unit)
+        assert told is not None
+        several = len(good) > 1
+        coherence, sd = (None if v is None or not several else v[i, 0] for v in (found.h1.coherence, found.h1.sd))
+        curves.append(
+            Curve(files[0][0], motion.where, end_of, reference, found.h1.frequency, of[form.estimator][i, 0], told[0], SI[told[0]], coherence, sd)
+        )
+    notes.append(
+        f"{name}: {len(good)} of {len(hits)} hits, {form.estimator}, {band[0]:.4g} to {band[1]:.4g} Hz in steps of {1 / (n * step):.4g} Hz, "
+        + ("no exponential window" if end == 1 else f"exponential window down to {end:g}")
+    )
+    return FromRecords(tuple(curves), float(decay), len(good), tuple(notes), ())
+
+
+SI = {"receptance": "m/N", "mobility": "(m/s)/N", "accelerance": "(m/s^2)/N"}
+
+
+def _scales(name: str, motions: Sequence[Motion]) -> tuple[list[float], list[Question]]:
+    """Factors to SI of the force and of every response."""
+    questions = []
+    force = next(m for m in motions if m.force)
+    scales = [units.of_force(force.unit) or 0.0]
+    if not scales[0]:
+        questions.append(Question(name, "columns", f"the unit of its force {force.where!r}, as in \"force [N]\"; found is {force.unit or 'none'!r}"))
+    for m in motions:
+        if not m.force:
+            told = units.of_response(m.unit)
+            scales.append(told[1] if told else 0.0)
+            if told is None:
+                questions.append(
+                    Question(name, "columns", f"the unit of its response {m.where!r}, as in \"response 3 [m/s^2]\"; found is {m.unit or 'none'!r}")
+                )
+    return scales, questions
+
+
+def _hits(path: Path, motions: Sequence[Motion], step: float, form: RecordForm) -> list[Hit]:
+    """The hits of one file: rows where it has several, else what stands around each pulse of one long record."""
+    forces = next(m for m in motions if m.force).value
+    responses = np.stack([m.value for m in motions if not m.force], axis=1)  # (hits, channels, n)
+    lead = round(PRE_TRIGGER / step)
+    found: list[Hit] = []
+    strongest = max(np.abs(f - np.median(f)).max() for f in forces)
+    for force, response in zip(forces, responses, strict=True):
+        quiet = force - np.median(force)
+        quiet = quiet * np.sign(quiet[np.argmax(np.abs(quiet))])
+        starts = _starts(quiet, strongest, round(form.apart_s / step))
+        length = round(form.hit_length_s / step) if form.hit_length_s else min([*np.diff(starts), len(force) - (starts[-1] if starts else 0) + lead])
+        for start in starts:
+            where = f"{path.name}: hit {len(found) + 1}" if len(starts) > 1 or len(forces) > 1 else path.name
+            first = start - lead
+            if start + min(length, round(form.apart_s / step)) - lead > len(force) or (form.hit_length_s and first + length > len(force)):
+                continue  # the record ends with it
+            pad = max(-first, 0)
+            cut = slice(max(first, 0), first + length)
+            found.append(Hit(where, np.pad(quiet[cut], (pad, 0)), np.pad(response[:, cut], ((0, 0), (pad, 0)))))
+    return found
+
+
+def _starts(force: Array, strongest: float, apart: int) -> list[int]:
+    """Samples at which hits begin: pulses that are at least `apart` samples from the one before."""
+    above = np.flatnonzero(force > WEAK * strongest)
+    if len(above) == 0:
+        return []
+    first = above[np.r_[True, np.diff(above) > apart]]
+    starts = []
+    for index in first.tolist():
+        while index > 0 and force[index - 1] > TOUCHING * WEAK * strongest:
+            index -= 1
+        starts.append(index)
+    return starts
+
+
+def _fault(hit: Hit, ends: Sequence[End], step: float, form: RecordForm) -> str | None:
+    """Why a hit cannot be used; None where it can."""
+    channels = [("force", hit.force), *((e.label or "response", r) for e, r in zip(ends, hit.response, strict=True))]
+    for name, value in channels:
+        limit = form.overload.get(name)
+        if limit is not None and np.abs(value).max() >= limit:
+            return f"overload: {name} reaches {np.abs(value).max():.4g}, limit {limit:g}"
+        if _held(value):
+            return f"overload: {name} reaches {value[np.argmax(np.abs(value))]:.4g} and never more, {HELD} times or oftener"
+    peak = int(np.argmax(hit.force[: round((PRE_TRIGGER + form.apart_s) / step)]))
+    after = hit.force[peak:]
+    released = np.flatnonzero(after < TOUCHING * hit.force[peak])
+    if len(released):
+        rest = after[released[0] :]
+        noise = 1.4826 * float(np.median(np.abs(hit.force[len(hit.force) // 2 :])))
+        second = float(rest.max())
+        if second > max(form.double_hit_share * hit.force[peak], NOISE * noise):
+            return f"double hit: {second / hit.force[peak]:.0%} of the first pulse, {1e3 * step * (released[0] + int(np.argmax(rest))):.3g} ms after it"
+    return None
+
+
+def _held(value: Array) -> bool:
+    for extreme in (value.max(), value.min()):
+        steps = np.abs(np.diff(value))
+        smallest = steps[steps > 0].min(initial=np.inf)
+        if abs(extreme) < 0.5 * np.abs(value).max() or abs(extreme) < STEPS * smallest:
+            continue
+        if np.count_nonzero(value == extreme) >= HELD:
+            return True
+    return False
+
+
+def _needed(response: Array) -> float:
+    """End value of the exponential window: one where every response has died away within its record."""
+    tail = np.abs(response[..., -response.shape[-1] // 20 :]).max(axis=(-1, 1))
+    floor = np.abs(response).max(axis=(-1, 1))
+    return 1.0 if bool(np.all(tail <= DECAYED * floor)) else ENDS_AT
+
+
+def _band(force: Array, step: float) -> tuple[float, float]:
+    """From the second line to where the hammer's force has fallen to `REACH`, at most 0.4 of the sampling rate."""
+    spectrum = np.sqrt(np.mean(np.abs(np.fft.rfft(force[0])) ** 2, axis=0))
+    frequency = np.fft.rfftfreq(force.shape[-1], step)
+    fallen = np.flatnonzero((spectrum < REACH * spectrum.max()) & (np.arange(len(spectrum)) > np.argmax(spectrum)))
+    high = frequency[fallen[0]] if len(fallen) else frequency[-1]
+    return float(frequency[2]), float(min(high, 0.4 / step))
+
+
+def _contact(force: Array, step: float) -> float:
+    """Duration (s) of the hammer's contact."""
+    return float(np.count_nonzero(np.abs(force) > TOUCHING * np.abs(force).max())) * step
+
+
+def in_si(curve: Curve, factor: float) -> Curve:
+    """A curve with its values times `factor`, its standard errors too."""
+    return replace(curve, value=curve.value * factor, sd=None if curve.sd is None else curve.sd * abs(factor))

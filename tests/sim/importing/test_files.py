@@ -1,0 +1,296 @@
+"""The same FRFs in every form that laboratories export come back as the same campaign."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.made_campaign import FREQUENCY, POINTS, ascii_58, rotor_frf
+from thermospindle.model.errors import BadInput, Unanswered
+from thermospindle.report.verbs.importing import bring
+from thermospindle.sim.campaign.campaign import read_campaign
+from thermospindle.sim.campaign.uff import write_frf
+from thermospindle.sim.importing import units
+from thermospindle.sim.importing.files.labels import role_of
+
+FRF = rotor_frf(noise=0.0005)
+SPINDLE = 'spindle = "hdd_2003"\n'
+HEAD = """
+[[tests]]
+id = "T20"
+temperature_C = 20.0
+speed_rpm = 0.0
+[[points]]
+node = 1
+name = "hub_top0"
+body = "hub"
+position_mm = [12.0, 0.0, 20.0]
+direction = "+Z"
+[[points]]
+node = 3
+name = "hub_side0"
+body = "hub"
+position_mm = [12.5, 0.0, 15.0]
+direction = "-X"
+[[points]]
+node = 6
+name = "seat90"
+body = "seat"
+position_mm = [0.0, 20.0, 0.0]
+direction = "+Z"
+"""
+PAIRS = [(r, q) for r in FRF.response_nodes for q in FRF.reference_nodes]
+
+
+def imported(folder: Path, mapping: str, *files: Path):
+    (folder / "mapping.toml").write_text(SPINDLE + mapping + HEAD)
+    bring(files, mapping=folder / "mapping.toml", out=folder / "campaign")
+    return read_campaign(folder / "campaign").tests[0].frf
+
+
+def table(file: Path, heads: list[str], columns: list[np.ndarray], separator: str = ",", comma: bool = False, above: str = "") -> Path:
+    rows = [separator.join(f"{v:.12g}".replace(".", ",") if comma else f"{v:.12g}" for v in row) for row in np.array(columns).T]
+    file.write_text(above + separator.join(heads) + "\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    return file
+
+
+def columns(form: str, unit: str, value=FRF.value):
+    heads, found = [], []
+    for (r, q), h in zip(PAIRS, value.reshape(len(PAIRS), -1), strict=True):
+        parts = {
+            "real": lambda h: [("real", h.real), ("imag", h.imag)],
+            "phase": lambda h: [("mag", np.abs(h)), ("phase [deg]", np.degrees(np.angle(h)))],
+            "decibel": lambda h: [("dB", 20 * np.log10(np.abs(h))), ("phase [rad]", np.angle(h))],
+        }[form](h)
+        for name, v in parts:
+            heads.append(f"H({r},{q}) {name}" + ("" if "[" in name else f" [{unit}]"))
+            found.append(v)
+    return heads, found
+
+
+@pytest.mark.parametrize("form", ["real", "phase", "decibel"])
+@pytest.mark.parametrize(("separator", "comma"), [(",", False), (";", True), ("\t", True), (";", False)], ids=["comma", "german", "tab", "semicolon"])
+def test_text_tables(tmp_path, form, separator, comma):
+    """Real and imaginary, magnitude and phase, decibel; comma, semicolon and tab; decimal comma."""
+    heads, found = columns(form, "(m/s)/N")
+    file = table(tmp_path / "T20.csv", ["Frequency [Hz]", *heads], [FREQUENCY, *found], separator, comma)
+    frf = imported(tmp_path, "", file)
+    assert frf.response_nodes == FRF.response_nodes
+    assert frf.reference_nodes == FRF.reference_nodes
+    np.testing.assert_allclose(frf.frequency, FREQUENCY)
+    np.testing.assert_allclose(frf.value, FRF.value, rtol=1e-8, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("unit", "quantity", "factor"),
+    [("g/N", "accelerance", 9.80665), ("(mm/s²)/N", "accelerance", 1e-3), ("um/N", "receptance", 1e-6), ("(mm/s)/lbf", "mobility", 1e-3 / 4.4482216152605)],
+)
+def test_units_and_quantities(tmp_path, unit, quantity, factor):
+    """The same structure in another quantity and unit: V = i w X, and units by their definitions."""
+    power = {"receptance": -1, "mobility": 0, "accelerance": 1}[quantity]
+    value = FRF.value * (2j * np.pi * FREQUENCY) ** power / factor
+    heads, found = columns("real", unit, value)
+    frf = imported(tmp_path, 'quantity = "mobility"\n', table(tmp_path / "T20.csv", ["f (Hz)", *heads], [FREQUENCY, *found]))
+    np.testing.assert_allclose(frf.value, FRF.value, rtol=1e-8, atol=1e-12)
+
+
+def test_arrays_of_numpy_and_matlab(tmp_path):
+    """.npz, .mat of version 5 with a structure, and HDF5 as MATLAB 7.3 writes it, its axes reversed."""
+    import h5py
+    from scipy.io import savemat
+
+    lists = {"response_nodes": FRF.response_nodes, "reference_nodes": FRF.reference_nodes}
+    np.savez(tmp_path / "T20.npz", frequency=FREQUENCY, H=FRF.value, **lists)
+    savemat(tmp_path / "T20.mat", {"lab": {"frequency": FREQUENCY, "FRF": np.moveaxis(FRF.value, 2, 0), **{k: np.array(v) for k, v in lists.items()}}})
+    (tmp_path / "73").mkdir()
+    with h5py.File(tmp_path / "73" / "T20.mat", "w") as file:
+        file["frequency"] = FREQUENCY[:, None]
+        stored = np.zeros(FRF.value.T.shape, [("real", "f8"), ("imag", "f8")])
+        stored["real"], stored["imag"] = FRF.value.T.real, FRF.value.T.imag
+        file["H"] = stored
+        for key, nodes in lists.items():
+            file[key] = np.array(nodes, float)[:, None]
+    for k, file in enumerate((tmp_path / "T20.npz", tmp_path / "T20.mat", tmp_path / "73" / "T20.mat")):
+        (tmp_path / str(k)).mkdir()
+        frf = imported(tmp_path / str(k), '[[files]]\nfile = "T20.*"\nunit = "(m/s)/N"\n', file)
+        np.testing.assert_array_equal(frf.value, FRF.value)
+
+
+def test_a_matlab_file_without_h5py_says_what_to_install(tmp_path, monkeypatch):
+    import sys
+
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    (tmp_path / "a.mat").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(600))
+    with pytest.raises(BadInput, match=r"thermospindle\[hdf5\]"):
+        bring([tmp_path / "a.mat"], out=tmp_path / "c")
+
+
+def test_uff_binary_and_ascii(tmp_path):
+    """Our own 58b, and another program's ASCII in (mm/s)/lbf, where each FRF has a file of its own."""
+    write_frf(tmp_path / "T20.uff", FRF, POINTS, "title", "test")
+    frf = imported(tmp_path, "", tmp_path / "T20.uff")
+    np.testing.assert_array_equal(frf.value, FRF.value)
+    assert frf.coherence is not None
+    (tmp_path / "b").mkdir()
+    (tmp_path / "b" / "a.unv").write_bytes(ascii_58(FREQUENCY, FRF.value[0, 0], 6, True))
+    frf = imported(tmp_path / "b", '[[files]]\nfile = "a.unv"\ntest = "T20"\n', tmp_path / "b" / "a.unv")
+    np.testing.assert_allclose(frf.value[0, 0], FRF.value[0, 0] * 1e-3 / 4.4482216152605, rtol=1e-10)
+
+
+def test_one_frf_a_file(tmp_path):
+    """Roving hammer, a file for each position, told by response and reference."""
+    files, mapping = [], ""
+    for j, q in enumerate(FRF.reference_nodes):
+        files.append(table(tmp_path / f"pos{q}.txt", ["Frequency", "Real", "Imaginary"], [FREQUENCY, FRF.value[0, j].real, FRF.value[0, j].imag], "\t"))
+        mapping += f'[[files]]\nfile = "pos{q}.txt"\nresponse = 1\nreference = "{dict((p.node, p.name) for p in POINTS)[q]}"\nunit = "(m/s)/N"\ntest = "T20"\n'
+    frf = imported(tmp_path, mapping, *files)
+    assert frf.value.shape == (1, 2, len(FREQUENCY))
+    np.testing.assert_allclose(frf.value, FRF.value[:1], rtol=1e-8, atol=1e-12)
+
+
+def test_direction_turned(tmp_path):
+    """A sensor that looks along +X, at a point along -X: the sign is turned."""
+    heads, found = columns("real", "(m/s)/N", FRF.value * np.array([1, -1, 1])[:, None, None])
+    heads = [h.replace("H(3,", "H(3:+X,") for h in heads]
+    frf = imported(tmp_path, "", table(tmp_path / "T20.csv", ["Hz", *heads], [FREQUENCY, *found]))
+    np.testing.assert_allclose(frf.value, FRF.value, rtol=1e-8, atol=1e-12)
+
+
+def test_everything_open_is_asked_at_once(tmp_path):
+    file = table(tmp_path / "lab.csv", ["Frequency", "H(7,8) mag", "H(7,8) phase"], [FREQUENCY, np.abs(FRF.value[0, 0]), np.angle(FRF.value[0, 0])])
+    with pytest.raises(Unanswered) as caught:
+        bring([file], out=tmp_path / "c")
+    text = "\n".join(caught.value.items)
+    for word in ("phase_unit", "temperature_C", "speed_rpm", "spindle"):
+        assert word in text
+    assert not (tmp_path / "c").exists()
+
+
+def test_the_form_is_written_and_filled_in(tmp_path, capsys):
+    """The form of an unknown file, its open answers filled in by search and replace, makes the campaign."""
+    heads, found = columns("real", "(m/s)/N")
+    file = table(tmp_path / "T20.csv", ["Frequency", *heads], [FREQUENCY, *found])
+    mapping = tmp_path / "lab.toml"
+    answer = bring([file], mapping=mapping)
+    assert len(answer.values["open"]) == 4
+    text = mapping.read_text()
+    assert "temperature_C = 20 " in text
+    for old, new in (('spindle = "?"', 'spindle = "hdd_2003"'), ('speed_rpm = "?"', "speed_rpm = 0.0"), ('body = "?"', 'body = "hub"'),
+                     ('["?", "?", "?"]', "[1.0, 2.0, 3.0]"), ('direction = "?"', 'direction = "+Z"')):  # fmt: skip
+        assert old in text
+        text = text.replace(old, new)
+    mapping.write_text(text)
+    bring([file], mapping=mapping, out=tmp_path / "c")
+    assert [p.node for p in read_campaign(tmp_path / "c").points] == [1, 3, 6]
+
+
+def test_points_of_a_scene(tmp_path):
+    from tests.conftest import SCENE
+
+    heads, found = columns("real", "(m/s)/N", FRF.value)
+    file = table(tmp_path / "T20.csv", ["Frequency", *heads], [FREQUENCY, *found])
+    (tmp_path / "m.toml").write_text('[[tests]]\nid = "T20"\ntemperature_C = 20.0\nspeed_rpm = 0.0\n')
+    values = bring([file], mapping=tmp_path / "m.toml", scene=SCENE, out=tmp_path / "c").values
+    assert values["points"] == [{"node": 1, "name": "hub_top0"}, {"node": 3, "name": "hub_side0"}, {"node": 6, "name": "seat90"}]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda v: v.conj(), r"T20.csv .*conjugated.*conjugate = true"),
+        (lambda v: -v, r"negative real part.*as in 3:-Z"),
+        (lambda v: v * np.where(np.arange(301) == 150, 0, 1), r"zero on 1 lines.*band_Hz"),
+        (lambda v: v * np.array([[1, 3], [1, 1], [1, 1]])[:, :, None], r"reciprocity.*another unit, sign or node"),
+    ],
+    ids=["conjugated", "sign", "gap", "reciprocity"],
+)
+def test_what_no_structure_does_is_told_with_the_users_file(tmp_path, change, said):
+    heads, found = columns("real", "(m/s)/N", change(FRF.value))
+    file = table(tmp_path / "T20.csv", ["Frequency", *heads], [FREQUENCY, *found])
+    with pytest.raises(BadInput, match=said):
+        imported(tmp_path, "", file)
+
+
+def test_a_conjugated_export_is_turned_by_one_key(tmp_path):
+    heads, found = columns("real", "(m/s)/N", FRF.value.conj())
+    frf = imported(tmp_path, '[[files]]\nfile = "*.csv"\nconjugate = true\n', table(tmp_path / "T20.csv", ["Frequency", *heads], [FREQUENCY, *found]))
+    np.testing.assert_allclose(frf.value, FRF.value, rtol=1e-8, atol=1e-12)
+
+
+def test_missing_pairs_leave_the_largest_rectangle(tmp_path):
+    heads, found = columns("real", "(m/s)/N")
+    (tmp_path / "mapping.toml").write_text(SPINDLE + HEAD)
+    file = table(tmp_path / "T20.csv", ["Frequency", *heads[:-2]], [FREQUENCY, *found[:-2]])
+    notes = bring([file], mapping=tmp_path / "mapping.toml", out=tmp_path / "c").values["notes"]
+    assert read_campaign(tmp_path / "c").tests[0].frf.value.shape[:2] == (2, 2)
+    assert any("H(6,1) left out" in n for n in notes)
+
+
+def test_lines_of_the_running_speed_are_replaced(tmp_path):
+    """480 rpm = 8 Hz beside lines of 1 Hz: a spike at every eighth line goes, what lies between stays."""
+    frf = rotor_frf(noise=0.0002)
+    spoiled = frf.value.copy()
+    spoiled[:, :, FREQUENCY % 24 == 0] += 0.3 * np.abs(frf.value).max()
+    heads, found = columns("real", "(m/s)/N", spoiled)
+    file = table(tmp_path / "T20.csv", ["Frequency", *heads], [FREQUENCY, *found])
+    (tmp_path / "mapping.toml").write_text(SPINDLE + HEAD.replace("speed_rpm = 0.0", "speed_rpm = 1440.0"))
+    notes = bring([file], mapping=tmp_path / "mapping.toml", out=tmp_path / "c").values["notes"]
+    assert any("multiples of the running speed" in n for n in notes)
+    back = read_campaign(tmp_path / "c").tests[0].frf.value
+    hit = FREQUENCY % 24 == 0
+    assert np.abs(back - frf.value)[:, :, hit].max() < 0.05 * np.abs(frf.value).max()
+    far = np.abs((FREQUENCY + 12) % 24 - 12) > 1.6
+    np.testing.assert_allclose(back[:, :, far], frf.value[:, :, far], rtol=1e-8, atol=1e-12)
+
+
+def test_modes_picked_by_hand(tmp_path):
+    """The easiest start: a frequency a row, damping in percent, a decimal comma."""
+    (tmp_path / "peaks.csv").write_text("test;mode;frequency [Hz];damping %\nT20;1;1002,5;0,5\nT20;2;1545;\n")
+    (tmp_path / "m.toml").write_text('spindle = "hdd_2003"\nfrequency_sd_Hz = 0.5\n[[tests]]\nid = "T20"\ntemperature_C = 20.0\nspeed_rpm = 0.0\n')
+    bring([tmp_path / "peaks.csv"], mapping=tmp_path / "m.toml", out=tmp_path / "c")
+    rows = read_campaign(tmp_path / "c").tests[0].modes
+    assert [(r.mode, r.frequency, r.frequency_sd, r.damping_ratio) for r in rows] == [(1, 1002.5, 0.5, 0.005), (2, 1545.0, 0.5, None)]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "is empty"),
+        ("nothing\nhere\n", "no table of numbers"),
+        ("f,H(1,1) real\n1,2\n2,nan\n3,4\n", "line 3: NaN or infinite"),
+        ("f;H(1,1) real\n1;2\n2\n3;4;5\n4;5\n", "numbers"),
+        ("frequency,mode\n1000,1\nabc,2\n", "line 3: frequency = 'abc': is no number"),
+    ],
+)
+def test_damaged_text_is_one_sentence(tmp_path, text, said):
+    (tmp_path / "a.csv").write_text(text)
+    with pytest.raises(BadInput, match=said):
+        bring([tmp_path / "a.csv"], out=tmp_path / "c")
+    assert not (tmp_path / "c").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [("m/s^2/N", ("accelerance", 1.0)), ("(1/N)*(m/s²)", ("accelerance", 1.0)), ("(m/s²)(N)", ("accelerance", 1.0)), ("1/kg", ("accelerance", 1.0)),
+     ("mm/s/N", ("mobility", 1e-3)), ("µm/kN", ("receptance", 1e-9)), ("N/m", None), ("V/N", None), ("m/s�/N", ("accelerance", 1.0))],
+)  # fmt: skip
+def test_units_of_frfs(text, found):
+    assert units.of_frf(text) == (found if found is None else (found[0], pytest.approx(found[1])))
+
+
+@pytest.mark.parametrize(
+    ("heading", "kind", "part", "ends", "unit"),
+    [
+        ("H(3,1) real [g/N]", "H", "real", ("3", "1"), "g/N"), ("Re H(3:+X, 1)", "H", "real", ("3:+X", "1"), ""), ("FRF(hub, seat) dB", "H", "decibel", ("hub", "seat"), ""),
+        ("Magnitude", "H", "magnitude", ("", ""), ""), ("Coherence(3,1)", "coherence", "", ("3", "1"), ""), ("Frequency (Hz)", "frequency", "", ("", ""), "Hz"),
+        ("force [N]", "force", "", ("", ""), "N"), ("acceleration 3 [g]", "response", "", ("3", ""), "g"), ("Time [s]", "time", "", ("", ""), "s"),
+        ("FRF-2 real", "H", "real", ("FRF-2", ""), ""),
+    ],
+)  # fmt: skip
+def test_headings(heading, kind, part, ends, unit):
+    role = role_of(heading)
+    assert role is not None
+    assert (role.kind, role.part, role.unit) == (kind, part, unit)
+    assert (role.response.label, role.reference.label) == ends

@@ -1,0 +1,113 @@
+"""Raw hammer records: hits found and judged, and FRFs as the exact answer of the model that made them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from thermospindle.report.verbs.importing import bring
+from thermospindle.sim.campaign.campaign import read_campaign
+
+RATE, LENGTH = 8192.0, 1.0
+POLES = 2 * np.pi * np.array([210.0, 640.0]), np.array([0.01, 0.008])
+SHAPES = np.array([[1.0, 0.6], [0.7, -0.9]])  # (points, modes), kg^-1/2
+MAPPING = """
+spindle = "rig"
+[[files]]
+file = "hammer*"
+test = "T20"
+[[tests]]
+id = "T20"
+temperature_C = 20.0
+speed_rpm = 0.0
+[[points]]
+node = 1
+name = "a"
+body = "b"
+position_mm = [0.0, 0.0, 0.0]
+direction = "+Z"
+[[points]]
+node = 2
+name = "c"
+body = "b"
+position_mm = [1.0, 0.0, 0.0]
+direction = "+Z"
+"""
+
+
+def exact(frequency, decay=0.0):
+    """Mobility (2, 2, n) at i w + decay."""
+    s = 2j * np.pi * frequency + decay
+    w, z = POLES
+    return np.einsum("rm,qm,mn->rqn", SHAPES, SHAPES, s / (s**2 + 2 * (z * w)[:, None] * s + w[:, None] ** 2))
+
+
+def hit(random, doubled=False):
+    """Force (n,) of one hit of 0.6 ms at 50 ms, and the velocities (2, n) it makes, by discrete convolution with the exact impulse response."""
+    n, start = round(RATE * LENGTH), round(0.05 * RATE)
+    t = np.arange(n) / RATE
+    width = 6e-4 * random.uniform(0.9, 1.1)
+    peak = random.uniform(60, 100)
+    force = peak * np.where((t > t[start]) & (t < t[start] + width), np.sin(np.pi * (t - t[start]) / width), 0.0)
+    if doubled:
+        force += 0.4 * np.roll(force, round(0.01 * RATE))
+    w, z = POLES
+    damped = w * np.sqrt(1 - z**2)
+    padded = np.fft.rfftfreq(4 * n, 1 / RATE)
+    del damped
+    shift = 12.0  # evaluated off the axis, so that the answer has died away within the padded record
+    answer = np.fft.irfft(np.fft.rfft(force * np.exp(-shift * t), 4 * n) * exact(padded, shift), 4 * n)[..., :n] * np.exp(shift * t)
+    return force, answer  # (n,), (2 responses, 2 references, n)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Six hits on each point, one record a point; of point 1 the second hit is double and the third is clipped."""
+    folder = tmp_path_factory.mktemp("records")
+    random = np.random.default_rng(3)
+    for q in (0, 1):
+        forces, answers = [], []
+        for k in range(6):
+            force, answer = hit(random, doubled=q == 0 and k == 1)
+            own = 1e3 * answer[:, q] + 2e-3 * random.standard_normal((2, len(force)))
+            if q == 0 and k == 2:
+                own[1] = np.clip(own[1], -0.6 * own[1].max(), 0.6 * own[1].max())
+            forces.append(force + 0.01 * random.standard_normal(len(force)))
+            answers.append(own)
+        force, answer = np.concatenate(forces), np.concatenate(answers, axis=1)
+        head = f"Time [s],force {q + 1} [N],velocity 1 [mm/s],velocity 2 [mm/s]"
+        np.savetxt(folder / f"hammer{q + 1}.csv", np.c_[np.arange(len(force)) / RATE, force, answer.T], delimiter=",", header=head, comments="", fmt="%.9g")
+    return folder
+
+
+@pytest.mark.parametrize("estimator", ["H1", "H2", "Hv"])
+def test_hits_are_found_judged_and_averaged(folder, tmp_path, estimator):
+    (tmp_path / "m.toml").write_text(MAPPING + f'[records]\nestimator = "{estimator}"\nband_Hz = [50.0, 1000.0]\n')
+    answer = bring([folder / "hammer1.csv", folder / "hammer2.csv"], mapping=tmp_path / "m.toml", out=tmp_path / "c")
+    notes = "\n".join(answer.values["notes"])
+    assert "hammer1.csv: hit 2: left out, double hit: 40% of the first pulse, 10 ms after it" in notes
+    assert "hammer1.csv: hit 3: left out, overload" in notes
+    assert "4 of 6 hits" in notes
+    assert "6 of 6 hits" in notes
+    test = read_campaign(tmp_path / "c").tests[0]
+    frf = test.frf
+    model = exact(frf.frequency, test.window_decay)
+    assert np.abs(frf.value - model).max() < 3e-3 * np.abs(model).max()
+    assert np.median(frf.coherence) > 0.98
+    assert test.window_decay > 1
+    if estimator == "H1":  # what standard errors say comes true, within the bias of a force cut to its window
+        ratio = np.abs(frf.value - model) / frf.sd
+        assert 0.4 < np.sqrt(np.mean(ratio**2)) < 3
+
+
+def test_a_hit_a_row_and_no_hit(tmp_path):
+    random = np.random.default_rng(5)
+    force, answer = zip(*(hit(random) for _ in range(4)), strict=True)
+    np.savez(tmp_path / "hammer1.npz", fs=RATE, force=np.array(force), velocity1=np.array(answer)[:, 0, 0], velocity2=np.array(answer)[:, 1, 0])
+    told = MAPPING.replace('test = "T20"', 'test = "T20"\nreference = 1\ncolumns = { force = "force [N]", velocity1 = "velocity 1 [m/s]", velocity2 = "velocity 2 [m/s]" }', 1)
+    (tmp_path / "m.toml").write_text(told + "[records]\nband_Hz = [50.0, 1000.0]\n")
+    answer = bring([tmp_path / "hammer1.npz"], mapping=tmp_path / "m.toml", out=tmp_path / "c")
+    assert "4 of 4 hits" in "\n".join(answer.values["notes"])
+    test = read_campaign(tmp_path / "c").tests[0]
+    model = exact(test.frf.frequency, test.window_decay)[:, :1]
+    assert np.abs(test.frf.value - model).max() < 1e-3 * np.abs(model).max()
