@@ -1,21 +1,20 @@
 """Measurement against model: compare, see where the model fails, learn which effect is missing.
 
 ============  ====================================================================================================
-data/         a campaign as mode tables with covariances: what the diagnosis takes as data
-prediction/   the same numbers predicted: spindle, tolerances, effects -> frequencies, damping, shapes of every test
-fit/          nuisance parameters and effects fitted, and the evidence
+data/         a campaign as FRF lines, or mode tables with covariances: what the diagnosis takes as data
+prediction/   the modes that a model predicts, and which of them the measured ones are
 inference/    mechanisms and free forms fitted to FRFs or mode tables together, and the evidence for each
-search/       where a fit of an effect starts, and what became of what was predicted
 misfit/       what a drift goes with: temperature, speed or level
 compare/      modes paired through all conditions; errors, MAC, FRAC, COMAC
 ladder/       model forms, tolerances, effects one after the other, and the error at every step
 runout/       the same for tests of the turning spindle
 verdict       `spindle diagnose`
+line_fit      toleranced parameters fitted to the lines of one test, for scripts
 draft         an effect of one's own from what drifts, by the simplest law of physics that fits
 add           a scene with more effects and the tolerances fitted beside them
 ============  ====================================================================================================
 
-Pull: (computed - measured) / standard error, where the standard error holds repeat scatter, estimator error and the model's own
-numerical floor; in `compare` also the error of the test's temperature. Features are logarithms: ln frequency, ln damping ratio, ln of
-shape ratios; errors in them are relative.
+Residual: (computed - measured) / standard error (JSON keys call it `pull`). In `compare` that error holds the scatter of repeats, the
+identification's error, the model's own numerical floor and the error of the test's temperature; FRF lines and mode tables in
+`inference` and `ladder` have their errors as stated or seen.
 """

@@ -13,7 +13,7 @@ from thermospindle.diagnosis.data.mode_table import mode_data
 from thermospindle.diagnosis.data.observe import condition_of
 from thermospindle.diagnosis.inference.freeform import free_forms
 from thermospindle.diagnosis.inference.mechanism import variants
-from thermospindle.diagnosis.inference.model import TestData, campaign_model, expected_noise
+from thermospindle.diagnosis.inference.model import CampaignModel, TestData, campaign_model, expected_noise
 from thermospindle.diagnosis.inference.next_test import NextTest, next_tests
 from thermospindle.diagnosis.inference.search import Hypothesis, Search, search
 from thermospindle.diagnosis.inference.verdict import Verdict, decide
@@ -58,9 +58,7 @@ def diagnose(
     spindle: Spindle, campaign: Campaign, catalogue: tuple[Effect, ...] = CATALOGUE, progress: Callable[[str], None] = lambda done: None
 ) -> Diagnosis:
     """Which effect of the catalogue explains a campaign's FRFs or mode tables, or what would have to drift where none does."""
-    noise = expected_noise(spindle)
-    data = in_parallel(partial(_data, campaign.noise, noise), campaign.tests, done=lambda d: progress(f"{d.test.id} read"))
-    model = campaign_model(spindle, campaign, data)
+    model = campaign_data(spindle, campaign, progress)
     present = {e.name for e, _ in of_scene(spindle)}
     named = [v for e in usable(spindle, catalogue) if e.name not in present for v in variants(e)]
     found = search(model, named, free_forms(spindle), progress)
@@ -69,6 +67,13 @@ def diagnose(
     tests = tuple(next_tests(found, verdict)) if verdict.word != "none" else ()
     progress("next tests weighed")
     return Diagnosis(spindle, campaign, found, verdict, drifts, tests)
+
+
+def campaign_data(spindle: Spindle, campaign: Campaign, progress: Callable[[str], None] = lambda done: None) -> CampaignModel:
+    """The model of a campaign beside the data of all its tests."""
+    noise = expected_noise(spindle)
+    data = in_parallel(partial(_data, campaign.noise, noise), campaign.tests, done=lambda d: progress(f"{d.test.id} read"))
+    return campaign_model(spindle, campaign, data)
 
 
 def _data(stated: Noise | None, expected: Noise, test: Test) -> TestData:

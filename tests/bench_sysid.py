@@ -3,7 +3,7 @@
 A spindle whose parameter is `TRUE` above its drawing is hit once at each hammer node and measured with the scene's noise. Both start
 from the drawing, know everything else, and get the same records, the same band and the same noise. The toolbox simulates the records
 with trial values until the response agrees; this program estimates the FRFs and fits the parameter to their lines
-(`diagnosis.fit.lines`). The toolbox has every advantage that the comparison allows: records and trial simulations come from one model with one
+(`diagnosis.line_fit`). The toolbox has every advantage that the comparison allows: records and trial simulations come from one model with one
 step (no error of the model at all), its residuals are whitened with the noise that was put in, a compiled model comes from our own chain
 within milliseconds, and it stops at `ENOUGH`, below its standard error.
 """
@@ -22,7 +22,7 @@ import mujoco
 import numpy as np
 from mujoco import sysid
 
-from thermospindle.diagnosis.fit.lines import fit_lines
+from thermospindle.diagnosis.line_fit import fit_lines
 from thermospindle.model.machine import Condition, HammerTest, Spindle
 from thermospindle.model.scene.reading import load
 from thermospindle.model.tolerance import Toleranced, toleranced

@@ -16,12 +16,12 @@ import numpy as np
 
 from thermospindle.diagnosis.compare.correlation import Correlation, comac, correlate, frac, likeness
 from thermospindle.diagnosis.data.observe import Observation, observe
-from thermospindle.diagnosis.data.thermometer import squares, temperature_slope, with_temperature
+from thermospindle.diagnosis.prediction.modes import Predicted, predict
 from thermospindle.diagnosis.prediction.partners import BELIEVABLE, crossings, expected_shapes, group, numbered, partners
-from thermospindle.diagnosis.prediction.theory import Predicted, predict
+from thermospindle.diagnosis.prediction.temperature import squares, temperature_slope, with_temperature
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition, Spindle
-from thermospindle.model.types import Array, ComplexArray
+from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.campaign.beside import beside, measured_at
 from thermospindle.sim.campaign.campaign import Campaign, Test
 from thermospindle.sim.effects import of_scene
@@ -146,13 +146,13 @@ def _as_measured(spindle: Spindle, campaign: Campaign, o: Observation) -> Predic
     return found if o.shape is None else replace(found, shape=found.shape[:, : o.shape.shape[1]])
 
 
-def _at_its_temperature(spindle: Spindle, campaign: Campaign, o: Observation, p: Predicted, partner: Array) -> Observation:
+def _at_its_temperature(spindle: Spindle, campaign: Campaign, o: Observation, p: Predicted, partner: Integers) -> Observation:
     """The observation with the error of its temperature among its errors."""
     slope = temperature_slope(measured_at(spindle, campaign.points, o.test.frf), o, p, of_scene(spindle)).reshape(2, -1)
     return with_temperature(o, np.where(partner >= 0, slope[:, partner], 0.0).ravel(), spindle.tolerances.temperature)
 
 
-def _repeat_variance(observed: Sequence[Observation], chosen: Sequence[Array], numbers: Sequence[Mapping[int, int]]) -> list[Array]:
+def _repeat_variance(observed: Sequence[Observation], chosen: Sequence[Integers], numbers: Sequence[Mapping[int, int]]) -> list[Array]:
     """For every test, variance (2m,) of ln frequency and ln damping that repeats show beyond the errors of single tests.
 
     Pooled over all conditions that were repeated, mode by mode, with their degrees of freedom: two repeats alone tell little. It
@@ -186,7 +186,7 @@ def _excess(observed: Sequence[Observation], places: Sequence[tuple[int, int]]) 
 
 
 def _test(
-    spindle: Spindle, campaign: Campaign, o: Observation, p: Predicted, partner: Array, number: Mapping[int, int], extra: Array
+    spindle: Spindle, campaign: Campaign, o: Observation, p: Predicted, partner: Integers, number: Mapping[int, int], extra: Array
 ) -> TestComparison:
     m = len(o.frequency)
     relative = np.sqrt(np.diag(o.covariance) + extra)

@@ -8,20 +8,18 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.parallel import in_parallel
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.campaign.campaign import Campaign, Noise, Test
-from thermospindle.sim.identification.modal import extract, mac, noise_model
+from thermospindle.sim.identification.modal import extract, noise_model
+from thermospindle.sim.identification.pairing import REPEATED, ModeSet, pairs
 
 FREQUENCY_FLOOR = 3e-5  # relative: finite elements and bearing equilibrium of the model itself
 DAMPING_FLOOR = 3e-3  # relative
 SHAPE_FLOOR = 3e-3  # relative, of a shape ratio
 UNCERTAIN = 3e-3  # relative error of a frequency from which a pole says nothing
-SAME = 0.3  # ln frequency within which two tests may show the same mode
-ALIKE = 0.3  # MAC above which they do
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +42,16 @@ class Observation:
     residue: ComplexArray | None
     residue_sd: Array | None
     kind: tuple[str, ...] | None
+
+    @property
+    def modes(self) -> ModeSet:
+        """For pairing."""
+        return ModeSet(self.frequency, self.shape, self.kind or ())
+
+    @property
+    def channels(self) -> int | None:
+        """How many points the shapes have, None without shapes."""
+        return None if self.shape is None else self.shape.shape[1]
 
 
 def observe(
@@ -70,15 +78,12 @@ def _repeated(o: Observation, others: list[Observation]) -> Observation:
 
     Less than three tests with shapes are taken as they are.
     """
-    shapes = [(other.frequency, other.shape) for other in others if other.shape is not None]
-    if o.shape is None or len(shapes) < 2:
+    shown = [other.modes for other in others if other.shape is not None]
+    if o.shape is None or len(shown) < 2:
         return o
     again = np.zeros(len(o.frequency), bool)
-    for frequency, shape in shapes:
-        alike = mac(o.shape, shape)
-        like = (np.abs(np.log(o.frequency[:, None] / frequency)) < SAME) & (alike > ALIKE)
-        rows, columns = linear_sum_assignment(np.where(like, 1 - alike, len(like)))
-        again[rows] |= like[rows, columns]
+    for modes in shown:
+        again[pairs(o.modes, modes, REPEATED)[:, 0]] = True
     return _only(o, again)
 
 

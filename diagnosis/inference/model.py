@@ -195,6 +195,12 @@ class CampaignModel:
             return _mode_residual(data, self.linear(t, x, effects))
         return self._whitened(t, _Response(self.linear(t, x, effects), data, self._gain(t, x)).value, data.value)
 
+    def response(self, t: int, x: Array, effects: Applied, frequency: Array) -> ComplexArray:
+        """FRFs (n_resp, n_ref, n) of test `t`, one of FRF lines, at other frequencies (n,) Hz."""
+        data = self.tests[t]
+        assert isinstance(data, LineData)
+        return _Response(self.linear(t, x, effects), replace(data, frequency=frequency), self._gain(t, x)).value
+
     def _gain(self, t: int, x: Array) -> Array:
         number, channel = self._gains[t]
         gain = np.zeros(self.channels)

@@ -13,7 +13,6 @@ physics that a spindle could have: they stand here and not there. Applied after 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import Any
 
 import numpy as np
 
@@ -84,7 +83,6 @@ FIXED_STIFFNESS = Effect(
     resembles=("constant_force_preload", "soak_lag", "radial_expansion"),
     valid="for comparison with the literature: no spindle with parts of different expansion does this",
     motions=_at_reference,
-    form_error=0.0,  # it is what it says
 )
 
 RADIAL_EXPANSION = Effect(
@@ -100,22 +98,7 @@ RADIAL_EXPANSION = Effect(
     resembles=("expansion_mismatch", "clearance_opening", "preload_loss"),
     valid="for comparison with the literature: a hub that only the bearings hold cannot stay where their forces do not balance",
     pair=_held_axially,
-    form_error=0.0,
 )
 
 FORMS = (Form("fixed stiffness", (FIXED_STIFFNESS,)), Form("radial expansion only", (RADIAL_EXPANSION,)), Form("axial equilibrium", ()))
 """In the order in which the literature took them in."""
-
-
-def pinned(effect: Effect, values: Values) -> Effect:
-    """The effect at fixed `values`, for a fit in which it is not to be free.
-
-    A fit asks every effect for a parameter: this one's moves nothing, so it changes neither misfit nor evidence.
-    """
-
-    def fixed(hook: Any) -> Any:
-        return None if hook is None else lambda spindle, condition, _, *state: hook(spindle, condition, values, *state)
-
-    hooks = {f.name: fixed(getattr(effect, f.name)) for f in fields(Effect) if "Callable" in str(f.type)}
-    nothing = Parameter("pinned", "1", 0.0, 0.0, 1.0, (-1.0, 1.0), "moves nothing", "none: the effect's own values are fixed")
-    return replace(effect, parameters=(nothing,), **hooks)

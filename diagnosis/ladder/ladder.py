@@ -1,79 +1,75 @@
 """The ladder: model forms and effects taken in one after the other, and the error at every step.
 
-The first three rungs are the model forms of the literature (`diagnosis.ladder.forms`) on the spindle as drawn, nothing fitted. Then the build
-tolerances are fitted, then effects join, everything fitted anew with each. Whoever adds an effect that the data do not ask for sees
-that the error stays where it was and the evidence falls.
+The first three steps are the model forms of the literature (`diagnosis.ladder.forms`) on the spindle as drawn, nothing fitted. Then the build
+tolerances are fitted, with the measuring errors; then what the model misses at all conditions alike, its constant discrepancy, is
+learned; then effects join, everything fitted anew with each. Whoever adds an effect that the data do not ask for sees that the error stays
+where it was and the evidence falls. Where effects are not chosen by hand they are those that `diagnose` names.
 
-Where effects are not chosen by hand they are those that `diagnose` names. The rungs have fits of their own, of modes instead of whole FRFs:
-in their evidence an effect's formula may be wrong by its `form_error`; errors are those of the fit that takes the formulas at their word,
-what they can do at best.
+Every fit is that of `diagnosis.inference`; the error of a temperature left out is that of a fit which never saw it
+(`diagnosis.ladder.fitting`).
 """
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-from thermospindle.diagnosis.data.features import data_of
+from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.observe import observe
-from thermospindle.diagnosis.fit.fit import Fit, fit, linearise
-from thermospindle.diagnosis.fit.held_out import held_out
+from thermospindle.diagnosis.inference.model import CampaignModel, TestData
 from thermospindle.diagnosis.inference.next_test import NextTest
-from thermospindle.diagnosis.inference.verdict import Candidate, Verdict
-from thermospindle.diagnosis.ladder.forms import FORMS, pinned
-from thermospindle.diagnosis.ladder.rung import Both, Rung, as_drawn, fitted, mode_numbers
-from thermospindle.diagnosis.prediction.theory import Theory, theory
-from thermospindle.diagnosis.search.screening import screen, starts
-from thermospindle.diagnosis.verdict import Diagnosis, diagnose
-from thermospindle.model.errors import BadInput, NoEquilibrium
+from thermospindle.diagnosis.inference.verdict import SPREAD, Candidate, Verdict
+from thermospindle.diagnosis.ladder.fitting import CONSTANT, FREE, Settled, predicted_squares, settled, unseen, without
+from thermospindle.diagnosis.ladder.forms import FORMS
+from thermospindle.diagnosis.ladder.step import MeasuredModes, Step, as_drawn, fitted, measured_modes
+from thermospindle.diagnosis.verdict import Diagnosis, campaign_data, diagnose
+from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Spindle
-from thermospindle.model.types import Array
+from thermospindle.model.parallel import in_parallel
 from thermospindle.sim.campaign.campaign import Campaign
 from thermospindle.sim.effects import CATALOGUE, of_scene
 from thermospindle.sim.effects.effect import Effect
 
+CLEAR = 12.0  # ln evidence by which a step must lead the one below it
 NEAREST = 3  # explanations shown where none is accepted
-TOLERANCES = "tolerances fitted"
-SMALL = 0.2  # of an effect's typical size: start of a fit that goes on from the rung below
+TOLERANCES, DISCREPANCY = "tolerances fitted", "constant discrepancy"
 
-Step = tuple[str, tuple[Effect, ...], str]
-"""Name of a rung, the effects added to what stands, and the name of the rung it is added to."""
+Asked = tuple[str, tuple[Effect, ...], str]
+"""Name of a step, the effects added to what stands, and the name of the step it is added to."""
 
 
 @dataclass(frozen=True, eq=False)
 class Ladder:
-    """Rungs in the order in which they were climbed.
+    """Steps in the order in which they were climbed, and the modes that were measured.
 
-    `mode` (n,) is the number of the mode that each feature is of, 0 without a computed partner; `kinds` by number. `forms`: every
-    model form with all tolerances free: (name, error, held-out error, evidence). `diagnosis` and its next `tests` where effects were
-    not chosen by hand.
+    `forms`: every model form with all tolerances and the constant discrepancy free: (name, error, held-out error, evidence), the held-out
+    error NaN for the earlier forms beside FRF lines. `diagnosis` and its next `tests` where effects were not chosen by hand.
     """
 
     spindle: Spindle
     campaign: Campaign
-    theory: Theory
-    rungs: tuple[Rung, ...]
-    mode: np.ndarray
-    kinds: Mapping[int, str]
+    model: CampaignModel
+    measured: MeasuredModes
+    steps: tuple[Step, ...]
     forms: tuple[tuple[str, float, float, float], ...]
     diagnosis: Diagnosis | None
     tests: tuple[NextTest, ...]
 
-    def rung(self, name: str) -> Rung:
-        return next(r for r in self.rungs if r.name == name)
+    def step(self, name: str) -> Step:
+        return next(s for s in self.steps if s.name == name)
 
     @property
-    def top(self) -> Rung:
-        """Where the ladder leads: the last rung, the best of alternatives, or fitted tolerances where no effect is accepted."""
+    def top(self) -> Step:
+        """Where the ladder leads: the last step, the best of alternatives, or that without effects where none is accepted."""
         word = "" if self.diagnosis is None else self.diagnosis.verdict.word
         if word in ("none", "unexplained"):
-            return self.rung(TOLERANCES)
+            return self.step(DISCREPANCY)
         if word == "ambiguous":
-            return max((r for r in self.rungs if r.fitted), key=lambda r: r.evidence)
-        return self.rungs[-1]
+            return max((s for s in self.steps if s.fitted), key=lambda s: s.evidence)
+        return self.steps[-1]
 
 
 def ladder(
@@ -81,70 +77,113 @@ def ladder(
     campaign: Campaign,
     chosen: Sequence[Effect] | None = None,
     catalogue: tuple[Effect, ...] = CATALOGUE,
-    seen: Callable[[Rung], None] = lambda rung: None,
+    seen: Callable[[Step], None] = lambda step: None,
     progress: Callable[[str], None] = lambda done: None,
 ) -> Ladder:
     """Climb from fixed stiffness to `chosen` effects, one on top of the other, or to those that the diagnosis names.
 
-    `seen` is told every rung when it is done. Raises `BadInput` for an effect named twice or in the scene already.
+    `seen` is told every step when it is done. Raises `BadInput` for an effect named twice or in the scene already.
     """
     own = [e.name for e, _ in of_scene(spindle)]
     _check(chosen or (), own, spindle)
-    about = theory(spindle, data_of(observe(campaign, spindle, progress, os.cpu_count() or 1)))
-    rungs: list[Rung] = []
+    model = without(campaign_data(spindle, campaign, progress), FREE)
+    plain = without(model, CONSTANT)
+    measured = measured_modes(model, observe(campaign, spindle, progress))
+    steps: list[Step] = []
 
-    def climbed(rung: Rung) -> None:
-        rungs.append(rung)
-        seen(rung)
+    def climbed(step: Step) -> None:
+        steps.append(step)
+        seen(step)
 
     for form in FORMS:
-        climbed(as_drawn(about, form.name, form.applied, rungs[-1].name if rungs else ""))
+        climbed(as_drawn(plain, measured, form.name, form.applied, steps[-1].name if steps else ""))
     progress("fitting the tolerances")
-    slopes = linearise(about)
-    below = rungs[-1].name
-    found = {TOLERANCES: _both(about, slopes, [fit(about, slopes)])}
-    climbed(fitted(about, TOLERANCES, found[TOLERANCES], below))
+    climbed(fits(plain).step(measured, TOLERANCES, steps[-1].name))
+    progress("fitting what the model misses at all conditions alike")
+    found = {DISCREPANCY: fits(model)}
+    climbed(found[DISCREPANCY].step(measured, DISCREPANCY, TOLERANCES))
     named: Diagnosis | None = None
     if chosen is None:
         progress("looking for the effects that are missing")
         named = diagnose(spindle, campaign, catalogue, progress)
-        steps = named_by(named.verdict)
+        asked = named_by(named.verdict)
     else:
-        names = [TOLERANCES, *(f"+ {e.name}" for e in chosen)]
-        steps = [(name, (e,), under) for name, e, under in zip(names[1:], chosen, names, strict=False)]
-    for name, effects, under in steps:
-        best = found[under]
-        for effect in effects:
-            progress(f"fitting {effect.name}")
-            best = added(about, slopes, best, effect)
-        found[name] = best
-        climbed(fitted(about, name, best, under))
-    mode, kinds = mode_numbers(about)
+        names = [DISCREPANCY, *(f"+ {e.name}" for e in chosen)]
+        asked = [(name, (e,), under) for name, e, under in zip(names[1:], chosen, names, strict=False)]
+    for name, effects, under in asked:
+        progress(f"fitting {' and '.join(e.name for e in effects)}")
+        found[name] = fits(model, found[under], effects)
+        climbed(found[name].step(measured, name, under))
     progress("fitting the tolerances of the other model forms")
-    free = [fit(about, slopes, [pinned(e, v) for e, v in form.applied]) for form in FORMS[:-1]]
-    forms = tuple(_told(about, form.name, best) for form, best in zip(FORMS, [*free, found[TOLERANCES][0]], strict=True))
-    return Ladder(spindle, campaign, about, tuple(rungs), mode, kinds, forms, named, named.tests if named else ())
+    lines = any(isinstance(d, LineData) for d in model.tests)  # each such fit takes minutes, to predict by a form that nobody defends
+    free = [fits(replace(model, present=(*model.present, *form.applied)), leave_out=not lines) for form in FORMS[:-1]]
+    forms = tuple((form.name, *own.errors()) for form, own in zip(FORMS, [*free, found[DISCREPANCY]], strict=True))
+    return Ladder(spindle, campaign, model, measured, tuple(steps), forms, named, named.tests if named else ())
+
+
+@dataclass(frozen=True, eq=False)
+class Fits:
+    """One model fitted to `whole`, all tests, and to all but each group of them: `partial`, with squares and number of the residuals that each of
+    these fits predicts its group with."""
+
+    whole: Settled
+    partial: tuple[tuple[Settled, float, int], ...]
+
+    def errors(self) -> tuple[float, float, float]:
+        """Rms residual of all data, of those left out (NaN where nothing can be), and ln evidence."""
+        squares, count = sum(row[1] for row in self.partial), sum(row[2] for row in self.partial)
+        fit = self.whole.fit
+        return float(np.sqrt(fit.chi2 / fit.count)), float(np.sqrt(squares / count)) if count else float("nan"), self.whole.evidence.ln
+
+    def step(self, measured: MeasuredModes, name: str, above: str) -> Step:
+        return fitted(self.whole, measured, name, self.errors()[1], above)
+
+
+def fits(model: CampaignModel, below: Fits | None = None, effects: Sequence[Effect] = (), leave_out: bool = True) -> Fits:
+    """All fits of a model with `effects` beside those of the step `below`; only that to all tests where nothing is to be left out."""
+    groups: list[list[int]] = [[], *(conditions(model.spindle, model.tests) if leave_out else [])]
+    before = [None] * len(groups) if below is None else [below.whole, *(row[0] for row in below.partial)]
+    (whole, _, _), *rest = in_parallel(partial(_fitted, model, tuple(effects)), list(zip(groups, before, strict=True)))
+    return Fits(whole, tuple(rest))
+
+
+def _fitted(model: CampaignModel, effects: tuple[Effect, ...], task: tuple[Sequence[int], Settled | None]) -> tuple[Settled, float, int]:
+    """The model fitted without a group of tests, and squares and number of the residuals that it predicts them with."""
+    group, below = task
+    found = settled(unseen(model, group), below, effects)
+    squares, count = predicted_squares(found, model.tests, group) if group else (0.0, 0)
+    return found, squares, count
+
+
+def conditions(spindle: Spindle, tests: Sequence[TestData]) -> list[list[int]]:
+    """Numbers of the tests of every temperature, those within the thermometer's own scatter together; test by test where all are of
+    one, and none of a single test."""
+    temperature = np.array([d.condition.temperature for d in tests])
+    order = np.argsort(temperature, kind="stable")
+    apart = np.diff(temperature[order]) > SPREAD * spindle.tolerances.temperature
+    groups = [group.tolist() for group in np.split(order, np.flatnonzero(apart if apart.any() else ~apart) + 1)]
+    return groups if len(groups) > 1 else []
 
 
 def _check(chosen: Sequence[Effect], present: Sequence[str], spindle: Spindle) -> None:
     names = [e.name for e in chosen]
     for name in names:
         if names.count(name) > 1:
-            raise BadInput(f"--effects {name}: is named twice; each effect stands on one rung")
+            raise BadInput(f"--effects {name}: is named twice; each effect is one step")
         if name in present:
-            raise BadInput(f"--effects {name}: is in scene {spindle.name} already; its own effects are on every rung")
+            raise BadInput(f"--effects {name}: is in scene {spindle.name} already; its own effects are on every step")
 
 
-def named_by(found: Verdict) -> list[Step]:
-    """The rungs that a verdict asks for: one effect or two on top of each other, or alternatives beside each other."""
+def named_by(found: Verdict) -> list[Asked]:
+    """The steps that a verdict asks for: one effect or two on top of each other, or alternatives beside each other."""
     if found.word == "none" or not found.candidates:
         return []
     if found.word in ("unexplained", "ambiguous"):
         word, rivals = ("nearest:", found.candidates[:NEAREST]) if found.word == "unexplained" else ("or", _alternatives(found))
-        return [(f"{word} {' + '.join(c.names)}", _effects(c), TOLERANCES) for c in rivals]
+        return [(f"{word} {' + '.join(c.names)}", _effects(c), DISCREPANCY) for c in rivals]
     best = next(c for c in found.candidates if set(c.names) == set(found.effects))
     alone = {c.names[0]: c.delta_evidence for c in found.candidates if len(c.names) == 1}
-    steps, below = list[Step](), TOLERANCES
+    steps, below = list[Asked](), DISCREPANCY
     for effect in sorted(_effects(best), key=lambda e: -alone.get(e.name, -np.inf)):
         steps.append((f"+ {effect.name}", (effect,), below))
         below = steps[-1][0]
@@ -163,41 +202,3 @@ def _alternatives(found: Verdict) -> list[Candidate]:
 
 def _effects(candidate: Candidate) -> tuple[Effect, ...]:
     return tuple(m.effect for m in candidate.hypothesis.mechanisms)
-
-
-def added(about: Theory, slopes: Array, below: Both, effect: Effect) -> Both:
-    """The fit `below` with one effect more, everything free: from the sizes that screening expects, and from a small size upwards."""
-    granted = below[0]
-    before = _values(granted)
-    effects = (*granted.effects, effect)
-    main = effect.parameters[0]
-    small = [main.neutral + SMALL * (main.typical - main.neutral), *effect.typical_list()[1:]]
-    fits = [fit(about, slopes, effects, [*before, *small], True, granted.nuisance)]
-    rough = []
-    for signature in screen(about, granted, (effect,), SMALL):
-        for start in starts(signature):
-            try:
-                rough.append(fit(about, slopes, effects, [*before, *start], False))
-            except NoEquilibrium:
-                continue
-    if rough:
-        fits.append(fit(about, slopes, effects, _values(max(rough, key=lambda f: f.evidence)), True))
-    return _both(about, slopes, fits)
-
-
-def _values(found: Fit) -> list[float]:
-    return [found.values[e.name][p.name] for e in found.effects for p in e.parameters]
-
-
-def _both(about: Theory, slopes: Array, fits: Sequence[Fit]) -> Both:
-    """The best of fits, and where it goes from there when the effects are taken at their word."""
-    best = max(fits, key=lambda f: f.evidence)
-    if not any(e.form_error for e in best.effects):
-        return best, best
-    effects = [replace(e, form_error=0.0) for e in best.effects]
-    return best, fit(about, slopes, effects, _values(best), True, best.nuisance)
-
-
-def _told(about: Theory, name: str, best: Fit) -> tuple[str, float, float, float]:
-    total, count = held_out(about, best)
-    return name, float(np.sqrt(best.misfit / len(best.residual))), float(np.sqrt(total / count)), best.evidence

@@ -1,10 +1,11 @@
-"""The same numbers predicted by the model, and their derivatives.
+"""Modes that a model predicts, and which of them the measured ones are.
 
 ===========  ===========================================================================================================
+modes        the modes that a model has at the condition of a test, as its measuring points show them
+outcomes     what was predicted before a test was read, beside what it then showed: confirmed or refuted
 partners     which measured mode is which computed one: partners, numbers through all conditions, crossings, shapes of
              close modes
-sensitivity  derivatives of the features by the nuisance parameters: the matrices by differences, poles and shapes from
-             them exactly
-theory       what the model predicts of a campaign: the same features as observed, for any tolerances and effects
+temperature  what a test's temperature error does to its modes: one unknown for the whole test, so its errors are
+             correlated
 ===========  ===========================================================================================================
 """

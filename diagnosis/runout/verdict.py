@@ -20,13 +20,13 @@ from scipy.stats import chi2 as chi_squared
 from thermospindle.diagnosis.runout.fit import Family, FamilyFit, families, fit_family, merged
 from thermospindle.diagnosis.runout.lines import Seen, StrangeLine, look, runout_tests
 from thermospindle.diagnosis.runout.sources import SourceKey, Sources, of_effect, sources
-from thermospindle.diagnosis.search.screening import CLEAR
 from thermospindle.model.machine import Spindle
 from thermospindle.model.types import Array
 from thermospindle.sim.campaign.campaign import Campaign
 from thermospindle.sim.effects import CATALOGUE, of_scene
 from thermospindle.sim.effects.effect import Effect
 
+CLEAR = 12.0  # ln evidence by which an explanation must lead the model without it
 AHEAD = 5.0  # ln evidence by which it must lead every rival to be identified
 MISFIT = 1e-4  # probability below which a misfit is not chance
 FALLS = 1 / 3  # held-out error ratio that counts as a clear fall

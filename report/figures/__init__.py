@@ -2,12 +2,11 @@
 
 =========  =============================================================================================================
 common     the report's figures as inline SVG, drawn with matplotlib's object-oriented interface
-compare    pictures of a comparison: pull map, FRFs over each other, FDAC, likeness by band and by FRF. Every function
+compare    pictures of a comparison: map of residuals, FRFs over each other, FDAC, likeness by band and by FRF. Every function
            returns a figure
-diagnosis  pictures of a diagnosis: how far every explanation leads, and the pull map before and after; those of the
-           misfit are in `misfit_plots`
-ladder     pictures of the ladder: the error on every rung, and the pull map (mode x test) of the first rung and of the
-           top
+diagnosis  pictures of a diagnosis: how far every explanation leads, and the map of residuals before and after
+ladder     pictures of the ladder: the error at every step, and the map of residuals (mode x test) at the first step and
+           at the top
 resonance  figures of a resonance map: Campbell diagram, the same over temperature, coincidences over both, and runout
            along both
 run        small figures of a run for its Rerun log: bearing states over temperature, first hits, key to the FRFs

@@ -1,9 +1,9 @@
-"""Pictures of the ladder: the error on every rung, and residuals by mode and test on the first rung and on the top."""
+"""Pictures of the ladder: the error at every step, and residuals by mode and test at the first step and at the top."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,10 +13,9 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from thermospindle.diagnosis.data.features import Data
 from thermospindle.diagnosis.data.observe import Observation
 from thermospindle.diagnosis.ladder.ladder import Ladder
-from thermospindle.diagnosis.ladder.rung import Rung
+from thermospindle.diagnosis.ladder.step import Step
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 from thermospindle.report.figures.common import PALE, STYLE, broken, cells, logarithmic, residual_bar, residual_norm, signed_short, svg
@@ -25,7 +24,7 @@ ERROR, HELD_OUT = "#b3402a", "#2166ac"
 
 
 @dataclass(frozen=True, eq=False)
-class PullMap:
+class ResidualMap:
     """(computed - measured) / standard error by mode (row) and test (column), NaN where not measured; `damping` None without any."""
 
     modes: list[str]
@@ -34,22 +33,19 @@ class PullMap:
     damping: Array | None
 
 
-def pull_map(found: Ladder, rung: Rung) -> PullMap:
-    """The pulls of a rung."""
-    return pulls(found.theory.data, found.mode, found.kinds, rung.residual)
-
-
-def pulls(data: Data, mode: np.ndarray, kinds: Mapping[int, str], residual: Array) -> PullMap:
-    """The pulls of all modes that have a number, tests in order of speed and temperature; `mode` (n,) is zero where there is none."""
-    order = sorted(range(len(data.observations)), key=lambda t: _place(data.observations[t]))
+def residual_map(found: Ladder, step: Step) -> ResidualMap:
+    """The residuals of a step in all numbered modes, tests in order of speed and temperature."""
+    measured, tests = found.measured, found.measured.observations
+    order = sorted(range(len(tests)), key=lambda t: _place(tests[t]))
     column = {t: k for k, t in enumerate(order)}
-    row = {number: k for k, number in enumerate(kinds)}
-    maps = {what: np.full((len(row), len(order)), np.nan) for what in ("frequency", "damping")}
-    for k, f in enumerate(data.features):
-        if f.what in maps and mode[k]:
-            maps[f.what][row[int(mode[k])], column[f.test]] = -residual[k] / data.sd[k]
-    damping = maps["damping"] if np.isfinite(maps["damping"]).any() else None
-    return PullMap([f"{n} {kind}" for n, kind in kinds.items()], _tests([data.observations[t] for t in order]), maps["frequency"], damping)
+    row = {number: k for k, number in enumerate(measured.kinds)}
+    frequency, damping = np.full((2, len(row), len(order)), np.nan)
+    rows = zip(measured.number, measured.test, *step.residual(measured), strict=True)
+    for number, t, of_frequency, of_damping in rows:
+        if number:
+            frequency[row[int(number)], column[int(t)]], damping[row[int(number)], column[int(t)]] = of_frequency, of_damping
+    known = damping if np.isfinite(damping).any() else None
+    return ResidualMap([f"{n} {kind}" for n, kind in measured.kinds.items()], _tests([tests[t] for t in order]), frequency, known)
 
 
 def _place(o: Observation) -> tuple[float, float, str]:
@@ -64,24 +60,24 @@ def _tests(observations: list[Observation]) -> list[str]:
 
 
 def figure(found: Ladder) -> Figure:
-    first, last = (pull_map(found, r) for r in (found.rungs[0], found.top))
+    first, last = (residual_map(found, r) for r in (found.steps[0], found.top))
     rows = 1 if first.damping is None else 2
     tall = 0.32 * len(first.modes) + 0.75
     drawn = Figure(figsize=(10.0, 3.1 + rows * tall))
     parts: Any = drawn.subfigures(2, 1, height_ratios=[3.1, rows * tall])
     _errors(parts[0].subplots(), found)
-    draw_maps(parts[1], [(found.rungs[0].name, first), (found.top.name, last)])
+    draw_maps(parts[1], [(found.steps[0].name, first), (found.top.name, last)])
     return drawn
 
 
 def _errors(axes: Axes, found: Ladder) -> None:
-    place = np.arange(len(found.rungs))
+    place = np.arange(len(found.steps))
     for values, colour, marker, label, up in (
-        ([r.held_out for r in found.rungs], HELD_OUT, "s", "left-out temperatures", True),
-        ([r.error for r in found.rungs], ERROR, "o", "all data", False),
+        ([r.held_out for r in found.steps], HELD_OUT, "s", "temperatures left out", True),
+        ([r.error for r in found.steps], ERROR, "o", "all data", False),
     ):
         axes.plot(place, values, color=colour, marker=marker, label=label, zorder=3)
-        for x, r in enumerate(found.rungs):
+        for x, r in enumerate(found.steps):
             if up and r.fitted is None:
                 continue  # both are the same there, written once
             above = up if r.held_out != r.error else not up
@@ -93,32 +89,32 @@ def _errors(axes: Axes, found: Ladder) -> None:
             )
     axes.axhline(1.0, color=PALE, lw=0.9, ls="--", zorder=1, label="errors of the data")
     logarithmic(axes)
-    low = min(1.0, *(min(r.error, r.held_out) for r in found.rungs))
-    high = max(max(r.error, r.held_out) for r in found.rungs)
+    low = min(1.0, *(min(r.error, r.held_out) for r in found.steps))
+    high = max(max(r.error, r.held_out) for r in found.steps)
     span = max(np.log10(high / low), 0.5)
     axes.set_ylim(low / 10 ** (0.16 * span), high * 10 ** (0.16 * span))
     axes.set_xlim(-0.5, len(place) - 0.5)
-    axes.set_xticks(place, [broken(r.name) for r in found.rungs])
+    axes.set_xticks(place, [broken(r.name) for r in found.steps])
     axes.set_ylabel("rms residual, standard errors")
-    axes.set_title("The error on every rung")
+    axes.set_title("The error at every step")
     axes.legend(loc="upper right")
     axes.grid(visible=False, axis="x")
 
 
-def draw_maps(part: Any, rungs: Sequence[tuple[str, PullMap]]) -> None:
+def draw_maps(part: Any, steps: Sequence[tuple[str, ResidualMap]]) -> None:
     """Maps of residuals beside each other in a figure or a part of one, each below its name; dampings below frequencies."""
-    rows = 1 if rungs[0][1].damping is None else 2
-    norm = residual_norm(max(float(np.nanmax(np.abs(m.frequency))) for _, m in rungs))
-    grid = part.subplots(rows, len(rungs), squeeze=False)
-    for k, (name, pulls) in enumerate(rungs):
-        for i, (what, values) in enumerate((("frequencies", pulls.frequency), ("damping ratios", pulls.damping))[:rows]):
+    rows = 1 if steps[0][1].damping is None else 2
+    norm = residual_norm(max(float(np.nanmax(np.abs(m.frequency))) for _, m in steps))
+    grid = part.subplots(rows, len(steps), squeeze=False)
+    for k, (name, residuals) in enumerate(steps):
+        for i, (what, values) in enumerate((("frequencies", residuals.frequency), ("damping ratios", residuals.damping))[:rows]):
             assert values is not None
             axes = grid[i][k]
             cells(axes, values, norm, "RdBu_r", signed_short)
-            axes.set_xticks(range(len(pulls.tests)), [t.replace(", ", "\n").removesuffix(" rpm") for t in pulls.tests], fontsize=7.5)
-            axes.set_yticks(range(len(pulls.modes)), pulls.modes if k == 0 else [])
+            axes.set_xticks(range(len(residuals.tests)), [t.replace(", ", "\n").removesuffix(" rpm") for t in residuals.tests], fontsize=7.5)
+            axes.set_yticks(range(len(residuals.modes)), residuals.modes if k == 0 else [])
             axes.set_title(f"{name}: {what}")
-            if i == rows - 1 and any(t.endswith(" rpm") for t in pulls.tests):
+            if i == rows - 1 and any(t.endswith(" rpm") for t in residuals.tests):
                 axes.set_xlabel("temperature, and below it speed in rpm")
         grid[0][0].set_ylabel("mode")
     residual_bar(part, norm, grid, shrink=0.9, pad=0.01)
@@ -131,7 +127,7 @@ def _short(value: float) -> str:
 def picture(found: Ladder) -> str:
     """The figure as an SVG element for a page."""
     with rc_context(STYLE):
-        return svg(figure(found), "ladder", "Error on every rung of the ladder, and residuals on the first and the last")
+        return svg(figure(found), "ladder", "Error at every step of the ladder, and residuals on the first and the last")
 
 
 def write(found: Ladder, path: Path) -> None:

@@ -9,7 +9,7 @@ compare           the Rerun log of a comparison: measured and computed FRFs of e
 content           what the log of a run shows, as plain numbers: modal peaks side by side, a summary, which FRFs in
                   which range
 drawing           the deformed section as plain arrays, and colours of temperatures
-ladder            the Rerun log of a ladder: on the timeline `rung` everything moves as one model after the other takes
+ladder            the Rerun log of a ladder: on the timeline `step` everything moves as one model after the other takes
                   its place
 ladder_content    what the Rerun log of a ladder shows, as plain numbers for `report.log.ladder`
 map               the Rerun log of a resonance map: a Campbell diagram that moves with temperature, and where its lines

@@ -1,7 +1,7 @@
-"""The Rerun log of a ladder: on the timeline `rung` everything moves as one model after the other takes its place.
+"""The Rerun log of a ladder: on the timeline `step` everything moves as one model after the other takes its place.
 
-Rerun shows one timeline at a time, so FRFs and the map of residuals stand as pictures on `rung`; the same FRFs stand as series on the
-timeline `frequency`, measured and of every rung on one axis.
+Rerun shows one timeline at a time, so FRFs and the map of residuals stand as pictures on `step`; the same FRFs stand as series on the
+timeline `frequency`, measured and of every step on one axis.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from thermospindle.report.log.content import Peak
 from thermospindle.report.log.pictures import for_dark, log_figure, view
 
 MEASURED, COMPUTED, HELD_OUT = np.array([(120, 255, 140), (255, 170, 80), (90, 200, 255)], np.uint8)
-SIZES = {"error": (6.1, 2.6), "pulls": (6.1, 3.5), "responses": (9.0, 8.7)}  # inches
+SIZES = {"error": (6.1, 2.6), "residuals": (6.1, 3.5), "responses": (9.0, 8.7)}  # inches
 PANELS = 2  # columns of the FRF pictures
 FLOOR = 80.0  # dB below the top that FRF pictures show
 
@@ -52,12 +52,12 @@ class Track:
 
 
 @dataclass(frozen=True, eq=False)
-class ShownRung:
+class ShownStep:
     name: str
     cells: tuple[str, ...]  # of its row of the table
     error: float  # rms of the residuals in standard errors
     held_out: float
-    pulls: Array  # (modes, tests), NaN where not measured
+    residuals: Array  # (modes, tests), NaN where not measured
     levels: tuple[Level, ...]  # none for a campaign of mode tables
     tracks: tuple[Track, ...]
 
@@ -69,10 +69,10 @@ class ShownLadder:
     modes: tuple[str, ...]
     tests: tuple[str, ...]
     unit: str  # of the levels
-    rungs: tuple[ShownRung, ...]
-    top: int  # index of the rung that the ladder leads to
+    steps: tuple[ShownStep, ...]
+    top: int  # index of the step that the ladder leads to
     sentences: tuple[str, ...]
-    peaks: tuple[Peak, ...]  # measured, and computed on the top rung
+    peaks: tuple[Peak, ...]  # measured, and computed on the top step
 
 
 def write_ladder_log(content: ShownLadder, path: Path) -> None:
@@ -88,29 +88,29 @@ def _write(content: ShownLadder, recording: rr.RecordingStream, file: Path) -> N
     about: dict[str, Any] = {"title": content.title, **content.provenance}
     recording.send_property("run", rr.AnyValues(**about))
     log_peak_numbers(recording, content.peaks)
-    numbers: dict[str, Any] = {"names": [r.name for r in content.rungs], "error": [r.error for r in content.rungs], "top": content.top}
-    recording.log("numbers/rungs", rr.AnyValues(**numbers), static=True)
-    for k, rung in enumerate(content.rungs, 1):
-        recording.set_time("rung", sequence=k)
-        for name, figure in (("error", errors(content, k - 1)), ("pulls", pulls(content, rung)), ("responses", responses(content, rung))):
+    numbers: dict[str, Any] = {"names": [r.name for r in content.steps], "error": [r.error for r in content.steps], "top": content.top}
+    recording.log("numbers/steps", rr.AnyValues(**numbers), static=True)
+    for k, step in enumerate(content.steps, 1):
+        recording.set_time("step", sequence=k)
+        for name, figure in (("error", errors(content, k - 1)), ("residuals", residuals(content, step)), ("responses", responses(content, step))):
             log_figure(recording, f"charts/{name}", figure, static=False)
-        recording.log("rung", rr.TextDocument(words(content, k - 1), media_type=rr.MediaType.MARKDOWN))
-        for name, value in (("all data", rung.error), ("left-out temperatures", rung.held_out)):
+        recording.log("step", rr.TextDocument(words(content, k - 1), media_type=rr.MediaType.MARKDOWN))
+        for name, value in (("all data", step.error), ("temperatures left out", step.held_out)):
             recording.log(rr.new_entity_path(["error", name]), rr.Scalars(value))
-    for name, colour in (("all data", COMPUTED), ("left-out temperatures", HELD_OUT)):
+    for name, colour in (("all data", COMPUTED), ("temperatures left out", HELD_OUT)):
         recording.log(rr.new_entity_path(["error", name]), rr.SeriesLines(colors=[colour], names=name), static=True)
     log_levels(recording, content)
 
 
 def log_levels(recording: rr.RecordingStream, content: ShownLadder) -> None:
-    """FRFs on the timeline `frequency` (whole Hz): measured, and of every rung, the later the brighter."""
-    for i, level in enumerate(content.rungs[0].levels):
+    """FRFs on the timeline `frequency` (whole Hz): measured, and of every step, the later the brighter."""
+    for i, level in enumerate(content.steps[0].levels):
         times = over_frequency(level.frequency)
         origin = _level_path(level)
         curves = [("measured", level.measured, MEASURED, 2.0)]
-        for k, rung in enumerate(content.rungs):
-            bright = COMPUTED * (0.35 + 0.65 * (k / max(len(content.rungs) - 1, 1)))
-            curves.append((f"{k + 1} {rung.name}", rung.levels[i].computed, bright.astype(np.uint8), 1.0 if k != content.top else 2.0))
+        for k, step in enumerate(content.steps):
+            bright = COMPUTED * (0.35 + 0.65 * (k / max(len(content.steps) - 1, 1)))
+            curves.append((f"{k + 1} {step.name}", step.levels[i].computed, bright.astype(np.uint8), 1.0 if k != content.top else 2.0))
         for name, values, colour, width in curves:
             log_curve(recording, rr.new_entity_path([*origin, name]), times, values, curve_look(colour, name, width))
 
@@ -119,48 +119,48 @@ def _level_path(level: Level) -> list[str]:
     return ["frf", level.test, level.name]
 
 
-# ---------------------------------------------------------------- pictures of one rung
+# ---------------------------------------------------------------- pictures of one step
 
 
 @rc_context(STYLE)
 def errors(content: ShownLadder, now: int) -> Figure:
-    """Rms residual over the rungs, with a bar at the present one."""
+    """Rms residual over the steps, with a bar at the present one."""
     figure = Figure(figsize=SIZES["error"])
     axes = figure.subplots()
-    place = np.arange(len(content.rungs))
+    place = np.arange(len(content.steps))
     axes.axvline(now, color=PALE, lw=6, alpha=0.4)
-    for key, label, colour in (("held_out", "left-out temperatures", HELD_OUT), ("error", "all data", COMPUTED)):
-        axes.plot(place, [getattr(r, key) for r in content.rungs], marker="o", color=for_dark(colour), label=label)
+    for key, label, colour in (("held_out", "temperatures left out", HELD_OUT), ("error", "all data", COMPUTED)):
+        axes.plot(place, [getattr(r, key) for r in content.steps], marker="o", color=for_dark(colour), label=label)
     logarithmic(axes)
-    axes.set_xticks(place, [broken(r.name) for r in content.rungs], fontsize=6.5)
+    axes.set_xticks(place, [broken(r.name) for r in content.steps], fontsize=6.5)
     axes.set_ylabel("rms residual, standard errors")
     axes.legend(loc="upper right")
     return figure
 
 
 @rc_context(STYLE)
-def pulls(content: ShownLadder, rung: ShownRung) -> Figure:
-    """(computed - measured) / standard error of every mode and test; colours mean the same on every rung."""
-    figure = Figure(figsize=SIZES["pulls"])
+def residuals(content: ShownLadder, step: ShownStep) -> Figure:
+    """(computed - measured) / standard error of every mode and test; colours mean the same at every step."""
+    figure = Figure(figsize=SIZES["residuals"])
     axes = figure.subplots()
-    largest = max(float(np.nanmax(np.abs(r.pulls))) for r in content.rungs)
-    cells(axes, rung.pulls, residual_norm(largest), "RdBu_r", signed_short)
+    largest = max(float(np.nanmax(np.abs(r.residuals))) for r in content.steps)
+    cells(axes, step.residuals, residual_norm(largest), "RdBu_r", signed_short)
     axes.set_xticks(range(len(content.tests)), [t.replace(", ", "\n") for t in content.tests], fontsize=7)
     axes.set_yticks(range(len(content.modes)), content.modes)
-    axes.set_title(f"{rung.name}: (computed − measured) / standard error")
+    axes.set_title(f"{step.name}: (computed − measured) / standard error")
     return figure
 
 
 @rc_context(STYLE)
-def responses(content: ShownLadder, rung: ShownRung) -> Figure:
-    """Measured and computed FRFs on one axis, or frequencies over temperature where there are no FRFs; axes are the same on every rung."""
+def responses(content: ShownLadder, step: ShownStep) -> Figure:
+    """Measured and computed FRFs on one axis, or frequencies over temperature where there are no FRFs; axes are the same at every step."""
     figure = Figure(figsize=SIZES["responses"])
-    shown: Sequence[Level | Track] = rung.levels or rung.tracks
-    columns = PANELS if rung.levels or len(shown) <= 4 else 3
+    shown: Sequence[Level | Track] = step.levels or step.tracks
+    columns = PANELS if step.levels or len(shown) <= 4 else 3
     panels = figure.subplots(-(-len(shown) // columns), columns, squeeze=False).flat[:]
     for i, (axes, one) in enumerate(zip(panels, shown, strict=False)):
         x = one.frequency if isinstance(one, Level) else one.temperature
-        every = np.concatenate([one.measured, *((r.levels or r.tracks)[i].computed for r in content.rungs)])
+        every = np.concatenate([one.measured, *((r.levels or r.tracks)[i].computed for r in content.steps)])
         top = float(every.max())
         low = max(float(every.min()), top - FLOOR) if isinstance(one, Level) else float(every.min())
         axes.plot(x, one.measured, color=for_dark(MEASURED), lw=1.6, label="measured")
@@ -178,15 +178,15 @@ def responses(content: ShownLadder, rung: ShownRung) -> Figure:
 
 
 def words(content: ShownLadder, now: int) -> str:
-    """Markdown: all rungs so far, and on the last what the ladder shows."""
-    lines = [f"## {now + 1}: {content.rungs[now].name}", "", "| rung | rms residual, s.e. | left out | Hz |", "|---|---|---|---|"]
-    for k, r in enumerate(content.rungs[: now + 1]):
+    """Markdown: all steps so far, and on the last what the ladder shows."""
+    lines = [f"## {now + 1}: {content.steps[now].name}", "", "| step | rms residual, s.e. | left out | Hz |", "|---|---|---|---|"]
+    for k, r in enumerate(content.steps[: now + 1]):
         name, error, held_out, hertz, *_ = r.cells
         strong = "**" if k == now else ""
         lines.append(f"| {strong}{k + 1} {name}{strong} | {error} | {held_out} | {hertz} |")
-    key = "FRFs" if content.rungs[now].levels else "Frequencies"
+    key = "FRFs" if content.steps[now].levels else "Frequencies"
     lines += ["", f"{key}: measured green, computed orange. Map: blue computed too low, red too high."]
-    if now == len(content.rungs) - 1:
+    if now == len(content.steps) - 1:
         lines += ["", *(f"- {s}" for s in content.sentences)]
     return "\n".join(lines) + "\n"
 
@@ -196,10 +196,10 @@ def words(content: ShownLadder, now: int) -> str:
 
 def _blueprint(content: ShownLadder) -> rrb.Blueprint:
     left = rrb.Vertical(
-        view("charts/error", "The error on every rung", SIZES["error"]), view("charts/pulls", "Residuals by mode and test", SIZES["pulls"]), rrb.TextDocumentView(origin="rung", name="Rung"),
+        view("charts/error", "The error at every step", SIZES["error"]), view("charts/residuals", "Residuals by mode and test", SIZES["residuals"]), rrb.TextDocumentView(origin="step", name="Step"),
         row_shares=[2.5, 3.3, 3.2],
     )  # fmt: skip
-    levels = content.rungs[0].levels
+    levels = content.steps[0].levels
     right = view("charts/responses", "Measured (green) and computed (orange)", SIZES["responses"])
     tabs: list[rrb.View | rrb.Container] = [rrb.Horizontal(left, right, column_shares=[1, 1.5], name="Ladder")]
     if levels:
@@ -215,7 +215,7 @@ def _blueprint(content: ShownLadder) -> rrb.Blueprint:
         rrb.Tabs(*tabs),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),
-        rrb.TimePanel(state="collapsed", timeline="rung", fps=0.7, play_state="playing", loop_mode="all"),
+        rrb.TimePanel(state="collapsed", timeline="step", fps=0.7, play_state="playing", loop_mode="all"),
         auto_views=False,
         auto_layout=False,
     )

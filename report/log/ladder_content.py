@@ -3,76 +3,68 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
-from thermospindle.diagnosis.data.observe import condition_of
 from thermospindle.diagnosis.ladder.ladder import Ladder
-from thermospindle.diagnosis.ladder.rung import Rung, frequencies
+from thermospindle.diagnosis.ladder.step import Step
 from thermospindle.model.types import ComplexArray
-from thermospindle.report.figures.ladder import pull_map
+from thermospindle.report.figures.ladder import residual_map
 from thermospindle.report.log.content import Peak, decibel, one
-from thermospindle.report.log.ladder import Level, ShownLadder, ShownRung, Track
+from thermospindle.report.log.ladder import Level, ShownLadder, ShownStep, Track
 from thermospindle.report.text.ladder import sentences
 from thermospindle.report.text.ladder_table import cells
-from thermospindle.sim.campaign.beside import Beside, measured_at
-from thermospindle.sim.operating import operating_point, provenance
+from thermospindle.sim.operating import provenance
 
 TINY = 1e-3  # Hz, instead of zero, where a receptance has no level
 UNITS = {"receptance": "m/N", "mobility": "(m/s)/N", "accelerance": "(m/s²)/N"}
 
 
 def shown(found: Ladder) -> ShownLadder:
-    maps = [pull_map(found, r) for r in found.rungs]
-    rungs = tuple(
-        ShownRung(r.name, cells(r), r.error, r.held_out, m.frequency, tuple(_levels(found, r)), tuple(_tracks(found, r)))
-        for r, m in zip(found.rungs, maps, strict=True)
+    maps = [residual_map(found, r) for r in found.steps]
+    steps = tuple(
+        ShownStep(r.name, cells(r), r.error, r.held_out, m.frequency, tuple(_levels(found, r)), tuple(_tracks(found, r)))
+        for r, m in zip(found.steps, maps, strict=True)
     )
-    quantity = found.campaign.quantity
     return ShownLadder(
         provenance(found.spindle),
         f"{found.campaign.title} against scene {found.spindle.name}",
         tuple(maps[0].modes),
         tuple(maps[0].tests),
-        f"dB re 1 {UNITS[quantity]}",
-        rungs,
-        found.rungs.index(found.top),
+        f"dB re 1 {UNITS[found.campaign.quantity]}",
+        steps,
+        found.steps.index(found.top),
         tuple(sentences(found)),
         tuple(_peaks(found)),
     )
 
 
 def _peaks(found: Ladder) -> Iterator[Peak]:
-    """Measured modes, and those of the top rung."""
-    data, top = found.theory.data, found.top
-    damping = {(f.test, f.mode): k for k, f in enumerate(data.features) if f.what == "damping"}
-    for source in ("measured", top.name):
-        values = data.value if source == "measured" else data.value - top.residual
-        for k, f in enumerate(data.features):
-            if f.what == "frequency":
-                test, number = data.observations[f.test].test, int(found.mode[k])
-                frequency = float(np.exp(values[k]))
-                sd = frequency * float(data.sd[k]) if source == "measured" else np.nan
-                ratio = float(np.exp(values[damping[f.test, f.mode]])) if (f.test, f.mode) in damping else np.nan
-                yield Peak(source, test.id, test.temperature, number, found.kinds.get(number, "unknown"), frequency, sd, ratio)
+    """Measured modes, and those of the top step."""
+    m, top = found.measured, found.top
+    nothing = np.full(len(m.test), np.nan)
+    for source, frequency, sd, damping in (("measured", m.frequency, m.sd, m.damping), (top.name, top.frequency, nothing, top.damping)):
+        for t, number, f, error, ratio in zip(m.test.tolist(), m.number.tolist(), frequency, sd, damping, strict=True):
+            if np.isfinite(f):
+                test = m.observations[t].test
+                yield Peak(source, test.id, test.temperature, number, m.kinds.get(number, "unknown"), float(f), float(error), float(ratio))
 
 
 def _ends(found: Ladder) -> list[int]:
     """The coldest and the hottest test with FRFs, at the lowest speed of those."""
-    tests = [(abs(o.condition.speed), o.condition.temperature, t) for t, o in enumerate(found.theory.data.observations) if o.test.frf]
+    tests = [(abs(d.condition.speed), d.condition.temperature, t) for t, d in enumerate(found.model.tests) if d.test.frf]
     slow = [w for w in tests if w[0] == min(tests)[0]]
     return sorted({min(slow)[2], max(slow)[2]}) if slow else []
 
 
-def _levels(found: Ladder, rung: Rung) -> list[Level]:
+def _levels(found: Ladder, step: Step) -> list[Level]:
     """Measured and computed level at the driving points of two tests, at the campaign's lines inside the band of the spindle."""
     levels = []
     low, high = found.spindle.hammer.band
     for t in _ends(found):
-        test = found.theory.data.observations[t].test
+        test = found.model.tests[t].test
         assert test.frf is not None
-        computed = response(found, rung, t)
+        computed = response(step, t)
         inside = (test.frf.frequency >= low) & (test.frf.frequency <= high) & (test.frf.frequency > 0)
         points = [n for n in test.frf.reference_nodes if n in test.frf.response_nodes]
         for node in points[:2]:
@@ -81,37 +73,26 @@ def _levels(found: Ladder, rung: Rung) -> list[Level]:
     return levels
 
 
-def response(found: Ladder, rung: Rung, t: int) -> ComplexArray:
-    """FRFs (n_resp, n_ref, n) of test `t` as a rung's model has them, at the test's lines, in its quantity, with the fitted gains."""
-    about = found.theory
-    test = about.data.observations[t].test
-    assert test.frf is not None
-    condition = condition_of(test)
-    spindle = measured_at(about.built(rung.nuisance), found.campaign.points, test.frf)
-    warm = replace(condition, temperature=condition.temperature + about.warmer(rung.nuisance)[t])
-    value = Beside(test, test.frf, operating_point(spindle, warm, (*about.present, *rung.applied))).computed(
-        np.maximum(test.frf.frequency, TINY)
-    )
-    gain = np.ones(len(value))
-    fitted = rung.nuisance[len(rung.nuisance) - about.channels :]
-    gain[: len(fitted)] += fitted
-    return np.asarray(value * gain[:, None, None], complex)
+def response(step: Step, t: int) -> ComplexArray:
+    """FRFs (n_resp, n_ref, n) of test `t` as a step's model has them, at the test's lines, in its quantity, with the fitted gains."""
+    frf = step.model.tests[t].test.frf
+    assert frf is not None
+    return step.model.response(t, step.nuisance, step.applied[t], np.maximum(frf.frequency, TINY))
 
 
-def _tracks(found: Ladder, rung: Rung) -> list[Track]:
+def _tracks(found: Ladder, step: Step) -> list[Track]:
     """Measured and computed frequency of every mode over temperature, at the lowest speed."""
-    data = found.theory.data
-    measured, computed = frequencies(found.theory, rung.residual)
-    slowest = min(abs(o.condition.speed) for o in data.observations)
-    rows = [k for k, f in enumerate(data.features) if f.what == "frequency"]
+    m = found.measured
+    conditions = [o.condition for o in m.observations]
+    slowest = min(abs(c.speed) for c in conditions)
     tracks = []
-    for number, kind in found.kinds.items():
+    for number, kind in m.kinds.items():
         own = [
-            (data.observations[data.features[k].test].condition.temperature, measured[i], computed[i])
-            for i, k in enumerate(rows)
-            if found.mode[k] == number and abs(data.observations[data.features[k].test].condition.speed) == slowest
+            (conditions[t].temperature, measured, computed)
+            for t, n, measured, computed in zip(m.test, m.number, m.frequency, step.frequency, strict=True)
+            if n == number and abs(conditions[t].speed) == slowest and np.isfinite(computed)
         ]
         if own:
-            temperature, m, c = np.array(sorted(own)).T
-            tracks.append(Track(f"{number} {kind}", temperature, m, c))
+            temperature, measured, computed = np.array(sorted(own)).T
+            tracks.append(Track(f"{number} {kind}", temperature, measured, computed))
     return tracks

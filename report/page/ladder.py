@@ -17,13 +17,13 @@ def section(found: Ladder) -> tuple[str, str]:
     head = "".join(f"<th{' class=left' if k == 0 else ''}>{escape(c).replace(chr(10), '<br>')}</th>" for k, c in enumerate(COLUMNS))
     body = "".join(
         "<tr>" + "".join(f"<td{' class=left' if k == 0 else ''}>{prose(c)}</td>" for k, c in enumerate(cells(r))) + "</tr>"
-        for r in found.rungs
+        for r in found.steps
     )
     grid = (
         f'<div class="scroll"><table><caption>{escape(LEGEND)}</caption><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
     )
-    figure = f'<figure class="chart wide">{ladder_plots.picture(found)}<figcaption>Above: the error on every rung, of all data and of each '
-    figure += f"temperature predicted from the others. Below: residuals of every mode in every test on the first rung and on '{escape(found.top.name)}'.</figcaption></figure>"
+    figure = f'<figure class="chart wide">{ladder_plots.picture(found)}<figcaption>Above: the error at every step, of all data and of each '
+    figure += f"temperature predicted by a fit that has not seen it. Below: residuals of every mode in every test at the first step and at '{escape(found.top.name)}'.</figcaption></figure>"
     words = "".join(f"<p>{prose(s)}</p>" for s in sentences(found))
     return f"The ladder: {found.campaign.title}", figure + grid + words
 
@@ -35,7 +35,7 @@ def write_ladder(found: Ladder, folder: Path) -> None:
     from thermospindle.report.page.report import page
 
     ladder_plots.write(found, folder / "ladder.svg")
-    count = len(found.theory.data.observations)
+    count = len(found.model.tests)
     conditions = f"the conditions of {count} test{'s' if count > 1 else ''}: {found.campaign.title}"
     (folder / "report.html").write_text(page(found.spindle, conditions, [section(found)], "Ladder"), encoding="utf-8")
     write_ladder_log(shown(found), folder / "ladder.rrd")

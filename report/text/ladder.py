@@ -7,64 +7,77 @@ from itertools import pairwise
 
 import numpy as np
 
+from thermospindle.diagnosis.inference import nuisance as kinds_of
 from thermospindle.diagnosis.inference.next_test import in_words
-from thermospindle.diagnosis.ladder.ladder import TOLERANCES, Ladder
-from thermospindle.diagnosis.ladder.rung import Rung, determined
-from thermospindle.diagnosis.search.screening import CLEAR
+from thermospindle.diagnosis.ladder.ladder import CLEAR, DISCREPANCY, TOLERANCES, Ladder
+from thermospindle.diagnosis.ladder.step import Step
 
 CERTAIN = 1000.0  # odds, beyond which models are not to be trusted so far
 STRETCHED = 2.0  # standard deviations from which a tolerance is named
 MOST = 5  # things named in one sentence
 CLOSE = 0.05  # relative distance of two modes that are called a pair
 WRONG = 3.0  # standard errors from which a shift or a split is called wrong
+MISSED = {kinds_of.STIFFNESS: "natural frequencies", kinds_of.DAMPING: "damping ratios"}
 
 
 def sentences(found: Ladder) -> list[str]:
     """What the ladder shows, in words with numbers."""
-    return [s for s in (_forms(found), _tolerances(found), *_effects(found), _counted(found), *remaining(found), *_tests(found)) if s]
+    every = (_forms(found), _tolerances(found), _discrepancy(found), *_effects(found), _counted(found), *remaining(found), *_tests(found))
+    return [s for s in every if s]
 
 
 def _forms(found: Ladder) -> str:
-    drawn = [r for r in found.rungs if r.fitted is None]
+    drawn = [r for r in found.steps if r.fitted is None]
     shifts = all(r.rms_shift_Hz is not None for r in drawn)
-    told = [
+    errors = [
         f"{r.rms_shift_Hz if shifts else r.rms_Hz:.1f} Hz with {r.name}" + (f" ({'; '.join(r.lost_contact)})" if r.lost_contact else "")
         for r in drawn
     ]
     ranked = sorted(found.forms, key=lambda f: -f[3])
     lead = ranked[0][3] - ranked[1][3]
     verb = "leads" if lead > CLEAR else "does not clearly lead"
-    free = f"With all tolerances free, {ranked[0][0]} {verb} {ranked[1][0]} by {evidence(lead)} in ln evidence"
-    return f"As drawn, {'shifts' if shifts else 'frequencies'} are wrong by {', '.join(told)} (rms). {free}."
+    free = f"With all tolerances and a constant discrepancy free, {ranked[0][0]} {verb} {ranked[1][0]} by {evidence(lead)} in ln evidence"
+    return f"As drawn, {'shifts' if shifts else 'frequencies'} are wrong by {', '.join(errors)} (rms). {free}."
 
 
 def _tolerances(found: Ladder) -> str:
-    drawn, r = found.rung("axial equilibrium"), found.rung(TOLERANCES)
-    far = [(n, x / sd) for n, x, sd in zip(found.theory.names, r.nuisance, found.theory.sd, strict=True) if abs(x / sd) > STRETCHED]
-    far.sort(key=lambda pair: -abs(pair[1]))
+    drawn, r = found.step("axial equilibrium"), found.step(TOLERANCES)
+    build = [(p.name, float(x)) for p, x in zip(r.model.parameters, r.nuisance, strict=True) if p.kind == kinds_of.BUILD]
+    far = sorted((row for row in build if abs(row[1]) > STRETCHED), key=lambda row: -abs(row[1]))
     more = f" and {len(far) - MOST} more" if len(far) > MOST else ""
-    paid = (
-        f"; beyond {STRETCHED:g} standard deviations are {', '.join(f'{n} ({x:+.1f})' for n, x in far[:MOST])}{more}"
-        if far
-        else "; none goes far"
+    named = ", ".join(f"{name} ({x:+.1f})" for name, x in far[:MOST])
+    paid = f"beyond {STRETCHED:g} standard deviations are {named}{more}" if far else "none goes far"
+    return f"The tolerances take the error from {drawn.error:.2f} to {r.error:.2f} standard errors; {paid}."
+
+
+def _discrepancy(found: Ladder) -> str:
+    """How wrong the model is at all conditions alike, and what granting that does."""
+    below, r = found.step(TOLERANCES), found.step(DISCREPANCY)
+    assert r.fitted is not None
+    known = MISSED if np.isfinite(found.measured.damping).any() else {kinds_of.STIFFNESS: MISSED[kinds_of.STIFFNESS]}
+    missed = [f"{what} by {100 * r.fitted.sizes[kind]:g} %" for kind, what in known.items() if r.fitted.sizes.get(kind)]
+    if not missed:
+        return "A constant discrepancy of the model is not asked for: what is missing changes with the conditions, or nothing is."
+    return (
+        f"The model is wrong at all conditions alike, in {' and in '.join(missed)} or so; where that is granted, the error is {r.error:.2f} instead of "
+        f"{below.error:.2f}, tolerances lie {r.stretch:.2f} instead of {below.stretch:.2f} standard deviations from the drawing (ln evidence {evidence(r.evidence - below.evidence, '+')})."
     )
-    return f"The tolerances take the error from {drawn.error:.2f} to {r.error:.2f} standard errors{paid}."
 
 
 def _effects(found: Ladder) -> Iterator[str]:
-    for r in (r for r in found.rungs if r.effects):
-        below = found.rung(r.above)
+    for r in (r for r in found.steps if r.effects):
+        below = found.step(r.above)
         gain = r.evidence - below.evidence
         change = f"error {below.error:.2f} -> {r.error:.2f}, held out {below.held_out:.2f} -> {r.held_out:.2f}, tolerances "
         change += f"{below.stretch:.2f} -> {r.stretch:.2f} s.d., ln evidence {evidence(gain, '+')}"
         if gain > CLEAR:
-            told = "is supported"
+            verdict = "is supported"
         elif gain > 0:
-            told = f"is not established: {CLEAR:g} in ln evidence is asked"
+            verdict = f"is not established: {CLEAR:g} in ln evidence is asked"
         else:
-            told = "is not asked for by these data"
+            verdict = "is not asked for by these data"
         name = r.effects[-1] if r.name.startswith("+") else " + ".join(r.effects)
-        yield f"{name} {told} ({change})."
+        yield f"{name} {verdict} ({change})."
     if found.diagnosis is not None:
         yield f"Diagnosis: {found.diagnosis.verdict.word}. {found.diagnosis.verdict.reason}"
 
@@ -72,68 +85,63 @@ def _effects(found: Ladder) -> Iterator[str]:
 def _counted(found: Ladder) -> str:
     top = found.top
     assert top.fitted is not None  # tolerances are always fitted
-    numbers, parameters = len(found.theory.data.value), len(found.theory.sd) + sum(len(v) for v in top.values.values())
-    told = (
-        f"Rung {top.name!r} has {parameters} parameters, all with priors, and {numbers} numbers, which decide {determined(found.theory, top.fitted):.1f} "
+    numbers, parameters = top.fitted.fit.count, len(top.fitted.fit.point)
+    counted = (
+        f"Step {top.name!r} has {parameters} parameters, all with priors, and {numbers} numbers, which decide {top.fitted.determined():.1f} "
         "combinations of them"
     )
     if parameters >= numbers:
-        told += "; with fewer numbers than parameters the data identify none of them alone: each value is a belief that the data moved"
-    return told + "."
+        counted += "; with fewer numbers than parameters the data identify none of them alone: each value is a belief that the data moved"
+    return counted + "."
 
 
 def remaining(found: Ladder) -> Iterator[str]:
-    """What is wrong with shifts and pairs, as drawn and on the top rung."""
-    for r in dict.fromkeys((found.rung("axial equilibrium"), found.top)):
-        wrong = [*[told for _, told in sorted(_wrong_shifts(found, r), reverse=True)[:MOST]], *_wrong_splits(found, r)]
+    """What is wrong with shifts and pairs, as drawn and at the top."""
+    for r in dict.fromkeys((found.step("axial equilibrium"), found.top)):
+        wrong = [*[words for _, words in sorted(_wrong_shifts(found, r), reverse=True)[:MOST]], *_wrong_splits(found, r)]
         if wrong:
-            yield f"Left over on rung {r.name!r}: {'; '.join(wrong)}."
+            yield f"Left over at step {r.name!r}: {'; '.join(wrong)}."
         elif r.fitted is not None:
-            yield f"Left over on rung {r.name!r}: no shift and no split wrong by more than {WRONG:g} standard errors."
+            yield f"Left over at step {r.name!r}: no shift and no split wrong by more than {WRONG:g} standard errors."
 
 
-def _numbers(found: Ladder, r: Rung) -> dict[tuple[int, int], tuple[float, float, float]]:
-    """(measured Hz, computed Hz, sd Hz) by test and mode number."""
-    data = found.theory.data
-    told = {}
-    for k, f in enumerate(data.features):
-        if f.what == "frequency" and found.mode[k]:
-            measured = float(np.exp(data.value[k]))
-            told[f.test, int(found.mode[k])] = (measured, measured * float(np.exp(-r.residual[k])), measured * float(data.sd[k]))
-    return told
+def _numbers(found: Ladder, r: Step) -> dict[tuple[int, int], tuple[float, float, float]]:
+    """(measured Hz, computed Hz, standard error Hz) by test and mode number."""
+    m = found.measured
+    rows = zip(m.test.tolist(), m.number.tolist(), m.frequency.tolist(), r.frequency.tolist(), m.sd.tolist(), strict=True)
+    return {(t, n): (measured, computed, sd) for t, n, measured, computed, sd in rows if n and np.isfinite(computed)}
 
 
 def _ends(found: Ladder) -> tuple[int, int]:
     """The coldest and the hottest test at the lowest speed."""
-    where = [(abs(o.condition.speed), o.condition.temperature, t) for t, o in enumerate(found.theory.data.observations)]
+    where = [(abs(o.condition.speed), o.condition.temperature, t) for t, o in enumerate(found.measured.observations)]
     slow = [w for w in where if w[0] == min(where)[0]]
     return min(slow)[2], max(slow)[2]
 
 
-def _wrong_shifts(found: Ladder, r: Rung) -> Iterator[tuple[float, str]]:
+def _wrong_shifts(found: Ladder, r: Step) -> Iterator[tuple[float, str]]:
     """By how many standard errors, and in words."""
     numbers, (cold, hot) = _numbers(found, r), _ends(found)
-    for mode, kind in found.kinds.items():
+    for mode, kind in found.measured.kinds.items():
         if cold != hot and (cold, mode) in numbers and (hot, mode) in numbers:
             (m0, c0, s0), (m1, c1, s1) = numbers[cold, mode], numbers[hot, mode]
             sd = float(np.hypot(s0, s1))
-            if abs((c1 - c0) - (m1 - m0)) > WRONG * sd:
-                told = (
-                    "moves the other way" if (m1 - m0) * (c1 - c0) < 0 else ("moves more" if abs(m1 - m0) > abs(c1 - c0) else "moves less")
-                )
-                pull = abs((c1 - c0) - (m1 - m0)) / sd
-                yield pull, f"mode {mode} ({kind}) {told} than computed, {m1 - m0:+.1f} +- {sd:.2g} Hz against {c1 - c0:+.1f}"
+            residual = abs((c1 - c0) - (m1 - m0)) / sd
+            if residual > WRONG:
+                more = "moves more" if abs(m1 - m0) > abs(c1 - c0) else "moves less"
+                how = "moves the other way" if (m1 - m0) * (c1 - c0) < 0 else more
+                yield residual, f"mode {mode} ({kind}) {how} than computed, {m1 - m0:+.1f} +- {sd:.2g} Hz against {c1 - c0:+.1f}"
 
 
-def _wrong_splits(found: Ladder, r: Rung) -> Iterator[str]:
-    numbers, cold = _numbers(found, r), _ends(found)[0]
-    for one, two in pairwise(found.kinds):
+def _wrong_splits(found: Ladder, r: Step) -> Iterator[str]:
+    numbers, cold, kinds = _numbers(found, r), _ends(found)[0], found.measured.kinds
+    for one, two in pairwise(kinds):
         pair = [numbers[cold, m] for m in (one, two) if (cold, m) in numbers]
-        if len(pair) == 2 and "axial" not in (found.kinds[one], found.kinds[two]):
+        if len(pair) == 2 and "axial" not in (kinds[one], kinds[two]):
             (m0, c0, s0), (m1, c1, s1) = pair
             sd = float(np.hypot(s0, s1))
             if abs(m1 - m0) < CLOSE * m0 and abs((c1 - c0) - (m1 - m0)) > WRONG * sd:
-                where = found.theory.data.observations[cold].test.id
+                where = found.measured.observations[cold].test.id
                 yield f"modes {one} and {two} lie {m1 - m0:.1f} +- {sd:.2g} Hz apart in {where}, computed {c1 - c0:.1f}"
 
 

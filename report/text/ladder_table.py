@@ -14,41 +14,42 @@ from rich.spinner import Spinner
 from rich.table import Table
 
 from thermospindle.diagnosis.ladder.ladder import Ladder
-from thermospindle.diagnosis.ladder.rung import Rung
-from thermospindle.report.figures.ladder import PullMap, pull_map
+from thermospindle.diagnosis.ladder.step import Step
+from thermospindle.report.figures.ladder import ResidualMap, residual_map
 from thermospindle.report.text.ladder import evidence, sentences
 
-COLUMNS = ("rung", "error\ns.e.", "held out\ns.e.", "error\nHz", "error\n%", "of shifts\nHz", "tolerances\ns.d.", "ln evidence")
+COLUMNS = ("step", "error\ns.e.", "held out\ns.e.", "error\nHz", "error\n%", "of shifts\nHz", "tolerances\ns.d.", "ln evidence")
 LEGEND = (
-    "Errors are rms, computed - measured; s.e. are standard errors, of the data or, held out, of the prediction from the other "
-    "temperatures. Tolerances: rms of the fitted build tolerances in their own standard deviations."
+    "Errors are rms residuals; s.e. are standard errors of the data (of every FRF line, or of a table's numbers) or, held out, of the prediction "
+    "by a fit that has not seen that temperature. Hz and %: of natural frequencies. Tolerances: rms of the fitted build tolerances in their own "
+    "standard deviations."
 )
 
 
 def ladder_json(found: Ladder) -> dict[str, Any]:
-    first, top = pull_map(found, found.rungs[0]), pull_map(found, found.top)
+    first, top = residual_map(found, found.steps[0]), residual_map(found, found.top)
     return {
         "scene": found.spindle.name,
         "campaign": found.campaign.title,
-        "numbers": len(found.theory.data.value),
-        "parameters": len(found.theory.sd),
+        "numbers": sum(d.count for d in found.model.tests),
+        "parameters": len(found.model.parameters),
         "verdict": None if found.diagnosis is None else found.diagnosis.verdict.word,
         "top": found.top.name,
-        "rungs": [_rung_json(r) for r in found.rungs],
-        "forms": [dict(zip(("name", "error", "held_out", "evidence"), f, strict=True)) for f in found.forms],
-        "pulls": {"modes": first.modes, "tests": first.tests, "first": _lists(first), "top": _lists(top)},
+        "rungs": [_step_json(r) for r in found.steps],
+        "forms": [{"name": f[0], "error": f[1], "held_out": _known(f[2]), "evidence": f[3]} for f in found.forms],
+        "pulls": {"modes": first.modes, "tests": first.tests, "first": _lists(first), "top": _lists(top)},  # residuals in standard errors
         "words": sentences(found),
     }
 
 
-def _rung_json(r: Rung) -> dict[str, Any]:
-    units = {e.name: {p.name: p.unit for p in e.parameters} for e in (r.fitted.effects if r.fitted else ())}
+def _step_json(r: Step) -> dict[str, Any]:
+    units = {m.name: {p.name: p.unit for p in m.effect.parameters} for m in (r.fitted.mechanisms if r.fitted else ())}
     return {
         "name": r.name,
         "on": r.above,
         "effects": list(r.effects),
         "error": r.error,
-        "held_out": r.held_out,
+        "held_out": _known(r.held_out),
         "rms_Hz": r.rms_Hz,
         "rms_percent": r.rms_percent,
         "rms_shift_Hz": r.rms_shift_Hz,
@@ -61,39 +62,46 @@ def _rung_json(r: Rung) -> dict[str, Any]:
     }
 
 
-def _lists(pulls: PullMap) -> dict[str, Any]:
+def _known(value: float) -> float | None:
+    """None for an error of tests left out where there is nothing to leave out."""
+    return float(value) if np.isfinite(value) else None
+
+
+def _lists(residuals: ResidualMap) -> dict[str, Any]:
     def rows(a: np.ndarray | None) -> list[list[float | None]] | None:
         return None if a is None else [[None if np.isnan(v) else float(v) for v in row] for row in a]
 
-    return {"frequency": rows(pulls.frequency), "damping": rows(pulls.damping)}
+    return {"frequency": rows(residuals.frequency), "damping": rows(residuals.damping)}
 
 
 # ---------------------------------------------------------------- terminal
 
 
-def table(rungs: Sequence[Rung]) -> Table:
-    grid = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
-    for column in COLUMNS:
-        grid.add_column(column, justify="left" if column == "rung" else "right", no_wrap=column != "rung")
-    for r in rungs:
+def table(steps: Sequence[Step]) -> Table:
+    grid = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
+    grid.add_column(COLUMNS[0], min_width=13, overflow="fold")
+    for column in COLUMNS[1:]:
+        grid.add_column(column, justify="right", no_wrap=True)
+    for r in steps:
         grid.add_row(*cells(r))
     return grid
 
 
-def cells(r: Rung) -> tuple[str, ...]:
+def cells(r: Step) -> tuple[str, ...]:
     shift = "-" if r.rms_shift_Hz is None else f"{r.rms_shift_Hz:.2f}"
     stretch = f"{r.stretch:.2f}" if r.fitted else "as drawn"
-    return (r.name, f"{r.error:.2f}", f"{r.held_out:.2f}", f"{r.rms_Hz:.2f}", f"{r.rms_percent:.3f}", shift, stretch, evidence(r.evidence))
+    held_out = f"{r.held_out:.2f}" if np.isfinite(r.held_out) else "-"
+    return (r.name, f"{r.error:.2f}", held_out, f"{r.rms_Hz:.2f}", f"{r.rms_percent:.3f}", shift, stretch, evidence(r.evidence))
 
 
 class Growing:
     """The table as it grows, with what is being done below it."""
 
     def __init__(self, live: Live) -> None:
-        self.live, self.rungs, self.doing = live, list[Rung](), "reading the campaign"
+        self.live, self.steps, self.doing = live, list[Step](), "reading the campaign"
 
-    def rung(self, rung: Rung) -> None:
-        self.rungs.append(rung)
+    def step(self, step: Step) -> None:
+        self.steps.append(step)
         self._draw()
 
     def progress(self, doing: str) -> None:
@@ -101,7 +109,7 @@ class Growing:
         self._draw()
 
     def _draw(self) -> None:
-        self.live.update(Group(table(self.rungs), Spinner("line", self.doing)))
+        self.live.update(Group(table(self.steps), Spinner("line", self.doing)))
 
 
 @contextmanager
@@ -113,10 +121,8 @@ def growing(console: Console) -> Iterator[Growing]:
 
 def show_ladder(console: Console, found: Ladder) -> None:
     console.print(f"{found.campaign.title} against scene {found.spindle.name}", style="bold", markup=False, highlight=False)
-    console.print(table(found.rungs))
+    console.print(table(found.steps))
     console.print(LEGEND, style="dim", highlight=False)
     for sentence in sentences(found):
         console.print(f"\n{sentence}", markup=False, highlight=False)
 
-
-# ---------------------------------------------------------------- report and files

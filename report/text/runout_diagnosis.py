@@ -8,8 +8,7 @@ import numpy as np
 from rich.console import Console
 
 from thermospindle.diagnosis.runout.sources import SourceKey
-from thermospindle.diagnosis.runout.verdict import Explanation, RunoutDiagnosis
-from thermospindle.diagnosis.search.screening import CLEAR
+from thermospindle.diagnosis.runout.verdict import CLEAR, Explanation, RunoutDiagnosis
 from thermospindle.model.units import RPM, TO_UM
 from thermospindle.sim.effects.effect import Effect
 

@@ -13,9 +13,9 @@ from thermospindle.diagnosis import verdict
 from thermospindle.diagnosis.compare.before_after import without
 from thermospindle.diagnosis.data.observe import observe
 from thermospindle.diagnosis.draft import draft as drafted
+from thermospindle.diagnosis.prediction.outcomes import outcomes
 from thermospindle.diagnosis.runout.lines import modal_tests
 from thermospindle.diagnosis.runout.verdict import diagnose_runout
-from thermospindle.diagnosis.search.predicted import outcomes
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Spindle
 from thermospindle.model.scene.reading import content_hash

@@ -27,6 +27,6 @@ def ladder(
     (spindle, catalogue), tests = with_effects(scene, effect_files), read_campaign(campaign)
     chosen = None if effects is None else [by_name(name, catalogue) for name in effects]
     with growing(Console(stderr=True, markup=False)) as live:
-        found = climb(spindle, tests, chosen, catalogue, live.rung, live.progress)
+        found = climb(spindle, tests, chosen, catalogue, live.step, live.progress)
     write = write_json("ladder.json", lambda folder: write_ladder(found, folder))
     return answered(ladder_json(found), lambda console: show_ladder(console, found), out, asked, write)

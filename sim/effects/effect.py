@@ -143,9 +143,6 @@ class Effect:
     `imperfections(spindle, condition, values, imperfections)` what excites the running spindle;
     `measurement(spindle, condition, values, chain, measurement)` the measuring chain.
 
-    `form_error` is the share of its own size by which the formula may be wrong, `damping_form_error` the same for what it does to damping:
-    nobody's law of a bond or a film is exact to a percent, and a law of its losses is worth far less.
-
     `idle(spindle)` says why the effect has nothing to act on in a spindle, `outside(spindle)` why that spindle is outside its validity; None
     where neither is so (`refusal` asks both). `sized(spindle)` gives what is plausible for a machine of that size: factors by parameter
     name, of typical size, prior and limits, for sizes that are written for the reference spindle.
@@ -165,8 +162,6 @@ class Effect:
     chain: Callable[[Spindle, Condition, Values, RotorBase], RotorBase] | None = None
     imperfections: Callable[[Spindle, Condition, Values, Imperfections], Imperfections] | None = None
     measurement: Callable[[Spindle, Condition, Values, RotorBase, Measurement], Measurement] | None = None
-    form_error: float = 0.05
-    damping_form_error: float = 0.5
     idle: Question | None = None
     outside: Question | None = None
     sized: Sizes | None = None

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -49,8 +50,14 @@ MEASURED = Policy(width=0.3, alone=1.25, mixing=0.03)
 """Modes measured at two conditions, of which either may lack some; shapes without likeness in spaces without likeness cost 1.5."""
 COMPARED = Policy(width=0.08, power=1, alone=4.0, kind=3.0)
 """Measured modes and those of a model that may be wrong."""
+COMPUTED = Policy(width=0.08, power=1, other_kind=3.0)
+"""Computed modes from one test to the next; shapes may be missing, where tests have other measuring points."""
 NEARBY = Policy(width=1e-3, power=1)
 """Modes of one model at conditions so close that frequencies hardly move, as for a difference quotient."""
+REPEATED = Policy(width=0.36, alone=0.7)
+"""Modes of two tests of one machine: a MAC above 0.3, and frequencies within a factor of e^0.3 of each other."""
+NEAREST = Policy(width=1.0, power=1)
+"""Modes known by their frequencies alone: as many as there are, at the least sum of distances."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,6 +152,22 @@ def in_order(partner: NDArray[np.intp], a: ModeSet, b: ModeSet, close: float, tr
                 continue
         partner[group] = partner[group][np.argsort(b.frequency[partner[group]])]
     return partner
+
+
+def kept_in_order(partner: NDArray[np.intp], a: ModeSet, b: ModeSet, close: float) -> NDArray[np.intp]:
+    """Partners (ma,) with neighbours of `b` that are close in both sets, and not axial, in the order of their frequencies.
+
+    Unlike `in_order` this leaves pairs alone that are close in one set only: those have come apart, and their shapes count.
+    """
+    back = {int(j): i for i, j in enumerate(partner) if j >= 0 and b.kind[j] != "axial"}
+    for j, k in pairwise(sorted(back)):
+        i, h = back[j], back[k]
+        if i > h and a.frequency[i] < (1 + close) * a.frequency[h] and b.frequency[k] < (1 + close) * b.frequency[j]:
+            back[j], back[k] = h, i
+    kept = np.array(partner)
+    for j, i in back.items():
+        kept[i] = j
+    return kept
 
 
 def track(conditions: Sequence[ModeSet], policy: Policy = MEASURED) -> NDArray[np.intp]:

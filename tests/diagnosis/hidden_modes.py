@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from thermospindle.diagnosis.data.features import data_of
 from thermospindle.diagnosis.data.observe import DAMPING_FLOOR, FREQUENCY_FLOOR, Observation
-from thermospindle.diagnosis.prediction.theory import Theory, predict, theory
+from thermospindle.diagnosis.prediction.modes import predict
 from thermospindle.model.machine import Condition
 from thermospindle.model.tolerance import toleranced
 from thermospindle.sim.campaign.campaign import Test
@@ -51,7 +50,3 @@ def hidden(spindle, effects, seed: int) -> list[Observation]:
             )
         )
     return observations
-
-
-def theory_of(spindle, observations) -> Theory:
-    return theory(spindle, data_of(observations))

@@ -10,8 +10,8 @@ import pytest
 from tests.conftest import DATA, SCENE
 from thermospindle.diagnosis.compare.compare import compare
 from thermospindle.diagnosis.data.observe import DAMPING_FLOOR, FREQUENCY_FLOOR, observe
+from thermospindle.diagnosis.prediction.modes import Predicted, predict
 from thermospindle.diagnosis.prediction.partners import BELIEVABLE, numbered, partners
-from thermospindle.diagnosis.prediction.theory import Predicted, predict
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Addition, Condition
 from thermospindle.report.text.compare import comparison_json

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from thermospindle.diagnosis.fit.lines import chain_noise, fit_lines
+from thermospindle.diagnosis.line_fit import chain_noise, fit_lines
 from thermospindle.model.machine import Condition
 from thermospindle.model.tolerance import toleranced
 from thermospindle.sim.hammer.test import impact_tests
@@ -56,7 +56,7 @@ def test_a_virtual_test_with_its_window(spindle):
 
 
 def test_a_fit_that_does_not_rest_says_so(spindle, monkeypatch):
-    monkeypatch.setattr("thermospindle.diagnosis.fit.lines.LONGEST", 1)
+    monkeypatch.setattr("thermospindle.diagnosis.line_fit.LONGEST", 1)
     free = parameters(spindle)
     exact = operating_point(free[0].apply(spindle, 0.02), Condition(20.0)).frf(FREQUENCY)
     frf = Frf(FREQUENCY, exact, tuple(p.node for p in spindle.points), spindle.hammer.hammer_nodes, "mobility")

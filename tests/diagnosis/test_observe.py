@@ -6,6 +6,8 @@ import numpy as np
 
 from tests.diagnosis.hidden_modes import hidden
 from thermospindle.diagnosis.data.observe import _repeated
+from thermospindle.diagnosis.prediction.modes import predict
+from thermospindle.diagnosis.prediction.partners import paired, partners
 
 
 def with_pole(o, like, off):
@@ -31,3 +33,15 @@ def test_a_pole_that_splits_a_peak_is_left_out(spindle):
     assert len(found.frequency) == len(tests[0].frequency)
     also = [with_pole(o, 0, 0.01) for o in tests[1:]]
     assert len(_repeated(split, also).frequency) == len(split.frequency)
+
+
+def test_a_mode_that_nobody_predicts_is_no_ones_partner(spindle):
+    """A pole at 650 Hz, of the shape of no mode there, has no partner within reach and leaves those of all others as they were."""
+    for o in hidden(spindle, [], 4):
+        p = predict(spindle, o, ())
+        m = len(o.frequency)
+        order = [m, *range(m)]
+        odd = np.array([[1.0, -1.0, 0.5, -0.5, 0.8, -0.8, 0.3]], complex)
+        strange = replace(o, frequency=np.append(o.frequency, 650.0)[order], shape=np.vstack([o.shape, odd])[order])
+        assert partners(strange, p)[0] == -1
+        assert paired(strange, p)[1:].tolist() == paired(o, p).tolist()

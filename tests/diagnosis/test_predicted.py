@@ -7,7 +7,7 @@ import pytest
 
 from tests.diagnosis.hidden_modes import hidden
 from thermospindle.diagnosis.data.observe import Observation
-from thermospindle.diagnosis.search.predicted import outcomes
+from thermospindle.diagnosis.prediction.outcomes import outcomes
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.sim.campaign.campaign import Test

@@ -8,8 +8,8 @@ from scipy.optimize import minimize_scalar
 
 from thermospindle.diagnosis.compare.compare import compare
 from thermospindle.diagnosis.data.observe import FREQUENCY_FLOOR, Observation
-from thermospindle.diagnosis.data.thermometer import squares, temperature_slope, with_temperature
-from thermospindle.diagnosis.prediction.theory import predict
+from thermospindle.diagnosis.prediction.modes import predict
+from thermospindle.diagnosis.prediction.temperature import squares, temperature_slope, with_temperature
 from thermospindle.model.machine import Condition
 from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Test
 from thermospindle.sim.operating import operating_point

@@ -42,5 +42,4 @@ EFFECT = Effect(
     resembles=("bond_softening",),
     valid="within the viscosity table; at chamber temperature, so without the bearings' own heat",
     pair=pair,
-    damping_form_error=0.1,
 )

@@ -50,5 +50,4 @@ EFFECT = Effect(
     resembles=("grease_damping", "channel_delay"),
     valid="window over the whole record, the same in all tests that have it; force unwindowed or short",
     measurement=measurement,
-    damping_form_error=0.1,
 )

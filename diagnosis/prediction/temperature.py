@@ -11,15 +11,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from thermospindle.diagnosis.data.observe import Observation
-from thermospindle.diagnosis.prediction.theory import Applied, Predicted, predict
+from thermospindle.diagnosis.inference.model import Applied
+from thermospindle.diagnosis.prediction.modes import Predicted, predict
 from thermospindle.model.machine import Spindle
 from thermospindle.model.types import Array
+from thermospindle.sim.identification.pairing import NEARBY, pairs
 
 STEP = 0.1  # K, of the difference: frequencies move by less than 1e-4 of themselves
-NEAR = 1e-3  # ln frequency that costs as much as a fully different shape
 
 
 def temperature_slope(spindle: Spindle, o: Observation, p: Predicted, effects: Applied) -> Array:
@@ -29,11 +29,9 @@ def temperature_slope(spindle: Spindle, o: Observation, p: Predicted, effects: A
     """
     step = -STEP if o.condition.temperature > spindle.reference_temperature else STEP
     moved = predict(spindle, o, effects, step)
-    shape = moved.shape[:, : p.shape.shape[1]]
-    distance = np.abs(np.log(p.frequency[:, None] / moved.frequency)) / NEAR
-    unlike = 1 - np.abs(_unit(p.shape).conj() @ _unit(shape).T) ** 2
+    channels = p.shape.shape[1]
     found = np.zeros(2 * len(p.frequency))
-    for i, j in zip(*linear_sum_assignment(distance + unlike), strict=True):
+    for i, j in pairs(p.modes(channels), moved.modes(channels), NEARBY):
         found[i] = np.log(moved.frequency[j] / p.frequency[i]) / step
         found[len(p.frequency) + i] = np.log(moved.damping[j] / p.damping[i]) / step
     return found
@@ -49,7 +47,3 @@ def with_temperature(o: Observation, slope: Array, sd: float) -> Observation:
 def squares(difference: Array, covariance: Array) -> float:
     """r^T C^-1 r for the errors (n,) and their covariance (n, n)."""
     return float(difference @ np.linalg.solve(covariance, difference)) if len(difference) else 0.0
-
-
-def _unit(shape: np.ndarray) -> np.ndarray:
-    return shape / np.maximum(np.linalg.norm(shape, axis=1, keepdims=True), 1e-300)

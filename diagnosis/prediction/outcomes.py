@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 from scipy.stats import chi2 as chi_squared
 
 from thermospindle.diagnosis.data.observe import Observation
 from thermospindle.model.errors import BadInput
 from thermospindle.model.units import RPM
+from thermospindle.sim.identification.pairing import NEAREST, ModeSet, pairs
 
 SAME = {"temperature": 1.0, "speed": 10 * RPM}  # K, rad/s within which a test is the one that was planned
 REFUTED, DOUBTFUL = 1e-6, 1e-2  # probabilities of a misfit as large by chance
@@ -78,8 +78,8 @@ def _is(o: Observation, condition: dict[str, Any]) -> bool:
 def _outcome(o: Observation, name: str, predicted: np.ndarray) -> Outcome:
     """Modes paired in the way that costs least in ln frequency; frequencies and, where known and predicted, ln damping ratios."""
     m, error = len(o.frequency), np.sqrt(np.diag(o.covariance))
-    seen, said = linear_sum_assignment(np.abs(np.log(o.frequency[:, None] / predicted[:, 0])))
-    frequency, sd, damping, damping_sd = predicted[said].T
+    seen, expected = pairs(ModeSet(o.frequency), ModeSet(predicted[:, 0]), NEAREST).T
+    frequency, sd, damping, damping_sd = predicted[expected].T
     off = np.log(np.concatenate([o.frequency[seen] / frequency, o.damping[seen] / damping]))
     known = np.hypot(np.concatenate([error[:m][seen], error[m:][seen]]), np.concatenate([sd / frequency, damping_sd / damping]))
     pull = (off / known)[np.isfinite(known)]

@@ -1,0 +1,208 @@
+"""Fits of the ladder: a model beside all tests, and beside all but those of one temperature, which it then has to predict.
+
+Both are fitted afresh, from the drawing and with errors enlarged at first, so that nothing of a test left out is in the fit that predicts
+it. Unlike in `diagnose`, no mode may drift freely from test to test: what drifts is what the steps of the ladder are to explain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+
+from thermospindle.diagnosis.data.lines import LineData
+from thermospindle.diagnosis.inference import nuisance as kinds_of
+from thermospindle.diagnosis.inference.evidence import GRIDS, REFERENCE, Evidence, Learned, evidence
+from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, Problem, fit
+from thermospindle.diagnosis.inference.mechanism import Mechanism, variants
+from thermospindle.diagnosis.inference.model import FAILED, CampaignModel, TestData
+from thermospindle.model.errors import NoEquilibrium
+from thermospindle.model.types import Array
+from thermospindle.sim.effects.effect import Effect, Values
+
+FREE = (kinds_of.STIFFNESS_DRIFT, kinds_of.DAMPING_DRIFT)
+CONSTANT = (kinds_of.STIFFNESS, kinds_of.DAMPING)
+BEGINNING = 2  # of the tempers, after which one variant and start of an effect is followed
+FEW = 4  # variants of an effect up to which each is also begun at its typical size
+STALLED = 1.0  # of the cost above that of the step below, whose model is part of this one
+HOLDS = 1.5  # times the chi2 that the quadratic promises, up to which it is believed where the fit did not stand itself
+
+
+def without(model: CampaignModel, kinds: Sequence[str]) -> CampaignModel:
+    """The model without nuisance parameters of some kinds."""
+    return replace(model, parameters=tuple(p for p in model.parameters if p.kind not in kinds))
+
+
+def unseen(model: CampaignModel, group: Sequence[int]) -> CampaignModel:
+    """The model with the data of the tests in `group` taken away; their conditions and parameters stay."""
+    return replace(model, tests=tuple(_empty(model, t) if t in group else data for t, data in enumerate(model.tests)))
+
+
+def _empty(model: CampaignModel, t: int) -> TestData:
+    nothing = np.zeros((0 if not isinstance(d := model.tests[t], LineData) else len(d.value), len(model.scenes[t].hammer.hammer_nodes), 0))
+    quantity = d.quantity if isinstance(d, LineData) else "receptance"
+    return LineData(d.test, d.condition, np.zeros(0), nothing.astype(complex), nothing, quantity, "left out", 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """A fit with the discrepancy at the size that the data ask for: `model` has it in its priors, and lacks what is not needed.
+
+    `first` is the fit at the reference sizes from which it went on, `sizes` what was learned of the discrepancies, by kind.
+    """
+
+    model: CampaignModel
+    fit: Fit
+    evidence: Evidence
+    first: Fit
+    sizes: dict[str, float]
+
+    @property
+    def mechanisms(self) -> tuple[Mechanism, ...]:
+        return self.fit.mechanisms
+
+    @property
+    def nuisance(self) -> Array:
+        return self.fit.nuisance
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Posterior covariance (n, n) of all parameters of the fit, whose priors are N(0, 1)."""
+        return np.asarray(np.linalg.inv(self.fit.information + np.eye(len(self.fit.point))), float)
+
+    @cached_property
+    def posterior(self) -> tuple[Array, Array]:
+        """Mean (n,) and covariance (n, n) of all parameters, with the width and the departure from its law that were learned of every effect.
+
+        These move the mean away from where the fit stands; where the quadratic does not hold so far, the fit itself is taken, with its
+        wider priors.
+        """
+        if self.mechanisms:
+            there = Problem(self.model, self.mechanisms).residuals(self.evidence.mean)
+            if there is None or sum(float(r @ r) for r in there) > HOLDS * self.evidence.chi2:
+                return self.fit.point, self.covariance
+        return self.evidence.mean, self.evidence.covariance
+
+    def applied(self, t: int) -> list[tuple[Effect, Values]]:
+        """The effects as fitted to test `t`."""
+        problem = Problem(self.model, self.mechanisms)
+        _, sizes, shapes = problem.parts(self.fit.point)
+        return problem.acting(problem.applied(t, sizes, shapes)[0])
+
+    def determined(self) -> float:
+        """How many combinations of parameters the data, not the priors, decide: trace of the resolution matrix, at most the data's number."""
+        return float(len(self.fit.point) - np.trace(self.covariance))
+
+    def values(self) -> dict[str, dict[str, tuple[float, float]]]:
+        """Every effect's parameters with standard errors; its size is the mean over the tests, weighted by what they tell."""
+        mean, spread = self.posterior
+        _, sizes, shapes = Problem(self.model, self.mechanisms).parts(mean)
+        found: dict[str, dict[str, tuple[float, float]]] = {}
+        at = len(self.nuisance)
+        for m, root, own, shape in zip(self.mechanisms, self.fit.roots, sizes, shapes, strict=True):
+            part = slice(at, at + len(root))
+            covariance = root @ spread[part, part] @ root.T
+            weight = 1 / np.maximum(np.diag(covariance), 1e-300)
+            weight /= weight.sum()
+            row = {m.size.name: (float(np.clip(weight @ own, *m.size.limits)), float(np.sqrt(weight @ covariance @ weight)))}
+            row |= {name: (v, 0.0) for name, v in m.choices.items()}
+            at += len(root)
+            errors = np.sqrt(np.maximum(np.diag(spread)[at : at + len(m.shape)], 0.0))
+            row |= {p.name: (float(v), float(e * p.prior_sd)) for p, v, e in zip(m.shape, shape, errors, strict=True)}
+            found[m.name] = {p.name: row[p.name] for p in m.effect.parameters if p.name in row}
+            at += len(m.shape)
+        return found
+
+
+def settled(model: CampaignModel, below: Settled | None = None, effects: Sequence[Effect] = ()) -> Settled:
+    """The model fitted with `effects` beside those of the step `below`, in the variant that suits the data best.
+
+    Raises `NoEquilibrium` where no start has a spindle.
+    """
+    present = below.mechanisms if below else ()
+    added = [variants(e) for e in effects]
+    choices = [(*present, *row) for row in product(*added)]
+    both = len(choices) <= FEW
+    begun = [f for c in choices for p in _starts(model, c, len(present), both) if (f := _tried(model, c, p)) is not None]
+    if not begun:
+        raise NoEquilibrium(f"no spindle can be built with {' and '.join(e.name for e in effects) or 'these tolerances'}")
+    best = max(begun, key=lambda f: evidence(model, f).ln) if len(begun) > 1 else begun[0]
+    found = fit(model, best.mechanisms, best.point, best.rates, TEMPERS[BEGINNING:])
+    if below and len(below.first.nuisance) == len(found.nuisance) and _cost(found) > _cost(below.first) + STALLED:
+        more = np.zeros(len(found.point) - len(below.first.point))
+        again = fit(model, found.mechanisms, np.concatenate([below.first.point, more]), below.first.rates, TEMPERS[-1:])
+        found = min(found, again, key=_cost)
+    return _at_learned(model, found)
+
+
+def _starts(model: CampaignModel, mechanisms: Sequence[Mechanism], present: int, both: bool) -> list[Array]:
+    """The drawing with new mechanisms at no size, and at their typical one in all tests."""
+    problem = Problem(model, mechanisms)
+    neutral, typical, at = np.zeros(problem.length), np.zeros(problem.length), problem.nuisances
+    for k, (m, root) in enumerate(zip(mechanisms, problem.roots, strict=True)):
+        if k >= present:
+            typical[at : at + len(root)] = np.linalg.solve(root, np.full(len(root), m.size.typical - m.size.neutral))
+        at += len(root) + len(m.shape)
+    return [neutral, typical] if both and typical.any() else [neutral]
+
+
+def _tried(model: CampaignModel, mechanisms: Sequence[Mechanism], start: Array) -> Fit | None:
+    try:
+        return fit(model, mechanisms, start, tempers=TEMPERS[:BEGINNING])
+    except FAILED:
+        return None
+
+
+def _cost(found: Fit) -> float:
+    return found.chi2 + float(found.point @ found.point)
+
+
+def _at_learned(model: CampaignModel, first: Fit) -> Settled:
+    """The fit gone on with every discrepancy at the size that makes the data likeliest, instead of the reference size; errors are as stated.
+
+    Far from the reference the quadratic about the fit is not to be trusted: a model that misses frequencies by a hundredth shifts peaks
+    by more than their width.
+    """
+    kinds = [kind for kind in GRIDS if any(p.kind == kind for p in model.parameters)]
+    tried = [dict(zip(kinds, row, strict=True)) for row in product(*(GRIDS[kind] for kind in kinds))]
+    learned = max(tried, key=lambda sizes: evidence(model, first, _as_stated(sizes)).ln)
+    times = np.array([learned[p.kind] / REFERENCE[p.kind] if p.kind in learned else 1.0 for p in model.parameters])
+    kept = np.flatnonzero(times)
+    own = replace(model, parameters=tuple(replace(model.parameters[i], sd=model.parameters[i].sd * times[i]) for i in kept))
+    start = np.concatenate([first.point[kept] / times[kept], first.point[len(times) :]])
+    found = fit(own, first.mechanisms, start, tempers=TEMPERS[-2:])
+    now = {kind: REFERENCE[kind] for kind, size in learned.items() if size}  # which the priors of `own` are
+    return Settled(own, found, evidence(own, found, _as_stated(now)), first, learned)
+
+
+def _as_stated(sizes: dict[str, float]) -> Learned:
+    return Learned(sizes, 1.0, (), ())
+
+
+# ---------------------------------------------------------------- what was left out
+
+
+def predicted_squares(found: Settled, tests: Sequence[TestData], group: Sequence[int]) -> tuple[float, int]:
+    """Squares, and number, of the residuals of tests that `found` has not seen, in standard errors of its prediction.
+
+    With r the residuals there in standard errors of the data, J their derivatives by all parameters and S the covariance of these, it is
+    r (1 + J S J^T)^-1 r: what is not known of the left-out test itself (its temperature, its gains) is part of S, with its prior.
+    """
+    model = replace(found.model, tests=tuple(tests))
+    problem = Problem(model, found.mechanisms)
+    point, covariance = found.posterior
+    rates = model.rates(problem.parts(point)[0], problem.effects_of(point))
+    information, gradient, total, count = np.zeros((problem.length,) * 2), np.zeros(problem.length), 0.0, 0
+    for t in group:
+        r, jacobian, numbers = problem.linearised(t, point, rates)
+        information[np.ix_(numbers, numbers)] += jacobian.T @ jacobian
+        gradient[numbers] += jacobian.T @ r
+        total += float(r @ r)
+        count += len(r)
+    size, directions = np.linalg.eigh(covariance)
+    root = directions * np.sqrt(np.maximum(size, 0.0))
+    half = root.T @ gradient
+    return total - float(half @ np.linalg.solve(np.eye(len(half)) + root.T @ information @ root, half)), count

@@ -1,0 +1,63 @@
+"""The modes that a model has at the condition of a test, as its measuring points show them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from thermospindle.diagnosis.data.observe import Observation
+from thermospindle.diagnosis.inference.model import Applied
+from thermospindle.model.machine import Spindle
+from thermospindle.model.rotor.chain import Matrices, matrices
+from thermospindle.model.rotor.modes import kinds, oscillating, poles
+from thermospindle.model.types import Array, ComplexArray
+from thermospindle.sim.effects.effect import Measurement
+from thermospindle.sim.identification.pairing import ModeSet
+from thermospindle.sim.operating import operating_point
+
+BEYOND = 1.5  # of the hammer's band, up to which modes are computed
+
+
+@dataclass(frozen=True, eq=False)
+class Predicted:
+    """Modes of one condition: pole (k,) rad/s, shape (k, n_resp) and participation (k, n_ref) as the measuring points see them, kinds.
+
+    The residue of the receptance is shape times participation.
+    """
+
+    pole: ComplexArray
+    shape: ComplexArray
+    participation: ComplexArray
+    kind: tuple[str, ...]
+
+    @property
+    def frequency(self) -> Array:
+        """Undamped frequencies (k,), Hz."""
+        return np.abs(self.pole) / (2 * np.pi)
+
+    @property
+    def damping(self) -> Array:
+        """Damping ratios (k,)."""
+        return np.asarray(-self.pole.real / np.abs(self.pole), float)
+
+    def modes(self, channels: int | None = None) -> ModeSet:
+        """For pairing, with shapes at the first `channels` points."""
+        return ModeSet(self.frequency, self.shape[:, :channels], self.kind)
+
+
+def predict(spindle: Spindle, observation: Observation, effects: Applied, warmer: float = 0.0) -> Predicted:
+    """Modes at the condition of an observation, `warmer` kelvin above what its thermometer said."""
+    condition = replace(observation.condition, temperature=observation.condition.temperature + warmer)
+    point = operating_point(spindle, condition, effects)
+    return predicted(matrices(point.chain), point.measurement, BEYOND * spindle.hammer.band[1])
+
+
+def predicted(linear: Matrices, chain: Measurement, highest: float) -> Predicted:
+    """Modes of a linear model up to `highest` (Hz) as its measuring chain shows them."""
+    own = poles(linear)
+    found = oscillating(own, highest)
+    pole, right = own.value[found] - chain.decay, own.right[:, found]
+    seen = chain.gain * np.exp(-1j * np.abs(pole[:, None]) * chain.delay)
+    participation = own.left[found] @ chain.reference_rows.T * (1 + chain.decay / pole[:, None])
+    return Predicted(pole, (chain.response_rows @ right).T * seen, participation, kinds(linear, right))
