@@ -14,7 +14,7 @@ import numpy as np
 
 from thermospindle.diagnosis.data.observe import Observation
 from thermospindle.diagnosis.prediction.modes import Predicted
-from thermospindle.model.types import Array, ComplexArray, Integers
+from thermospindle.model.types import ComplexArray, Integers
 from thermospindle.model.units import RPM
 from thermospindle.sim.identification import pairing
 from thermospindle.sim.identification.pairing import COMPARED, COMPUTED, in_order, kept_in_order
