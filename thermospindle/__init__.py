@@ -1,1 +1,45 @@
-"""Thermospindle: from temperature to the modal peaks of a spindle, and from measurements to the physics a model lacks."""
+"""Thermospindle: from temperature to the modal peaks of a spindle, and from measurements to the physics a model lacks.
+
+    import thermospindle as ts
+
+    spindle = ts.load("hdd_2003")
+    point = ts.point(spindle, 60.0, speed_rpm=7200)
+    for mode in ts.modes(point):
+        print(mode.kind, mode.frequency)
+
+The names below are functions of `thermospindle.front`, loaded when first used: importing this package costs nothing. They take and return
+the objects that the command line uses; `thermospindle.testing` has assertions for pytest.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from thermospindle.front import add as add
+    from thermospindle.front import campaign as campaign
+    from thermospindle.front import compare as compare
+    from thermospindle.front import diagnose as diagnose
+    from thermospindle.front import frf as frf
+    from thermospindle.front import impact as impact
+    from thermospindle.front import load as load
+    from thermospindle.front import modes as modes
+    from thermospindle.front import point as point
+    from thermospindle.front import read_log as read_log
+    from thermospindle.model.errors import BadInput as BadInput
+
+__all__ = ["BadInput", "add", "campaign", "compare", "diagnose", "frf", "impact", "load", "modes", "point", "read_log"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in __all__:
+        raise AttributeError(f"module 'thermospindle' has no attribute {name!r}; there are {', '.join(__all__)}")
+    from importlib import import_module
+
+    found = getattr(import_module("thermospindle.model.errors" if name == "BadInput" else "thermospindle.front"), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -111,8 +111,8 @@ class Log:
 
         value = np.empty((len(responses), len(references), len(frequency)), complex)
         value.real, value.imag = lines("real"), lines("imaginary")
-        others = [lines(name) if name in self.columns[entity] else None for name in ("coherence", "standard_error")]
-        return Frf(frequency[rising], value, responses, references, about["quantity"][0], *others)
+        coherence, sd = (lines(name) if name in self.columns[entity] else None for name in ("coherence", "standard_error"))
+        return Frf(frequency[rising], value, responses, references, about["quantity"][0], coherence, sd)
 
     # ------------------------------------------------------------ maps
 

@@ -136,7 +136,8 @@ def read_frf(path: Path, quantity: str, points: Sequence[Point]) -> Frf:
         raise BadInput(f"{path}: holds no FRF (dataset 58, function type 4)")
     responses, references = (tuple(dict.fromkeys(pair[k] for pair in found["FRF"])) for k in (0, 1))
     arrays = {role: _stack(path, role, pairs, responses, references) for role, pairs in found.items() if pairs}
-    return Frf(frequency, arrays["FRF"], responses, references, quantity, arrays.get("coherence"), arrays.get(STANDARD_ERROR))
+    names = {p.node: p.name for p in points}
+    return Frf(frequency, arrays["FRF"], responses, references, quantity, arrays.get("coherence"), arrays.get(STANDARD_ERROR), names)
 
 
 MOTIONS = {1: ("time", 17, "s"), 12: ("spectrum", 18, "Hz")}

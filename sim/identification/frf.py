@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ TO_POWER = {"receptance": 1j, "mobility": 1.0, "accelerance": -1j}
 class Frf:
     """The FRFs of one test, motion along each response point's direction over force along each reference point's direction.
 
-    Equal means equal bit for bit. The sign of zeros in `value` is dropped: it means nothing, and UFF readers do not keep it.
+    `frf["hub_top0", "seat90"]` or `frf[1, 6]` is one of them, (n,): response and reference by the names or numbers of their nodes. Equal means equal bit for bit. The sign of zeros in `value` is dropped: it means nothing, and UFF readers do not keep it.
     """
 
     frequency: np.ndarray  # (n,), Hz
@@ -29,12 +30,25 @@ class Frf:
     quantity: str  # receptance, mobility or accelerance
     coherence: np.ndarray | None = None  # like value, real, 0 to 1
     sd: np.ndarray | None = None  # like value, real, its unit: standard error sqrt(E |error|^2) of each complex value
+    names: Mapping[int, str] = field(default_factory=dict, compare=False)  # of the nodes, where they are known
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "value", self.value + 0.0)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Frf) and all(_same(getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
+        return isinstance(other, Frf) and all(_same(getattr(self, f.name), getattr(other, f.name)) for f in fields(self) if f.compare)
+
+    def __getitem__(self, ends: tuple[int | str, int | str]) -> np.ndarray:
+        """One FRF (n,), complex. Raises `BadInput` naming the nodes there are."""
+        places = [self._place(end, nodes) for end, nodes in zip(ends, (self.response_nodes, self.reference_nodes), strict=True)]
+        return np.asarray(self.value[places[0], places[1]])
+
+    def _place(self, end: int | str, nodes: tuple[int, ...]) -> int:
+        for place, node in enumerate(nodes):
+            if end in (node, self.names.get(node)):
+                return place
+        what = "response" if nodes is self.response_nodes else "reference"
+        raise BadInput(f"{end!r} is no {what} of these FRFs; there are {', '.join(f'{n} {self.names.get(n, str())}'.strip() for n in nodes)}")
 
 
 def _same(a: Any, b: Any) -> bool:

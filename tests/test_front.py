@@ -1,0 +1,90 @@
+"""`import thermospindle as ts`: the same numbers and objects as the command line, named nodes, nothing loaded before it is used."""
+
+import runpy
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import thermospindle as ts
+from tests.conftest import DATA, ROOT, SCENE
+from thermospindle.model.machine import Condition
+from thermospindle.model.scene.reading import load
+from thermospindle.sim.campaign.campaign import read_campaign
+from thermospindle.sim.operating import operating_point
+
+GALLERY = sorted((ROOT / "docs" / "gallery").glob("*.py"))
+SLOW = ("05_hammer_test", "10_diagnose")
+
+
+def test_importing_loads_nothing():
+    code = "import sys, time; a = time.process_time(); import thermospindle; b = time.process_time(); print(b - a, 'numpy' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    seconds, numpy_there = done.stdout.split()
+    assert float(seconds) < 0.1
+    assert numpy_there == "False"
+
+
+def test_every_name_is_there_and_documented():
+    for name in ts.__all__:
+        assert getattr(ts, name).__doc__
+        assert name in dir(ts)
+    with pytest.raises(AttributeError, match="there are BadInput, add"):
+        _ = ts.lode
+
+
+def test_modes_are_those_of_the_model():
+    point = ts.point("hdd_2003", 60, speed_rpm=7200)
+    own = operating_point(load(SCENE), Condition(60.0, 7200 * 2 * np.pi / 60)).modes
+    assert [m.frequency for m in ts.modes(point)] == [m.frequency for m in own]
+    assert len(ts.modes(point, highest_Hz=3000)) == 5
+
+
+@pytest.mark.parametrize(("quantity", "power"), [("receptance", -1), ("mobility", 0), ("accelerance", 1)])
+def test_frfs_know_their_nodes(quantity, power):
+    point, lines = ts.point("hdd_2003", 20), np.array([900.0, 1002.0, 1500.0])
+    found = ts.frf(point, lines, quantity=quantity)
+    expected = point.frf(lines) * (2j * np.pi * lines) ** power
+    np.testing.assert_allclose(found["seat90", "hub_top90"], expected[5, 1])
+    np.testing.assert_array_equal(found["seat90", "hub_top90"], found[6, 2])
+    with pytest.raises(ts.BadInput, match="'hub' is no response of these FRFs; there are 1 hub_top0, 2 hub_top90"):
+        _ = found["hub", "hub_top0"]
+
+
+def test_frfs_of_a_campaign_know_their_nodes():
+    frf = ts.campaign(DATA / "foreign_bond").tests[0].frf
+    np.testing.assert_array_equal(frf["hub_side0", "hub_top90"], frf.value[2, 1])
+
+
+def test_add_is_the_effect_of_the_catalogue():
+    worn = ts.add("hdd_2003", "preload_loss", loss=0.3)
+    assert worn.effects[0].values["loss"] == 0.3
+    assert ts.modes(ts.point(worn, 20))[4].frequency < ts.modes(ts.point("hdd_2003", 20))[4].frequency
+    with pytest.raises(ts.BadInput, match="did you mean loss"):
+        ts.add("hdd_2003", "preload_loss", los=0.3)
+    with pytest.raises(ts.BadInput, match="has it already"):
+        ts.add(worn, "preload_loss")
+
+
+def test_compare_takes_folders_and_campaigns():
+    folder = SCENE / "measured" / "jang_2003"
+    assert ts.compare(SCENE, folder).rms_pull == ts.compare(ts.load("hdd_2003"), read_campaign(folder)).rms_pull
+
+
+@pytest.mark.parametrize("wrong", [[-1.0], [[1.0]], [np.nan]])
+def test_frequencies_that_are_none_are_refused(wrong):
+    with pytest.raises(ts.BadInput, match="frequency_Hz"):
+        ts.frf(ts.point("hdd_2003", 20), wrong)
+
+
+def test_there_are_ten_in_the_gallery():
+    assert len(GALLERY) == 10
+    assert all(f.read_text(encoding="utf-8").startswith('"""') for f in GALLERY)
+
+
+@pytest.mark.parametrize("script", [pytest.param(f, marks=[pytest.mark.slow] * (f.stem in SLOW), id=f.stem) for f in GALLERY])
+def test_gallery(script: Path, capsys):
+    runpy.run_path(str(script), run_name="__main__")
+    assert capsys.readouterr().out.strip()

@@ -1,0 +1,109 @@
+"""The pytest plugin and its assertions, by pytest's own tool for plugins."""
+
+import os
+import subprocess
+import sys
+from importlib.metadata import entry_points
+
+import pytest
+
+from tests.conftest import DATA, ROOT, SCENE
+from thermospindle.model.errors import BadInput
+from thermospindle.testing import (
+    Spindles,
+    assert_agreement,
+    assert_damping,
+    assert_frequency,
+    assert_frequency_shift,
+    assert_margin,
+    assert_peak_level,
+    assert_split,
+)
+
+pytest_plugins = ["pytester"]
+THERE = "thermospindle" in {e.name for e in entry_points(group="pytest11")}
+PLUGIN = () if THERE else ("-p", "thermospindle.plugin")
+
+
+def test_a_users_tests(pytester):
+    """What holds passes; what does not is told with what moved, by how much, and where the energy is."""
+    pytester.makepyfile(
+        """
+        from thermospindle.testing import assert_frequency_shift
+
+        def test_holds():
+            assert_frequency_shift("hdd_2003", mode="rocking 1", from_C=20, to_C=60, shift_Hz=-20, within=2)
+
+        def test_fails():
+            assert_frequency_shift("hdd_2003", mode="axial 3", from_C=20, to_C=60, shift_Hz=-20, within=2)
+
+        def test_is_loaded_once(spindle):
+            assert spindle("hdd_2003") is spindle("hdd_2003")
+            assert spindle.point("hdd_2003", 20) is spindle.point("hdd_2003", 20.0)
+        """
+    )
+    result = pytester.runpytest_inprocess(*PLUGIN, "-p", "no:cacheprovider")
+    result.assert_outcomes(passed=2, failed=1)
+    result.stdout.fnmatch_lines(
+        [
+            "*hdd_2003: axial 3 moves by -13.92 Hz from 20 to 60 C; wanted -20 +- 2 Hz",
+            "*> axial 3 *2009.98 *1996.06* *-13.92",
+            "*strain energy of axial at 2010.0 Hz: flange 58%, plate 30%*",
+            "*moved by the stiffness of: *",
+        ]
+    )
+    assert "_pair(scene" not in result.stdout.str()
+
+
+def test_the_plugin_loads_nothing_that_computes():
+    code = "import sys, pytest; before = set(sys.modules); import thermospindle.plugin; print(sorted(set(sys.modules) - before))"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "['thermospindle', 'thermospindle.plugin']"
+
+
+def test_modes_by_kind_and_number():
+    own = Spindles()
+    assert own.mode(SCENE, "rocking 1", 20).frequency == pytest.approx(1795.0, abs=0.5)
+    assert own.mode(SCENE, "rocking 2", 20).frequency == pytest.approx(1821.0, abs=0.5)
+    assert own.mode(SCENE, 5, 20) is own.mode(SCENE, "axial 3", 20)
+    for wrong in ("rocking", "rocking 9", "tumbling 1", 0, "3"):
+        with pytest.raises(BadInput, match="hdd_2003 has axial 1 to 4, rocking 1 to"):
+            own.mode(SCENE, wrong, 20)
+
+
+HOLDS = [
+    (assert_frequency, {"mode": "axial 1", "at_C": 20, "frequency_Hz": 1002, "within": 0.5}, {"frequency_Hz": 1010}, "axial 1 lies at 1002.0"),
+    (assert_damping, {"mode": "axial 1", "at_C": 20, "percent": 0.54, "within": 0.01}, {"percent": 0.6}, "0.53"),
+    (assert_split, {"modes": ("rocking 1", "rocking 2"), "at_C": 20, "speed_rpm": 7200, "split_Hz": 94.7, "within": 0.5}, {"speed_rpm": 0.0}, "lie 26.0"),
+    (assert_frequency_shift, {"mode": 3, "from_C": 20, "to_C": 60, "shift_Hz": -19.9, "within": 0.2}, {"shift_Hz": 0}, "moves by -19.87 Hz"),
+    (
+        assert_peak_level,
+        {"mode": "axial 1", "at_C": 20, "response": "base", "reference": "hub_top0", "level": 0.0200, "within": 0.0002},
+        {"level": 1.0},
+        "is 0.0",
+    ),
+    (assert_margin, {"mode": "axial 1", "speed_rpm": 7200, "at_least_percent": 0.5}, {"at_least_percent": 1.0}, r"20 \(fo-fc\)"),
+    (assert_agreement, {"campaign": SCENE / "measured" / "jang_2003", "rms": 42}, {"rms": 2}, "is 41.5. standard errors"),
+]
+
+
+@pytest.mark.parametrize(("check", "told", "change", "said"), HOLDS, ids=lambda a: getattr(a, "__name__", ""))
+def test_every_assertion_holds_and_bites(check, told, change, said):
+    check(SCENE, **told)
+    with pytest.raises(AssertionError, match=said):
+        check(SCENE, **(told | change))
+
+
+def test_a_scene_that_changed_is_read_again(tmp_path):
+    own, file = Spindles(), tmp_path / "spindle.toml"
+    file.write_text((SCENE / "spindle.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    first = own.mode(tmp_path, "axial 3", 20).frequency
+    file.write_text(file.read_text(encoding="utf-8").replace("preload_N = 16.0", "preload_N = 12.0"), encoding="utf-8")
+    os.utime(file, ns=(1, 1))
+    assert own.mode(tmp_path, "axial 3", 20).frequency < first - 1
+
+
+@pytest.mark.slow
+def test_agreement_with_frfs_of_another_program():
+    with pytest.raises(AssertionError, match="the worst are"):
+        assert_agreement(SCENE, DATA / "foreign_bond", rms=1.0)

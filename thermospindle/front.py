@@ -1,0 +1,183 @@
+"""The functions of `import thermospindle as ts`: one line each from a scene to its modes, FRFs, tests, comparison and diagnosis.
+
+Arguments carry the units people write in their names (C, rpm, Hz, N); what comes back is SI, with the units at its fields. Everything raises
+`BadInput`, one sentence that names file, key, value and what is allowed, for what cannot be used.
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does, before numpy loads
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, overload
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from thermospindle.model.errors import BadInput
+from thermospindle.model.machine import Addition, Condition, Spindle
+from thermospindle.model.rotor.modes import Mode
+from thermospindle.model.scene.reading import load as load_scene
+from thermospindle.model.units import RPM
+from thermospindle.sim.campaign.beside import POWER
+from thermospindle.sim.campaign.campaign import Campaign, read_campaign
+from thermospindle.sim.effects import by_name, checked
+from thermospindle.sim.effects.effect import fitted_to, refusal
+from thermospindle.sim.effects.rules import equipped
+from thermospindle.sim.hammer.test import ImpactTest, impact_tests
+from thermospindle.sim.identification.frf import Frf
+from thermospindle.sim.identification.modal import Modes, extract
+from thermospindle.sim.operating import OperatingPoint, operating_point
+from thermospindle.sim.run import identify
+
+if TYPE_CHECKING:
+    from thermospindle.diagnosis.compare.compare import Comparison
+    from thermospindle.diagnosis.verdict import Diagnosis
+    from thermospindle.report.log.read import Log
+
+LINES = 2000  # of an FRF over the scene's band, where no frequencies are given
+
+
+def load(scene: str | Path, effect_files: Sequence[str | Path] = ()) -> Spindle:
+    """The spindle of a scene: its folder, its `spindle.toml`, or the name of a shipped one like "hdd_2003".
+
+    `effect_files` hold effects of your own that the scene has.
+    """
+    return equipped(load_scene(scene), [Path(f) for f in effect_files])[0]
+
+
+def point(spindle: Spindle | str | Path, temperature_C: float, *, speed_rpm: float = 0.0) -> OperatingPoint:
+    """The spindle soaked at a temperature (C) and turning (rpm): bearing states in `.state`, the compiled MuJoCo model in `.model`.
+
+    Raises `NoEquilibrium` where the bearings find no balance.
+    """
+    return operating_point(_spindle(spindle), Condition(float(temperature_C), speed_rpm * RPM))
+
+
+@overload
+def modes(source: OperatingPoint, *, highest_Hz: float = ...) -> list[Mode]: ...
+@overload
+def modes(source: ImpactTest | Frf, *, highest_Hz: float = ...) -> Modes: ...
+def modes(source: OperatingPoint | ImpactTest | Frf, *, highest_Hz: float = np.inf) -> list[Mode] | Modes:
+    """Natural modes up to `highest_Hz`.
+
+    Of an operating point the model's own, a list in order of frequency: `.frequency` Hz, `.damping_ratio`, `.kind`, `.whirl`, `.energy` (share of the
+    strain energy by element), `.shape` (n,). Of an impact test or measured FRFs those identified by maximum likelihood: `Modes` with `.frequency` (m,)
+    Hz, `.damping` (m,), `.shape` (m, responses), and `.frequency_sd` (m,) and so on, their standard errors.
+    """
+    if isinstance(source, OperatingPoint):
+        return [m for m in source.modes if m.frequency <= highest_Hz]
+    if isinstance(source, Frf):
+        use = source.frequency <= highest_Hz
+        sd = None if source.sd is None else source.sd[..., use]
+        return extract(source.frequency[use], source.value[..., use], sd, kind=source.quantity)
+    return identify(source)
+
+
+def frf(source: OperatingPoint | ImpactTest, frequency_Hz: ArrayLike | None = None, *, quantity: str = "mobility") -> Frf:
+    """FRFs between the scene's measuring points: `frf["hub_top0", "hub_top90"]` is one of them, (n,) complex, SI.
+
+    Of an operating point exact at `frequency_Hz` (n,), by default 2000 lines over the scene's band; of an impact test the H1 estimate with coherence
+    and standard errors at its own lines. `quantity`: receptance m/N, mobility (m/s)/N, accelerance (m/s2)/N; responses are all points, references the
+    hammer's.
+    """
+    if quantity not in POWER:
+        raise BadInput(f"quantity = {quantity!r}; allowed are {', '.join(POWER)}")
+    spindle = source.spindle if isinstance(source, OperatingPoint) else source.point.spindle
+    names = {p.node: p.name for p in spindle.points}
+    if isinstance(source, ImpactTest):
+        if frequency_Hz is not None:
+            raise BadInput("frequency_Hz: an impact test has its own lines; frf(test) takes none")
+        found = source.estimate.h1
+        factor = (2j * np.pi * found.frequency) ** POWER[quantity]
+        sd = None if found.sd is None or not np.all(np.isfinite(found.sd)) else found.sd * np.abs(factor)
+        return replace(found, value=found.value * factor, sd=sd, quantity=quantity, names=names)
+    lines = np.linspace(*spindle.hammer.band, LINES) if frequency_Hz is None else np.atleast_1d(np.asarray(frequency_Hz, float))
+    if lines.ndim != 1 or not np.all(np.isfinite(lines)) or np.any(lines <= 0):
+        raise BadInput("frequency_Hz: must be one row of positive numbers")
+    value = source.frf(lines) * (2j * np.pi * lines) ** POWER[quantity]
+    return Frf(lines, value, tuple(names), spindle.hammer.hammer_nodes, quantity, names=names)
+
+
+def impact(
+    point: OperatingPoint,
+    *,
+    hits: int | None = None,
+    level_N: float | None = None,
+    element: str = "linear",
+    seed: int = 0,
+    noise: bool = True,
+) -> ImpactTest:
+    """A virtual impact-hammer test in MuJoCo's time domain, half a second to some seconds of computing a hit.
+
+    `hits` on each hammer point and their peak force `level_N` are the scene's by default; `element` "ball-by-ball" takes contact laws instead of
+    linear bearings. `.record` is what the analyser sampled; `ts.frf(test)` and `ts.modes(test)` follow from it.
+    """
+    changes = {key: value for key, value in (("hits", hits), ("level", level_N)) if value is not None}
+    settings = replace(point.spindle.hammer, **changes)  # type: ignore[arg-type]
+    return impact_tests([point], settings, element, seed, noise)[0]
+
+
+def campaign(folder: str | Path) -> Campaign:
+    """A campaign of tests, measured or virtual; `spindle import` makes one of your own files. `.tests[0].frf` and `.modes` hold what was measured."""
+    return read_campaign(Path(folder))
+
+
+def compare(spindle: Spindle | str | Path, tests: Campaign | str | Path) -> Comparison:
+    """A campaign beside the scene: modes paired through all conditions with errors and standard errors; `.rms_pull` is one number for the whole."""
+    from thermospindle.diagnosis.compare.compare import compare as beside
+    from thermospindle.diagnosis.runout.lines import modal_tests
+
+    return beside(_spindle(spindle), modal_tests(_campaign(tests)))
+
+
+def diagnose(
+    spindle: Spindle | str | Path,
+    tests: Campaign | str | Path,
+    effects: Sequence[str] | None = None,
+    progress: Callable[[str], None] = lambda done: None,
+) -> Diagnosis:
+    """Which physics the scene lacks to explain a campaign: ten seconds to some minutes. `effects` names those of the catalogue to ask (all by default).
+
+    `.verdict.word` is none, identified, ambiguous, two effects or unexplained.
+    """
+    from thermospindle.diagnosis.runout.lines import modal_tests
+    from thermospindle.diagnosis.verdict import diagnose as search
+    from thermospindle.sim.effects import CATALOGUE
+
+    catalogue = CATALOGUE if effects is None else tuple(by_name(name) for name in effects)
+    return search(_spindle(spindle), modal_tests(_campaign(tests)), catalogue, progress)
+
+
+def add(spindle: Spindle | str | Path, effect: str, **values: float) -> Spindle:
+    """The spindle with an effect of the catalogue more; parameters that `values` do not name are typical ones (`spindle effects NAME`).
+
+    Nothing is written; `spindle add` writes a scene.
+    """
+    drawing = _spindle(spindle)
+    found = fitted_to(by_name(effect), drawing)
+    if why := refusal(found, drawing):
+        raise BadInput(f"effect {effect}: {why}")
+    if any(a.effect == effect for a in drawing.effects):
+        raise BadInput(f"effect {effect}: {drawing.name} has it already")
+    own = checked(found, found.typical() | values)
+    return replace(drawing, effects=(*drawing.effects, Addition(effect, own)))
+
+
+def read_log(file: str | Path) -> Log:
+    """Everything in a Rerun log (`.rrd`) of this program, FRFs back as numbers in `.frfs`."""
+    from thermospindle.report.log.read import read_log as read
+
+    return read(Path(file))
+
+
+def _spindle(spindle: Spindle | str | Path) -> Spindle:
+    return spindle if isinstance(spindle, Spindle) else load(spindle)
+
+
+def _campaign(tests: Campaign | str | Path) -> Campaign:
+    return tests if isinstance(tests, Campaign) else campaign(tests)

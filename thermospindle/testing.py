@@ -1,0 +1,281 @@
+"""Assertions about a spindle for pytest: what moves with temperature and speed, by how much, and which element is behind it.
+
+    from thermospindle.testing import assert_frequency_shift
+
+    def test_the_rocking_mode_falls():
+        assert_frequency_shift("hdd_2003", mode="rocking 1", from_C=20, to_C=60, shift_Hz=-20, within=2)
+
+A mode is named by kind and number: "rocking 1" is the lowest rocking mode at the condition it is named at, "axial 3" the third axial one; a whole
+number counts all modes. From one condition to another it is followed by its shape. `scene` is a folder, the name of a shipped scene, or a
+spindle (`thermospindle.load`). A scene and a condition are computed once a process. What fails says what moved, and where its energy is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from thermospindle.model.machine import Spindle
+    from thermospindle.model.rotor.modes import Mode
+    from thermospindle.sim.operating import OperatingPoint
+
+    Scene = str | Path | Spindle
+
+__all__ = [
+    "Spindles",
+    "assert_agreement",
+    "assert_damping",
+    "assert_frequency",
+    "assert_frequency_shift",
+    "assert_margin",
+    "assert_peak_level",
+    "assert_split",
+]
+MOST = 3  # elements named in a failure
+KEPT = 256  # conditions
+
+
+class Spindles:
+    """The fixture `spindle`: spindles and their operating points, each computed once; `spindle("hdd_2003")`, `spindle.point("hdd_2003", 60)`."""
+
+    def __call__(self, scene: Scene) -> Spindle:
+        return _loaded(scene)
+
+    def point(self, scene: Scene, temperature_C: float, *, speed_rpm: float = 0.0) -> OperatingPoint:
+        """The operating point at a temperature (C) and a speed (rpm)."""
+        return _point(_loaded(scene), temperature_C, speed_rpm)
+
+    def mode(self, scene: Scene, mode: str | int, temperature_C: float, *, speed_rpm: float = 0.0) -> Mode:
+        """A mode by its kind and number there."""
+        found = self.point(scene, temperature_C, speed_rpm=speed_rpm)
+        return found.modes[_index(found, mode)]
+
+
+def assert_frequency_shift(
+    scene: Scene, *, mode: str | int, from_C: float, to_C: float, shift_Hz: float, within: float, speed_rpm: float = 0.0
+) -> None:
+    """The natural frequency moves by `shift_Hz` from one temperature to another, give or take `within` Hz."""
+    __tracebackhide__ = True
+    cold, hot = _pair(scene, from_C, to_C, speed_rpm, speed_rpm)
+    index, partners = _index(cold, mode), _partners(cold, hot)
+    after = _partner(cold, hot, index, partners)
+    found = after.frequency - cold.modes[index].frequency
+    if not abs(found - shift_Hz) <= within:
+        head = f"{_called(cold, mode)} moves by {found:+.2f} Hz from {from_C:g} to {to_C:g} C{_at(speed_rpm)}; wanted {shift_Hz:+g} +- {within:g} Hz"
+        raise AssertionError("\n".join([head, *_table(cold, hot, partners, f"{from_C:g} C", f"{to_C:g} C", index), *_behind(cold, hot, index)]))
+
+
+def assert_frequency(scene: Scene, *, mode: str | int, at_C: float, frequency_Hz: float, within: float, speed_rpm: float = 0.0) -> None:
+    """The natural frequency is `frequency_Hz`, give or take `within` Hz."""
+    __tracebackhide__ = True
+    point = _of(scene, at_C, speed_rpm)
+    index = _index(point, mode)
+    found = point.modes[index].frequency
+    if not abs(found - frequency_Hz) <= within:
+        raise AssertionError("\n".join([f"{_called(point, mode)} lies at {found:.2f} Hz, {at_C:g} C{_at(speed_rpm)}; wanted {frequency_Hz:g} +- {within:g} Hz", *_energy(point, index)]))
+
+
+def assert_damping(scene: Scene, *, mode: str | int, at_C: float, percent: float, within: float, speed_rpm: float = 0.0) -> None:
+    """The damping ratio is `percent`, give or take `within` percent points."""
+    __tracebackhide__ = True
+    point = _of(scene, at_C, speed_rpm)
+    index = _index(point, mode)
+    found = 100 * point.modes[index].damping_ratio
+    if not abs(found - percent) <= within:
+        raise AssertionError("\n".join([f"{_called(point, mode)} has {found:.3f} % damping, {at_C:g} C{_at(speed_rpm)}; wanted {percent:g} +- {within:g} %", *_energy(point, index)]))
+
+
+def assert_peak_level(
+    scene: Scene, *, mode: str | int, at_C: float, response: str | int, reference: str | int, level: float, within: float,
+    quantity: str = "mobility", speed_rpm: float = 0.0,
+) -> None:  # fmt: skip
+    """|H| between two points at the mode's damped frequency is `level` (SI of `quantity`), give or take `within`."""
+    __tracebackhide__ = True
+    from thermospindle.front import frf
+
+    point = _of(scene, at_C, speed_rpm)
+    index = _index(point, mode)
+    frequency = point.modes[index].damped_frequency()
+    found = float(abs(frf(point, [frequency], quantity=quantity)[response, reference][0]))
+    if not abs(found - level) <= within:
+        head = f"|{quantity}| of {response} to {reference} at {_called(point, mode)}, {frequency:.1f} Hz, is {found:.4g}; wanted {level:g} +- {within:g}"
+        raise AssertionError("\n".join([head, *_energy(point, index)]))
+
+
+def assert_split(scene: Scene, *, modes: tuple[str | int, str | int], at_C: float, split_Hz: float, within: float, speed_rpm: float = 0.0) -> None:
+    """Two modes, as ("rocking 1", "rocking 2"), lie `split_Hz` apart, the second above the first, give or take `within` Hz."""
+    __tracebackhide__ = True
+    point = _of(scene, at_C, speed_rpm)
+    first, second = (_index(point, m) for m in modes)
+    found = point.modes[second].frequency - point.modes[first].frequency
+    if not abs(found - split_Hz) <= within:
+        pair = " and ".join(f"{m} at {point.modes[i].frequency:.2f} Hz ({point.modes[i].whirl} whirl)" for m, i in zip(modes, (first, second), strict=True))
+        head = f"{point.spindle.name}: {pair} lie {found:.2f} Hz apart, {at_C:g} C{_at(speed_rpm)}; wanted {split_Hz:g} +- {within:g} Hz"
+        raise AssertionError("\n".join([head, *_energy(point, first), *_energy(point, second)]))
+
+
+def assert_margin(
+    scene: Scene, *, mode: str | int, speed_rpm: float, at_least_percent: float, temperatures_C: Sequence[float] = (), multiples: int = 3
+) -> None:
+    """No line of the bearings or the unbalance comes nearer to the mode than `at_least_percent` of its frequency.
+
+    Lines in the mode's own direction count, of waviness up to `multiples` of the number of balls; at every temperature given, the ends of the
+    scene's range by default. The mode is named at the first and followed by its shape.
+    """
+    __tracebackhide__ = True
+    from thermospindle.model.bearing.kinematics import lines, row_kinematics
+
+    spindle = _loaded(scene)
+    points = [_point(spindle, t, speed_rpm) for t in (temperatures_C or spindle.temperatures)]
+    index = _index(points[0], mode)
+    near: list[tuple[float, str]] = []
+    for point in points:
+        own = _partner(points[0], point, index, _partners(points[0], point))
+        for line in lines(point.spindle, row_kinematics(point.spindle, point.state), multiples):
+            if (line.direction == "axial") == (own.kind == "axial"):
+                percent = 100 * (line.frequency - own.frequency) / own.frequency
+                bearing = f" of bearing {line.bearing}" if line.bearing else ""
+                near.append((percent, f"{point.condition.temperature:g} C: {line.name} ({line.cause}{bearing}) at {line.frequency:.1f} Hz, {percent:+.2f} % from {own.frequency:.1f} Hz"))
+    close = sorted((row for row in near if abs(row[0]) < at_least_percent), key=lambda row: abs(row[0]))
+    if close:
+        head = f"{_called(points[0], mode)}{_at(speed_rpm)}: {len(close)} lines come nearer than {at_least_percent:g} %; the nearest are"
+        raise AssertionError("\n".join([head, *(f"  {text}" for _, text in close[:5]), *_energy(points[0], index)]))
+
+
+def assert_agreement(scene: Scene, campaign: str | Path | Any, *, rms: float) -> None:
+    """A campaign's frequencies and dampings agree with the scene: rms error of at most `rms` standard errors (`spindle compare`)."""
+    __tracebackhide__ = True
+    from thermospindle.front import compare
+
+    found = compare(_loaded(scene), campaign)
+    if not found.rms_pull <= rms:
+        rows = sorted(((abs(m.pull), t.test.id, m) for t in found.tests for m in t.modes), key=lambda row: -row[0])
+        worst = [f"  {test}: {m.kind} mode measured at {m.measured:.2f} Hz, computed {m.computed - m.measured:+.2f} Hz, {m.pull:+.1f} s.e." for _, test, m in rows[:5]]
+        raise AssertionError("\n".join([f"{found.campaign} is {found.rms_pull:.2f} standard errors (rms) from {found.spindle}; wanted at most {rms:g}; the worst are", *worst]))
+
+
+# ---------------------------------------------------------------- spindles and conditions, each once
+
+
+def _loaded(scene: Scene) -> Spindle:
+    if not isinstance(scene, str | Path):
+        return scene
+    from thermospindle.model.scene.reading import scene_path
+
+    file = scene_path(scene)
+    return _read(file.resolve(), file.stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=32)
+def _read(file: Path, changed: int) -> Spindle:
+    from thermospindle.front import load
+
+    return load(file)
+
+
+_POINTS: dict[tuple[str, float, float], OperatingPoint] = {}
+
+
+def _point(spindle: Spindle, temperature: float, speed: float) -> OperatingPoint:
+    from thermospindle.front import point
+    from thermospindle.model.scene.reading import content_hash
+
+    key = content_hash(spindle), float(temperature), float(speed)
+    if key not in _POINTS:
+        if len(_POINTS) >= KEPT:
+            _POINTS.pop(next(iter(_POINTS)))
+        _POINTS[key] = point(spindle, temperature, speed_rpm=speed)
+    return _POINTS[key]
+
+
+def _of(scene: Scene, temperature: float, speed: float) -> OperatingPoint:
+    return _point(_loaded(scene), temperature, speed)
+
+
+def _pair(scene: Scene, from_C: float, to_C: float, *speeds: float) -> tuple[OperatingPoint, OperatingPoint]:
+    spindle = _loaded(scene)
+    return _point(spindle, from_C, speeds[0]), _point(spindle, to_C, speeds[1])
+
+
+# ---------------------------------------------------------------- modes by name
+
+
+def _index(point: OperatingPoint, mode: str | int) -> int:
+    """Place of a mode among those of its condition. Raises `BadInput` with those there are."""
+    from thermospindle.model.errors import BadInput
+
+    found = point.modes
+    kind, _, text = ("", "", str(mode)) if isinstance(mode, int) else mode.strip().rpartition(" ")
+    own = [i for i, m in enumerate(found) if kind in ("", m.kind)]
+    if not text.isdigit() or not 1 <= int(text) <= len(own) or (isinstance(mode, str) and not kind):
+        counts = {k: sum(m.kind == k for m in found) for k in dict.fromkeys(m.kind for m in found)}
+        there = ", ".join(f"{k} 1 to {n}" for k, n in counts.items())
+        raise BadInput(f"mode = {mode!r}: {point.spindle.name} has {there} at {point.condition.temperature:g} C, or whole numbers 1 to {len(found)}")
+    return own[int(text) - 1]
+
+
+def _partners(first: OperatingPoint, then: OperatingPoint) -> list[int]:
+    from thermospindle.model.rotor.chain import matrices
+    from thermospindle.sim.identification.pairing import follow
+
+    return follow(matrices(first.chain).mass, first.modes, then.modes)
+
+
+def _partner(first: OperatingPoint, then: OperatingPoint, index: int, partners: Sequence[int]) -> Mode:
+    if partners[index] < 0:
+        t = then.condition.temperature
+        raise AssertionError(f"{_called(first, index + 1)}, {first.modes[index].frequency:.1f} Hz: no mode at {t:g} C has its shape, so it cannot be followed")
+    return then.modes[partners[index]]
+
+
+# ---------------------------------------------------------------- what a failure says
+
+
+def _called(point: OperatingPoint, mode: str | int) -> str:
+    return f"{point.spindle.name}: mode {mode}" if isinstance(mode, int) else f"{point.spindle.name}: {mode}"
+
+
+def _at(speed: float) -> str:
+    return f" at {speed:g} rpm" if speed else ""
+
+
+def _table(first: OperatingPoint, then: OperatingPoint, partners: Sequence[int], a: str, b: str, index: int) -> list[str]:
+    """All modes up to two above the one in question, before and after."""
+    rows = [f"    {'':14}{a:>10}{b:>10}{'change':>10} Hz"]
+    counts: dict[str, int] = {}
+    for i, m in enumerate(first.modes[: index + 3]):
+        counts[m.kind] = counts.get(m.kind, 0) + 1
+        after = then.modes[partners[i]].frequency if partners[i] >= 0 else None
+        change = "lost" if after is None else f"{after - m.frequency:+.2f}"
+        rows.append(f"  {'>' if i == index else ' '} {m.kind + ' ' + str(counts[m.kind]):14}{m.frequency:10.2f}{'' if after is None else f'{after:10.2f}':>10}{change:>10}")
+    return rows
+
+
+def _energy(point: OperatingPoint, index: int) -> list[str]:
+    mode = point.modes[index]
+    most = sorted(mode.energy.items(), key=lambda e: -e[1])[:MOST]
+    return [f"  strain energy of {mode.kind} at {mode.frequency:.1f} Hz: " + ", ".join(f"{name} {share:.0%}" for name, share in most)]
+
+
+def _behind(first: OperatingPoint, then: OperatingPoint, index: int) -> list[str]:
+    """Where the energy is, and what the change of each element's stiffness does to the mode, to first order: df = f/2 phi^T dK phi / phi^T K phi."""
+    import numpy as np
+
+    from thermospindle.model.rotor.chain import element_rows
+
+    mode = first.modes[index]
+    change: dict[str, float] = {}
+    total = 0.0
+    quadratic: Callable[[Any, Any], float] = lambda row, k: float(np.real(row.conj() @ k @ row))  # noqa: E731
+    after = {e.name: e for e in then.chain.elements}
+    for e in first.chain.elements:
+        row = element_rows(first.chain, e) @ mode.shape
+        total += quadratic(row, e.stiffness)
+        if e.name in after:
+            change[e.name] = quadratic(row, after[e.name].stiffness - e.stiffness)
+    moved = sorted(((name, 0.5 * mode.frequency * value / total) for name, value in change.items()), key=lambda row: -abs(row[1]))[:MOST]
+    told = ", ".join(f"{name} {value:+.2f} Hz" for name, value in moved if abs(value) > 5e-3)
+    return [*_energy(first, index), *([f"  moved by the stiffness of: {told}"] if told else [])]
