@@ -197,9 +197,9 @@ def test_a_dependency_has_a_range_and_a_pin_within_it(required):
 
 
 def test_no_library_is_imported_without_being_required():
-    """Imports of the product, against the names that its requirements install; h5py (extra hdf5) is imported where it is used."""
+    """Imports of the product, against the names that its requirements install; h5py (extra hdf5) is imported where it is used, pytest by its plugin."""
     modules = {"scikit-fem": "skfem", "rerun-sdk": "rerun"}
     given = {modules.get(r.name, r.name) for r in map(Requirement, PROJECT["dependencies"])}
-    given |= {r.name for r in map(Requirement, PROJECT["optional-dependencies"]["hdf5"])}
+    given |= {r.name for r in map(Requirement, PROJECT["optional-dependencies"]["hdf5"])} | {"pytest"}
     found = {name.split(".")[0] for file in FILES for name in imported(file)}
     assert found - set(sys.stdlib_module_names) - {"thermospindle"} == given
