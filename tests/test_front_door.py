@@ -67,6 +67,16 @@ def test_every_option_is_an_argument_of_its_verb():
             assert options[name].required == (argument.default is inspect.Parameter.empty) or options[name].nargs == "?"
 
 
+@pytest.mark.parametrize("shell", ["bash", "zsh", "tcsh"])
+def test_completion_knows_every_verb(capsys, shell):
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["--completion", shell])
+    assert ended.value.code == 0
+    script = capsys.readouterr().out
+    assert all(verb in script for verb in cli._parser()[1])
+    assert "held-out" in script
+
+
 def test_version_and_help_start_quickly():
     """They import nothing that computes: half a second on an idle machine, of processor time here."""
     for arguments in (["--version"], ["--help"], []):

@@ -100,6 +100,23 @@ class _Parser(argparse.ArgumentParser):
         self.exit(2, f"spindle: {message}; see {self.prog} --help\n")
 
 
+class _Completion(argparse.Action):
+    """Prints what `eval "$(spindle --completion bash)"` needs: verbs, options, and files where files are asked for."""
+
+    def __call__(self, parser: argparse.ArgumentParser, namespace: Any, values: Any, option_string: str | None = None) -> NoReturn:
+        import shtab
+
+        pending = [parser]
+        while pending:
+            for action in pending.pop()._actions:
+                if isinstance(action.choices, dict):
+                    pending += action.choices.values()
+                elif action.type is Path:
+                    action.complete = shtab.FILE  # type: ignore[attr-defined]
+        print(shtab.complete(parser, shell=values))
+        parser.exit()
+
+
 def _number(text: str) -> float:
     try:
         value = float(text)
@@ -163,6 +180,7 @@ def _parser() -> tuple[_Parser, dict[str, argparse.ArgumentParser]]:
     """The parser, and those of the verbs: an option has the name (`dest`) of an argument of the verb's function, and its default."""
     parser = _Parser(prog="spindle", description="From temperature to modal peaks of a ball-bearing spindle.")
     parser.add_argument("--version", action="version", version=f"spindle {version('thermospindle')}")
+    parser.add_argument("--completion", action=_Completion, default=argparse.SUPPRESS, choices=("bash", "zsh", "tcsh"), help="print the completion script of a shell and end")
     verbs = parser.add_subparsers(required=True, metavar="VERB", parser_class=_Parser)
     speed_number = _up_to(FASTEST, 1e-3, " rpm")
 
@@ -202,6 +220,9 @@ def _parser() -> tuple[_Parser, dict[str, argparse.ArgumentParser]]:
         added.add_argument("--level", type=_up_to(NEWTONS, unit=" N"), metavar="N", help="peak force of the hammer (the scene's by default)")
         added.add_argument("--seed", type=_seed, help="of hammer scatter and sensor noise")
 
+    def verbose(added: argparse.ArgumentParser) -> None:
+        added.add_argument("--verbose", action="store_true", help="everything, not the verdict and what matters most alone")
+
     def held_out(added: argparse.ArgumentParser, text: str) -> None:
         added.add_argument("--held-out", dest="held_out_tests", nargs="+", action="extend", metavar="TEST", help=text)
 
@@ -238,9 +259,11 @@ def _parser() -> tuple[_Parser, dict[str, argparse.ArgumentParser]]:
     compare = verb("compare", ("compare", "compare"), "a campaign beside the scene: modes, dampings, shapes and FRFs, and one number for the whole")
     compare.add_argument("campaign", metavar="CAMPAIGN", type=Path)
     compare.add_argument("--before", type=Path, metavar="SCENE", help="the scene as it was, to see whether the error fell")
+    verbose(compare)
     held_out(compare, "tests that the scene was not fitted to (by default those that its build table does not list)")
     diagnose = verb("diagnose", ("diagnose", "diagnose"), "which physics the scene lacks to explain a campaign")
     diagnose.add_argument("campaign", metavar="CAMPAIGN", type=Path)
+    verbose(diagnose)
     held_out(diagnose, "tests to leave out, so that `compare` can show what is predicted of them")
     diagnose.add_argument(
         "--predictions", type=Path, metavar="DIAGNOSIS.json", help="an earlier diagnosis: did what it predicted come true?"

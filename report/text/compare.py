@@ -70,9 +70,23 @@ def _mode_json(m: PairedMode) -> dict[str, Any]:
     }
 
 
-def show_comparison(console: Console, c: Comparison) -> None:
-    """One table of modes, one line a test for what has no partner, one table of FRAC and COMAC by point."""
-    console.print(f"{c.campaign} beside scene {c.spindle}: rms residual {c.rms_pull:.3g} standard errors", highlight=False, markup=False)
+AGREES, ALMOST = 1.5, 3.0  # standard errors rms up to which a scene and a campaign agree, and nearly do
+
+
+def verdict(c: Comparison) -> str:
+    """One sentence: whether they agree, by how much they do not, and the mode that is furthest off."""
+    words = "agree within their errors" if c.rms_pull < AGREES else "nearly agree" if c.rms_pull < ALMOST else "do not agree"
+    told = f"{c.campaign} and the scene {c.spindle} {words}: rms residual {c.rms_pull:.3g} standard errors"
+    every = [(abs(m.pull), t, m) for t in c.tests for m in t.modes]
+    if not every or c.rms_pull < AGREES:
+        return f"{told}."
+    _, t, m = max(every, key=lambda row: row[0])
+    return f"{told}; furthest off is the {m.kind} mode at {m.measured:.0f} Hz of {t.test.id}, computed {abs(m.error):.3g} Hz too {'high' if m.error > 0 else 'low'}."
+
+
+def show_comparison(console: Console, c: Comparison, verbose: bool = True) -> None:
+    """The verdict, the table of modes, what has no partner; with `verbose` also the likeness of FRFs, crossings, FRAC and COMAC by point."""
+    console.print(verdict(c), style="bold", highlight=False, markup=False)
     columns = (
         "test", "mode", "kind", "measured\nHz", "+-", "computed\nHz", "error\nHz", "error\n%", "error\ns.e.",
         "damping\n%", "computed\n%", "error\ns.e.", "MAC",
@@ -95,6 +109,9 @@ def show_comparison(console: Console, c: Comparison) -> None:
         for what, values in (("measured, not computed", t.missing), ("computed, not measured", t.extra)):
             if values:
                 console.print(f"{t.test.id}: {what}: {', '.join(f'{f:.1f}' for f in values)} Hz", highlight=False)
+    if not verbose:
+        console.print("--verbose adds the likeness of FRFs, COMAC and crossings of modes.", style="dim", highlight=False)
+        return
     for line in c.crossings:
         console.print(line, highlight=False)
     if any(t.correlation for t in c.tests):

@@ -267,7 +267,8 @@ SENTENCES = {
 }
 
 
-def show_diagnosis(console: Console, answer: dict[str, Any]) -> None:
+def show_diagnosis(console: Console, answer: dict[str, Any], verbose: bool = True) -> None:
+    """The verdict in one sentence and why; with `verbose` every explanation, drift and next test, and what would have been seen."""
     joined = (" and " if answer["verdict"] == "two effects" else ", ").join(answer["effects"])
     console.print(f"{answer['verdict']}: {SENTENCES[answer['verdict']].format(joined)}", style="bold")
     console.print(answer["reason"])
@@ -277,11 +278,13 @@ def show_diagnosis(console: Console, answer: dict[str, Any]) -> None:
         f"Error, rms in standard errors: {error['before']:.2f} -> {error['after']:.2f}; on conditions left out "
         f"{error['held_out_before']:.2f} -> {error['held_out_after']:.2f}"
     )
+    if not verbose:
+        _show_little(console, answer)
+        return
     if answer["candidates"]:
         console.print("\nExplanations, ln evidence over the model without effects and posterior probability:")
     for c in answer["candidates"][:5]:
-        values = ", ".join(f"{k.split('.', 1)[1]} {v['value']:.4g}{_error(v['sd'])}{_unit(v['unit'])}" for k, v in c["parameters"].items())
-        console.print(f"  {' + '.join(c['effects'])}: {c['delta_evidence']:+.1f}, {_percent(c['probability'])}; {values}")
+        console.print(f"  {' + '.join(c['effects'])}: {c['delta_evidence']:+.1f}, {_percent(c['probability'])}; {_values(c)}")
     best = answer["candidates"][0] if answer["candidates"] else None
     if best and answer["effects"]:
         for name, rows in best["law"].items():
@@ -293,9 +296,7 @@ def show_diagnosis(console: Console, answer: dict[str, Any]) -> None:
         for sentence in answer["misfit"]["words"]:
             console.print(f"  {sentence}")
     for t in answer["next_test"]:
-        first, second = t["separates"]
-        odds = "more than a million" if t["odds"] >= 1e6 * (1 - 1e-9) else f"{t['odds']:.3g}"
-        console.print(f"\nA test {plan_words(t['condition'])} would tell {first} from {second} with odds of {odds} to 1, most by {t['tells']}.")
+        console.print(f"\n{_next(t)}")
     for o in answer.get("predictions", []):
         console.print(
             f"\nPredicted earlier by {o['explanation']} for {o['test']}: {o['verdict']}, {o['rms']:.2g} standard errors rms over {o['modes']} modes"
@@ -306,6 +307,29 @@ def show_diagnosis(console: Console, answer: dict[str, Any]) -> None:
         for name, row in small:
             console.print(f"  {name}: {row['parameter']} {row['size']:.2g}{_unit(row['unit'])}")
         console.print(f"Not visible in these data at a typical size: {', '.join(answer['invisible']) or 'nothing'}")
+
+
+def _show_little(console: Console, answer: dict[str, Any]) -> None:
+    """The explanations that the verdict names with their values, the test to make next, and where the rest is."""
+    for c in answer["candidates"]:
+        if set(c["effects"]) <= set(answer["effects"]) and answer["effects"]:
+            console.print(f"  {' + '.join(c['effects'])}, {_percent(c['probability'])}: {_values(c)}")
+    for t in answer["next_test"][:1]:
+        console.print(_next(t))
+    for o in answer.get("predictions", []):
+        console.print(f"Predicted earlier by {o['explanation']} for {o['test']}: {o['verdict']}, {o['rms']:.2g} standard errors rms")
+    console.print("--verbose shows every explanation, what would drift, and what these data could have shown.", style="dim")
+
+
+def _values(candidate: dict[str, Any]) -> str:
+    """Fitted parameters with their errors and units."""
+    return ", ".join(f"{k.split('.', 1)[1]} {v['value']:.4g}{_error(v['sd'])}{_unit(v['unit'])}" for k, v in candidate["parameters"].items())
+
+
+def _next(test: dict[str, Any]) -> str:
+    first, second = test["separates"]
+    odds = "more than a million" if test["odds"] >= 1e6 * (1 - 1e-9) else f"{test['odds']:.3g}"
+    return f"A test {plan_words(test['condition'])} would tell {first} from {second} with odds of {odds} to 1, most by {test['tells']}."
 
 
 def _percent(probability: float) -> str:

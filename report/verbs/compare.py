@@ -31,6 +31,7 @@ def compare(
     campaign: Path,
     before: Path | None = None,
     held_out_tests: Sequence[str] = (),
+    verbose: bool = False,
     effect_files: Sequence[Path] = (),
     out: Path | None = None,
 ) -> Answer:
@@ -55,7 +56,7 @@ def compare(
         values |= {"runout": turning[0]}
 
     def show(console: Console) -> None:
-        show_comparison(console, comparison)
+        show_comparison(console, comparison, verbose)
         if earlier:
             show_before_after(console, both)
         if turning:

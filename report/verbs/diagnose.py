@@ -34,6 +34,7 @@ def diagnose(
     campaign: Path,
     held_out_tests: Sequence[str] = (),
     predictions: Path | None = None,
+    verbose: bool = False,
     effect_files: Sequence[Path] = (),
     out: Path | None = None,
 ) -> Answer:
@@ -54,7 +55,7 @@ def diagnose(
         values |= {"runout": turning[0]}
 
     def show(console: Console) -> None:
-        show_diagnosis(console, values)
+        show_diagnosis(console, values, verbose)
         if turning:
             turning[1](console)
 

@@ -121,6 +121,17 @@ def test_the_terminal_tells_drifts_only_where_something_is_missing(told, nothing
     assert "Smallest size these data would have shown" in text
 
 
+def test_without_verbose_the_verdict_is_told_in_few_lines(told, nothing_missing, capsys):
+    console = Console(width=80)
+    for answer in (told[1], diagnosis_json(nothing_missing)):
+        show_diagnosis(console, answer, verbose=False)
+        text = capsys.readouterr().out
+        assert text.startswith(f"{answer['verdict']}: ")
+        assert len(text.splitlines()) < 20
+        assert max(map(len, text.splitlines())) <= 80
+        assert "--verbose" in text
+
+
 def test_add_takes_what_it_fitted(told, spindle, tmp_path, capsys):
     """The answer as it is written, taken by `spindle add`: the effect's value and every build tolerance, none of tests or channels."""
     answer = told[1] | {"scene_hash": content_hash(spindle)}
