@@ -75,8 +75,8 @@ AGREES, ALMOST = 1.5, 3.0  # standard errors rms up to which a scene and a campa
 
 def verdict(c: Comparison) -> str:
     """One sentence: whether they agree, by how much they do not, and the mode that is furthest off."""
-    words = "agree within their errors" if c.rms_pull < AGREES else "nearly agree" if c.rms_pull < ALMOST else "do not agree"
-    told = f"{c.campaign} and the scene {c.spindle} {words}: rms residual {c.rms_pull:.3g} standard errors"
+    words = "agrees with the tests within their errors" if c.rms_pull < AGREES else "nearly agrees with the tests" if c.rms_pull < ALMOST else "does not agree with the tests"
+    told = f"{c.spindle} {words}: rms residual {c.rms_pull:.3g} standard errors"
     every = [(abs(m.pull), t, m) for t in c.tests for m in t.modes]
     if not every or c.rms_pull < AGREES:
         return f"{told}."
@@ -87,6 +87,7 @@ def verdict(c: Comparison) -> str:
 def show_comparison(console: Console, c: Comparison, verbose: bool = True) -> None:
     """The verdict, the table of modes, what has no partner; with `verbose` also the likeness of FRFs, crossings, FRAC and COMAC by point."""
     console.print(verdict(c), style="bold", highlight=False, markup=False)
+    console.print(f"Tests: {c.campaign}", highlight=False, markup=False)
     columns = (
         "test", "mode", "kind", "measured\nHz", "+-", "computed\nHz", "error\nHz", "error\n%", "error\ns.e.",
         "damping\n%", "computed\n%", "error\ns.e.", "MAC",
