@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from thermospindle.model.machine import Condition, HammerTest, Spindle
 from thermospindle.model.tolerance import Toleranced
@@ -21,8 +22,7 @@ from thermospindle.sim.identification.frf import Frf
 from thermospindle.sim.operating import operating_point
 
 STEP = 1e-5  # relative, for differences: far above what the bearing equilibrium is solved to
-ENOUGH = 0.01  # standard errors, a step after which nothing more is gained
-LONGEST = 20  # steps
+LONGEST = 30  # steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class LineFit:
 
 
 def fit_lines(spindle: Spindle, condition: Condition, frf: Frf, parameters: Sequence[Toleranced], window_decay: float = 0.0) -> LineFit:
-    """Gauss-Newton from the drawing over the lines of the hammer's band.
+    """Least squares (Levenberg-Marquardt), from the drawing, over the lines of the hammer's band.
 
     `window_decay` (1/s) is that of the exponential window that the FRFs were estimated with. Errors are those of `frf`, or where it has
     none (a single hit) the noise of the scene's measuring chain. ValueError if steps do not come to rest.
@@ -52,13 +52,13 @@ def fit_lines(spindle: Spindle, condition: Condition, frf: Frf, parameters: Sequ
     frequency = frf.frequency[inside]
     to_mobility = (2j * np.pi * frequency + window_decay) ** -POWER[frf.quantity]
     measured = frf.value[..., inside] * to_mobility
-    told = frf.sd[..., inside] * np.abs(to_mobility) if frf.sd is not None else np.array(np.nan)
-    sd = told if np.all(np.isfinite(told)) else chain_noise(spindle.hammer, measured)
+    stated = frf.sd[..., inside] * np.abs(to_mobility) if frf.sd is not None else np.array(np.nan)
+    sd = stated if np.all(np.isfinite(stated)) else chain_noise(spindle.hammer, measured)
     rows = [p.node for p in spindle.points]
     response = [rows.index(node) for node in frf.response_nodes]
     reference = [spindle.hammer.hammer_nodes.index(node) for node in frf.reference_nodes]
 
-    def seen(x: Array) -> ComplexArray:
+    def computed(x: Array) -> ComplexArray:
         built = spindle
         for parameter, value in zip(parameters, x, strict=True):
             built = parameter.apply(built, float(value))
@@ -68,17 +68,16 @@ def fit_lines(spindle: Spindle, condition: Condition, frf: Frf, parameters: Sequ
         """Real and imaginary parts in standard errors."""
         return np.sqrt(2) * np.concatenate([(value.real / sd).ravel(), (value.imag / sd).ravel()])
 
-    x = np.zeros(len(parameters))
-    for step in range(1, LONGEST + 1):
-        here = seen(x)
-        residual = stacked(measured - here)
-        jacobian = np.stack([stacked(seen(x + STEP * unit) - here) / STEP for unit in np.eye(len(x))], axis=1)
-        covariance: Array = np.asarray(np.linalg.inv(jacobian.T @ jacobian), float)
-        move = covariance @ (jacobian.T @ residual)
-        x = x + move
-        if np.all(np.abs(move) < ENOUGH * np.sqrt(np.diag(covariance))):
-            return LineFit(tuple(p.name for p in parameters), x, covariance, 0.5 * float(residual @ residual), measured.size, step)
-    raise ValueError(f"the fit of {', '.join(p.name for p in parameters)} has not come to rest after {LONGEST} steps")
+    def jacobian(x: Array) -> Array:
+        here = computed(x)
+        return np.stack([stacked(computed(x + STEP * unit) - here) / STEP for unit in np.eye(len(x))], axis=1)
+
+    names = tuple(p.name for p in parameters)
+    found = least_squares(lambda x: stacked(computed(x) - measured), np.zeros(len(names)), jacobian, method="lm", max_nfev=LONGEST)
+    if not found.success:
+        raise ValueError(f"the fit of {', '.join(names)} has not come to rest after {LONGEST} steps")
+    covariance = np.asarray(np.linalg.inv(found.jac.T @ found.jac), float)
+    return LineFit(names, found.x, covariance, float(found.cost), measured.size, int(found.nfev))
 
 
 def chain_noise(hammer: HammerTest, value: ComplexArray) -> Array:

@@ -9,7 +9,7 @@ b_q a unit of size, N(0, prior^2), and psi the phases of groups of sources that 
 frequency. Every test starts with the balls elsewhere, so that psi is unknown, uniform, in every test. Every ball has its own phase in every test
 too: c_q of ball waviness is another in every test. A probe without phase enters by its amplitude.
 
-chi2 is least by Levenberg-Marquardt from several starts; the evidence is Laplace's, phases with the variance pi^2 / 3 of a uniform one.
+chi2 is made least from several starts; the evidence is Laplace's, phases with the variance pi^2 / 3 of a uniform one.
 """
 
 from __future__ import annotations
@@ -19,13 +19,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from thermospindle.diagnosis.runout.lines import Key, Seen, SeenLine, key_of
 from thermospindle.diagnosis.runout.sources import SourceKey, Sources
 from thermospindle.model.types import Array, ComplexArray
 
 UNIFORM = np.pi**2 / 3  # variance of a uniform phase
-STARTS, UNPHASED_STARTS, STEPS = 4, 12, 40  # amplitudes alone have many more local minima
+STARTS, UNPHASED_STARTS, STEPS = 4, 12, 60  # amplitudes alone have many more local minima
+RESTS = 1e-4  # relative fall of chi2, or step, from which a fit rests
 TURNING = "turning"
 
 
@@ -207,6 +209,7 @@ class _Problem:
         self.by = f.by_tolerance * f.tolerance_sd[:, None, None]
         precision = np.concatenate([np.full(2 * self.q, 2.0), np.ones(self.n), np.zeros(self.m), np.ones(self.k)])
         self.precision = precision
+        self.scale = np.sqrt(2) / f.sd
         self.belief = np.where(precision > 0, precision, 1 / UNIFORM)
         groups = np.zeros((self.m, *f.phase.shape), bool)
         for g in range(self.m):
@@ -249,52 +252,34 @@ class _Problem:
         u = self._amplitudes(p)
         return column @ u, column, turn, u
 
-    def residual(self, p: Array) -> tuple[Array, Array]:
-        """Residual and Jacobian of the data alone, two rows a complex number (one for amplitudes)."""
+    def residual(self, p: Array) -> Array:
+        """Computed less measured in standard errors, two rows a complex number (the second zero for amplitudes), and below them the priors."""
+        m = self.model(p)[0]
+        phased = self.f.phased
+        left = np.where(phased, m - self.f.value, np.abs(m) - np.abs(self.f.value)) * self.scale
+        return np.concatenate([left.real, left.imag, np.sqrt(self.precision) * p])
+
+    def jacobian(self, p: Array) -> Array:
         m, column, turn, u = self.model(p)
-        scale = np.sqrt(2) / self.f.sd
         parts: list[ComplexArray] = [column * self.f.likely, 1j * column * self.f.likely]
         parts.append(column @ (self.b * self.priors[:, None]).T if self.n else np.zeros((len(m), 0), complex))
         whole = column * u
         parts.append(1j * np.array([(whole * g).sum(axis=1) for g in self.groups]).reshape(self.m, len(m)).T)
         parts.append(np.einsum("krq,rq->rk", self.by, turn * u))
         jacobian = np.concatenate(parts, axis=1)
-        left = self.f.value - m
         unphased = ~self.f.phased
         if unphased.any():
-            size = np.maximum(np.abs(m), 1e-300)
-            unit = m / size
-            left = np.where(unphased, (np.abs(self.f.value) - size) + 0j, left)
+            unit = m / np.maximum(np.abs(m), 1e-300)
             jacobian = np.where(unphased[:, None], (unit.conj()[:, None] * jacobian).real + 0j, jacobian)
-        left, jacobian = left * scale, jacobian * scale[:, None]
-        return np.concatenate([left.real, left.imag]), np.concatenate([jacobian.real, jacobian.imag])
-
-    def cost(self, p: Array) -> float:
-        m = self.model(p)[0]
-        left = np.where(self.f.phased, self.f.value - m, np.abs(self.f.value) - np.abs(m))
-        return float(2 * np.sum(np.abs(left / self.f.sd) ** 2) + np.sum(self.precision * p**2))
+        jacobian = jacobian * self.scale[:, None]
+        return np.concatenate([jacobian.real, jacobian.imag, np.diag(np.sqrt(self.precision))])
 
     def least(self, p: Array) -> tuple[float, Array]:
-        damping, current = 1e-2, self.cost(p)
-        for _ in range(STEPS):
-            left, jacobian = self.residual(p)
-            normal = jacobian.T @ jacobian + np.diag(self.precision)
-            gradient = jacobian.T @ left - self.precision * p
-            for _ in range(7):
-                new = p + np.linalg.solve(normal + np.diag(damping * (np.diag(normal) + 1e-9)), gradient)
-                cost = self.cost(new)
-                if cost <= current:
-                    break
-                damping *= 8
-            else:
-                break
-            fell, p, current, damping = current - cost, new, cost, max(damping / 8, 1e-9)
-            if fell < 1e-3 + 1e-4 * current:
-                break
-        return current, p
+        found = least_squares(self.residual, p, self.jacobian, method="lm", ftol=RESTS, xtol=RESTS, max_nfev=STEPS)
+        return 2 * float(found.cost), found.x
 
     def told(self, cost: float, p: Array) -> FamilyFit:
-        _, jacobian = self.residual(p)
+        jacobian = self.jacobian(p)[: 2 * len(self.f.value)]
         data = jacobian.T @ jacobian
         normal = data + np.diag(self.belief)
         evidence = -0.5 * cost - 0.5 * float(np.linalg.slogdet(normal)[1] - np.log(self.belief).sum())

@@ -157,7 +157,7 @@ def residual_bar(part: Any, norm: SymLogNorm, axes: Any, **look: Any) -> None:
     bar = part.colorbar(ScalarMappable(norm, "RdBu_r"), ax=axes, ticks=ticks, format="{x:g}", **look)
     bar.minorticks_off()
     bar.outline.set_visible(False)
-    bar.set_label("residual, (computed − measured) / standard error")
+    bar.set_label("(computed − measured) / s.e.")
 
 
 # ---------------------------------------------------------------- maps of cells
