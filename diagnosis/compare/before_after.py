@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol, TypeVar
 
-from rich.box import SIMPLE_HEAD
-from rich.console import Console
-from rich.table import Table
-
-from thermospindle.diagnosis.compare.compare import Comparison, rms_pull
+from thermospindle.diagnosis.compare.compare import Comparison, rms_residual
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Spindle
-from thermospindle.sim.campaign.campaign import Campaign
+from thermospindle.sim.campaign.campaign import Campaign, Test
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,13 +21,28 @@ class BeforeAfter:
     held_out: tuple[str, ...]
 
     def errors(self) -> dict[str, float | None]:
-        """Rms pulls of all tests, of fitted and of held-out ones, before and after; None where there are no such tests."""
-        found: dict[str, float | None] = {}
-        for when, comparison in (("before", self.before), ("after", self.after)):
-            for which, wanted in (("", (True, False)), ("fitted_", (False,)), ("held_out_", (True,))):
-                tests = [t for t in comparison.tests if (t.test.id in self.held_out) in wanted]
-                found[f"{which}{when}"] = rms_pull(tests) if sum(t.count for t in tests) else None
-        return found
+        return errors(self.before.tests, self.after.tests, self.held_out, lambda tests: rms_residual(tests) if any(t.count for t in tests) else None)
+
+
+class OfTest(Protocol):
+    """What was found of one test."""
+
+    @property
+    def test(self) -> Test: ...
+
+
+Found = TypeVar("Found", bound=OfTest)
+
+
+def errors(
+    before: Sequence[Found], after: Sequence[Found], held_out: Sequence[str], rms: Callable[[Sequence[Found]], float | None]
+) -> dict[str, float | None]:
+    """Rms residuals of all tests, of fitted and of held-out ones, before and after; None where there are no such tests."""
+    found: dict[str, float | None] = {}
+    for when, tests in (("before", before), ("after", after)):
+        for which, wanted in (("", (True, False)), ("fitted_", (False,)), ("held_out_", (True,))):
+            found[f"{which}{when}"] = rms([t for t in tests if (t.test.id in held_out) in wanted])
+    return found
 
 
 def without(campaign: Campaign, ids: Sequence[str]) -> Campaign:
@@ -61,17 +73,3 @@ def _known(campaign: Campaign, ids: Sequence[str]) -> None:
     for test in ids:
         if test not in (known := [t.id for t in campaign.tests]):
             raise BadInput(f"--held-out {test}: is no test of the campaign; allowed are {', '.join(known)}")
-
-
-def show_before_after(console: Console, both: BeforeAfter) -> None:
-    errors = both.errors()
-    grid = Table(title="Error, rms in standard errors", title_justify="left", title_style="bold", box=SIMPLE_HEAD, show_edge=False)
-    for column in ("", f"before\n{both.before.spindle}", f"after\n{both.after.spindle}"):
-        grid.add_column(column, justify="right" if column else "left")
-    for label, which in (("all tests", ""), ("fitted tests", "fitted_"), ("held-out tests", "held_out_")):
-        values = [errors[f"{which}{when}"] for when in ("before", "after")]
-        if which == "" or (both.held_out and None not in values):
-            grid.add_row(label, *(f"{v:.3g}" for v in values if v is not None))
-    console.print(grid)
-    if both.held_out:
-        console.print(f"held out: {', '.join(both.held_out)}", highlight=False)

@@ -2,7 +2,7 @@
 
 Errors are computed - measured, in Hz, percent and standard errors; those hold estimator error, scatter of repeats beyond it, the
 model's numerical floor, so they are never zero, and the error of the test's temperature (`thermometer`), which all modes of a test
-share: the rms pull is sqrt(r^T C^-1 r / n) with its correlations. A measured mode with no computed one within `BELIEVABLE` is missing
+share: the rms residual is sqrt(r^T C^-1 r / n) with its correlations. A measured mode with no computed one within `BELIEVABLE` is missing
 from the model (or a false pole of the extraction), a computed mode in the band that was not measured is extra. Nothing is fitted here.
 Sources: Ewins, *Modal Testing* (2000), 5.3: MAC (Allemang 1982), COMAC (Lieven, Ewins 1988); for FRFs see `correlation`.
 """
@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from thermospindle.diagnosis.compare.correlation import Correlation, comac, correlate, frac, likeness
+from thermospindle.diagnosis.compare.correlation import Correlation, assurance, comac, correlate, frac
 from thermospindle.diagnosis.data.observe import Observation, observe
 from thermospindle.diagnosis.prediction.modes import Predicted, predict
 from thermospindle.diagnosis.prediction.partners import BELIEVABLE, crossings, expected_shapes, group, numbered, partners
@@ -32,7 +32,7 @@ class PairedMode:
     """A measured mode and the computed one behind it; damping ratios are None where not measured, `mac` without shapes.
 
     `number` counts the computed modes at the coldest test at rest and follows them from there by shape. Modes closer than
-    `theory.ALONE` (`close`) turn in their plane at the slightest asymmetry: their `mac` is the share of the measured shape in
+    `partners.ALONE` (`close`) turn in their plane at the slightest asymmetry: their `mac` is the share of the measured shape in
     the plane of the computed ones.
     """
 
@@ -52,11 +52,11 @@ class PairedMode:
         return self.computed - self.measured
 
     @property
-    def pull(self) -> float:
+    def residual(self) -> float:
         return self.error / self.sd
 
     @property
-    def damping_pull(self) -> float | None:
+    def damping_residual(self) -> float | None:
         if self.damping_measured is None or self.damping_sd is None:
             return None
         return (self.damping_computed - self.damping_measured) / self.damping_sd
@@ -72,7 +72,7 @@ class TestComparison:
     modes: tuple[PairedMode, ...]
     missing: tuple[float, ...]
     extra: tuple[float, ...]
-    missing_pull: tuple[float, ...]  # of an error of `BELIEVABLE`
+    missing_residual: tuple[float, ...]  # of an error of `BELIEVABLE`
     correlation: Correlation | None
     squares: float  # r^T C^-1 r of all frequencies and dampings, and of the missing modes
     count: int  # of numbers in it
@@ -87,7 +87,7 @@ class TestComparison:
 class Comparison:
     """A campaign beside a scene; `comac` by node, None where no mode moves it; `crossings` in words.
 
-    `rms_pull` is over frequencies and dampings, correlations of their errors included. A missing mode counts as an error of
+    `rms_residual` is over frequencies and dampings, correlations of their errors included. A missing mode counts as an error of
     `BELIEVABLE`, so that a model does not look better for losing a mode.
     """
 
@@ -98,11 +98,11 @@ class Comparison:
     crossings: tuple[str, ...]
 
     @property
-    def rms_pull(self) -> float:
-        return rms_pull(self.tests)
+    def rms_residual(self) -> float:
+        return rms_residual(self.tests)
 
 
-def rms_pull(tests: Sequence[TestComparison]) -> float:
+def rms_residual(tests: Sequence[TestComparison]) -> float:
     """The rms error of some tests in standard errors; infinite where nothing was measured."""
     count = sum(t.count for t in tests)
     return float(np.sqrt(sum(t.squares for t in tests) / count)) if count else float("inf")
@@ -204,12 +204,12 @@ def _test(
                 float(o.damping[i]) if known else None,
                 float(p.damping[j]),
                 float(o.damping[i] * relative[m + i]) if known else None,
-                None if o.shape is None else likeness(o.shape[i], expected[i]),
+                None if o.shape is None else assurance(o.shape[i], expected[i]),
                 len(group(o, p, partner, i)) > 1,
             )
         )
     lost = np.flatnonzero(partner < 0)
-    lost_pull = BELIEVABLE / relative[lost]
+    lost_residual = BELIEVABLE / relative[lost]
     rows = np.flatnonzero(np.isfinite(relative) & (np.tile(partner, 2) >= 0))
     computed = np.concatenate([p.frequency, p.damping])[np.concatenate([partner, partner + len(p.frequency)])[rows]]
     error = np.log(computed / np.concatenate([o.frequency, o.damping])[rows])
@@ -223,8 +223,8 @@ def _test(
         tuple(modes),
         tuple(o.frequency[lost].tolist()),
         tuple(float(f) for j, f in enumerate(p.frequency) if low <= f <= high and j not in found),
-        tuple(lost_pull.tolist()),
+        tuple(lost_residual.tolist()),
         None if shown is None else correlate(shown),
-        squares(error, covariance) + float(lost_pull @ lost_pull),
+        squares(error, covariance) + float(lost_residual @ lost_residual),
         len(rows) + len(lost),
     )

@@ -38,7 +38,7 @@ THIRD = 10**0.1  # ratio of neighbouring third-octave band centres
 Pair = tuple[int, int]  # response node, reference node
 
 
-def likeness(a: ComplexArray, b: ComplexArray) -> float | None:
+def assurance(a: ComplexArray, b: ComplexArray) -> float | None:
     """|a^H b|^2 / (|a|^2 |b|^2): the MAC of two shapes, the FRAC of two FRFs; None where one of them is zero."""
     size = float(np.vdot(a, a).real * np.vdot(b, b).real)
     return min(1.0, float(abs(np.vdot(a, b)) ** 2) / size) if size > 0 else None
@@ -60,7 +60,7 @@ def bands(low: float, high: float) -> list[tuple[float, float]]:
 
 @dataclass(frozen=True)
 class Shape:
-    """Likeness of one FRF over some lines; None where symmetry forbids an answer."""
+    """Correlation of one FRF over some lines; None where symmetry forbids an answer."""
 
     frac: float | None
     csf: float | None
@@ -68,7 +68,7 @@ class Shape:
 
 @dataclass(frozen=True)
 class Band:
-    """Likeness in one band (Hz): means of CSAC and CSF over its lines, the largest mean of FDAC over shifts, and each FRF.
+    """Correlation in one band (Hz): means of CSAC and CSF over its lines, the largest mean of FDAC over shifts, and each FRF.
 
     `shift` is that of the largest mean FDAC, computed over measured frequency - 1; None where FDAC does not tell shifts up to
     `BELIEVABLE` apart or is still rising at the end of them. Without a shift the mean FDAC is `csac`.
@@ -112,7 +112,7 @@ class Correlation:
         frf = self.beside.measured
         return {(r, h): (i, j) for i, r in enumerate(frf.response_nodes) for j, h in enumerate(frf.reference_nodes)}
 
-    def loud(self, pair: Pair) -> bool:
+    def responds(self, pair: Pair) -> bool:
         """Whether the model answers at all at this pair; symmetry forbids some."""
         size = np.linalg.norm(self.computed, axis=-1)
         return bool(size[self.pairs[pair]] > SILENT * size.max())
@@ -124,7 +124,7 @@ class Correlation:
 
 
 def correlate(beside: Beside) -> Correlation:
-    """All likenesses of one test."""
+    """All correlations of one test."""
     frequency, measured = beside.measured.frequency, beside.measured.value
     computed = beside.computed(frequency)
     x, a = _stacked(measured), _stacked(computed)
@@ -143,7 +143,7 @@ def correlate(beside: Beside) -> Correlation:
         by_frf = {}
         for pair, (i, j) in found.pairs.items():
             one = (measured[i, j, inside], computed[i, j, inside])
-            by_frf[pair] = Shape(likeness(*one), scale_factor(*one)) if found.loud(pair) else Shape(None, None)
+            by_frf[pair] = Shape(assurance(*one), scale_factor(*one)) if found.responds(pair) else Shape(None, None)
         means = (float(csac[inside].mean()), float(csf[inside].mean()), float(by_shift.max()))
         return Band(low, high, int(inside.sum()), *means, _best(shifts, by_shift), by_frf)
 
@@ -193,7 +193,7 @@ def _best(shifts: Array, by_shift: Array) -> float | None:
 
 def frac(found: Correlation) -> dict[Pair, float | None]:
     """FRAC of every response and reference over all lines."""
-    return {p: likeness(found.measured[ij], found.computed[ij]) if found.loud(p) else None for p, ij in found.pairs.items()}
+    return {p: assurance(found.measured[ij], found.computed[ij]) if found.responds(p) else None for p, ij in found.pairs.items()}
 
 
 def comac(nodes: Sequence[int], pairs: Sequence[tuple[ComplexArray, ComplexArray]]) -> dict[int, float | None]:

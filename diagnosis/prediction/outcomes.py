@@ -82,7 +82,7 @@ def _outcome(o: Observation, name: str, predicted: np.ndarray) -> Outcome:
     frequency, sd, damping, damping_sd = predicted[expected].T
     off = np.log(np.concatenate([o.frequency[seen] / frequency, o.damping[seen] / damping]))
     known = np.hypot(np.concatenate([error[:m][seen], error[m:][seen]]), np.concatenate([sd / frequency, damping_sd / damping]))
-    pull = (off / known)[np.isfinite(known)]
-    chance = float(chi_squared.sf(float(pull @ pull), len(pull)))
+    residual = (off / known)[np.isfinite(known)]
+    chance = float(chi_squared.sf(float(residual @ residual), len(residual)))
     verdict = "refuted" if chance < REFUTED else "doubtful" if chance < DOUBTFUL else "confirmed"
-    return Outcome(o.test.id, name, float(np.sqrt(np.mean(pull**2))), len(seen), verdict)
+    return Outcome(o.test.id, name, float(np.sqrt(np.mean(residual**2))), len(seen), verdict)

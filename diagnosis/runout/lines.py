@@ -55,7 +55,7 @@ class SeenLine:
 
 
 @dataclass(frozen=True)
-class StrangeLine:
+class UnexplainedLine:
     """A line that no line of theory explains."""
 
     test: str
@@ -73,7 +73,7 @@ class Seen:
     condition: Condition
     nodes: tuple[int, ...]
     seen: tuple[SeenLine, ...]
-    strange: tuple[StrangeLine, ...]
+    unexplained: tuple[UnexplainedLine, ...]
     slip: float
     phased: bool
 
@@ -110,17 +110,17 @@ def look(spindle: Spindle, test: Test) -> Seen:
     turning = abs(condition.speed) / (2 * np.pi)
     if record.kind == "time":
         phasor, sd, left = _fitted(record, frequency)
-        strange = _strange(test, record, left, frequency, np.abs(phasor).max(axis=1), turning, limit)
+        unexplained = _unexplained(test, record, left, frequency, np.abs(phasor).max(axis=1), turning, limit)
     else:
         phasor, sd = _summed(record, frequency)
         sd = np.hypot(sd, OF_BINS * np.abs(phasor))
-        strange = ()
+        unexplained = ()
     further = lines(point.spindle, slipped(kin, slip + APART), MULTIPLE)
     moved = {key_of(g): g.frequency for g in further}
     astray = [max(abs(moved.get(key_of(g), g.frequency) - g.frequency) for g in cluster) for cluster in clusters]
     sd = np.sqrt(sd**2 + _form(clusters, frequency, np.abs(phasor), record.length, np.array(astray)) ** 2)
     found = tuple(SeenLine(float(f), tuple(c), phasor[:, i], sd[:, i]) for i, (f, c) in enumerate(zip(frequency, clusters, strict=True)))
-    return Seen(test, condition, record.nodes, found, strange, slip, record.phased)
+    return Seen(test, condition, record.nodes, found, unexplained, slip, record.phased)
 
 
 def slipped(kin: Mapping[str, Kinematics], slip: float) -> dict[str, Kinematics]:
@@ -213,9 +213,9 @@ def _floor(square: Array, bins: Array, f: float, fitted: Array, length: float) -
     return np.asarray(np.median(square[:, chosen], axis=1) / np.log(2))
 
 
-def _strange(
+def _unexplained(
     test: Test, record: RunoutRecord, left: Array, fitted: Array, strongest: Array, turning: float, limit: float
-) -> tuple[StrangeLine, ...]:
+) -> tuple[UnexplainedLine, ...]:
     """Peaks of the rest that stand out of their surroundings and lie at no fitted line, strongest first."""
     n, length = left.shape[1], record.length
     window = np.hanning(n + 1)[:-1]
@@ -224,7 +224,7 @@ def _strange(
     free: NDArray[np.bool_] = (
         (np.abs(frequency[:, None] - fitted).min(axis=1) > 3 / length) & (frequency > 3 / length) & (frequency < limit)
     )
-    found: list[StrangeLine] = []
+    found: list[UnexplainedLine] = []
     for i in np.argsort(-(amplitude / strongest[:, None]).max(axis=0) * free):
         if len(found) == MOST or not free[i]:
             break
@@ -235,7 +235,7 @@ def _strange(
             break
         if not near and amplitude[probe, i] ** 2 > STANDS_OUT * float(np.median(around)) ** 2:
             order = float(frequency[i]) / turning
-            found.append(StrangeLine(test.id, float(frequency[i]), order, float(amplitude[probe, i]), record.nodes[probe]))
+            found.append(UnexplainedLine(test.id, float(frequency[i]), order, float(amplitude[probe, i]), record.nodes[probe]))
     return tuple(found)
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.stats import chi2 as chi_squared
 
 from thermospindle.diagnosis.runout.fit import Family, FamilyFit, families, fit_family, merged
-from thermospindle.diagnosis.runout.lines import Seen, StrangeLine, look, runout_tests
+from thermospindle.diagnosis.runout.lines import Seen, UnexplainedLine, look, runout_tests
 from thermospindle.diagnosis.runout.sources import SourceKey, Sources, of_effect, sources
 from thermospindle.model.machine import Spindle
 from thermospindle.model.types import Array
@@ -84,7 +84,7 @@ class RunoutDiagnosis:
     families: tuple[Family, ...]
     base: tuple[FamilyFit, ...]
     smallest: Mapping[str, float]
-    strange: tuple[StrangeLine, ...]
+    unexplained: tuple[UnexplainedLine, ...]
     held_out_before: float
     held_out_after: float
 
@@ -191,7 +191,7 @@ def _pairs(best: Sequence[Explanation], tried: Sequence[Variant], parts: Sequenc
 # ---------------------------------------------------------------- held out
 
 
-def _pull(rows: Family, explained: Explanation | None) -> tuple[float, int]:
+def _squares(rows: Family, explained: Explanation | None) -> tuple[float, int]:
     """Squared error of lines as the scene foretells them, or the scene with an effect of a given size, in its standard errors, and how many numbers.
 
     What the scene has besides is of its likely size. Phases are those that suit the data best: nothing foretells them.
@@ -202,13 +202,13 @@ def _pull(rows: Family, explained: Explanation | None) -> tuple[float, int]:
             together = (rows.test == t) & (rows.frequency == frequency)
             each = [together] if rows.phased[together].all() else [together & (rows.node == n) for n in np.unique(rows.node[together])]
             for chosen in each:  # probes without phases each by itself
-                one, n = _pull_of(rows.only(chosen), explained)
+                one, n = _squares_of_line(rows.only(chosen), explained)
                 total, count = total + one, count + n
     return total, count
 
 
-def _pull_of(own: Family, explained: Explanation | None) -> tuple[float, int]:
-    """As `_pull`, of one line in one test."""
+def _squares_of_line(own: Family, explained: Explanation | None) -> tuple[float, int]:
+    """As `_squares`, of one line in one test."""
     scene = np.diag(own.sd**2).astype(complex)
     for same in np.unique(own.phase, axis=1).T:
         column = own.shown * np.all(own.phase == same[:, None], axis=0) * own.likely
@@ -236,8 +236,8 @@ def held_out(found: Explanation, parts: Sequence[Family]) -> tuple[float, float]
             continue
         rest = family.only(~out)
         fit = fit_family(rest, [rest.of_effect(v.amplitudes) for v in found.variants], [v.prior for v in found.variants])
-        one, n = _pull(family.only(out), None)
-        before, after, count = before + one, after + _pull(family.only(out), replace(found, size=fit.size))[0], count + n
+        one, n = _squares(family.only(out), None)
+        before, after, count = before + one, after + _squares(family.only(out), replace(found, size=fit.size))[0], count + n
     if count == 0:
         return float("nan"), float("nan")
     return float(np.sqrt(before / count)), float(np.sqrt(after / count))
@@ -289,7 +289,7 @@ def _verdict(
     pairs: Sequence[Explanation],
 ) -> RunoutDiagnosis:
     count, chi2 = sum(f.count for f in parts), sum(f.chi2 for f in base)
-    strange = tuple(sorted((g for s in seen for g in s.strange), key=lambda g: -g.amplitude))
+    unexplained = tuple(sorted((g for s in seen for g in s.unexplained), key=lambda g: -g.amplitude))
     first = best[0] if best else None
     candidates = sorted([*best, *(f for f in fits if first and f not in best and first.delta_evidence - f.delta_evidence < AHEAD), *pairs],
                         key=lambda f: -f.delta_evidence)  # fmt: skip
@@ -309,11 +309,11 @@ def _verdict(
     def answer(verdict: str, names: Sequence[str], reason: str) -> RunoutDiagnosis:
         return RunoutDiagnosis(
             verdict, tuple(names), reason, tuple(candidates), tuple(seen), found, tuple(parts), tuple(base),
-            _smallest(effects, fits, found, parts), strange, before, after,
+            _smallest(effects, fits, found, parts), unexplained, before, after,
         )  # fmt: skip
 
-    if strange:
-        where = ", ".join(f"{g.frequency:.1f} Hz ({g.order:.3f} orders, {1e9 * g.amplitude:.3g} nm)" for g in strange[:4])
+    if unexplained:
+        where = ", ".join(f"{g.frequency:.1f} Hz ({g.order:.3f} orders, {1e9 * g.amplitude:.3g} nm)" for g in unexplained[:4])
         return answer("unexplained", (), f"The records hold lines that no imperfection has: {where}.")
     rejected = _rejected(chi2, count)
     if first is None or not leading or leading[0].delta_evidence < CLEAR:

@@ -2,7 +2,7 @@
 
 =========  =============================================================================================================
 common     the report's figures as inline SVG, drawn with matplotlib's object-oriented interface
-compare    pictures of a comparison: map of residuals, FRFs over each other, FDAC, likeness by band and by FRF. Every function
+compare    pictures of a comparison: map of residuals, FRFs over each other, FDAC, correlation by band and by FRF. Every function
            returns a figure
 diagnosis  pictures of a diagnosis: how far every explanation leads, and the map of residuals before and after
 ladder     pictures of the ladder: the error at every step, and the map of residuals (mode x test) at the first step and

@@ -1,4 +1,4 @@
-"""Pictures of a comparison: map of residuals, FRFs over each other, FDAC, likeness by band and by FRF. Every function returns a figure."""
+"""Pictures of a comparison: map of residuals, FRFs over each other, FDAC, correlation by band and by FRF. Every function returns a figure."""
 
 from __future__ import annotations
 
@@ -49,9 +49,9 @@ def residual_map(c: Comparison) -> Figure:
     """Errors in standard errors, mode by test, frequencies and dampings; what has no partner stands below."""
     modes = {m.number: f"{m.number} {m.kind}" for t in c.tests for m in sorted(t.modes, key=lambda m: m.number)}
     modes = dict(sorted(modes.items()))
-    measures: list[tuple[str, Callable[[PairedMode], float | None]]] = [("Frequency", lambda m: m.pull)]
-    if any(m.damping_pull is not None for t in c.tests for m in t.modes):
-        measures.append(("Damping ratio", lambda m: m.damping_pull))
+    measures: list[tuple[str, Callable[[PairedMode], float | None]]] = [("Frequency", lambda m: m.residual)]
+    if any(m.damping_residual is not None for t in c.tests for m in t.modes):
+        measures.append(("Damping ratio", lambda m: m.damping_residual))
     wide = max(4.6, 1.5 + 0.72 * len(c.tests))
     figure = _figure(min(11.0, wide * len(measures)) if len(measures) > 1 else wide, 1.9 + 0.3 * (len(modes) + 2))
     panels = figure.subplots(1, len(measures), squeeze=False, sharey=True)[0]

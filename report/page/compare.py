@@ -24,15 +24,15 @@ WORDS = {
     ),
     "frfs": ("FRFs over each other", "Measured FRFs (coloured) and those of the model (dashed) at the same points, lines and window."),
     "bands": (
-        "Likeness by band",
+        "Correlation by band",
         "Means over the lines of third-octave bands. CSAC compares the shape of all FRFs at a line and is blind to a scale, CSF amplitude "
         "too. The shift by FDAC: by how much the computed frequencies must come down to be most like the measured ones (FDAC); grey where no shift "
         "is better than another.",
     ),
-    "channels": ("Likeness by FRF", "Every FRF over all its lines. Grey: symmetry forbids an answer, so there is nothing to compare."),
+    "channels": ("Correlation by FRF", "Every FRF over all its lines. Grey: symmetry forbids an answer, so there is nothing to compare."),
     "fdac": (
         "FDAC",
-        "Likeness of the computed FRFs at one frequency with the measured ones at another, for the tests that agree best and worst. "
+        "Correlation of the computed FRFs at one frequency with the measured ones at another, for the tests that agree best and worst. "
         "A ridge off the thin diagonal is a model whose frequencies are off; red: the shift found in each band.",
     ),
 }
@@ -72,17 +72,17 @@ def _figure(drawn: str, name: str) -> str:
 def _summary(c: Comparison) -> str:
     modes = [m for t in c.tests for m in t.modes]
     words = [
-        f"<p>{Markup.escape(c.campaign)} beside the scene {Markup.escape(c.spindle)}: rms residual <b>{c.rms_pull:.3g} standard errors</b>"
+        f"<p>{Markup.escape(c.campaign)} beside the scene {Markup.escape(c.spindle)}: rms residual <b>{c.rms_residual:.3g} standard errors</b>"
     ]
     if modes:
-        pulls = [(m.pull, f"{signed(m.error, 2)} Hz", m) for m in modes]
-        pulls += [
-            (m.damping_pull, f"{signed(100 * (m.damping_computed - m.damping_measured), 3)} % of damping", m)
+        residuals = [(m.residual, f"{signed(m.error, 2)} Hz", m) for m in modes]
+        residuals += [
+            (m.damping_residual, f"{signed(100 * (m.damping_computed - m.damping_measured), 3)} % of damping", m)
             for m in modes
-            if m.damping_pull is not None and m.damping_measured is not None
+            if m.damping_residual is not None and m.damping_measured is not None
         ]
-        pull, error, worst = max(pulls, key=lambda row: abs(row[0]))
-        words.append(f", the largest that of mode {worst.number} ({worst.kind}), {signed(pull, 1)} standard errors or {error}")
+        residual, error, worst = max(residuals, key=lambda row: abs(row[0]))
+        words.append(f", the largest that of mode {worst.number} ({worst.kind}), {signed(residual, 1)} standard errors or {error}")
     words.append(".</p>")
     remarks = [f"{label(t, ', ')}: {what} {', '.join(f'{f:.1f}' for f in values)} Hz" for t in c.tests
             for what, values in (("measured, not computed (a mode the model lacks, or a false pole):", t.missing), ("computed, not measured:", t.extra))
@@ -102,7 +102,7 @@ def _table(c: Comparison) -> str:
             damping = "–" if m.damping_measured is None else f"{100 * m.damping_measured:.3f}"
             cells = [
                 label(t, ", ") if k == 0 else "", str(m.number), m.kind, f"{m.measured:.2f} <small>± {m.sd:.2g}</small>", f"{m.computed:.2f}",
-                signed(m.error, 2), signed(100 * m.error / m.measured, 2), signed(m.pull, 1), damping, f"{100 * m.damping_computed:.3f}",
+                signed(m.error, 2), signed(100 * m.error / m.measured, 2), signed(m.residual, 1), damping, f"{100 * m.damping_computed:.3f}",
                 "–" if m.mac is None else f"{m.mac:.3f}" + ("*" if m.close else ""),
             ]  # fmt: skip
             rows.append(_row("td", cells, ' class="rule"' if k == 0 and rows else ""))

@@ -11,6 +11,7 @@ resonance         what `spindle map` says: JSON, sentences, terminal table, CSV 
 run               what the command line says: the JSON objects, the terminal tables, and the files of a run's folder
 runout            what `spindle runout` says and writes: the JSON object, the terminal table, CSV files, figures, and a
                   section for the report
+runout_compare    measured runout beside the scene's, as JSON and in terminal tables
 runout_diagnosis  the diagnosis of runout as JSON with the keys of `diagnosis.verdict`, and in the terminal
 warmup            what `spindle warmup` says: JSON, terminal table, CSV, figures, and a section of the report
 ================  ======================================================================================================

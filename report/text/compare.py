@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
+from thermospindle.diagnosis.compare.before_after import BeforeAfter
 from thermospindle.diagnosis.compare.compare import Comparison, PairedMode, TestComparison
 from thermospindle.diagnosis.compare.correlation import Band
 from thermospindle.model.units import RPM
-from thermospindle.report.text.grid import show_grid
+from thermospindle.report.text.grid import grid, show_grid
 
 
 def comparison_json(c: Comparison) -> dict[str, Any]:
@@ -20,7 +21,7 @@ def comparison_json(c: Comparison) -> dict[str, Any]:
         "tests": [_test_json(t) for t in c.tests],
         "comac": {str(node): value for node, value in c.comac.items()},
         "crossings": list(c.crossings),
-        "rms_pull": c.rms_pull if np.isfinite(c.rms_pull) else None,
+        "rms_pull": c.rms_residual if np.isfinite(c.rms_residual) else None,
     }
 
 
@@ -60,11 +61,11 @@ def _mode_json(m: PairedMode) -> dict[str, Any]:
         "computed_Hz": m.computed,
         "error_Hz": m.error,
         "error_percent": 100 * m.error / m.measured,
-        "pull": m.pull,
+        "pull": m.residual,
         "damping_measured": m.damping_measured,
         "damping_sd": m.damping_sd,
         "damping_computed": m.damping_computed,
-        "damping_pull": m.damping_pull,
+        "damping_pull": m.damping_residual,
         "mac": m.mac,
         "close": m.close,
     }
@@ -75,17 +76,17 @@ AGREES, ALMOST = 1.5, 3.0  # standard errors rms up to which a scene and a campa
 
 def verdict(c: Comparison) -> str:
     """One sentence: whether they agree, by how much they do not, and the mode that is furthest off."""
-    words = "agrees with the tests within their errors" if c.rms_pull < AGREES else "nearly agrees with the tests" if c.rms_pull < ALMOST else "does not agree with the tests"
-    told = f"{c.spindle} {words}: rms residual {c.rms_pull:.3g} standard errors"
-    every = [(abs(m.pull), t, m) for t in c.tests for m in t.modes]
-    if not every or c.rms_pull < AGREES:
-        return f"{told}."
+    words = "agrees with the tests within their errors" if c.rms_residual < AGREES else "nearly agrees with the tests" if c.rms_residual < ALMOST else "does not agree with the tests"
+    sentence = f"{c.spindle} {words}: rms residual {c.rms_residual:.3g} standard errors"
+    every = [(abs(m.residual), t, m) for t in c.tests for m in t.modes]
+    if not every or c.rms_residual < AGREES:
+        return f"{sentence}."
     _, t, m = max(every, key=lambda row: row[0])
-    return f"{told}; furthest off is the {m.kind} mode at {m.measured:.0f} Hz of {t.test.id}, computed {abs(m.error):.3g} Hz too {'high' if m.error > 0 else 'low'}."
+    return f"{sentence}; furthest off is the {m.kind} mode at {m.measured:.0f} Hz of {t.test.id}, computed {abs(m.error):.3g} Hz too {'high' if m.error > 0 else 'low'}."
 
 
 def show_comparison(console: Console, c: Comparison, verbose: bool = True) -> None:
-    """The verdict, the table of modes, what has no partner; with `verbose` also the likeness of FRFs, crossings, FRAC and COMAC by point."""
+    """The verdict, the table of modes, what has no partner; with `verbose` also the correlation of FRFs, crossings, FRAC and COMAC by point."""
     console.print(verdict(c), style="bold", highlight=False, markup=False)
     console.print(f"Tests: {c.campaign}", highlight=False, markup=False)
     columns = (
@@ -96,9 +97,9 @@ def show_comparison(console: Console, c: Comparison, verbose: bool = True) -> No
     for t in c.tests:
         for m in t.modes:
             damping = "" if m.damping_measured is None else f"{100 * m.damping_measured:.3f}"
-            damping_error = "" if m.damping_pull is None else f"{m.damping_pull:+.1f}"
+            damping_error = "" if m.damping_residual is None else f"{m.damping_residual:+.1f}"
             mac = "" if m.mac is None else f"{m.mac:.3f}" + ("*" if m.close else "")
-            error = (f"{m.error:+.2f}", f"{100 * m.error / m.measured:+.2f}", f"{m.pull:+.1f}")
+            error = (f"{m.error:+.2f}", f"{100 * m.error / m.measured:+.2f}", f"{m.residual:+.1f}")
             name = t.test.id if m is t.modes[0] else ""
             frequencies = (f"{m.measured:.2f}", f"{m.sd:.2f}", f"{m.computed:.2f}")
             beside = (damping, f"{100 * m.damping_computed:.3f}", damping_error, mac)
@@ -131,7 +132,7 @@ def show_comparison(console: Console, c: Comparison, verbose: bool = True) -> No
 
 
 def _show_frfs(console: Console, c: Comparison) -> None:
-    """One line a test: likeness of all FRFs, and the band that is least alike."""
+    """One line a test: correlation of all FRFs, and the band that is least alike."""
     rows = []
     for t in c.tests:
         if t.correlation is not None:
@@ -145,3 +146,15 @@ def _show_frfs(console: Console, c: Comparison) -> None:
 
 def _percent(shift: float | None) -> str:
     return "-" if shift is None else f"{100 * shift:+.2f}"
+
+
+def show_before_after(console: Console, both: BeforeAfter) -> None:
+    errors = both.errors()
+    table = grid("Error, rms in standard errors", ("", f"before\n{both.before.spindle}", f"after\n{both.after.spindle}"), ("",))
+    for label, which in (("all tests", ""), ("fitted tests", "fitted_"), ("held-out tests", "held_out_")):
+        values = [errors[f"{which}{when}"] for when in ("before", "after")]
+        if which == "" or (both.held_out and None not in values):
+            table.add_row(label, *(f"{v:.3g}" for v in values if v is not None))
+    console.print(table)
+    if both.held_out:
+        console.print(f"held out: {', '.join(both.held_out)}", highlight=False)

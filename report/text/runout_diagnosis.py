@@ -42,7 +42,7 @@ def runout_diagnosis_json(d: RunoutDiagnosis, catalogue: tuple[Effect, ...]) -> 
         "next_test": [],
         "unexplained_lines": [
             {"test": g.test, "frequency_Hz": g.frequency, "order": g.order, "amplitude_um": TO_UM * g.amplitude, "node": g.node}
-            for g in d.strange
+            for g in d.unexplained
         ],
         "tests": [
             {
@@ -105,7 +105,7 @@ def would_change(d: RunoutDiagnosis) -> str:
     """What would make this verdict another one, in a sentence."""
     if d.verdict == "none":
         return "An imperfection larger than these records could have hidden would change that; how large that is, is listed for each."
-    if d.strange:
+    if d.unexplained:
         return "An excitation that turns or sounds at these frequencies and is none of a bearing's or of an unbalance's would explain them; the catalogue has none."
     if d.verdict == "unexplained":
         return "Longer records, or probes in another plane, would tell which lines are not as computed."
@@ -130,7 +130,7 @@ def show_runout_diagnosis(console: Console, answer: dict[str, Any]) -> None:
     console.print(answer["reason"], highlight=False)
     console.print(answer["would_change"], highlight=False)
     error = answer["error"]
-    console.print(f"rms pull {error['before']:.2f} -> {error['after']:.2f}", highlight=False)
+    console.print(f"rms residual {error['before']:.2f} -> {error['after']:.2f}", highlight=False)
     if answer["verdict"] not in ("none",):
         console.print("\nBest explanations (ln evidence over the scene's own imperfections):")
         for c in answer["candidates"][:5]:

@@ -8,20 +8,15 @@ from typing import Any
 
 from rich.console import Console
 
-from thermospindle.diagnosis.compare.before_after import BeforeAfter, held_out, show_before_after
+from thermospindle.diagnosis.compare.before_after import BeforeAfter, errors, held_out
 from thermospindle.diagnosis.compare.compare import compare as beside
 from thermospindle.diagnosis.data.observe import observe
-from thermospindle.diagnosis.runout.compare import (
-    compare_runout,
-    errors_of,
-    runout_comparison_json,
-    show_errors,
-    show_runout_comparison,
-)
+from thermospindle.diagnosis.runout.compare import compare_runout, rms_residual
 from thermospindle.diagnosis.runout.lines import modal_tests
 from thermospindle.model.machine import Spindle
 from thermospindle.report.page.compare import write_comparison
-from thermospindle.report.text.compare import comparison_json, show_comparison
+from thermospindle.report.text.compare import comparison_json, show_before_after, show_comparison
+from thermospindle.report.text.runout_compare import runout_comparison_json, show_errors, show_runout_comparison
 from thermospindle.report.verbs.answer import Answer, answered, progress_bar, with_effects, write_json
 from thermospindle.sim.campaign.campaign import Campaign, read_campaign
 
@@ -76,13 +71,13 @@ def _of_runout(
         found = compare_runout(spindle, campaign, progress)
         earlier = compare_runout(before, campaign, progress) if before else None
     values = runout_comparison_json(found)
-    errors = errors_of(earlier, found, unseen) if earlier else None
-    if errors:
-        values |= {"error": errors, "held_out": list(unseen)}
+    before_after = errors(earlier, found, unseen, rms_residual) if earlier else None
+    if before_after:
+        values |= {"error": before_after, "held_out": list(unseen)}
 
     def show(console: Console) -> None:
         show_runout_comparison(console, found)
-        if errors:
-            show_errors(console, errors)
+        if before_after:
+            show_errors(console, before_after)
 
     return values, show

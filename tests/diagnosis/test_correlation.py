@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from thermospindle.diagnosis.compare.correlation import TOLD, bands, correlate, likeness, scale_factor
+from thermospindle.diagnosis.compare.correlation import TOLD, assurance, bands, correlate, scale_factor
 from thermospindle.diagnosis.prediction.partners import BELIEVABLE
 from thermospindle.model.machine import Condition
 from thermospindle.sim.campaign.beside import Beside, beside
@@ -115,9 +115,9 @@ def test_third_octaves():
 
 def test_closed_forms():
     a = np.array([1.0, 2j, 0.5])
-    assert likeness(a, (3 - 4j) * a) == pytest.approx(1.0)
-    assert likeness(np.array([1.0, 0j]), np.array([0j, 1.0])) == 0.0
-    assert likeness(a, 0 * a) is None
+    assert assurance(a, (3 - 4j) * a) == pytest.approx(1.0)
+    assert assurance(np.array([1.0, 0j]), np.array([0j, 1.0])) == 0.0
+    assert assurance(a, 0 * a) is None
     assert scale_factor(a, (3 - 4j) * a) == pytest.approx(2 * 5 / (1 + 25))
     assert scale_factor(a, 1j * a) == pytest.approx(1.0)
     assert scale_factor(a, 0 * a) == 0.0

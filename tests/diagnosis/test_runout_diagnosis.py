@@ -10,7 +10,7 @@ import pytest
 
 from tests.conftest import SCENE
 from thermospindle.cli import main
-from thermospindle.diagnosis.runout.compare import compare_runout, rms_pull
+from thermospindle.diagnosis.runout.compare import compare_runout, rms_residual
 from thermospindle.diagnosis.runout.lines import look
 from thermospindle.diagnosis.runout.verdict import RunoutDiagnosis, diagnose_runout
 from thermospindle.model.drawn import drawn
@@ -96,11 +96,11 @@ def test_a_line_that_no_imperfection_has_is_unexplained(spindle) -> None:
     hum = replace(made.tests[1].runout, value=made.tests[1].runout.value + 3e-8 * np.cos(2 * np.pi * 150.0 * time))
     d = diagnose_runout(spindle, replace(made, tests=(made.tests[0], replace(made.tests[1], runout=hum), made.tests[2])))
     assert (d.verdict, d.effects) == ("unexplained", ())
-    assert d.strange[0].frequency == pytest.approx(150.0, abs=1.0)
-    assert d.strange[0].test == made.tests[1].id
+    assert d.unexplained[0].frequency == pytest.approx(150.0, abs=1.0)
+    assert d.unexplained[0].test == made.tests[1].id
     answer = runout_diagnosis_json(d, CATALOGUE)
     assert answer["unexplained_lines"][0]["order"] == pytest.approx(150 / 90, rel=0.01)
-    assert "150.0 Hz" in answer["reason"] or f"{d.strange[0].frequency:.1f} Hz" in answer["reason"]
+    assert "150.0 Hz" in answer["reason"] or f"{d.unexplained[0].frequency:.1f} Hz" in answer["reason"]
 
 
 def test_with_one_speed_the_cage_and_the_balls_are_not_told_apart_for_certain(spindle) -> None:
@@ -122,7 +122,7 @@ def test_errors_of_lines_come_true(spindle) -> None:
     made = runout_campaign(perfect, [CONDITIONS[2]] * 6, 0.4, seed=1, noise=1e-8, path="linear")
     pulls = np.concatenate([np.abs(line.phasor / line.sd) for t in made.tests for line in look(spindle, t).seen])
     assert np.mean(pulls**2) == pytest.approx(1.0, abs=0.25)
-    assert not any(look(spindle, t).strange for t in made.tests)
+    assert not any(look(spindle, t).unexplained for t in made.tests)
 
 
 def as_spectrum(record: RunoutRecord, phased: bool) -> RunoutRecord:
@@ -184,7 +184,7 @@ def test_the_scene_that_made_the_records_agrees_with_them_and_another_does_not(s
     right, wrong = compare_runout(spindle, made), compare_runout(replace(spindle, imperfections=drawn(spindle, 9)), made)
     exactly = [[abs(a.computed - a.measured) for t in them for a in t.lines] for them in (right, wrong)]
     assert np.mean(exactly[0]) < 0.5 * np.mean(exactly[1])
-    assert rms_pull(right) < rms_pull(wrong) < 2.0  # other spindles of the drawing are believable too
+    assert rms_residual(right) < rms_residual(wrong) < 2.0  # other spindles of the drawing are believable too
     line = next(g for g in right[0].lines if g.causes[0].cause == "outer waviness" and g.causes[0].order == 1)
     assert line.frequency == pytest.approx(90.0)
     assert line.computed == pytest.approx(line.measured, rel=0.03)

@@ -65,7 +65,7 @@ def test_a_thermometer_off_by_its_error_is_one_error_not_eight(spindle):
     found = compare(spindle, warmer(spindle, spindle.tolerances.temperature)).tests[0]
     assert found.count == 16
     assert found.squares == pytest.approx(1.0, abs=0.15)
-    assert max(abs(m.pull) for m in found.modes) == pytest.approx(1.0, abs=0.15)
+    assert max(abs(m.residual) for m in found.modes) == pytest.approx(1.0, abs=0.15)
     exact = replace(spindle, tolerances=replace(spindle.tolerances, temperature=1e-9))
     alone = compare(exact, warmer(spindle, spindle.tolerances.temperature)).tests[0]
     assert alone.squares > 100

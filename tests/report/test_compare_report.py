@@ -128,7 +128,7 @@ def test_the_pull_map_shows_the_pulls(found):
         text = svg(figures(found)["pulls"], "k", "pulls")
     for test in found.tests:
         for m in test.modes:
-            shown = f"{m.pull:+.1f}" if abs(m.pull) < 9.95 else f"{m.pull:+.0f}"
+            shown = f"{m.residual:+.1f}" if abs(m.residual) < 9.95 else f"{m.residual:+.0f}"
             assert f">{shown.replace('-', '−')}<" in text
 
 
