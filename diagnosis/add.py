@@ -120,12 +120,12 @@ def new_scene(
 
 def _added(effect: Effect, fitted: Mapping[str, float], by_hand: Mapping[str, float], diagnosis: Path | None) -> Added:
     values = checked(effect, effect.typical() | dict(fitted) | dict(by_hand))
-    told = {
+    origins = {
         "typical of the catalogue": [n for n in values if n not in fitted and n not in by_hand],
         f"fitted, from {diagnosis}": [n for n in fitted if n not in by_hand],
         "set by hand": list(by_hand),
     }
-    source = "; ".join(f"{what}: {', '.join(names)}" for what, names in told.items() if names)
+    source = "; ".join(f"{what}: {', '.join(names)}" for what, names in origins.items() if names)
     if isinstance(effect, OwnEffect):
         source += f"; the effect is not of the catalogue but of {effect.where}"
     units = {p.name: p.unit for p in effect.parameters}
@@ -196,10 +196,10 @@ def fitted_values(effects: Sequence[Effect], answer: Answer, file: Path) -> dict
     names = [e.name for e in effects]
     parameters = next((p for own, p in answer.candidates if set(names) <= set(own)), None)
     if parameters is None:
-        told = dict.fromkeys(" + ".join(own) if len(names) > 1 else e for own, _ in answer.candidates for e in own)
+        offered = dict.fromkeys(" + ".join(own) if len(names) > 1 else e for own, _ in answer.candidates for e in own)
         raise BadInput(
             f"--from {file}: no candidate has effect{'s' * (len(names) > 1)} {' and '.join(names)}; its candidates are "
-            f"{', '.join(told) or 'none'}"
+            f"{', '.join(offered) or 'none'}"
         )
     found: dict[str, dict[str, float]] = {}
     for effect in effects:

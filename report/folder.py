@@ -41,8 +41,8 @@ def mark(folder: Path, options: Mapping[str, Any], answer: Mapping[str, Any]) ->
         from thermospindle.report.page.report import stamp
 
         stamp(folder, COMMAND.get() or _call(options), datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"))
-    told = {"options": dict(options), "answer": dict(answer), "files": {name: digest(folder / name) for name in _entries(folder)}}
-    (folder / MARK).write_text(json.dumps(told, indent=1, default=str), encoding="utf-8")
+    record = {"options": dict(options), "answer": dict(answer), "files": {name: digest(folder / name) for name in _entries(folder)}}
+    (folder / MARK).write_text(json.dumps(record, indent=1, default=str), encoding="utf-8")
 
 
 def _call(options: Mapping[str, Any]) -> str:

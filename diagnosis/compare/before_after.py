@@ -57,7 +57,7 @@ def without(campaign: Campaign, ids: Sequence[str]) -> Campaign:
 def held_out(spindle: Spindle, campaign: Campaign, named: Sequence[str]) -> tuple[str, ...]:
     """Ids of the tests a scene was not fitted to: those named, or else those its `build` table does not list.
 
-    A scene without that table tells nothing, and none is held out. `BadInput` for a named test that the table lists.
+    A scene without that table says nothing, and none is held out. `BadInput` for a named test that the table lists.
     """
     _known(campaign, named)
     fitted = spindle.build.tests if spindle.build else ()

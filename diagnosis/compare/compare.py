@@ -155,7 +155,7 @@ def _at_its_temperature(spindle: Spindle, campaign: Campaign, o: Observation, p:
 def _repeat_variance(observed: Sequence[Observation], chosen: Sequence[Integers], numbers: Sequence[Mapping[int, int]]) -> list[Array]:
     """For every test, variance (2m,) of ln frequency and ln damping that repeats show beyond the errors of single tests.
 
-    Pooled over all conditions that were repeated, mode by mode, with their degrees of freedom: two repeats alone tell little. It
+    Pooled over all conditions that were repeated, mode by mode, with their degrees of freedom: two repeats alone say little. It
     holds for all tests of the campaign, also those made once.
     """
     extra = [np.zeros(2 * len(o.frequency)) for o in observed]

@@ -32,7 +32,7 @@ from thermospindle.sim.campaign.beside import Beside
 SILENT = 1e-6  # of the largest FRF of the test; smaller computed ones are forbidden by symmetry and have no shape to compare
 FEWEST = 8  # lines of a band that is worth a number
 SHIFT_STEP = 5e-4  # relative, between the shifts tried
-TOLD = 0.05  # by how much FDAC must vary over the shifts tried to tell one from another
+DISTINCT = 0.05  # by how much FDAC must vary over the shifts tried for one of them to be the best
 THIRD = 10**0.1  # ratio of neighbouring third-octave band centres
 
 Pair = tuple[int, int]  # response node, reference node
@@ -70,7 +70,7 @@ class Shape:
 class Band:
     """Correlation in one band (Hz): means of CSAC and CSF over its lines, the largest mean of FDAC over shifts, and each FRF.
 
-    `shift` is that of the largest mean FDAC, computed over measured frequency - 1; None where FDAC does not tell shifts up to
+    `shift` is that of the largest mean FDAC, computed over measured frequency - 1; None where FDAC does not separate shifts up to
     `BELIEVABLE` apart or is still rising at the end of them. Without a shift the mean FDAC is `csac`.
     """
 
@@ -184,7 +184,7 @@ def _shifted_fdac(beside: Beside, frequency: Array, x: ComplexArray) -> tuple[Ar
 def _best(shifts: Array, by_shift: Array) -> float | None:
     """The shift with the largest mean FDAC, between the steps by a parabola."""
     k = int(np.argmax(by_shift))
-    if np.ptp(by_shift) < TOLD or k in (0, len(shifts) - 1):
+    if np.ptp(by_shift) < DISTINCT or k in (0, len(shifts) - 1):
         return None
     left, here, right = by_shift[k - 1 : k + 2]
     bend = left - 2 * here + right

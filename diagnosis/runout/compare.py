@@ -1,6 +1,6 @@
 """Measured runout beside the scene's: every line with its cause, and the repeatable and nonrepeatable parts.
 
-The scene's imperfections are taken as they are, but where the balls stood when a record began nothing foretells: a line of both bearings, or of several
+The scene's imperfections are taken as they are, but where the balls stood when a record began nothing predicts: a line of both bearings, or of several
 balls, is their sum by chance. Its computed amplitude is the rms over random starts. Residuals are in standard deviations of the record, of that chance, and
 of how spindles of one drawing scatter about the scene's imperfections, which are one draw (`runout_sources`).
 """

@@ -60,7 +60,7 @@ class Family:
 
     @property
     def count(self) -> int:
-        """How many real numbers the data are, less the phases that nothing foretells."""
+        """How many real numbers the data are, less the phases that nothing predicts."""
         return max(int(np.where(self.phased, 2, 1).sum()) - self.free, 1)
 
     def of_effect(self, amplitudes: Mapping[SourceKey, complex]) -> ComplexArray:
@@ -197,7 +197,7 @@ def fit_family(f: Family, effects: Sequence[ComplexArray] = (), priors: Sequence
         if best is None or found[0] < best[0] - 1e-6:
             best = found
     assert best is not None
-    return problem.told(*best)
+    return problem.summary(*best)
 
 
 class _Problem:
@@ -278,7 +278,7 @@ class _Problem:
         found = least_squares(self.residual, p, self.jacobian, method="lm", ftol=RESTS, xtol=RESTS, max_nfev=STEPS)
         return 2 * float(found.cost), found.x
 
-    def told(self, cost: float, p: Array) -> FamilyFit:
+    def summary(self, cost: float, p: Array) -> FamilyFit:
         jacobian = self.jacobian(p)[: 2 * len(self.f.value)]
         data = jacobian.T @ jacobian
         normal = data + np.diag(self.belief)

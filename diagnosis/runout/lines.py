@@ -1,6 +1,6 @@
 """What a runout test shows: amplitude and phase of every known line at every probe with standard errors, and lines that theory does not know.
 
-Lines are fitted by least squares at their known frequencies; lines too near to be told apart in the record are one, seen at its middle. What is left of
+Lines are fitted by least squares at their known frequencies; lines too near to be separated in the record are one, seen at its middle. What is left of
 the record around a line gives its standard error. The cage turns a little faster or slower than computed, since a contact angle is not exact: one
 relative change of d cos(angle) / D of all bearings is found from the record first. In a spectrum the squares of a line's bins are added up.
 """
@@ -27,7 +27,7 @@ MULTIPLE = 4  # of the number of balls and of even ball orders: highest lines lo
 TOGETHER = 0.5  # bins: lines of a time record nearer than this are one; of a spectrum those that share bins
 REACH = {"none": 1, "hann": 2, "flattop": 4}  # bins on either side that hold a line of a spectrum
 OF_BINS = 0.04  # relative error of an amplitude from bins
-AROUND = 15  # bins on either side from which the floor around a line is told
+AROUND = 15  # bins on either side from which the floor around a line is estimated
 SLIPS = np.linspace(-0.006, 0.006, 49)  # relative changes of d cos(angle) / D that are tried
 SLIP_SD = 0.002  # how well a contact angle is believed, as that change
 FORM, LEAKS = 0.015, 0.03  # relative error of a line's form, and of what it leaks into its neighbours, however well its frequency is known
@@ -46,7 +46,7 @@ def key_of(line: Line) -> Key:
 
 @dataclass(frozen=True, eq=False)
 class SeenLine:
-    """Lines of theory told as one: `phasor` (probes,) m at `frequency` (Hz) and standard errors `sd` (probes,), E|error|^2 = sd^2."""
+    """Lines of theory that are one in the record: `phasor` (probes,) m at `frequency` (Hz) and standard errors `sd` (probes,), E|error|^2 = sd^2."""
 
     frequency: float
     lines: tuple[Line, ...]
@@ -117,8 +117,8 @@ def look(spindle: Spindle, test: Test) -> Seen:
         unexplained = ()
     further = lines(point.spindle, slipped(kin, slip + APART), MULTIPLE)
     moved = {key_of(g): g.frequency for g in further}
-    astray = [max(abs(moved.get(key_of(g), g.frequency) - g.frequency) for g in cluster) for cluster in clusters]
-    sd = np.sqrt(sd**2 + _form(clusters, frequency, np.abs(phasor), record.length, np.array(astray)) ** 2)
+    uncertain = [max(abs(moved.get(key_of(g), g.frequency) - g.frequency) for g in cluster) for cluster in clusters]
+    sd = np.sqrt(sd**2 + _form(clusters, frequency, np.abs(phasor), record.length, np.array(uncertain)) ** 2)
     found = tuple(SeenLine(float(f), tuple(c), phasor[:, i], sd[:, i]) for i, (f, c) in enumerate(zip(frequency, clusters, strict=True)))
     return Seen(test, condition, record.nodes, found, unexplained, slip, record.phased)
 
@@ -146,10 +146,10 @@ def _clusters(known: list[Line], near: float) -> list[list[Line]]:
     return found
 
 
-def _form(clusters: list[list[Line]], frequency: Array, size: Array, length: float, astray: Array) -> Array:
-    """Errors (probes, k) of lines of `size` (probes, k) that are not of noise: frequencies `astray` (k,) Hz, lines that beat, neighbours that leak."""
+def _form(clusters: list[list[Line]], frequency: Array, size: Array, length: float, uncertain: Array) -> Array:
+    """Errors (probes, k) of lines of `size` (probes, k) that are not of noise: frequencies `uncertain` (k,) Hz, lines that beat, neighbours that leak."""
     spread = np.array([c[-1].frequency - c[0].frequency for c in clusters]) * length
-    off = astray * length
+    off = uncertain * length
     apart = np.abs(frequency[:, None] - frequency) * length
     np.fill_diagonal(apart, np.inf)
     leaked = size**2 @ ((LEAKS + off)[:, None] / np.maximum(apart, 0.5)) ** 2

@@ -25,8 +25,8 @@ from thermospindle.sim.operating import OperatingPoint, operating_point
 from thermospindle.sim.running.excitation import at_speed, chain_response, excitation
 
 GRADE = GRADES["high precision"]
-ECCENTRIC = 0.1e-6  # m, rms eccentricity of a race where the scene tells none
-CAGE = 4e-9  # kg m, rms unbalance of a cage where the scene tells none: 0.5 g that is 8 um off centre
+ECCENTRIC = 0.1e-6  # m, rms eccentricity of a race where the scene gives none
+CAGE = 4e-9  # kg m, rms unbalance of a cage where the scene gives none: 0.5 g that is 8 um off centre
 FIRST, SECOND = "first", "second"
 """Two sources share a line of a race (a radial and an axial wave) and of the turning part (static and couple unbalance)."""
 
@@ -146,10 +146,10 @@ def _likely(spindle: Spindle, made: Imperfections, source: SourceKey) -> float:
         body = next(b for b in spindle.structure.bodies if b.turns)
         static = 0.5 * body.mass * GRADE.balance / spindle.nominal_speed
         span = max(b.z for b in spindle.bearings) - min(b.z for b in spindle.bearings)
-        told = [scene.unbalance or static, made.unbalance]
+        sizes = [scene.unbalance or static, made.unbalance]
         if which == SECOND:
-            told = [scene.couple_unbalance or 0.5 * span * static, made.couple_unbalance + made.unbalance * abs(made.unbalance_z - body.z)]
-        return max(told)
+            sizes = [scene.couple_unbalance or 0.5 * span * static, made.couple_unbalance + made.unbalance * abs(made.unbalance_z - body.z)]
+        return max(sizes)
     row, rows = made.row(bearing), [scene.row(b.name) for b in spindle.bearings]
     if cause == "cage unbalance":
         return max(_rms([r.cage_unbalance for r in rows]) or CAGE, row.cage_unbalance)

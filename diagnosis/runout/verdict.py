@@ -1,9 +1,9 @@
 """Which imperfection of a running spindle is larger than its scene lets expect: unbalance, a race and its order, a ball, a cage.
 
 Effects are compared by evidence with all tolerances free, and one of five verdicts is given. The data are the lines of runout
-tests (`runout_lines`); without an effect every imperfection has an unknown amplitude of the size the scene tells (`runout_sources`); an effect adds one of its
+tests (`runout_lines`); without an effect every imperfection has an unknown amplitude of the size that the scene gives (`runout_sources`); an effect adds one of its
 own size, and what cannot be continuous (order, ring, bearing) is tried choice by choice: a *variant*. Everything falls apart into families of lines
-(`runout_fit`), so that an effect is fitted to the lines it can move alone. Parameters that runout cannot tell (phases at an unknown start) stay typical.
+(`runout_fit`), so that an effect is fitted to the lines it can move alone. Parameters that runout does not determine (phases at an unknown start) stay typical.
 
 Lines in a record that theory does not know are unexplained whatever the rest says.
 """
@@ -32,7 +32,7 @@ MISFIT = 1e-4  # probability below which a misfit is not chance
 FALLS = 1 / 3  # held-out error ratio that counts as a clear fall
 WORTH = 4.0  # chi2 of the sources of a variant, fitted without it, from which it is worth a fit of its own
 SLACK = 1.5  # chi2 a number up to which a misfit is laid to the errors of lines, which are known but roughly
-ONE = 1e-3  # of the typical size, at which an effect's sources are told: they are linear in it
+ONE = 1e-3  # of the typical size, at which an effect's sources are computed: they are linear in it
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,20 +123,20 @@ def variants(effect: Effect, found: Sources, parts: Sequence[Family]) -> list[Va
     """Every choice of the effect's discrete parameters that shows in some line, each once."""
     main = effect.parameters[0]
     small = main.neutral + ONE * (main.typical - main.neutral)
-    told: dict[tuple[tuple[SourceKey, complex], ...], Variant] = {}
+    distinct: dict[tuple[tuple[SourceKey, complex], ...], Variant] = {}
     for chosen in product(*[p.choices or (p.typical,) for p in effect.parameters[1:]]):
         values = {main.name: small, **{p.name: v for p, v in zip(effect.parameters[1:], chosen, strict=True)}}
         amplitudes = {s: a / (small - main.neutral) for s, a in of_effect(found, effect, values).items()}
         own = tuple(i for i, f in enumerate(parts) if any(source in amplitudes for source, _ in f.source))
         largest = max((abs(a) for a in amplitudes.values()), default=1.0)
         key = tuple((s, complex(np.round(amplitudes[s] / largest, 6))) for s in sorted(amplitudes))
-        if own and key not in told:
-            told[key] = Variant(effect, {k: v for k, v in values.items() if k != main.name}, amplitudes, own)
-    return list(told.values())
+        if own and key not in distinct:
+            distinct[key] = Variant(effect, {k: v for k, v in values.items() if k != main.name}, amplitudes, own)
+    return list(distinct.values())
 
 
 def _fitted(chosen: Sequence[Variant], parts: Sequence[Family], base: Sequence[FamilyFit], worth: bool = False) -> Explanation:
-    """The fit of variants to the families they move; the others stay. With `worth` one that cannot gain anything is told at size zero."""
+    """The fit of variants to the families they move; the others stay. With `worth` one that cannot gain anything stays at size zero."""
     own = sorted({i for v in chosen for i in v.parts})
     family = merged([parts[i] for i in own])
     b = [family.of_effect(v.amplitudes) for v in chosen]
@@ -149,7 +149,7 @@ def _fitted(chosen: Sequence[Variant], parts: Sequence[Family], base: Sequence[F
             tuple(chosen), np.zeros(1), np.full(1, chosen[0].prior / np.hypot(1, size)), -float(np.log(np.hypot(1, size))), total
         )
     fit = fit_family(family, b, [v.prior for v in chosen])
-    # turned by half a turn an effect is the same: nothing foretells its phase
+    # turned by half a turn an effect is the same: nothing predicts its phase
     return Explanation(tuple(chosen), np.abs(fit.size), fit.size_sd, fit.evidence - before_evidence, total - before_chi2 + fit.chi2)
 
 
@@ -192,9 +192,9 @@ def _pairs(best: Sequence[Explanation], tried: Sequence[Variant], parts: Sequenc
 
 
 def _squares(rows: Family, explained: Explanation | None) -> tuple[float, int]:
-    """Squared error of lines as the scene foretells them, or the scene with an effect of a given size, in its standard errors, and how many numbers.
+    """Squared error of lines as the scene predicts them, or the scene with an effect of a given size, in its standard errors, and how many numbers.
 
-    What the scene has besides is of its likely size. Phases are those that suit the data best: nothing foretells them.
+    What the scene has besides is of its likely size. Phases are those that suit the data best: nothing predicts them.
     """
     total, count = 0.0, 0
     for t in np.unique(rows.test):
@@ -324,7 +324,7 @@ def _verdict(
         gained = (
             f"the best effect, {first.effects[0]}, gains {first.delta_evidence:.1f} in ln evidence" if first else "no effect can be tried"
         )
-        return answer("none", (), f"Imperfections of the size the scene tells explain all lines (misfit {chi2:.0f} for {count} numbers); {gained} "
+        return answer("none", (), f"Imperfections of the size that the scene gives explain all lines (misfit {chi2:.0f} for {count} numbers); {gained} "
                       f"where {CLEAR:g} is asked.")  # fmt: skip
     chosen = leading[0]
     if _rejected(chosen.chi2, count):
@@ -348,7 +348,7 @@ def _verdict(
     falls = (
         ""
         if not np.isfinite(before) or after < FALLS * before
-        else ", less than threefold, since the size an imperfection has is foretold but roughly"
+        else ", less than threefold, since the size an imperfection has is known but roughly"
     )
     return answer(
         "identified", first.effects, f"{first.effects[0]} leads every other explanation by more than {AHEAD:g} in ln evidence{fall}{falls}."

@@ -109,15 +109,15 @@ def _over_temperature(axes: Axes, conditions: Sequence[Condition], value: Array,
 def errors(d: Diagnosis) -> Figure:
     """chi2 a number of every test, with tolerances fitted and with what the verdict names."""
     tests = d.search.model.tests
-    told: list[tuple[str, Any, str]] = [("tolerances fitted", d.search.base, OTHER)]
+    shown: list[tuple[str, Any, str]] = [("tolerances fitted", d.search.base, OTHER)]
     if d.verdict.accepted is not d.search.base:
-        told.append((" + ".join(d.verdict.accepted.names), d.verdict.accepted, NAMED))
+        shown.append((" + ".join(d.verdict.accepted.names), d.verdict.accepted, NAMED))
     figure = Figure(figsize=(8.6, 2.6), layout="constrained")
     axes = figure.add_subplot()
-    width = 0.8 / len(told)
-    for k, (label, h, paint) in enumerate(told):
+    width = 0.8 / len(shown)
+    for k, (label, h, paint) in enumerate(shown):
         value = [b[0] / t.count for b, t in zip(h.fit.by_test, tests, strict=True)]
-        axes.bar(np.arange(len(tests)) + (k - (len(told) - 1) / 2) * width, value, width=width, color=paint, label=label)
+        axes.bar(np.arange(len(tests)) + (k - (len(shown) - 1) / 2) * width, value, width=width, color=paint, label=label)
     axes.axhline(1.0, color=INK, lw=0.8, ls="--")
     axes.set_xticks(range(len(tests)), [t.test.id for t in tests], rotation=30 if len(tests) > 6 else 0)
     axes.set_ylabel("chi² a number")

@@ -106,11 +106,11 @@ def _tests(answer: dict[str, Any]) -> str:
     for t in answer["next_test"]:
         times = "" if t["repeats"] == 1 else f"; {t['repeats']} of them make it 100 to 1"
         first, second = (escape(s) for s in t["separates"])
-        words = f"<h3>A test {escape(plan_words(t['condition']))}</h3><p>It tells {first} from {second} with odds of {_odds(t['odds'])} to 1{times}; most by {prose(t['tells'])}.</p>"
+        words = f"<h3>A test {escape(plan_words(t['condition']))}</h3><p>It separates {first} from {second} with odds of {_odds(t['odds'])} to 1{times}; most by {prose(t['tells'])}.</p>"
         most = max(len(rows) for rows in t["predicted"].values())
         rows = [
-            [(escape(name), 0), *((_with_error(r["frequency_Hz"], r["sd_Hz"], 1), 1) for r in told), *[("", 1)] * (most - len(told))]
-            for name, told in t["predicted"].items()
+            [(escape(name), 0), *((_with_error(r["frequency_Hz"], r["sd_Hz"], 1), 1) for r in predicted), *[("", 1)] * (most - len(predicted))]
+            for name, predicted in t["predicted"].items()
         ]
         parts.append(words + _grid("What each predicts of it, Hz.", ["", *(f"mode {k}" for k in range(1, most + 1))], rows))
     return "".join(parts)
@@ -144,7 +144,7 @@ def _detectable(answer: dict[str, Any]) -> str:
         ]
         for name, row in sorted(answer["detectable_in"].items())
     ]  # fmt: skip
-    caption = "Size from which each effect would have been told from the tolerances, which are fitted anew beside it: first order about the fit without effects."
+    caption = "Size from which each effect would have been separated from the tolerances, which are fitted anew beside it: first order about the fit without effects."
     return _grid(caption, ["effect", "parameter", "smallest", "unit", ""], rows)
 
 

@@ -32,12 +32,12 @@ def show_effects(console: Console, catalogue: Sequence[Effect], refused: Mapping
 
 
 def show_effect(console: Console, effect: Effect, refused: str = "") -> None:
-    def tell(what: str, text: str) -> None:
+    def line(what: str, text: str) -> None:
         console.print(f"\n{what}:", style="bold")
         console.print(text, markup=False, highlight=False)
 
     console.print(f"{effect.name}: {effect.title}", style="bold", highlight=False)
-    tell("Equation", effect.equation)
+    line("Equation", effect.equation)
     console.print("\nParameters:", style="bold")
     grid = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
     for column in ("name", "unit", "neutral", "typical", "prior s.d.", "limits"):
@@ -47,8 +47,8 @@ def show_effect(console: Console, effect: Effect, refused: str = "") -> None:
     console.print(grid)
     for p in effect.parameters:
         console.print(f"{p.name}: {p.meaning}. Source: {p.source}.", markup=False, highlight=False)
-    tell("What one sees", effect.sees)
-    tell("What it resembles", ", ".join(effect.resembles))
-    tell("Where it is valid", effect.valid)
+    line("What one sees", effect.sees)
+    line("What it resembles", ", ".join(effect.resembles))
+    line("Where it is valid", effect.valid)
     if refused:
-        tell("In this scene", refused)
+        line("In this scene", refused)

@@ -150,7 +150,7 @@ def _tests(found: Ladder) -> Iterator[str]:
     for t in found.tests[:1]:
         one, two = max(zip(*t.predictions, strict=True), key=lambda m: abs(m[0].frequency - m[1].frequency) / np.hypot(m[0].sd, m[1].sd))
         yield (
-            f"A test {in_words(t.condition)} would tell {t.separates[0]} from {t.separates[1]}, at odds of {_odds(t.odds)} to 1 if either is "
+            f"A test {in_words(t.condition)} would separate {t.separates[0]} from {t.separates[1]}, at odds of {_odds(t.odds)} to 1 if either is "
             f"right: a mode would lie at {one.frequency:.1f} +- {one.sd:.2g} Hz or at {two.frequency:.1f} +- {two.sd:.2g} Hz."
         )
 

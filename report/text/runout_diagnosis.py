@@ -1,4 +1,4 @@
-"""The diagnosis of runout told: as JSON with the keys of `diagnosis.verdict`, and in the terminal."""
+"""The diagnosis of runout as JSON with the keys of `diagnosis.verdict`, and in the terminal."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from thermospindle.model.units import RPM, TO_UM
 from thermospindle.sim.effects.effect import Effect
 
 SHOWN = 12  # candidates
-LARGE = 3.0  # likely sizes from which what a source has is told
+LARGE = 3.0  # likely sizes from which a source is named
 UNITS = {"unbalance": ("g mm", 1e6), "cage unbalance": ("g mm", 1e6)}
 """Unit of a source and its size in SI's; nm for all others."""
 
@@ -22,8 +22,8 @@ def runout_diagnosis_json(d: RunoutDiagnosis, catalogue: tuple[Effect, ...]) -> 
     best = d.explanations[0] if d.explanations else None
     accepted = next((e for e in d.explanations if e.effects == d.effects), best) if d.verdict not in ("none", "unexplained") else None
     before = float(np.sqrt(d.chi2 / d.count))
-    told = {e.name: e for e in catalogue}
-    unseen = [n for n, e in told.items() if n not in d.smallest or d.smallest[n] > max(abs(v) for v in e.parameters[0].limits)]
+    by_name = {e.name: e for e in catalogue}
+    unseen = [n for n, e in by_name.items() if n not in d.smallest or d.smallest[n] > max(abs(v) for v in e.parameters[0].limits)]
     return {
         "verdict": d.verdict,
         "effects": list(d.effects),
@@ -67,7 +67,7 @@ def _candidate(e: Explanation) -> dict[str, Any]:
         main, *others = v.effect.parameters
         parameters[f"{v.effect.name}.{main.name}"] = {"value": float(size), "sd": float(sd), "unit": main.unit}
         for p in others:
-            # choices were compared; what runout from an unknown start cannot tell keeps its typical value and its prior
+            # choices were compared; what runout from an unknown start does not determine keeps its typical value and its prior
             parameters[f"{v.effect.name}.{p.name}"] = {"value": v.values[p.name], "sd": 0.0 if p.choices else p.prior_sd, "unit": p.unit}
     return {
         "effects": list(e.effects),
@@ -87,17 +87,17 @@ def source_words(source: SourceKey) -> tuple[str, str]:
 
 
 def where(d: RunoutDiagnosis) -> list[dict[str, Any]]:
-    """Sources that have far more than the scene tells, without any effect: which, how large against its likely size, in which line."""
+    """Sources that have far more than the scene gives, without any effect: which, how large against its likely size, in which line."""
     found: dict[tuple[str, str], dict[str, Any]] = {}
     for family, fit in zip(d.families, d.base, strict=True):
         for (source, test), likely, z in zip(family.source, family.likely, np.abs(fit.amplitude), strict=True):
             if z > LARGE:
                 place, line = source_words(source)
                 unit, factor = UNITS.get(source[0][1], ("nm", 1e9))
-                told = found.setdefault((place, line), {"element": place, "change": [], "with": line, "relative": 0.0})
+                drift = found.setdefault((place, line), {"element": place, "change": [], "with": line, "relative": 0.0})
                 at = {} if test is None else {"test": d.seen[test].test.id}
-                told["change"].append({**at, "amplitude": float(factor * likely * z), "likely": float(factor * likely), "unit": unit})
-                told["relative"] = max(told["relative"], float(z))
+                drift["change"].append({**at, "amplitude": float(factor * likely * z), "likely": float(factor * likely), "unit": unit})
+                drift["relative"] = max(drift["relative"], float(z))
     return sorted(found.values(), key=lambda w: -w["relative"])[:SHOWN]
 
 
@@ -108,10 +108,10 @@ def would_change(d: RunoutDiagnosis) -> str:
     if d.unexplained:
         return "An excitation that turns or sounds at these frequencies and is none of a bearing's or of an unbalance's would explain them; the catalogue has none."
     if d.verdict == "unexplained":
-        return "Longer records, or probes in another plane, would tell which lines are not as computed."
+        return "Longer records, or probes in another plane, would show which lines are not as computed."
     speeds = {round(s.condition.speed / RPM) for s in d.seen}
     one = (
-        " With one speed alone, what grows with speed cannot be told from what does not: a test at another speed would."
+        " With one speed alone, what grows with speed cannot be separated from what does not: a test at another speed would."
         if len(speeds) == 1
         else ""
     )
@@ -121,7 +121,7 @@ def would_change(d: RunoutDiagnosis) -> str:
         if rivals
         else "none"
     )
-    return f"Records that the next best explanation ({rival}) foretells better would change that.{one}"
+    return f"Records that the next best explanation ({rival}) predicts better would change that.{one}"
 
 
 def show_runout_diagnosis(console: Console, answer: dict[str, Any]) -> None:
@@ -144,7 +144,7 @@ def show_runout_diagnosis(console: Console, answer: dict[str, Any]) -> None:
                 f"  {' + '.join(c['effects'])}: {c['delta_evidence']:+.1f}, probability {c['probability']:.3f}; {values}", highlight=False
             )
         if answer["where"]:
-            console.print("\nWithout any catalogue, larger than the scene tells:")
+            console.print("\nWithout any catalogue, larger than the scene gives:")
             for w in answer["where"][:5]:
                 c = w["change"][0]
                 console.print(

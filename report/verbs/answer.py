@@ -20,7 +20,7 @@ from thermospindle.report.folder import mark, whole_folder
 from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.effects.rules import equipped
 
-STEPS = 5  # of temperature over a scene's range, unless a verb is told others
+STEPS = 5  # of temperature over a scene's range, unless a verb is given others
 
 
 @dataclass(frozen=True)
@@ -40,12 +40,12 @@ def answered(
     warnings: Sequence[str] = (),
 ) -> Answer:
     """The answer with its warnings; where `out` is given, the folder that `write` fills, marked with what was `asked`."""
-    told = {**values, "warnings": list(dict.fromkeys(warnings))}
+    answer = {**values, "warnings": list(dict.fromkeys(warnings))}
     if out is not None:
         with whole_folder(Path(out)) as folder:
-            write(folder, told)
-            mark(folder, asked, told)
-    return Answer(told, show)
+            write(folder, answer)
+            mark(folder, asked, answer)
+    return Answer(answer, show)
 
 
 def with_effects(scene: Path, effect_files: Sequence[Path]) -> tuple[Spindle, tuple[Effect, ...]]:

@@ -59,9 +59,9 @@ def diagnose(
         if turning:
             turning[1](console)
 
-    def write(folder: Path, told: dict[str, Any]) -> None:
-        write_json("diagnosis.json")(folder, told)
-        write_diagnosis(found, told, folder)
+    def write(folder: Path, answer: dict[str, Any]) -> None:
+        write_json("diagnosis.json")(folder, answer)
+        write_diagnosis(found, answer, folder)
 
     return answered(values, show, out, asked, write)
 

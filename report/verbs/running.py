@@ -65,8 +65,8 @@ def runout(
                 "scene holds its own"
             )
 
-        def write(folder: Path, told: dict[str, Any]) -> None:
-            write_runout(found, spindle, told, folder, progress)
+        def write(folder: Path, answer: dict[str, Any]) -> None:
+            write_runout(found, spindle, answer, folder, progress)
 
         return answered(values, lambda console: show_runout(console, values), out, asked, write, doubts)
 

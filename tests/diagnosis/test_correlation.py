@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from thermospindle.diagnosis.compare.correlation import TOLD, assurance, bands, correlate, scale_factor
+from thermospindle.diagnosis.compare.correlation import DISTINCT, assurance, bands, correlate, scale_factor
 from thermospindle.diagnosis.prediction.partners import BELIEVABLE
 from thermospindle.model.machine import Condition
 from thermospindle.sim.campaign.beside import Beside, beside
@@ -69,7 +69,7 @@ def test_no_shift_is_told_where_nothing_resonates(spindle, point):
     flat = correlate(replace(measured(spindle, point, mass_line), point=Rigid(point)))
     assert flat.whole.fdac == pytest.approx(1.0)
     assert all(b.shift is None for b in (flat.whole, *flat.bands))
-    assert TOLD > 0
+    assert DISTINCT > 0
 
 
 @dataclass(frozen=True)
