@@ -70,7 +70,7 @@ def test_add_is_the_effect_of_the_catalogue():
 
 def test_compare_takes_folders_and_campaigns():
     folder = SCENE / "measured" / "jang_2003"
-    assert ts.compare(SCENE, folder).rms_pull == ts.compare(ts.load("hdd_2003"), read_campaign(folder)).rms_pull
+    assert ts.compare(SCENE, folder).rms_residual == ts.compare(ts.load("hdd_2003"), read_campaign(folder)).rms_residual
 
 
 @pytest.mark.parametrize("wrong", [[-1.0], [[1.0]], [np.nan]])

@@ -128,7 +128,7 @@ def campaign(folder: str | Path) -> Campaign:
 
 
 def compare(spindle: Spindle | str | Path, tests: Campaign | str | Path) -> Comparison:
-    """A campaign beside the scene: modes paired through all conditions with errors and standard errors; `.rms_pull` is one number for the whole."""
+    """A campaign beside the scene: modes paired through all conditions with errors and standard errors; `.rms_residual` is one number for the whole."""
     from thermospindle.diagnosis.compare.compare import compare as beside
     from thermospindle.diagnosis.runout.lines import modal_tests
 
