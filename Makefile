@@ -3,7 +3,7 @@ PYTHON ?= python3
 SPINDLE = .venv/bin/spindle
 READY = .venv/ready
 
-.PHONY: demo test test-all lint bench blind clean
+.PHONY: demo test test-all lint bench blind docs clean
 
 demo: $(READY)
 	$(SPINDLE) run scenes/hdd_2003 --out out/hdd_2003
@@ -23,6 +23,11 @@ SEEDS ?= 1000 1300
 blind: $(READY)
 	.venv/bin/python -m tests.blind.study --seeds $(SEEDS)
 	.venv/bin/python -m tests.blind.score
+
+# The documentation as one static site in out/site; its own libraries come with it.
+docs: $(READY)
+	.venv/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[docs]'
+	.venv/bin/python -m sphinx -q -b html docs/site out/site
 
 bench: $(READY)
 	.venv/bin/python -m tests.bench

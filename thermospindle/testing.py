@@ -92,7 +92,7 @@ def assert_peak_level(
     scene: Scene, *, mode: str | int, at_C: float, response: str | int, reference: str | int, level: float, within: float,
     quantity: str = "mobility", speed_rpm: float = 0.0,
 ) -> None:  # fmt: skip
-    """|H| between two points at the mode's damped frequency is `level` (SI of `quantity`), give or take `within`."""
+    """`|H|` between two points at the mode's damped frequency is `level` (SI of `quantity`), give or take `within`."""
     __tracebackhide__ = True
     from thermospindle.front import frf
 

@@ -1,0 +1,26 @@
+"""The documentation as one static site: `make docs` builds it in out/site. References and pictures of effects are generated from the program."""
+
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE), str(HERE.parents[1])]
+
+from generated import write_all  # noqa: E402
+
+project = "Thermospindle"
+author = "the Thermospindle developers"
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.viewcode"]
+myst_enable_extensions = ["colon_fence", "deflist"]
+myst_heading_anchors = 3
+default_role = "code"
+html_theme = "furo"
+html_title = "Thermospindle"
+exclude_patterns = ["_build"]
+autodoc_member_order = "bysource"
+autodoc_typehints = "description"
+nitpicky = False
+
+
+def setup(app):
+    app.connect("config-inited", lambda app, config: write_all(HERE / "generated"))

@@ -1,0 +1,74 @@
+"""The documentation's site: every key has a meaning, nothing told is stale, what `--json` answers is what is told. It is built by `make docs`."""
+
+import importlib.util
+import json
+import subprocess
+import sys
+
+import pytest
+
+from tests.conftest import DATA, ROOT, SCENE
+from thermospindle.cli import main
+
+SITE = ROOT / "docs" / "site"
+SPEC = importlib.util.spec_from_file_location("site_generated", SITE / "generated.py")
+assert SPEC is not None
+assert SPEC.loader is not None
+generated = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(generated)
+ANSWERS = generated.tomllib.loads((SITE / "answers.toml").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("form", ["campaign", "mapping"])
+def test_every_key_of_a_file_is_explained(form):
+    assert [f"{path} {key}" for path, key in generated.keys(form) if not generated.meaning(form, path, key)] == []
+
+
+def test_most_keys_of_a_scene_are_explained():
+    known = list(generated.keys("scene"))
+    assert sum(bool(generated.meaning("scene", *k)) for k in known) > 0.9 * len(known)
+
+
+@pytest.mark.parametrize("form", ["campaign", "mapping"])
+def test_nothing_explained_is_stale(form):
+    assert {m.split(".")[-1] for m in generated.MEANINGS[form]} <= {key for _, key in generated.keys(form)}
+
+
+def test_references_hold_every_key():
+    for form in generated.FORMS:
+        page = generated.reference(form, "title", "intro")
+        assert all(f"| `{key}` |" in page for _, key in generated.keys(form))
+        assert "{" not in page.replace("{ ", "")
+    assert all(f"## spindle {verb}" in generated.command_line() for verb in ("run", "import", "diagnose"))
+
+
+@pytest.mark.parametrize(
+    ("verb", "arguments"),
+    [
+        ("table", [SCENE, "--temperatures", 20]),
+        ("modes", [SCENE]),
+        ("effects", []),
+        ("compare", [SCENE, SCENE / "measured" / "jang_2003"]),
+        pytest.param("diagnose", [SCENE, SCENE / "measured" / "jang_2003"], marks=pytest.mark.slow),
+    ],
+    ids=lambda a: a if isinstance(a, str) else "",
+)
+def test_answers_have_the_keys_that_are_told(capsys, verb, arguments):
+    assert main([verb, *map(str, arguments), "--json"]) == 0
+    assert set(json.loads(capsys.readouterr().out)) == {*ANSWERS[verb], "warnings"}
+
+
+def test_import_answers_so_too(capsys, tmp_path):
+    (tmp_path / "m.toml").write_text('spindle = "rig"\n[[tests]]\nid = "at_rest"\ntemperature_C = 20.0\nspeed_rpm = 0.0\n')
+    arguments = ["import", str(DATA / "amh_isma" / "at_rest.csv"), "--mapping", str(tmp_path / "m.toml"), "--out", str(tmp_path / "c"), "--json"]
+    assert main(arguments) == 0
+    assert set(json.loads(capsys.readouterr().out)) == {*ANSWERS["import"], "warnings"}
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_a_warning(tmp_path):
+    pytest.importorskip("sphinx")
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", str(SITE), str(tmp_path)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "generated" / "mapping.html").is_file()
