@@ -20,6 +20,7 @@ exclude_patterns = ["_build"]
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
 nitpicky = False
+smartquotes = False  # --scene is an option, no dash
 
 
 def setup(app):
