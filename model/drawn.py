@@ -57,8 +57,9 @@ def drawn(spindle: Spindle, seed: int, grade: Grade = GRADES["high precision"]) 
     """A plausible set of imperfections of a spindle; the same seed gives the same set."""
     random = np.random.default_rng(seed)
     body = spindle.turning
-    span = max(b.z for b in spindle.bearings) - min(b.z for b in spindle.bearings)
-    permissible = body.mass * grade.balance / spindle.nominal_speed
+    heights = [b.z for b in spindle.all_bearings] or [p.position[2] for p in spindle.points]
+    span = max(heights) - min(heights)
+    permissible = spindle.turning_mass * grade.balance / spindle.nominal_speed
     static, couple = random.uniform(0, 1, 2) * permissible
     phases = random.uniform(0, 2 * np.pi, 2)
     rows = {b.name: _drawn_row(b.balls, grade, random) for b in spindle.bearings}

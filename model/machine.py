@@ -14,6 +14,7 @@ import numpy as np
 
 from thermospindle.model.errors import OutsideRange
 from thermospindle.model.imperfections import Imperfections
+from thermospindle.model.shaft import Shaft
 
 PARTS = ("stationary", "rotating")
 SENSE = {"back-to-back": (-1, 1), "face-to-face": (1, -1), "tandem": (1, 1)}
@@ -99,7 +100,13 @@ class Bearing:
     ring_material: str
     damping_ratio: float  # at Structure.damping_frequency
     sense: int  # -1 or 1: direction along z in which moving the outer ring loads the row
+    inner_body: str  # the bodies that carry its rings; "ground" stands still
+    outer_body: str
+    turning_ring: str  # inner | outer
+    preload: float  # N, axial, its share of its set's at the reference temperature
     raceway_width: float | None = None  # m, along z; None for the whole height of a ring that is this bearing's alone
+    constant_factor: float = 1.0  # load-deflection constant over that of Hertz, where a catalogue tells it
+    rated_stiffness: float | None = None  # N/m, radial, as a catalogue or designer states it
 
     @property
     def unloaded_distance(self) -> float:
@@ -108,27 +115,43 @@ class Bearing:
 
 
 @dataclass(frozen=True)
-class PreloadSpring:
-    """The spring behind one ring of the bearing `ring_of`; the other bearing locates the shaft and takes axial loads.
+class LinearBearing:
+    """A bearing given by numbers: the 5x5 matrix of its ring's motion against its seat, constant or over temperature and speed."""
 
-    Without a `rate` the spring's force is the preload wherever the ring slides, and in vibration friction holds the ring in its seat. With
-    one, force falls as the ring follows, and the ring slides in vibration too, with its own `mass`.
-    """
-
-    ring_of: str
-    rate: float | None = None  # N/m
-    mass: float = 0.0  # kg, of the sliding ring
+    name: str
+    z: float
+    inner_body: str
+    outer_body: str
+    temperature: tuple[float, ...]  # C, rising; one where nothing depends on it
+    speed: tuple[float, ...]  # rad/s, rising
+    stiffness: tuple[float, ...]  # N/m, N/rad, N m/rad: (temperatures, speeds, 5, 5), flat
+    damping_ratio: float  # at Structure.damping_frequency
 
 
 @dataclass(frozen=True)
-class Pair:
-    """How the two bearings are mounted against each other; which way each is loaded is `Bearing.sense`."""
+class PreloadSpring:
+    """The spring behind one ring of each of the bearings `rings_of`, which slide as one; the others locate the shaft and take axial loads.
 
+    Without a `rate` the spring's force is the preload wherever the rings slide, and in vibration friction holds them in their seat. With
+    one, force falls as they follow, and they slide in vibration too, with their own `mass`.
+    """
+
+    rings_of: tuple[str, ...]
+    rate: float | None = None  # N/m
+    mass: float = 0.0  # kg, of the sliding rings
+
+
+@dataclass(frozen=True)
+class BearingSet:
+    """Ball rows that are preloaded together: each of the groups that load against each other carries `preload`, its rows share it.
+
+    A set all of whose rows are loaded one way is preloaded from outside.
+    """
+
+    name: str
+    bearings: tuple[str, ...]
     preload: float  # N, axial, at the reference temperature
-    turning_ring: str  # inner | outer
-    ball_inertia: float  # share of the balls' centrifugal force and gyroscopic moment in the equilibrium, 0 to 1
-    axial_bias: float = 0.0  # N, external axial force on the outer rings' body, positive along z
-    spring: PreloadSpring | None = None  # None for rings fixed in their seats, and for a tandem set, which is loaded from outside
+    spring: PreloadSpring | None = None  # None for rings fixed in their seats, and for rows loaded from outside
 
 
 @dataclass(frozen=True)
@@ -142,7 +165,8 @@ class Body:
     moves: tuple[str, ...]
     turns: bool
     regions: tuple[str, ...]  # the section regions it is made of; empty for a body given by numbers
-    role: str = ""  # base, seat, shaft or hub: what effects know it by; empty for none of these
+    role: str = ""  # base, seat, shaft, hub or housing: what effects know it by; empty for none of these
+    speed_ratio: float = 1.0  # of its speed to the spindle's, where it turns
 
 
 @dataclass(frozen=True)
@@ -163,9 +187,14 @@ class Joint:
 class Structure:
     bodies: tuple[Body, ...]
     joints: tuple[Joint, ...]
-    inner_body: str  # the body that carries the inner rings
-    outer_body: str
     damping_frequency: float  # Hz; damping = 2 zeta stiffness / (2 pi this)
+    inner_body: str = ""  # the bodies that carry the rings of bearings that name none of their own
+    outer_body: str = ""
+    shafts: tuple[Shaft, ...] = ()  # those whose nodes and elements are among `bodies` and `joints`
+
+    def carrier(self, body: str) -> str:
+        """What a body is axially rigid with: its shaft, or itself."""
+        return next((s.name for s in self.shafts if body in s.bodies), body)
 
     def body(self, name: str) -> Body:
         return next(b for b in self.bodies if b.name == name)
@@ -297,8 +326,8 @@ class Spindle:
     reference_temperature: float
     materials: Mapping[str, Material]
     regions: tuple[Region, ...]
-    bearings: tuple[Bearing, ...]  # lower first
-    pair: Pair
+    bearings: tuple[Bearing, ...]  # ball rows, lowest first
+    sets: tuple[BearingSet, ...]  # every ball row is in one of them
     structure: Structure
     points: tuple[Point, ...]
     hammer: HammerTest
@@ -306,24 +335,48 @@ class Spindle:
     tolerances: Tolerances
     nominal_speed: float  # rad/s, the service speed
     temperatures: tuple[float, float]  # C, between which it is meant to run
+    ball_inertia: float = 0.0  # share of the balls' centrifugal force and gyroscopic moment in the equilibrium, 0 to 1
+    axial_load: float = 0.0  # N, external axial force on what carries the outer rings, positive along z
+    linear_bearings: tuple[LinearBearing, ...] = ()  # those given by numbers
     effects: tuple[Addition, ...] = ()
     build: Build | None = None
     imperfections: Imperfections = field(default_factory=Imperfections)
     provenance: Mapping[str, Provenance] = field(default_factory=dict, repr=False)  # by dotted key of the file
     file: Path | None = field(default=None, compare=False)
 
+    @property
+    def all_bearings(self) -> tuple[Bearing | LinearBearing, ...]:
+        """Ball rows and bearings given by numbers, lowest first."""
+        every: list[Bearing | LinearBearing] = [*self.bearings, *self.linear_bearings]
+        return tuple(sorted(every, key=lambda b: b.z))
+
     def bearing(self, name: str) -> Bearing:
+        """The ball row of that name."""
         return next(b for b in self.bearings if b.name == name)
 
-    @property
-    def tandem(self) -> bool:
-        """Whether all bearings are loaded the same way, so that only an outer force can preload them."""
-        return len({b.sense for b in self.bearings}) == 1
+    def set_of(self, bearing: str) -> BearingSet:
+        """The set a ball row is in."""
+        return next(s for s in self.sets if bearing in s.bearings)
+
+    def one_way(self, bearings: BearingSet) -> bool:
+        """Whether all rows of a set are loaded the same way, so that only an outer force can preload them."""
+        return len({self.bearing(name).sense for name in bearings.bearings}) == 1
 
     @property
     def turning(self) -> Body:
-        """The body that turns."""
-        return next(b for b in self.structure.bodies if b.turns)
+        """The body that turns; of several the one nearest their common centre of mass."""
+        turning = [b for b in self.structure.bodies if b.turns]
+        centre = sum(b.mass * b.z for b in turning) / sum(b.mass for b in turning)
+        return min(turning, key=lambda b: abs(b.z - centre))
+
+    @property
+    def turning_mass(self) -> float:
+        """Mass (kg) of all that turns."""
+        return sum(b.mass for b in self.structure.bodies if b.turns)
+
+    def turning_at(self, z: float) -> Body:
+        """The turning body nearest a height (m): a node of a flexible shaft, or the rigid hub wherever one asks."""
+        return min((b for b in self.structure.bodies if b.turns), key=lambda b: abs(b.z - z))
 
     def raceway(self, ring: str, bearing: Bearing) -> tuple[float, float]:
         """Heights (m) between which the raceway of `bearing` lies on its region `ring`.
@@ -337,12 +390,6 @@ class Spindle:
                 return region.z
             width = RACEWAY_WIDTH * bearing.ball_diameter
         return max(region.z[0], bearing.z - width / 2), min(region.z[1], bearing.z + width / 2)
-
-    @property
-    def standing(self) -> Body:
-        """The body that holds the rings that do not turn."""
-        s = self.structure
-        return s.body(s.inner_body if self.pair.turning_ring == "outer" else s.outer_body)
 
     def region(self, name: str) -> Region:
         return next(r for r in self.regions if r.name == name)

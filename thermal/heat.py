@@ -95,7 +95,7 @@ class History:
 
 def running(spindle: Spindle, air: float, speed: float, loads: Mapping[str, float] | None = None) -> Running:
     """Running conditions; bearings carry the preload of the reference state unless `loads` says else."""
-    return Running(air, speed, {b.name: spindle.pair.preload for b in spindle.bearings} if loads is None else dict(loads))
+    return Running(air, speed, {b.name: b.preload for b in spindle.bearings} if loads is None else dict(loads))
 
 
 def steady(model: HeatModel, drive: Running) -> TemperatureField:

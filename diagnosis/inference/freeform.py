@@ -17,7 +17,7 @@ from thermospindle.diagnosis.inference.mechanism import Mechanism
 from thermospindle.model.bearing.pair import PairState
 from thermospindle.model.machine import MOVES, Condition, RingMotion, Spindle
 from thermospindle.model.rotor.chain import RotorBase
-from thermospindle.model.tolerance import with_preload
+from thermospindle.model.tolerance import scaled_preload
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 from thermospindle.sim.effects.effect import Effect, Parameter, Values
@@ -120,7 +120,7 @@ def _moved(names: list[str], coordinate: str):
 
 
 def _preloaded(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
-    return with_preload(spindle, spindle.pair.preload * _factor(values))
+    return scaled_preload(spindle, _factor(values))
 
 
 def drifting(

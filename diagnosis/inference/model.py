@@ -307,7 +307,7 @@ class CampaignModel:
     def _structural(self) -> list[bool]:
         """Which build tolerances leave the bearings alone."""
         ends = [p.apply(self.spindle, 0.01) for p in self.build]
-        return [end.bearings is self.spindle.bearings and end.pair is self.spindle.pair for end in ends]
+        return [end.bearings is self.spindle.bearings and end.sets is self.spindle.sets for end in ends]
 
     def _mode_jacobian(self, t: int, data: ModeData, linear: Linear, rates: Rates) -> tuple[Array, Array, Integers]:
         """By first-order perturbation of the poles, -left (p^2 dM + p dC + dK) right (Lancaster 1964, AIAA J. 2, 1659)."""

@@ -31,8 +31,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from thermospindle.model.bearing.pair import BearingState, PairState
-from thermospindle.model.machine import Bearing, Condition, Spindle
+from thermospindle.model.bearing.pair import BearingState, PairState, ring_speeds
+from thermospindle.model.machine import Bearing, Spindle
 
 SMALLEST = 1e-9
 """Frequency (Hz) below which a line is a displacement that stands still, not an excitation."""
@@ -92,11 +92,6 @@ class Line:
 CAUSES = ("unbalance", "inner waviness", "outer waviness", "ball waviness", "ball size", "cage unbalance")
 
 
-def ring_speeds(spindle: Spindle, condition: Condition) -> tuple[float, float]:
-    """Speeds (rad/s) of the inner and the outer rings at a condition; one of them stands."""
-    return (condition.speed, 0.0) if spindle.pair.turning_ring == "inner" else (0.0, condition.speed)
-
-
 def kinematics(
     bearing: BearingState, balls: int, ball_diameter: float, pitch_diameter: float, inner_speed: float, outer_speed: float
 ) -> Kinematics:
@@ -114,9 +109,9 @@ def kinematics(
 
 def row_kinematics(spindle: Spindle, state: PairState) -> dict[str, Kinematics]:
     """Cage and ball speeds of every bearing of a spindle at its operating point, by name."""
-    inner, outer = ring_speeds(spindle, state.condition)
 
     def of(b: Bearing) -> Kinematics:
+        inner, outer = ring_speeds(spindle, b, state.condition.speed)
         return kinematics(state.bearing(b.name), b.balls, b.ball_diameter, b.pitch_diameter, inner, outer)
 
     return {b.name: of(b) for b in spindle.bearings}

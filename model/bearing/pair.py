@@ -1,4 +1,4 @@
-"""The ball rows against each other: axial equilibrium of the hub at a temperature, and the bearing states that follow.
+"""The ball rows of all sets against each other: axial equilibrium at a temperature, and the bearing states that follow.
 
 Jang, Kim, Han, Kim (2003): contact angle and deformation from ring motion, Eqs. (1)-(5); load-deflection and stiffness, Eqs. (6),
 (7); the hub moves until the axial forces balance, Eq. (8) and Fig. 5. Besides the ball (Eq. 3) the grooves grow too, which makes
@@ -8,16 +8,16 @@ every row's axial force rises monotonically with the hub's movement, so the root
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import brentq, root
 
 from thermospindle.model.bearing.ball_row import BallInertia, BallRow, RowForce, centred_axial_force, respond
 from thermospindle.model.bearing.hertz import in_series, race_contact
-from thermospindle.model.errors import NoEquilibrium
-from thermospindle.model.machine import Bearing, Condition, PreloadSpring, RingMotion, Spindle
+from thermospindle.model.errors import NoEquilibrium, OutsideRange
+from thermospindle.model.machine import Bearing, BearingSet, Condition, LinearBearing, RingMotion, Spindle
 from thermospindle.model.types import Array
 
 
@@ -63,17 +63,34 @@ class BearingState:
 
 
 @dataclass(frozen=True)
+class LinearState:
+    """A bearing given by numbers at one condition: stiffness and damping (5, 5) between its two bodies at its height."""
+
+    name: str
+    z: float
+    stiffness: Array
+    damping: Array
+
+
+@dataclass(frozen=True)
 class PairState:
     """All bearings at one condition.
 
-    `hub_movement` (m) is the rigid axial movement of the outer rings' body against that of the inner rings. Every bearing's ring makes it
-    too, but one behind a spring, which slides in its seat (`BearingState.movement`).
+    `hub_movement` (m) is the rigid axial movement of what carries the outer ring of the first bearing against what carries its inner one.
+    Every bearing's ring makes it too, but one behind a spring, which slides in its seat (`BearingState.movement`).
     """
 
     condition: Condition
     bearings: tuple[BearingState, ...]  # in the order of Spindle.bearings
     hub_movement: float
     status: str  # "in contact", or which bearing lost contact
+    linear: tuple[LinearState, ...] = ()  # in the order of Spindle.linear_bearings
+
+    @property
+    def all_bearings(self) -> tuple[BearingState | LinearState, ...]:
+        """Ball rows and bearings given by numbers, lowest first."""
+        every: list[BearingState | LinearState] = [*self.bearings, *self.linear]
+        return tuple(sorted(every, key=lambda b: b.z))
 
     def bearing(self, name: str) -> BearingState:
         return next(b for b in self.bearings if b.name == name)
@@ -85,44 +102,144 @@ def reference_motion(temperature: float) -> RingMotion:
 
 
 def solve(spindle: Spindle, condition: Condition, motions: Mapping[str, RingMotion]) -> PairState:
-    """Axial equilibrium of the pair under the thermal ring `motions` (by bearing name)."""
-    pair = spindle.pair
-    rows = {b.name: row_at(spindle, b, b.sense, motions[b.name], condition.speed) for b in spindle.bearings}
-    if pair.spring is not None:
-        hub, slid = _sprung(spindle, rows, pair.spring)
-    else:
-        # a tandem pair carries all shares together, from outside; opposed ones carry each other's
-        hub = slid = _balance(list(rows.values()), sum(b.sense for b in spindle.bearings) * pair.preload + pair.axial_bias)
-    states = []
-    for b in spindle.bearings:
-        movement = slid if pair.spring is not None and pair.spring.ring_of == b.name else hub
-        states.append(replace(bearing_state(spindle, b, replace(rows[b.name], axial=rows[b.name].axial + movement)), movement=movement))
-    return PairState(condition, tuple(states), hub, contact_status(tuple(states)))
+    """Axial equilibrium of all rows under the thermal ring `motions` (by bearing name).
 
-
-def _sprung(spindle: Spindle, rows: Mapping[str, BallRow], spring: PreloadSpring) -> tuple[float, float]:
-    """Movements (m) of the outer rings' body, and of the ring behind the spring.
-
-    With H the body's movement, R the ring's and s its sense, the spring pushes the ring by s P - k (R - H), so the sprung row carries
-    f(R) = s P - k (R - H), and the others, which locate the body, what is left of the axial bias: sum of all f = bias. The first gives
-    R(H), rising with H, and the second is monotonic in H then. It is the same whether the inner or the outer ring slides.
+    Unknown are the axial positions of what carries rings and is rigid in itself; the balance of the axial forces on each gives the
+    equations. Raises `NoEquilibrium` where they have no answer.
     """
-    pair, own = spindle.pair, rows[spring.ring_of]
-    push = spindle.bearing(spring.ring_of).sense * pair.preload
-    others = [row for name, row in rows.items() if name != spring.ring_of]
-    if spring.rate is None:
-        return _balance(others, pair.axial_bias - push), _movement_for(own, push)
-    rate = spring.rate
+    rows = {b.name: row_at(spindle, b, b.sense, motions[b.name], condition.speed) for b in spindle.bearings}
+    moved: dict[str, float] = {}
+    for group in joined(spindle):
+        moved |= _positions(spindle, {b.name: rows[b.name] for b in group}, group)
+    states = [
+        replace(bearing_state(spindle, b, replace(rows[b.name], axial=rows[b.name].axial + moved[b.name])), movement=moved[b.name])
+        for b in spindle.bearings
+    ]
+    sliding = {name for s in spindle.sets if s.spring is not None for name in s.spring.rings_of}
+    hub = next((moved[b.name] for b in spindle.bearings if b.name not in sliding), 0.0)
+    linear = tuple(linear_state(spindle, b, condition) for b in spindle.linear_bearings)
+    return PairState(condition, tuple(states), hub, contact_status(tuple(states)), linear)
 
-    def slid(row: BallRow, hub: float) -> float:
-        return _root([row], lambda rows, r: centred_axial_force(rows[0], r) + rate * (r - hub) - push)
 
-    def imbalance(rows: list[BallRow], hub: float) -> float:
-        first, *rest = rows
-        return centred_axial_force(first, slid(first, hub)) + sum(centred_axial_force(row, hub) for row in rest) - pair.axial_bias
+def joined(spindle: Spindle) -> list[list[Bearing]]:
+    """The ball rows in groups that share carriers: what one rotor's equilibrium is made of."""
+    groups: list[tuple[set[str], list[Bearing]]] = []
+    for b in spindle.bearings:
+        carriers = set(_carriers(spindle, b)) - {"ground"}
+        touching = [g for g in groups if g[0] & carriers]
+        rest = [g for g in groups if not g[0] & carriers]
+        merged = (carriers.union(*(g[0] for g in touching)), [row for g in touching for row in g[1]] + [b])
+        groups = [*rest, merged]
+    return [rows for _, rows in groups]
 
-    hub = _root([own, *others], imbalance)
-    return hub, slid(own, hub)
+
+def _carriers(spindle: Spindle, b: Bearing) -> tuple[str, str]:
+    """What carries the inner and the outer ring of a row and is axially rigid."""
+    return spindle.structure.carrier(b.inner_body), spindle.structure.carrier(b.outer_body)
+
+
+@dataclass(frozen=True)
+class _Sleeve:
+    """Rings that slide together on a spring: their rows, its push in the sense of z (N) and its rate (N/m; 0 for a constant force)."""
+
+    rows: tuple[str, ...]
+    push: float
+    rate: float
+
+
+def _positions(spindle: Spindle, rows: Mapping[str, BallRow], group: Sequence[Bearing]) -> dict[str, float]:
+    """Movement (m) of every row's outer ring against its inner one, for one group of rows that share carriers."""
+    of = {b.name: _carriers(spindle, b) for b in group}
+    carriers = list(dict.fromkeys(c for pair in of.values() for c in pair))
+    sets = [s for s in spindle.sets if s.bearings[0] in rows]
+    sleeves = [
+        _Sleeve(s.spring.rings_of, spindle.bearing(s.spring.rings_of[0]).sense * s.preload, s.spring.rate or 0.0)
+        for s in sets
+        if s.spring is not None
+    ]
+    if len(carriers) > 2:
+        return _many_positions(spindle, rows, of, carriers, sets, sleeves)
+    # one unknown: how far the second carrier of the first row has moved against its first
+    towards = {name: 1 if pair == of[group[0].name] else -1 for name, pair in of.items()}
+    # rows loaded one way carry all shares together, from outside; opposed ones carry each other's
+    outside = sum(towards[name] * spindle.bearing(name).sense * s.preload / len(s.bearings) for s in sets if spindle.one_way(s) for name in s.bearings)
+    load = outside + spindle.axial_load
+    fixed = [name for name in rows if not any(name in s.rows for s in sleeves)]
+
+    def slid(at: Mapping[str, BallRow], sleeve: _Sleeve, hub: float) -> float:
+        """Movement of the rings on a sleeve: they carry f(R) = push - rate (R - H), which rises with R."""
+        own = [at[name] for name in sleeve.rows]
+        return _root(own, lambda rows, r: sum(centred_axial_force(row, r) for row in rows) + sleeve.rate * (r - towards[sleeve.rows[0]] * hub) - sleeve.push)
+
+    def imbalance(at: Sequence[BallRow], hub: float) -> float:
+        by_name = dict(zip(rows, at, strict=True))
+        found = sum(towards[name] * centred_axial_force(by_name[name], towards[name] * hub) for name in fixed)
+        for sleeve in sleeves:
+            if sleeve.rate:
+                moved = slid(by_name, sleeve, hub)
+                found += towards[sleeve.rows[0]] * sum(centred_axial_force(by_name[name], moved) for name in sleeve.rows)
+            else:  # whatever its rings do, their force is the push
+                found += towards[sleeve.rows[0]] * sleeve.push
+        return found - load
+
+    hub = _root(list(rows.values()), imbalance)
+    moved = {name: towards[name] * hub for name in rows}
+    for sleeve in sleeves:
+        moved |= dict.fromkeys(sleeve.rows, slid(rows, sleeve, hub))
+    return moved
+
+
+def _many_positions(
+    spindle: Spindle,
+    rows: Mapping[str, BallRow],
+    of: Mapping[str, tuple[str, str]],
+    carriers: Sequence[str],
+    sets: Sequence[BearingSet],
+    sleeves: Sequence[_Sleeve],
+) -> dict[str, float]:
+    """As `_positions` for more than two carriers, as of rotors within rotors: all balances at once, by Powell's hybrid method.
+
+    The energy of rows without ball inertia is convex in the positions, so that their answer is unique; it is the start for those with it.
+    """
+    if sleeves or spindle.axial_load:
+        raise NoEquilibrium(f"rings on springs and axial loads are for one rotor in one housing; here are {', '.join(carriers)}")
+    names, unknown = list(rows), list(carriers[1:])
+    motion = np.array([[(of[n][1] == c) - (of[n][0] == c) for c in unknown] for n in names], float)
+    outside = np.zeros(len(names))
+    for s in sets:
+        if spindle.one_way(s):
+            for name in s.bearings:
+                outside[names.index(name)] = spindle.bearing(name).sense * s.preload / len(s.bearings)
+    scale = max(b.preload for b in spindle.bearings)
+
+    def imbalance(z: Array, at: Sequence[BallRow]) -> Array:
+        force = np.array([centred_axial_force(row, float(m)) for row, m in zip(at, motion @ (1e-6 * z), strict=True)])
+        return np.asarray(motion.T @ (force - outside)) / scale
+
+    massless = [replace(row, inertia=None) for row in rows.values()]
+    start = root(imbalance, np.zeros(len(unknown)), args=(massless,), options={"xtol": 1e-13})
+    end = root(imbalance, start.x, args=(list(rows.values()),), options={"xtol": 1e-13})
+    if np.abs(end.fun).max() > 1e-6:
+        raise NoEquilibrium(f"the bearings between {', '.join(carriers)} find no axial equilibrium")
+    return {name: float(m) for name, m in zip(names, motion @ (1e-6 * end.x), strict=True)}
+
+
+def linear_state(spindle: Spindle, b: LinearBearing, condition: Condition) -> LinearState:
+    """A bearing given by numbers at a condition, bilinear between those of its table; `OutsideRange` beyond them."""
+    grid = np.reshape(b.stiffness, (len(b.temperature), len(b.speed), 5, 5))
+    at = []
+    for name, unit, values, where in (
+        ("temperature", "C", b.temperature, condition.temperature),
+        ("speed", "rad/s", b.speed, abs(condition.speed)),
+    ):
+        if len(values) > 1 and not values[0] - 1e-9 <= where <= values[-1] + 1e-9:
+            raise OutsideRange(f"the table of bearing {b.name!r} spans {name} {values[0]:g} to {values[-1]:g} {unit} and was asked at {where:g} {unit}")
+        at.append(float(np.interp(where, values, np.arange(len(values)))))
+    i, j = (min(int(x), n - 1) for x, n in zip(at, grid.shape[:2], strict=True))
+    p, q = at[0] - i, at[1] - j
+    i1, j1 = min(i + 1, grid.shape[0] - 1), min(j + 1, grid.shape[1] - 1)
+    k = (1 - p) * ((1 - q) * grid[i, j] + q * grid[i, j1]) + p * ((1 - q) * grid[i1, j] + q * grid[i1, j1])
+    return LinearState(b.name, b.z, k, 2 * b.damping_ratio / (2 * np.pi * spindle.structure.damping_frequency) * k)
 
 
 def contact_status(bearings: tuple[BearingState, ...]) -> str:
@@ -163,7 +280,7 @@ def row_at(spindle: Spindle, b: Bearing, sense: int, motion: RingMotion, speed: 
 def reference_deformation(spindle: Spindle, b: Bearing) -> float:
     """Deformation (m) of each ball under the preload at the reference temperature, both contacts: Eq. (6) inverted."""
     constants = contact_constants(spindle, b, reference_motion(spindle.reference_temperature), b.contact_angle)
-    return float((spindle.pair.preload / (b.balls * np.sin(b.contact_angle)) / in_series(*constants)) ** (2 / 3))
+    return float((b.preload / (b.balls * np.sin(b.contact_angle)) / in_series(*constants)) ** (2 / 3))
 
 
 def contact_constants(spindle: Spindle, b: Bearing, motion: RingMotion, angle: float) -> tuple[float, float]:
@@ -180,25 +297,27 @@ def contact_constants(spindle: Spindle, b: Bearing, motion: RingMotion, angle: f
             (b.outer_conformity, motion.outer_strain, False),
         )
     )
-    return inner, outer
+    return b.constant_factor * inner, b.constant_factor * outer
 
 
 def _ball_inertia(spindle: Spindle, b: Bearing, speed: float) -> BallInertia | None:
-    if speed == 0.0 or spindle.pair.ball_inertia == 0.0:
+    if speed == 0.0 or spindle.ball_inertia == 0.0:
         return None
-    inner, outer = (0.0, speed) if spindle.pair.turning_ring == "outer" else (speed, 0.0)
+    inner, outer = ring_speeds(spindle, b, speed)
     density = spindle.materials[b.ball_material].density
-    return BallInertia(b.ball_diameter, b.pitch_diameter, density, inner, outer, spindle.pair.ball_inertia)
+    return BallInertia(b.ball_diameter, b.pitch_diameter, density, inner, outer, spindle.ball_inertia)
 
 
-def _balance(rows: list[BallRow], external: float) -> float:
-    """Hub movement at which the axial forces of all rows add up to `external`: Jang et al. 2003, Eq. (8)."""
-    return _root(rows, lambda rows, h: sum(centred_axial_force(row, h) for row in rows) - external)
+def ring_speeds(spindle: Spindle, b: Bearing, speed: float) -> tuple[float, float]:
+    """Speeds (rad/s) of the inner and the outer ring of a bearing where the spindle turns at `speed`."""
 
+    def of(name: str) -> float:
+        if name == "ground":
+            return 0.0
+        body = spindle.structure.body(name)
+        return body.speed_ratio * speed if body.turns else 0.0
 
-def _movement_for(row: BallRow, force: float) -> float:
-    """Movement of one outer ring under a constant axial force."""
-    return _root([row], lambda rows, h: centred_axial_force(rows[0], h) - force)
+    return of(b.inner_body), of(b.outer_body)
 
 
 def _root(rows: list[BallRow], imbalance: Callable[[list[BallRow], float], float]) -> float:

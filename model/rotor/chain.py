@@ -14,7 +14,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from thermospindle.model.bearing.pair import PairState
+from thermospindle.model.bearing.pair import BearingState, LinearState, PairState
 from thermospindle.model.machine import MOVES, Body, Point, Spindle, Structure
 from thermospindle.model.types import Array
 
@@ -75,32 +75,42 @@ def rotor_base(spindle: Spindle, state: PairState) -> RotorBase:
     """The chain at one condition: the structure's joints and the bearings, one of them behind its preload spring where that has a rate."""
     structure = spindle.structure
     joints = [joint_element(structure, i) for i in range(len(structure.joints))]
-    bearings = [
-        Element(b.name, "bearings", structure.inner_body, structure.outer_body, b.z, b.stiffness, b.damping) for b in state.bearings
-    ]
+    of = {b.name: (b.inner_body, b.outer_body) for b in spindle.all_bearings}
+    ordered: list[BearingState | LinearState] = [*state.bearings, *state.linear]
+    bearings = [Element(b.name, "bearings", *of[b.name], b.z, b.stiffness, b.damping) for b in ordered]
     chain = RotorBase(structure.bodies, (*joints, *bearings), state.condition.speed)
-    spring = spindle.pair.spring
-    return chain if spring is None or spring.rate is None else sprung(chain, spring.ring_of, spring.rate, spring.mass)
+    for s in spindle.sets:
+        if s.spring is not None and s.spring.rate is not None:
+            chain = sprung(chain, s.spring.rings_of, s.spring.rate, s.spring.mass)
+    return chain
 
 
-def sprung(chain: RotorBase, name: str, rate: float, mass: float) -> RotorBase:
-    """The chain with the ring of bearing `name` on a lossless axial spring of `rate` (N/m); it moves across the axis and tilts with its body.
+def sprung(chain: RotorBase, names: Sequence[str], rate: float, mass: float) -> RotorBase:
+    """The chain with the rings of bearings on one lossless axial spring of `rate` (N/m); they move across the axis and tilt with their body.
 
-    A ring without mass is condensed: K - K_z K_z^T / (rate + k_zz), damping to first order of complex stiffness.
+    A ring without mass is condensed: K - K_z K_z^T / (rate + k_zz), damping to first order of complex stiffness. ValueError for
+    several without mass.
     """
-    own = next(e for e in chain.elements if e.name == name)
+    own = [e for e in chain.elements if e.name in names]
     if mass > 0.0:
-        body = chain.body(own.b)
-        ring = Body(f"{name} sprung ring", mass, (0.0, 0.0, 0.0), own.z, ("z",), False, ())
+        body, first = chain.body(own[0].b), own[0]
+        ring = Body(f"{first.name} sprung ring", mass, (0.0, 0.0, 0.0), first.z, ("z",), False, ())
         stiffness = np.diag([0.0, 0.0, rate, 0.0, 0.0])
-        spring = Element(f"{name} preload spring", "bearings", body.name, ring.name, own.z, stiffness, np.zeros((5, 5)))
-        elements = [replace(e, slides=ring.name) if e is own else e for e in chain.elements]
+        spring = Element(f"{first.name} preload spring", "bearings", body.name, ring.name, first.z, stiffness, np.zeros((5, 5)))
+        elements = [replace(e, slides=ring.name) if e.name in names else e for e in chain.elements]
         return replace(chain, bodies=(*chain.bodies, ring), elements=(*elements, spring))
+    if len(own) > 1:
+        raise ValueError(f"the rings of {', '.join(names)} slide together, and need a mass to do so in vibration")
     pass_on = np.eye(5)
-    pass_on[:, 2] -= own.stiffness[:, 2] / (rate + own.stiffness[2, 2])
-    stiffness = pass_on @ own.stiffness
-    condensed = replace(own, stiffness=(stiffness + stiffness.T) / 2, damping=pass_on @ own.damping @ pass_on.T)
-    return replace(chain, elements=tuple(condensed if e is own else e for e in chain.elements))
+    pass_on[:, 2] -= own[0].stiffness[:, 2] / (rate + own[0].stiffness[2, 2])
+    stiffness = pass_on @ own[0].stiffness
+    condensed = replace(own[0], stiffness=(stiffness + stiffness.T) / 2, damping=pass_on @ own[0].damping @ pass_on.T)
+    return replace(chain, elements=tuple(condensed if e is own[0] else e for e in chain.elements))
+
+
+def turning_at(chain: RotorBase, z: float) -> Body:
+    """The turning body nearest a height (m)."""
+    return min((b for b in chain.bodies if b.turns), key=lambda b: abs(b.z - z))
 
 
 def joint_element(structure: Structure, index: int) -> Element:
@@ -156,17 +166,22 @@ def matrices(chain: RotorBase) -> Matrices:
     """M, C + G, K assembled element by element (independent of MuJoCo)."""
     n = len(chain.dofs)
     mass, damping, stiffness = np.zeros(n), np.zeros((n, n)), np.zeros((n, n))
-    index = {dof: i for i, dof in enumerate(chain.dofs)}
+    start: dict[str, int] = {"ground": 0}
+    width = {"ground": 0}
+    at = 0
     for body in chain.bodies:
+        start[body.name], width[body.name] = at, len(body.moves)
         inertia = dict(zip(MOVES, (body.mass, body.mass, body.mass, *body.inertia[:2]), strict=True))
-        for move in body.moves:
-            mass[index[body.name, move]] = inertia[move]
+        mass[at : at + len(body.moves)] = [inertia[move] for move in body.moves]
         if body.turns:
-            i, j = index[body.name, "tilt_x"], index[body.name, "tilt_y"]
-            damping[i, j] += body.inertia[2] * chain.speed
-            damping[j, i] -= body.inertia[2] * chain.speed
+            i, j = at + body.moves.index("tilt_x"), at + body.moves.index("tilt_y")
+            damping[i, j] += body.inertia[2] * chain.speed * body.speed_ratio
+            damping[j, i] -= body.inertia[2] * chain.speed * body.speed_ratio
+        at += len(body.moves)
     for element in chain.elements:
-        rows = element_rows(chain, element)
-        damping += rows.T @ element.damping @ rows
-        stiffness += rows.T @ element.stiffness @ rows
+        ends = [name for name in (element.a, element.b, element.slides) if name]
+        own = np.concatenate([np.arange(start[name], start[name] + width[name]) for name in ends])
+        rows = element_rows(chain, element)[:, own]
+        damping[np.ix_(own, own)] += rows.T @ element.damping @ rows
+        stiffness[np.ix_(own, own)] += rows.T @ element.stiffness @ rows
     return Matrices(np.diag(mass), damping, stiffness, chain.dofs)

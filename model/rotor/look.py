@@ -163,8 +163,8 @@ def region_bodies(spindle: Spindle) -> dict[str, str]:
         if name not in hosts and (near := all_near & hosts.keys())
     }:
         hosts |= found
-    rings = structure.inner_body, structure.outer_body
-    turning, still = rings if spindle.pair.turning_ring == "inner" else rings[::-1]
+    turning = spindle.turning.name
+    still = next((b.name for b in structure.bodies if not b.turns), turning)
     return {g.name: hosts.get(g.name, turning if g.part == "rotating" else still) for g in spindle.regions}
 
 
@@ -244,7 +244,7 @@ def _add_mesh(out: MjSpec, spindle: Spindle, mesh: RegionMesh, material: str) ->
 
 def _add_balls(out: MjSpec, spindle: Spindle, bearing: BearingState) -> None:
     """Balls between their groove centres, on a body that does not turn: they go round at a speed of their own."""
-    inner = spindle.structure.body(spindle.structure.inner_body)
+    inner = spindle.structure.body(spindle.bearing(bearing.name).inner_body)
     holder = out.body(f"{inner.name} carrier" if inner.turns else inner.name)
     springs, row = ball_springs(bearing), bearing.row
     centres = springs.inner + row.inner_length / row.unloaded_distance * (springs.outer - springs.inner)

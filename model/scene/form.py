@@ -5,21 +5,24 @@ Its tables stand in `section`, `bearings`, `structure`, `thermal`, `measuring` a
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field, model_validator
 
 from thermospindle.model import machine as m
-from thermospindle.model.scene.bearings import BallRow, Bearing, BearingPair
+from thermospindle.model.errors import BadInput
+from thermospindle.model.scene.bearings import BallRow, Bearing, BearingPair, BearingSet, Mounted, check_sets
+from thermospindle.model.scene.defaults import GENTLE, WARMER, assumed
 from thermospindle.model.scene.fields import Finite, Name, NotNegative, Positive, Table, Temperature, TemperatureSpan, first_error
 from thermospindle.model.scene.imperfections import Imperfections
 from thermospindle.model.scene.measuring import HammerTest, Measuring, Point
 from thermospindle.model.scene.section import Material, Section
+from thermospindle.model.scene.shafts import ShaftForm, resolved_body
 from thermospindle.model.scene.structure import Structure
-from thermospindle.model.scene.thermal import MOVED_AIR, STILL_AIR, Thermal
-from thermospindle.model.units import RPM
+from thermospindle.model.scene.thermal import Thermal
+from thermospindle.model.units import MM, RPM
 
 __all__ = ["Finite", "Name", "NotNegative", "Point", "Positive", "Scene", "Table", "first_error"]
 
@@ -58,22 +61,21 @@ class Build(Table):
         return m.Build(deviations=dict(self.deviations), tests=tuple(self.tests))
 
 
-GENTLE = 100_000.0
-"""mm rpm, speed times pitch diameter, at which a spindle runs where its scene names no speed: a fifth of what grease allows."""
-WARMER = 40.0  # K above the reference temperature up to which it is meant to run, where its scene does not say
-
-
 class Scene(Table):
     title: Name
     reference_temperature_C: Temperature
     nominal_speed_rpm: Annotated[float, Field(ge=1e-3, le=1e8)] | None = None
     temperature_range_C: TemperatureSpan | None = None
     materials: dict[str, Material] = Field(min_length=1)
-    section: Section
-    ball_rows: dict[str, BallRow] = Field(min_length=1)
-    bearings: dict[str, Bearing] = Field(min_length=2, max_length=2)
-    bearing_pair: BearingPair
+    section: Section = Section()
+    ball_rows: dict[str, BallRow] = Field(default_factory=dict)
+    bearings: dict[str, Bearing] = Field(default_factory=dict)
+    bearing_pair: BearingPair | None = None
+    sets: dict[str, BearingSet] = Field(default_factory=dict)
+    ball_inertia: Annotated[float, Field(ge=0, le=1)] | None = None
+    axial_load_N: Finite = 0.0
     structure: Structure
+    shafts: list[ShaftForm] = Field(default_factory=list)
     thermal: Thermal = Thermal()
     measuring: Measuring
     hammer_test: HammerTest = HammerTest()
@@ -85,35 +87,75 @@ class Scene(Table):
     @model_validator(mode="after")
     def _rows_exist(self) -> Scene:
         for name, bearing in self.bearings.items():
-            if bearing.row not in self.ball_rows:
+            if bearing.row is not None and bearing.row not in self.ball_rows:
                 raise ValueError(f"bearings.{name}.row = {bearing.row!r}: allowed are {', '.join(self.ball_rows)}")
+        return self
+
+    @model_validator(mode="after")
+    def _sets_hold_every_row(self) -> Scene:
+        check_sets({n: b for n, b in self.bearings.items() if b.row is not None}, self.bearing_pair, self.sets)
+        return self
+
+    @model_validator(mode="after")
+    def _ball_inertia_told_once(self) -> Scene:
+        if self.bearing_pair is not None and self.ball_inertia is not None:
+            raise ValueError("ball_inertia: with a bearing_pair it stands there, as bearing_pair.ball_inertia")
         return self
 
     @model_validator(mode="after")
     def _imperfections_fit_the_bearings(self) -> Scene:
         for name, row in self.imperfections.bearings.items():
-            if name not in self.bearings:
-                raise ValueError(f"imperfections.bearings.{name}: names no bearing; allowed are {', '.join(self.bearings)}")
+            if name not in self.bearings or (own := self.bearings[name].row) is None:
+                rows = [n for n, b in self.bearings.items() if b.row is not None]
+                raise ValueError(f"imperfections.bearings.{name}: names no bearing with a ball row; allowed are {', '.join(rows)}")
             try:
-                row.check(self.ball_rows[self.bearings[name].row].balls)
+                row.check(self.ball_rows[own].balls)
             except ValueError as error:
                 raise ValueError(f"imperfections.bearings.{name}.{error}") from None
         return self
 
-    @model_validator(mode="after")
-    def _sprung_bearing_exists(self) -> Scene:
-        sprung = self.bearing_pair.sprung_bearing
-        if sprung is not None and sprung not in self.bearings:
-            raise ValueError(f"bearing_pair.sprung_bearing = {sprung!r}: allowed are {', '.join(self.bearings)}")
-        return self
+    def rows(self) -> dict[str, Bearing]:
+        """The bearings with a ball row, the lowest first."""
+        rows = {n: b for n, b in self.bearings.items() if b.row is not None}
+        return dict(sorted(rows.items(), key=lambda item: item[1].z_mm))
 
     def spindle(self, name: str, file: Path, provenance: dict[str, m.Provenance]) -> m.Spindle:
-        order = sorted(self.bearings, key=lambda n: self.bearings[n].z_mm)
-        senses = m.SENSE[self.bearing_pair.arrangement]
-        bearings = tuple(self.bearings[n].bearing(n, self.ball_rows, sense) for n, sense in zip(order, senses, strict=True))
+        """The spindle in SI units; its shafts have their nodes, which `reading.build` makes bodies of."""
+        rows, reference = self.rows(), self.reference_temperature_C
+        heights = [b.z_mm * MM for b in self.bearings.values()] + [j.z_mm * MM for j in self.structure.joints]
+        heights += [p.position_mm[2] * MM for p in self.measuring.points]
+        shafts = {s.name: s.shaft(heights) for s in self.shafts}
+        turning = {b.name for b in self.structure.bodies if b.turns} | {s.name for s in self.shafts if s.turns}
+        pair = self.bearing_pair
+        sets = tuple(s.set(n) for n, s in self.sets.items()) if pair is None else (pair.set(list(rows)),)
+        if pair is not None:
+            senses = dict(zip(rows, m.SENSE[pair.arrangement], strict=True))
+        else:
+            senses = {n: 1 if b.sense == "+z" else -1 for n, b in rows.items()}
+        shares = {n: s.preload / sum(senses[k] == senses[n] for k in s.bearings) for s in sets for n in s.bearings}
+
+        def ends(key: str, b: Bearing) -> tuple[str, str]:
+            """Bodies of the inner and the outer ring as the file names them, the scene's own where the bearing names none."""
+            told = (b.inner_body or self.structure.inner_body, b.outer_body or self.structure.outer_body)
+            for body, missing in zip(told, ("inner_body", "outer_body"), strict=True):
+                if body is None:
+                    raise BadInput(f"{file}: bearings.{key}.{missing}: missing; a bearing or structure.{missing} must name the body that carries its ring")
+            return str(told[0]), str(told[1])
+
+        def mounted(key: str, b: Bearing) -> Mounted:
+            inner, outer = ends(key, b)
+            turns = pair.turning_ring if pair is not None else "outer" if outer in turning and inner not in turning else "inner"
+            at = b.z_mm * MM
+            return Mounted(resolved_body(shafts, inner, at), resolved_body(shafts, outer, at), turns, shares[key])
+
+        linear = []
+        for key, b in self.bearings.items():
+            if b.numbers is not None:
+                inner, outer = (resolved_body(shafts, body, b.z_mm * MM) for body in ends(key, b))
+                linear.append(b.linear(key, inner, outer, file.parent))
+        bearings = tuple(b.bearing(key, self.ball_rows, senses[key], mounted(key, b)) for key, b in rows.items())
         regions = tuple(r.region() for r in self.section.regions)
-        points = tuple(p.point() for p in self.measuring.points)
-        reference = self.reference_temperature_C
+        points = tuple(replace(p, body=resolved_body(shafts, p.body, p.position[2])) for p in (p.point() for p in self.measuring.points))
         return m.Spindle(
             name=name,
             title=self.title,
@@ -121,58 +163,28 @@ class Scene(Table):
             materials={n: t.material(n) for n, t in self.materials.items()},
             regions=regions,
             bearings=bearings,
-            pair=self.bearing_pair.pair(order),
-            structure=self.structure.structure(),
+            sets=sets,
+            structure=self.structure.structure(tuple(shafts.values())),
             points=points,
             hammer=self.hammer_test.test([p.node for p in points]),
             thermal=self.thermal.thermal(regions),
             tolerances=self.tolerances.tolerances(),
             nominal_speed=self.speed_rpm() * RPM,
             temperatures=self.temperature_range_C or (reference, reference + WARMER),
+            ball_inertia=pair.ball_inertia if pair is not None else self.ball_inertia if self.ball_inertia is not None else 1.0,
+            axial_load=self.axial_load_N,
+            linear_bearings=tuple(sorted(linear, key=lambda b: b.z)),
             effects=tuple(m.Addition(effect=e.name, values=dict(e.values)) for e in self.effects),
             build=self.build.build() if self.build else None,
             imperfections=self.imperfections.imperfections({b.name: b.balls for b in bearings}),
-            provenance=provenance | self._assumed(provenance),
+            provenance=provenance | assumed(self, provenance),
             file=file,
         )
 
     def speed_rpm(self) -> float:
-        """The nominal speed; where the file names none, two digits of `GENTLE` over the largest pitch diameter."""
+        """The nominal speed; where the file names none, two digits of `GENTLE` over the largest pitch diameter, or shaft diameter."""
         if self.nominal_speed_rpm is not None:
             return self.nominal_speed_rpm
-        return float(f"{GENTLE / max(self.ball_rows[b.row].pitch_diameter_mm for b in self.bearings.values()):.1e}")
-
-    def _assumed(self, told: Mapping[str, m.Provenance]) -> dict[str, m.Provenance]:
-        """Provenance of what the file leaves to the program, by key."""
-        found: dict[str, m.Provenance] = {}
-        for table in ("hammer_test", "tolerances"):
-            form = getattr(self, table)
-            for key, value in form.model_dump(exclude={"origin", "source", "origins"}).items():
-                if key not in form.model_fields_set:
-                    chosen = value is None or value == []
-                    said = "chosen by the program" if chosen else f"{value}"
-                    found[f"{table}.{key}"] = m.Provenance("assumed", f"assumed default: {said}")
-        if not self.thermal.convection:
-            found["thermal.convection"] = m.Provenance(
-                "assumed", f"assumed default: {STILL_AIR:g} W/m2 K on standing regions, {MOVED_AIR:g} on turning ones"
-            )
-        if "friction" not in self.thermal.model_fields_set:
-            found["thermal.friction"] = m.Provenance("assumed", "assumed default: a light grease, f0 = 2, 26 mm2/s at 40 C")
-        if self.nominal_speed_rpm is None:
-            said = f"assumed default: {self.speed_rpm():g} rpm, a speed parameter of {GENTLE:g} mm rpm"
-            found["nominal_speed_rpm"] = m.Provenance("assumed", said)
-        if self.temperature_range_C is None:
-            found["temperature_range_C"] = m.Provenance(
-                "assumed", f"assumed default: from the reference temperature to {WARMER:g} K above it"
-            )
-        pair = self.bearing_pair
-        if pair.preload_kind == "spring" and pair.arrangement != "tandem":
-            if pair.sprung_bearing is None:
-                found["bearing_pair.sprung_bearing"] = m.Provenance(
-                    "assumed", "assumed default: the upper bearing; the lower locates the shaft and takes axial loads"
-                )
-            if pair.preload_rate_N_per_m is None:
-                found["bearing_pair.preload_rate_N_per_m"] = m.Provenance(
-                    "assumed", "assumed default: constant spring force as the ring slides, and a ring that friction holds in vibration"
-                )
-        return {key: value for key, value in found.items() if key not in told}
+        diameters = [self.ball_rows[b.row].pitch_diameter_mm for b in self.bearings.values() if b.row is not None]
+        diameters = diameters or [max(p[:-1]) for s in self.shafts for p in s.outer_mm] or [100.0]
+        return float(f"{GENTLE / max(diameters):.1e}")

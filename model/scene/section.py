@@ -47,4 +47,4 @@ class Region(Table):
 
 
 class Section(Table):
-    regions: list[Region] = Field(min_length=2, max_length=300)
+    regions: list[Region] = Field(default_factory=list, max_length=300)

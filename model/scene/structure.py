@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Annotated, Literal
 
 from pydantic import Field, Strict, model_validator
 
 from thermospindle.model import machine as m
 from thermospindle.model.scene.fields import Both, Name, NotNegative, Place, Positive, Share, Table, TwoNames
+from thermospindle.model.shaft import Shaft
 from thermospindle.model.units import MM
 
 Mass = Annotated[float, Field(ge=1e-9, le=1e9)]
@@ -23,7 +26,8 @@ class StructureBody(Table):
     regions: list[str] = Field(default_factory=list)
     moves: list[Literal["x", "y", "z", "tilt_x", "tilt_y"]] = Field(min_length=1)
     turns: bool = False
-    role: Literal["base", "seat", "shaft", "hub"] | None = None
+    role: Literal["base", "seat", "shaft", "hub", "housing"] | None = None
+    speed_ratio: Annotated[float, Field(ge=-100, le=100)] = 1.0
 
     @model_validator(mode="after")
     def _inertia_given_once(self) -> StructureBody:
@@ -59,6 +63,7 @@ class StructureBody(Table):
             turns=self.turns,
             regions=tuple(self.regions),
             role=self.role or "",
+            speed_ratio=self.speed_ratio,
         )
 
 
@@ -71,7 +76,7 @@ class StructureJoint(Table):
     lateral_stiffness_N_per_m: Both = (0.0, 0.0)
     tilt_stiffness_N_m_per_rad: Both = (0.0, 0.0)
     damping_ratio: Share
-    role: Literal["mount", "plate", "flange"] | None = None
+    role: Literal["mount", "plate", "flange", "holder"] | None = None
     material: str = ""
 
     def joint(self) -> m.Joint:
@@ -89,17 +94,25 @@ class StructureJoint(Table):
 
 
 class Structure(Table):
-    inner_body: str
-    outer_body: str
+    inner_body: str | None = None
+    outer_body: str | None = None
     damping_frequency_Hz: Positive
-    bodies: list[StructureBody] = Field(min_length=2)
-    joints: list[StructureJoint] = Field(min_length=1)
+    bodies: list[StructureBody] = Field(default_factory=list)
+    joints: list[StructureJoint] = Field(default_factory=list)
 
-    def structure(self) -> m.Structure:
+    def structure(self, shafts: Sequence[Shaft] = ()) -> m.Structure:
+        """With joints on the nodes of `shafts` where they name those; nodes and elements come in `model.rotor.beam`."""
+        by_name = {s.name: s for s in shafts}
+
+        def body(name: str, z: float) -> str:
+            return by_name[name].node_at(z) if name in by_name else name
+
+        joints = (j.joint() for j in self.joints)
         return m.Structure(
             bodies=tuple(b.body() for b in self.bodies),
-            joints=tuple(j.joint() for j in self.joints),
-            inner_body=self.inner_body,
-            outer_body=self.outer_body,
+            joints=tuple(replace(j, bodies=(body(j.bodies[0], j.z), body(j.bodies[1], j.z))) for j in joints),
             damping_frequency=self.damping_frequency_Hz,
+            inner_body=self.inner_body or "",
+            outer_body=self.outer_body or "",
+            shafts=tuple(shafts),
         )

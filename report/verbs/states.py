@@ -54,7 +54,7 @@ def _speed_left_out(spindle: Spindle, found: StiffnessTable) -> list[str]:
 
     if len(found.speed) < 2 or not all(same(values) for own in found.values.values() for values in own.values()):
         return []
-    if spindle.pair.ball_inertia:
+    if spindle.ball_inertia:
         return ["the bearings are the same at every speed"]
     return [
         "the bearings are the same at every speed, since the balls' centrifugal force and gyroscopic moment are left out; "

@@ -48,7 +48,7 @@ REFERENCE_HUB = 0.0259
 
 def mass_ratio(spindle: Spindle) -> float:
     """Turning mass over that of the reference spindle."""
-    return spindle.turning.mass / REFERENCE_HUB
+    return spindle.turning_mass / REFERENCE_HUB
 
 
 def fitted_to(effect: Effect, spindle: Spindle) -> Effect:

@@ -38,7 +38,7 @@ from thermospindle.model.bearing.kinematics import (
 )
 from thermospindle.model.bearing.pair import BearingState
 from thermospindle.model.imperfections import Imperfections, RowImperfections, Wave
-from thermospindle.model.rotor.chain import RotorBase, element_rows, matrices, motion_rows
+from thermospindle.model.rotor.chain import RotorBase, element_rows, matrices, motion_rows, turning_at
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.operating import OperatingPoint
 
@@ -123,7 +123,7 @@ def excitation(point: OperatingPoint, imperfections: Imperfections | None = None
         bearing, own, element = point.state.bearing(name), present.row(name), elements[name]
         if own.cage_unbalance:
             whirl = _whirling(own.cage_unbalance * np.exp(1j * own.cage_phase), kin.cage)
-            outer = motion_rows(chain, point.spindle.structure.outer_body, (0.0, 0.0, bearing.z))
+            outer = motion_rows(chain, point.spindle.bearing(bearing.name).outer_body, (0.0, 0.0, bearing.z))
             add(cage_line(name, kin, "cage unbalance"), 2, whirl @ outer[:2])
         rows = element_rows(chain, element)
         to_element = np.eye(5)  # of a bending shaft, the element may stand at another height than its bearing
@@ -139,8 +139,7 @@ def excitation(point: OperatingPoint, imperfections: Imperfections | None = None
 
 def _unbalance(point: OperatingPoint, own: Imperfections) -> Iterator[tuple[Line, ComplexArray]]:
     speed = point.condition.speed
-    body = next(b for b in point.chain.bodies if b.turns)
-    rows = motion_rows(point.chain, body.name, (0.0, 0.0, own.unbalance_z))
+    rows = motion_rows(point.chain, turning_at(point.chain, own.unbalance_z).name, (0.0, 0.0, own.unbalance_z))
     if own.unbalance:
         yield unbalance_line(speed), _whirling(own.unbalance * np.exp(1j * own.unbalance_phase), speed) @ rows[:2]
     if own.couple_unbalance:  # height times a force towards the phase turns about a quarter turn further

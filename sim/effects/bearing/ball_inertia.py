@@ -9,10 +9,10 @@ from thermospindle.sim.effects.effect import Effect, Parameter, Values
 
 
 def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
-    share, own = values["share"], spindle.pair.ball_inertia
+    share, own = values["share"], spindle.ball_inertia
     if share == 0.0:
         return spindle
-    return replace(spindle, pair=replace(spindle.pair, ball_inertia=own + share * (1 - own)))
+    return replace(spindle, ball_inertia=own + share * (1 - own))
 
 
 EFFECT = Effect(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from thermospindle.model.bearing.pair import solve
-from thermospindle.model.machine import Condition, PreloadSpring, RingMotion, Spindle
+from thermospindle.model.machine import BearingSet, Condition, PreloadSpring, RingMotion, Spindle
 from thermospindle.sim.effects.effect import Effect, Parameter, Values
 
 
@@ -15,8 +15,8 @@ def motions(spindle: Spindle, condition: Condition, values: Values, by_bearing: 
     if share == 0.0 or idle(spindle) is not None:
         return by_bearing
     rigid = solve(spindle, condition, by_bearing)
-    spring = PreloadSpring(spindle.bearings[-1].name)  # any one of the pair: both then carry the preload, but for an axial bias
-    sprung = solve(replace(spindle, pair=replace(spindle.pair, spring=spring)), condition, by_bearing)
+    sets = tuple(replace(s, spring=PreloadSpring(_upper(spindle, s))) if _opposed(spindle, s) else s for s in spindle.sets)
+    sprung = solve(replace(spindle, sets=sets), condition, by_bearing)
     moved = {}
     for b, old, new in zip(spindle.bearings, rigid.bearings, sprung.bearings, strict=True):
         slide = new.row.axial - old.row.axial
@@ -25,9 +25,20 @@ def motions(spindle: Spindle, condition: Condition, values: Values, by_bearing: 
 
 
 def idle(spindle: Spindle) -> str | None:
-    if spindle.tandem:
-        return "a tandem pair has no opposed rings that would hold each other's preload"
-    return None if spindle.pair.spring is None else "the scene's preload is by a spring already"
+    if all(spindle.one_way(s) for s in spindle.sets):
+        return "a tandem set has no opposed rings that would hold each other's preload"
+    return None if any(_opposed(spindle, s) for s in spindle.sets) else "the scene's preload is by a spring already"
+
+
+def _opposed(spindle: Spindle, s: BearingSet) -> bool:
+    """Whether a set's rings load each other in fixed positions."""
+    return s.spring is None and not spindle.one_way(s)
+
+
+def _upper(spindle: Spindle, s: BearingSet) -> tuple[str, ...]:
+    """The rows loaded as the uppermost one: any group of a set serves, all then carry the preload, but for an axial load."""
+    rows = sorted((spindle.bearing(name) for name in s.bearings), key=lambda b: b.z)
+    return tuple(b.name for b in rows if b.sense == rows[-1].sense)
 
 
 EFFECT = Effect(

@@ -59,7 +59,7 @@ def films(
     )
     viscosity = OIL_DENSITY * spindle.thermal.friction.viscosity(temperature)
     gamma = b.ball_diameter * np.cos(b.contact_angle) / b.pitch_diameter
-    load = spindle.pair.preload / (b.balls * np.sin(b.contact_angle))
+    load = b.preload / (b.balls * np.sin(b.contact_angle))
     found = []
     for conformity, inner in ((b.inner_conformity, True), (b.outer_conformity, False)):
         contact = race_contact(b.ball_diameter, conformity, b.pitch_diameter, b.contact_angle, inner, ball, ring)

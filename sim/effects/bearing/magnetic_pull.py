@@ -17,7 +17,7 @@ def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
     pull = pull_at(spindle, condition, values)
     if pull == 0.0:
         return spindle
-    return replace(spindle, pair=replace(spindle.pair, axial_bias=spindle.pair.axial_bias - pull))
+    return replace(spindle, axial_load=spindle.axial_load - pull)
 
 
 def pull_at(spindle: Spindle, condition: Condition, values: Values) -> float:
@@ -35,7 +35,7 @@ def chain(spindle: Spindle, condition: Condition, values: Values, chain: RotorBa
         "magnet",
         "motor",
         stator_body(spindle, int(values["below"])),
-        spindle.turning.name,
+        spindle.turning_at(magnet_height(spindle)).name,
         magnet_height(spindle),
         across,
         np.zeros((5, 5)),
@@ -51,7 +51,7 @@ def stator_body(spindle: Spindle, below: int = 0) -> str:
 
 def sized(spindle: Spindle) -> Mapping[str, float]:
     """A pull is a share of the preload, here of 16 N, and air gaps go with lengths."""
-    return {"pull": spindle.pair.preload / 16.0, "radial_ratio": mass_ratio(spindle) ** (-1 / 3)}
+    return {"pull": max((s.preload for s in spindle.sets), default=16.0) / 16.0, "radial_ratio": mass_ratio(spindle) ** (-1 / 3)}
 
 
 def magnet_height(spindle: Spindle) -> float:

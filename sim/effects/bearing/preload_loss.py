@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from thermospindle.model.machine import Condition, Spindle
-from thermospindle.model.tolerance import with_preload
+from thermospindle.model.tolerance import scaled_preload
 from thermospindle.sim.effects.effect import Effect, Parameter, Values
 
 RISE = 40.0
@@ -13,7 +13,7 @@ RISE = 40.0
 def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
     if values["loss"] == 0.0:
         return spindle
-    return with_preload(spindle, spindle.pair.preload * remaining(spindle, condition, values))
+    return scaled_preload(spindle, remaining(spindle, condition, values))
 
 
 def remaining(spindle: Spindle, condition: Condition, values: Values) -> float:

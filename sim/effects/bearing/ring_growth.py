@@ -37,7 +37,7 @@ def motions(spindle: Spindle, condition: Condition, values: Values, by_bearing: 
     grown = {}
     for b in spindle.bearings:
         motion, growth = by_bearing[b.name], scale * condition.speed**2 * unit_growth(spindle, b)
-        if spindle.pair.turning_ring == "outer":
+        if b.turning_ring == "outer":
             grown[b.name] = replace(motion, outer_r=motion.outer_r + growth)
         else:
             grown[b.name] = replace(motion, inner_r=motion.inner_r + growth)
@@ -46,9 +46,9 @@ def motions(spindle: Spindle, condition: Condition, values: Values, by_bearing: 
 
 def unit_growth(spindle: Spindle, b: Bearing) -> float:
     """Radial growth of the turning raceway for 1 rad/s (m s2)."""
-    name = b.outer_ring if spindle.pair.turning_ring == "outer" else b.inner_ring
+    name = b.outer_ring if b.turning_ring == "outer" else b.inner_ring
     ring = replace(spindle.region(name), z=spindle.raceway(name, b))  # of a tube that bearings share, what is about this one
-    race = ring.r[0] if spindle.pair.turning_ring == "outer" else ring.r[1]
+    race = ring.r[0] if b.turning_ring == "outer" else ring.r[1]
     regions = tuple(g for g in spindle.regions if g.part == ring.part)
     constants = tuple(
         (m.youngs_modulus(spindle.reference_temperature), m.poisson_ratio, m.density) for m in (_material(spindle, g) for g in regions)

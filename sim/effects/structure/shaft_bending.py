@@ -37,7 +37,7 @@ def chain(spindle: Spindle, condition: Condition, values: Values, chain: RotorBa
         return chain
     if idle(spindle) is not None or outside(spindle) is not None:
         return chain
-    inner = spindle.structure.inner_body
+    inner = spindle.bearings[0].inner_body
     bearings, joints = {b.name for b in spindle.bearings}, {j.name for j in spindle.structure.joints if inner in j.bodies}
     root = next((e.z for e in chain.elements if e.name in joints), chain.body(inner).z)
     node, *others = sorted((b.z for b in spindle.bearings), key=lambda z: abs(z - root))
@@ -60,8 +60,11 @@ def idle(spindle: Spindle) -> str | None:
 
 def outside(spindle: Spindle) -> str | None:
     """A shaft that only its bearings hold is no cantilever."""
-    held = any(spindle.structure.inner_body in j.bodies for j in spindle.structure.joints)
-    return None if held else f"the shaft {spindle.structure.inner_body!r} turns free between its bearings and is not held at one end"
+    inner = {b.inner_body for b in spindle.bearings}
+    if len(inner) > 1:
+        return "its inner rings sit on several bodies, of which none is the rigid shaft whose bending this puts in series"
+    held = any(inner & set(j.bodies) for j in spindle.structure.joints)
+    return None if held else f"the shaft {min(inner)!r} turns free between its bearings and is not held at one end"
 
 
 def moved(element: Element, z: float) -> Element:

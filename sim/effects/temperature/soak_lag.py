@@ -26,8 +26,9 @@ def motions(spindle: Spindle, condition: Condition, values: Values, by_bearing: 
         return by_bearing
     lag = missing * (condition.temperature - spindle.reference_temperature)  # K, of the turning rings behind the standing
     ball, groove = (0.5 - values["ball_share"]) * lag, (1 - values["ball_share"]) / 2 * lag
-    moved, strain = {}, f"{spindle.pair.turning_ring}_strain"
+    moved = {}
     for b in spindle.bearings:
+        strain = f"{b.turning_ring}_strain"
         motion, ring = by_bearing[b.name], by_bearing[b.name].temperature - lag / 2
         grown = spindle.materials[b.ball_material].thermal_strain(motion.temperature + ball, motion.temperature)
         widened = spindle.materials[b.ring_material].thermal_strain(ring + groove, ring)

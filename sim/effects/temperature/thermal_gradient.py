@@ -65,13 +65,13 @@ def heat(spindle: Spindle, condition: Condition, unit: UnitRise) -> Array:
 
     RuntimeError where they do not: a bearing that runs so hot that its viscosity falls by half in the rise itself.
     """
-    law, load = spindle.thermal.friction, spindle.pair.preload
+    law = spindle.thermal.friction
     made = np.zeros(len(spindle.bearings))
     for _ in range(100):
         warm = condition.temperature + made @ unit.bearing
         last, made = (
             made,
-            np.array([friction.heat(law, b, condition.speed, float(t), load) for b, t in zip(spindle.bearings, warm, strict=True)]),
+            np.array([friction.heat(law, b, condition.speed, float(t), b.preload) for b, t in zip(spindle.bearings, warm, strict=True)]),
         )
         if np.abs((made - last) @ unit.bearing).max() < 1e-9:
             return made

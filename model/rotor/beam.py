@@ -1,0 +1,150 @@
+"""Beam elements of flexible shafts: nodes that are bodies, joined by elements that are joints.
+
+Between two nodes a beam of any section is exactly a diagonal 5x5 stiffness at its elastic centre, between rigid arms: with
+z_c = integral(z / EI) / integral(1 / EI) the two free-end flexibilities of bending no longer couple, and
+
+    1 / k_tilt    = integral(dz / EI)
+    1 / k_lateral = integral((z - z_c)^2 / EI dz) + shear integral(dz / kappa G A)
+    1 / k_axial   = integral(dz / EA),
+
+for a uniform Timoshenko beam 12 EI / (l^3 (1 + phi)), EI / l and EA / l at its middle (Przemieniecki, *Theory of Matrix Structural
+Analysis*, 1968, 5.6). Static answers are exact on any mesh, steps and tapers inside an element included.
+
+The mass of an element goes to its nodes by its linear shape functions, each share with its centre of mass moved inward by the first
+moment (l / 2) integral(rho A x (1 - x) dz), x from 0 to 1: for a uniform element half of m, moved by l / 6. This is the Euler-Maclaurin
+correction of the trapezoidal rule: w^2 is integrated to fourth order also at free ends, where a plain lump is of second. Inside a uniform
+beam the corrections of neighbours cancel, and bending frequencies of k l = c are right to c^4 / 1440, the size of the consistent mass's error with
+the other sign. Rotary inertia rho I (polar 2 rho I) is shared alike; none is added for the length of a lump.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from thermospindle.model.machine import MOVES, Body, Joint, Material, Structure
+from thermospindle.model.shaft import Segment, Shaft
+from thermospindle.model.types import Array
+
+PLACES, WEIGHTS = np.polynomial.legendre.leggauss(8)
+SLIGHT = 1e-4
+"""Rotary inertia left to a node where its theory has none, over mass times length squared: MuJoCo wants some, bending frequencies move by half of it
+times (k l)^2."""
+
+
+def shear_factor(bore: float, poisson: float) -> float:
+    """Shear factor of a tube of radius ratio `bore`: Cowper, The shear coefficient in Timoshenko's beam theory, J. Appl. Mech., 1966."""
+    m = (1 + bore**2) ** 2
+    return 6 * (1 + poisson) * m / ((7 + 6 * poisson) * m + (20 + 12 * poisson) * bore**2)
+
+
+def with_shafts(structure: Structure, materials: Mapping[str, Material], temperature: float) -> Structure:
+    """The structure with the nodes and elements of its shafts among its bodies and joints; moduli are those at `temperature` (C)."""
+    bodies = [body for shaft in structure.shafts for body in nodes(shaft, materials)]
+    joints = [joint for shaft in structure.shafts for joint in elements(shaft, materials, temperature)]
+    return replace(structure, bodies=(*structure.bodies, *bodies), joints=(*structure.joints, *joints))
+
+
+def with_theory(structure: Structure, materials: Mapping[str, Material], temperature: float, shear: float, rotary: float) -> Structure:
+    """The structure with other shares of shear and rotary inertia in the beams of its shafts, all else of them as it stands.
+
+    What has been added to a node or scaled in an element stays: only the change that the shares make is applied.
+    """
+    changed_bodies: dict[str, Body] = {}
+    changed_joints: dict[str, Joint] = {}
+    shafts = tuple(replace(s, shear=shear, rotary=rotary) for s in structure.shafts)
+    for old, new in zip(structure.shafts, shafts, strict=True):
+        for a, b in zip(nodes(old, materials), nodes(new, materials), strict=True):
+            own = structure.body(a.name)
+            x, y, z = (i + after - before for i, after, before in zip(own.inertia, b.inertia, a.inertia, strict=True))
+            changed_bodies[a.name] = replace(own, inertia=(x, y, z))
+        for before, after in zip(elements(old, materials, temperature), elements(new, materials, temperature), strict=True):
+            joint = next(j for j in structure.joints if j.name == before.name)
+            k = [own * b / a for own, a, b in zip(joint.stiffness, before.stiffness, after.stiffness, strict=True)]
+            changed_joints[joint.name] = replace(joint, stiffness=(k[0], k[1], k[2], k[3], k[4]))
+    return replace(
+        structure,
+        bodies=tuple(changed_bodies.get(b.name, b) for b in structure.bodies),
+        joints=tuple(changed_joints.get(j.name, j) for j in structure.joints),
+        shafts=shafts,
+    )
+
+
+def elements(shaft: Shaft, materials: Mapping[str, Material], temperature: float) -> list[Joint]:
+    """The joints between neighbouring nodes of a shaft."""
+    found = []
+    for i, (low, high) in enumerate(zip(shaft.nodes, shaft.nodes[1:], strict=False)):
+        bent, sheared, drawn, about = 0.0, 0.0, 0.0, 0.0  # integrals of 1/EI, 1/kappa G A, 1/EA and z/EI
+        squares = 0.0  # of z^2 / EI, from the element's lower end
+        used: list[str] = []
+        for segment, z, dz in _slices(shaft, low, high):
+            material = materials[segment.material]
+            used += [segment.material] if segment.material not in used else []
+            modulus, poisson = material.youngs_modulus(temperature), material.poisson_ratio
+            outer, bore = _radii(segment, segment.outer, z), _radii(segment, segment.bore, z)
+            area, moment = np.pi * (outer**2 - bore**2), np.pi / 4 * (outer**4 - bore**4)
+            factor = _shear_factors(bore / outer, poisson)
+            bent += float(np.sum(dz / (modulus * moment)))
+            about += float(np.sum((z - low) * dz / (modulus * moment)))
+            squares += float(np.sum((z - low) ** 2 * dz / (modulus * moment)))
+            sheared += float(np.sum(dz / (factor * modulus / (2 * (1 + poisson)) * area)))
+            drawn += float(np.sum(dz / (modulus * area)))
+        centre = about / bent
+        lateral = 1 / (squares - centre * about + shaft.shear * sheared)
+        found.append(
+            Joint(
+                name=shaft.elements[i],
+                group=shaft.name,
+                bodies=(shaft.bodies[i], shaft.bodies[i + 1]),
+                z=low + centre,
+                stiffness=(lateral, lateral, 1 / drawn, 1 / bent, 1 / bent),
+                damping_ratio=shaft.damping_ratio,
+                role="beam",
+                material=used[0] if len(used) == 1 else "",
+            )
+        )
+    return found
+
+
+def nodes(shaft: Shaft, materials: Mapping[str, Material]) -> list[Body]:
+    """The nodes of a shaft as bodies."""
+    mass, first, least = np.zeros(len(shaft.nodes)), np.zeros(len(shaft.nodes)), np.zeros(len(shaft.nodes))
+    rotary = np.zeros(len(shaft.nodes))
+    for i, (low, high) in enumerate(zip(shaft.nodes, shaft.nodes[1:], strict=False)):
+        length = high - low
+        for segment, z, dz in _slices(shaft, low, high):
+            outer, bore = _radii(segment, segment.mass_outer, z), _radii(segment, segment.bore, z)
+            density, x = materials[segment.material].density, (z - low) / length
+            line = density * np.pi * (outer**2 - bore**2) * dz
+            inertia = density * np.pi / 4 * (outer**4 - bore**4) * dz
+            inward = length / 2 * float(np.sum(line * x * (1 - x)))
+            for node, share, sign in ((i, 1 - x, 1.0), (i + 1, x, -1.0)):
+                mass[node] += float(np.sum(line * share))
+                rotary[node] += float(np.sum(inertia * share))
+                least[node] += SLIGHT * float(np.sum(line * share)) * length**2
+                first[node] += sign * inward
+    found = []
+    for name, z, m, s, tilt, small in zip(shaft.bodies, shaft.nodes, mass, first, shaft.rotary * rotary, least, strict=True):
+        tilt = max(float(tilt), float(small))
+        z = z + float(s / m)
+        found.append(Body(name, float(m), (tilt, tilt, 2 * tilt), z, MOVES, shaft.turns, (), shaft.role, shaft.speed_ratio))
+    return found
+
+
+def _slices(shaft: Shaft, low: float, high: float) -> Iterator[tuple[Segment, Array, Array]]:
+    """The segments between two heights, each with places (m) and weights (m) of Gauss's rule on it."""
+    for segment in shaft.segments:
+        a, b = max(low, segment.z[0]), min(high, segment.z[1])
+        if b - a > 1e-12:
+            yield segment, (a + b) / 2 + (b - a) / 2 * PLACES, (b - a) / 2 * WEIGHTS
+
+
+def _radii(segment: Segment, ends: tuple[float, float], z: Array) -> Array:
+    """Radii (m) of a segment at heights."""
+    return ends[0] + (ends[1] - ends[0]) * (z - segment.z[0]) / (segment.z[1] - segment.z[0])
+
+
+def _shear_factors(bore: Array, poisson: float) -> Array:
+    return np.array([shear_factor(float(b), poisson) for b in bore])

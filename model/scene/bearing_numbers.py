@@ -1,0 +1,93 @@
+"""The form of a scene file: bearings given by numbers, as a diagonal, a 5x5 matrix, or a table over temperature and speed."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field, Strict, model_validator
+
+from thermospindle.model.cells import plain_number
+from thermospindle.model.errors import BadInput
+from thermospindle.model.scene.fields import Finite, NotNegative, Positive, Share, Table
+from thermospindle.model.units import RPM
+
+Row = Annotated[tuple[Finite, Finite, Finite, Finite, Finite], Strict(False)]
+COLUMNS = ("radial_stiffness_N_per_m", "axial_stiffness_N_per_m", "tilt_stiffness_N_m_per_rad", "coupling_stiffness_N_per_rad")
+"""Of a table; those that are missing are zero, but one of the first two must be there."""
+
+
+class Numbers(Table):
+    """`radial`, `axial` and `tilt` stiffness alike in both planes; or `matrix_SI`, order x, y, z, tilt_x, tilt_y in N, m and rad; or the CSV
+    file `table` with columns temperature_C, speed_rpm and those of `COLUMNS`, which is also what the verb `table` writes."""
+
+    radial_stiffness_N_per_um: Positive | None = None
+    axial_stiffness_N_per_um: NotNegative = 0.0
+    tilt_stiffness_N_m_per_rad: NotNegative = 0.0
+    matrix_SI: Annotated[list[Row], Field(min_length=5, max_length=5)] | None = None
+    table: str | None = None
+    bearing: str | None = None
+    damping_ratio: Share
+
+    @model_validator(mode="after")
+    def _one_form(self) -> Numbers:
+        given = [key for key in ("radial_stiffness_N_per_um", "matrix_SI", "table") if getattr(self, key) is not None]
+        if len(given) != 1:
+            raise ValueError("a bearing given by numbers has one of radial_stiffness_N_per_um, matrix_SI and table")
+        if self.matrix_SI is not None:
+            k = np.array(self.matrix_SI)
+            if np.abs(k - k.T).max() > 1e-9 * np.abs(k).max():
+                raise ValueError("matrix_SI must be symmetric")
+            if np.linalg.eigvalsh(k).min() < -1e-9 * np.abs(k).max():
+                raise ValueError("matrix_SI has a negative eigenvalue: a bearing that pushes the shaft away")
+        if self.bearing is not None and self.table is None:
+            raise ValueError("bearing names the rows of a table; without table there are none")
+        return self
+
+    def grid(self, folder: Path) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
+        """Temperatures (C), speeds (rad/s) and stiffness (temperatures, speeds, 5, 5), flat."""
+        if self.table is not None:
+            return _read(folder / self.table, self.bearing)
+        if self.matrix_SI is not None:
+            k = np.array(self.matrix_SI)
+        else:
+            radial, axial, tilt = 1e6 * (self.radial_stiffness_N_per_um or 0.0), 1e6 * self.axial_stiffness_N_per_um, self.tilt_stiffness_N_m_per_rad
+            k = np.diag([radial, radial, axial, tilt, tilt])
+        return (0.0,), (0.0,), tuple(float(v) for v in k.ravel())
+
+
+def _read(file: Path, bearing: str | None) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
+    """The grid of a table; `BadInput` where it is none, or has gaps."""
+    try:
+        lines = [line for line in file.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+        rows = list(csv.DictReader(lines))
+    except (OSError, UnicodeDecodeError) as error:
+        raise BadInput(f"{file}: cannot be read as a table of bearing stiffness: {error}") from None
+    if rows and bearing is not None:
+        rows = [row for row in rows if row.get("bearing") == bearing]
+    if not rows:
+        raise BadInput(f"{file}: has no rows{f' of bearing {bearing!r}' if bearing else ''}")
+    known = [c for c in COLUMNS if c in rows[0]]
+    if not set(known) & set(COLUMNS[:2]) or "temperature_C" not in rows[0] or "speed_rpm" not in rows[0]:
+        raise BadInput(f"{file}: its columns must be temperature_C, speed_rpm and {', '.join(COLUMNS)}, the last two where there are any")
+    values: dict[tuple[float, float], np.ndarray] = {}
+    for number, row in enumerate(rows, 2):
+        try:
+            at = float(plain_number(row["temperature_C"])), float(plain_number(row["speed_rpm"])) * RPM
+            radial, axial, tilt, coupling = (float(plain_number(row[c])) if c in known else 0.0 for c in COLUMNS)
+        except (TypeError, ValueError):
+            raise BadInput(f"{file}: row {number}: {row}: every column must hold a number in digits 0 to 9") from None
+        k = np.diag([radial, radial, axial, tilt, tilt])
+        k[0, 4] = k[4, 0] = coupling
+        k[1, 3] = k[3, 1] = -coupling
+        if at in values:
+            raise BadInput(f"{file}: row {number}: {at[0]:g} C and {at[1] / RPM:g} rpm stand twice{'' if bearing else '; which bearing? say bearing = ...'}")
+        if not np.isfinite(k).all() or np.linalg.eigvalsh(k).min() < -1e-9 * np.abs(k).max():
+            raise BadInput(f"{file}: row {number}: is no stiffness of a bearing; it must be finite and push nothing away")
+        values[at] = k
+    temperatures, speeds = (tuple(sorted({at[i] for at in values})) for i in (0, 1))
+    if len(values) != len(temperatures) * len(speeds):
+        raise BadInput(f"{file}: the table has gaps; it needs a row for each of {len(temperatures)} temperatures and {len(speeds)} speeds")
+    return temperatures, speeds, tuple(float(v) for t in temperatures for s in speeds for v in values[t, s].ravel())

@@ -1,0 +1,210 @@
+"""What cannot be a spindle: sections, bearings and structures that do not fit together, refused with one sentence each."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+
+from thermospindle.model.bearing.hertz import in_series
+from thermospindle.model.bearing.pair import contact_constants, reference_motion, ring_speeds
+from thermospindle.model.errors import BadInput
+from thermospindle.model.machine import Bearing, Region, Spindle
+
+# ---------------------------------------------------------------- geometry
+
+
+def _mm(pair: tuple[float, float]) -> list[float]:
+    return [round(v * 1e3, 6) for v in pair]
+
+
+def _overlap(a: Region, b: Region) -> bool:
+    return all(min(p[1], q[1]) - max(p[0], q[0]) > 1e-12 for p, q in ((a.r, b.r), (a.z, b.z)))
+
+
+def _touch(a: Region, b: Region) -> bool:
+    """Whether two regions overlap or share an edge of positive length."""
+    spans = sorted(min(p[1], q[1]) - max(p[0], q[0]) for p, q in ((a.r, b.r), (a.z, b.z)))
+    return spans[0] >= -1e-12 and spans[1] > 1e-12
+
+
+def check_section(file: Path, spindle: Spindle) -> None:
+    names = [g.name for g in spindle.regions]
+    for name in names:
+        if names.count(name) > 1:
+            raise BadInput(f"{file}: section.regions: the name {name!r} stands twice; region names must differ")
+    for region in spindle.regions:
+        if region.material not in spindle.materials:
+            allowed = ", ".join(spindle.materials)
+            raise BadInput(f"{file}: section.regions.{region.name}.material = {region.material!r}: allowed are {allowed}")
+    for a, b in combinations(spindle.regions, 2):
+        where = f"{file}: section.regions.{b.name}: r_mm = {_mm(b.r)}, z_mm = {_mm(b.z)}"
+        if _overlap(a, b) and a.part != b.part:
+            raise BadInput(f"{where} overlaps {a.name!r} of the other part; parts may not share space")
+        if _overlap(a, b) and a.material != b.material:
+            raise BadInput(f"{where} overlaps {a.name!r} of another material; only regions of one material may overlap")
+    for part in ("stationary", "rotating") if spindle.regions else ():
+        regions = [g for g in spindle.regions if g.part == part]
+        if not regions:
+            raise BadInput(f"{file}: section.regions: the {part} part has no region; each part needs at least one")
+        reached, waiting = {regions[0].name}, [regions[0]]
+        while waiting:
+            here = waiting.pop()
+            for other in regions:
+                if other.name not in reached and _touch(here, other):
+                    reached.add(other.name)
+                    waiting.append(other)
+        for region in regions:
+            if region.name not in reached:
+                where = f"r_mm = {_mm(region.r)}, z_mm = {_mm(region.z)}"
+                raise BadInput(f"{file}: section.regions.{region.name}: {where} floats; it must touch its {part} part along an edge")
+
+    heated = [("convection", c.regions) for c in spindle.thermal.convections]
+    heated += [("sources", s.regions) for s in spindle.thermal.sources] + [("gaps", g.regions) for g in spindle.thermal.gaps]
+    for key, used in heated:
+        for name in used:
+            if name not in names:
+                raise BadInput(f"{file}: thermal.{key}: {name!r} names no section region; allowed are {', '.join(names)}")
+
+
+def check_bearings(file: Path, spindle: Spindle) -> None:
+    for b in spindle.bearings:
+        where = f"{file}: bearings.{b.name}"
+        for key, name in (("inner_ring", b.inner_ring), ("outer_ring", b.outer_ring)):
+            if name not in {g.name for g in spindle.regions}:
+                raise BadInput(f"{where}.{key} = {name!r}: names no section region")
+            ring = spindle.region(name)
+            if not ring.z[0] <= b.z <= ring.z[1]:
+                raise BadInput(f"{where}.z_mm = {b.z * 1e3:g}: outside its ring {name!r}, which spans z_mm = {_mm(ring.z)}")
+        for key, name in (("ball_material", b.ball_material), ("ring_material", b.ring_material)):
+            if name not in spindle.materials:
+                raise BadInput(f"{where}: {key} = {name!r}: allowed are {', '.join(spindle.materials)}")
+        inner, outer = spindle.region(b.inner_ring), spindle.region(b.outer_ring)
+        if inner.part == outer.part:
+            raise BadInput(f"{where}: both rings are on the {inner.part} part; one ring must turn")
+        if (outer.part == "rotating") != (b.turning_ring == "outer"):
+            raise BadInput(
+                f"{file}: bearing_pair.turning_ring = {b.turning_ring!r}: but {b.outer_ring!r} is on the {outer.part} part"
+                if len(spindle.sets) == 1 and spindle.sets[0].name == "pair"
+                else f"{where}.outer_ring = {b.outer_ring!r}: is on the {outer.part} part, but of its bodies {b.outer_body!r} "
+                f"{'turns' if b.turning_ring == 'outer' else 'does not turn'}"
+            )
+        if not inner.r[1] < b.pitch_diameter / 2 < outer.r[0]:
+            raise BadInput(
+                f"{where}: pitch_diameter_mm = {b.pitch_diameter * 1e3:g}: the ball centres must lie between the raceways at "
+                f"r_mm = {inner.r[1] * 1e3:g} and {outer.r[0] * 1e3:g}"
+            )
+        gap = outer.r[0] - inner.r[1] - b.ball_diameter
+        if not -0.02 * b.ball_diameter < gap < 0.05 * b.ball_diameter:
+            raise BadInput(
+                f"{where}: the raceways leave {(gap + b.ball_diameter) * 1e3:g} mm for balls of ball_diameter_mm = "
+                f"{b.ball_diameter * 1e3:g}; allowed is -2 % to +5 % of the ball in play"
+            )
+        if b.clearance is None:
+            continue
+        low, high = b.clearance
+        implied = implied_clearance(spindle, b)
+        if not low - 1e-9 <= implied <= high + 1e-9:
+            raise BadInput(
+                f"{where}: contact_angle_deg = {np.degrees(b.contact_angle):g} under {b.preload:g} N means a diametral "
+                f"clearance of {implied * 1e3:.4f} mm, which contradicts diametral_clearance_mm = [{low * 1e3:g}, {high * 1e3:g}]"
+            )
+
+
+def check_raceways(file: Path, spindle: Spindle) -> None:
+    """Raceways of bearings that share a region as a ring lie apart on it."""
+    for a, b in combinations(spindle.bearings, 2):
+        for ring in {a.inner_ring, a.outer_ring} & {b.inner_ring, b.outer_ring}:
+            lower, upper = sorted((spindle.raceway(ring, a), spindle.raceway(ring, b)))
+            if lower[1] > upper[0]:
+                raise BadInput(
+                    f"{file}: bearings.{b.name}.raceway_width_mm: the raceways of {a.name!r} and {b.name!r} on {ring!r}, z_mm = {_mm(lower)} "
+                    f"and {_mm(upper)}, overlap; allowed are widths that leave them apart"
+                )
+
+
+def implied_clearance(spindle: Spindle, b: Bearing) -> float:
+    """Diametral clearance (m) that makes the free contact angle close to `b.contact_angle` under the preload.
+
+    The radial distance of the groove curvature centres is the same free and loaded: A cos(free) = (A + deformation) cos(loaded),
+    and the clearance is 2 A (1 - cos(free)) (Harris 1991, Eq. 2.9).
+    """
+    force = b.preload / (b.balls * np.sin(b.contact_angle))
+    loaded = b.unloaded_distance + (force / constant(spindle, b)) ** (2 / 3)
+    return float(2 * (b.unloaded_distance - loaded * np.cos(b.contact_angle)))
+
+
+def constant(spindle: Spindle, b: Bearing) -> float:
+    """Hertz constant (N/m^1.5) of both contacts in series at the reference temperature."""
+    return in_series(*contact_constants(spindle, b, reference_motion(spindle.reference_temperature), b.contact_angle))
+
+
+# ---------------------------------------------------------------- structure
+
+
+def check_structure(file: Path, spindle: Spindle) -> None:
+    structure = spindle.structure
+    names = [b.name for b in structure.bodies]
+    mountings = [(f"structure.{key}", name) for key, name in (("inner_body", structure.inner_body), ("outer_body", structure.outer_body)) if name]
+    shafts = [s.name for s in structure.shafts]
+    for key, name in mountings:
+        if name not in (*names, *shafts):
+            raise BadInput(f"{file}: {key} = {name!r}: allowed are {', '.join((*_plain(spindle), *shafts))}")
+    for body in structure.bodies:
+        if len(set(names)) < len(names) or body.name == "ground":
+            raise BadInput(f"{file}: structure.bodies: the name {body.name!r} is taken; body names must differ, and 'ground' is the world")
+        for name in body.regions:
+            if name not in {g.name for g in spindle.regions}:
+                raise BadInput(f"{file}: structure.bodies.{body.name}.regions: {name!r} names no section region")
+    if not structure.bodies:
+        raise BadInput(f"{file}: structure.bodies: there is neither a body nor a shaft; a spindle has at least one")
+    _check_mountings(file, spindle)
+    for joint in structure.joints:
+        if joint.material and joint.material not in spindle.materials:
+            allowed = ", ".join(spindle.materials)
+            raise BadInput(f"{file}: structure.joints.{joint.name}.material = {joint.material!r}: allowed are {allowed}")
+        for name in joint.bodies:
+            if name not in (*names, "ground"):
+                raise BadInput(
+                    f"{file}: structure.joints.{joint.name}.between: {name!r} is no body; allowed are ground, {', '.join((*_plain(spindle), *shafts))}"
+                )
+    nodes = [p.node for p in spindle.points]
+    for point in spindle.points:
+        if nodes.count(point.node) > 1:
+            raise BadInput(f"{file}: measuring.points: node = {point.node} stands twice; nodes must differ")
+        if point.body not in names:
+            raise BadInput(f"{file}: measuring.points.{point.node}.body = {point.body!r}: allowed are {', '.join((*_plain(spindle), *shafts))}")
+    for node in spindle.hammer.hammer_nodes:
+        if node not in nodes:
+            raise BadInput(f"{file}: hammer_test.hammer_nodes: {node} is no measuring point; allowed are {nodes}")
+
+
+def _plain(spindle: Spindle) -> list[str]:
+    """Names of the bodies that are no nodes of a shaft."""
+    return [b.name for b in spindle.structure.bodies if spindle.structure.carrier(b.name) == b.name]
+
+
+def _check_mountings(file: Path, spindle: Spindle) -> None:
+    """Bodies that carry rings exist, and of the two of a ball row one turns against the other."""
+    structure = spindle.structure
+    names = {b.name for b in structure.bodies}
+    allowed = ", ".join(("ground", *_plain(spindle), *(s.name for s in structure.shafts)))
+    for b in spindle.all_bearings:
+        for key, name in (("inner_body", b.inner_body), ("outer_body", b.outer_body)):
+            if name != "ground" and name not in names:
+                raise BadInput(f"{file}: bearings.{b.name}.{key} = {name!r}: allowed are {allowed}")
+        if b.inner_body == b.outer_body:
+            raise BadInput(f"{file}: bearings.{b.name}: both rings are on {b.inner_body!r}; a bearing lies between two bodies")
+    turning = {b.name for b in structure.bodies if b.turns}
+    if spindle.sets and spindle.sets[0].name == "pair":  # as the one pair of a scene says it
+        first = spindle.bearings[0]
+        wanted = first.outer_body if first.turning_ring == "outer" else first.inner_body
+        if not {b.name for b in structure.bodies if structure.carrier(b.name) == structure.carrier(wanted)} == turning:
+            raise BadInput(f"{file}: structure.bodies: exactly the body {wanted!r} that carries the turning rings must have turns = true")
+    for b in spindle.bearings:
+        inner, outer = ring_speeds(spindle, b, 1.0)
+        if inner == outer:
+            raise BadInput(
+                f"{file}: bearings.{b.name}: its rings, on {b.inner_body!r} and {b.outer_body!r}, turn alike; one of the two must have turns = true"
+            )

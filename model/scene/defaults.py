@@ -1,0 +1,92 @@
+"""What a scene file leaves to the program: the assumed values, told in its provenance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from thermospindle.model import machine as m
+from thermospindle.model.scene.bearings import BearingPair, BearingSet
+from thermospindle.model.scene.fields import Table
+from thermospindle.model.scene.shafts import COARSE, ShaftForm
+from thermospindle.model.scene.thermal import MOVED_AIR, STILL_AIR, Thermal
+
+GENTLE = 100_000.0
+"""mm rpm, speed times pitch diameter, at which a spindle runs where its scene names no speed: a fifth of what grease allows."""
+WARMER = 40.0  # K above the reference temperature up to which it is meant to run, where its scene does not say
+
+
+class Told(Protocol):
+    """What of a `form.Scene` may be missing in its file."""
+
+    @property
+    def hammer_test(self) -> Table: ...
+
+    @property
+    def tolerances(self) -> Table: ...
+
+    @property
+    def thermal(self) -> Thermal: ...
+
+    @property
+    def nominal_speed_rpm(self) -> float | None: ...
+
+    @property
+    def temperature_range_C(self) -> tuple[float, float] | None: ...
+
+    @property
+    def bearing_pair(self) -> BearingPair | None: ...
+
+    @property
+    def sets(self) -> dict[str, BearingSet]: ...
+
+    @property
+    def ball_inertia(self) -> float | None: ...
+
+    @property
+    def shafts(self) -> list[ShaftForm]: ...
+
+    def speed_rpm(self) -> float: ...
+
+
+def assumed(scene: Told, told: Mapping[str, m.Provenance]) -> dict[str, m.Provenance]:
+    """Provenance of what the file leaves to the program, by key."""
+    found: dict[str, m.Provenance] = {}
+    for table in ("hammer_test", "tolerances"):
+        form = (scene.hammer_test if table == "hammer_test" else scene.tolerances)
+        for key, value in form.model_dump(exclude={"origin", "source", "origins"}).items():
+            if key not in form.model_fields_set:
+                chosen = value is None or value == []
+                said = "chosen by the program" if chosen else f"{value}"
+                found[f"{table}.{key}"] = m.Provenance("assumed", f"assumed default: {said}")
+    if not scene.thermal.convection:
+        found["thermal.convection"] = m.Provenance(
+            "assumed", f"assumed default: {STILL_AIR:g} W/m2 K on standing regions, {MOVED_AIR:g} on turning ones"
+        )
+    if "friction" not in scene.thermal.model_fields_set:
+        found["thermal.friction"] = m.Provenance("assumed", "assumed default: a light grease, f0 = 2, 26 mm2/s at 40 C")
+    if scene.nominal_speed_rpm is None:
+        said = f"assumed default: {scene.speed_rpm():g} rpm, a speed parameter of {GENTLE:g} mm rpm"
+        found["nominal_speed_rpm"] = m.Provenance("assumed", said)
+    if scene.temperature_range_C is None:
+        found["temperature_range_C"] = m.Provenance(
+            "assumed", f"assumed default: from the reference temperature to {WARMER:g} K above it"
+        )
+    pair = scene.bearing_pair
+    if pair is not None and pair.preload_kind == "spring" and pair.arrangement != "tandem":
+        if pair.sprung_bearing is None:
+            found["bearing_pair.sprung_bearing"] = m.Provenance(
+                "assumed", "assumed default: the upper bearing; the lower locates the shaft and takes axial loads"
+            )
+        if pair.preload_rate_N_per_m is None:
+            found["bearing_pair.preload_rate_N_per_m"] = m.Provenance(
+                "assumed", "assumed default: constant spring force as the ring slides, and a ring that friction holds in vibration"
+            )
+    if pair is None and scene.sets and scene.ball_inertia is None:
+        found["ball_inertia"] = m.Provenance("assumed", "assumed default: 1, balls with their centrifugal force and gyroscopic moment")
+    for shaft in scene.shafts:
+        if shaft.longest_element_mm is None:
+            found[f"shafts.{shaft.name}.longest_element_mm"] = m.Provenance(
+                "assumed", f"assumed default: {COARSE:g} of its length, and nodes where bearings, joints and points are"
+            )
+    return {key: value for key, value in found.items() if key not in told}

@@ -1,0 +1,120 @@
+"""The form of a scene file: flexible shafts, as the diameters and lengths of a drawing from one end to the other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import accumulate, pairwise
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field, Strict, model_validator
+
+from thermospindle.model.scene.fields import Name, NotNegative, Place, Positive, Share, Table
+from thermospindle.model.shaft import THEORIES, Segment, Shaft, mesh
+from thermospindle.model.units import MM
+
+
+def _piece(numbers: tuple[float, ...]) -> tuple[float, ...]:
+    if len(numbers) not in (2, 3):
+        raise ValueError("a piece is [diameter, length] or [diameter at its start, at its end, length] in mm")
+    if not 1e-3 <= numbers[-1] <= 1e4:
+        raise ValueError(f"a piece is 0.001 to 10000 mm long, not {numbers[-1]:g}")
+    return numbers
+
+
+Piece = Annotated[tuple[NotNegative, ...], Strict(False), AfterValidator(_piece)]
+"""[diameter, length], or [diameter at its start, diameter at its end, length] of a cone, in mm."""
+
+COARSE = 0.05
+"""Longest element over the shaft's length where nobody says: twenty over a shaft, and the nodes that bearings and points need."""
+
+
+class ShaftForm(Table):
+    name: Name
+    material: str
+    start_z_mm: Place = 0.0
+    outer_mm: Annotated[list[Piece], Field(min_length=1, max_length=300)]
+    bore_mm: Annotated[list[Piece], Field(max_length=300)] = Field(default_factory=list)
+    mass_outer_mm: Annotated[list[Piece], Field(max_length=300)] = Field(default_factory=list)
+    turns: bool = False
+    speed_ratio: Annotated[float, Field(ge=-100, le=100)] = 1.0
+    beam: Literal["timoshenko", "rayleigh", "euler-bernoulli"] = "timoshenko"
+    longest_element_mm: Positive | None = None
+    damping_ratio: Share
+    role: Literal["shaft", "housing"] | None = None
+
+    @model_validator(mode="after")
+    def _drawn_whole(self) -> ShaftForm:
+        length = sum(p[-1] for p in self.outer_mm)
+        for key in ("bore_mm", "mass_outer_mm"):
+            pieces = getattr(self, key)
+            own = sum(p[-1] for p in pieces)
+            if pieces and abs(own - length) > 1e-6 * length:
+                raise ValueError(f"{key} is {own:g} mm long and outer_mm {length:g} mm; both must tell the whole shaft, with diameter 0 where there is no bore")
+        for key in ("outer_mm", "mass_outer_mm"):
+            for piece in getattr(self, key):
+                if min(piece[:-1]) <= 0:
+                    raise ValueError(f"{key}: a diameter must be greater than 0, not {min(piece[:-1]):g}")
+        for segment in self._segments():
+            for k in (0, 1):
+                if min(segment.outer[k], segment.mass_outer[k]) <= segment.bore[k]:
+                    raise ValueError(
+                        f"bore_mm: at z_mm = {segment.z[k] / MM:g} the bore of {2 * segment.bore[k] / MM:g} mm leaves nothing of a diameter of "
+                        f"{2 * min(segment.outer[k], segment.mass_outer[k]) / MM:g} mm"
+                    )
+        if self.turns and self.speed_ratio == 0.0:
+            raise ValueError("speed_ratio = 0 does not turn; without turns = true the shaft stands")
+        return self
+
+    def _segments(self) -> tuple[Segment, ...]:
+        """The pieces of all three lists, cut where any of them changes."""
+        lists = {"outer": self.outer_mm, "bore": self.bore_mm or [(0.0, sum(p[-1] for p in self.outer_mm))]}
+        lists["mass_outer"] = self.mass_outer_mm or self.outer_mm
+        spans = {key: _spans(pieces) for key, pieces in lists.items()}
+        cuts = sorted({round(z, 9) for pieces in spans.values() for a, b, _, _ in pieces for z in (a, b)})
+        found = []
+        for low, high in pairwise(cuts):
+            if high - low < 1e-6:
+                continue
+            at = {key: _at(pieces, low, high) for key, pieces in spans.items()}
+            z = (self.start_z_mm + low) * MM, (self.start_z_mm + high) * MM
+            found.append(Segment(z, at["outer"], at["bore"], at["mass_outer"], self.material))
+        return tuple(found)
+
+    def ends(self) -> tuple[float, float]:
+        """Heights (m) of its ends."""
+        return self.start_z_mm * MM, (self.start_z_mm + sum(p[-1] for p in self.outer_mm)) * MM
+
+    def shaft(self, heights: Sequence[float]) -> Shaft:
+        """The shaft, with nodes at all of `heights` (m) that lie on it."""
+        segments, (low, high) = self._segments(), self.ends()
+        longest = COARSE * (high - low) if self.longest_element_mm is None else self.longest_element_mm * MM
+        shear, rotary = THEORIES[self.beam]
+        return Shaft(
+            name=self.name,
+            segments=segments,
+            nodes=mesh(segments, heights, longest),
+            turns=self.turns,
+            speed_ratio=self.speed_ratio,
+            damping_ratio=self.damping_ratio,
+            role=self.role or "",
+            shear=shear,
+            rotary=rotary,
+        )
+
+
+def _spans(pieces: Sequence[Sequence[float]]) -> list[tuple[float, float, float, float]]:
+    """Start, end (mm from the shaft's start) and radii (m) at both of every piece."""
+    ends = list(accumulate(p[-1] for p in pieces))
+    return [(end - p[-1], end, p[0] * MM / 2, p[-2] * MM / 2) for p, end in zip(pieces, ends, strict=True)]
+
+
+def _at(pieces: Sequence[tuple[float, float, float, float]], low: float, high: float) -> tuple[float, float]:
+    """Radii (m) at two places within one piece."""
+    middle = (low + high) / 2
+    a, b, first, last = next((p for p in pieces if p[0] <= middle <= p[1]), pieces[-1])
+    return first + (last - first) * (low - a) / (b - a), first + (last - first) * (high - a) / (b - a)
+
+
+def resolved_body(shafts: Mapping[str, Shaft], name: str, z: float) -> str:
+    """The body that a scene means by a name at a height (m): the shaft's node there, or the body itself."""
+    return shafts[name].node_at(z) if name in shafts else name
