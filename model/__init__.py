@@ -9,7 +9,7 @@ tolerance      the toleranced build parameters of a spindle
 imperfections  unbalance, waviness, ball sizes, cage unbalance
 drawn          plausible imperfections from a seed
 scene/         `spindle.toml`: its form, reading and checking
-bearing/       contact, ball, row, pair; stiffness over temperature and speed; bearing frequencies
+bearing/       contact, ball, row, sets; stiffness over temperature and speed; bearing frequencies
 rotor/         the section's masses, the rotor-base chain, modes and FRFs, and the same as a MuJoCo model
 sense          limits of sense of conditions and states: they warn
 cells          names and numbers as cells of a CSV file
@@ -18,6 +18,7 @@ errors         what goes wrong in one sentence
 whole          files and folders that are written whole or not at all
 types          array types
 parallel       one function over many items, on all cores
+shaft          flexible shafts as they are drawn, and the nodes a beam model gives them
 =============  ====================================================================================================
 
 Axes: z is the spindle axis, up; r is radial; the tilts are right-handed rotations about x and y.

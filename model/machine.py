@@ -370,6 +370,12 @@ class Spindle:
         return min(turning, key=lambda b: abs(b.z - centre))
 
     @property
+    def standing(self) -> Body:
+        """The body that holds the first bearing's ring that does not turn."""
+        first = self.bearings[0]
+        return self.structure.body(first.inner_body if first.turning_ring == "outer" else first.outer_body)
+
+    @property
     def turning_mass(self) -> float:
         """Mass (kg) of all that turns."""
         return sum(b.mass for b in self.structure.bodies if b.turns)

@@ -23,6 +23,7 @@ from typing import Any, NoReturn
 
 from thermospindle.model.errors import BadInput, NoEquilibrium, NotConverged, OutsideRange, Unanswered, instead
 from thermospindle.model.rotor.elements import ELEMENTS
+from thermospindle.model.shaft import THEORIES
 from thermospindle.report.folder import COMMAND
 
 HOTTEST, FASTEST = 1e4, 1e8  # C and rpm, up to which numbers are computed with; what no bearing bears only warns
@@ -213,6 +214,9 @@ def _parser() -> tuple[_Parser, dict[str, argparse.ArgumentParser]]:
     def element(added: argparse.ArgumentParser) -> None:
         added.add_argument("--element", choices=ELEMENTS, help="bearing element of the time simulation")
 
+    def beam(added: argparse.ArgumentParser) -> None:
+        added.add_argument("--beam", choices=tuple(THEORIES), help="theory of the flexible shafts (the scene's by default)")
+
     def hammer(added: argparse.ArgumentParser) -> None:
         speed(added)
         element(added)
@@ -236,6 +240,15 @@ def _parser() -> tuple[_Parser, dict[str, argparse.ArgumentParser]]:
     one(modes)
     speed(modes)
     modes.add_argument("--highest", type=_number, metavar="HZ", help="upper end (the scene's band by default)")
+    beam(modes)
+    static = verb("static", ("states", "static"), "stiffness, bearing reactions and shares of the compliance for a unit force at every point")
+    one(static)
+    speed(static)
+    beam(static)
+    static.add_argument(
+        "--bearings", choices=("rated", "computed"),
+        help="as their catalogue rates them, to rigid ground (by default where all are rated), or as computed, in their housing",
+    )  # fmt: skip
     impact = verb("impact", ("chain", "impact"), "a virtual impact-hammer test in MuJoCo's time domain, and the modes it shows")
     one(impact)
     hammer(impact)

@@ -6,10 +6,11 @@ heavy_ball       one ball with inertia between its two races: where its centre s
                  outer ring
 hertz            Hertz point contact with exact elliptic integrals
 kinematics       how fast cage and balls turn, and at which frequencies a running spindle is excited
-pair             the two ball rows against each other: axial equilibrium of the hub at a temperature, and the bearing
+pair             the ball rows of all sets against each other: axial equilibrium at a temperature, and the bearing
                  states that follow
 springs          balls as springs between points of two bodies: what a ball-by-ball bearing element is made of
 stiffness_table  the stiffness table: bearing properties over temperature and speed, as a CSV with units in its header
                  and its provenance above
+catalogue        spindle bearings as their catalogues print them: preload, unloading force and rigidity of a pair
 ===============  =======================================================================================================
 """

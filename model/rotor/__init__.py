@@ -7,5 +7,7 @@ look      what a spindle looks like: cut-away bodies of its section, and the vis
 mjcf      the rotor-base chain as a MuJoCo model
 modes     modes and exact FRFs of a linearised spindle
 section   the axisymmetric section: which region owns which rectangle, and the mass and inertia that follow
+beam      beam elements of flexible shafts: nodes that are bodies, joined by elements that are joints
+static    static answers: stiffness at points, bearing reactions, and which part gives how much
 ========  ==============================================================================================================
 """

@@ -12,9 +12,10 @@ Analysis*, 1968, 5.6). Static answers are exact on any mesh, steps and tapers in
 
 The mass of an element goes to its nodes by its linear shape functions, each share with its centre of mass moved inward by the first
 moment (l / 2) integral(rho A x (1 - x) dz), x from 0 to 1: for a uniform element half of m, moved by l / 6. This is the Euler-Maclaurin
-correction of the trapezoidal rule: w^2 is integrated to fourth order also at free ends, where a plain lump is of second. Inside a uniform
-beam the corrections of neighbours cancel, and bending frequencies of k l = c are right to c^4 / 1440, the size of the consistent mass's error with
-the other sign. Rotary inertia rho I (polar 2 rho I) is shared alike; none is added for the length of a lump.
+correction of the trapezoidal rule, without which a free end is of second order only: what is left there is the lump's own inertia about its
+node, m l^3 / 72 of it, of third. Inside a uniform beam the corrections of neighbours cancel, and bending frequencies of k l = c are right to
+c^4 / 1440, the size of the consistent mass's error with the other sign. Measured: the third bending frequency of a free shaft of 20 elements is
+0.09 % low, of 40 elements 0.011 % (`tests/model/test_beam.py`). Rotary inertia rho I (polar 2 rho I) is shared alike; none is added for the length of a lump.
 """
 
 from __future__ import annotations

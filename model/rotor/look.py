@@ -164,7 +164,8 @@ def region_bodies(spindle: Spindle) -> dict[str, str]:
     }:
         hosts |= found
     turning = spindle.turning.name
-    still = next((b.name for b in structure.bodies if not b.turns), turning)
+    still = next((name for b in spindle.bearings for name in (b.inner_body, b.outer_body) if name != "ground" and not structure.body(name).turns), "")
+    still = still or next((b.name for b in structure.bodies if not b.turns), turning)
     return {g.name: hosts.get(g.name, turning if g.part == "rotating" else still) for g in spindle.regions}
 
 

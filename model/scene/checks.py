@@ -149,7 +149,7 @@ def check_structure(file: Path, spindle: Spindle) -> None:
     mountings = [(f"structure.{key}", name) for key, name in (("inner_body", structure.inner_body), ("outer_body", structure.outer_body)) if name]
     shafts = [s.name for s in structure.shafts]
     for key, name in mountings:
-        if name not in (*names, *shafts):
+        if name not in (*names, *shafts, "ground"):
             raise BadInput(f"{file}: {key} = {name!r}: allowed are {', '.join((*_plain(spindle), *shafts))}")
     for body in structure.bodies:
         if len(set(names)) < len(names) or body.name == "ground":

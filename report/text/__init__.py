@@ -14,5 +14,6 @@ runout            what `spindle runout` says and writes: the JSON object, the te
 runout_compare    measured runout beside the scene's, as JSON and in terminal tables
 runout_diagnosis  the diagnosis of runout as JSON with the keys of `diagnosis.verdict`, and in the terminal
 warmup            what `spindle warmup` says: JSON, terminal table, CSV, figures, and a section of the report
+static            the answers of `static` in words and numbers
 ================  ======================================================================================================
 """

@@ -1,8 +1,9 @@
-"""The verbs `table` and `modes`: states of equilibrium, without a test in time."""
+"""The verbs `table`, `modes` and `static`: states of equilibrium, without a test in time."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +12,14 @@ from thermospindle.model import sense
 from thermospindle.model.bearing.stiffness_table import StiffnessTable, write_table
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.rotor import static as statics
+from thermospindle.model.rotor.beam import with_theory
+from thermospindle.model.shaft import THEORIES
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 from thermospindle.report.text import run as text
-from thermospindle.report.verbs.answer import Answer, answered, temperature_or_reference, temperatures_or_range, with_effects
+from thermospindle.report.text.static import show_static, static_json
+from thermospindle.report.verbs.answer import Answer, answered, temperature_or_reference, temperatures_or_range, with_effects, write_json
 from thermospindle.sim.operating import operating_point, stiffness_table
 
 
@@ -67,6 +72,7 @@ def modes(
     temperature: float | None = None,
     speed_rpm: float = 0.0,
     highest: float | None = None,
+    beam: str | None = None,
     effect_files: Sequence[Path] = (),
     out: Path | None = None,
 ) -> Answer:
@@ -74,7 +80,7 @@ def modes(
     asked = dict(locals())
     if highest is not None and highest <= 0:
         raise BadInput(f"--highest {highest:g}: must be positive")
-    spindle, _ = with_effects(scene, effect_files)
+    spindle = _with_beam(with_effects(scene, effect_files)[0], beam)
     point = operating_point(spindle, Condition(temperature_or_reference(temperature, spindle), speed_rpm * RPM))
     values = text.modes_json(point, spindle.hammer.band[1] if highest is None else highest)
     doubts = sense.of_conditions(spindle, [point.condition]) + sense.of_states(spindle, [point.state.bearings])
@@ -86,3 +92,52 @@ def modes(
         lambda folder, _: text.write_modes(point, folder),
         doubts,
     )
+
+
+RATED, COMPUTED = "rated", "computed"
+BEARINGS = (RATED, COMPUTED)
+
+
+def static(
+    scene: Path,
+    temperature: float | None = None,
+    speed_rpm: float = 0.0,
+    beam: str | None = None,
+    bearings: str | None = None,
+    effect_files: Sequence[Path] = (),
+    out: Path | None = None,
+) -> Answer:
+    """Stiffness, bearing reactions and shares of the compliance for a unit force at every measuring point.
+
+    `bearings` rated: springs of the stiffness that the scene's bearings are rated at, to rigid ground, the default where all have one;
+    computed: what the program computes, in the spindle's own housing.
+    """
+    asked = dict(locals())
+    spindle = _with_beam(with_effects(scene, effect_files)[0], beam)
+    if bearings == RATED and not statics.rated(spindle):
+        without = [b.name for b in spindle.bearings if b.rated_stiffness is None]
+        raise BadInput(f"{spindle.file}: bearings.{without[0] if without else ''}: has no rated_radial_stiffness_N_per_um, which --bearings rated asks for")
+    chosen = bearings or (RATED if statics.rated(spindle) else COMPUTED)
+    point = operating_point(spindle, Condition(temperature_or_reference(temperature, spindle), speed_rpm * RPM))
+    chain = statics.rated_chain(spindle, point.chain) if chosen == RATED else point.chain
+    answers = [statics.static(spindle, chain, p) for p in spindle.points]
+    values = static_json(answers, chosen, _beam_of(spindle))
+    doubts = sense.of_conditions(spindle, [point.condition]) + sense.of_states(spindle, [point.state.bearings])
+    return answered(values, lambda console: show_static(console, values), out, {"verb": "static"} | asked, write_json("static.json"), doubts)
+
+
+def _with_beam(spindle: Spindle, beam: str | None) -> Spindle:
+    """The spindle with its flexible shafts by another beam theory; `BadInput` where it has none."""
+    if beam is None:
+        return spindle
+    if not spindle.structure.shafts:
+        raise BadInput(f"{spindle.file}: shafts: there are none, so --beam {beam} has nothing to act on")
+    shear, rotary = THEORIES[beam]
+    structure = with_theory(spindle.structure, spindle.materials, spindle.reference_temperature, shear, rotary)
+    return replace(spindle, structure=structure)
+
+
+def _beam_of(spindle: Spindle) -> str:
+    """The beam theory of the shafts, in one word."""
+    own = {(s.shear, s.rotary) for s in spindle.structure.shafts}
+    return next((name for name, shares in THEORIES.items() if own == {shares}), "none" if not own else "of its own")

@@ -51,11 +51,23 @@ def mass_ratio(spindle: Spindle) -> float:
     return spindle.turning_mass / REFERENCE_HUB
 
 
+ROWS, SECTION, TURNING, SHAFT = "ball row", "section", "turning body", "flexible shaft"
+PARTS: Mapping[str, Callable[[Spindle], bool]] = {
+    ROWS: lambda spindle: bool(spindle.bearings),
+    SECTION: lambda spindle: bool(spindle.regions),
+    TURNING: lambda spindle: any(b.turns for b in spindle.structure.bodies),
+    SHAFT: lambda spindle: bool(spindle.structure.shafts),
+}
+"""What an effect may need of a spindle, as a message names it."""
+
+
 def fitted_to(effect: Effect, spindle: Spindle) -> Effect:
     """The effect with its parameters as plausible for a spindle: sizes in its scale, to two digits, and a choice for each of its bearings.
 
     Limits only widen. On the reference spindle it is the effect itself, and so is one that has been fitted already.
     """
+    if refusal(effect, spindle) is not None:
+        return effect
     factors = effect.sized(spindle) if effect.sized else {}
     rows = tuple(_fitted(p, factors.get(p.name, 1.0), len(spindle.bearings)) for p in effect.parameters)
     return effect if rows == effect.parameters else replace(effect, parameters=rows, sized=None)
@@ -78,6 +90,9 @@ def _fitted(p: Parameter, factor: float, bearings: int) -> Parameter:
 
 def refusal(effect: Effect, spindle: Spindle) -> str | None:
     """Why an effect is not to be added to a spindle, or looked for in its tests; None where it may."""
+    for part in effect.acts_on:
+        if not PARTS[part](spindle):
+            return f"nothing to act on here: the scene has no {part}"
     if effect.idle and (why := effect.idle(spindle)):
         return f"nothing to act on here: {why}"
     if effect.outside and (why := effect.outside(spindle)):
@@ -143,7 +158,8 @@ class Effect:
     `imperfections(spindle, condition, values, imperfections)` what excites the running spindle;
     `measurement(spindle, condition, values, chain, measurement)` the measuring chain.
 
-    `idle(spindle)` says why the effect has nothing to act on in a spindle, `outside(spindle)` why that spindle is outside its validity; None
+    `acts_on` names the parts of a spindle (`PARTS`) without any of which the effect has nothing to act on; `idle(spindle)` says why it
+    has nothing to act on in a spindle that has them, `outside(spindle)` why that spindle is outside its validity; None
     where neither is so (`refusal` asks both). `sized(spindle)` gives what is plausible for a machine of that size: factors by parameter
     name, of typical size, prior and limits, for sizes that are written for the reference spindle.
     """
@@ -162,6 +178,7 @@ class Effect:
     chain: Callable[[Spindle, Condition, Values, RotorBase], RotorBase] | None = None
     imperfections: Callable[[Spindle, Condition, Values, Imperfections], Imperfections] | None = None
     measurement: Callable[[Spindle, Condition, Values, RotorBase, Measurement], Measurement] | None = None
+    acts_on: tuple[str, ...] = ()  # of PARTS, what a spindle must have for it
     idle: Question | None = None
     outside: Question | None = None
     sized: Sizes | None = None

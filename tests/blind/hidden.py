@@ -17,7 +17,7 @@ import numpy as np
 from thermospindle.model.bearing.pair import BearingState
 from thermospindle.model.machine import Body, RingMotion, Spindle
 from thermospindle.model.rotor.chain import Element, RotorBase
-from thermospindle.model.tolerance import with_preload
+from thermospindle.model.tolerance import scaled_preload
 from thermospindle.model.types import Array
 
 Place = tuple[float, float]
@@ -150,11 +150,11 @@ def mechanisms(spindle: Spindle, usable: Sequence[str]) -> tuple[Mechanism, ...]
 
 
 def _of_rings(spindle: Spindle) -> list[Mechanism]:
-    turning, standing = ("outer", "inner") if spindle.pair.turning_ring == "outer" else ("inner", "outer")
+    turning, standing = ("outer", "inner") if spindle.bearings[0].turning_ring == "outer" else ("inner", "outer")
     first = spindle.bearings[0].name
     found = [
         Mechanism("preload falls", "%", 1.0, 40.0, ("preload_loss",), "preload",
-                  {"spindle": lambda s, a, _: with_preload(s, s.pair.preload * max(1 + a / 100, 0.02))}, sign=-1),
+                  {"spindle": lambda s, a, _: scaled_preload(s, max(1 + a / 100, 0.02))}, sign=-1),
         Mechanism("turning part warmer", "K", 0.3, 8.0, ("thermal_gradient", "soak_lag"), "rings", {"temperatures": _warmer(turning)}),
         Mechanism("standing part warmer", "K", 0.3, 8.0, ("thermal_gradient", "soak_lag"), "rings", {"temperatures": _warmer(standing)}),
         Mechanism("outer rings grow", "um", 0.02, 0.8, ("clearance_opening", "ring_growth", "loose_inserts", "expansion_mismatch"),
@@ -165,7 +165,7 @@ def _of_rings(spindle: Spindle) -> list[Mechanism]:
         Mechanism("inner grooves grow", "1e-6", 20.0, 600.0, ("expansion_mismatch", "clearance_opening"), "rings",
                   {"motions": _moved(None, "inner_strain")}),
     ]  # fmt: skip
-    if spindle.pair.spring is None:
+    if spindle.sets[0].spring is None:
         found.append(Mechanism("rings move along the axis", "um", 0.02, 0.8, ("preload_loss", "expansion_mismatch"), "preload",
                                {"motions": _moved((first,), "outer_z")}))  # fmt: skip
     return found

@@ -155,7 +155,7 @@ def row_of(chain: RotorBase, body: str, position: Sequence[float], direction: Se
 
 def balanced(spindle: Spindle, condition: Condition, motions: Mapping[str, RingMotion], constant_kept: bool) -> PairState:
     """Axial equilibrium of two rows fixed in their seats, or of one behind a spring whose force is the preload wherever it slides."""
-    pair, rows = spindle.pair, {}
+    pair, rows = spindle.sets[0], {}
     for b in spindle.bearings:
         row = row_at(spindle, b, b.sense, motions[b.name], condition.speed)
         if constant_kept:
@@ -164,18 +164,18 @@ def balanced(spindle: Spindle, condition: Condition, motions: Mapping[str, RingM
         rows[b.name] = row
     spring = pair.spring
     if spring is None:
-        external = sum(b.sense for b in spindle.bearings) * pair.preload + pair.axial_bias
+        external = sum(b.sense * b.preload for b in spindle.bearings) + spindle.axial_load
         hub = moved(list(rows.values()), external)
         slid = hub
     elif spring.rate is None:
-        push = spindle.bearing(spring.ring_of).sense * pair.preload
-        slid = moved([rows[spring.ring_of]], push)
-        hub = moved([row for name, row in rows.items() if name != spring.ring_of], pair.axial_bias - push)
+        push = spindle.bearing(spring.rings_of[0]).sense * pair.preload
+        slid = moved([rows[spring.rings_of[0]]], push)
+        hub = moved([row for name, row in rows.items() if name not in spring.rings_of], spindle.axial_load - push)
     else:
         raise NotImplementedError("a preload spring with a rate")
     found = []
     for b in spindle.bearings:
-        movement = slid if spring is not None and spring.ring_of == b.name else hub
+        movement = slid if spring is not None and b.name in spring.rings_of else hub
         loaded = replace(rows[b.name], axial=rows[b.name].axial + movement)
         found.append(replace(bearing_state(spindle, b, loaded), movement=movement))
     return PairState(condition, tuple(found), hub, contact_status(tuple(found)))

@@ -90,7 +90,7 @@ def test_build_tolerances_are_in_the_numbers_of_the_scene(spindle, add, tmp_path
         expected = parameter.apply(expected, TOLERANCES.get(parameter.name, 0.0))
     assert built.structure == expected.structure
     assert built.bearings == expected.bearings
-    assert built.pair.preload == pytest.approx(16.0 * 0.97)
+    assert built.sets[0].preload == pytest.approx(16.0 * 0.97)
     mounts = [s.structure.joints[0].stiffness[2] for s in (built, spindle)]
     assert mounts[0] == pytest.approx(1.012 * mounts[1], rel=1e-12)
     assert built.build.deviations == TOLERANCES
@@ -129,7 +129,7 @@ def test_a_second_diagnosis_adds_to_the_first(add, tmp_path):
     add("two", "soak_lag", of=tmp_path / "one", found=second | {"scene_hash": content_hash(load(tmp_path / "one"))})
     built = load(tmp_path / "two")
     assert built.build.deviations == pytest.approx(TOLERANCES | {"preload": 0.97 * 1.02 - 1, "hub mass": 0.001})
-    assert built.pair.preload == pytest.approx(16.0 * 0.97 * 1.02)
+    assert built.sets[0].preload == pytest.approx(16.0 * 0.97 * 1.02)
     assert [a.effect for a in built.effects] == ["preload_loss", "added_disk", "soak_lag"]
     assert (tmp_path / "two" / "spindle.toml").read_text().count("[build]") == 1
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import DATA, SCENE
+from tests.mounting import told_preload
 from thermospindle.diagnosis.compare.compare import compare
 from thermospindle.diagnosis.data.observe import DAMPING_FLOOR, FREQUENCY_FLOOR, observe
 from thermospindle.diagnosis.prediction.modes import Predicted, predict
@@ -132,7 +133,7 @@ def test_points_of_the_campaign(spindle, nodes):
 
 def test_a_changed_scene_pulls(spindle, clean, itself):
     """5 % of preload moves the bearing modes, whose stiffness goes with its cube root, by some 0.8 %, and the base's by little."""
-    lower = replace(spindle, pair=replace(spindle.pair, preload=0.95 * spindle.pair.preload))
+    lower = told_preload(spindle, 0.95 * spindle.sets[0].preload)
     found = compare(lower, *clean)
     assert found.rms_residual > 10 * itself.rms_residual  # the error of the temperature explains part of it
     errors = {m.number: 100 * m.error / m.measured for m in found.tests[0].modes}

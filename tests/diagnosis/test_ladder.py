@@ -74,7 +74,7 @@ def test_outer_race_moved_outward_at_fixed_axial_position(spindle, outward_um, p
     state = solve(spindle, Condition(20.0), {"lower": still, "upper": replace(still, outer_r=1e-6 * outward_um)})
     held = RADIAL_EXPANSION.pair(spindle, Condition(20.0), {"share": 1.0}, state)
     assert held.bearing("upper").preload == pytest.approx(preload, rel=2e-3, abs=5e-3)  # printed to 0.01 N
-    assert held.bearing("lower").preload == pytest.approx(spindle.pair.preload, rel=1e-9)
+    assert held.bearing("lower").preload == pytest.approx(spindle.sets[0].preload, rel=1e-9)
     assert state.bearing("upper").preload == pytest.approx(state.bearing("lower").preload, rel=1e-9)
     assert state.bearing("upper").preload > 1.02 * preload
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.mounting import turning_inside
 from thermospindle.model.bearing.kinematics import (
     Kinematics,
     ball_line,
@@ -12,9 +13,9 @@ from thermospindle.model.bearing.kinematics import (
     kinematics,
     lines,
     race_line,
-    ring_speeds,
     row_kinematics,
 )
+from thermospindle.model.bearing.pair import ring_speeds
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
 
@@ -52,9 +53,9 @@ def test_balls_roll_without_slip(cold, inner, outer):
 
 
 def test_ring_that_turns(spindle):
-    assert ring_speeds(spindle, Condition(20.0, 100.0)) == (0.0, 100.0)
-    other = replace(spindle, pair=replace(spindle.pair, turning_ring="inner"))
-    assert ring_speeds(other, Condition(20.0, 100.0)) == (100.0, 0.0)
+    assert ring_speeds(spindle, spindle.bearings[0], 100.0) == (0.0, 100.0)
+    other = turning_inside(spindle)
+    assert ring_speeds(other, other.bearings[0], 100.0) == (100.0, 0.0)
 
 
 def test_a_hotter_bearing_has_a_slower_cage(spindle, running, hot):

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.mounting import sprung
 from thermospindle.model.bearing.ball_row import respond
 from thermospindle.model.bearing.pair import reference_motion, solve
-from thermospindle.model.machine import SENSE, Condition, Law, PreloadSpring, RingMotion
-from thermospindle.model.tolerance import with_preload
+from thermospindle.model.machine import SENSE, Condition, Law, RingMotion
+from thermospindle.model.tolerance import scaled_preload
 
 
 def motions(spindle, **moves):
@@ -18,11 +19,8 @@ def motions(spindle, **moves):
 
 def arranged(spindle, arrangement):
     bearings = tuple(replace(b, sense=s) for b, s in zip(spindle.bearings, SENSE[arrangement], strict=True))
-    return replace(spindle, bearings=bearings)
-
-
-def sprung(spindle, ring_of="upper", **spring):
-    return replace(spindle, pair=replace(spindle.pair, spring=PreloadSpring(ring_of, **spring)))
+    share = 2 if arrangement == "tandem" else 1  # of a tandem pair each row has the preload, and the set both
+    return replace(spindle, bearings=bearings, sets=tuple(replace(s, preload=share * s.preload) for s in spindle.sets))
 
 
 def test_reference_state(cold):
@@ -92,7 +90,7 @@ def test_a_preload_spring_gives_way_as_its_ring_slides(spindle):
     """Force balances at the ring and at the hub; a rate from nothing to rigid goes from constant force to fixed positions."""
     moved = motions(spindle, upper={"outer_r": 0.3e-6}, lower={"outer_z": 0.2e-6})
     for bias in (0.0, 3.0):
-        base = replace(spindle, pair=replace(spindle.pair, axial_bias=bias))
+        base = replace(spindle, axial_load=bias)
         soft, fixed = solve(sprung(base), Condition(20.0), moved), solve(base, Condition(20.0), moved)
         for rate, expected in ((1.0, soft), (1e13, fixed)):
             state = solve(sprung(base, rate=rate), Condition(20.0), moved)
@@ -107,7 +105,7 @@ def test_a_preload_spring_gives_way_as_its_ring_slides(spindle):
 
 @pytest.mark.parametrize("ring_of", ["lower", "upper"])
 def test_the_locating_bearing_takes_the_axial_load(spindle, ring_of):
-    spring = sprung(replace(spindle, pair=replace(spindle.pair, axial_bias=2.0)), ring_of)
+    spring = sprung(replace(spindle, axial_load=2.0), ring_of)
     load = {b.name: b.preload for b in solve(spring, Condition(20.0), motions(spindle)).bearings}
     assert load[ring_of] == pytest.approx(16.0, rel=1e-9)
     assert load["lower" if ring_of == "upper" else "upper"] == pytest.approx(14.0 if ring_of == "upper" else 18.0, rel=1e-9)
@@ -169,7 +167,7 @@ def test_the_state_holds_the_row_at_its_loaded_position(spindle, arrangement):
 
 def test_the_preload_can_be_mounted_otherwise(spindle):
     """Another preload keeps the radial distance of the groove centres; the angle rises with the load."""
-    more = with_preload(spindle, 20.0)
+    more = scaled_preload(spindle, 20.0 / 16.0)
     state = solve(more, Condition(20.0), motions(spindle))
     row, old = state.bearings[0].row, solve(spindle, Condition(20.0), motions(spindle)).bearings[0].row
     assert state.bearings[0].preload == pytest.approx(20.0, rel=1e-9)
@@ -188,7 +186,7 @@ def test_soft_hot_steel_softens_the_contact(spindle):
 
 def test_ball_inertia_at_speed(spindle):
     """Balls with inertia press the outer race by their centrifugal force: closed form of the cage, at most percents here."""
-    heavy = replace(spindle, pair=replace(spindle.pair, ball_inertia=1.0))
+    heavy = replace(spindle, ball_inertia=1.0)
     speed = 20000 * np.pi / 30
     state = solve(heavy, Condition(20.0, speed), motions(spindle))
     light = solve(spindle, Condition(20.0, speed), motions(spindle))

@@ -6,8 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from tests.mounting import sprung
 from thermospindle.model.bearing.pair import reference_motion, solve
-from thermospindle.model.machine import Body, Condition, PreloadSpring
+from thermospindle.model.machine import Body, Condition
 from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.chain import Element, RotorBase, matrices, rotor_base
 from thermospindle.model.rotor.elements import ELEMENTS
@@ -178,7 +179,7 @@ def test_a_ball_cannot_push(spindle, cold):
 
 
 def behind_a_spring(spindle, rate, mass=0.0):
-    return replace(spindle, pair=replace(spindle.pair, spring=PreloadSpring("upper", rate, mass)))
+    return sprung(spindle, "upper", rate, mass)
 
 
 def axial_stiffness(chain):

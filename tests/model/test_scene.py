@@ -11,7 +11,8 @@ import pytest
 from thermospindle.model.errors import BadInput, OutsideRange
 from thermospindle.model.machine import Law
 from thermospindle.model.rotor.section import cells, mass_properties
-from thermospindle.model.scene.reading import build, content_hash, implied_clearance, load
+from thermospindle.model.scene.checks import implied_clearance
+from thermospindle.model.scene.reading import build, content_hash, load
 from thermospindle.model.span import inside, temperature_range
 
 FILE = Path(__file__).parents[2] / "scenes" / "hdd_2003" / "spindle.toml"
@@ -237,18 +238,19 @@ def test_the_sense_of_every_bearing_follows_the_arrangement(raw):
     for arrangement, senses in (("back-to-back", [-1, 1]), ("face-to-face", [1, -1]), ("tandem", [1, 1])):
         raw["bearing_pair"].update(arrangement=arrangement, preload_kind="spring" if arrangement == "tandem" else "rigid")
         assert [b.sense for b in build(copy.deepcopy(raw), FILE).bearings] == senses
-        assert build(copy.deepcopy(raw), FILE).tandem is (arrangement == "tandem")
+        built = build(copy.deepcopy(raw), FILE)
+        assert built.one_way(built.sets[0]) is (arrangement == "tandem")
 
 
 def test_a_spring_without_a_rate_says_what_is_assumed(raw):
     raw["bearing_pair"]["preload_kind"] = "spring"
     assumed = build(copy.deepcopy(raw), FILE)
-    assert assumed.pair.spring.ring_of == "upper"
+    assert assumed.sets[0].spring.rings_of == ("upper",)
     assert "friction holds" in assumed.provenance["bearing_pair.preload_rate_N_per_m"].source
     assert "locates" in assumed.provenance["bearing_pair.sprung_bearing"].source
     raw["bearing_pair"].update(sprung_bearing="lower", preload_rate_N_per_m=2e5, sprung_ring_mass_g=0.4)
-    spring = build(raw, FILE).pair.spring
-    assert (spring.ring_of, spring.rate, spring.mass) == ("lower", 2e5, 0.4e-3)
+    spring = build(raw, FILE).sets[0].spring
+    assert (spring.rings_of, spring.rate, spring.mass) == (("lower",), 2e5, 0.4e-3)
 
 
 def test_where_a_spindle_can_be_computed(spindle):

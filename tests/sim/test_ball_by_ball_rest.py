@@ -31,4 +31,4 @@ def test_a_magnet_pulls_with_its_dead_load(spindle):
     loads = {model.actuator(i).name: model.actuator_biasprm[i, 0] for i in range(model.nu) if "dead load" in model.actuator(i).name}
     assert set(loads) == {"dead load shaft.z", "dead load hub.z"}
     assert loads["dead load hub.z"] == pytest.approx(-loads["dead load shaft.z"])
-    assert abs(loads["dead load hub.z"]) == pytest.approx(abs(point.spindle.pair.axial_bias), rel=1e-9)
+    assert abs(loads["dead load hub.z"]) == pytest.approx(abs(point.spindle.axial_load), rel=1e-9)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from thermospindle.model.machine import Condition, Spindle
-from thermospindle.sim.effects.effect import Effect, Parameter, Values
+from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values
 
 
 def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
@@ -38,4 +38,5 @@ EFFECT = Effect(
     resembles=("ring_growth", "thermal_gradient", "lubricant_film"),
     valid="rolling without gross slip under outer-race control; loaded balls",
     spindle=spindle,
+    acts_on=(ROWS,),
 )

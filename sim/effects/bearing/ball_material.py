@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from thermospindle.model.machine import Condition, Law, Material, Spindle
-from thermospindle.sim.effects.effect import Effect, Parameter, Values
+from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values
 from thermospindle.sim.effects.temperature.loose_inserts import blend
 
 CERAMIC = Material(
@@ -80,4 +80,5 @@ EFFECT = Effect(
     resembles=("expansion_mismatch", "clearance_opening", "preload_loss"),
     valid="mounted to the drawing's preload and loaded contact angle; shares between 0 and 1 only bridge the two materials",
     spindle=spindle,
+    acts_on=(ROWS,),
 )

@@ -10,7 +10,7 @@ import numpy as np
 from thermospindle.model.bearing.ball_row import respond
 from thermospindle.model.bearing.pair import BearingState, PairState, contact_status, reference_deformation
 from thermospindle.model.machine import Condition, Spindle
-from thermospindle.sim.effects.effect import Effect, Parameter, Values, direction_parameter
+from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values, direction_parameter
 
 
 def pair(spindle: Spindle, condition: Condition, values: Values, state: PairState) -> PairState:
@@ -100,4 +100,5 @@ EFFECT = Effect(
     ),
     pair=pair,
     sized=sized,
+    acts_on=(ROWS,),
 )

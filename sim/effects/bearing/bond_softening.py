@@ -10,7 +10,7 @@ import numpy as np
 from thermospindle.model.bearing.pair import PairState
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array
-from thermospindle.sim.effects.effect import Effect, Parameter, Values
+from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values
 
 HELD = np.array([1.0, 1.0, 1.0, 0.0, 0.0])
 """Motions in which the bond gives, in the order of MOVES: the ring's length in its seat keeps it from tilting."""
@@ -125,4 +125,5 @@ EFFECT = Effect(
     ),
     pair=pair,
     sized=sized,
+    acts_on=(ROWS,),
 )

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from thermospindle.model.bearing.pair import reference_deformation
 from thermospindle.model.machine import Condition, RingMotion, Spindle
-from thermospindle.sim.effects.effect import Effect, Parameter, Values
+from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values
 
 RISE = 40.0
 """Temperature rise (K) at which `opening` is told."""
@@ -61,4 +61,5 @@ EFFECT = Effect(
     valid="both bearings alike; fixed-position preload (a spring would take the opening up)",
     motions=motions,
     sized=sized,
+    acts_on=(ROWS,),
 )

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from thermospindle.model.bearing.pair import solve
 from thermospindle.model.machine import BearingSet, Condition, PreloadSpring, RingMotion, Spindle
-from thermospindle.sim.effects.effect import Effect, Parameter, Values
+from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values
 
 
 def motions(spindle: Spindle, condition: Condition, values: Values, by_bearing: dict[str, RingMotion]) -> dict[str, RingMotion]:
@@ -69,4 +69,5 @@ EFFECT = Effect(
     ),
     motions=motions,
     idle=idle,
+    acts_on=(ROWS,),
 )

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from thermospindle.model.bearing.pair import PairState
 from thermospindle.model.machine import Condition, Spindle
-from thermospindle.sim.effects.effect import Effect, Parameter, Values
+from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values
 
 
 def pair(spindle: Spindle, condition: Condition, values: Values, state: PairState) -> PairState:
@@ -42,4 +42,5 @@ EFFECT = Effect(
     resembles=("bond_softening",),
     valid="within the viscosity table; at chamber temperature, so without the bearings' own heat",
     pair=pair,
+    acts_on=(ROWS,),
 )

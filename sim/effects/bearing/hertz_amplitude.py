@@ -17,7 +17,7 @@ import numpy as np
 
 from thermospindle.model.bearing.pair import BearingState, PairState, reference_deformation
 from thermospindle.model.machine import Bearing, Condition, Spindle
-from thermospindle.sim.effects.effect import Effect, Parameter, Values, scale_parameter
+from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values, scale_parameter
 
 COEFFICIENT = 1 / 32
 """Of a^2 in the small-amplitude law."""
@@ -100,4 +100,5 @@ EFFECT = Effect(
         "beyond which balls lift off and modes are no longer well separated lines"
     ),
     pair=pair,
+    acts_on=(ROWS,),
 )

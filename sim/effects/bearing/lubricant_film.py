@@ -9,7 +9,7 @@ import numpy as np
 from thermospindle.model.bearing.hertz import race_contact
 from thermospindle.model.bearing.pair import PairState
 from thermospindle.model.machine import Bearing, Condition, RingMotion, Spindle
-from thermospindle.sim.effects.effect import Effect, Parameter, Values, scale_parameter
+from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values, scale_parameter
 
 LOAD_POWER = 0.067  # h ~ W^-0.067 (Hamrock & Dowson 1977)
 PRESSURE_VISCOSITY = 22e-9  # 1/Pa, mineral oils 18 to 26 per GPa (Hamrock & Dowson, *Ball Bearing Lubrication*, 1981)
@@ -137,4 +137,5 @@ EFFECT = Effect(
     ),
     motions=motions,
     pair=pair,
+    acts_on=(ROWS,),
 )

@@ -9,7 +9,7 @@ import numpy as np
 
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import Element, RotorBase
-from thermospindle.sim.effects.effect import Effect, Parameter, Values, mass_ratio
+from thermospindle.sim.effects.effect import TURNING, Effect, Parameter, Values, mass_ratio
 from thermospindle.sim.effects.roles import body
 
 
@@ -134,4 +134,5 @@ EFFECT = Effect(
     spindle=spindle,
     chain=chain,
     sized=sized,
+    acts_on=(TURNING,),
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.tolerance import scaled_preload
-from thermospindle.sim.effects.effect import Effect, Parameter, Values
+from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values
 
 RISE = 40.0
 """Temperature rise (K) at which `loss` is told."""
@@ -55,4 +55,5 @@ EFFECT = Effect(
     resembles=("clearance_opening", "expansion_mismatch", "bond_softening", "hertz_amplitude"),
     valid="reversible relaxation, the same in every test of a campaign; at the drawing's ring positions, before thermal expansion",
     spindle=spindle,
+    acts_on=(ROWS,),
 )

@@ -16,7 +16,7 @@ import numpy as np
 
 from thermospindle.model.machine import Bearing, Condition, Material, Region, RingMotion, Spindle
 from thermospindle.model.rotor.section import cells
-from thermospindle.sim.effects.effect import Effect, Values, scale_parameter
+from thermospindle.sim.effects.effect import ROWS, SECTION, Effect, Values, scale_parameter
 
 
 @dataclass(frozen=True)
@@ -146,4 +146,5 @@ EFFECT = Effect(
     resembles=("ball_inertia", "thermal_gradient", "lubricant_film"),
     valid="plane stress, bonded layers, no support from or load on neighbouring heights; grooves keep their radii",
     motions=motions,
+    acts_on=(ROWS, SECTION),
 )

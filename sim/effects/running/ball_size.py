@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from thermospindle.model.imperfections import Imperfections
 from thermospindle.model.machine import Condition, Spindle
-from thermospindle.sim.effects.effect import Effect, Parameter, Values, bearing_parameter
+from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values, bearing_parameter
 from thermospindle.sim.effects.running.race_waviness import bearing
 
 
@@ -44,4 +44,5 @@ EFFECT = Effect(
     resembles=("cage_unbalance",),
     valid="difference small beside the balls' elastic deformation; every ball loaded",
     imperfections=imperfections,
+    acts_on=(ROWS,),
 )

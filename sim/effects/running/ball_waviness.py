@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from thermospindle.model.imperfections import Imperfections, Wave
 from thermospindle.model.machine import Condition, Spindle
-from thermospindle.sim.effects.effect import Effect, Parameter, Values, bearing_parameter
+from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values, bearing_parameter
 from thermospindle.sim.effects.running.race_waviness import bearing
 
 
@@ -55,4 +55,5 @@ EFFECT = Effect(
     resembles=("race_waviness",),
     valid="the ball keeps its axis of spin; amplitude small beside its elastic deformation",
     imperfections=imperfections,
+    acts_on=(ROWS,),
 )

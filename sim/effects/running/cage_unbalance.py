@@ -9,7 +9,7 @@ from math import radians
 
 from thermospindle.model.imperfections import Imperfections
 from thermospindle.model.machine import Condition, Spindle
-from thermospindle.sim.effects.effect import Effect, Parameter, Values, bearing_parameter, phase_parameter
+from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values, bearing_parameter, phase_parameter
 from thermospindle.sim.effects.running.race_waviness import bearing
 
 
@@ -51,4 +51,5 @@ EFFECT = Effect(
     valid="a cage that keeps its place against the balls and is guided by the outer ring",
     imperfections=imperfections,
     sized=sized,
+    acts_on=(ROWS,),
 )

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from thermospindle.model.imperfections import Imperfections, Wave
 from thermospindle.model.machine import Condition, Spindle
-from thermospindle.sim.effects.effect import Effect, Parameter, Values, bearing_parameter
+from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values, bearing_parameter
 
 
 def order(spindle: Spindle, values: Values) -> int:
@@ -89,4 +89,5 @@ EFFECT = Effect(
     resembles=("unbalance", "ball_waviness"),
     valid="waves shorter than the groove is wide and longer than the contact; amplitude small beside the balls' elastic deformation",
     imperfections=imperfections,
+    acts_on=(ROWS,),
 )

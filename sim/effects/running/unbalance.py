@@ -10,7 +10,7 @@ from math import radians
 from thermospindle.model.imperfections import Imperfections
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.units import RPM
-from thermospindle.sim.effects.effect import Effect, Parameter, Values, mass_ratio, phase_parameter
+from thermospindle.sim.effects.effect import TURNING, Effect, Parameter, Values, mass_ratio, phase_parameter
 
 G_MM, G_MM2 = 1e-6, 1e-9
 
@@ -74,4 +74,5 @@ EFFECT = Effect(
     valid="small eccentricity (the response is linear in it); an eccentric turning race has the same line, but hardly changes with speed",
     imperfections=imperfections,
     sized=sized,
+    acts_on=(TURNING,),
 )

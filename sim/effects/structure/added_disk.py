@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from thermospindle.model.machine import Condition, Spindle
-from thermospindle.sim.effects.effect import Effect, Parameter, Values, mass_ratio
+from thermospindle.sim.effects.effect import TURNING, Effect, Parameter, Values, mass_ratio
 from thermospindle.sim.effects.roles import with_mass
 
 
@@ -79,4 +79,5 @@ EFFECT = Effect(
     valid="rigid disk, balanced and centred on the axis",
     spindle=spindle,
     sized=sized,
+    acts_on=(TURNING,),
 )

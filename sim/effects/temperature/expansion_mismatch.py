@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from thermospindle.model.machine import Condition, Law, Material, Spindle
-from thermospindle.sim.effects.effect import Effect, Parameter, Values
+from thermospindle.sim.effects.effect import SECTION, Effect, Parameter, Values
 from thermospindle.sim.effects.roles import lacking, materials
 
 
@@ -87,4 +87,5 @@ EFFECT = Effect(
     ),
     spindle=spindle,
     idle=idle,
+    acts_on=(SECTION,),
 )

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from thermospindle.model.machine import Condition, Law, Spindle
-from thermospindle.sim.effects.effect import Effect, Parameter, Values
+from thermospindle.sim.effects.effect import SECTION, Effect, Parameter, Values
 from thermospindle.sim.effects.roles import lacking, materials
 
 
@@ -72,4 +72,5 @@ EFFECT = Effect(
     ),
     spindle=spindle,
     idle=idle,
+    acts_on=(SECTION,),
 )

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from thermospindle.model.machine import Condition, RingMotion, Spindle
-from thermospindle.sim.effects.effect import Effect, Parameter, Values
+from thermospindle.sim.effects.effect import ROWS, SECTION, Effect, Parameter, Values
 
 
 def temperatures(spindle: Spindle, condition: Condition, values: Values, by_region: dict[str, float]) -> dict[str, float]:
@@ -100,4 +100,5 @@ EFFECT = Effect(
     valid="the rotating part is isothermal (Biot number far below 1) and the stationary part has the chamber's temperature",
     temperatures=temperatures,
     motions=motions,
+    acts_on=(ROWS, SECTION),
 )

@@ -15,7 +15,7 @@ from scipy.sparse.linalg import splu
 
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array
-from thermospindle.sim.effects.effect import Effect, Parameter, Values, scale_parameter
+from thermospindle.sim.effects.effect import ROWS, SECTION, Effect, Parameter, Values, scale_parameter
 from thermospindle.thermal import conduction, friction
 from thermospindle.thermal.influence import influence, raceways
 
@@ -156,4 +156,5 @@ EFFECT = Effect(
         "no motor heat; below the temperature at which the viscosity table ends"
     ),
     temperatures=temperatures,
+    acts_on=(ROWS, SECTION),
 )

@@ -119,5 +119,5 @@ def test_heavy_balls_against_the_cage_speed(spindle, share):
 
 
 def test_ball_inertia_of_the_scene_is_kept(spindle):
-    heavy = replace(spindle, pair=replace(spindle.pair, ball_inertia=0.6))
-    assert ball_inertia.EFFECT.spindle(heavy, RUNNING, {"share": 0.5}).pair.ball_inertia == pytest.approx(0.8)
+    heavy = replace(spindle, ball_inertia=0.6)
+    assert ball_inertia.EFFECT.spindle(heavy, RUNNING, {"share": 0.5}).ball_inertia == pytest.approx(0.8)

@@ -1,11 +1,11 @@
 """Centrifugal growth against closed forms and finite elements."""
 
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
+from tests.mounting import turning_inside
 from thermospindle.model.bearing.pair import reference_motion
 from thermospindle.model.machine import Condition
 from thermospindle.sim.effects.bearing import ring_growth
@@ -65,7 +65,7 @@ def test_growth_of_the_reference_rings_against_finite_elements(spindle, bearing)
 def test_growth_reaches_the_turning_race(spindle):
     """As the square of the speed, and as large as the layers say, which the closed forms above verify."""
     nothing = {b.name: reference_motion(20.0) for b in spindle.bearings}
-    turning = replace(spindle, pair=replace(spindle.pair, turning_ring="inner"))
+    turning = turning_inside(spindle)
     for made, field, other in ((spindle, "outer_r", "inner_r"), (turning, "inner_r", "outer_r")):
         slow, fast = (ring_growth.EFFECT.motions(made, Condition(20.0, w), {"scale": 0.8}, nothing)["upper"] for w in (500.0, 1000.0))
         growth = ring_growth.unit_growth(made, next(b for b in made.bearings if b.name == "upper"))

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.conftest import SCENE
+from tests.mounting import turning_inside
 from thermospindle.diagnosis.add import new_scene
 from thermospindle.model.bearing.pair import reference_motion
 from thermospindle.model.errors import BadInput
@@ -117,8 +118,7 @@ def test_a_choice_for_every_bearing(spindle):
 @pytest.mark.parametrize("turning", ["inner", "outer"])
 def test_the_turning_rings_groove_lags(spindle, turning):
     """T_turning groove = (T_ball + T_rotating) / 2, whichever ring turns."""
-    pair = replace(spindle.pair, turning_ring=turning)
-    s = replace(spindle, pair=pair)
+    s = turning_inside(spindle) if turning == "inner" else spindle
     still = {b.name: reference_motion(50.0) for b in s.bearings}
     values = soak_lag.EFFECT.neutral() | {"hub_share": 0.25}
     moved = soak_lag.motions(s, Condition(60.0), values, still)["lower"]

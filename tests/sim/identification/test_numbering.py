@@ -10,6 +10,7 @@ import pytest
 
 from tests.conftest import SCENE
 from tests.made_campaign import other_campaign
+from tests.mounting import told_preload
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
 from thermospindle.report.page.comparison import compared
@@ -62,7 +63,7 @@ def test_modes_are_followed_over_a_long_way():
     """From 20 C to 120 C under eight times the preload, two lateral modes fall past a rocking one; one jump finds the same modes as
     small steps."""
     spindle = load(SCENE)
-    spindle = replace(spindle, pair=replace(spindle.pair, preload=125.0))
+    spindle = told_preload(spindle, 125.0)
 
     def steps(*temperatures: float) -> Run:
         return Run(spindle, tuple(Step(operating_point(spindle, Condition(t)), None, None) for t in temperatures), ())  # type: ignore[arg-type]

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.mounting import told_preload
 from thermospindle.cli import main
 from thermospindle.model.bearing.kinematics import lines, row_kinematics
 from thermospindle.model.errors import BadInput
@@ -35,7 +36,7 @@ def found(spindle):
 @pytest.fixture(scope="module")
 def light(spindle):
     """The reference under a quarter of its preload: warm, little of it is left, and its modes fall through lines that the reference's never meet."""
-    return replace(spindle, pair=replace(spindle.pair, preload=4.2))
+    return told_preload(spindle, 4.2)
 
 
 @pytest.fixture(scope="module")

@@ -59,7 +59,7 @@ RINGS = [("inner", 1.0), ("outer", -1.0)]
 def test_order_one_is_a_rigid_displacement_of_the_race(spindle, ring, sign, inertia):
     """Radial: the ring stands off by the amplitude; axial: the race is tilted by amplitude over lever. Exact, not to first order in
     load / stiffness, and with heavy balls too."""
-    heavy = replace(spindle, pair=replace(spindle.pair, ball_inertia=inertia))
+    heavy = replace(spindle, ball_inertia=inertia)
     bearing = operating_point(heavy, Condition(20.0, SPIN)).state.bearing("upper")
     kin = Kinematics(*{"inner": (SPIN, 0.0), "outer": (0.0, SPIN)}[ring], cage=0.5 * SPIN, spin=3 * SPIN, balls=10)
     across = RowImperfections(**{f"{ring}_radial": (Wave(1, 2e-8, 0.0),)})
@@ -148,7 +148,7 @@ def rotation(angle: float) -> np.ndarray:
 def test_odd_orders_of_heavy_balls_do_not_cancel(spindle):
     """With centrifugal force the two contacts differ: an odd order keeps their small difference, which linear theory leaves out."""
     balls = tuple((Wave(3, 1e-8, 0.7 * j),) for j in range(10))
-    heavy = replace(spindle, pair=replace(spindle.pair, ball_inertia=1.0))
+    heavy = replace(spindle, ball_inertia=1.0)
     assert harmonics(at(spindle, both(ball_waves=balls))).line == ()
     odd = harmonics(at(heavy, both(ball_waves=balls)))
     even = harmonics(at(heavy, both(ball_waves=tuple((replace(w[0], order=2),) for w in balls))))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.signal import hilbert
 
+from tests.mounting import turning_inside
 from thermospindle.model.drawn import drawn
 from thermospindle.model.errors import BadInput
 from thermospindle.model.imperfections import Imperfections, RowImperfections, Wave
@@ -76,8 +77,7 @@ def test_all_at_once_at_other_speeds(spindle, temperature, speed):
 
 def test_an_inner_ring_that_turns(spindle):
     """The shaft turns in standing outer rings: lines of the other kind, unbalance on the shaft, and the same agreement."""
-    bodies = tuple(replace(b, turns=b.name == "shaft") for b in spindle.structure.bodies)
-    other = replace(spindle, pair=replace(spindle.pair, turning_ring="inner"), structure=replace(spindle.structure, bodies=bodies))
+    other = turning_inside(spindle)
     own = replace(drawn(spindle, 1), unbalance=5e-9, unbalance_z=0.008, couple_unbalance=2e-11)
     point = at(other, own, 40.0)
     forces = harmonics(point)
@@ -293,6 +293,6 @@ def test_forces_of_moving_balls_are_those_of_the_row_when_they_stand(spindle):
 
 
 def test_moving_balls_refuse_what_they_cannot_do(spindle):
-    heavy = replace(spindle, pair=replace(spindle.pair, ball_inertia=1.0))
+    heavy = replace(spindle, ball_inertia=1.0)
     with pytest.raises(ValueError, match="massless balls"):
         run_moving_balls(at(heavy, Imperfections()), drawn(spindle, 1), 0.01)

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.mounting import turning_inside
 from thermospindle.cli import main
 from thermospindle.model.bearing.kinematics import Line, row_kinematics
 from thermospindle.model.drawn import drawn
@@ -424,10 +425,7 @@ def test_a_perfect_spindle_runs_true(spindle, tmp_path):
 
 def test_the_inner_ring_may_turn_instead(spindle):
     """A shaft that turns in standing outer rings: the cage goes slower than half speed, and lines move with it."""
-    shaft = replace(spindle.structure.body("shaft"), turns=True)
-    hub = replace(spindle.structure.body("hub"), turns=False)
-    bodies = tuple({"shaft": shaft, "hub": hub}.get(b.name, b) for b in spindle.structure.bodies)
-    turned = replace(spindle, structure=replace(spindle.structure, bodies=bodies), pair=replace(spindle.pair, turning_ring="inner"))
+    turned = turning_inside(spindle)
     row = RowImperfections(ball_diameter=tuple(1e-7 * np.cos(2 * np.pi * np.arange(10) / 10)))
     point = operating_point(with_imperfections(turned, Imperfections(bearings={"upper": row})), Condition(20.0, 7200 * RPM))
     [only] = runout(point, 0.25, path="linear").lines

@@ -1,0 +1,98 @@
+"""Static answers of a spindle: stiffness at its points, what its bearings carry, and which part gives how much.
+
+K u = f for a unit force at a point. By Clapeyron's theorem the compliance at the point is twice the strain energy, so that the shares of energy are
+the shares of compliance. Where the whole may move freely, as along the axis or as a shaft that nothing holds, a force that does work on that
+motion has no static answer; any other has, and the free motion stays out of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from thermospindle.model.machine import Point, Spindle
+from thermospindle.model.rotor.chain import Element, RotorBase, element_rows, matrices, point_row
+from thermospindle.model.types import Array
+
+FREE = 1e-12
+"""Of the largest eigenvalue of M^-1/2 K M^-1/2: what is below is a motion that nothing resists."""
+
+
+@dataclass(frozen=True)
+class Static:
+    """Answer to a unit force at a point, along its direction.
+
+    `stiffness` (N/m) is inf where the point cannot move and 0 where nothing holds it; `reactions` (N) are the forces of the bearings
+    on what turns, along the direction; `shares` those of the compliance by shaft, bearing and joint group, sum 1.
+    """
+
+    point: Point
+    stiffness: float
+    reactions: Mapping[str, float]
+    shares: Mapping[str, float]
+
+
+def static(spindle: Spindle, chain: RotorBase, point: Point) -> Static:
+    """Stiffness, reactions and shares at one point of a chain at its operating state."""
+    linear = matrices(chain)
+    row = point_row(chain, point)
+    moved = displacement(linear.stiffness, np.diag(linear.mass), row)
+    names = {b.name: b for b in spindle.all_bearings}
+    if moved is None:
+        return Static(point, 0.0, dict.fromkeys(names, 0.0), {})
+    reactions, energy = dict.fromkeys(names, 0.0), {}
+    turning = {b.name for b in chain.bodies if b.turns}
+    for element in chain.elements:
+        relative = element_rows(chain, element) @ moved
+        force = element.stiffness @ relative
+        key = element.name if element.name in names else element.group
+        energy[key] = energy.get(key, 0.0) + float(relative @ force)
+        if element.name in names:
+            on_turning = -1.0 if element.b in turning and element.a not in turning else 1.0
+            reactions[element.name] = on_turning * float(np.array(point.direction) @ force[:3])
+    compliance = float(row @ moved)
+    total = sum(energy.values())
+    shares = {key: value / total for key, value in energy.items()} if total > 0 else {}
+    return Static(point, 1 / compliance if compliance > 0 else np.inf, reactions, shares)
+
+
+def displacement(stiffness: Array, mass: Array, force: Array) -> Array | None:
+    """Displacement (n,) under a force (n,) at masses (n,); None where the force drives a motion that nothing resists."""
+    root = np.sqrt(mass)
+    value, vector = np.linalg.eigh(stiffness / np.outer(root, root))
+    free = vector[:, value < FREE * value[-1]] / root[:, None]
+    free = np.linalg.qr(free)[0] if free.size else free
+    if free.size and np.linalg.norm(free.T @ force) > 1e-6 * np.linalg.norm(force):
+        return None
+    held = stiffness + np.trace(stiffness) / len(stiffness) * free @ free.T
+    return np.asarray(np.linalg.solve(held, force))
+
+
+def rated(spindle: Spindle) -> bool:
+    """Whether every bearing of a spindle has a rated stiffness or is given by numbers."""
+    return bool(spindle.all_bearings) and all(b.rated_stiffness is not None for b in spindle.bearings)
+
+
+def rated_chain(spindle: Spindle, chain: RotorBase) -> RotorBase:
+    """The chain with every bearing a spring of its rated radial stiffness from what turns to rigid ground, as catalogues and design
+    calculations have it: without tilt stiffness, coupling or housing. Bearings given by numbers keep theirs, to ground."""
+    ratings = {b.name: b for b in spindle.bearings}
+    given = {b.name for b in spindle.linear_bearings}
+    turning = {b.name for b in chain.bodies if b.turns}
+    elements: list[Element] = []
+    for e in chain.elements:
+        if e.name not in ratings and e.name not in given:
+            elements.append(e)
+            continue
+        own = e.b if e.b in turning else e.a
+        stiffness = e.stiffness
+        if e.name in ratings:
+            radial = ratings[e.name].rated_stiffness or 0.0
+            stiffness = np.diag([radial, radial, e.stiffness[2, 2], 0.0, 0.0])
+        damping = e.damping * (stiffness[0, 0] / e.stiffness[0, 0] if e.stiffness[0, 0] else 1.0)
+        elements.append(replace(e, a=own, b="ground", stiffness=stiffness, damping=damping, slides=""))
+    moved = {e.slides for e in chain.elements if e.slides}
+    bodies = tuple(b for b in chain.bodies if b.name not in moved)
+    return replace(chain, bodies=bodies, elements=tuple(e for e in elements if e.b not in moved))

@@ -1,0 +1,85 @@
+"""The spindle of the machine tool MK7702 against the answers printed with it, and against a rotor code.
+
+Printed: vshabanov/spindlecad, `src/MK7702Spindle.lhs` at 530f201e (Euler-Bernoulli, radial springs to rigid ground). With shear and at speed: ROSS 3.1
+(Timoshenko, rotary inertia, gyroscopic terms, 57 nodes, same springs), run beside this project.
+"""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.conftest import ROOT
+from thermospindle.cli import main
+from thermospindle.model.machine import Condition
+from thermospindle.model.rotor.beam import with_theory
+from thermospindle.model.rotor.chain import matrices, motion_rows
+from thermospindle.model.rotor.static import rated_chain
+from thermospindle.model.scene.reading import load
+from thermospindle.model.units import RPM
+from thermospindle.sim.operating import operating_point
+
+SCENE = ROOT / "scenes" / "mk7702"
+
+
+@pytest.fixture(scope="module")
+def mk7702():
+    return load(SCENE)
+
+
+def asked(capsys, *words: str) -> dict:
+    assert main([*words, "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_static_answers_are_the_printed_ones(capsys):
+    nose = asked(capsys, "static", str(SCENE), "--beam", "euler-bernoulli")["points"]["nose"]
+    assert nose["direction"] == "+X"
+    assert nose["stiffness_N_per_m"] == pytest.approx(260.9192641748797e6, rel=1e-8)
+    assert list(nose["reactions_N"]) == ["front1", "front2", "front3", "rear1"]
+    assert list(nose["reactions_N"].values()) == pytest.approx([-0.517, -0.441, -0.340, 0.298], abs=5e-4)
+    assert sum(nose["reactions_N"].values()) == pytest.approx(-1.0, rel=1e-9)
+    shares = nose["compliance_shares"]
+    assert [shares[k] for k in ("spindle", "front1", "front2", "front3", "rear1")] == pytest.approx(
+        [0.3236, 0.3087, 0.2240, 0.1330, 0.0107], abs=6e-5
+    )
+
+
+def test_the_nose_with_shear(capsys):
+    assert asked(capsys, "static", str(SCENE))["points"]["nose"]["stiffness_N_per_m"] == pytest.approx(235.60e6, abs=5e3)
+
+
+@pytest.mark.parametrize(("console", "printed"), [(0.1, 105.32109), (0.2, 53.548479), (0.3, 31.875272), (0.4, 21.013870)])
+def test_a_rigid_console_in_front(mk7702, console, printed):
+    """A force at its tip. In the source it acts at the nose and its moment 1 mm behind, and the tip follows the tilt of the nose."""
+    k = matrices(rated_chain(mk7702, bent_only(mk7702))).stiffness
+    nose = motion_rows(bent_only(mk7702), "spindle 0", (0.0, 0.0, 0.0))
+    force, moment = nose[0], -nose[4]  # a force at z = -console tilts about -y
+    by_force, by_moment = np.linalg.solve(k, np.array([force, moment]).T).T
+    first = 1e-3 / (210e9 * np.pi / 64 * (0.106**4 - 0.081**4))  # bending of the first millimetre, which the moment does not reach
+    tip = force @ by_force + console * (moment @ by_force + force @ by_moment - 0.5e-3 * first) + console**2 * (moment @ by_moment - first)
+    assert 1e-6 / tip == pytest.approx(printed, rel=2e-7)
+
+
+def bent_only(spindle):
+    """The chain at the reference with Euler-Bernoulli beams."""
+    structure = with_theory(spindle.structure, spindle.materials, 20.0, 0.0, 0.0)
+    return operating_point(replace(spindle, structure=structure), Condition(20.0)).chain
+
+
+ROSS = {  # rpm: Hz, lateral in both planes
+    0: [706.83, 706.83, 1058.64, 1058.64, 1558.53, 1558.53, 3101.92, 3101.92],
+    12000: [700.29, 713.39, 1049.77, 1066.96, 1539.70, 1577.71],
+}
+
+
+@pytest.mark.parametrize("rpm", ROSS)
+def test_lateral_modes_are_those_of_a_rotor_code(mk7702, rpm):
+    undamped = replace(
+        mk7702,
+        linear_bearings=tuple(replace(b, damping_ratio=0.0) for b in mk7702.linear_bearings),
+        structure=replace(mk7702.structure, joints=tuple(replace(j, damping_ratio=0.0) for j in mk7702.structure.joints)),
+    )
+    found = [m.frequency for m in operating_point(undamped, Condition(20.0, rpm * RPM)).modes if m.kind != "axial"]
+    assert found[: len(ROSS[rpm])] == pytest.approx(ROSS[rpm], rel=1e-3)
