@@ -97,7 +97,7 @@ def scatter(spindle: Spindle, point: OperatingPoint, probes: Sequence[Point]) ->
 
 def units(spindle: Spindle) -> dict[str, Imperfections]:
     """Imperfections in which every source has the amplitude 1."""
-    body = next(b for b in spindle.structure.bodies if b.turns)
+    body = spindle.turning
     first, second = {}, {}
     for b in spindle.bearings:
         orders = [1, *(k * b.balls + by for k in range(1, MULTIPLE + 1) for by in (-1, 0, 1))]
@@ -143,8 +143,8 @@ def _likely(spindle: Spindle, made: Imperfections, source: SourceKey) -> float:
     (bearing, cause, order, _, _), which = source
     scene = spindle.imperfections
     if cause == "unbalance":
-        body = next(b for b in spindle.structure.bodies if b.turns)
-        static = 0.5 * body.mass * GRADE.balance / spindle.nominal_speed
+        body = spindle.turning
+        static = 0.5 * spindle.turning_mass * GRADE.balance / spindle.nominal_speed
         span = max(b.z for b in spindle.bearings) - min(b.z for b in spindle.bearings)
         sizes = [scene.unbalance or static, made.unbalance]
         if which == SECOND:

@@ -42,7 +42,8 @@ def static(spindle: Spindle, chain: RotorBase, point: Point) -> Static:
     names = {b.name: b for b in spindle.all_bearings}
     if moved is None:
         return Static(point, 0.0, dict.fromkeys(names, 0.0), {})
-    reactions, energy = dict.fromkeys(names, 0.0), {}
+    reactions = dict.fromkeys(names, 0.0)
+    energy: dict[str, float] = {}
     turning = {b.name for b in chain.bodies if b.turns}
     for element in chain.elements:
         relative = element_rows(chain, element) @ moved

@@ -119,12 +119,18 @@ class Scene(Table):
         rows = {n: b for n, b in self.bearings.items() if b.row is not None}
         return dict(sorted(rows.items(), key=lambda item: item[1].z_mm))
 
+    def _heights_on(self, shaft: str) -> list[float]:
+        """Heights (m) of all that sits on a shaft: bearings, joints, measuring points."""
+        default = self.structure.inner_body, self.structure.outer_body
+        found = [b.z_mm for b in self.bearings.values() if shaft in (b.inner_body or default[0], b.outer_body or default[1])]
+        found += [j.z_mm for j in self.structure.joints if shaft in j.between]
+        found += [p.position_mm[2] for p in self.measuring.points if p.body == shaft]
+        return [MM * z for z in found]
+
     def spindle(self, name: str, file: Path, provenance: dict[str, m.Provenance]) -> m.Spindle:
         """The spindle in SI units; its shafts have their nodes, which `reading.build` makes bodies of."""
         rows, reference = self.rows(), self.reference_temperature_C
-        heights = [b.z_mm * MM for b in self.bearings.values()] + [j.z_mm * MM for j in self.structure.joints]
-        heights += [p.position_mm[2] * MM for p in self.measuring.points]
-        shafts = {s.name: s.shaft(heights) for s in self.shafts}
+        shafts = {s.name: s.shaft(self._heights_on(s.name)) for s in self.shafts}
         turning = {b.name for b in self.structure.bodies if b.turns} | {s.name for s in self.shafts if s.turns}
         pair = self.bearing_pair
         sets = tuple(s.set(n) for n, s in self.sets.items()) if pair is None else (pair.set(list(rows)),)

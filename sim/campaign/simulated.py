@@ -20,7 +20,7 @@ from thermospindle.sim.campaign.campaign import Campaign, Test
 from thermospindle.sim.campaign.runout_record import RunoutRecord
 from thermospindle.sim.operating import OperatingPoint, operating_point
 from thermospindle.sim.running.run import run_spindle
-from thermospindle.sim.running.runout import BELOW_TOP, hub_probes, linear, sampling_rate
+from thermospindle.sim.running.runout import hub_probes, linear, sampling_rate, second_plane
 
 NOISE = 1e-9  # m rms in the band of the record: a capacitive probe
 SECONDS = 0.6
@@ -67,10 +67,7 @@ def hub_points(spindle: Spindle) -> tuple[Point, ...]:
     One plane alone cannot tell the bearings from each other (ISO 230-7:2015 measures a spindle's error motions, tilt among them, with five sensors).
     """
     top = hub_probes(spindle)
-    body = spindle.structure.body(top[0].body)
-    low = min((spindle.region(name) for name in body.regions), key=lambda g: (g.z[0], -g.r[1]))
-    radius, height = low.r[1], low.z[0] + BELOW_TOP * (low.z[1] - low.z[0])
-    below = [replace(top[0], name="low x", position=(radius, 0.0, height)), replace(top[1], name="low y", position=(0.0, radius, height))]
+    below = second_plane(spindle)
     first = max((p.node for p in spindle.points), default=0) + 1
     return tuple(Point(first + i, p.name.replace(" ", "_"), p.body, p.position, p.direction) for i, p in enumerate([*top, *below]))
 

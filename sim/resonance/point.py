@@ -93,7 +93,7 @@ def unit_imperfections(spindle: Spindle, multiples: int) -> Imperfections:
         balls = (waves(range(2, 2 * multiples + 1, 2)), *[()] * (b.balls - 1))
         sizes = (UNIT_WAVE, *[0.0] * (b.balls - 1))
         rows[b.name] = RowImperfections(radial, waves(axial), radial, waves(axial), sizes, balls, UNIT_UNBALANCE)
-    body = next(b for b in spindle.structure.bodies if b.turns)
+    body = spindle.turning
     return Imperfections(unbalance=UNIT_UNBALANCE, unbalance_z=body.z, bearings=rows)
 
 

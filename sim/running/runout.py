@@ -22,6 +22,7 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.imperfections import Imperfections
 from thermospindle.model.machine import Point, Spindle
 from thermospindle.model.rotor.chain import RotorBase, motion_rows
+from thermospindle.model.shaft import Shaft
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.operating import OperatingPoint
 from thermospindle.sim.running.excitation import Harmonics, harmonics, response
@@ -119,16 +120,48 @@ class Runout:
 
 def hub_probes(spindle: Spindle) -> tuple[Probe, Probe, Probe]:
     """Across the axis along x and y, at the side of the turning body's highest region a tenth of its height below the top, and along the
-    axis, at the centre of its top face."""
-    body = next((b for b in spindle.structure.bodies if b.turns), None)
-    if body is None or not body.regions:
-        raise BadInput(f"{spindle.file or spindle.name}: structure.bodies: runout needs a turning body made of section regions, to look at")
-    top = max((spindle.region(name) for name in body.regions), key=lambda g: (g.z[1], g.r[1]))
-    radius, height = top.r[1], top.z[1] - BELOW_TOP * (top.z[1] - top.z[0])
+    axis, at the centre of its top face. Of a flexible shaft that turns at its first measuring point across the axis, or else its lower end."""
+    shaft = next((s for s in spindle.structure.shafts if s.turns), None)
+    if shaft is not None:
+        body, radius, height = _on_shaft(spindle, shaft)
+        end = height
+    else:
+        turning = next((b for b in spindle.structure.bodies if b.turns), None)
+        if turning is None or not turning.regions:
+            raise BadInput(
+                f"{spindle.file or spindle.name}: structure.bodies: runout needs a turning body made of section regions, or a turning shaft, to look at"
+            )
+        top = max((spindle.region(name) for name in turning.regions), key=lambda g: (g.z[1], g.r[1]))
+        body, radius, height, end = turning.name, top.r[1], top.z[1] - BELOW_TOP * (top.z[1] - top.z[0]), top.z[1]
     return (
-        Probe(X, body.name, (radius, 0.0, height), (1.0, 0.0, 0.0)),
-        Probe(Y, body.name, (0.0, radius, height), (0.0, 1.0, 0.0)),
-        Probe(AXIAL, body.name, (0.0, 0.0, top.z[1]), (0.0, 0.0, 1.0)),
+        Probe(X, body, (radius, 0.0, height), (1.0, 0.0, 0.0)),
+        Probe(Y, body, (0.0, radius, height), (0.0, 1.0, 0.0)),
+        Probe(AXIAL, body, (0.0, 0.0, end), (0.0, 0.0, 1.0)),
+    )
+
+
+def _on_shaft(spindle: Spindle, shaft: Shaft, lowest: bool = True) -> tuple[str, float, float]:
+    """Body, radius (m) and height (m) at which a probe looks at a shaft: its first measuring point across the axis, or the end farthest from it."""
+    across = [p for p in spindle.points if p.body in shaft.bodies and abs(p.direction[2]) < 0.5]
+    first = across[0].position[2] if across else shaft.nodes[0]
+    height = first if lowest else max((shaft.nodes[0], shaft.nodes[-1]), key=lambda z: abs(z - first))
+    segment = next((g for g in shaft.segments if g.z[0] <= height <= g.z[1]), shaft.segments[-1])
+    return shaft.node_at(height), segment.outer[0], height
+
+
+def second_plane(spindle: Spindle) -> tuple[Probe, Probe]:
+    """Two more probes across the axis, at the other end of what turns."""
+    x, y, _ = hub_probes(spindle)
+    shaft = next((s for s in spindle.structure.shafts if s.turns), None)
+    if shaft is not None:
+        body, radius, height = _on_shaft(spindle, shaft, lowest=False)
+    else:
+        own = spindle.structure.body(x.body)
+        low = min((spindle.region(name) for name in own.regions), key=lambda g: (g.z[0], -g.r[1]))
+        body, radius, height = x.body, low.r[1], low.z[0] + BELOW_TOP * (low.z[1] - low.z[0])
+    return (
+        replace(x, name="low x", body=body, position=(radius, 0.0, height)),
+        replace(y, name="low y", body=body, position=(0.0, radius, height)),
     )
 
 
