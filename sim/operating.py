@@ -17,7 +17,7 @@ from thermospindle.model.bearing.stiffness_table import StiffnessTable, tabulate
 from thermospindle.model.imperfections import Imperfections
 from thermospindle.model.machine import Condition, RingMotion, Spindle
 from thermospindle.model.rotor import mjcf
-from thermospindle.model.rotor.chain import Matrices, RotorBase, rotor_base
+from thermospindle.model.rotor.chain import Matrices, RotorBase, matrices, rotor_base
 from thermospindle.model.rotor.modes import Mode, frf, modes, point_rows
 from thermospindle.model.scene.reading import content_hash
 from thermospindle.model.types import Array, ComplexArray
@@ -77,8 +77,8 @@ class OperatingPoint:
 
     @cached_property
     def linear(self) -> Matrices:
-        """M, C + G, K by central differences of the MuJoCo model."""
-        return mjcf.linearise(self.model)
+        """M, C + G, K assembled of the chain, which the MuJoCo model linearises to (`mjcf.linearise`; a rule of every effect)."""
+        return matrices(self.chain)
 
     @cached_property
     def modes(self) -> list[Mode]:

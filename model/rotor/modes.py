@@ -7,14 +7,16 @@ Sources: Genta, *Dynamics of Rotating Systems* (2005), ch. 5; Ewins, *Modal Test
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 from thermospindle.model.machine import MOVES, Spindle
 from thermospindle.model.rotor.chain import Matrices, RotorBase, element_rows, matrices, motion_rows, point_row
-from thermospindle.model.types import Array, ComplexArray
+from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.model.units import HERTZ
 
 FREE = 5e-8
@@ -50,8 +52,44 @@ class Poles:
     left: ComplexArray
 
 
+LARGE = 40
+"""Degrees of freedom from which a chain is taken apart into what moves by itself: the planes of a flexible shaft at rest, its axis always."""
+
+
 def poles(linear: Matrices) -> Poles:
     """Poles and vectors of M q'' + C q' + K q = f."""
+    n = len(linear.mass)
+    if n > LARGE:
+        pattern = sum(_coupled(matrix) for matrix in (linear.mass, linear.damping, linear.stiffness))
+        count, label = connected_components(csr_array(pattern), directed=False)
+        if count > 1:
+            return _together(linear, [np.flatnonzero(label == k) for k in range(count)])
+    return _poles(linear)
+
+
+def _coupled(matrix: Array) -> Array:
+    """1 where an entry of a matrix is more than rounding beside its diagonal, else 0."""
+    size = np.sqrt(np.abs(np.diag(matrix)))
+    return np.asarray(np.abs(matrix) > 1e-12 * np.outer(size, size), float)
+
+
+def _together(linear: Matrices, blocks: Sequence[Integers]) -> Poles:
+    """The poles of blocks of degrees of freedom that nothing couples."""
+    n = len(linear.mass)
+    value, right, left = np.zeros(2 * n, complex), np.zeros((n, 2 * n), complex), np.zeros((2 * n, n), complex)
+    at = 0
+    for own in blocks:
+        grid = np.ix_(own, own)
+        part = _poles(Matrices(linear.mass[grid], linear.damping[grid], linear.stiffness[grid], tuple(linear.dofs[i] for i in own)))
+        columns = np.arange(at, at + 2 * len(own))
+        value[columns] = part.value
+        right[np.ix_(own, columns)] = part.right
+        left[np.ix_(columns, own)] = part.left
+        at += 2 * len(own)
+    return Poles(value, right, left)
+
+
+def _poles(linear: Matrices) -> Poles:
     n = len(linear.mass)
     inverse = np.linalg.inv(linear.mass)
     state = np.zeros((2 * n, 2 * n))

@@ -12,7 +12,7 @@ from thermospindle.model.bearing.kinematics import Line
 from thermospindle.model.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import matrices
-from thermospindle.model.rotor.modes import Mode, poles
+from thermospindle.model.rotor.modes import Mode, Poles, poles
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.operating import OperatingPoint
 from thermospindle.sim.running.excitation import Harmonics, harmonics, response
@@ -51,9 +51,14 @@ class Exact:
     def probes(self) -> Array:
         return np.array([p.row(self.point.chain) for p in hub_probes(self.point.spindle)])
 
+    @cached_property
+    def poles(self) -> Poles:
+        """Of the assembled chain."""
+        return poles(matrices(self.point.chain))
+
     def amplitudes(self, number: int, which: Key) -> tuple[float, float, float]:
         """Sense, strength and unit strength (m) of a line on a mode at this condition."""
-        p = poles(matrices(self.point.chain))
+        p = self.poles
         at = int(np.argmin(np.abs(p.value - self.modes[number].pole)))
         axial = which[3] == "axial"
         values = []

@@ -39,6 +39,7 @@ from thermospindle.model.bearing.kinematics import (
 from thermospindle.model.bearing.pair import BearingState
 from thermospindle.model.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.rotor.chain import RotorBase, element_rows, matrices, motion_rows, turning_at
+from thermospindle.model.rotor.modes import LARGE, poles
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.operating import OperatingPoint
 
@@ -100,6 +101,10 @@ def response(point: OperatingPoint, forces: Harmonics) -> ComplexArray:
 def chain_response(chain: RotorBase, forces: Harmonics) -> ComplexArray:
     """As `response`, of a chain."""
     linear = matrices(chain)
+    if len(linear.mass) > LARGE:  # one eigenproblem for all lines
+        p = poles(linear)
+        modal = forces.force @ p.left.T / (2j * np.pi * forces.frequency[:, None] - p.value)
+        return np.asarray(modal @ p.right.T)
     omega = 2 * np.pi * forces.frequency[:, None, None]
     dynamic = linear.stiffness - omega**2 * linear.mass + 1j * omega * linear.damping
     found = np.linalg.solve(dynamic, forces.force[:, :, None])[:, :, 0].astype(np.complex128)
