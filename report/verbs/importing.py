@@ -15,6 +15,7 @@ from thermospindle.report.verbs.answer import Answer, with_effects
 from thermospindle.sim.campaign.campaign import Campaign, write_campaign
 from thermospindle.sim.importing.assemble import campaign_of, read
 from thermospindle.sim.importing.mapping import read_mapping
+from thermospindle.sim.importing.measured import words_of
 from thermospindle.sim.importing.template import template
 
 
@@ -42,7 +43,7 @@ def bring(
         with whole(Path(mapping)) as file:
             file.write_text(template(found, files, spindle), encoding="utf-8")
     if out is None:
-        return _form_written(Path(str(mapping)), [f"{q.about}: {q.key}: {q.text}" for q in found.questions])
+        return _form_written(Path(str(mapping)), [words_of(q) for q in found.questions])
     try:
         campaign, notes = campaign_of(found, form, spindle, files, mapping)
     except Unanswered as error:
@@ -55,7 +56,7 @@ def _form_written(mapping: Path, open_: list[str]) -> Answer:
     values: dict[str, Any] = {"mapping": str(mapping), "open": open_, "warnings": []}
 
     def show(console: Console) -> None:
-        console.print(f"{mapping} is written: {len(open_)} answers are open in it.", highlight=False)
+        console.print(f"{mapping} is written: {len(open_)} answers are open in it, or taken from names and to be checked.", highlight=False)
         for k, item in enumerate(open_, 1):
             console.print(f"  {k}. {item}", highlight=False)
         console.print(f"Then: spindle import FILES --mapping {mapping} --out CAMPAIGN", highlight=False)

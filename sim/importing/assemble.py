@@ -18,7 +18,7 @@ from thermospindle.sim.importing import units
 from thermospindle.sim.importing.files.reading import content
 from thermospindle.sim.importing.frfs import Placed, frf_of
 from thermospindle.sim.importing.mapping import FileForm, MappingForm, TestForm, settings_of
-from thermospindle.sim.importing.measured import Content, Curve, End, ModeLine, Motion, Question, listed
+from thermospindle.sim.importing.measured import Content, Curve, End, ModeLine, Motion, Question, listed, words_of
 from thermospindle.sim.importing.peaks import from_peaks
 from thermospindle.sim.importing.places import place, points_of, unplaced
 from thermospindle.sim.importing.records import frfs_of
@@ -85,7 +85,7 @@ def read(files: Sequence[Path], form: MappingForm, scene: Spindle | None) -> Rea
     blank = sorted({(name, key) for name, x in own_curves for key in ("response", "reference") if not getattr(x, key).label})
     for key in ("response", "reference"):
         if of := [name for name, k in blank if k == key]:
-            questions.append(Question(listed(of), key, f"the point that {'answered' if key == 'response' else 'was hit'}: {key} = node or name"))
+            questions.append(Question(", ".join(of), key, f"the point that {'answered' if key == 'response' else 'was hit'}: {key} = node or name"))
     ends = tuple((n, e) for n, x in own_curves for e in (x.response, x.reference) if place(e, form, points) is None)
     questions += unplaced(ends, points, scene)
     questions += _units(own_curves, settings)
@@ -96,10 +96,10 @@ def read(files: Sequence[Path], form: MappingForm, scene: Spindle | None) -> Rea
 
 def _together(questions: Sequence[Question]) -> tuple[Question, ...]:
     """Each thing asked once, for all files at a time."""
-    about: dict[tuple[str, str], list[str]] = {}
+    about: dict[tuple[str, str, tuple[str, ...]], list[str]] = {}
     for q in questions:
-        about.setdefault((q.key, q.text), []).append(q.about)
-    return tuple(Question(listed(dict.fromkeys(of)), key, text) for (key, text), of in about.items())
+        about.setdefault((q.key, q.text, q.names), []).append(q.about)
+    return tuple(Question(", ".join(dict.fromkeys(of)), *same) for same, of in about.items())
 
 
 def _fits(table: FileForm, file: Path) -> bool:
@@ -162,7 +162,7 @@ def _units(curves: list[tuple[str, Curve]], settings: dict[Path, FileForm]) -> l
         if isinstance(fault := scaled(curve, settings[curve.file]), str):
             key, _, text = fault.partition(": ")
             open_.setdefault((key, text), []).append(name)
-    return [Question(listed(dict.fromkeys(names)), key, text) for (key, text), names in open_.items()]
+    return [Question(", ".join(dict.fromkeys(names)), key, text) for (key, text), names in open_.items()]
 
 
 def scaled(curve: Curve, settings: FileForm) -> tuple[str, float] | str:
@@ -176,12 +176,18 @@ def scaled(curve: Curve, settings: FileForm) -> tuple[str, float] | str:
     if not curve.quantity or curve.quantity == told[0]:
         return told
     if settings.unit and settings.quantity:
-        return f"quantity: quantity = {settings.quantity!r} or unit = {settings.unit!r}, which is that of a {told[0]}"
+        return f"quantity: quantity = {settings.quantity!r} or unit = {settings.unit!r}, which is that of {_a(told[0])}"
+    if settings.quantity and units.length_factor(curve.unit) is None:
+        return f"unit: the unit of its FRFs: quantity = {curve.quantity!r} is told, and {curve.unit!r} is that of an {told[0]}"
     if settings.quantity and (factor := units.length_factor(curve.unit)) is not None:
         return curve.quantity, factor  # settled: the label's unit of time is wrong, its length and force are taken
     if settings.unit:
         return told
-    return f"quantity: which quantity its FRFs are: called {curve.quantity}, with the unit {curve.unit!r} of a {told[0]}"
+    return f"quantity: which quantity its FRFs are: called {curve.quantity}, with the unit {curve.unit!r} of {_a(told[0])}"
+
+
+def _a(quantity: str) -> str:
+    return f"an {quantity}" if quantity == "accelerance" else f"a {quantity}"
 
 
 def _conditions(found: Read, form: MappingForm, scene: Spindle | None) -> list[Question]:
@@ -191,10 +197,10 @@ def _conditions(found: Read, form: MappingForm, scene: Spindle | None) -> list[Q
     for id_ in forms:
         if id_ not in found.tests and found.tests:
             raise BadInput(f"mapping: tests: id = {id_!r}: no file makes such a test; there are {listed(found.tests)}")
-    for key, text in (("temperature_C", "the temperature of the spindle, C"), ("speed_rpm", "the speed, rpm (0 at rest)")):
+    for key, text in (("temperature_C", "the temperature of the spindle, C,"), ("speed_rpm", "the speed, rpm (0 at rest),")):
         missing = [t for t in found.tests if t not in forms or getattr(forms[t], key) is None]
         if missing:
-            questions.append(Question(f"test{'s' * (len(missing) > 1)} {listed(missing)}", key, text))
+            questions.append(Question(", ".join(missing), key, f"{text} of the test{'s' * (len(missing) > 1)}"))
     if form.spindle is None and scene is None:
         questions.append(Question("the campaign", "spindle", "the name of its scene (or --scene SCENE)"))
     rows = [m for every in found.modes.values() for m in every]
@@ -211,7 +217,7 @@ def campaign_of(found: Read, form: MappingForm, scene: Spindle | None, files: Se
         count = len(found.questions)
         head = f"{count} thing{'s are' if count > 1 else ' is'} not told by the files:"
         tail = f"answer them in {mapping}" if mapping else "--mapping NEW.toml writes a form to answer them in"
-        raise Unanswered(head, [f"{q.about}: {q.key}: {q.text}" for q in found.questions], tail)
+        raise Unanswered(head, [words_of(q) for q in found.questions], tail)
     if not found.tests:
         raise BadInput(f"{listed(f.name for f in files)}: hold no FRF, time record or mode; geometry alone is no campaign")
     forms = {t.id: t for t in form.tests}

@@ -74,9 +74,10 @@ class ModeLine:
 class Question:
     """What a file does not tell: `key` of which table of the mapping answers it, and a sentence why."""
 
-    about: str  # file, test or point
+    about: str  # files, tests or points, with ", " between them
     key: str
     text: str
+    names: tuple[str, ...] = ()  # of columns that are asked about
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +92,11 @@ class Content:
     coherence: dict[tuple[End, End], Array] = field(default_factory=dict)  # of FRFs that may be in another file of the test
     notes: tuple[str, ...] = ()
     questions: tuple[Question, ...] = ()
+
+
+def words_of(question: Question) -> str:
+    """A question as a person reads it."""
+    return f"{listed(question.about.split(', '))}: {question.key}: {question.text}"
 
 
 def even(values: Array) -> float:

@@ -37,14 +37,16 @@ def template(found: Read, files: Sequence[Path], scene: Spindle | None) -> str:
     if any(q.key == "frequency_sd_Hz" for q in found.questions):
         lines.append('frequency_sd_Hz = "?"    # how sure hand-picked frequencies are: one standard deviation')
     asked: dict[str, list[tuple[str, str]]] = {}
+    columns = {c.file.name: [n for q in c.questions for n in q.names] for c in found.contents}
     for q in found.questions:
         for file in files:
-            if file.name in q.about.split(", ") or q.about == file.name:
+            if file.name in q.about.split(", "):
                 asked.setdefault(file.name, []).append((q.key, q.text))
     for file in files:
         own = asked.get(file.name, [])
         lines += ["", "[[files]]", f"file = {toml(file.name)}", f"test = {toml(plain(file.stem))}    # files of one test have the same"]
-        lines += [f'{key} = {"{ }" if key == "columns" else toml("?")}    # {text}' for key, text in _once(own) if key not in ("records", "test")]
+        blank = {"columns": toml(dict.fromkeys(columns.get(file.name, []), "?"))}
+        lines += [f"{key} = {blank.get(key, toml('?'))}    # {text}" for key, text in _once(own) if key not in ("records", "test")]
     for test in found.tests:
         lines += ["", "[[tests]]", f"id = {toml(test)}", *_condition(test)]
     lines += [line for block in _points(found, scene) for line in block]

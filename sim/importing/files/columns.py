@@ -86,7 +86,10 @@ def _pieces(column: Column, lists: Mapping[str, list[End] | None], length: int) 
     """A matrix of FRFs as single ones, its last axis that of the lines; what is no matrix as it is."""
     value, role = column.values, column.role
     if role is None or role.kind not in ("H", "coherence", "sd") or value.ndim == 1:
-        return [column if role is None or value.ndim < 2 or role.kind in ("force", "response") else replace(column, values=value)]
+        if role is not None and role.kind == "response" and value.ndim == 3:  # (hits, responses, n)
+            ends = lists["response"] or [End(name=f"response {k + 1}") for k in range(value.shape[1])]
+            return [replace(column, role=replace(role, response=e), values=value[:, k]) for k, e in enumerate(ends)]
+        return [column]
     axes = [k for k in range(value.ndim) if value.shape[k] == length] or [int(np.argmax(value.shape))]
     value = np.moveaxis(value, axes[-1], -1)
     responses, references = lists["response"], lists["reference"]
@@ -107,7 +110,7 @@ def _content(file: Path, columns: Sequence[Column], settings: FileForm, arrays: 
     unknown = [c.name for c in columns if c.role is None]
     if unknown and not all(len(c.values) < 3 for c in columns if c.role is None):
         questions.append(
-            Question(file.name, "columns", f"what {listed(unknown)} {'is' if len(unknown) == 1 else 'are'}: columns = {{ {unknown[0]!r} = \"...\" }}; allowed are {ROLES}")
+            Question(file.name, "columns", f"what {listed(unknown)} {'is' if len(unknown) == 1 else 'are'}: columns = {{ {unknown[0]!r} = \"...\" }}; allowed are {ROLES}", tuple(unknown))
         )
     known = [c for c in columns if c.role is not None]
     moving = [c for c in known if c.role and c.role.kind in ("force", "response")]

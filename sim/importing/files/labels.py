@@ -48,6 +48,10 @@ def role_of(heading: str) -> Role | None:
         return Role("ignore") if low else None
     pair = re.search(r"\(\s*([^(),;/|]+?)\s*[,;/|]\s*([^(),;/|]+?)\s*\)", text)
     ends = (end(pair[1]), end(pair[2])) if pair else (End(), End())
+    short = re.fullmatch(r"([HhGg])[_ ]?(\d)(\d)|([HhGg])[_ ]?(\d+)[_/-](\d+)", text.split(" ")[0]) if pair is None else None
+    if short is not None:  # H21, H_2_1
+        digits = [d for d in short.groups() if d and d.isdigit()]
+        return role_of(f"H({digits[0]},{digits[1]}){text[len(text.split(' ')[0]) :]}" + (f" [{unit}]" if unit else ""))
     rest = text[: pair.start()] + " " + text[pair.end() :] if pair else text
     words = [w for w in re.split(r"[^A-Za-zéγ²0-9]+", rest.lower()) if w]
     told = Role("H", "", *ends, unit)

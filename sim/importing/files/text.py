@@ -32,7 +32,7 @@ def text_of(file: Path) -> str:
         raise BadInput(f"{file}: {file.stat().st_size / 1e6:.0f} MB of text; at most {LARGEST_FILE / 1e6:.0f} are read: export it as .npz or UFF 58b")
     data = file.read_bytes()
     if b"\0" in data[:4000] and not data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise BadInput(f"{file}: is no text; UFF, CSV and other text tables, .npz and .mat are read")
+        raise BadInput(f"{file}: is no text; UFF, CSV and other text tables, .npz and .mat are read; a sheet is saved as CSV first")
     for encoding in ("utf-16" if data.startswith((b"\xff\xfe", b"\xfe\xff")) else "utf-8-sig", "latin-1"):
         try:
             return data.decode(encoding)
@@ -91,7 +91,8 @@ def _manner(file: Path, lines: list[str]) -> tuple[str | None, bool]:
             if comma and separator == ",":
                 continue
             parsed = [_parse(_cells(line, separator), comma) for line in sample]
-            width = len(parsed[-1] or ()) if parsed else 0
+            counts = [len(p) for p in parsed if p]
+            width = max(counts, key=counts.count) if counts else 0
             score = (sum(p is not None and len(p) == width for p in parsed), width)
             if width and score > best:
                 best, found = score, (separator, comma)

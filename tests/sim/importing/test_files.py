@@ -261,6 +261,7 @@ def test_modes_picked_by_hand(tmp_path):
         ("nothing\nhere\n", "no table of numbers"),
         ("f,H(1,1) real\n1,2\n2,nan\n3,4\n", "line 3: NaN or infinite"),
         ("f;H(1,1) real\n1;2\n2\n3;4;5\n4;5\n", "numbers"),
+        ("f,H(1,1) real\n1,2\n2,3\n3,4\nend of data\n", "line 5: 'end of data' stands below the numbers"),
         ("frequency,mode\n1000,1\nabc,2\n", "line 3: frequency = 'abc': is no number"),
     ],
 )
@@ -286,7 +287,7 @@ def test_units_of_frfs(text, found):
         ("H(3,1) real [g/N]", "H", "real", ("3", "1"), "g/N"), ("Re H(3:+X, 1)", "H", "real", ("3:+X", "1"), ""), ("FRF(hub, seat) dB", "H", "decibel", ("hub", "seat"), ""),
         ("Magnitude", "H", "magnitude", ("", ""), ""), ("Coherence(3,1)", "coherence", "", ("3", "1"), ""), ("Frequency (Hz)", "frequency", "", ("", ""), "Hz"),
         ("force [N]", "force", "", ("", ""), "N"), ("acceleration 3 [g]", "response", "", ("3", ""), "g"), ("Time [s]", "time", "", ("", ""), "s"),
-        ("FRF-2 real", "H", "real", ("FRF-2", ""), ""),
+        ("FRF-2 real", "H", "real", ("FRF-2", ""), ""), ("H21", "H", "complex", ("2", "1"), ""), ("H_12_3 imag [g/N]", "H", "imaginary", ("12", "3"), "g/N"),
     ],
 )  # fmt: skip
 def test_headings(heading, kind, part, ends, unit):
