@@ -1,5 +1,6 @@
 """`import thermospindle as ts`: the same numbers and objects as the command line, named nodes, nothing loaded before it is used."""
 
+import re
 import runpy
 import subprocess
 import sys
@@ -88,3 +89,15 @@ def test_there_are_ten_in_the_gallery():
 def test_gallery(script: Path, capsys):
     runpy.run_path(str(script), run_name="__main__")
     assert capsys.readouterr().out.strip()
+
+
+def test_the_code_of_the_readme_runs(capsys):
+    """Its first block prints modes at both temperatures; its second is a test, and holds."""
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.S)
+    names: dict[str, object] = {}
+    for block in blocks:
+        exec(compile(block, "README.md", "exec"), names)
+    for name, found in list(names.items()):
+        if name.startswith("test_") and callable(found):
+            found()
+    assert capsys.readouterr().out.count("rocking") == 4
