@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from thermospindle.model.machine import Point, Spindle
 from thermospindle.model.scene.measuring import axis_vector
+from thermospindle.model.scene.shafts import resolved_body
 from thermospindle.model.units import MM
 from thermospindle.sim.campaign.uff import axis_number
 from thermospindle.sim.importing.mapping import MadePoint, MappingForm
@@ -18,7 +20,8 @@ def points_of(form: MappingForm, scene: Spindle | None) -> tuple[dict[int, Point
     """The points there may be, by node: those of the mapping, filled from the scene's of the same node, and the scene's others."""
     found = {p.node: p for p in scene.points} if scene else {}
     questions = []
-    bodies = [b.name for b in scene.structure.bodies] if scene else []
+    shafts = {s.name: s for s in scene.structure.shafts} if scene else {}
+    bodies = body_names(scene) if scene else []
     for made in form.points:
         base = found.get(made.node)
         missing = [key for key in NEEDED if getattr(made, key) is None] if base is None else []
@@ -27,8 +30,16 @@ def points_of(form: MappingForm, scene: Spindle | None) -> tuple[dict[int, Point
             continue
         if scene and made.body is not None and made.body not in bodies:
             questions.append(Question(f"point {made.node}", "body", f"a body of the scene {scene.name} ({', '.join(bodies)}) in place of {made.body!r}"))
-        found[made.node] = _point(made, base)
+            continue
+        point = _point(made, base)
+        found[made.node] = replace(point, body=resolved_body(shafts, point.body, point.position[2]))
     return found, questions
+
+
+def body_names(scene: Spindle) -> list[str]:
+    """What a point may be on: bodies, and shafts by their names in place of their nodes."""
+    nodes = {b for s in scene.structure.shafts for b in s.bodies}
+    return [*(b.name for b in scene.structure.bodies if b.name not in nodes), *(s.name for s in scene.structure.shafts)]
 
 
 def _point(made: MadePoint, base: Point | None) -> Point:

@@ -11,6 +11,7 @@ from thermospindle.model.units import MM
 from thermospindle.sim.campaign.form import in_unit, toml
 from thermospindle.sim.importing.assemble import Read, plain
 from thermospindle.sim.importing.measured import End, listed
+from thermospindle.sim.importing.places import body_names
 
 HEAD = """\
 # What the files do not tell. Put an answer in the place of each "?"; a key that is left out, or "?", is open.
@@ -80,7 +81,7 @@ def _points(found: Read, scene: Spindle | None) -> Iterable[list[str]]:
             ends.setdefault(end.label, end)
     places = {n: p for c in found.contents for n, p in c.places.items()}
     taken = set(found.points)
-    bodies = f"    # a body of the scene: {', '.join(b.name for b in scene.structure.bodies)}" if scene else "    # the body of the scene that it is on"
+    bodies = f"    # a body of the scene: {', '.join(body_names(scene))}" if scene else "    # the body of the scene that it is on"
     for label, end in ends.items():
         node = end.node if end.node and end.node not in taken else next(n for n in range(1, 10**6) if n not in taken)
         taken.add(node)

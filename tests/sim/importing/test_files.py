@@ -295,3 +295,20 @@ def test_headings(heading, kind, part, ends, unit):
     assert role is not None
     assert (role.kind, role.part, role.unit) == (kind, part, unit)
     assert (role.response.label, role.reference.label) == ends
+
+
+def test_points_on_a_flexible_shaft_are_told_by_its_name(tmp_path):
+    from thermospindle.model.scene.reading import load
+
+    scene = load("mk7702")
+    shaft = scene.structure.shafts[0]
+    height = scene.points[0].position[2]
+    point = f'[[points]]\nnode = 77\nname = "nose"\nbody = "{shaft.name}"\nposition_mm = [0.0, 0.0, {1e3 * height}]\ndirection = "+X"\n'
+    (tmp_path / "m.toml").write_text('[[tests]]\nid = "T20"\ntemperature_C = 20.0\nspeed_rpm = 0.0\n' + point)
+    h = FRF.value[0, 0]
+    file = table(tmp_path / "T20.csv", ["Frequency", "H(77,77) real [(m/s)/N]", "H(77,77) imag"], [FREQUENCY, h.real, h.imag])
+    bring([file], mapping=tmp_path / "m.toml", scene="mk7702", out=tmp_path / "c")
+    assert read_campaign(tmp_path / "c").points[0].body == shaft.node_at(height)
+    (tmp_path / "m.toml").write_text((tmp_path / "m.toml").read_text().replace(f'body = "{shaft.name}"', 'body = "nowhere"'))
+    with pytest.raises(Unanswered, match=f"a body of the scene mk7702 .*{shaft.name}"):
+        bring([file], mapping=tmp_path / "m.toml", scene="mk7702", out=tmp_path / "d")
