@@ -1,6 +1,7 @@
 """The front door: whatever is wrong is one sentence and exit code 2, and a verb is a function that Python calls as the command line does."""
 
 import inspect
+import json
 import os
 import re
 import subprocess
@@ -124,6 +125,7 @@ def test_stopped_while_it_is_loaded():
         (["impact", SCENE, "--hits", "10000000"], "count of one or more, up to 1000"),
         (["runout", SCENE, "--speed", "1e-9"], "at least 0.001 rpm, or 0"),
         (["runout", SCENE, "--speed", "7200", "--seconds", "1e9"], "at most 100 s"),
+        (["runout", SCENE, "--speed", "1e6", "--seconds", "0.01"], "take a shorter step, or --path linear"),
         (["warmup", SCENE, "--minutes", "1e12"], "at most 100000 min"),
         (["map", SCENE, "--multiples", "100000"], "up to 100"),
         (["modes", "n" * 5000], "File name too long"),
@@ -134,6 +136,13 @@ def test_stopped_while_it_is_loaded():
 )
 def test_refused_in_one_sentence(capsys, arguments, said):
     assert said in refused(capsys, *arguments)
+
+
+def test_lines_faster_than_the_integration_step_show_by_the_linear_path(capsys, scene):
+    """At a million rpm the balls' lines lie at 289 kHz; nothing is integrated there, so the step does not matter."""
+    assert main(["runout", str(scene()), "--speed", "1e6", "--path", "linear", "--seconds", "0.001", "--json"]) == 0
+    lines = json.loads(capsys.readouterr().out)["lines"]
+    assert any(line["frequency_Hz"] == pytest.approx(1e6 / 60, rel=1e-3) for line in lines)
 
 
 def test_a_misspelt_key_is_told_the_one_meant(capsys, scene):

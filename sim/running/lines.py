@@ -18,6 +18,7 @@ from thermospindle.model.bearing.kinematics import Line
 from thermospindle.model.types import Array, ComplexArray
 
 SNAP = 0.02  # of a bin: nearer than this to another frequency, a record cannot tell the two apart and one is fitted
+HIGHEST = 0.45  # of the sample rate: the highest line looked for, below half of it with room for the filter
 TOGETHER = 0.5  # of a bin: lines nearer than this are fitted as one
 CUTOFF = 1e-12  # of the largest eigenvalue of the normal equations
 LEAST = 0.01  # of the strongest line, and
@@ -126,7 +127,7 @@ def find_lines(
     phasors (known, 3) m by linear theory. Lines below a thousandth of the strongest in their direction are left out.
     """
     length, rate = float(time[-1] - time[0]) * len(time) / (len(time) - 1), abs(turning)
-    below = 0.45 * len(time) / length  # of the Nyquist frequency, with room for the filter
+    below = HIGHEST * len(time) / length
     far = [line for line in known if line.frequency > below]
     if far:
         raise ValueError(f"the record is sampled too slowly for the line {far[-1].name} at {far[-1].frequency:.0f} Hz")

@@ -24,9 +24,10 @@ from thermospindle.model.machine import Point, Spindle
 from thermospindle.model.rotor.chain import RotorBase, motion_rows
 from thermospindle.model.shaft import Shaft
 from thermospindle.model.types import Array, ComplexArray
+from thermospindle.model.units import RPM
 from thermospindle.sim.operating import OperatingPoint
 from thermospindle.sim.running.excitation import Harmonics, harmonics, response
-from thermospindle.sim.running.lines import Fit, FoundLine, find_lines
+from thermospindle.sim.running.lines import HIGHEST, Fit, FoundLine, find_lines
 from thermospindle.sim.running.revolutions import (
     ErrorMotion,
     Revolutions,
@@ -210,11 +211,21 @@ def whole_turns(point: OperatingPoint) -> int:
     return min(counts, key=lambda count: float(size @ np.abs(leakage(orders, count))))
 
 
-def sampling_rate(point: OperatingPoint) -> float:
-    """Lowest sample rate (Hz) the integration step divides, of at least 20 kHz and eight samples a period of the highest line looked for."""
-    wanted = max(SAMPLE_RATE, 8 * max(line.frequency for line in _known(point)[0]))
-    step = point.spindle.hammer.step
-    return 1 / (step * max(1, int(1 / (wanted * step) + 1e-9)))
+def sampling_rate(point: OperatingPoint, integrated: bool = True) -> float:
+    """Lowest sample rate (Hz) of at least 20 kHz and eight samples a period of the highest line looked for; where motion is `integrated`, one
+    that its step divides. BadInput where that step is too long for the line."""
+    highest = max(line.frequency for line in _known(point)[0])
+    wanted, step = max(SAMPLE_RATE, 8 * highest), point.spindle.hammer.step
+    rate = 1 / (step * max(1, int(1 / (wanted * step) + 1e-9)))
+    if highest <= HIGHEST * rate:
+        return rate
+    if not integrated:
+        return wanted
+    rpm = abs(point.condition.speed) / RPM
+    raise BadInput(
+        f"--speed {rpm:g}: the highest line looked for lies at {highest:.0f} Hz, and an integration step of {1e6 * step:g} us (hammer_test.step_us) shows "
+        f"lines up to {HIGHEST / step:.0f} Hz; take a shorter step, or --path linear"
+    )
 
 
 # ---------------------------------------------------------------- analysis
@@ -256,7 +267,7 @@ def runout(point: OperatingPoint, seconds: float | None = None, element: str = "
     if seconds is not None and seconds < 2 * turn:
         raise BadInput(f"--seconds {seconds:g}: at {60 / turn:g} rpm the record needs at least two revolutions, {2 * turn:.3g} s")
     count = whole_turns(point) if seconds is None else int(seconds / turn + 1e-9)
-    rate, probes = sampling_rate(point), all_probes(point.spindle)
+    rate, probes = sampling_rate(point, path != "linear"), all_probes(point.spindle)
     samples = int(np.ceil(count * turn * rate)) + 2  # the last revolution ends between two samples
     if path == "linear":
         return analyse(point, linear(point, probes, np.arange(samples) / rate))

@@ -230,6 +230,20 @@ class TestCache:
         assert len(calls) == 4
         assert np.array_equal(first.responses["rotating"].gain, again.responses["rotating"].gain)
 
+    def test_a_file_written_anew_with_another_gain_is_recomputed(self, spindle, monkeypatch, tmp_path):
+        """It has every array in its form, and numbers that are finite; they are not those that were computed."""
+        monkeypatch.setenv("THERMOSPINDLE_CACHE", str(tmp_path))
+        calls = self.count(monkeypatch)
+        first = influence(spindle, tolerance=2e-2)
+        for file in tmp_path.iterdir():
+            with np.load(file) as data:
+                arrays = dict(data)
+            np.savez(file, **{**arrays, "gain": 1.5 * arrays["gain"]})
+        influence_module.forget()
+        again = influence(spindle, tolerance=2e-2)
+        assert len(calls) == 4
+        assert np.array_equal(first.responses["rotating"].gain, again.responses["rotating"].gain)
+
     def test_folder_that_cannot_be_made(self, spindle, monkeypatch, tmp_path):
         (tmp_path / "file").write_text("")
         monkeypatch.setenv("THERMOSPINDLE_CACHE", str(tmp_path / "file" / "folder"))
