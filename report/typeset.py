@@ -1,11 +1,17 @@
-"""Numbers as a page shows them: true minus signs, signs, standard errors to their own digit."""
+"""What pages and files are made of: numbers with true minus signs and standard errors to their own digit, tables, figures, CSV files."""
 
 from __future__ import annotations
 
+import csv
 import re
+from collections.abc import Collection, Iterable, Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup, escape
+
+from thermospindle.model.cells import cells
 
 
 def minus(text: str) -> str:
@@ -31,3 +37,32 @@ def with_error(pair: tuple[float, float] | None, sign: bool = False, digits: int
         return Markup(minus(f"{value:{'+' if sign else ''}.{digits}f}"))
     digits = int(np.clip(-np.floor(np.log10(error / 2)), 0, 5))
     return Markup(minus(f"{value:{'+' if sign else ''}.{digits}f}") + f" <small>± {error:.{digits}f}</small>")
+
+
+def table(
+    head: Sequence[str], rows: Iterable[Sequence[str]], words: Collection[int] = (0,), caption: str = "", name: str = "", ruled: bool = False
+) -> str:
+    """A table of a page: cells are HTML, columns `words` stand to the left, numbers to the right; `ruled`: a line above each row that has a first
+    cell. `name` is its id."""
+
+    def row(kind: str, cells: Sequence[str], look: str = "") -> str:
+        return f"<tr{look}>" + "".join(f"<{kind}{' class=left' if k in words else ''}>{c}</{kind}>" for k, c in enumerate(cells)) + "</tr>"
+
+    top = row("th", [str(escape(h)).replace("\n", "<br>") for h in head])
+    body = "".join(row("td", cells, ' class="rule"' if ruled and k and cells[0] else "") for k, cells in enumerate(rows))
+    about = f"<caption>{caption}</caption>" if caption else ""
+    return f'<div class="scroll"><table{f" id={name!r}" if name else ""}>{about}<thead>{top}</thead><tbody>{body}</tbody></table></div>'
+
+
+def figure(drawn: str, caption: str = "") -> str:
+    """A picture of a page, with its caption in HTML."""
+    return f'<figure class="chart wide">{drawn}' + (f"<figcaption>{caption}</figcaption>" if caption else "") + "</figure>"
+
+
+def write_csv(path: Path, head: Sequence[str], rows: Iterable[Iterable[Any]], about: str = "") -> None:
+    """A CSV file with a header, and before it `about` as a comment; names in it are no formulas to a spreadsheet."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        file.write(f"# {about}\n" if about else "")
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(cells(head))
+        writer.writerows(cells(row) for row in rows)

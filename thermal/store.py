@@ -114,7 +114,7 @@ def _write(question: str, section: PartMesh, races: Sequence[Race], more: dict[s
         file.parent.mkdir(parents=True, exist_ok=True)
         with whole(file) as part:
             mesh = {"p": section.mesh.p, "t": section.mesh.t, "region_of": section.region_of}
-            kept = {name: np.asarray(a) for name, a in {"notes": json.dumps(notes), **mesh, **arrays}.items()}
+            kept: dict[str, Any] = {name: np.asarray(a) for name, a in {"notes": json.dumps(notes), **mesh, **arrays}.items()}
             np.savez(part, digest=_digest(kept), **kept)
         _make_room(file.parent)
     except OSError:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from markupsafe import Markup
@@ -14,7 +13,7 @@ from thermospindle.report.figures.common import STYLE, svg
 from thermospindle.report.figures.compare import figures, label
 from thermospindle.report.log.compare import FrfsBeside, write_comparison_log
 from thermospindle.report.page.report import Section, page
-from thermospindle.report.typeset import minus, signed
+from thermospindle.report.typeset import figure, minus, signed, table
 
 WORDS = {
     "pulls": (
@@ -42,12 +41,12 @@ def sections(c: Comparison) -> list[Section]:
     """What the comparison adds to a report: the map of residuals and errors in a table, then what its FRFs say, where it has any."""
     found: list[Section] = []
     with rc_context(STYLE):
-        drawn = {name: svg(figure, f"compare-{name}", WORDS[name][0]) for name, figure in figures(c).items()}
-    modal = "".join(_figure(drawn[name], name) for name in ("pulls",) if name in drawn)
+        drawn = {name: svg(one, f"compare-{name}", WORDS[name][0]) for name, one in figures(c).items()}
+    modal = "".join(figure(drawn[name], WORDS[name][1]) for name in ("pulls",) if name in drawn)
     found.append(("Measured beside computed", _summary(c) + modal + _table(c)))
     spectral = [name for name in ("frfs", "bands", "channels", "fdac") if name in drawn]
     if spectral:
-        found.append(("FRFs, measured and computed", "".join(f"<h3>{WORDS[n][0]}</h3>{_figure(drawn[n], n)}" for n in spectral)))
+        found.append(("FRFs, measured and computed", "".join(f"<h3>{WORDS[n][0]}</h3>{figure(drawn[n], WORDS[n][1])}" for n in spectral)))
     return found
 
 
@@ -56,17 +55,13 @@ def write_comparison(c: Comparison, spindle: Spindle, folder: Path) -> None:
     conditions = f"the conditions of {len(c.tests)} test{'s' if len(c.tests) > 1 else ''}: {c.campaign}"
     (folder / "report.html").write_text(page(spindle, conditions, sections(c), "Comparison"), encoding="utf-8")
     with rc_context(STYLE):
-        for name, figure in figures(c).items():
+        for name, one in figures(c).items():
             for kind in ("svg", "png"):
-                figure.savefig(folder / f"{name}.{kind}", dpi=150, facecolor="white", metadata={"Date": None} if kind == "svg" else None)
+                one.savefig(folder / f"{name}.{kind}", dpi=150, facecolor="white", metadata={"Date": None} if kind == "svg" else None)
     shown = [FrfsBeside(t.test, found.beside.measured, found.computed) for t in c.tests if (found := t.correlation) is not None]
     if shown:
         peaks = {t.test.id: [(m.number, m.kind, m.measured, m.sd, m.computed) for m in t.modes] for t in c.tests}
         write_comparison_log(spindle, c.campaign, shown, peaks, folder / "compare.rrd")
-
-
-def _figure(drawn: str, name: str) -> str:
-    return f'<figure class="chart wide">{drawn}<figcaption>{WORDS[name][1]}</figcaption></figure>'
 
 
 def _summary(c: Comparison) -> str:
@@ -96,7 +91,7 @@ def _table(c: Comparison) -> str:
         "test", "mode", "kind", "measured, Hz", "computed, Hz", "error, Hz", "error, %", "error, s.e.",
         "damping, %", "computed, %", "MAC",
     )  # fmt: skip
-    rows: list[str] = []
+    rows = []
     for t in c.tests:
         for k, m in enumerate(t.modes):
             damping = "–" if m.damping_measured is None else f"{100 * m.damping_measured:.3f}"
@@ -105,15 +100,8 @@ def _table(c: Comparison) -> str:
                 signed(m.error, 2), signed(100 * m.error / m.measured, 2), signed(m.residual, 1), damping, f"{100 * m.damping_computed:.3f}",
                 "–" if m.mac is None else f"{m.mac:.3f}" + ("*" if m.close else ""),
             ]  # fmt: skip
-            rows.append(_row("td", cells, ' class="rule"' if k == 0 and rows else ""))
+            rows.append(cells)
     starred = any(m.close and m.mac is not None for t in c.tests for m in t.modes)
     note = " * Close modes: share of the measured shape in the plane of the computed ones." if starred else ""
-    caption = f"<caption>Every mode of every test, with one standard error. MAC: modal assurance criterion.{note}</caption>"
-    return (
-        f'<div class="scroll"><table id="compared">{caption}<thead>{_row("th", head)}</thead><tbody>{"".join(rows)}</tbody></table></div>'
-    )
-
-
-def _row(kind: str, cells: Sequence[str], look: str = "") -> str:
-    text = "".join(f"<{kind}{' class=left' if i in (0, 2) else ''}>{cell}</{kind}>" for i, cell in enumerate(cells))
-    return f"<tr{look}>{text}</tr>"
+    caption = f"Every mode of every test, with one standard error. MAC: modal assurance criterion.{note}"
+    return table(head, rows, (0, 2), caption, "compared", ruled=True)

@@ -15,7 +15,7 @@ from thermospindle.report.figures.common import STYLE, svg
 from thermospindle.report.figures.diagnosis import figures
 from thermospindle.report.page.report import Section, page
 from thermospindle.report.text.diagnosis import plan_words
-from thermospindle.report.typeset import minus, prose, with_error
+from thermospindle.report.typeset import figure, minus, prose, table, with_error
 
 CAPTIONS = {
     "errors": "Mean square of the whitened residuals of every test's FRF lines: one is noise alone.",
@@ -31,7 +31,7 @@ def sections(d: Diagnosis, answer: dict[str, Any], drawn: dict[str, Figure] | No
     """Titles and HTML; `answer` is the JSON answer of the diagnosis."""
     drawn = figures(d) if drawn is None else drawn
     with rc_context(STYLE):
-        shown = {name: _figure(svg(f, f"diagnosis-{name}", CAPTIONS[name]), CAPTIONS[name]) for name, f in drawn.items()}
+        shown = {name: figure(svg(f, f"diagnosis-{name}", CAPTIONS[name]), CAPTIONS[name]) for name, f in drawn.items()}
     found = [("Verdict", _verdict(answer) + shown["errors"])]
     found.append(("Explanations", shown.get("explanations", "") + _candidates(answer)))
     if "law" in shown:
@@ -169,15 +169,7 @@ def _with_error(value: float, sd: float, digits: int = 3) -> str:
     return minus(f"{value:.3g}") + f" <small>± {sd:.1g}</small>"
 
 
-def _figure(drawn: str, caption: str) -> str:
-    return f'<figure class="chart wide">{drawn}<figcaption>{caption}</figcaption></figure>'
-
-
 def _grid(caption: str, head: Sequence[str], rows: Sequence[Sequence[tuple[str, int]]]) -> str:
     """A table; a cell is its HTML and whether it is a number, set right."""
-    words = [not row[1] for row in rows[0]] if rows else [True] * len(head)
-    top = "".join(f"<th{' class=left' if left else ''}>{escape(h)}</th>" for h, left in zip(head, words, strict=True))
-    body = "".join("<tr>" + "".join(f"<td{'' if number else ' class=left'}>{text}</td>" for text, number in row) + "</tr>" for row in rows)
-    return (
-        f'<div class="scroll"><table><caption>{escape(caption)}</caption><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
-    )
+    words = [k for k in range(len(head)) if not rows or not rows[0][k][1]]
+    return table(head, [[text for text, _ in row] for row in rows], words, escape(caption))

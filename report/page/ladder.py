@@ -9,23 +9,17 @@ from thermospindle.diagnosis.ladder.ladder import Ladder
 from thermospindle.report.figures import ladder as ladder_plots
 from thermospindle.report.text.ladder import sentences
 from thermospindle.report.text.ladder_table import COLUMNS, LEGEND, cells
-from thermospindle.report.typeset import prose
+from thermospindle.report.typeset import figure, prose, table
 
 
 def section(found: Ladder) -> tuple[str, str]:
     """Title and HTML for `report.page.report.write_report`."""
-    head = "".join(f"<th{' class=left' if k == 0 else ''}>{escape(c).replace(chr(10), '<br>')}</th>" for k, c in enumerate(COLUMNS))
-    body = "".join(
-        "<tr>" + "".join(f"<td{' class=left' if k == 0 else ''}>{prose(c)}</td>" for k, c in enumerate(cells(r))) + "</tr>"
-        for r in found.steps
-    )
-    grid = (
-        f'<div class="scroll"><table><caption>{escape(LEGEND)}</caption><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
-    )
-    figure = f'<figure class="chart wide">{ladder_plots.picture(found)}<figcaption>Above: the error at every step, of all data and of each '
-    figure += f"temperature predicted by a fit that has not seen it. Below: residuals of every mode in every test at the first step and at '{escape(found.top.name)}'.</figcaption></figure>"
+    grid = table(COLUMNS, [[prose(c) for c in cells(r)] for r in found.steps], caption=escape(LEGEND))
+    caption = "Above: the error at every step, of all data and of each temperature predicted by a fit that has not seen it. Below: residuals of every mode "
+    caption += f"in every test at the first step and at '{escape(found.top.name)}'."
+    drawn = figure(ladder_plots.picture(found), caption)
     words = "".join(f"<p>{prose(s)}</p>" for s in sentences(found))
-    return f"The ladder: {found.campaign.title}", figure + grid + words
+    return f"The ladder: {found.campaign.title}", drawn + grid + words
 
 
 def write_ladder(found: Ladder, folder: Path) -> None:

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from rich.console import Console
 
-from thermospindle.model.cells import cells
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 from thermospindle.report.figures.resonance import figures_svg, write_figures
 from thermospindle.report.text.grid import show_grid
-from thermospindle.report.typeset import prose
+from thermospindle.report.typeset import figure, prose, table, write_csv
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.resonance.map import Coincidence, ResonanceMap, strongest
 
@@ -152,48 +150,24 @@ def _cells(c: Coincidence) -> list[str]:
 
 def write_map(found: ResonanceMap, folder: Path) -> None:
     """`coincidences.csv`, `modes.csv` over the grid, and the figures."""
-    about = "# " + ", ".join(f"{k} {v}" for k, v in provenance(found.spindle).items()) + "\n"
+    about = ", ".join(f"{k} {v}" for k, v in provenance(found.spindle).items())
     coincidences = [_coincidence_json(c) for c in found.coincidences]
-    with (folder / "coincidences.csv").open("w", newline="", encoding="utf-8") as file:
-        file.write(about)
-        names = list(coincidences[0]) if coincidences else ["line", "mode", "temperature_C", "speed_rpm", "frequency_Hz"]
-        writer = csv.DictWriter(file, names, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(dict(zip(names, cells(row.values()), strict=True)) for row in coincidences)
-    with (folder / "modes.csv").open("w", newline="", encoding="utf-8") as file:
-        file.write(about)
-        rows = csv.writer(file, lineterminator="\n")
-        rows.writerow(["temperature_C", "speed_rpm", *(f"mode {m.number} {m.kind}_Hz" for m in found.modes)])
-        for i, t in enumerate(found.temperatures):
-            for j, s in enumerate(found.speeds):
-                rows.writerow([repr(float(t)), repr(float(s / RPM)), *(repr(float(m.frequency[i, j])) for m in found.modes)])
+    names = list(coincidences[0]) if coincidences else ["line", "mode", "temperature_C", "speed_rpm", "frequency_Hz"]
+    write_csv(folder / "coincidences.csv", names, (row.values() for row in coincidences), about)
+    grid = [
+        [float(v) for v in (t, s / RPM, *(m.frequency[i, j] for m in found.modes))]
+        for i, t in enumerate(found.temperatures)
+        for j, s in enumerate(found.speeds)
+    ]
+    write_csv(folder / "modes.csv", ["temperature_C", "speed_rpm", *(f"mode {m.number} {m.kind}_Hz" for m in found.modes)], grid, about)
     write_figures(found, folder)
 
 
 def map_section(found: ResonanceMap) -> tuple[str, str]:
     """Title and HTML of a report section."""
     said = "".join(f"<p>{prose(s)}</p>" for s in sentences(found))
-    head = "".join(
-        f"<th{' class=left' if k < 4 else ''}>{h}</th>"
-        for k, h in enumerate(
-            (
-                "line",
-                "wave and order",
-                "bearing",
-                "mode",
-                "°C",
-                "rpm",
-                "Hz",
-                "strength, nm",
-                "NRRO (nonrepeatable runout), nm rms",
-                "margin, %",
-            )
-        )
-    )
-    body = "".join(
-        "<tr>" + "".join(f"<td{' class=left' if k < 4 else ''}>{prose(cell)}</td>" for k, cell in enumerate(_cells(c))) + "</tr>"
-        for c in strongest(found.coincidences)[:SHOWN]
-    )
+    head = ("line", "wave and order", "bearing", "mode", "°C", "rpm", "Hz", "strength, nm", "NRRO (nonrepeatable runout), nm rms", "margin, %")
+    grid = table(head, [[prose(cell) for cell in _cells(c)] for c in strongest(found.coincidences)[:SHOWN]], range(4))
     drawings = figures_svg(found)
     captions = {
         "campbell": "Campbell diagram: natural frequencies and lines over speed.",
@@ -201,6 +175,4 @@ def map_section(found: ResonanceMap) -> tuple[str, str]:
         "coincidences": "Where lines meet modes, over both.",
         "nrro": "Nonrepeatable runout along temperature and speed, linear response.",
     }
-    pictures = "".join(f'<figure class="chart wide">{drawings[k]}<figcaption>{captions[k]}</figcaption></figure>' for k in captions)
-    table = f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
-    return "Resonance map", said + table + pictures
+    return "Resonance map", said + grid + "".join(figure(drawings[k], caption) for k, caption in captions.items())

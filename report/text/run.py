@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -19,6 +18,7 @@ from thermospindle.report.log.read import Log
 from thermospindle.report.log.run import write_log
 from thermospindle.report.page.report import write_report
 from thermospindle.report.text.grid import show_grid
+from thermospindle.report.typeset import write_csv
 from thermospindle.sim.campaign.campaign import Campaign, write_campaign
 from thermospindle.sim.identification.numbering import identified, measured_rows, numbered
 from thermospindle.sim.operating import OperatingPoint, provenance, stiffness_table
@@ -110,15 +110,13 @@ def write_modes(point: OperatingPoint, folder: Path) -> None:
 
 def _write_modes_csv(points: list[OperatingPoint], path: Path) -> None:
     elements = [e.name for e in points[0].chain.elements]
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        shares = [f"energy_share_{name}" for name in elements]
-        writer.writerow(["temperature_C", "speed_rpm", "mode", "kind", "whirl", "frequency_Hz", "damping_ratio", *shares])
-        for point in points:
-            for i, m in enumerate(point.modes, 1):
-                where = (point.condition.temperature, point.condition.speed / RPM)
-                energy = [m.energy[name] for name in elements]
-                writer.writerow([*where, i, m.kind, m.whirl, m.frequency, m.damping_ratio, *energy])
+    head = ["temperature_C", "speed_rpm", "mode", "kind", "whirl", "frequency_Hz", "damping_ratio", *(f"energy_share_{name}" for name in elements)]
+    rows = [
+        [p.condition.temperature, p.condition.speed / RPM, i, m.kind, m.whirl, m.frequency, m.damping_ratio, *(m.energy[e] for e in elements)]
+        for p in points
+        for i, m in enumerate(p.modes, 1)
+    ]
+    write_csv(path, head, rows)
 
 
 def write_run(run: Run, folder: Path, progress: Callable[[str], None]) -> None:
@@ -143,12 +141,9 @@ def write_frf_tables(log: Log, folder: Path) -> None:
     """One CSV a test: frequency and the real and imaginary part of every FRF."""
     for test, frf in log.frfs.items():
         names = [f"H({i},{j})" for i in frf.response_nodes for j in frf.reference_nodes]
-        with (folder / f"{test}.csv").open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(["frequency_Hz", *(f"{part} {name} ({frf.quantity})" for name in names for part in ("re", "im"))])
-            flat = frf.value.reshape(len(names), -1)
-            for line, column in zip(frf.frequency, flat.T, strict=True):
-                writer.writerow([repr(float(line)), *(repr(float(v)) for z in column for v in (z.real, z.imag))])
+        head = ["frequency_Hz", *(f"{part} {name} ({frf.quantity})" for name in names for part in ("re", "im"))]
+        lines = np.ascontiguousarray(frf.value.reshape(len(names), -1).T).view(float)
+        write_csv(folder / f"{test}.csv", head, np.column_stack([frf.frequency, lines]).tolist())
     (folder / "contents.json").write_text(json.dumps({"scene": log.scene, "entities": list(log.entities)}, indent=1))
 
 

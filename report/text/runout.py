@@ -6,7 +6,6 @@ record; `averaged` holds the same values with the RRO from averaging over the re
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable
 from html import escape
 from pathlib import Path
@@ -17,13 +16,13 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 from rich.console import Console
 
-from thermospindle.model.cells import cells
 from thermospindle.model.machine import Spindle
 from thermospindle.model.units import RPM, TO_UM
 from thermospindle.report.figures.common import STYLE, svg
 from thermospindle.report.figures.runout import motion_figure, spectrum_figure
 from thermospindle.report.log.runout import write_runout_log
 from thermospindle.report.text.grid import grid, show_grid
+from thermospindle.report.typeset import figure, table, write_csv
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.running.lines import FoundLine
 from thermospindle.sim.running.revolutions import ErrorMotion
@@ -119,10 +118,10 @@ def line_json(line: FoundLine) -> dict[str, Any]:
 def show_runout(console: Console, answer: dict[str, Any]) -> None:
     title = f"Runout at {answer['temperature_C']:g} C, {answer['speed_rpm']:g} rpm, {answer['revolutions']} revolutions, um"
     title += f" (bearings {answer['status']})"
-    table = grid(title, ("", "radial\n(hub x)", "axial"), words=("",))
+    quoted = grid(title, ("", "radial\n(hub x)", "axial"), words=("",))
     for key, meaning in STATISTICS.items():
-        table.add_row(meaning, *(f"{answer[key][d]:.4f}" for d in MAIN))
-    console.print(table)
+        quoted.add_row(meaning, *(f"{answer[key][d]:.4f}" for d in MAIN))
+    console.print(quoted)
     console.print()
     if not answer["lines"]:
         return
@@ -143,16 +142,13 @@ def write_runout(runout: Runout, spindle: Spindle, answer: dict[str, Any], folde
     (as its scene has it, without what its effects change)."""
     _write_record(runout, folder / "record.csv")
     _write_repeatable(runout, folder / "repeatable.csv")
-    with (folder / "lines.csv").open("w", newline="", encoding="utf-8") as file:
-        names = [k for k in line_json(runout.lines[0]) if k != "causes"] if runout.lines else ["frequency_Hz"]
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(names)
-        writer.writerows(cells(row[k] for k in names) for row in answer["lines"])
+    names = [k for k in line_json(runout.lines[0]) if k != "causes"] if runout.lines else ["frequency_Hz"]
+    write_csv(folder / "lines.csv", names, ([row[k] for k in names] for row in answer["lines"]))
     progress("tables written")
     with rc_context(STYLE):
-        for name, figure in (("motion", motion_figure(runout)), ("spectrum", spectrum_figure(runout))):
-            figure.savefig(folder / f"{name}.png", dpi=130, facecolor="white")
-            figure.savefig(folder / f"{name}.svg", dpi=130, facecolor="white", metadata={"Date": None})
+        for name, drawn in (("motion", motion_figure(runout)), ("spectrum", spectrum_figure(runout))):
+            drawn.savefig(folder / f"{name}.png", dpi=130, facecolor="white")
+            drawn.savefig(folder / f"{name}.svg", dpi=130, facecolor="white", metadata={"Date": None})
     progress("figures written")
     condition = runout.point.condition
     write_runout_log(runout, waterfall(spindle, condition.temperature, run_up(condition.speed)), folder / "runout.rrd")
@@ -187,30 +183,25 @@ def _table(path: Path, names: list[str], columns: list[Any]) -> None:
 
 def runout_section(runout: Runout, answer: dict[str, Any]) -> tuple[str, str]:
     """A section of the report: title and HTML."""
-    rows = "".join(
-        f'<tr><td class="left">{escape(meaning)}</td>' + "".join(f"<td>{1e3 * answer[key][d]:.2f}</td>" for d in MAIN) + "</tr>"
-        for key, meaning in STATISTICS.items()
-    )
-    named = "".join(
-        f"<tr><td>{g['frequency_Hz']:.2f}</td><td>{g['order']:.3f}</td><td class='left'>{g['direction']}</td>"
-        f"<td>{1e3 * g['amplitude_um']:.2f}</td><td class='left'>{escape(g['name'])}</td>"
-        f"<td class='left'>{escape(' '.join(w for w in (g['bearing'], g['cause']) if w))}</td></tr>"
+    quoted = [[escape(meaning), *(f"{1e3 * answer[key][d]:.2f}" for d in MAIN)] for key, meaning in STATISTICS.items()]
+    lines = [
+        [
+            f"{g['frequency_Hz']:.2f}", f"{g['order']:.3f}", g["direction"], f"{1e3 * g['amplitude_um']:.2f}", escape(g["name"]),
+            escape(" ".join(w for w in (g["bearing"], g["cause"]) if w)),
+        ]
         for g in answer["lines"][:SHOWN]
-    )
+    ]  # fmt: skip
     text = (
         f"<p>{answer['revolutions']} revolutions at {answer['temperature_C']:g} °C and {answer['speed_rpm']:.6g} rpm, bearings {answer['status']}, "
         f"imperfections {answer['imperfections']}. The repeatable part is made of the lines at whole multiples of the turning frequency.</p>"
-        '<div class="scroll"><table><thead><tr><th class="left">nm</th><th>radial (hub x)</th><th>axial</th></tr></thead>'
-        f"<tbody>{rows}</tbody></table></div>"
+        f"{table(('nm', 'radial (hub x)', 'axial'), quoted)}"
         f"{_figure(motion_figure(runout), 'motion', 'Orbit of the hub, and its error motion over the angle of the turning part.')}"
         f"{_figure(spectrum_figure(runout), 'spectrum', 'Amplitude over frequency; a mark is a line fitted at its known frequency.')}"
-        '<div class="scroll"><table><thead><tr><th>Hz</th><th>orders</th><th class="left">direction</th><th>nm</th>'
-        f'<th class="left">line</th><th class="left">cause</th></tr></thead><tbody>{named}</tbody></table></div>'
+        f"{table(('Hz', 'orders', 'direction', 'nm', 'line', 'cause'), lines, (2, 4, 5))}"
     )
     return "Runout", text
 
 
-def _figure(figure: Figure, key: str, caption: str) -> str:
+def _figure(drawn: Figure, key: str, caption: str) -> str:
     with rc_context(STYLE):
-        picture = svg(figure, f"runout-{key}", caption)
-    return f'<figure class="chart wide">{picture}<figcaption>{caption}</figcaption></figure>'
+        return figure(svg(drawn, f"runout-{key}", caption), caption)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
@@ -11,12 +10,11 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from thermospindle.model.cells import cells
 from thermospindle.model.types import Array
 from thermospindle.model.units import MINUTE, RPM
 from thermospindle.report.figures.warmup import figure_png, figure_svg
 from thermospindle.report.text.grid import show_grid
-from thermospindle.report.typeset import minus
+from thermospindle.report.typeset import figure, minus, write_csv
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.warmup import Moment, Warmup, energy
 
@@ -95,11 +93,8 @@ def rows(warmup: Warmup) -> tuple[list[str], list[list[float]]]:
 def write_warmup(warmup: Warmup, folder: Path) -> None:
     """`warmup.csv` (a comment line of provenance, a header with units, all steps) and `warmup.png`."""
     header, body = rows(warmup)
-    with (folder / "warmup.csv").open("w", newline="", encoding="utf-8") as file:
-        file.write("# " + ", ".join(f"{k} {v}" for k, v in provenance(warmup.spindle).items()) + "\n")
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(cells(header))
-        writer.writerows([repr(v) for v in row] for row in body)
+    about = ", ".join(f"{k} {v}" for k, v in provenance(warmup.spindle).items())
+    write_csv(folder / "warmup.csv", header, body, about)
     figure_png(warmup, folder / "warmup.png")
 
 
@@ -176,4 +171,4 @@ def warmup_section(warmup: Warmup) -> tuple[str, str]:
         f"<p>Heat: motor {total['motor']:.1f} J, bearings {total['friction']:.1f} J in; convection {total['convection']:.1f} J out; "
         f"stored {total['stored']:.1f} J.</p>"
     )
-    return "Warm-up", f'{minus(about)}<figure class="chart wide">{figure_svg(warmup)}</figure>'
+    return "Warm-up", minus(about) + figure(figure_svg(warmup))
