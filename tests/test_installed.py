@@ -132,6 +132,11 @@ def test_nothing_but_one_name_and_one_command_lands(installed, tmp_path):
     assert seen.strip() == "[]"
 
 
+def test_pytest_finds_its_plugin(installed, tmp_path):
+    code = "from importlib.metadata import entry_points; print([e.value for e in entry_points(group='pytest11') if e.name == 'thermospindle'])"
+    assert call(installed.python, "-c", code, cwd=tmp_path).strip() == "['thermospindle.plugin']"
+
+
 def test_a_users_own_modules_of_the_same_names_break_nothing(installed, users, spindle):
     """His script imports his and ours; ours finds the shipped scene by its name and gives the number that it gives here."""
     printed = float(call(installed.python, "script.py", cwd=users))

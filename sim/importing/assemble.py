@@ -62,6 +62,9 @@ def read(files: Sequence[Path], form: MappingForm, scene: Spindle | None) -> Rea
         own = settings[c.file].test or plain(c.file.stem)
         if not (c.curves or c.motions or c.modes or c.places or c.coherence or c.questions):
             raise BadInput(f"{c.file}: holds no FRF, no time record, no modes and no geometry")
+        for x in c.curves:
+            if x.value.shape != x.frequency.shape:
+                raise BadInput(f"{c.file}: {x.where}: {x.value.size} values at {x.frequency.size} frequencies; there must be as many")
         if c.curves or c.questions or c.motions:
             curves.setdefault(own, []).extend(_turned(x, settings[c.file]) for x in c.curves)
         coherence.setdefault(own, {}).update(c.coherence)

@@ -118,6 +118,33 @@ def test_arrays_of_numpy_and_matlab(tmp_path):
         np.testing.assert_array_equal(frf.value, FRF.value)
 
 
+def test_values_and_frequencies_of_different_number_are_refused(tmp_path):
+    np.savez(tmp_path / "T20.npz", frequency=FREQUENCY[:-1], H11=FRF.value[0, 0])
+    with pytest.raises(BadInput, match="301 values at 300 frequencies"):
+        bring([tmp_path / "T20.npz"], out=tmp_path / "c")
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_damaged_bytes_end_in_one_sentence(tmp_path, seed):
+    """A byte changed, cut out or doubled anywhere: a campaign or a refusal, and nothing else."""
+    heads, found = columns("real", "(m/s)/N")
+    table(tmp_path / "a.csv", ["Frequency [Hz]", *heads], [FREQUENCY[:40], *(f[:40] for f in found)])
+    np.savez(tmp_path / "b.npz", frequency=FREQUENCY[:40], H=FRF.value[..., :40], response_nodes=FRF.response_nodes, reference_nodes=FRF.reference_nodes)
+    (tmp_path / "c.unv").write_bytes(ascii_58(FREQUENCY, FRF.value[0, 0], 6, True))
+    (tmp_path / "m.toml").write_text(SPINDLE + '[[files]]\nfile = "*"\ntest = "T20"\nunit = "(m/s)/N"\n' + HEAD)
+    random = np.random.default_rng(seed)
+    whole = {f: f.read_bytes() for f in sorted(tmp_path.glob("?.*")) if f.suffix != ".toml"}
+    for k in range(25):
+        for file, data in whole.items():
+            at = int(random.integers(len(data)))
+            file.write_bytes(data[:at] + [b"", b"nan", bytes([random.integers(256)])][k % 3] + data[at + int(random.integers(3)) :])
+            try:
+                bring([file], mapping=tmp_path / "m.toml", out=tmp_path / f"{file.stem}{k}")
+            except BadInput as error:
+                assert str(error)
+            assert not (tmp_path / f"{file.stem}{k}").exists() or (tmp_path / f"{file.stem}{k}" / "campaign.toml").is_file()
+
+
 def test_a_matlab_file_without_h5py_says_what_to_install(tmp_path, monkeypatch):
     import sys
 

@@ -100,6 +100,28 @@ def test_hits_are_found_judged_and_averaged(folder, tmp_path, estimator):
         assert 0.4 < np.sqrt(np.mean(ratio**2)) < 3
 
 
+def test_time_records_of_a_uff_file(tmp_path):
+    """Dataset 58, function type 1: force and responses of three hits one after the other, a file for each kind of channel."""
+    import pyuff
+
+    random = np.random.default_rng(7)
+    base = {"type": 58, "binary": 0, "func_type": 1, "abscissa_spec_data_type": 17, "abscissa_axis_units_lab": "s", "ref_node": 1, "ref_dir": 3, "orddenom_spec_data_type": 0}
+    for _ in range(3):
+        force, answer = hit(random)
+        time = np.arange(len(force)) / RATE
+        channels = [("force.uff", 1, 13, "N", force), ("motion.uff", 1, 11, "m/s", answer[0, 0]), ("motion.uff", 2, 11, "m/s", answer[1, 0])]
+        for name, node, kind, unit, value in channels:
+            told = {"rsp_node": node, "rsp_dir": 3, "ordinate_spec_data_type": kind, "ordinate_axis_units_lab": unit, "x": time, "data": value}
+            pyuff.UFF(str(tmp_path / name)).write_sets(base | told | {"abscissa_inc": 1 / RATE}, mode="add")
+    mapping = MAPPING.replace('file = "hammer*"', 'file = "*.uff"') + "[records]\nband_Hz = [50.0, 1000.0]\n"
+    (tmp_path / "m.toml").write_text(mapping)
+    answer = bring([tmp_path / "force.uff", tmp_path / "motion.uff"], mapping=tmp_path / "m.toml", out=tmp_path / "c")
+    assert "3 of 3 hits" in "\n".join(answer.values["notes"])
+    test = read_campaign(tmp_path / "c").tests[0]
+    model = exact(test.frf.frequency, test.window_decay)[:, :1]
+    assert np.abs(test.frf.value - model).max() < 2e-3 * np.abs(model).max()
+
+
 def test_a_hit_a_row_and_no_hit(tmp_path):
     random = np.random.default_rng(5)
     force, answer = zip(*(hit(random) for _ in range(4)), strict=True)
