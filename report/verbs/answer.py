@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Spindle
@@ -74,7 +74,7 @@ def with_hammer(spindle: Spindle, hits: int | None, level: float | None) -> Spin
 @contextmanager
 def progress_bar(steps: int) -> Iterator[Callable[[str], None]]:
     """A function that takes what has been done, and moves a bar of so many steps on standard error."""
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn())
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn())
     console = Console(stderr=True, markup=False)
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("starting", total=steps)

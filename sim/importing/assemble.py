@@ -60,7 +60,7 @@ def read(files: Sequence[Path], form: MappingForm, scene: Spindle | None) -> Rea
     coherence: dict[str, dict[tuple[End, End], np.ndarray]] = {}
     for c in contents:
         own = settings[c.file].test or plain(c.file.stem)
-        if not (c.curves or c.motions or c.modes or c.places or c.coherence or c.questions):
+        if not (c.curves or c.motions or c.modes or c.places or c.unscaled or c.coherence or c.questions):
             raise BadInput(f"{c.file}: holds no FRF, no time record, no modes and no geometry")
         for x in c.curves:
             if x.value.shape != x.frequency.shape:

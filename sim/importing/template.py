@@ -73,6 +73,12 @@ def _condition(test: str) -> list[str]:
     return lines
 
 
+def _told(place: tuple[float, ...] | None, unscaled: tuple[float, ...] | None) -> str:
+    if place:
+        return "as the file has it; "
+    return f"the file has {', '.join(f'{v:g}' for v in unscaled)} in a unit that it does not name; " if unscaled else ""
+
+
 def _points(found: Read, scene: Spindle | None) -> Iterable[list[str]]:
     """A [[points]] for every end that no point is called by, nodes and places as files have them."""
     ends: dict[str, End] = {}
@@ -80,6 +86,7 @@ def _points(found: Read, scene: Spindle | None) -> Iterable[list[str]]:
         if end.label:
             ends.setdefault(end.label, end)
     places = {n: p for c in found.contents for n, p in c.places.items()}
+    unscaled = {n: p for c in found.contents for n, p in c.unscaled.items()}
     taken = set(found.points)
     bodies = f"    # a body of the scene: {', '.join(body_names(scene))}" if scene else "    # the body of the scene that it is on"
     for label, end in ends.items():
@@ -92,6 +99,6 @@ def _points(found: Read, scene: Spindle | None) -> Iterable[list[str]]:
         yield [
             "", "[[points]]", f"node = {node}", f"name = {toml(name)}    # at most ten characters", f"called = [{toml(label)}]",
             f'body = "?"{bodies}',
-            f"position_mm = {toml(where)}    # " + ("as the file has it; " if place else "") + "spindle axis along z, as in the scene",
+            f"position_mm = {toml(where)}    # " + _told(place, unscaled.get(end.node)) + "spindle axis along z, as in the scene",
             f"direction = {toml(end.direction or '?')}    # +X -X +Y -Y +Z -Z: the way the sensor or hammer looks",
         ]  # fmt: skip

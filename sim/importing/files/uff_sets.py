@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from thermospindle.sim.campaign.uff import FORCE, KINDS, read_uff
+from thermospindle.sim.campaign.uff import AXIS, FORCE, KINDS, STANDARD_ERROR, read_uff
 from thermospindle.sim.importing import units
 from thermospindle.sim.importing.files.labels import end
 from thermospindle.sim.importing.mapping import FileForm
@@ -30,7 +30,10 @@ def from_uff(file: Path, settings: FileForm) -> Content:
     modes: list[ModeLine] = []
     questions: list[Question] = []
     coherence: dict[tuple[End, End], np.ndarray] = {}
+    errors: dict[tuple[End, End], np.ndarray] = {}
+    axis: np.ndarray | None = None
     places: dict[int, tuple[float, float, float]] = {}
+    unscaled: dict[int, tuple[float, float, float]] = {}
     left: dict[str, int] = {}
     for number, record in enumerate(sets, 1):
         where = f"set {number}"
@@ -40,7 +43,9 @@ def from_uff(file: Path, settings: FileForm) -> Content:
         if kind == 58:
             function = record["func_type"]
             ends = _end(record, "rsp", settings.response), _end(record, "ref", settings.reference)
-            if function == FRF:
+            if max(abs(int(record["rsp_dir"])), abs(int(record["ref_dir"]))) > 3:
+                left["function in rotation"] = left.get("function in rotation", 0) + 1
+            elif function == FRF:
                 curve, asked = _curve(file, where, record, ends, system, settings)
                 curves.append(curve)
                 questions += asked
@@ -48,19 +53,25 @@ def from_uff(file: Path, settings: FileForm) -> Content:
                 coherence[ends] = np.asarray(np.real(record["data"]), float)
             elif function == RECORD:
                 motions.append(_motion(file, where, record, ends))
-            elif record["id2"].strip() not in ("standard error", "frequency axis"):
+            elif record["id2"].strip() == STANDARD_ERROR:  # of our own files, in the unit of the FRF
+                errors[ends] = np.asarray(np.real(record["data"]), float)
+            elif record["id2"].strip() == AXIS:
+                axis = np.asarray(np.real(record["data"]), float)
+            else:
                 name = LEFT.get(function, f"function of type {function}")
                 left[name] = left.get(name, 0) + 1
         elif kind in (15, 2411):
             scale = 1 / float(system["length"]) if system else 1.0
             nodes, xyz = _nodes(record)
-            places |= {int(n): tuple(float(v) * scale for v in p) for n, p in zip(nodes, xyz, strict=True)}  # type: ignore[misc]
+            told = {int(n): (float(x) * scale, float(y) * scale, float(z) * scale) for n, (x, y, z) in zip(nodes, xyz, strict=True)}
+            (places if system else unscaled).update(told)
         elif kind in (55, 2414) and (mode := _mode(record)) is not None:
             modes.append(mode)
         elif kind not in (151, 164, 18, 82, 2412):
             left[f"dataset {kind}"] = left.get(f"dataset {kind}", 0) + 1
+    curves = [replace(c, sd=errors.get((c.response, c.reference)), frequency=c.frequency if axis is None else axis) for c in curves]
     notes = [f"{file.name}: {count} x {name} left out: not used by a campaign" for name, count in left.items()]
-    return Content(file, tuple(curves), _joined(motions), tuple(modes), places, coherence, tuple(notes), tuple(questions))
+    return Content(file, tuple(curves), _joined(motions), tuple(modes), places, unscaled, coherence, tuple(notes), tuple(questions))
 
 
 def _end(record: Mapping[str, Any], side: str, told: str | int | None) -> End:

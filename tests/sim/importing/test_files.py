@@ -158,7 +158,8 @@ def test_uff_binary_and_ascii(tmp_path):
     write_frf(tmp_path / "T20.uff", FRF, POINTS, "title", "test")
     frf = imported(tmp_path, "", tmp_path / "T20.uff")
     np.testing.assert_array_equal(frf.value, FRF.value)
-    assert frf.coherence is not None
+    np.testing.assert_array_equal(frf.sd, FRF.sd)
+    np.testing.assert_array_equal(frf.coherence, FRF.coherence)
     (tmp_path / "b").mkdir()
     (tmp_path / "b" / "a.unv").write_bytes(ascii_58(FREQUENCY, FRF.value[0, 0], 6, True))
     frf = imported(tmp_path / "b", '[[files]]\nfile = "a.unv"\ntest = "T20"\n', tmp_path / "b" / "a.unv")

@@ -72,8 +72,15 @@ def test_modes_and_units_of_real_uff():
     assert content(UFF / "dataset2414_node.unv", FileForm(file="x")).modes[0].frequency == pytest.approx(23383.2)
     [curve] = content(UFF / "dataset151_164_58_55.unv", FileForm(file="x")).curves
     assert curve.value[0].real == pytest.approx(1.73331e-4 * 0.224808943 / 39.3700787, rel=1e-6)
-    places = content(UFF / "dataset15.unv", FileForm(file="x")).places
-    assert places[4] == pytest.approx((5.0976e-15, 83.25, 50.0))
+    geometry = content(UFF / "dataset15.unv", FileForm(file="x"))
+    assert geometry.places == {}
+    assert geometry.unscaled[4] == pytest.approx((5.0976e-15, 83.25, 50.0))
+
+
+def test_geometry_without_a_unit_is_shown_and_not_taken(tmp_path):
+    bring([UFF / "dataset15.unv", UFF / "dataset58_ufb.ufb"], mapping=tmp_path / "m.toml")
+    text = (tmp_path / "m.toml").read_text()
+    assert 'position_mm = ["?", "?", "?"]    # the file has 51.619, 51.619, 50 in a unit that it does not name' in text
 
 
 def test_magnitudes_of_a_rotor_rig_make_modes_and_lines_of_its_speed_do_not(tmp_path):
