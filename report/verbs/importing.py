@@ -38,7 +38,7 @@ def bring(
         raise BadInput(f"--out {out}: is not empty; a campaign is written to a new or empty folder")
     spindle = with_effects(scene, effect_files)[0] if scene is not None else None
     form = read_mapping(None if fresh else mapping)
-    found = read(files, form, spindle)
+    found = read(files, form, spindle, mapping)
     if fresh and mapping is not None:
         with whole(Path(mapping)) as file:
             file.write_text(template(found, files, spindle), encoding="utf-8")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,7 @@ from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Test
 from thermospindle.sim.importing import units
 from thermospindle.sim.importing.files.reading import content
 from thermospindle.sim.importing.frfs import Placed, frf_of
-from thermospindle.sim.importing.mapping import FileForm, MappingForm, TestForm, settings_of
+from thermospindle.sim.importing.mapping import FileForm, MappingForm, TestForm, fits, settings_of
 from thermospindle.sim.importing.measured import Content, Curve, End, ModeLine, Motion, Question, listed, words_of
 from thermospindle.sim.importing.peaks import from_peaks
 from thermospindle.sim.importing.places import place, points_of, unplaced
@@ -42,13 +41,13 @@ class Read:
         return list(dict.fromkeys([*self.curves, *self.modes]))
 
 
-def read(files: Sequence[Path], form: MappingForm, scene: Spindle | None) -> Read:
-    """Read every file as the mapping says; what it does not say is among the questions. Raises `BadInput` for damaged files."""
+def read(files: Sequence[Path], form: MappingForm, scene: Spindle | None, mapping: Path | None = None) -> Read:
+    """Read every file as the mapping (`form`, of the file `mapping`) says; what it does not say is among the questions. Raises `BadInput` for damaged files."""
     if len({f.resolve() for f in files}) < len(files):
         raise BadInput(f"{listed(f.name for f in files)}: a file is named twice")
-    unused = [t.file for t in form.files if not any(settings_of(MappingForm(files=[t]), f).model_fields_set - {"file", "columns", "leave_out"} or _fits(t, f) for f in files)]
+    unused = [t.file for t in form.files if not any(fits(t, f) for f in files)]
     if unused:
-        raise BadInput(f"mapping: files: file = {unused[0]!r}: is none of {listed(f.name for f in files)}")
+        raise BadInput(f"{mapping}: files: file = {unused[0]!r}: is none of {listed(f.name for f in files)}")
     settings = {f: settings_of(form, f) for f in files}
     contents = [content(f, settings[f]) for f in files]
     points, questions = points_of(form, scene)
@@ -93,7 +92,7 @@ def read(files: Sequence[Path], form: MappingForm, scene: Spindle | None) -> Rea
     questions += unplaced(ends, points, scene)
     questions += _units(own_curves, settings)
     found = Read(tuple(contents), curves, modes, window, ends, points, tuple(notes), ())
-    questions += _conditions(found, form, scene)
+    questions += _conditions(found, form, scene, mapping)
     return Read(tuple(contents), curves, modes, window, ends, points, tuple(notes), _together(questions))
 
 
@@ -103,10 +102,6 @@ def _together(questions: Sequence[Question]) -> tuple[Question, ...]:
     for q in questions:
         about.setdefault((q.key, q.text, q.names), []).append(q.about)
     return tuple(Question(", ".join(dict.fromkeys(of)), *same) for same, of in about.items())
-
-
-def _fits(table: FileForm, file: Path) -> bool:
-    return fnmatchcase(file.name, table.file) or fnmatchcase(str(file), table.file)
 
 
 def plain(stem: str) -> str:
@@ -193,13 +188,13 @@ def _a(quantity: str) -> str:
     return f"an {quantity}" if quantity == "accelerance" else f"a {quantity}"
 
 
-def _conditions(found: Read, form: MappingForm, scene: Spindle | None) -> list[Question]:
+def _conditions(found: Read, form: MappingForm, scene: Spindle | None, mapping: Path | None) -> list[Question]:
     """What tests and the campaign as a whole leave open."""
     forms = {t.id: t for t in form.tests}
     questions = []
     for id_ in forms:
         if id_ not in found.tests and found.tests:
-            raise BadInput(f"mapping: tests: id = {id_!r}: no file makes such a test; there are {listed(found.tests)}")
+            raise BadInput(f"{mapping}: tests: id = {id_!r}: no file makes such a test; there are {listed(found.tests)}")
     for key, text in (("temperature_C", "the temperature of the spindle, C,"), ("speed_rpm", "the speed, rpm (0 at rest),")):
         missing = [t for t in found.tests if t not in forms or getattr(forms[t], key) is None]
         if missing:

@@ -128,11 +128,16 @@ def _check_point(path: Path, point: MadePoint) -> None:
         raise BadInput(first_error(f"{path}: points.{point.node}", full, PointForm, error)) from None
 
 
+def fits(table: FileForm, file: Path) -> bool:
+    """Whether a table of the mapping is about a file, by its name or its path."""
+    return fnmatchcase(file.name, table.file) or fnmatchcase(str(file), table.file)
+
+
 def settings_of(form: MappingForm, file: Path) -> FileForm:
     """What the mapping says of one file, all tables that fit it taken together, later ones first."""
     told: dict[str, Any] = {"file": file.name}
     for table in form.files:
-        if fnmatchcase(file.name, table.file) or fnmatchcase(str(file), table.file):
+        if fits(table, file):
             own = table.model_dump(exclude_unset=True)
             own["columns"] = {**told.get("columns", {}), **own.get("columns", {})}
             own["leave_out"] = [*told.get("leave_out", []), *own.get("leave_out", [])]

@@ -8,7 +8,7 @@ are Bendat & Piersol, *Random Data* (2010), ch. 6; Rocklin, Crowley and Vold (IM
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -213,8 +213,3 @@ def _band(force: Array, step: float) -> tuple[float, float]:
 def _contact(force: Array, step: float) -> float:
     """Duration (s) of the hammer's contact."""
     return float(np.count_nonzero(np.abs(force) > TOUCHING * np.abs(force).max())) * step
-
-
-def in_si(curve: Curve, factor: float) -> Curve:
-    """A curve with its values times `factor`, its standard errors too."""
-    return replace(curve, value=curve.value * factor, sd=None if curve.sd is None else curve.sd * abs(factor))

@@ -17,7 +17,7 @@ LARGEST_FILE = 400e6  # bytes
 
 @dataclass(frozen=True, eq=False)
 class TextTable:
-    """`heading` and `unit` of each column ("" where there is none), `values` (rows, columns), `words`: cells that are no numbers."""
+    """`heading` and `unit` of each column ("" where there is none), `values` (rows, columns), real or complex."""
 
     file: Path
     heading: tuple[str, ...]

@@ -339,3 +339,37 @@ def test_points_on_a_flexible_shaft_are_told_by_its_name(tmp_path):
     (tmp_path / "m.toml").write_text((tmp_path / "m.toml").read_text().replace(f'body = "{shaft.name}"', 'body = "nowhere"'))
     with pytest.raises(Unanswered, match=f"a body of the scene mk7702 .*{shaft.name}"):
         bring([file], mapping=tmp_path / "m.toml", scene="mk7702", out=tmp_path / "d")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ('[[files]]\nfile = "other.csv"\n', r"m.toml: files: file = 'other.csv': is none of T20.csv"),
+        ('[[tests]]\nid = "T30"\n', r"m.toml: tests: id = 'T30': no file makes such a test; there are T20"),
+        ('[[files]]\nfile = "*"\nunits = "g/N"\n', "did you mean unit"),
+        ("[[points]]\nnode = 1\n[[points]]\nnode = 1\n", "points: node = 1 stands 2 times"),
+        ('[[points]]\nnode = 1\nname = "much too long a name"\n', "points.1: name = 'much too long a name'"),
+        ("[records]\nband_Hz = [1.0]\n", "records.band_Hz"),
+    ],
+)
+def test_a_wrong_mapping_is_one_sentence(tmp_path, wrong, said):
+    heads, found = columns("real", "(m/s)/N")
+    file = table(tmp_path / "T20.csv", ["Frequency", *heads], [FREQUENCY, *found])
+    (tmp_path / "m.toml").write_text(wrong)
+    with pytest.raises(BadInput, match=said):
+        bring([file], mapping=tmp_path / "m.toml", out=tmp_path / "c")
+
+
+def test_standard_errors_of_coherence_and_averages(tmp_path):
+    """|H| sqrt((1 - g2) / (g2 n)): a tenth of it with a hundred times the hits."""
+    heads, found = columns("real", "(m/s)/N")
+    g = np.full(len(FREQUENCY), 0.9)
+    heads += [f"coherence({r},{q})" for r, q in PAIRS]
+    file = table(tmp_path / "T20.csv", ["Frequency", *heads], [FREQUENCY, *found, *[g] * len(PAIRS)])
+    sizes = []
+    for n in (4, 400):
+        (tmp_path / "m.toml").write_text(SPINDLE + HEAD.replace('id = "T20"', f'id = "T20"\naverages = {n}'))
+        bring([file], mapping=tmp_path / "m.toml", out=tmp_path / f"c{n}")
+        sizes.append(read_campaign(tmp_path / f"c{n}").tests[0].frf.sd)
+    np.testing.assert_allclose(sizes[0], np.abs(FRF.value) * np.sqrt(0.1 / 0.9 / 4), rtol=1e-6)
+    np.testing.assert_allclose(sizes[1], sizes[0] / 10, rtol=1e-6)
