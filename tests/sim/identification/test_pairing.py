@@ -13,10 +13,12 @@ from thermospindle.sim.identification.pairing import (
     FOLLOWED_BY_KIND,
     IDENTIFIED,
     MEASURED,
+    REPEATED,
     ModeSet,
     Policy,
     cost,
     in_order,
+    kept_in_order,
     mac,
     pairs,
     partners,
@@ -127,3 +129,23 @@ def test_close_modes_keep_their_order_unless_their_shapes_are_trusted():
     assert in_order(by_shape, a, b, close=0.03, trusted=0.3).tolist() == [1, 0, 2]
     assert in_order(by_shape, a, b, close=0.005).tolist() == [1, 0, 2]
     assert by_shape.tolist() == [1, 0, 2]  # the argument stays as it was
+
+
+def test_a_pair_that_has_come_apart_is_not_put_in_order():
+    """Close in both sets, shapes that turned in their plane are chance and the order of frequencies counts; apart in one, shapes count."""
+    a = known([1000.0, 1001.0], np.eye(2), ["tilt", "tilt"])
+    close, apart = (known([1000.0, f], np.eye(2), ["tilt", "tilt"]) for f in (1002.0, 1100.0))
+    crossed = np.array([1, 0])
+    assert kept_in_order(crossed, a, close, close=0.03).tolist() == [0, 1]
+    assert kept_in_order(crossed, a, apart, close=0.03).tolist() == [1, 0]
+    axial = known([1000.0, 1002.0], np.eye(2), ["axial", "tilt"])
+    assert kept_in_order(crossed, a, axial, close=0.03).tolist() == [1, 0]
+
+
+def test_repeats_ask_for_a_likeness_of_shape():
+    """A MAC of 0.36 makes two modes the same, of 0.25 not; nor does any far away in frequency."""
+    a = known([1000.0], np.array([[1.0, 0.0]]))
+    like, unlike = (known([1000.0], np.array([[c, np.sqrt(1 - c**2)]])) for c in (0.6, 0.5))
+    assert pairs(a, like, REPEATED).tolist() == [[0, 0]]
+    assert pairs(a, unlike, REPEATED).tolist() == []
+    assert pairs(a, known([1400.0], np.array([[1.0, 0.0]])), REPEATED).tolist() == []
