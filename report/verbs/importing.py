@@ -30,7 +30,7 @@ def bring(
 
     Raises `Unanswered` with everything that the files and the mapping leave open.
     """
-    files = [Path(f) for f in files]
+    files = [file for given in files for file in _named(Path(given))]
     fresh = mapping is not None and not Path(mapping).exists()
     if out is None and not fresh:
         raise BadInput("--out: import needs the campaign folder to write, or --mapping with a new file")
@@ -50,6 +50,18 @@ def bring(
         raise Unanswered(error.head, error.items, f"{mapping} is written: {error.tail}" if fresh else error.tail) from None
     write_campaign(campaign, Path(out))
     return _written(campaign, Path(out), notes, None if scene is None else Path(scene))
+
+
+def _named(path: Path) -> list[Path]:
+    """The files that a name means: itself, or those of a pattern that no shell has expanded."""
+    if path.is_dir():
+        raise BadInput(f"{path}: is a folder; name its files, as in {path}/*.csv")
+    if path.exists() or not set("*?[") & set(path.name):
+        return [path]
+    found = sorted(path.parent.glob(path.name))
+    if not found:
+        raise BadInput(f"{path}: no file is called so")
+    return found
 
 
 def _form_written(mapping: Path, open_: list[str]) -> Answer:

@@ -341,6 +341,17 @@ def test_points_on_a_flexible_shaft_are_told_by_its_name(tmp_path):
         bring([file], mapping=tmp_path / "m.toml", scene="mk7702", out=tmp_path / "d")
 
 
+def test_patterns_and_folders(tmp_path):
+    """A pattern that no shell expanded is expanded; a folder is told from a file."""
+    (tmp_path / "a.csv").write_text("frequency,mode\n1000,1\n")
+    (tmp_path / "b.csv").write_text("frequency,mode\n1001,1\n")
+    assert len(bring([tmp_path / "*.csv"], mapping=tmp_path / "m.toml").values["open"]) == 4
+    with pytest.raises(BadInput, match=r"is a folder; name its files"):
+        bring([tmp_path], out=tmp_path / "c")
+    with pytest.raises(BadInput, match=r"\*\.txt: no file is called so"):
+        bring([tmp_path / "*.txt"], out=tmp_path / "c")
+
+
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [

@@ -7,7 +7,7 @@ import csv
 import numpy as np
 import pytest
 
-from tests.conftest import DATA
+from tests.conftest import DATA, SCENE
 from thermospindle.model.errors import BadInput, Unanswered
 from thermospindle.report.verbs.importing import bring
 from thermospindle.sim.campaign.campaign import read_campaign
@@ -118,3 +118,22 @@ def test_a_lone_column_of_complex_numbers(tmp_path):
     with files[0].open() as stream:
         rows = [complex(row[0]) for row in csv.reader(stream)]
     np.testing.assert_array_equal(frf.value[0, 0], rows[1:])
+
+
+def test_the_tutorial_files_become_the_campaign_they_are_of(tmp_path):
+    """Seven UFF files of another program, conditions read off their names into the form, which needs no more than to be looked at."""
+    files = sorted((DATA / "foreign_bond").glob("*.uff"))
+    answer = bring(files, mapping=tmp_path / "lab.toml", scene=SCENE)
+    assert len(answer.values["open"]) == 2
+    assert "?" not in (tmp_path / "lab.toml").read_text().split("# ------")[0].split("\n", 3)[3]
+    bring(files, mapping=tmp_path / "lab.toml", scene=SCENE, out=tmp_path / "campaign")
+    found, own = read_campaign(tmp_path / "campaign"), read_campaign(DATA / "foreign_bond")
+    by_id = {t.id: t for t in own.tests}
+    assert {t.id for t in found.tests} == set(by_id)
+    for a in found.tests:
+        b = by_id[a.id]
+        assert (a.temperature, a.speed) == (b.temperature, b.speed)
+        assert a.frf.response_nodes == b.frf.response_nodes
+        np.testing.assert_array_equal(a.frf.value, b.frf.value)
+        np.testing.assert_allclose(a.frf.frequency, b.frf.frequency, rtol=1e-6)
+    assert [p.node for p in found.points] == [p.node for p in own.points]
