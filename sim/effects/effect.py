@@ -189,10 +189,6 @@ class Effect:
     def typical(self) -> dict[str, float]:
         return {p.name: p.typical for p in self.parameters}
 
-    def typical_list(self) -> list[float]:
-        """Typical values in the order of the parameters."""
-        return [p.typical for p in self.parameters]
-
 
 HOOKS: Mapping[str, type] = {
     "spindle": Spindle,
