@@ -59,7 +59,7 @@ def _discrepancy(found: Ladder) -> str:
     if not missed:
         return "A constant discrepancy of the model is not asked for: what is missing changes with the conditions, or nothing is."
     return (
-        f"The model is wrong at all conditions alike, in {' and in '.join(missed)} or so; where that is granted, the error is {r.error:.2f} instead of "
+        f"Without an effect the data ask for a model that is wrong at all conditions alike, in {' and in '.join(missed)} or so; where that is granted, the error is {r.error:.2f} instead of "
         f"{below.error:.2f}, tolerances lie {r.stretch:.2f} instead of {below.stretch:.2f} standard deviations from the drawing (ln evidence {evidence(r.evidence - below.evidence, '+')})."
     )
 
