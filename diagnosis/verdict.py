@@ -25,7 +25,7 @@ from thermospindle.sim.campaign.campaign import Campaign, Noise, Test
 from thermospindle.sim.effects import CATALOGUE, of_scene, usable
 from thermospindle.sim.effects.effect import Effect
 
-STEPS = 5  # of progress, beside one a test
+STEPS = 6  # of progress, beside one a test
 
 
 @dataclass(frozen=True, eq=False)

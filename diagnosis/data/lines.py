@@ -5,6 +5,7 @@ lines is replaced by the values of its least-squares polynomial of degree p - 1 
 By discrete orthogonality (Gautschi, *Orthogonal Polynomials*, 2004, Theorem 1.31 and 1.4.1) these values have independent errors of
 variance sd^2 / weight, the weights adding up to k: nothing is lost, and the model is evaluated at p frequencies instead of k. A block is
 divided until what its polynomial leaves is noise; where poles are sharp, single lines remain. What blocks leave also tells the noise.
+Under an exponential window the noise of neighbouring lines is correlated, which `window` takes into account where the lines show it.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import nnls
 
+from thermospindle.diagnosis.data.window import left_by, neighbours, windowed
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.campaign.campaign import Noise, Test
@@ -26,6 +28,7 @@ LONGEST = 160  # lines in a block
 BEYOND = 4  # polynomials of the next degrees, where what a block lacks shows first
 LACK_OF_FIT = 4.0  # standard deviations of a block's chi2, and of that of the next degrees alone, from which it is divided
 LINES_THAT_SCATTER = 50  # of an FRF at least, from whose neighbours its noise can be told
+RISES = (0, 2, 4)  # powers of frequency in which noise of largest is told: a hammer's force falls, and noise over it rises
 ENOUGH = 200  # degrees of freedom from which the scatter within blocks tells the noise
 REPEATS, CAMPAIGN, SCATTER = "repeats", "the campaign", "scatter of neighbouring lines"
 KNOWN = (REPEATS, CAMPAIGN)
@@ -50,9 +53,20 @@ class LineData:
     raw: int
 
     @property
+    def duration(self) -> float:
+        """Length (s) of the record that lines so far apart are the transform of."""
+        assert self.test.frf is not None
+        return record_length(self.test.frf)
+
+    @property
     def count(self) -> int:
         """Real numbers in the likelihood."""
         return 2 * self.value.size
+
+
+def record_length(frf: Frf) -> float:
+    """Length (s) of the record that lines so far apart are the discrete Fourier transform of."""
+    return 1 / float(np.median(np.diff(frf.frequency))) if len(frf.frequency) > 1 else np.inf
 
 
 def line_data(test: Test, condition: Condition, stated: Noise | None, expected: Noise) -> LineData:
@@ -62,30 +76,32 @@ def line_data(test: Test, condition: Condition, stated: Noise | None, expected: 
     assert frf is not None
     use = frf.frequency > 0
     frequency, value = frf.frequency[use], frf.value[:, :, use]
-    sd, noise_from = _noise(frf, value, use, stated, expected)
+    damped = test.window_decay * record_length(frf)
+    damped = damped if windowed(value, damped) else 0.0
+    sd, noise_from = _noise(frf, value, use, stated, expected, damped)
     least = SILENT * float(np.abs(value).max())  # where symmetry forbids an answer there is rounding alone
     sd = np.maximum(sd, least)
-    known, blocks = sd if noise_from in KNOWN else None, _blocks(value, sd)
-    seen = _within_blocks(value, blocks)
+    known, blocks = sd if noise_from in KNOWN else None, _blocks(value, sd, damped)
+    seen = _within_blocks(value, blocks, damped)
     if seen is None and len(frequency) > LINES_THAT_SCATTER:  # noise stated too small divides every block to single lines
-        blocks = _blocks(value, np.maximum(sd, _smooth_sd(value, scatter(value))))
-        seen = _within_blocks(value, blocks)
+        blocks = _blocks(value, np.maximum(sd, _smooth_sd(value, scatter(value) / np.sqrt(neighbours(damped)))), damped)
+        seen = _within_blocks(value, blocks, damped)
     for _ in range(2):
         if seen is None:
             break
         sd_seen = np.maximum(np.sqrt(seen), least)
         if known is not None and np.sqrt(np.mean(sd_seen**2 / known**2)) < CONFIRMED:
-            sd, blocks = known, _blocks(value, known)
+            sd, blocks = known, _blocks(value, known, damped)
             break
         sd = sd_seen if known is None else np.maximum(known, sd_seen)
         noise_from = SCATTER if known is None else noise_from
-        blocks = _blocks(value, sd)
-        seen = _within_blocks(value, blocks)
-    at, kept, error = _compressed(frequency, value, sd, blocks)
+        blocks = _blocks(value, sd, damped)
+        seen = _within_blocks(value, blocks, damped)
+    at, kept, error = _compressed(frequency, value, sd, blocks, damped)
     return LineData(test, condition, at, kept, error, frf.quantity, noise_from, len(frequency))
 
 
-def _noise(frf: Frf, value: ComplexArray, use, stated: Noise | None, expected: Noise) -> tuple[Array, str]:
+def _noise(frf: Frf, value: ComplexArray, use, stated: Noise | None, expected: Noise, damped: float) -> tuple[Array, str]:
     if frf.sd is not None and np.all(np.isfinite(frf.sd)):
         return _smooth_sd(value, frf.sd[:, :, use]), REPEATS
     if stated is not None:
@@ -93,7 +109,7 @@ def _noise(frf: Frf, value: ComplexArray, use, stated: Noise | None, expected: N
     seen = scatter(value) if value.shape[-1] > LINES_THAT_SCATTER else None
     if seen is None:
         return noise_model(value, expected.of_value, expected.of_largest), "the scene's measuring accuracy"
-    return _smooth_sd(value, seen), SCATTER
+    return _smooth_sd(value, seen / np.sqrt(neighbours(damped))), SCATTER
 
 
 def _smooth_sd(value: ComplexArray, sd: Array) -> Array:
@@ -117,7 +133,7 @@ def _basis(k: int, p: int = NODES) -> tuple[Array, Array, Array]:
     return _at_nodes(x, k, p), nodes + (k - 1) / 2, weights
 
 
-def _blocks(value: ComplexArray, sd: Array) -> list[tuple[int, int]]:
+def _blocks(value: ComplexArray, sd: Array, damped: float) -> list[tuple[int, int]]:
     """Ranges of lines [first, after) whose polynomial leaves nothing but noise, from the whole band down by halves."""
     n, found = value.shape[-1], []
     parts = np.linspace(0, n, n // LONGEST + 2).astype(int)
@@ -132,7 +148,11 @@ def _blocks(value: ComplexArray, sd: Array) -> list[tuple[int, int]]:
         v, variance = value[:, :, first:after], sd[:, :, first:after] ** 2
         left = v - (v @ q[:, :NODES]) @ q[:, :NODES].T
         beyond = np.abs(v @ q[:, NODES:]) ** 2 / (variance @ q[:, NODES:] ** 2)
-        if _lacking(np.abs(left) ** 2 / variance, left.shape[0] * left.shape[1] * (k - NODES)) or _lacking(beyond, beyond.size):
+        _, rest, spread = left_by(q[:, :NODES], damped)
+        following, _, _ = left_by(q[:, NODES:], damped)
+        frfs = left.shape[0] * left.shape[1]
+        whole = _lacking(np.abs(left) ** 2 / variance, frfs * rest, frfs * spread)
+        if whole or _lacking(beyond, frfs * following.sum(), frfs * (following**2).sum()):
             middle = (first + after) // 2
             open_ranges += [(first, middle), (middle, after)]
         else:
@@ -140,18 +160,19 @@ def _blocks(value: ComplexArray, sd: Array) -> list[tuple[int, int]]:
     return sorted(found)
 
 
-def _lacking(squares: Array, freedom: int) -> bool:
-    return float(squares.sum()) > freedom + LACK_OF_FIT * np.sqrt(freedom)
+def _lacking(squares: Array, mean: float, variance: float) -> bool:
+    return float(squares.sum()) > mean + LACK_OF_FIT * np.sqrt(variance)
 
 
-def _within_blocks(value: ComplexArray, blocks: list[tuple[int, int]]) -> Array | None:
+def _within_blocks(value: ComplexArray, blocks: list[tuple[int, int]], damped: float) -> Array | None:
     """Noise variances (n_resp, n_ref, n) from what the polynomials of all blocks leave, as shares of |H|^2 and of the largest |H|^2 to that
     hammer, reference by reference; None where too few degrees of freedom are left."""
     size = np.abs(value) ** 2
-    largest = np.broadcast_to(size.max(axis=(0, 2), keepdims=True), size.shape)
+    n = size.shape[-1]
+    rising = [np.linspace(0, 1, n) ** power for power in RISES]
     variance = np.empty(size.shape)
     for j in range(value.shape[1]):
-        rows, seen, freedom = [], [], []
+        rows, seen, freedom, largest = [], [], [], float(size[:, j].max())
         for first, after in blocks:
             k = after - first
             if k <= NODES + 1:
@@ -159,15 +180,16 @@ def _within_blocks(value: ComplexArray, blocks: list[tuple[int, int]]) -> Array 
             q, _, _ = _basis(k)
             v = value[:, j, first:after]
             left = v - (v @ q) @ q.T
-            seen.append(np.sum(np.abs(left) ** 2, axis=1) / (k - NODES))
-            rows.append(np.stack([size[:, j, first:after].mean(axis=1), largest[:, j, 0]], axis=1))
+            seen.append(np.sum(np.abs(left) ** 2, axis=1) / left_by(q, damped)[1])
+            floor = [np.full(len(v), largest * r[first:after].mean()) for r in rising]
+            rows.append(np.stack([size[:, j, first:after].mean(axis=1), *floor], axis=1))
             freedom.append(np.full(len(v), float(k - NODES)))
         if sum(f.sum() for f in freedom) < ENOUGH:
             return None
         a, y, w = np.concatenate(rows), np.concatenate(seen), np.concatenate(freedom)
-        variance[:, j] = np.maximum(_gamma_fit(a, y, w) @ np.stack([size[:, j], largest[:, j]]).reshape(2, -1), 1e-14 * largest[0, j, 0]).reshape(
-            size[:, j].shape
-        )
+        share = _gamma_fit(a, y, w)
+        floor_of = largest * np.sum([c * r for c, r in zip(share[1:], rising, strict=True)], axis=0)
+        variance[:, j] = np.maximum(share[0] * size[:, j] + floor_of, 1e-14 * largest)
     return variance
 
 
@@ -181,7 +203,9 @@ def _gamma_fit(columns: Array, seen: Array, freedom: Array) -> Array:
     return share
 
 
-def _compressed(frequency: Array, value: ComplexArray, sd: Array, blocks: list[tuple[int, int]]) -> tuple[Array, ComplexArray, Array]:
+def _compressed(
+    frequency: Array, value: ComplexArray, sd: Array, blocks: list[tuple[int, int]], damped: float
+) -> tuple[Array, ComplexArray, Array]:
     at, kept, error = [], [], []
     for first, after in blocks:
         k = after - first
@@ -195,8 +219,9 @@ def _compressed(frequency: Array, value: ComplexArray, sd: Array, blocks: list[t
         polynomials = _at_nodes(nodes - (k - 1) / 2, k)  # (p nodes, p polynomials)
         at.append(np.interp(nodes, np.arange(k), frequency[own]))
         kept.append((value[:, :, own] @ q) @ polynomials.T)
-        variance = (sd[:, :, own] ** 2 @ q**2) @ (polynomials**2).T  # equal noise gives sd^2 / weight
-        error.append(np.sqrt(np.maximum(variance, (sd[:, :, own] ** 2).min(axis=-1, keepdims=True) / weights)))
+        shares, _, _ = left_by(q, damped)
+        variance = (sd[:, :, own] ** 2 @ q**2 * shares) @ (polynomials**2).T  # equal white noise gives sd^2 / weight
+        error.append(np.sqrt(np.maximum(variance, shares.min() * (sd[:, :, own] ** 2).min(axis=-1, keepdims=True) / weights)))
     return np.concatenate(at), np.concatenate(kept, axis=-1), np.concatenate(error, axis=-1)
 
 

@@ -3,11 +3,15 @@
 =========  ========================================================================================================
 nuisance   build tolerances, measuring errors, and the model's own constant discrepancy
 model      residuals of every test in standard errors, with exact derivatives
+response   FRFs at the lines of a test, with what their derivatives need
+mode_residual  the residual of a table of modes
+prior      priors at reference widths, or at those learned
 mechanism  what an effect changes, and its law as a prior over conditions
 freeform   what would have to drift where nobody names a cause
 fit        tempered Gauss-Newton with priors
 evidence   Laplace evidence with everything of unknown size learned
-search     screening, fits, pairs: the evidence of every explanation
+screening  what a mechanism promises beside a fitted model
+search     fits, pairs: the evidence of every explanation
 verdict    posterior probabilities, and the answer with the least expected loss
 next_test  which test would decide between the explanations that survive
 =========  ========================================================================================================

@@ -21,8 +21,8 @@ from scipy.special import log_ndtr, logsumexp
 
 from thermospindle.diagnosis.inference import nuisance as kinds_of
 from thermospindle.diagnosis.inference.fit import Fit
-from thermospindle.diagnosis.inference.mechanism import size_covariance
 from thermospindle.diagnosis.inference.model import CampaignModel
+from thermospindle.diagnosis.inference.prior import Learned, covariance, mechanism_covariance, nuisance_variances
 from thermospindle.model.types import Array
 
 GRIDS = {
@@ -30,30 +30,12 @@ GRIDS = {
     kinds_of.DAMPING: (0.0, 0.03, 0.1),
     kinds_of.STIFFNESS_DRIFT: (0.0, 3e-5, 1e-4, 3e-4, 1e-3),
     kinds_of.DAMPING_DRIFT: (0.0, 0.01, 0.03),
-    kinds_of.DRIFT: (0.0, 1e-3, 1e-2),
-}
-REFERENCE = {
-    kinds_of.STIFFNESS: kinds_of.STIFFNESS_SD,
-    kinds_of.DAMPING: kinds_of.DAMPING_SD,
-    kinds_of.STIFFNESS_DRIFT: kinds_of.STIFFNESS_DRIFT_SD,
-    kinds_of.DAMPING_DRIFT: kinds_of.DAMPING_DRIFT_SD,
-    kinds_of.DRIFT: kinds_of.DRIFT_SD,
+    kinds_of.DRIFT: (0.0, 3e-4, 1e-3, 3e-3, 1e-2),
 }
 WIDTHS = (0.5, 1.0, 2.0, 4.0)  # of a size, in its own prior standard deviations
 DEPARTURES = (0.0, 0.1, 0.3, 1.0)  # from a law, of the size
 FREE_WIDTHS = (0.1, 0.3, 1.0, 3.0, 10.0)  # free forms have a width to be learned; their law is a constant
 SWEEPS = 3  # at most, through the sizes of nuisances one after the other
-
-
-@dataclass(frozen=True)
-class Learned:
-    """What is likeliest: `sizes` of discrepancies and of gain drift by kind of nuisance, the factor of the stated errors; width and departure of
-    every mechanism."""
-
-    sizes: Mapping[str, float]
-    errors: float
-    widths: tuple[float, ...]
-    departures: tuple[float, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,12 +80,12 @@ def evidence(model: CampaignModel, fit: Fit, near: Learned | None = None) -> Evi
     grids = {kind: grid for kind, grid in GRIDS.items() if kind in kinds}
     scales = [1.0] if fit.temper < 1.0 else [float(s) for s in _error_scales(whole, fit.count)]
     own_grid = list(_mechanism_grid(fit))
-    priors = [_mechanism_prior(model, fit, own) for own in own_grid]
+    priors = [mechanism_covariance(model, fit.mechanisms, fit.roots, own) for own in own_grid]
 
     def rated(s: float, sizes: Mapping[str, float]) -> tuple[float, int]:
         """ln evidence, the mean over widths and departures; and which of these is best."""
         scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
-        inner = _marginal(scaled, _prior_diagonal(model, sizes), p)
+        inner = _marginal(scaled, nuisance_variances(model, sizes), p)
         values = np.array([inner.with_prior(prior) for prior in priors]) - fit.count * np.log(s)
         return float(logsumexp(values) - np.log(len(values))), int(np.argmax(values))
 
@@ -130,19 +112,19 @@ def evidence(model: CampaignModel, fit: Fit, near: Learned | None = None) -> Evi
                 break
     own = own_grid[own_best]
     scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
-    mean, covariance = _posterior(scaled, _whole_prior(model, fit, sizes, own))
+    learned = Learned(sizes, s, tuple(w for w, _ in own), tuple(d for _, d in own))
+    mean, spread = _posterior(scaled, covariance(model, fit.mechanisms, learned))
     at, means, covariances, truncation = p, [], [], 0.0
     tests = len(model.tests)
     for m, root in zip(fit.mechanisms, fit.roots, strict=True):
         part = slice(at, at + tests)
         means.append(m.size.neutral + root @ mean[part])
-        covariances.append(root @ covariance[part, part] @ root.T)
+        covariances.append(root @ spread[part, part] @ root.T)
         truncation += _one_sided(m, means[-1], covariances[-1])
         at += tests + len(m.shape)
-    learned = Learned(sizes, s, tuple(w for w, _ in own), tuple(d for _, d in own))
     shape = (len(fit.mechanisms), tests)
     return Evidence(
-        total + truncation, learned, mean, covariance, np.array(means).reshape(shape), np.array(covariances).reshape(*shape, tests),
+        total + truncation, learned, mean, spread, np.array(means).reshape(shape), np.array(covariances).reshape(*shape, tests),
         whole.at(mean),
     )
 
@@ -166,36 +148,9 @@ def _error_scales(whole: Quadratic, count: int) -> Array:
     return np.array([1.0]) if centre < 1.02 else np.unique(np.concatenate([[1.0], np.maximum(centre * np.array([0.95, 1.0, 1.05, 1.2]), 1.0)]))
 
 
-def _prior_diagonal(model: CampaignModel, sizes: Mapping[str, float]) -> Array:
-    """Prior variances (P,) of the nuisance parameters in units of their reference widths."""
-    return np.array([(sizes[p.kind] / REFERENCE[p.kind]) ** 2 if p.kind in sizes else 1.0 for p in model.parameters])
-
-
 def _mechanism_grid(fit: Fit):
     """(width, departure) of every mechanism."""
     return product(*[list(product(FREE_WIDTHS if m.free else WIDTHS, DEPARTURES)) for m in fit.mechanisms])
-
-
-def _mechanism_prior(model: CampaignModel, fit: Fit, own: Sequence[tuple[float, float]]) -> Array:
-    """Prior covariance of [z, u] of all mechanisms."""
-    conditions = [d.condition for d in model.tests]
-    n = sum(len(conditions) + len(m.shape) for m in fit.mechanisms)
-    prior, at = np.eye(n), 0
-    for m, root, (width, departure) in zip(fit.mechanisms, fit.roots, own, strict=True):
-        sizes = size_covariance(conditions, width * m.size.prior_sd, departure)
-        half = solve_triangular(root, sizes, lower=True)
-        prior[at : at + len(root), at : at + len(root)] = solve_triangular(root, half.T, lower=True)
-        at += len(root) + len(m.shape)
-    return prior
-
-
-def _whole_prior(model: CampaignModel, fit: Fit, sizes: Mapping[str, float], own: Sequence[tuple[float, float]]) -> Array:
-    diagonal = _prior_diagonal(model, sizes)
-    n = len(diagonal)
-    prior = np.zeros((len(fit.point), len(fit.point)))
-    prior[:n, :n] = np.diag(diagonal)
-    prior[n:, n:] = _mechanism_prior(model, fit, own)
-    return prior
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,8 +197,7 @@ def _posterior(q: Quadratic, prior: Array) -> tuple[Array, Array]:
 def left_out(model: CampaignModel, fit: Fit, found: Evidence, groups: Sequence[Sequence[int]]) -> float:
     """Root mean square residual, in standard errors of the data, of groups of tests predicted from all others, with what was learned from all."""
     learned = found.learned
-    own = list(zip(learned.widths, learned.departures, strict=True))
-    prior = _whole_prior(model, fit, learned.sizes, own)
+    prior = covariance(model, fit.mechanisms, learned)
     by_test = [quadratic(*b, fit.point) for b in fit.by_test]
     total, count = 0.0, 0
     for group in groups:

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from thermospindle.diagnosis.inference import nuisance as kinds_of
-from thermospindle.diagnosis.inference.mechanism import REFERENCE_DEPARTURE, REFERENCE_WIDTH, Mechanism, size_covariance
+from thermospindle.diagnosis.inference.mechanism import Mechanism
 from thermospindle.diagnosis.inference.model import FAILED, Applied, CampaignModel, Rates
+from thermospindle.diagnosis.inference.prior import Learned, precision, roots_of
 from thermospindle.model.types import Array, Integers
 
 TEMPERS = (3e-4, 3e-3, 0.03, 0.3, 1.0)
@@ -44,6 +45,7 @@ class Fit:
     count: int
     rates: Rates
     temper: float
+    cost: float = np.nan  # chi2 and priors, those that it was fitted with
 
     @property
     def nuisance(self) -> Array:
@@ -51,16 +53,16 @@ class Fit:
 
 
 class Problem:
-    """A campaign and the mechanisms that act in it, as a least-squares problem over p = [x, z_1, u_1, z_2, u_2, ...]."""
+    """A campaign and the mechanisms that act in it, as a least-squares problem over p = [x, z_1, u_1, z_2, u_2, ...].
 
-    def __init__(self, model: CampaignModel, mechanisms: Sequence[Mechanism]) -> None:
+    Priors have their reference widths, or those `learned`.
+    """
+
+    def __init__(self, model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned | None = None) -> None:
         self.model, self.mechanisms = model, tuple(mechanisms)
-        conditions = [d.condition for d in model.tests]
-        self.roots: tuple[Array, ...] = tuple(
-            np.asarray(np.linalg.cholesky(size_covariance(conditions, REFERENCE_WIDTH * m.size.prior_sd, REFERENCE_DEPARTURE)), float)
-            for m in self.mechanisms
-        )
-        self.tests = len(conditions)
+        self.roots = roots_of(model, self.mechanisms)
+        self.precision = precision(model, self.mechanisms, learned) * (1.0 if learned is None else learned.errors**2)
+        self.tests = len(model.tests)
         self.nuisances = len(model.parameters)
         self.length = self.nuisances + sum(self.tests + len(m.shape) for m in self.mechanisms)
         small = (kinds_of.STIFFNESS, kinds_of.DAMPING, kinds_of.STIFFNESS_DRIFT, kinds_of.DAMPING_DRIFT, kinds_of.DRIFT)
@@ -118,23 +120,24 @@ class Problem:
         return np.zeros(self.model.tests[t].count)
 
     def linearised(self, t: int, p: Array, rates: Rates) -> tuple[Array, Array, Integers]:
-        """Residual (N,), derivatives (N, k) and the numbers (k,) of the parameters of p they belong to."""
+        """Residual (N,), derivatives (k, N) and the numbers (k,) of the parameters of p they belong to."""
         x, sizes, shapes = self.parts(p)
         effects, beyond = self.applied(t, sizes, shapes)
-        r, jacobian, numbers = self.model.jacobian(t, x, self.acting(effects), rates)
-        columns, places, at = [jacobian], [numbers], self.nuisances
+        more = sum(t + 1 + len(m.shape) for m in self.mechanisms)
+        r, jacobian, numbers = self.model.jacobian(t, x, self.acting(effects), rates, more)
+        row, at, own = len(numbers), self.nuisances, []
         for k, (m, root) in enumerate(zip(self.mechanisms, self.roots, strict=True)):
             by_size = self.by_size(t, x, effects, k)
             if beyond[k]:
                 r = r + beyond[k] * by_size
-            columns.append(by_size[:, None] * root[t][None, : t + 1])
-            places.append(at + np.arange(t + 1))
-            at += self.tests
+            np.multiply(root[t, : t + 1, None], by_size, out=jacobian[row : row + t + 1])
+            own += range(at, at + t + 1)
+            row, at = row + t + 1, at + self.tests
             for q in m.shape:
-                columns.append((q.prior_sd * self._by_value(t, x, effects, k, q))[:, None])
-                places.append(np.array([at]))
-                at += 1
-        return r, np.concatenate(columns, axis=1), np.concatenate(places)
+                jacobian[row] = q.prior_sd * self._by_value(t, x, effects, k, q)
+                own.append(at)
+                row, at = row + 1, at + 1
+        return r, jacobian, np.concatenate([numbers, np.array(own, int)])
 
     def effects_of(self, p: Array) -> list[list]:
         _, sizes, shapes = self.parts(p)
@@ -161,7 +164,7 @@ class Linearisation:
         self.by_test = []
         for _, jacobian, numbers in rows:
             information = np.zeros((length, length))
-            information[np.ix_(numbers, numbers)] = jacobian.T @ jacobian
+            information[np.ix_(numbers, numbers)] = jacobian @ jacobian.T
             self.by_test.append(information)
         self.information: Array = np.sum(self.by_test, axis=0)
 
@@ -169,20 +172,20 @@ class Linearisation:
         found = []
         for r, (_, jacobian, numbers) in zip(residuals, self.rows, strict=True):
             gradient = np.zeros(self.length)
-            gradient[numbers] = jacobian.T @ r
+            gradient[numbers] = jacobian @ r
             found.append(gradient)
         return found
 
 
 def fit(
     model: CampaignModel, mechanisms: Sequence[Mechanism] = (), start: Array | None = None, rates: Rates | None = None,
-    tempers: Sequence[float] = TEMPERS, keep: list[Fit] | None = None, steps: int = 4,
+    tempers: Sequence[float] = TEMPERS, keep: list[Fit] | None = None, steps: int = 4, learned: Learned | None = None,
 ) -> Fit:
-    """The fit with the reference widths of all priors; `keep` takes the fit at every temper.
+    """The fit with the reference widths of all priors, or those `learned`; `keep` takes the fit at every temper.
 
     Raises what the model raises where even the start cannot be built.
     """
-    problem = Problem(model, mechanisms)
+    problem = Problem(model, mechanisms, learned)
     p = np.zeros(problem.length) if start is None else start.copy()
     for temper in tempers:
         rates = model.rates(problem.parts(p)[0], problem.effects_of(p), rates)
@@ -199,17 +202,17 @@ def _settled(problem: Problem, p: Array, rates: Rates, temper: float, steps: int
     with `fresh` at the end."""
     lines = problem.linearisation(p, rates)
     residuals, current, damping = lines.residuals, True, 1e-4
-    cost = _cost(residuals, p, temper)
+    cost = _cost(problem, residuals, p, temper)
     for _ in range(8 * steps if temper == 1.0 else 3 * steps):
-        gradient = temper**2 * np.sum(lines.gradients(residuals), axis=0) + p
-        normal = temper**2 * lines.information + np.eye(problem.length)
+        gradient = temper**2 * np.sum(lines.gradients(residuals), axis=0) + problem.precision @ p
+        normal = temper**2 * lines.information + problem.precision
         for _ in range(6):
             move = -np.linalg.solve(normal + damping * np.diag(np.diag(normal)), gradient)
             share = min(1.0, LONGEST / max(float((np.abs(move) * problem.reach).max()), 1e-300))
             move *= share
             promised = -2 * float(gradient @ move) - float(move @ normal @ move)
             there = problem.residuals(p + move)
-            new = np.inf if there is None else _cost(there, p + move, temper)
+            new = np.inf if there is None else _cost(problem, there, p + move, temper)
             if new < cost or not current:
                 break
             damping = max(10 * damping, 1e-3)
@@ -230,8 +233,8 @@ def _settled(problem: Problem, p: Array, rates: Rates, temper: float, steps: int
     return p, lines, residuals
 
 
-def _cost(residuals: Sequence[Array], p: Array, temper: float) -> float:
-    return temper**2 * sum(float(r @ r) for r in residuals) + float(p @ p)
+def _cost(problem: Problem, residuals: Sequence[Array], p: Array, temper: float) -> float:
+    return temper**2 * sum(float(r @ r) for r in residuals) + float(p @ problem.precision @ p)
 
 
 def _finished(problem: Problem, p: Array, rates: Rates, temper: float, lines: Linearisation, residuals: Sequence[Array]) -> Fit:
@@ -251,4 +254,5 @@ def _finished(problem: Problem, p: Array, rates: Rates, temper: float, lines: Li
         sum(d.count for d in problem.model.tests),
         rates,
         temper,
+        _cost(problem, residuals, p, 1.0),
     )

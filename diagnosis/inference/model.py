@@ -12,22 +12,22 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.mode_table import ModeData
 from thermospindle.diagnosis.inference import nuisance as kinds_of
+from thermospindle.diagnosis.inference.mode_residual import mode_residual, partners
 from thermospindle.diagnosis.inference.nuisance import Nuisance, ReferenceModes, nuisances, reference_modes
+from thermospindle.diagnosis.inference.response import Linear, Response, same_chain
 from thermospindle.model.errors import NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Condition, RingMotion, Spindle
 from thermospindle.model.rotor.chain import Matrices, matrices
-from thermospindle.model.rotor.modes import kinds, oscillating, poles
 from thermospindle.model.tolerance import Toleranced, toleranced
 from thermospindle.model.types import Array, ComplexArray, Integers
-from thermospindle.sim.campaign.beside import POWER, measured_at
+from thermospindle.sim.campaign.beside import measured_at
 from thermospindle.sim.campaign.campaign import Campaign, Noise
 from thermospindle.sim.effects import of_scene
-from thermospindle.sim.effects.effect import HOOKS, Effect, Measurement, Values
+from thermospindle.sim.effects.effect import HOOKS, Effect, Values
 from thermospindle.sim.operating import OperatingPoint, operating_point
 
 Applied = Sequence[tuple[Effect, Values]]
@@ -35,19 +35,11 @@ TestData = LineData | ModeData
 Discrepancies = tuple[Integers, Integers, Integers, Array]
 
 STEP = 0.02  # of a prior standard deviation, for differences
-MOST_MODES = 10  # of the discrepancy's basis
+MOST_MODES = 16  # of the discrepancy's basis
+IN_BAND, BEYOND = 1.15, 2.2  # of the highest line: modes that are seen, and modes beyond that still lend them some of their shape
 MEASURING = frozenset(HOOKS) - {"measurement"}
 FAILED = (NoEquilibrium, OutsideRange, ValueError, RuntimeError, ZeroDivisionError, FloatingPointError, np.linalg.LinAlgError)
 """What a model says at parameter values where no spindle can be built; a fit then steps less far."""
-
-
-@dataclass(frozen=True, eq=False)
-class Linear:
-    """One test's linear model: matrices with dofs, and its measuring chain (None for a table of modes)."""
-
-    matrices: Matrices
-    chain: Measurement
-    layout: tuple
 
 
 @dataclass(eq=False)
@@ -64,7 +56,7 @@ class CampaignModel:
 
     def __getstate__(self) -> dict:
         """Without what was worked out: it is on its way to another process."""
-        return {k: v for k, v in self.__dict__.items() if k not in ("_points", "_spindles", "_linearised")}
+        return {k: v for k, v in self.__dict__.items() if k not in ("_points", "_spindles", "kept")}
 
     # ------------------------------------------------------------ the spindle at nuisance values
 
@@ -155,16 +147,9 @@ class CampaignModel:
         return {}
 
     @cached_property
-    def _linearised(self) -> dict:
+    def kept(self) -> dict:
+        """What whoever asks for many things about one fit has worked out of it."""
         return {}
-
-    def about(self, point: Array, rates: Rates) -> list[tuple[Array, Array, Integers]]:
-        """Residuals, derivatives and parameter numbers of every test without any effect at nuisance values `point`; the last is kept."""
-        key = point.tobytes()
-        if key not in self._linearised:
-            self._linearised.clear()
-            self._linearised[key] = [self.jacobian(t, point, [], rates) for t in range(len(self.tests))]
-        return self._linearised[key]
 
     def linear(self, t: int, x: Array, effects: Applied) -> Linear:
         point = self.operating(t, x, effects)
@@ -192,8 +177,19 @@ class CampaignModel:
         """Residuals (N,) of test `t`, computed less measured, in standard errors."""
         data = self.tests[t]
         if isinstance(data, ModeData):
-            return _mode_residual(data, self.linear(t, x, effects))
-        return self._whitened(t, _Response(self.linear(t, x, effects), data, self._gain(t, x)).value, data.value)
+            return mode_residual(data, self.linear(t, x, effects))
+        return self.whitened(t, self.response(t, x, effects).value, data.value)
+
+    def response(self, t: int, x: Array, effects: Applied, linear: Linear | None = None) -> Response:
+        """FRFs of test `t` at its lines."""
+        data = self.tests[t]
+        assert isinstance(data, LineData)
+        cut = float(x[self._record]) if self._record is not None else 0.0
+        return Response(linear or self.linear(t, x, effects), data, self._gain(t, x), cut)
+
+    @cached_property
+    def _record(self) -> int | None:
+        return next((i for i, p in enumerate(self.parameters) if p.kind == kinds_of.RECORD), None)
 
     def response(self, t: int, x: Array, effects: Applied, frequency: Array) -> ComplexArray:
         """FRFs (n_resp, n_ref, n) of test `t`, one of FRF lines, at other frequencies (n,) Hz."""
@@ -211,24 +207,27 @@ class CampaignModel:
     def channels(self) -> int:
         return 1 + max((p.index for p in self.parameters if p.kind == kinds_of.GAIN), default=-1)
 
-    def _whitened(self, t: int, value: ComplexArray, measured: ComplexArray | float) -> Array:
+    def whitened(self, t: int, value: ComplexArray, measured: ComplexArray | float) -> Array:
         data = self.tests[t]
         assert isinstance(data, LineData)
         left = ((value - measured) / data.sd * np.sqrt(2)).ravel()
         return np.concatenate([left.real, left.imag])
 
-    def jacobian(self, t: int, x: Array, effects: Applied, rates: Rates) -> tuple[Array, Array, Integers]:
-        """Residuals (N,) of test `t`, their derivatives (N, k) by k nuisance parameters, and the numbers (k,) of these."""
+    def jacobian(self, t: int, x: Array, effects: Applied, rates: Rates, more: int = 0) -> tuple[Array, Array, Integers]:
+        """Residuals (N,) of test `t`, their derivatives (k + more, N) by k nuisance parameters, and the numbers (k,) of these; rows `more` are
+        left zero for whoever has further parameters."""
         data, linear = self.tests[t], self.linear(t, x, effects)
         if isinstance(data, ModeData):
-            return self._mode_jacobian(t, data, linear, rates)
-        response = _Response(linear, data, self._gain(t, x))
+            r, found, numbers = self._mode_jacobian(t, data, linear, rates)
+            return r, np.concatenate([found.T, np.zeros((more, len(r)))]), numbers
+        response = self.response(t, x, effects, linear)
         own, channel = self._gains[t]
         pairs = self._discrepancies[t]
-        numbers = np.concatenate([rates.numbers[t], *[row[0] for row in pairs], own])
+        record = [] if self._record is None else [self._record]
+        numbers = np.concatenate([rates.numbers[t], *[row[0] for row in pairs], own, np.array(record, int)])
         n_resp, n_ref, lines = response.value.shape
         weight = np.sqrt(2) / data.sd
-        jacobian = np.zeros((len(numbers), 2, n_resp, n_ref, lines))
+        jacobian = np.zeros((len(numbers) + more, 2, n_resp, n_ref, lines))
 
         def fill(first: int, moved: ComplexArray) -> int:
             moved = moved * weight
@@ -249,7 +248,9 @@ class CampaignModel:
             if c < n_resp:
                 gain = response.value[c] * weight[c] * self.parameters[own[k]].sd
                 jacobian[at + k, 0, c], jacobian[at + k, 1, c] = gain.real, gain.imag
-        return self._whitened(t, response.value, data.value), jacobian.reshape(len(numbers), -1).T, numbers
+        if record:
+            fill(at + len(own), response.cut_off[None])
+        return self.whitened(t, response.value, data.value), jacobian.reshape(len(jacobian), -1), numbers
 
     def column(self, t: int, x: Array, first: Applied, second: Applied, apart: float) -> Array:
         """(residual at `second` - residual at `first`) / apart, (N,): the derivative by what differs between two lists of effects.
@@ -258,15 +259,14 @@ class CampaignModel:
         """
         data = self.tests[t]
         at, moved = self.linear(t, x, first), self.linear(t, x, second)
-        same = at.layout == moved.layout and at.matrices.dofs == moved.matrices.dofs and _same_chain(at.chain, moved.chain)
+        same = at.layout == moved.layout and at.matrices.dofs == moved.matrices.dofs and same_chain(at.chain, moved.chain)
         if isinstance(data, ModeData):
-            return (_mode_residual(data, moved) - _mode_residual(data, at)) / apart
-        gain = self._gain(t, x)
-        response = _Response(at, data, gain)
+            return (mode_residual(data, moved) - mode_residual(data, at)) / apart
+        response = self.response(t, x, first, at)
         if same:
             difference = [(getattr(moved.matrices, k) - getattr(at.matrices, k))[None] / apart for k in ("mass", "damping", "stiffness")]
-            return self._whitened(t, response.moved(*difference)[0], 0.0)
-        return self._whitened(t, (_Response(moved, data, gain).value - response.value) / apart, 0.0)
+            return self.whitened(t, response.moved(*difference)[0], 0.0)
+        return self.whitened(t, (self.response(t, x, second, moved).value - response.value) / apart, 0.0)
 
     # ------------------------------------------------------------ derivatives of the matrices
 
@@ -311,7 +311,7 @@ class CampaignModel:
 
     def _mode_jacobian(self, t: int, data: ModeData, linear: Linear, rates: Rates) -> tuple[Array, Array, Integers]:
         """By first-order perturbation of the poles, -left (p^2 dM + p dC + dK) right (Lancaster 1964, AIAA J. 2, 1659)."""
-        found, partner, p = _partners(data, linear)
+        found, partner, p = partners(data, linear)
         pole, right, left = p.value[found][partner], p.right[:, found][:, partner], p.left[found][partner]
         stacks = [(rates.mass[t], rates.damping[t], rates.stiffness[t])]
         numbers = [rates.numbers[t]]
@@ -328,7 +328,7 @@ class CampaignModel:
         by_damping = moved.real / pole.real[:, None] - by_frequency
         known = np.isfinite(data.damping_sd)
         jacobian = np.concatenate([by_frequency / data.frequency_sd[:, None], by_damping[known] / data.damping_sd[known, None]])
-        return _mode_residual(data, linear), jacobian, np.concatenate(numbers)
+        return mode_residual(data, linear), jacobian, np.concatenate(numbers)
 
 
 @dataclass(frozen=True, eq=False)
@@ -339,51 +339,6 @@ class Rates:
     mass: tuple[Array, ...]
     damping: tuple[Array, ...]
     stiffness: tuple[Array, ...]
-
-
-class _Response:
-    """FRFs of one test's linear model at its lines, in the measured quantity, with what their derivatives need."""
-
-    def __init__(self, linear: Linear, data: LineData, gain: Array) -> None:
-        chain, m = linear.chain, linear.matrices
-        n_resp = data.value.shape[0]
-        omega = 2 * np.pi * data.frequency
-        window = data.test.window_decay
-        self.s: ComplexArray = np.asarray(1j * omega + (chain.decay + window), complex)
-        dynamic = self.s[:, None, None] ** 2 * m.mass + self.s[:, None, None] * m.damping + m.stiffness
-        inverse = np.linalg.inv(dynamic)
-        self.left: ComplexArray = chain.response_rows[:n_resp] @ inverse  # (L, n_resp, n)
-        self.right: ComplexArray = inverse @ chain.reference_rows.T  # (L, n, n_ref)
-        self._references = chain.reference_rows.T
-        self.factor: ComplexArray = (
-            (gain[:n_resp] * chain.gain[:n_resp])[:, None]
-            * np.exp(-1j * omega * chain.delay[:n_resp, None])
-            * (self.s * (1j * omega + window) ** POWER[data.quantity])
-        )  # (n_resp, L)
-        receptance = self.left @ self._references  # (L, n_resp, n_ref)
-        self.value: ComplexArray = receptance.transpose(1, 2, 0) * self.factor[:, None, :]
-
-    def moved(self, mass: Array, damping: Array, stiffness: Array) -> ComplexArray:
-        """Derivatives (k, n_resp, n_ref, L) for dM, dC, dK (k, n, n)."""
-        k, n = mass.shape[:2]
-        lines, n_resp, _ = self.left.shape
-        flat = self.left.reshape(lines * n_resp, n)
-        total: ComplexArray = np.zeros((lines, n_resp, k, n), complex)
-        for power, matrix in ((2, mass), (1, damping), (0, stiffness)):
-            if matrix.any():
-                part = (flat @ matrix.transpose(1, 0, 2).reshape(n, k * n)).reshape(lines, n_resp, k, n)
-                total += part * (self.s**power)[:, None, None, None] if power else part
-        product = total.reshape(lines, n_resp * k, n) @ self.right  # (L, n_resp k, n_ref)
-        n_ref = product.shape[-1]
-        value = product.reshape(lines, n_resp, k, n_ref).transpose(2, 1, 3, 0)
-        return -value * self.factor[:, None, :]
-
-
-def _same_chain(a: Measurement, b: Measurement) -> bool:
-    return a is b or (
-        a.decay == b.decay
-        and all(np.array_equal(getattr(a, k), getattr(b, k)) for k in ("response_rows", "reference_rows", "gain", "delay"))
-    )
 
 
 def replace_measuring(point: OperatingPoint, effects: Applied) -> OperatingPoint:
@@ -407,33 +362,6 @@ def _stretched(radial: float, axial: float, grooves: float) -> tuple[Effect, Val
     return Effect("expansion", "", "", (), "", (), "", motions=motions), {}
 
 
-# ---------------------------------------------------------------- tables of modes
-
-
-def _partners(data: ModeData, linear: Linear):
-    """Poles of the model in order of frequency, and which of them is which measured mode: of its kind, near in ln frequency."""
-    p = poles(linear.matrices)
-    found = oscillating(p, 2.5 * float(data.frequency.max()))
-    frequency = np.abs(p.value[found]) / (2 * np.pi)
-    unlike = np.array(data.kind)[:, None] != np.array(kinds(linear.matrices, p.right[:, found]))[None, :]
-    # squares: two modes of a kind on one side of two measured ones cost the same either way in absolute differences, and would swap at random
-    cost = np.log(data.frequency[:, None] / frequency[None, :]) ** 2 + 9.0 * unlike
-    if cost.shape[1] < cost.shape[0]:
-        raise ValueError("the model has fewer modes than the table")
-    rows, columns = linear_sum_assignment(cost)
-    return found, columns[np.argsort(rows)], p
-
-
-def _mode_residual(data: ModeData, linear: Linear) -> Array:
-    found, partner, p = _partners(data, linear)
-    pole = p.value[found][partner] - linear.chain.decay
-    frequency, damping = np.abs(pole) / (2 * np.pi), -pole.real / np.abs(pole)
-    known = np.isfinite(data.damping_sd)
-    by_frequency = np.log(frequency / data.frequency) / data.frequency_sd
-    by_damping = np.log(np.maximum(damping[known], 1e-9) / data.damping[known]) / data.damping_sd[known]
-    return np.concatenate([by_frequency, by_damping])
-
-
 # ---------------------------------------------------------------- making one
 
 
@@ -443,13 +371,12 @@ def campaign_model(spindle: Spindle, campaign: Campaign, tests: Sequence[TestDat
     present = tuple(of_scene(spindle))
     reference = matrices(operating_point(spindle, Condition(spindle.reference_temperature), present).chain)
     highest = max(float(d.frequency.max()) for d in tests)
-    modes = reference_modes(reference, 2 * np.pi * 1.15 * highest)
-    modes = replace(modes, omega=modes.omega[:MOST_MODES], damping=modes.damping[:MOST_MODES], weighted=modes.weighted[:, :MOST_MODES])
+    modes = reference_modes(reference, 2 * np.pi * IN_BAND * highest, 2 * np.pi * BEYOND * highest, MOST_MODES)
     build = tuple(toleranced(spindle))
     lines = [d for d in tests if isinstance(d, LineData)]
     channels = max((d.value.shape[0] for d in lines), default=0)
     names = [d.test.id for d in tests]
-    parameters = nuisances(spindle, build, names, bool(lines), channels, modes.omega)
+    parameters = nuisances(spindle, build, names, bool(lines), channels, modes)
     return CampaignModel(spindle, tuple(tests), scenes, build, parameters, modes, present)
 
 

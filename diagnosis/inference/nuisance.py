@@ -23,6 +23,7 @@ from thermospindle.model.tolerance import Toleranced
 from thermospindle.model.types import Array
 
 BUILD, TEMPERATURE, GAIN, DRIFT, EXPANSION = "build", "temperature", "gain", "gain drift", "thermal expansion"
+RECORD = "end of records"
 STIFFNESS, DAMPING = "stiffness discrepancy", "damping discrepancy"
 STIFFNESS_DRIFT, DAMPING_DRIFT = "drifting stiffness discrepancy", "drifting damping discrepancy"
 STIFFNESS_SD = 1e-3  # relative error of a frequency at the reference width
@@ -52,12 +53,16 @@ class Nuisance:
 
 @dataclass(frozen=True, eq=False)
 class ReferenceModes:
-    """Undamped modes of the reference condition: angular frequencies (m,), damping ratios (m,), M f (n, m) over the named dofs."""
+    """Undamped modes of the reference condition: angular frequencies (m,), damping ratios (m,), M f (n, m) over the named dofs.
+
+    The first `seen` lie in the band of the measurement; those above lend them some of their shapes.
+    """
 
     omega: Array
     damping: Array
     weighted: Array
     dofs: tuple[tuple[str, str], ...]
+    seen: int
 
     def over(self, dofs: Sequence[tuple[str, str]]) -> Array:
         """M f over other dofs: zero for those that the reference has not."""
@@ -65,35 +70,35 @@ class ReferenceModes:
         return np.array([self.weighted[place[dof]] if dof in place else np.zeros(len(self.omega)) for dof in dofs])
 
 
-def reference_modes(linear: Matrices, highest: float) -> ReferenceModes:
-    """Modes below `highest` (rad/s) of the undamped, standing reference."""
+def reference_modes(linear: Matrices, seen: float, highest: float, most: int) -> ReferenceModes:
+    """Modes of the undamped, standing reference below `highest`, `most` of them, and how many of these lie below `seen` (rad/s)."""
     squares, vectors = eigh(linear.stiffness, linear.mass)
     omega = np.sqrt(np.maximum(squares, 0.0))
-    keep = (omega > 1e-3 * omega.max()) & (omega < highest)
+    keep = np.flatnonzero((omega > 1e-3 * omega.max()) & (omega < highest))[:most]
     modal = vectors[:, keep]
     damping = np.einsum("ni,nm,mi->i", modal, (linear.damping + linear.damping.T) / 2, modal) / (2 * omega[keep])
-    return ReferenceModes(omega[keep], np.maximum(damping, 1e-4), linear.mass @ modal, linear.dofs)
+    return ReferenceModes(omega[keep], np.maximum(damping, 1e-4), linear.mass @ modal, linear.dofs, int(np.sum(omega[keep] < seen)))
 
 
 def nuisances(
-    spindle: Spindle, build: Sequence[Toleranced], tests: Sequence[str], with_lines: bool, channels: int, omega: Array
+    spindle: Spindle, build: Sequence[Toleranced], tests: Sequence[str], with_lines: bool, channels: int, modes: ReferenceModes
 ) -> tuple[Nuisance, ...]:
     """All nuisance parameters of a campaign with `tests` (ids): those of FRF lines only where a test has any."""
     t = spindle.tolerances
     found = [Nuisance(BUILD, p.name, p.sd, index=i) for i, p in enumerate(build)]
     found += [Nuisance(EXPANSION, name, sd, index=i) for i, (name, sd) in enumerate(EXPANSION_SD.items())]
     found += [Nuisance(TEMPERATURE, f"temperature of {name}", t.temperature, test=k) for k, name in enumerate(tests)]
-    for i in range(len(omega)):
-        for j in range(i, len(omega)):
+    for i in range(modes.seen):
+        for j in range(i, len(modes.omega) if with_lines else i + 1):
             of = f"mode {i + 1}" if i == j else f"modes {i + 1} and {j + 1}"
-            if i == j or with_lines:
-                found.append(Nuisance(STIFFNESS, f"stiffness discrepancy of {of}", STIFFNESS_SD, modes=(i, j)))
-                found.append(Nuisance(DAMPING, f"damping discrepancy of {of}", DAMPING_SD, modes=(i, j)))
+            found.append(Nuisance(STIFFNESS, f"stiffness discrepancy of {of}", STIFFNESS_SD, modes=(i, j)))
+            found.append(Nuisance(DAMPING, f"damping discrepancy of {of}", DAMPING_SD, modes=(i, j)))
     for k, name in enumerate(tests):
-        for i in range(len(omega)):
+        for i in range(modes.seen):
             found.append(Nuisance(STIFFNESS_DRIFT, f"frequency of mode {i + 1} in {name}", STIFFNESS_DRIFT_SD, test=k, modes=(i, i)))
             found.append(Nuisance(DAMPING_DRIFT, f"damping of mode {i + 1} in {name}", DAMPING_DRIFT_SD, test=k, modes=(i, i)))
     if with_lines:
         found += [Nuisance(GAIN, f"gain of channel {c + 1}", t.gain, index=c) for c in range(channels)]
         found += [Nuisance(DRIFT, f"gain of channel {c + 1} in {name}", DRIFT_SD, test=k, index=c) for k, name in enumerate(tests) for c in range(channels)]
+        found.append(Nuisance(RECORD, "end of the records, before answers have died away", 1.0))
     return tuple(found)

@@ -120,5 +120,5 @@ def test_derivatives_by_sizes(spindle, model, table):
             up[i] += 1e-3
             down[i] -= 1e-3
             wanted = (problem.residual(t, up) - problem.residual(t, down)) / 2e-3
-            found = jacobian[:, list(numbers).index(i)]
+            found = jacobian[list(numbers).index(i)]
             assert np.linalg.norm(found - wanted) <= 2e-2 * np.linalg.norm(wanted) + 1e-9

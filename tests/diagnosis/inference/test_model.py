@@ -49,7 +49,7 @@ def worst_by_kind(model, t, x):
     assert len(set(numbers)) == len(numbers)
     wanted = differences(model, t, x, numbers)
     length = np.linalg.norm(wanted, axis=0)
-    error = np.linalg.norm(jacobian - wanted, axis=0) / np.maximum(length, 1e-3 * np.median(length))
+    error = np.linalg.norm(jacobian.T - wanted, axis=0) / np.maximum(length, 1e-3 * np.median(length))
     kinds = np.array([model.parameters[i].kind for i in numbers])
     return {k: error[kinds == k].max() for k in KINDS if k in kinds}
 

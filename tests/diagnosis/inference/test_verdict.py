@@ -8,10 +8,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from thermospindle.diagnosis.inference.evidence import Evidence, Learned
+from thermospindle.diagnosis.inference.evidence import Evidence
 from thermospindle.diagnosis.inference.fit import Fit
 from thermospindle.diagnosis.inference.mechanism import Mechanism
-from thermospindle.diagnosis.inference.search import Hypothesis, Screened, Search
+from thermospindle.diagnosis.inference.prior import Learned
+from thermospindle.diagnosis.inference.screening import Screened
+from thermospindle.diagnosis.inference.search import Hypothesis, Search
 from thermospindle.diagnosis.inference.verdict import FALSE_ALARM, MISSED, WRONG, Verdict, conditions_of, decide
 from thermospindle.model.machine import Condition
 from thermospindle.sim.effects.effect import Effect, Parameter

@@ -1,0 +1,97 @@
+"""Priors of everything a fit moves, over p = [nuisances, whitened sizes and shape parameters of every mechanism], in reference widths."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from thermospindle.diagnosis.inference import nuisance as kinds_of
+from thermospindle.diagnosis.inference.mechanism import REFERENCE_DEPARTURE, REFERENCE_WIDTH, Mechanism, size_covariance
+from thermospindle.diagnosis.inference.model import CampaignModel
+from thermospindle.model.types import Array
+
+REFERENCE = {
+    kinds_of.STIFFNESS: kinds_of.STIFFNESS_SD,
+    kinds_of.DAMPING: kinds_of.DAMPING_SD,
+    kinds_of.STIFFNESS_DRIFT: kinds_of.STIFFNESS_DRIFT_SD,
+    kinds_of.DAMPING_DRIFT: kinds_of.DAMPING_DRIFT_SD,
+    kinds_of.DRIFT: kinds_of.DRIFT_SD,
+}
+"""Widths in which nuisances of unknown size are counted."""
+NOTHING = 1e-4  # of a reference width: what stands for a size of zero where a prior must be inverted
+
+
+@dataclass(frozen=True)
+class Learned:
+    """What is likeliest: `sizes` of discrepancies and of gain drift by kind of nuisance, the factor of the stated errors; width and departure of
+    every mechanism."""
+
+    sizes: Mapping[str, float]
+    errors: float
+    widths: tuple[float, ...]
+    departures: tuple[float, ...]
+
+
+DRIFTING = (kinds_of.STIFFNESS_DRIFT, kinds_of.DAMPING_DRIFT)
+
+
+def steady(learned: Learned, mechanisms: Sequence[Mechanism] = ()) -> Learned:
+    """What was learned of constant discrepancies and of gains, for a fit of `mechanisms`: how much modes drift is left as it is on paper, so that
+    drift does not take what the mechanisms should explain."""
+    sizes = {kind: max(REFERENCE[kind], learned.sizes[kind]) if kind not in DRIFTING else REFERENCE[kind] for kind in learned.sizes}
+    return Learned(sizes, 1.0, (REFERENCE_WIDTH,) * len(mechanisms), (REFERENCE_DEPARTURE,) * len(mechanisms))
+
+
+def roots_of(model: CampaignModel, mechanisms: Sequence[Mechanism]) -> tuple[Array, ...]:
+    """Of every mechanism the root (tests, tests) of its sizes' covariance at the reference width: sizes = neutral + root z."""
+    conditions = [d.condition for d in model.tests]
+    return tuple(
+        np.asarray(np.linalg.cholesky(size_covariance(conditions, REFERENCE_WIDTH * m.size.prior_sd, REFERENCE_DEPARTURE)), float)
+        for m in mechanisms
+    )
+
+
+def nuisance_variances(model: CampaignModel, sizes: Mapping[str, float]) -> Array:
+    """Prior variances (P,) of the nuisance parameters in units of their reference widths."""
+    return np.array([(sizes[p.kind] / REFERENCE[p.kind]) ** 2 if p.kind in sizes else 1.0 for p in model.parameters])
+
+
+def mechanism_covariance(
+    model: CampaignModel, mechanisms: Sequence[Mechanism], roots: Sequence[Array], own: Sequence[tuple[float, float]]
+) -> Array:
+    """Prior covariance of [z, u] of all mechanisms, each with its (width, departure)."""
+    conditions = [d.condition for d in model.tests]
+    prior, at = np.eye(sum(len(conditions) + len(m.shape) for m in mechanisms)), 0
+    for m, root, (width, departure) in zip(mechanisms, roots, own, strict=True):
+        sizes = size_covariance(conditions, width * m.size.prior_sd, departure)
+        half = solve_triangular(root, sizes, lower=True)
+        prior[at : at + len(root), at : at + len(root)] = solve_triangular(root, half.T, lower=True)
+        at += len(root) + len(m.shape)
+    return prior
+
+
+def covariance(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned) -> Array:
+    """Prior covariance (n, n) of all parameters at learned sizes; singular where a size is zero."""
+    diagonal = nuisance_variances(model, learned.sizes)
+    n = len(diagonal)
+    own = mechanism_covariance(model, mechanisms, roots_of(model, mechanisms), list(zip(learned.widths, learned.departures, strict=True)))
+    prior = np.zeros((n + len(own), n + len(own)))
+    prior[:n, :n] = np.diag(diagonal)
+    prior[n:, n:] = own
+    return prior
+
+
+def precision(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned | None) -> Array:
+    """The inverse of `covariance`, with next to nothing for sizes of zero; the identity, the reference widths, without `learned`."""
+    n = len(model.parameters)
+    if learned is None:
+        return np.eye(n + sum(len(model.tests) + len(m.shape) for m in mechanisms))
+    found = covariance(model, mechanisms, learned)
+    found[:n, :n] = np.diag(1 / np.maximum(np.diag(found)[:n], NOTHING**2))
+    if len(found) > n:
+        own = found[n:, n:]
+        found[n:, n:] = np.linalg.inv(own + NOTHING**2 * np.eye(len(own)))
+    return found

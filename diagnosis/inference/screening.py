@@ -1,0 +1,109 @@
+"""What a mechanism promises beside a model that is fitted already: linear, from the derivative by its sizes alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from thermospindle.diagnosis.inference.evidence import evidence
+from thermospindle.diagnosis.inference.fit import Fit, Problem
+from thermospindle.diagnosis.inference.mechanism import Mechanism
+from thermospindle.diagnosis.inference.model import FAILED, CampaignModel
+from thermospindle.diagnosis.inference.prior import Learned
+from thermospindle.model.parallel import in_parallel
+from thermospindle.model.types import Array, Integers
+
+
+@dataclass(frozen=True)
+class Screened:
+    """What screening promises of a mechanism: ln evidence it would gain, and where a fit should start (all parameters, as a fit has them)."""
+
+    mechanism: Mechanism
+    gain: float
+    start: Array
+    visibility: float  # standard errors by which its typical size shows, beside what nuisances can do
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """One test of a fitted model: residual (N,), derivatives (k, N) by the parameters `numbers` (k,), and their products."""
+
+    residual: Array
+    derivatives: Array
+    numbers: Integers
+    gradient: Array
+    information: Array
+
+
+def screen(
+    model: CampaignModel, about: Fit, temper: float, learned: Learned, mechanisms: Sequence[Mechanism], workers: int | None = None
+) -> list[Screened]:
+    """Every one of `mechanisms` beside the model `about`, its errors 1 / `temper` times the data's and sizes of discrepancies as `learned`."""
+    about = replace(about, temper=temper)
+    sizes = Learned(learned.sizes, learned.errors if temper == 1.0 else 1.0, (), ())
+    nothing = evidence(model, about, sizes).ln
+    found = in_parallel(partial(_screened, model, about, sizes, nothing), list(mechanisms), workers)
+    return [replace(s, mechanism=m) for s, m in zip(found, mechanisms, strict=True)]
+
+
+def _fitted(model: CampaignModel, about: Fit) -> list[Fitted]:
+    """All tests of the model `about`; the last one asked for is kept with the model."""
+    key = (about.point.tobytes(), len(about.mechanisms))
+    if key not in model.kept:
+        model.kept.clear()
+        problem, found = Problem(model, about.mechanisms), []
+        for t in range(problem.tests):
+            r, jacobian, numbers = problem.linearised(t, about.point, about.rates)
+            found.append(Fitted(r, jacobian, numbers, jacobian @ r, jacobian @ jacobian.T))
+        model.kept[key] = found
+    return model.kept[key]
+
+
+def _screened(model: CampaignModel, about: Fit, sizes: Learned, nothing: float, mechanism: Mechanism) -> Screened:
+    """The quadratic of the fitted model, with the mechanism's sizes beside its parameters."""
+    problem = Problem(model, [*about.mechanisms, mechanism])
+    first = len(about.point)
+    p = np.concatenate([about.point, np.zeros(problem.length - first)])
+    x, own_sizes, shapes = problem.parts(p)
+    by_test, seen = [], []
+    for t, at in enumerate(_fitted(model, about)):
+        effects, _ = problem.applied(t, own_sizes, shapes)
+        try:
+            column = problem.by_size(t, x, effects, len(about.mechanisms))
+        except FAILED:
+            column = np.zeros(len(at.residual))
+        weights = problem.roots[-1][t, : t + 1]
+        own = first + np.arange(t + 1)
+        cross, square = at.derivatives @ column, float(column @ column)
+        gradient, information = np.zeros(problem.length), np.zeros((problem.length, problem.length))
+        gradient[at.numbers] = at.gradient
+        gradient[own] = weights * (column @ at.residual)
+        information[np.ix_(at.numbers, at.numbers)] = at.information
+        information[np.ix_(at.numbers, own)] = np.outer(cross, weights)
+        information[np.ix_(own, at.numbers)] = np.outer(weights, cross)
+        information[np.ix_(own, own)] = np.outer(weights, weights) * square
+        by_test.append((float(at.residual @ at.residual), gradient, information))
+        seen.append((cross, square, at.numbers))
+    whole = replace(
+        about, mechanisms=problem.mechanisms, point=p, sizes=own_sizes, shapes=tuple(tuple(float(v) for v in s) for s in shapes),
+        roots=problem.roots, chi2=sum(b[0] for b in by_test), gradient=np.sum([b[1] for b in by_test], axis=0),
+        information=np.sum([b[2] for b in by_test], axis=0), by_test=tuple(by_test),
+    )  # fmt: skip
+    visibility = _visibility(seen, whole.information[:first, :first], mechanism)
+    if visibility == 0.0:
+        return Screened(mechanism, -np.inf, p, 0.0)
+    found = evidence(model, whole, sizes)
+    return Screened(mechanism, found.ln - nothing, found.mean, visibility)
+
+
+def _visibility(seen: Sequence[tuple[Array, float, Integers]], information: Array, mechanism: Mechanism) -> float:
+    """Standard errors of the typical size, the same in all tests, after all else is fitted anew."""
+    n = len(information)
+    cross = np.zeros(n)
+    for of_test, _, numbers in seen:
+        cross[numbers] += of_test
+    left = sum(square for _, square, _ in seen) - float(cross @ np.linalg.solve(information + np.eye(n), cross))
+    return float(abs(mechanism.size.typical - mechanism.size.neutral) * np.sqrt(max(left, 0.0)))
