@@ -179,22 +179,20 @@ class Linearisation:
 
 def fit(
     model: CampaignModel, mechanisms: Sequence[Mechanism] = (), start: Array | None = None, rates: Rates | None = None,
-    tempers: Sequence[float] = TEMPERS, keep: list[Fit] | None = None, steps: int = 4, learned: Learned | None = None,
+    tempers: Sequence[float] = TEMPERS, steps: int = 4, learned: Learned | None = None,
 ) -> Fit:
-    """The fit with the reference widths of all priors, or those `learned`; `keep` takes the fit at every temper.
+    """The fit with the reference widths of all priors, or those `learned`. While errors are taken too
+    large, the thinned model serves.
 
     Raises what the model raises where even the start cannot be built.
     """
-    problem = Problem(model, mechanisms, learned)
-    p = np.zeros(problem.length) if start is None else start.copy()
+    p = None if start is None else start.copy()
     for temper in tempers:
-        rates = model.rates(problem.parts(p)[0], problem.effects_of(p), rates)
+        problem = Problem(model if temper == 1.0 else model.thinned, mechanisms, learned)
+        p = np.zeros(problem.length) if p is None else p
+        rates = problem.model.rates(problem.parts(p)[0], problem.effects_of(p), rates)
         p, lines, residuals = _settled(problem, p, rates, temper, steps, fresh=temper == 1.0)
-        if keep is not None or temper == tempers[-1]:
-            done = _finished(problem, p, rates, temper, lines, residuals)
-            if keep is not None:
-                keep.append(done)
-    return done
+    return _finished(problem, p, rates, temper, lines, residuals)
 
 
 def _settled(problem: Problem, p: Array, rates: Rates, temper: float, steps: int, fresh: bool) -> tuple[Array, Linearisation, list[Array]]:

@@ -37,6 +37,7 @@ Discrepancies = tuple[Integers, Integers, Integers, Array]
 STEP = 0.02  # of a prior standard deviation, for differences
 MOST_MODES = 16  # of the discrepancy's basis
 IN_BAND, BEYOND = 1.15, 2.2  # of the highest line: modes that are seen, and modes beyond that still lend them some of their shape
+THIN, ENOUGH_LINES = 4, 30  # lines left out of a thinned model, and how many of a test it keeps at least
 MEASURING = frozenset(HOOKS) - {"measurement"}
 FAILED = (NoEquilibrium, OutsideRange, ValueError, RuntimeError, ZeroDivisionError, FloatingPointError, np.linalg.LinAlgError)
 """What a model says at parameter values where no spindle can be built; a fit then steps less far."""
@@ -56,7 +57,12 @@ class CampaignModel:
 
     def __getstate__(self) -> dict:
         """Without what was worked out: it is on its way to another process."""
-        return {k: v for k, v in self.__dict__.items() if k not in ("_points", "_spindles", "kept")}
+        return {k: v for k, v in self.__dict__.items() if k not in ("_points", "_spindles", "kept", "thinned")}
+
+    @cached_property
+    def thinned(self) -> CampaignModel:
+        """The model of every `THIN`-th line with errors that much smaller: what a fit needs as long as errors are taken too large anyway."""
+        return replace(self, tests=tuple(_thin(d) if isinstance(d, LineData) else d for d in self.tests))
 
     # ------------------------------------------------------------ the spindle at nuisance values
 
@@ -215,7 +221,7 @@ class CampaignModel:
 
     def jacobian(self, t: int, x: Array, effects: Applied, rates: Rates, more: int = 0) -> tuple[Array, Array, Integers]:
         """Residuals (N,) of test `t`, their derivatives (k + more, N) by k nuisance parameters, and the numbers (k,) of these; rows `more` are
-        left zero for whoever has further parameters."""
+        left zero for whoever has further parameters. What records leave out is small: the derivatives leave out how it moves."""
         data, linear = self.tests[t], self.linear(t, x, effects)
         if isinstance(data, ModeData):
             r, found, numbers = self._mode_jacobian(t, data, linear, rates)
@@ -360,6 +366,13 @@ def _stretched(radial: float, axial: float, grooves: float) -> tuple[Effect, Val
         return {b: replace(m, **{k: f * getattr(m, k) for k, f in factors.items()}) for b, m in by_bearing.items()}
 
     return Effect("expansion", "", "", (), "", (), "", motions=motions), {}
+
+
+def _thin(data: LineData) -> LineData:
+    lines = data.value.shape[-1]
+    own = slice(THIN // 2, None, THIN) if lines >= ENOUGH_LINES * THIN else slice(None)
+    share = np.sqrt(lines / data.value[:, :, own].shape[-1])
+    return replace(data, frequency=data.frequency[own], value=data.value[:, :, own], sd=data.sd[:, :, own] / share)
 
 
 # ---------------------------------------------------------------- making one

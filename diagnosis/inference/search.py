@@ -80,7 +80,7 @@ def search(
         about, temper = fit(model, tempers=TEMPERS[: EARLY + 1], learned=expected), TEMPERS[EARLY]
     else:
         about, temper = none.fit, 1.0
-    looked = screen(model, about, temper, learned, [*named, *free], workers)
+    looked = screen(model if temper == 1.0 else model.thinned, about, temper, learned, [*named, *free], workers)
     progress("effects screened")
     chosen = _chosen(looked, strained)
     # tolerances strained to stand in for an effect must give way with it; while errors are enlarged they are not strained yet
@@ -107,7 +107,7 @@ def _settled(model: CampaignModel, h: Hypothesis) -> Hypothesis:
         except FAILED:
             return h
         before, h = h.evidence, Hypothesis(found, evidence(model, found))
-        if h.evidence.learned == before.learned and abs(h.evidence.ln - before.ln) < LITTLE / 4:
+        if h.evidence.learned == before.learned and abs(h.evidence.ln - before.ln) < LITTLE:
             break
     return h
 

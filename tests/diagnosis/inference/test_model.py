@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.conftest import ROOT
 from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, truth, virtual_campaign
-from thermospindle.diagnosis.inference.nuisance import BUILD, DAMPING, DRIFT, EXPANSION, GAIN, STIFFNESS, TEMPERATURE
+from thermospindle.diagnosis.inference.nuisance import BUILD, DAMPING, DRIFT, EXPANSION, GAIN, RECORD, STIFFNESS, TEMPERATURE
+from thermospindle.diagnosis.inference.response import Response
 from thermospindle.model.machine import Condition
+from thermospindle.model.rotor.modes import poles
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
 
 CONDITIONS = (Condition(20.0), Condition(45.0, 7200 * RPM))
 FREQUENCY = np.arange(400.0, 6000.1, 40.0)
-KINDS = (BUILD, EXPANSION, TEMPERATURE, GAIN, DRIFT, STIFFNESS, DAMPING)
+KINDS = (BUILD, EXPANSION, TEMPERATURE, GAIN, DRIFT, STIFFNESS, DAMPING, RECORD)
 SCENES = {"reference": ROOT / "scenes" / "hdd_2003", "symmetric": ROOT / "tests" / "scenes" / "symmetric"}
 
 
@@ -27,7 +31,9 @@ def made(scene, **changes):
     """A model of two tests, and nuisance values one to two standard deviations from the drawing."""
     errors = drawn(scene, 2, 3)
     model = model_of(scene, virtual_campaign(scene, CONDITIONS, 3, errors=errors, frequency=FREQUENCY, **changes))
-    return model, truth(model, errors) + 0.7 * np.random.default_rng(11).standard_normal(len(model.parameters))
+    x = truth(model, errors) + 0.7 * np.random.default_rng(11).standard_normal(len(model.parameters))
+    x[[p.kind == RECORD for p in model.parameters]] = 0.0  # records are long enough
+    return model, x
 
 
 def differences(model, t, x, numbers, step=2e-3):
@@ -60,10 +66,29 @@ def test_derivatives_of_lines(scene, quantity, decay):
     model, x = made(scene, quantity=quantity, window_decay=decay)
     worst = worst_by_kind(model, 1, x)
     assert set(worst) == set(KINDS)
-    for kind in (GAIN, DRIFT, STIFFNESS, DAMPING):
+    for kind in (GAIN, DRIFT, STIFFNESS, DAMPING, RECORD):
         assert worst[kind] < 1e-4, kind
     for kind in (BUILD, EXPANSION, TEMPERATURE):
         assert worst[kind] < 5e-3, kind
+
+
+def test_records_that_end_early(scene):
+    """A record of T seconds and its discrete Fourier transform, mode by mode: p A e^(p t) from 0 to T under the window."""
+    decay = 15.0
+    model, x = made(scene, window_decay=decay)
+    x[[p.kind == RECORD for p in model.parameters]] = 1.0
+    data, linear = model.tests[0], model.linear(0, x, [])
+    p, rows = poles(linear.matrices), linear.chain
+    duration = 1 / 40.0  # s, of lines 40 Hz apart
+    lines = np.arange(10, 150) / duration
+    away = 2j * np.pi * lines + decay + rows.decay - p.value[:, None]
+    residue = (rows.response_rows @ p.right)[:, None, :] * (p.left @ rows.reference_rows.T).T[None] * p.value
+    at_lines = replace(data, frequency=lines, value=np.zeros((*data.value.shape[:2], len(lines)), complex))
+    gain = np.ones(len(rows.gain))
+    exact = residue @ ((1 - np.exp(-away * duration)) / away) * rows.gain[:, None, None]
+    cut, uncut = (Response(linear, at_lines, gain, share).value for share in (1.0, 0.0))
+    assert np.abs(cut - exact).max() < 1e-9 * np.abs(exact).max()
+    assert np.abs(uncut - exact).max() > 1e-3 * np.abs(exact).max()
 
 
 def test_parameters_of_other_tests_do_not_move_a_test(scene):
