@@ -4,5 +4,6 @@
 lines       FRFs as lines with their covariance, where a campaign has FRFs
 mode_table  modes of every test with their covariances, where it has a mode table only
 observe     the modes of every test, identified or from tables, with covariances that are never zero
+window      noise under an exponential window: how it is correlated over lines, and whether it is
 ==========  ============================================================================================================
 """
