@@ -125,7 +125,8 @@ class Problem:
         effects, beyond = self.applied(t, sizes, shapes)
         more = sum(t + 1 + len(m.shape) for m in self.mechanisms)
         r, jacobian, numbers = self.model.jacobian(t, x, self.acting(effects), rates, more)
-        row, at, own = len(numbers), self.nuisances, []
+        own: list[int] = []
+        row, at = len(numbers), self.nuisances
         for k, (m, root) in enumerate(zip(self.mechanisms, self.roots, strict=True)):
             by_size = self.by_size(t, x, effects, k)
             if beyond[k]:
@@ -181,18 +182,18 @@ def fit(
     model: CampaignModel, mechanisms: Sequence[Mechanism] = (), start: Array | None = None, rates: Rates | None = None,
     tempers: Sequence[float] = TEMPERS, steps: int = 4, learned: Learned | None = None,
 ) -> Fit:
-    """The fit with the reference widths of all priors, or those `learned`. While errors are taken too
-    large, the thinned model serves.
+    """The fit with the reference widths of all priors, or those `learned`. While errors are taken too large, the thinned model serves.
 
     Raises what the model raises where even the start cannot be built.
     """
-    p = None if start is None else start.copy()
+    problem = Problem(model, mechanisms, learned)
+    p = np.zeros(problem.length) if start is None else start.copy()
     for temper in tempers:
         problem = Problem(model if temper == 1.0 else model.thinned, mechanisms, learned)
-        p = np.zeros(problem.length) if p is None else p
         rates = problem.model.rates(problem.parts(p)[0], problem.effects_of(p), rates)
         p, lines, residuals = _settled(problem, p, rates, temper, steps, fresh=temper == 1.0)
-    return _finished(problem, p, rates, temper, lines, residuals)
+        done = problem, p, rates, temper, lines, residuals
+    return _finished(*done)
 
 
 def _settled(problem: Problem, p: Array, rates: Rates, temper: float, steps: int, fresh: bool) -> tuple[Array, Linearisation, list[Array]]:

@@ -184,24 +184,22 @@ class CampaignModel:
         data = self.tests[t]
         if isinstance(data, ModeData):
             return mode_residual(data, self.linear(t, x, effects))
-        return self.whitened(t, self.response(t, x, effects).value, data.value)
+        return self.whitened(t, self._response(t, x, self.linear(t, x, effects)).value, data.value)
 
-    def response(self, t: int, x: Array, effects: Applied, linear: Linear | None = None) -> Response:
-        """FRFs of test `t` at its lines."""
+    def response(self, t: int, x: Array, effects: Applied, frequency: Array) -> ComplexArray:
+        """FRFs (n_resp, n_ref, n) of test `t`, one of FRF lines, at other frequencies (n,) Hz."""
+        return self._response(t, x, self.linear(t, x, effects), frequency).value
+
+    def _response(self, t: int, x: Array, linear: Linear, frequency: Array | None = None) -> Response:
         data = self.tests[t]
         assert isinstance(data, LineData)
-        cut = float(x[self._record]) if self._record is not None else 0.0
-        return Response(linear or self.linear(t, x, effects), data, self._gain(t, x), cut)
+        if frequency is not None:
+            data = replace(data, frequency=frequency)
+        return Response(linear, data, self._gain(t, x), 0.0 if self._record is None else float(x[self._record]))
 
     @cached_property
     def _record(self) -> int | None:
         return next((i for i, p in enumerate(self.parameters) if p.kind == kinds_of.RECORD), None)
-
-    def response(self, t: int, x: Array, effects: Applied, frequency: Array) -> ComplexArray:
-        """FRFs (n_resp, n_ref, n) of test `t`, one of FRF lines, at other frequencies (n,) Hz."""
-        data = self.tests[t]
-        assert isinstance(data, LineData)
-        return _Response(self.linear(t, x, effects), replace(data, frequency=frequency), self._gain(t, x)).value
 
     def _gain(self, t: int, x: Array) -> Array:
         number, channel = self._gains[t]
@@ -226,7 +224,7 @@ class CampaignModel:
         if isinstance(data, ModeData):
             r, found, numbers = self._mode_jacobian(t, data, linear, rates)
             return r, np.concatenate([found.T, np.zeros((more, len(r)))]), numbers
-        response = self.response(t, x, effects, linear)
+        response = self._response(t, x, linear)
         own, channel = self._gains[t]
         pairs = self._discrepancies[t]
         record = [] if self._record is None else [self._record]
@@ -268,11 +266,11 @@ class CampaignModel:
         same = at.layout == moved.layout and at.matrices.dofs == moved.matrices.dofs and same_chain(at.chain, moved.chain)
         if isinstance(data, ModeData):
             return (mode_residual(data, moved) - mode_residual(data, at)) / apart
-        response = self.response(t, x, first, at)
+        response = self._response(t, x, at)
         if same:
             difference = [(getattr(moved.matrices, k) - getattr(at.matrices, k))[None] / apart for k in ("mass", "damping", "stiffness")]
             return self.whitened(t, response.moved(*difference)[0], 0.0)
-        return self.whitened(t, (self.response(t, x, second, moved).value - response.value) / apart, 0.0)
+        return self.whitened(t, (self._response(t, x, moved).value - response.value) / apart, 0.0)
 
     # ------------------------------------------------------------ derivatives of the matrices
 
@@ -371,7 +369,7 @@ def _stretched(radial: float, axial: float, grooves: float) -> tuple[Effect, Val
 def _thin(data: LineData) -> LineData:
     lines = data.value.shape[-1]
     own = slice(THIN // 2, None, THIN) if lines >= ENOUGH_LINES * THIN else slice(None)
-    share = np.sqrt(lines / data.value[:, :, own].shape[-1])
+    share = np.sqrt(lines / max(data.value[:, :, own].shape[-1], 1)) or 1.0
     return replace(data, frequency=data.frequency[own], value=data.value[:, :, own], sd=data.sd[:, :, own] / share)
 
 

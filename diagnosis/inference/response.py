@@ -50,7 +50,7 @@ class Response:
         )  # (n_resp, L)
         receptance = self.left @ self._references  # (L, n_resp, n_ref)
         self.value: ComplexArray = receptance.transpose(1, 2, 0) * self.factor[:, None, :]
-        self._of = linear, data, omega
+        self._of = linear, data
         if cut:
             self.value = self.value + cut * self.cut_off
 
@@ -59,10 +59,12 @@ class Response:
         """What a record of finite length T leaves out, (n_resp, n_ref, L): of a velocity's mode p A e^(p t) the part after T,
         -p A e^((p - w) T) / (s - p) with w what windows add. At the lines 1/T apart of a discrete Fourier transform e^(-i omega T) is one, so
         that the part is smooth over lines (Brandt, *Noise and Vibration Analysis*, 2011, 10.3)."""
-        linear, data, omega = self._of
+        linear, data = self._of
+        if not np.isfinite(data.duration):
+            return np.zeros_like(self.value)
         p = poles(linear.matrices)
         chain = linear.chain
-        window = float((self.s - 1j * omega)[0].real)
+        window = chain.decay + data.test.window_decay
         decayed = np.exp(np.minimum((p.value.real - window) * data.duration, 0.0)) * np.exp(1j * p.value.imag * data.duration)
         seen = np.abs(decayed) > SILENT
         residue = (chain.response_rows[: self.left.shape[1]] @ p.right[:, seen])[:, None, :] * (p.left[seen] @ self._references).T[None]

@@ -15,10 +15,11 @@ import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.inference import nuisance as kinds_of
-from thermospindle.diagnosis.inference.evidence import GRIDS, REFERENCE, Evidence, Learned, evidence
+from thermospindle.diagnosis.inference.evidence import GRIDS, Evidence, evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, Problem, fit
 from thermospindle.diagnosis.inference.mechanism import Mechanism, variants
 from thermospindle.diagnosis.inference.model import FAILED, CampaignModel, TestData
+from thermospindle.diagnosis.inference.prior import REFERENCE, Learned
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import Effect, Values
@@ -198,8 +199,8 @@ def predicted_squares(found: Settled, tests: Sequence[TestData], group: Sequence
     information, gradient, total, count = np.zeros((problem.length,) * 2), np.zeros(problem.length), 0.0, 0
     for t in group:
         r, jacobian, numbers = problem.linearised(t, point, rates)
-        information[np.ix_(numbers, numbers)] += jacobian.T @ jacobian
-        gradient[numbers] += jacobian.T @ r
+        information[np.ix_(numbers, numbers)] += jacobian @ jacobian.T
+        gradient[numbers] += jacobian @ r
         total += float(r @ r)
         count += len(r)
     size, directions = np.linalg.eigh(covariance)
