@@ -30,7 +30,7 @@ PAIRS = 6  # fitted at most
 ENOUGH, PLENTY = 5.0, 12.0  # ln evidence that a second mechanism must promise: beside one that leaves a misfit, and one that leaves none
 OCCAM = 20.0  # ln evidence that a second mechanism of no size may cost at most: less tells of a fit that stalled
 STRAIN = 1.02  # times the errors, from which the model without effects leaves a misfit
-FINALISTS = {1: 3, 2: 2}  # explanations of one and of two mechanisms that are fitted anew at the end, of the catalogue and free
+FINALISTS = {1: 3, 2: 2, 3: 1}  # explanations of one, two and three mechanisms that are fitted anew at the end, of the catalogue and free
 NEAR = 100.0  # ln evidence behind the best, so far
 REFITS = 2  # at most
 LITTLE = 2.0  # ln evidence that a screened mechanism must promise
@@ -183,16 +183,27 @@ def _fit_one(model: CampaignModel, rates, tempers, most: float, expected: Learne
 def _joined(
     model, none: Hypothesis, singles: Sequence[Hypothesis], mechanisms: Sequence[Mechanism], most: float, expected: Learned, workers
 ) -> list[Hypothesis]:
-    """The best single mechanisms with every other one that promises to gain beside them."""
+    """The best single mechanisms with every other one that promises to gain beside them, and what promises to gain beside the best two."""
     ranked = sorted(singles, key=lambda h: -h.evidence.ln)
     gains = [h for h in ranked if h.evidence.ln > none.evidence.ln + LITTLE]
     leads = [h for h in gains if not h.free and h.evidence.ln > gains[0].evidence.ln - CLOSE][:LEADS] or [h for h in gains if not h.free][:1]
     if leads and (leads[0] is not gains[0] or leads[0].evidence.learned.errors > 1.0):
         leads += [h for h in gains if h.free][:1]  # two things that drift: where one of the catalogue does not do
+    pairs = _beside(model, leads, mechanisms, most, expected, workers)
+    best = max([*singles, *pairs], key=lambda h: h.evidence.ln, default=none)
+    if len(best.mechanisms) < 2:
+        return pairs
+    best_named = max((h for h in pairs if not h.free), key=lambda h: h.evidence.ln, default=best)
+    return [*pairs, *_beside(model, [best] if best_named is best else [best, best_named], mechanisms, most, expected, workers)]
+
+
+def _beside(model, leads: Sequence[Hypothesis], mechanisms: Sequence[Mechanism], most: float, expected: Learned, workers) -> list[Hypothesis]:
+    """One mechanism more, beside each of the `leads`: of the catalogue, and free beside what is not."""
     tasks, done = [], set()
     for lead in leads:
         asked = ENOUGH if lead.evidence.learned.errors > 1.0 else PLENTY
-        others = [m for m in mechanisms if m.name != lead.names[0] and not (lead.free and not m.free)]
+        drifts = all(m.free for m in lead.mechanisms)
+        others = [m for m in mechanisms if m.name not in lead.names and not (drifts and not m.free) and not (m.free and lead.free and not drifts)]
         looked = screen(model, lead.fit, 1.0, lead.evidence.learned, others, workers)
         for free in (False, True):
             best: dict[str, Screened] = {}
@@ -200,7 +211,7 @@ def _joined(
                 if s.mechanism.free == free and s.gain > asked:
                     best.setdefault(s.mechanism.name, s)
             for s in list(best.values())[:SECONDS]:
-                names = frozenset({s.mechanism.name, lead.names[0]})
+                names = frozenset({s.mechanism.name, *lead.names})
                 if names not in done:
                     done.add(names)
                     tasks.append((lead.evidence.ln + s.gain, (*lead.mechanisms, s.mechanism), s.start, lead.evidence.ln - OCCAM))

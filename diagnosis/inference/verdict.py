@@ -21,11 +21,12 @@ from thermospindle.diagnosis.inference.fit import Problem
 from thermospindle.diagnosis.inference.model import CampaignModel
 from thermospindle.diagnosis.inference.search import STRAIN, Hypothesis, Search
 
-PRIOR = {"none": 0.5, "one": 0.33, "two": 0.08, "free": 0.05, "two free": 0.02, "one and free": 0.02}
+PRIOR = {"none": 0.5, "one": 0.33, "two": 0.08, "free": 0.05, "two free": 0.02, "one and free": 0.02, "three": 0.01}
 WRONG, FALSE_ALARM, MISSED, SET, HALF = 10.0, 20.0, 5.0, 1.0, 3.0
 ENOUGH = 0.95  # posterior probability that a set holds the truth
 LARGEST = 6  # names in a set, beyond which it says little
 NUMERICS = (1e-4, 0.01)  # drift of frequencies and of damping that two honest programs may differ by
+MOSTLY = 0.6  # of the ln evidence of an explanation with free drift in it, that what it names must reach alone to be the answer
 COARSE = 4.0  # chosen on blind campaigns 1 to 16, by log score; others judge it
 LAGS, SMALL = 12, 0.05  # lines over which residuals are compared, and the correlation that chance makes
 SPREAD = 3.0  # temperatures within so many tolerances of each other are one condition
@@ -85,7 +86,7 @@ def decide(found: Search) -> Verdict:
         none = 0.0
     unknown = sum(c.probability for c in free)
     word, effects, losses = _least_loss(candidates, none, free)
-    accepted = _accepted(found, word, effects, candidates)
+    accepted = _accepted(found, word, effects, candidates, free)
     groups = conditions_of(found)
     before = left_out(found.model, found.base.fit, found.base.evidence, groups)
     after = left_out(found.model, accepted.fit, accepted.evidence, groups)
@@ -138,9 +139,22 @@ def _prior(h: Hypothesis, named: int, free: int) -> float:
         return float(np.log(PRIOR["none"]))
     if count == 1:
         return float(np.log(PRIOR["free"] / free) if frees else np.log(PRIOR["one"] / named))
+    if count > 2:
+        return float(np.log(PRIOR["three"] / max(comb(named + free, 3), 1)))
     if frees == 0:
         return float(np.log(PRIOR["two"] / max(comb(named, 2), 1)))
     return float(np.log(PRIOR["two free"] / max(comb(free, 2), 1)) if frees == 2 else np.log(PRIOR["one and free"] / (named * free)))
+
+
+def named_part(c: Candidate) -> Names:
+    """The effects of the catalogue in an explanation that may hold free forms too."""
+    return tuple(m.name for m in c.hypothesis.mechanisms if not m.free)
+
+
+def _mostly_named(c: Candidate, alone: Mapping[frozenset[str], float]) -> bool:
+    """Whether the effects of the catalogue, by themselves or some of them, reach most of what an explanation gains with free drift beside them."""
+    own = frozenset(named_part(c))
+    return max((gain for names, gain in alone.items() if names <= own), default=-np.inf) > MOSTLY * c.delta_evidence
 
 
 def _least_loss(candidates: Sequence[Candidate], none: float, free: Sequence[Candidate]) -> tuple[str, Names, dict[str, float]]:
@@ -150,6 +164,7 @@ def _least_loss(candidates: Sequence[Candidate], none: float, free: Sequence[Can
     losses: dict[str, float] = {"none": MISSED * something}
     answers: dict[str, tuple[str, Names]] = {"none": ("none", ())}
     p_unknown, p_beside = sum(c.probability for c in unknown), sum(c.probability for c in beside)
+    alone = {frozenset(c.names): c.delta_evidence for c in candidates}
 
     def named_loss(own: set[str]) -> float:
         """Of naming one effect, or two: half right where one of two is named, or one beside something unknown."""
@@ -157,11 +172,15 @@ def _least_loss(candidates: Sequence[Candidate], none: float, free: Sequence[Can
         for c in candidates:
             hit = own & set(c.names)
             loss += c.probability * (0.0 if own == set(c.names) else HALF if hit else WRONG)
-        return loss + sum(c.probability * (HALF if own & {m.name for m in c.hypothesis.mechanisms if not m.free} else WRONG) for c in beside)
+        for c in beside:
+            of_it = set(named_part(c))
+            whole = SET / 2 if own == of_it and _mostly_named(c, alone) else HALF
+            loss += c.probability * (whole if own & of_it else WRONG)
+        return loss
 
-    for c in candidates[:8]:
-        key = " + ".join(c.names)
-        losses[key], answers[key] = named_loss(set(c.names)), ("identified" if len(c.names) == 1 else "two effects", c.names)
+    for names in dict.fromkeys([c.names for c in candidates[:8]] + [named_part(c) for c in beside[:3]]):
+        key = " + ".join(names)
+        losses[key], answers[key] = named_loss(set(names)), ("identified" if len(names) == 1 else "two effects", names)
     chosen, share = list[Candidate](), 0.0
     for c in candidates:
         if share >= ENOUGH * something or len({n for k in chosen for n in k.names}) >= LARGEST:
@@ -180,11 +199,12 @@ def _least_loss(candidates: Sequence[Candidate], none: float, free: Sequence[Can
     return *answers[best], losses
 
 
-def _accepted(found: Search, word: str, effects: Names, candidates: Sequence[Candidate]) -> Hypothesis:
+def _accepted(found: Search, word: str, effects: Names, candidates: Sequence[Candidate], free: Sequence[Candidate]) -> Hypothesis:
     """The hypothesis by which errors after the verdict are told: the best that it names."""
     if word in ("none", "unexplained"):
         return found.base
-    return next(c.hypothesis for c in candidates if set(c.names) <= set(effects))
+    there = next((c.hypothesis for c in candidates if set(c.names) <= set(effects)), None)
+    return there or next(c.hypothesis for c in free if set(named_part(c)) == set(effects))
 
 
 def conditions_of(found: Search) -> list[list[int]]:
@@ -216,7 +236,6 @@ def _reason(found: Search, word: str, effects: Names, candidates, free, none: fl
             place = f"every mode drifts from test to test, by {drift:.1g} of its frequency, more than two honest programs differ by"
         rival = f"; the best of the catalogue, {' + '.join(lead.names)}, reaches {lead.delta_evidence:.0f}" if lead else ""
         return f"No effect of the catalogue explains the data as well as free drift does: {place}{rival} (chi2 without effects: {chi2 / n:.2f} a number)."
-    assert lead is not None
     named = " + ".join(effects)
     checked = f"; conditions left out are predicted with {after:.2f} instead of {before:.2f} standard errors"
     if word == "ambiguous":
@@ -224,7 +243,11 @@ def _reason(found: Search, word: str, effects: Names, candidates, free, none: fl
         share = sum(c.probability for c in rows)
         return f"One of {', '.join(effects)} explains the data (together {share:.0%} probable); no one of them is probable enough to be named{checked}."
     disagreement = ", which does not confirm it" if after > 0.9 * before else ""
-    rest = 1 - lead.probability
+    told = [c for c in (*candidates, *free) if set(named_part(c)) == set(effects)]
+    chosen = max(told, key=lambda c: c.probability)
+    rest = 1 - sum(c.probability for c in told)
     odds = "all else together is less probable than 1 in 1000" if rest < 1e-3 else f"all else together has a probability of {rest:.1%}"
-    word_of = "are both needed" if word == "two effects" else "is the explanation"
-    return f"{named} {word_of}: {lead.delta_evidence:.0f} in ln evidence over the model without effects, {odds}{checked}{disagreement}."
+    word_of = "is the explanation" if len(effects) == 1 else "are both needed" if len(effects) == 2 else "are all needed"
+    drifting = [m.name for m in chosen.hypothesis.mechanisms if m.free]
+    beside = f"; beside {'it' if len(effects) == 1 else 'them'} {' and '.join(drifting)} drifts a little" if drifting else ""
+    return f"{named} {word_of}: {chosen.delta_evidence:.0f} in ln evidence over the model without effects, {odds}{beside}{checked}{disagreement}."

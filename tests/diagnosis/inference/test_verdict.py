@@ -11,10 +11,11 @@ import pytest
 from thermospindle.diagnosis.inference.evidence import Evidence
 from thermospindle.diagnosis.inference.fit import Fit
 from thermospindle.diagnosis.inference.mechanism import Mechanism
+from thermospindle.diagnosis.inference.nuisance import DAMPING, STIFFNESS
 from thermospindle.diagnosis.inference.prior import Learned
 from thermospindle.diagnosis.inference.screening import Screened
 from thermospindle.diagnosis.inference.search import Hypothesis, Search
-from thermospindle.diagnosis.inference.verdict import FALSE_ALARM, MISSED, WRONG, Verdict, conditions_of, decide
+from thermospindle.diagnosis.inference.verdict import COARSE, FALSE_ALARM, MISSED, WRONG, Verdict, coarsening, conditions_of, decide
 from thermospindle.model.machine import Condition
 from thermospindle.sim.effects.effect import Effect, Parameter
 
@@ -67,6 +68,10 @@ CASES = {
     "free drift alone": ({"~x": 70.0, "~y": 60.0}, "unexplained", ()),
     "two drift": ({"a": 10.0, ("~x", "~y"): 70.0}, "unexplained", ()),
     "free drift near behind": ({"a": 40.0, "~x": 30.0}, "identified", ("a",)),
+    "a little drift beside one": ({"a": 40.0, "~x": 20.0, ("a", "~x"): 60.0}, "identified", ("a",)),
+    "mostly drift, with a name beside": ({"a": 20.0, "~x": 40.0, ("a", "~x"): 80.0}, "unexplained", ()),
+    "two, and a little drift": ({"a": 40.0, ("a", "b"): 80.0, ("a", "~x"): 90.0, ("a", "~x", "b"): 120.0}, "two effects", {"a", "b"}),
+    "three": ({"a": 40.0, ("a", "b"): 80.0, ("a", "b", "c"): 140.0}, "two effects", {"a", "b", "c"}),
 }
 
 
@@ -116,6 +121,17 @@ def test_a_wrong_name_costs_ten_times_a_set():
         if abs(WRONG * rest - 1) > 0.05:
             assert v.word == ("ambiguous" if WRONG * rest > 1 else "identified"), lead
     assert {v.word for v in words.values()} == {"ambiguous", "identified"}
+
+
+@pytest.mark.parametrize(("sizes", "errors", "worth"), [({}, 1.0, 1.0), ({STIFFNESS: 1e-3}, 1.0, COARSE), ({DAMPING: 0.0}, 1.0, 1.0), ({}, 1.1, COARSE)])
+def test_evidence_is_worth_less_where_the_model_is_a_little_wrong(sizes, errors, worth):
+    """A lead of six is a lead of six in a model that is right, and of a quarter of it in one that has an error everywhere."""
+    found = made({"a": 30.0, "b": 24.0})
+    wrong = [replace(h, evidence=replace(h.evidence, learned=replace(h.evidence.learned, sizes=sizes, errors=errors))) for h in found.hypotheses]
+    v = decide(replace(found, hypotheses=tuple(wrong), base=wrong[-1]))
+    first, second = (next(c for c in v.candidates if c.names == (k,)).probability for k in "ab")
+    assert np.log(first / second) == pytest.approx(6.0 / worth)
+    assert coarsening(wrong[0]) == worth
 
 
 def test_the_order_of_hypotheses_does_not_matter():
