@@ -11,8 +11,9 @@ import numpy as np
 
 from thermospindle.model.bearing.kinematics import row_kinematics
 from thermospindle.model.machine import MOVES, Spindle
-from thermospindle.model.rotor.look import RegionMesh, plate_meshes, region_meshes
+from thermospindle.model.rotor.look import RegionMesh, plate_meshes, region_meshes, shaft_meshes
 from thermospindle.model.rotor.modes import Mode, frf, point_rows
+from thermospindle.model.rotor.shaft_look import extent
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.model.units import TO_MM
 from thermospindle.sim.operating import OperatingPoint
@@ -27,8 +28,8 @@ Poses = dict[str, tuple[Array, Array]]
 
 
 def reach(spindle: Spindle) -> float:
-    """Largest radius of the section (m)."""
-    return max(g.r[1] for g in spindle.regions)
+    """Largest radius of section and shafts (m)."""
+    return extent(spindle)[0]
 
 
 def round_down(value: float) -> float:
@@ -39,7 +40,7 @@ def round_down(value: float) -> float:
 
 def body_meshes(spindle: Spindle) -> dict[str, list[RegionMesh]]:
     """The cut-away meshes by the body they move with."""
-    meshes = [*region_meshes(spindle), *plate_meshes(spindle)]
+    meshes = [*region_meshes(spindle), *shaft_meshes(spindle), *plate_meshes(spindle)]
     return {b.name: own for b in spindle.structure.bodies if (own := [m for m in meshes if m.body == b.name])}
 
 

@@ -49,8 +49,7 @@ def run(
     points = []
     for temperature in temperatures:
         points.append(operating_point(spindle, Condition(temperature, speed)))
-        preload = points[-1].state.bearings[0].preload
-        progress(f"{temperature:g} C: {points[-1].state.status}, preload {preload:.2f} N")
+        progress(f"{temperature:g} C: {points[-1].state.words}")
     tests = impact_tests(points, element=element, seed=seed, progress=progress)
     steps = []
     for test in tests:

@@ -94,6 +94,9 @@ def warm_up(
     """
     if duration is not None and not duration > 0:
         raise BadInput(f"duration {duration:g} s: a warm-up needs a positive one")
+    if not spindle.regions or not spindle.bearings:
+        lacking = "section" if not spindle.regions else "ball rows"
+        raise BadInput(f"{spindle.file or spindle.name}: {lacking}: there are none, and a warm-up needs a section that heat flows through and ball rows that make it")
     air = start if air is None else air
     effects = tuple((effect, values) for effect, values in of_scene(spindle) if not effect.temperatures)
     left_out = tuple(effect.name for effect, _ in of_scene(spindle) if effect.temperatures)

@@ -176,10 +176,10 @@ def _radial(bearing: str, cause: str, order: int, name: str, speed: float, kin: 
     return Line(bearing, cause, order, name, "radial", whirl, abs(speed) / (2 * np.pi))
 
 
-def lines(spindle: Spindle, kinematics_by_bearing: Mapping[str, Kinematics], highest_multiple: int = 3) -> list[Line]:
+def lines(spindle: Spindle, kinematics_by_bearing: Mapping[str, Kinematics], highest_multiple: int = 3, speed: float = 0.0) -> list[Line]:
     """All lines of linear theory for k up to `highest_multiple`, multiples of Z and even ball orders alike, in order of frequency.
 
-    Orders that stand still (order 1 of a ring at rest, anything at speed zero) excite nothing and are left out.
+    `speed` (rad/s) is the spindle's where it has no ball row to tell. Orders that stand still (order 1 of a ring at rest, anything at speed zero) excite nothing and are left out.
     """
     found: list[Line] = []
     for name in (b.name for b in spindle.bearings):
@@ -192,6 +192,7 @@ def lines(spindle: Spindle, kinematics_by_bearing: Mapping[str, Kinematics], hig
                 found.append(race_line(name, kin, side, passes, "axial"))
         for order in range(2, 2 * highest_multiple + 1, 2):
             found += [ball_line(name, kin, order, "radial", by) for by in (-1, 1)] + [ball_line(name, kin, order, "axial")]
-    speed = next(iter(kinematics_by_bearing.values())).turning
+    if kinematics_by_bearing:
+        speed = next(iter(kinematics_by_bearing.values())).turning
     found.append(unbalance_line(speed))
     return sorted((line for line in found if line.frequency > SMALLEST), key=lambda line: line.frequency)

@@ -71,6 +71,23 @@ class LinearState:
     stiffness: Array
     damping: Array
 
+    @property
+    def radial_stiffness(self) -> float:
+        return float(self.stiffness[0, 0])
+
+    @property
+    def axial_stiffness(self) -> float:
+        return float(self.stiffness[2, 2])
+
+    @property
+    def tilt_stiffness(self) -> float:
+        return float(self.stiffness[3, 3])
+
+    @property
+    def coupling_stiffness(self) -> float:
+        """Radial force per tilt, k_x,tilt_y (N/rad)."""
+        return float(self.stiffness[0, 4])
+
 
 @dataclass(frozen=True)
 class PairState:
@@ -87,10 +104,21 @@ class PairState:
     linear: tuple[LinearState, ...] = ()  # in the order of Spindle.linear_bearings
 
     @property
+    def words(self) -> str:
+        """Status and the first ball row's preload, in words."""
+        if not self.bearings:
+            return "bearings given by numbers" if self.linear else "no bearings"
+        return f"{self.status}, preload {self.bearings[0].preload:.2f} N"
+
+    @property
     def all_bearings(self) -> tuple[BearingState | LinearState, ...]:
         """Ball rows and bearings given by numbers, lowest first."""
         every: list[BearingState | LinearState] = [*self.bearings, *self.linear]
         return tuple(sorted(every, key=lambda b: b.z))
+
+    def any_bearing(self, name: str) -> BearingState | LinearState:
+        """The ball row, or bearing given by numbers, of that name."""
+        return next(b for b in self.all_bearings if b.name == name)
 
     def bearing(self, name: str) -> BearingState:
         return next(b for b in self.bearings if b.name == name)

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from thermospindle.model.bearing.pair import PairState
+from thermospindle.model.bearing.pair import BearingState, LinearState, PairState
 from thermospindle.model.cells import cell, name_of
 from thermospindle.model.errors import BadInput, OutsideRange
 from thermospindle.model.types import Array
@@ -65,10 +66,10 @@ def _between(grid: Array, values: Array, where: float, name: str, unit: str) -> 
 
 def tabulate(states: Sequence[Sequence[PairState]], unloads: Mapping[str, float | None], provenance: Mapping[str, str]) -> StiffnessTable:
     """Table of pair states on a grid: `states[i][j]` at temperature i and speed j."""
-    names = [b.name for b in states[0][0].bearings]
+    names = [b.name for b in states[0][0].all_bearings]
 
     def column(name: str, read) -> Array:
-        return np.array([[float(read(state.bearing(name))) for state in row] for row in states])
+        return np.array([[_property(state.any_bearing(name), read) for state in row] for row in states])
 
     return StiffnessTable(
         np.array([row[0].condition.temperature for row in states]),
@@ -77,6 +78,14 @@ def tabulate(states: Sequence[Sequence[PairState]], unloads: Mapping[str, float 
         dict(unloads),
         dict(provenance),
     )
+
+
+def _property(bearing: BearingState | LinearState, read: Callable[[Any], float]) -> float:
+    """A property of a bearing; NaN for what only balls have of a bearing given by numbers."""
+    try:
+        return float(read(bearing))
+    except AttributeError:
+        return float("nan")
 
 
 def write_table(table: StiffnessTable, path: Path) -> None:
@@ -105,12 +114,12 @@ def read_table(path: Path) -> StiffnessTable:
         for row in rows:
             where = np.searchsorted(temperature, float(row["temperature_C"])), np.searchsorted(rpm, float(row["speed_rpm"]))
             for column in COLUMNS:
-                grid = values.setdefault(name_of(row["bearing"]), {}).setdefault(column, np.full((len(temperature), len(rpm)), np.nan))
+                grid = values.setdefault(name_of(row["bearing"]), {}).setdefault(column, np.full((len(temperature), len(rpm)), np.inf))
                 grid[where] = float(row[column])
     except (OSError, UnicodeDecodeError, RecursionError, IndexError, KeyError, ValueError, TypeError) as error:
         raise BadInput(f"{path}: not a stiffness table as spindle writes it: {type(error).__name__} {error}") from None
-    if not values or any(np.isnan(grid).any() for columns in values.values() for grid in columns.values()):
+    if not values or any(np.isinf(grid).any() for columns in values.values() for grid in columns.values()):
         raise BadInput(f"{path}: the table has gaps; every bearing needs a row for each temperature and speed")
-    if not all(np.isfinite(a).all() for a in (temperature, rpm, *(grid for columns in values.values() for grid in columns.values()))):
+    if not all(np.isfinite(a).all() for a in (temperature, rpm)):
         raise BadInput(f"{path}: holds an infinite number; only finite ones are allowed")
     return StiffnessTable(temperature, rpm * RPM, values, unloads, provenance)

@@ -25,7 +25,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from thermospindle.model.machine import MOVES, Body, Joint, Material, Structure
+from thermospindle.model.machine import Body, Joint, Material, Structure
 from thermospindle.model.shaft import Segment, Shaft
 from thermospindle.model.types import Array
 
@@ -48,14 +48,17 @@ def with_shafts(structure: Structure, materials: Mapping[str, Material], tempera
     return replace(structure, bodies=(*structure.bodies, *bodies), joints=(*structure.joints, *joints))
 
 
-def with_theory(structure: Structure, materials: Mapping[str, Material], temperature: float, shear: float, rotary: float) -> Structure:
-    """The structure with other shares of shear and rotary inertia in the beams of its shafts, all else of them as it stands.
+def with_theory(
+    structure: Structure, materials: Mapping[str, Material], temperature: float, shares: tuple[float, float] | Mapping[str, tuple[float, float]]
+) -> Structure:
+    """The structure with other shares of shear and rotary inertia in the beams of its shafts (of all, or by name), all else of them as it stands.
 
     What has been added to a node or scaled in an element stays: only the change that the shares make is applied.
     """
     changed_bodies: dict[str, Body] = {}
     changed_joints: dict[str, Joint] = {}
-    shafts = tuple(replace(s, shear=shear, rotary=rotary) for s in structure.shafts)
+    told = {s.name: shares if isinstance(shares, tuple) else shares[s.name] for s in structure.shafts}
+    shafts = tuple(replace(s, shear=told[s.name][0], rotary=told[s.name][1]) for s in structure.shafts)
     for old, new in zip(structure.shafts, shafts, strict=True):
         for a, b in zip(nodes(old, materials), nodes(new, materials), strict=True):
             own = structure.body(a.name)
@@ -130,7 +133,7 @@ def nodes(shaft: Shaft, materials: Mapping[str, Material]) -> list[Body]:
     for name, z, m, s, tilt, small in zip(shaft.bodies, shaft.nodes, mass, first, shaft.rotary * rotary, least, strict=True):
         tilt = max(float(tilt), float(small))
         z = z + float(s / m)
-        found.append(Body(name, float(m), (tilt, tilt, 2 * tilt), z, MOVES, shaft.turns, (), shaft.role, shaft.speed_ratio))
+        found.append(Body(name, float(m), (tilt, tilt, 2 * tilt), z, shaft.moves, shaft.turns, (), shaft.role, shaft.speed_ratio))
     return found
 
 

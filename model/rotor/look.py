@@ -21,6 +21,7 @@ from thermospindle.model.bearing.pair import BearingState, PairState
 from thermospindle.model.bearing.springs import ball_springs
 from thermospindle.model.machine import PARTS, Body, Region, Spindle
 from thermospindle.model.rotor.section import Cell, cells
+from thermospindle.model.rotor.shaft_look import drawn_by_shaft, extent, host, slices
 from thermospindle.model.types import Array
 
 MjSpec = Any  # mujoco.MjSpec
@@ -35,6 +36,7 @@ COLOURS = {
     "steel": (0.46, 0.53, 0.61),
     "yoke": (0.46, 0.34, 0.25),
     "magnet": (0.15, 0.20, 0.36),
+    "cast iron": (0.43, 0.44, 0.46),
 }
 SHADES = (1.0, 0.84, 0.70, 0.58)  # of touching regions of one material
 PLATE, STRIPE, BALL, LOOSE_BALL = (0.33, 0.36, 0.40), (0.95, 0.62, 0.10), (0.74, 0.75, 0.77), (0.85, 0.30, 0.15)
@@ -72,19 +74,34 @@ def region_meshes(spindle: Spindle) -> list[RegionMesh]:
     """Every region of the section as a sector of a ring between the azimuths `CUT`, in the order of the regions."""
     hosts, colours = region_bodies(spindle), region_colours(spindle)
     tiles = [tile for part in PARTS for tile in cells([g for g in spindle.regions if g.part == part])]
-    owned = {g.name: [t for t in tiles if t.region == g.name] for g in spindle.regions}
+    owned = {g.name: [t for t in tiles if t.region == g.name] for g in spindle.regions if not drawn_by_shaft(spindle, g)}
     return [RegionMesh(name, hosts[name], *revolve(own), (*colours[name], 1.0)) for name, own in owned.items() if own]
+
+
+def shaft_meshes(spindle: Spindle) -> list[RegionMesh]:
+    """A slice for every node of every flexible shaft, neighbours in different shades."""
+    return [
+        RegionMesh(name, name, *revolve(tiles), (*(SHADES[k % 2] * np.array(colour(shaft.segments[0].material))).tolist(), 1.0))
+        for shaft in spindle.structure.shafts
+        for k, (name, tiles) in enumerate(slices(shaft).items())
+        if tiles
+    ]
 
 
 def plate_meshes(spindle: Spindle) -> list[RegionMesh]:
     """A ring plate for every body that no region shows, as wide as its measuring points lie, its top at their height."""
-    shown = set(region_bodies(spindle).values())
+    shown = set(region_bodies(spindle).values()) | {name for shaft in spindle.structure.shafts for name in shaft.bodies}
     return [_plate(spindle, body) for body in spindle.structure.bodies if body.name not in shown]
 
 
 def stripe_meshes(spindle: Spindle) -> list[RegionMesh]:
     """A stripe of paint on the top and the side of every turning body's highest region: it shows the spin."""
     meshes = []
+    for shaft in (s for s in spindle.structure.shafts if s.turns):
+        name, tiles = next(iter(slices(shaft).items()))
+        thick, middle, half = 0.01 * tiles[0].r[1], CUT[1] - np.deg2rad(24.0), np.deg2rad(4.0)
+        face = Cell(name, tiles[0].r, (tiles[0].z[0] - thick, tiles[0].z[0]))
+        meshes.append(RegionMesh(f"{name} stripe", name, *revolve([face], middle - half, middle + half), (*STRIPE, 1.0)))
     for body in (b for b in spindle.structure.bodies if b.turns and b.regions):
         top = max((spindle.region(name) for name in body.regions), key=lambda g: (g.z[1], g.r[1]))
         (r0, r1), (z0, z1), thick = top.r, top.z, 0.004 * top.r[1]
@@ -163,10 +180,11 @@ def region_bodies(spindle: Spindle) -> dict[str, str]:
         if name not in hosts and (near := all_near & hosts.keys())
     }:
         hosts |= found
+    on_shafts = {g.name: node for g in spindle.regions if g.name not in made_of and (node := host(spindle, g))}
     turning = spindle.turning.name
     still = next((name for b in spindle.bearings for name in (b.inner_body, b.outer_body) if name != "ground" and not structure.body(name).turns), "")
     still = still or next((b.name for b in structure.bodies if not b.turns), turning)
-    return {g.name: hosts.get(g.name, turning if g.part == "rotating" else still) for g in spindle.regions}
+    return {g.name: on_shafts.get(g.name) or hosts.get(g.name, turning if g.part == "rotating" else still) for g in spindle.regions}
 
 
 def _touching(regions: Sequence[Region]) -> dict[str, set[str]]:
@@ -208,7 +226,7 @@ def _bulk(region: Region) -> float:
 
 
 def _plate(spindle: Spindle, body: Body) -> RegionMesh:
-    reach = max(g.r[1] for g in spindle.regions)
+    reach = extent(spindle)[0]
     points = [p.position for p in spindle.points if p.body == body.name]
     outer = 1.05 * max((float(np.hypot(x, y)) for x, y, _ in points), default=1.2 * reach)
     top = min((z for *_, z in points), default=body.z)
@@ -229,7 +247,10 @@ def dress(out: MjSpec, spindle: Spindle, state: PairState) -> None:
     for mesh in region_meshes(spindle):
         polished = mesh.region in _rings(spindle)
         _add_mesh(out, spindle, mesh, "polished finish" if polished else spindle.region(mesh.region).material)
-    for mesh in (*plate_meshes(spindle), *stripe_meshes(spindle)):
+    for shaft in spindle.structure.shafts:
+        if shaft.segments[0].material not in {g.material for g in spindle.regions}:
+            out.add_material(name=shaft.segments[0].material, rgba=[*colour(shaft.segments[0].material), 1.0], specular=0.35, shininess=0.45)
+    for mesh in (*shaft_meshes(spindle), *plate_meshes(spindle), *stripe_meshes(spindle)):
         _add_mesh(out, spindle, mesh, "matt finish")
     for bearing in state.bearings:
         _add_balls(out, spindle, bearing)
@@ -262,8 +283,8 @@ def _visual(group: int) -> dict[str, float]:
 
 def _add_surroundings(out: MjSpec, spindle: Spindle) -> None:
     """Lights, cameras and the sizes MuJoCo scales its pictures by; the cameras look into the cut."""
-    reach = max(g.r[1] for g in spindle.regions)
-    low, high = min(g.z[0] for g in spindle.regions), max(g.z[1] for g in spindle.regions)
+    reach, low, high = extent(spindle)
+    reach = max(reach, 0.5 * (high - low))
     centre = np.array([0.0, 0.0, (low + high) / 2])
     out.stat.center, out.stat.extent, out.stat.meansize = centre, 2.4 * reach, 0.05 * reach
     view = float(np.mean(CUT)) + np.pi
@@ -278,7 +299,7 @@ def _add_surroundings(out: MjSpec, spindle: Spindle) -> None:
         out.worldbody.add_light(
             name=name, pos=centre + 4 * reach * towards, dir=-towards, diffuse=[diffuse] * 3, specular=[0.3] * 3, castshadow=False
         )
-    bearings = np.array([0.0, 0.0, np.mean([b.z for b in spindle.bearings])])
+    bearings = np.array([0.0, 0.0, np.mean([b.z for b in spindle.all_bearings]) if spindle.all_bearings else (low + high) / 2])
     shots = {
         "front": (centre - [0.0, 0.0, 0.15 * reach], 5.6 * reach, 27.0, view + 0.1),
         "close": (bearings, 2.6 * reach, 12.0, view + 0.05),

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, Strict, model_validator
 
+from thermospindle.model import machine as m
 from thermospindle.model.scene.fields import Name, NotNegative, Place, Positive, Share, Table
 from thermospindle.model.shaft import THEORIES, Segment, Shaft, mesh
 from thermospindle.model.units import MM
@@ -35,6 +36,7 @@ class ShaftForm(Table):
     outer_mm: Annotated[list[Piece], Field(min_length=1, max_length=300)]
     bore_mm: Annotated[list[Piece], Field(max_length=300)] = Field(default_factory=list)
     mass_outer_mm: Annotated[list[Piece], Field(max_length=300)] = Field(default_factory=list)
+    moves: Annotated[list[Literal["x", "y", "z", "tilt_x", "tilt_y"]], Field(min_length=1)] = Field(default=["x", "y", "z", "tilt_x", "tilt_y"])
     turns: bool = False
     speed_ratio: Annotated[float, Field(ge=-100, le=100)] = 1.0
     beam: Literal["timoshenko", "rayleigh", "euler-bernoulli"] = "timoshenko"
@@ -61,6 +63,10 @@ class ShaftForm(Table):
                         f"bore_mm: at z_mm = {segment.z[k] / MM:g} the bore of {2 * segment.bore[k] / MM:g} mm leaves nothing of a diameter of "
                         f"{2 * min(segment.outer[k], segment.mass_outer[k]) / MM:g} mm"
                     )
+        if self.turns and set(self.moves) != set(m.MOVES):
+            raise ValueError("a shaft that turns must move in x, y, z, tilt_x and tilt_y")
+        if ("x" in self.moves) != ("tilt_y" in self.moves) or ("y" in self.moves) != ("tilt_x" in self.moves):
+            raise ValueError("a shaft bends in a plane: x goes with tilt_y, and y with tilt_x")
         if self.turns and self.speed_ratio == 0.0:
             raise ValueError("speed_ratio = 0 does not turn; without turns = true the shaft stands")
         return self
@@ -99,6 +105,7 @@ class ShaftForm(Table):
             role=self.role or "",
             shear=shear,
             rotary=rotary,
+            moves=tuple(name for name in m.MOVES if name in self.moves),
         )
 
 

@@ -82,7 +82,7 @@ def summary(run: Run, found: Sequence[Peak]) -> str:
     lines += ["", "All temperatures:", "", *_table(found, temperatures)] if temperatures != ends else []
     named = [(f"{s.point.condition.temperature:g} °C", s) for s in run.steps]
     lines += ["", f"**{run.spindle.title}**", "", "Bearings:", ""]
-    lines += [f"- {t}: {s.point.state.status}, preload {s.point.state.bearings[0].preload:.2f} N" for t, s in named]
+    lines += [f"- {t}: {s.point.state.words}" for t, s in named]
     lines += ["", "Identification:", "", *(f"- {t}: {s.identified.status}" for t, s in named)]
     lines += [
         f"- {p.temperature:g} °C: {p.frequency:.1f} Hz is none of the model's modes"

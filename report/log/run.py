@@ -51,9 +51,9 @@ def write_log(run: Run, path: Path) -> None:
 def _write(content: Shown, recording: rr.RecordingStream, file: Path) -> None:
     run, spindle = content.run, content.run.spindle
     sections = [field(spindle, t) for t in content.temperatures]
-    factor = drawing.exaggeration(sections, posing.reach(spindle))
+    factor = drawing.exaggeration(sections, posing.reach(spindle)) if spindle.regions else 1.0
     series = {b.name: bearing_series(run, b.name) for b in spindle.bearings}
-    quantities = dict(series[spindle.bearings[0].name])
+    quantities = dict(series[spindle.bearings[0].name]) if spindle.bearings else {}
     recording.save(file, default_blueprint=blueprint(content, list(quantities), factor))
     ends = (min(content.temperatures), max(content.temperatures))
     recording.send_recording_name(f"{spindle.name}, " + " to ".join(f"{t:g} C" for t in dict.fromkeys(ends)))
@@ -155,7 +155,7 @@ def log_section(recording: rr.RecordingStream, content: Shown, sections: Sequenc
     for part in sections[0]:
         drawn = []
         for section, step, t in zip(sections, content.run.steps, temperatures, strict=True):
-            shift = step.point.state.hub_movement if part == spindle.region(spindle.bearings[0].outer_ring).part else 0.0
+            shift = step.point.state.hub_movement if spindle.bearings and part == spindle.region(spindle.bearings[0].outer_ring).part else 0.0
             drawn.append(drawing.section_mesh(spindle, section[part], shift, factor, heat(t, temperatures)))
         for name, side, k in ends:
             vertices, triangles, colours = drawn[k]

@@ -22,9 +22,9 @@ def headlines(run: Run, table: Table) -> list[tuple[str, str, str]]:
     """(what, number, explanation): preload, bearing angle and stiffness, and how far the modes of each flexibility move."""
     cold, hot = table.temperatures
     first, last = (next(s.point.state for s in run.steps if temperature_of(s) == t) for t in (cold, hot))
-    preload = [s.bearings[0].preload for s in (first, last)]
+    preload = [s.bearings[0].preload if s.bearings else 0.0 for s in (first, last)]
     if cold == hot:
-        return [("Preload", f"{preload[0]:.1f} N", f"at {cold:g} °C")]
+        return [("Preload", f"{preload[0]:.1f} N", f"at {cold:g} °C")] if first.bearings else []
     pairs = list(zip(first.bearings, last.bearings, strict=True))[::-1]
     angle = " / ".join(f"{np.degrees(b.contact_angle - a.contact_angle):+.2f}" for a, b in pairs)
     radial = " / ".join(_change(a.radial_stiffness, b.radial_stiffness) for a, b in pairs)
@@ -39,6 +39,8 @@ def headlines(run: Run, table: Table) -> list[tuple[str, str, str]]:
         ("Contact angle", f"{angle} degrees", f"{names}, from {cold:g} to {hot:g} °C"),
         ("Radial bearing stiffness", radial, f"{names}; axial {axial}"),
     ]
+    if not pairs:
+        cards = []
     groups: dict[tuple[str, str], list[int]] = {}
     for row in table.rows:
         named = (row.published_flexibility, "as published") if row.published_flexibility else (row.flexibility, "by the model")

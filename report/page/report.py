@@ -74,26 +74,28 @@ def results(run: Run) -> list[Section]:
     picture = plots.comparison("modes", table.labels(), table.peaks, cold, hot) if cold != hot and table.rows else ""
     fig8 = plots.responses("frf", driving_points(run, steps), table.peaks, run.spindle.hammer.band)
     hottest = max(run.steps, key=lambda s: abs(temperature_of(s) - run.spindle.reference_temperature)).point
-    drawing, scale = plots.section("section", hottest)
-    return [
+    drawn = plots.section("section", hottest) if run.spindle.regions else None
+    found = [
         ("In short", page.short(headlines(run, table), misses(table), calibration(run.spindle), table)),
         ("Natural frequencies", page.frequencies(table, Markup(picture), table.sources())),
         ("Frequency response", page.responses(Markup(fig8), run, steps, table)),
-        ("Bearings over temperature", page.bearings(bearing_figures(run), run)),
-        ("Thermal deformation", page.deformation(Markup(drawing), scale, hottest)),
-        ("All modes", page.modes([(s, identified(s), in_band(s)) for s in run.steps], group_energy)),
     ]
+    if run.spindle.bearings:
+        found.append(("Bearings over temperature", page.bearings(bearing_figures(run), run)))
+    if drawn is not None:
+        found.append(("Thermal deformation", page.deformation(Markup(drawn[0]), drawn[1], hottest)))
+    return [*found, ("All modes", page.modes([(s, identified(s), in_band(s)) for s in run.steps], group_energy))]
 
 
 def background(run: Run) -> list[Section]:
     """How the results were made, and from which numbers."""
     page, spindle, last = _page(), run.spindle, run.steps[-1].point
-    mesh = influence(spindle, temperatures=region_temperatures(spindle, last.condition.temperature))
+    mesh = influence(spindle, temperatures=region_temperatures(spindle, last.condition.temperature)) if spindle.regions else None
     origins = Counter(p.origin for p in spindle.provenance.values())
     values, unchanged = values_of_file(spindle)
     return [
         ("The virtual test", page.acquisition(run.steps[0].test)),
-        ("Finite element meshes", page.meshes(mesh, last.condition.temperature)),
+        *([("Finite element meshes", page.meshes(mesh, last.condition.temperature))] if mesh else []),
         ("Where the numbers come from", page.origins(spindle, origins, values, unchanged)),
         ("Versions", page.versions(provenance(spindle))),
     ]

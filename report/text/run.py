@@ -44,7 +44,7 @@ def table_json(table: StiffnessTable) -> dict[str, Any]:
     """Lists over temperature at the first speed; with several speeds each entry of `speeds` holds its own."""
 
     def at(speed: int) -> dict[str, Any]:
-        return {name: {c: v[c][:, speed].tolist() for c in JSON_COLUMNS} for name, v in table.values.items()}
+        return {name: {c: [None if np.isnan(x) else x for x in v[c][:, speed].tolist()] for c in JSON_COLUMNS} for name, v in table.values.items()}
 
     answer = {"temperature_C": table.temperature.tolist(), "bearings": at(0), "unloads_C": dict(table.unloads)}
     if len(table.speed) > 1:
@@ -161,7 +161,7 @@ def show_table(console: Console, table: StiffnessTable) -> None:
         for j, speed in enumerate(table.speed):
             for name, values in table.values.items():
                 cells = zip(JSON_COLUMNS, scale, digits, strict=False)
-                row = [f"{values[c][i, j] * s:.{d}f}" for c, s, d in cells]
+                row = ["" if np.isnan(values[c][i, j]) else f"{values[c][i, j] * s:.{d}f}" for c, s, d in cells]
                 rows.append([f"{temperature:g}", f"{speed / RPM:g}", name, *row])
     show_grid(console, "Bearing state", columns, rows, ("bearing",), keys=3)
     for name, where in table.unloads.items():

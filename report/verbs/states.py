@@ -47,7 +47,8 @@ def table(
 
 
 def _depths(spindle: Spindle, found: StiffnessTable) -> list[str]:
-    deepest = {name: 1e-6 * float(np.max(values["deformation_um"])) for name, values in found.values.items()}
+    rows = {b.name for b in spindle.bearings}
+    deepest = {name: 1e-6 * float(np.max(values["deformation_um"])) for name, values in found.values.items() if name in rows}
     return sense.of_depths(spindle, deepest)
 
 
@@ -55,7 +56,7 @@ def _speed_left_out(spindle: Spindle, found: StiffnessTable) -> list[str]:
     """Why rows at different speeds are the same, where they are."""
 
     def same(values: Array) -> bool:
-        return bool(np.all(values == values[:, :1]))
+        return bool(np.all((values == values[:, :1]) | np.isnan(values)))
 
     if len(found.speed) < 2 or not all(same(values) for own in found.values.values() for values in own.values()):
         return []
@@ -132,8 +133,7 @@ def _with_beam(spindle: Spindle, beam: str | None) -> Spindle:
         return spindle
     if not spindle.structure.shafts:
         raise BadInput(f"{spindle.file}: shafts: there are none, so --beam {beam} has nothing to act on")
-    shear, rotary = THEORIES[beam]
-    structure = with_theory(spindle.structure, spindle.materials, spindle.reference_temperature, shear, rotary)
+    structure = with_theory(spindle.structure, spindle.materials, spindle.reference_temperature, THEORIES[beam])
     return replace(spindle, structure=structure)
 
 

@@ -35,6 +35,7 @@ from thermospindle.sim.effects.bearing import (
     magnetic_pull,
     preload_loss,
     ring_growth,
+    tandem_sharing,
 )
 from thermospindle.sim.effects.effect import Effect, Values, fitted_to, refusal
 from thermospindle.sim.effects.measuring import channel_delay, hammer_position, sensor_gain, window_damping
@@ -43,15 +44,19 @@ from thermospindle.sim.effects.running import ball_size, ball_waviness, cage_unb
 from thermospindle.sim.effects.structure import (
     added_disk,
     flange_fit_loosening,
+    housing_flexibility,
     hub_flexibility,
     modulus_softening,
     mount_compliance,
     plate_prestress,
+    rotary_inertia,
+    seat_clearance,
     sensor_mass,
     shaft_bending,
+    shear,
     support_anisotropy,
 )
-from thermospindle.sim.effects.temperature import expansion_mismatch, loose_inserts, soak_lag, thermal_gradient
+from thermospindle.sim.effects.temperature import cooling_imbalance, expansion_mismatch, loose_inserts, soak_lag, thermal_gradient
 
 CATALOGUE: tuple[Effect, ...] = (
     # temperature and expansion
@@ -59,6 +64,7 @@ CATALOGUE: tuple[Effect, ...] = (
     soak_lag.EFFECT,
     expansion_mismatch.EFFECT,
     loose_inserts.EFFECT,
+    cooling_imbalance.EFFECT,
     # bearings
     preload_loss.EFFECT,
     constant_force_preload.EFFECT,
@@ -72,6 +78,7 @@ CATALOGUE: tuple[Effect, ...] = (
     magnetic_pull.EFFECT,
     bearing_misalignment.EFFECT,
     hertz_amplitude.EFFECT,
+    tandem_sharing.EFFECT,
     # structure
     modulus_softening.EFFECT,
     flange_fit_loosening.EFFECT,
@@ -80,6 +87,10 @@ CATALOGUE: tuple[Effect, ...] = (
     support_anisotropy.EFFECT,
     shaft_bending.EFFECT,
     hub_flexibility.EFFECT,
+    shear.EFFECT,
+    rotary_inertia.EFFECT,
+    housing_flexibility.EFFECT,
+    seat_clearance.EFFECT,
     added_disk.EFFECT,
     sensor_mass.EFFECT,
     # what excites a running spindle

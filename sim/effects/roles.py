@@ -12,6 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from thermospindle.model.machine import Body, Joint, Region, Spindle
+from thermospindle.model.rotor.chain import Element
+from thermospindle.model.types import Array
 
 
 def joints(spindle: Spindle, role: str) -> list[str]:
@@ -20,7 +22,7 @@ def joints(spindle: Spindle, role: str) -> list[str]:
 
 
 def body(spindle: Spindle, role: str) -> Body | None:
-    """The body with a role (base, seat, shaft or hub); the first of several, None without one."""
+    """The body with a role (base, seat, shaft, hub or housing); the first of several, None without one."""
     return next((b for b in spindle.structure.bodies if b.role == role), None)
 
 
@@ -68,3 +70,13 @@ def with_mass(body: Body, mass: float, z: float, inertia: tuple[float, float, fl
 def beyond(value: float, play: float) -> float:
     """What is left of a value, of either sign, after a play."""
     return float(np.sign(value) * max(abs(value) - play, 0.0))
+
+
+def in_series(element: Element, flexibility: Array) -> Element:
+    """The element with a lossless flexibility (5, 5) at its end.
+
+    K_s = (1 + K F)^-1 K; its damping to first order of complex stiffness K + i omega D: (1 + K F)^-1 D (1 + F K)^-1.
+    """
+    pass_on = np.linalg.inv(np.eye(5) + element.stiffness @ flexibility)
+    stiffness, damping = pass_on @ element.stiffness, pass_on @ element.damping @ pass_on.T
+    return replace(element, stiffness=(stiffness + stiffness.T) / 2, damping=(damping + damping.T) / 2)

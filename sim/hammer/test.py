@@ -30,6 +30,7 @@ from thermospindle.sim.operating import OperatingPoint
 
 T = TypeVar("T")
 
+MOST_STEPS = 5_000_000  # of one record: a minute of a large model
 MARGIN = 64  # samples of quiet simulated past the record, so that the anti-alias filter ends outside it
 
 
@@ -70,6 +71,11 @@ def impact_tests(
     test = settings or points[0].spindle.hammer
     check_band(test, str(points[0].spindle.file or points[0].spindle.name))
     every, steps = sampling(test)
+    if steps > MOST_STEPS:
+        raise BadInput(
+            f"{points[0].spindle.file or points[0].spindle.name}: the stiffest mode of the model asks for steps of {test.step * 1e6:.3g} us, {steps:.2g} of them a "
+            "record; shafts with beam = timoshenko or rayleigh, longer elements or a shorter record_length_s take fewer"
+        )
     for point in points:
         check_step(point, test.step)
     at_once = max(1, (os.cpu_count() or 1) // (test.hits * len(test.hammer_nodes)))

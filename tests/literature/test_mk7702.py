@@ -64,7 +64,7 @@ def test_a_rigid_console_in_front(mk7702, console, printed):
 
 def bent_only(spindle):
     """The chain at the reference with Euler-Bernoulli beams."""
-    structure = with_theory(spindle.structure, spindle.materials, 20.0, 0.0, 0.0)
+    structure = with_theory(spindle.structure, spindle.materials, 20.0, (0.0, 0.0))
     return operating_point(replace(spindle, structure=structure), Condition(20.0)).chain
 
 

@@ -124,8 +124,8 @@ def test_nodes_have_the_shafts_mass_and_inertia():
 
 def test_another_theory_changes_what_it_says_and_nothing_else():
     own = with_shafts(Structure((), (), 100.0, shafts=(shaft(shear=1.0, rotary=1.0),)), STEEL, 20.0)
-    there = with_theory(own, STEEL, 20.0, 0.0, 0.0)
-    back = with_theory(there, STEEL, 20.0, 1.0, 1.0)
+    there = with_theory(own, STEEL, 20.0, (0.0, 0.0))
+    back = with_theory(there, STEEL, 20.0, (1.0, 1.0))
     assert [j.stiffness[2:] for j in there.joints] == [pytest.approx(j.stiffness[2:], rel=1e-14) for j in own.joints]
     assert all(a.stiffness[0] > b.stiffness[0] for a, b in zip(there.joints, own.joints, strict=True))
     for a, b in zip(back.joints, own.joints, strict=True):

@@ -19,5 +19,6 @@ magnetic_pull           the motor's magnet pulls the hub: an axial bias on the b
                         the spindle
 preload_loss            the pair was assembled with less preload than its drawing says, or loses preload when warm
 ring_growth             the turning ring and what is round it grow by their own centrifugal force
+tandem_sharing          unequal load of rows in tandem
 ======================  ================================================================================================
 """

@@ -15,5 +15,9 @@ shaft_bending         the shaft bends: a Timoshenko beam from its flange past on
                       rigid body
 support_anisotropy    what holds the spindle is stiffer in one direction across its axis than in the other: screws on
                       two sides, ribs, a slot
+shear                 shear of the flexible shaft
+rotary_inertia        rotary inertia of the flexible shaft
+housing_flexibility   housing seats that give under the bearings
+seat_clearance        a bearing loose in its seat
 ====================  ==================================================================================================
 """

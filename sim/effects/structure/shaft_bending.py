@@ -14,11 +14,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.rotor.beam import shear_factor
 from thermospindle.model.rotor.chain import Element, RotorBase
 from thermospindle.model.rotor.section import cells
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import Effect, Values, scale_parameter
-from thermospindle.sim.effects.roles import lacking, regions
+from thermospindle.sim.effects.roles import in_series, lacking, regions
 
 
 @dataclass(frozen=True)
@@ -74,16 +75,6 @@ def moved(element: Element, z: float) -> Element:
     return replace(element, z=z, stiffness=back.T @ element.stiffness @ back, damping=back.T @ element.damping @ back)
 
 
-def in_series(element: Element, flexibility: Array) -> Element:
-    """The element with a lossless flexibility (5, 5) at its end.
-
-    K_s = (1 + K F)^-1 K; its damping to first order of complex stiffness K + i omega D: (1 + K F)^-1 D (1 + F K)^-1.
-    """
-    pass_on = np.linalg.inv(np.eye(5) + element.stiffness @ flexibility)
-    stiffness, damping = pass_on @ element.stiffness, pass_on @ element.damping @ pass_on.T
-    return replace(element, stiffness=(stiffness + stiffness.T) / 2, damping=(damping + damping.T) / 2)
-
-
 def flexibility(beam: Sequence[Piece], start: float, stop: float) -> Array:
     """Motion (5,) of a beam's free end at height `stop` by unit forces and moments there, clamped at `start`; order of MOVES."""
     along = np.sign(stop - start)
@@ -121,12 +112,6 @@ def pieces(spindle: Spindle, temperature: float) -> list[Piece]:
         factor = shear_factor(min(t.r[0] for t in tiles) / max(t.r[1] for t in tiles), poisson)
         found.append(Piece(z, bending, factor * tension / (2 * (1 + poisson)), tension))
     return found
-
-
-def shear_factor(bore: float, poisson: float) -> float:
-    """Shear factor of a tube of radius ratio `bore`: Cowper, The shear coefficient in Timoshenko's beam theory, J. Appl. Mech., 1966."""
-    m = (1 + bore**2) ** 2
-    return 6 * (1 + poisson) * m / ((7 + 6 * poisson) * m + (20 + 12 * poisson) * bore**2)
 
 
 EFFECT = Effect(

@@ -8,5 +8,6 @@ soak_lag            parts short of chamber temperature: the rotating part, reach
                     shaft and the balls
 thermal_gradient    the running bearings heat themselves: their friction leaves shaft and inner rings hotter than the
                     hub
+cooling_imbalance   a cooled housing round a warm shaft
 ==================  ====================================================================================================
 """

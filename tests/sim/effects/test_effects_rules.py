@@ -5,14 +5,17 @@ import importlib
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import pytest
 
 from tests import a_tenth_off
+from thermospindle.model.rotor.beam import with_theory
 from thermospindle.model.scene.reading import load
 from thermospindle.sim.effects import CATALOGUE, by_name
+from thermospindle.sim.effects.effect import refusal
 from thermospindle.sim.effects.rules import DONE, SAID
 from thermospindle.sim.effects.trial import trial
 
@@ -27,8 +30,17 @@ def reference():
 
 
 @cache
+def machine_tool():
+    spindle = load(ROOT / "scenes" / "five_bearing")
+    structure = with_theory(spindle.structure, spindle.materials, spindle.reference_temperature, (0.0, 0.0))
+    return replace(spindle, structure=structure)
+
+
+@cache
 def on_trial(name):
-    return trial(by_name(name), reference())
+    """On the reference, or on a machine that has what the effect acts on: one with a flexible shaft in a housing, its beam without shear."""
+    effect = by_name(name)
+    return trial(effect, next(s for s in (reference(), machine_tool()) if refusal(effect, s) is None))
 
 
 FILES = {

@@ -11,6 +11,7 @@ from tests.effect_points import REST, RUNNING, at
 from thermospindle.model.machine import Body, Condition
 from thermospindle.model.rotor.chain import Element, RotorBase, matrices
 from thermospindle.model.rotor.modes import modes, poles
+from thermospindle.sim.effects.roles import in_series
 from thermospindle.sim.effects.structure import added_disk, shaft_bending, support_anisotropy
 from thermospindle.sim.effects.structure.shaft_bending import Piece
 from thermospindle.sim.operating import operating_point
@@ -109,7 +110,7 @@ def test_shaft_bending_with_a_mass_at_its_end():
     flexible = shaft_bending.flexibility([Piece((0.0, length), bending, 1e15, 1e15)], 0.0, length)
     stiff = Element("tip", "beam", "ground", "mass", length, np.diag([1e13, 1e13, 1e13, 0, 0]), NONE)
     body = Body("mass", mass, (0.0, 0.0, 0.0), length, ("x",), False, ())
-    found = undamped(RotorBase((body,), (shaft_bending.in_series(stiff, flexible),), 0.0))[0]
+    found = undamped(RotorBase((body,), (in_series(stiff, flexible),), 0.0))[0]
     assert found == pytest.approx(np.sqrt(3 * bending / (mass * length**3)) / (2 * np.pi), rel=1e-6)
 
 
@@ -117,7 +118,7 @@ def test_shaft_bending_damping_against_complex_stiffness(spindle):
     """(K + i w D)^-1 and F in series: the imaginary part of the inverse of their sum, for damping so small that first order is all."""
     bearing = next(e for e in operating_point(spindle, REST, ()).chain.elements if e.name == "upper")
     flexible = shaft_bending.flexibility(shaft_bending.pieces(spindle, 60.0), 5e-3, 16.5e-3)
-    found = shaft_bending.in_series(bearing, flexible)
+    found = in_series(bearing, flexible)
     small = 1e-6
     exact = np.linalg.inv(np.linalg.inv(bearing.stiffness + 1j * small * bearing.damping) + flexible)
     assert found.stiffness == pytest.approx(exact.real, rel=1e-9, abs=1e-6)

@@ -1,0 +1,105 @@
+"""Effects that machine-tool spindles need, against closed forms or a second way to the same number."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.conftest import ROOT
+from thermospindle.model.machine import Condition
+from thermospindle.model.rotor.beam import shear_factor, with_theory
+from thermospindle.model.rotor.chain import matrices
+from thermospindle.model.scene.reading import load
+from thermospindle.sim.effects import by_name
+from thermospindle.sim.effects.effect import refusal
+from thermospindle.sim.operating import operating_point
+
+
+@pytest.fixture(scope="module")
+def machine():
+    return load(ROOT / "scenes" / "five_bearing")
+
+
+@pytest.fixture(scope="module")
+def free_shaft():
+    return load(ROOT / "scenes" / "free_shaft")
+
+
+def bending(spindle, *effects):
+    """First bending frequency (Hz) of a free shaft."""
+    return operating_point(spindle, Condition(20.0), [(by_name(n), {"scale": s}) for n, s in effects]).modes[0].frequency
+
+
+@pytest.mark.parametrize(("name", "scale"), [("shear", 0.5), ("shear", 1.0), ("rotary_inertia", 0.5), ("rotary_inertia", 1.0)])
+def test_thick_beams_bend_slower(free_shaft, name, scale):
+    """To first order by Rayleigh's quotient of the free beam's first mode: integrals of its shape, doubled and its slope squared."""
+    shaft = free_shaft.structure.shafts[0]
+    length, radius, k = shaft.nodes[-1], shaft.segments[0].outer[0], 4.730040744862704
+    x = np.linspace(0, 1, 4001)
+    s = (np.cosh(k) - np.cos(k)) / (np.sinh(k) - np.sin(k))
+    w = np.cosh(k * x) + np.cos(k * x) - s * (np.sinh(k * x) + np.sin(k * x))
+    slope = k * (np.sinh(k * x) - np.sin(k * x) - s * (np.cosh(k * x) + np.cos(k * x)))
+    third = k**3 * (np.sinh(k * x) + np.sin(k * x) - s * (np.cosh(k * x) - np.cos(k * x)))
+    second = k**2 * (np.cosh(k * x) - np.cos(k * x) - s * (np.sinh(k * x) - np.sin(k * x)))
+    gyration = (radius / 2 / length) ** 2
+    if name == "shear":
+        by_stiffness = 2 * (1 + 0.3) / shear_factor(0.0, 0.3) * np.trapezoid(third**2, x) / np.trapezoid(second**2, x)
+        fall = -0.5 * gyration * by_stiffness
+    else:
+        fall = -0.5 * gyration * np.trapezoid(slope**2, x) / np.trapezoid(w**2, x)
+    found = np.log(bending(free_shaft, (name, scale)) / bending(free_shaft))
+    assert found == pytest.approx(scale * fall, rel=0.02)
+
+
+def test_shear_and_rotary_inertia_make_a_timoshenko_beam(free_shaft):
+    whole = with_theory(free_shaft.structure, free_shaft.materials, 20.0, (1.0, 1.0))
+    assert bending(free_shaft, ("shear", 1.0), ("rotary_inertia", 1.0)) == pytest.approx(bending(replace(free_shaft, structure=whole)), rel=1e-12)
+
+
+def test_housing_flexibility_is_a_spring_in_series(machine):
+    """Of a row without coupling 1 / k_s = 1 / k + radial, and the same in the element with it, by its compliance matrix."""
+    effect, condition = by_name("housing_flexibility"), Condition(20.0)
+    before = operating_point(machine, condition).chain
+    after = operating_point(machine, condition, [(effect, {"radial": 2.0, "tilt": 5.0})]).chain
+    for a, b in zip(before.elements, after.elements, strict=True):
+        if a.group != "bearings":
+            assert a is b
+            continue
+        more = np.linalg.inv(b.stiffness) - np.linalg.inv(a.stiffness)
+        assert more == pytest.approx(np.diag([2e-9, 2e-9, 0, 5e-6, 5e-6]), abs=1e-12)
+
+
+def test_seat_clearance_takes_its_share_of_one_row(machine):
+    effect, condition = by_name("seat_clearance"), Condition(20.0)
+    before = operating_point(machine, condition).chain
+    after = operating_point(machine, condition, [(effect, {"share": 0.4, "bearing": 3.0})]).chain
+    changed = {a.name: b.stiffness[0, 0] / a.stiffness[0, 0] for a, b in zip(before.elements, after.elements, strict=True) if a is not b}
+    assert changed == {"rear1": pytest.approx(0.6, rel=1e-12)}
+    assert np.linalg.eigvalsh(matrices(after).stiffness).min() > 0
+
+
+def test_tandem_sharing_loads_one_row_more(machine):
+    """Loads move apart by rigidity times offset, and the set stays in balance."""
+    effect, condition = by_name("tandem_sharing"), Condition(20.0)
+    even = operating_point(machine, condition, []).state
+    state = operating_point(machine, condition, [(effect, {"offset": 0.1})]).state
+    first, second, third = (state.bearing(f"front{k}").preload for k in (1, 2, 3))
+    assert first - second == pytest.approx(even.bearing("front1").axial_stiffness * 0.1e-6, rel=0.01)
+    rear = state.bearing("rear1").preload - state.bearing("rear2").preload
+    assert first + second - third + rear == pytest.approx(0.0, abs=1e-6)
+
+
+def test_cooling_imbalance_parts_shaft_and_housing(machine):
+    effect = by_name("cooling_imbalance")
+    same = {g.name: 30.0 for g in machine.regions}
+    half = Condition(30.0, machine.nominal_speed / 2)
+    found = effect.temperatures(machine, half, {"difference": 8.0, "exponent": 2.0}, same)
+    assert found["front shaft"] - found["front housing"] == pytest.approx(2.0, rel=1e-12)
+    assert found["front shaft"] + found["front housing"] == pytest.approx(60.0, rel=1e-12)
+    still = operating_point(machine, Condition(30.0), [(effect, {"difference": 8.0, "exponent": 2.0})]).state
+    assert still.bearing("front1").preload == operating_point(machine, Condition(30.0), []).state.bearing("front1").preload
+
+
+@pytest.mark.parametrize("name", ["shear", "rotary_inertia", "housing_flexibility", "seat_clearance", "tandem_sharing", "cooling_imbalance"])
+def test_they_have_nothing_to_act_on_in_a_disk_drive(spindle, name):
+    assert str(refusal(by_name(name), spindle)).startswith("nothing to act on here: ")
