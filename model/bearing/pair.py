@@ -370,6 +370,10 @@ def bearing_state(spindle: Spindle, b: Bearing, row: BallRow) -> BearingState:
     answer: RowForce = respond(row)
     zeta, omega = b.damping_ratio, 2 * np.pi * spindle.structure.damping_frequency
     deformation = float(answer.deformation[0])
+    stiffness = answer.tangent
+    if row.inertia is not None:
+        # outer-race control makes the tangent of heavy balls unsymmetric, by 1e-4 of it; springs, in MuJoCo too, carry the symmetric part
+        stiffness = (stiffness + stiffness.T) / 2
     return BearingState(
         name=b.name,
         z=b.z,
@@ -379,8 +383,8 @@ def bearing_state(spindle: Spindle, b: Bearing, row: BallRow) -> BearingState:
         contact_force=float(answer.ball_force[0]),
         ball_stiffness=1.5 * row.constant * max(deformation, 0.0) ** 0.5,
         preload=abs(float(answer.force[2])),
-        stiffness=answer.tangent,
-        damping=2 * zeta / omega * answer.tangent,
+        stiffness=stiffness,
+        damping=2 * zeta / omega * stiffness,
         row=row,
         in_contact=bool(answer.in_contact.all()),
     )

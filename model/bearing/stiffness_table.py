@@ -31,6 +31,7 @@ COLUMNS = {
     "coupling_stiffness_N_per_rad": lambda b: b.coupling_stiffness,
 }
 """Property of a bearing state behind every column."""
+MISSING = -1e308  # in a grid that is being read; NaN is what a bearing given by numbers does not have
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,12 +115,12 @@ def read_table(path: Path) -> StiffnessTable:
         for row in rows:
             where = np.searchsorted(temperature, float(row["temperature_C"])), np.searchsorted(rpm, float(row["speed_rpm"]))
             for column in COLUMNS:
-                grid = values.setdefault(name_of(row["bearing"]), {}).setdefault(column, np.full((len(temperature), len(rpm)), np.inf))
+                grid = values.setdefault(name_of(row["bearing"]), {}).setdefault(column, np.full((len(temperature), len(rpm)), MISSING))
                 grid[where] = float(row[column])
     except (OSError, UnicodeDecodeError, RecursionError, IndexError, KeyError, ValueError, TypeError) as error:
         raise BadInput(f"{path}: not a stiffness table as spindle writes it: {type(error).__name__} {error}") from None
-    if not values or any(np.isinf(grid).any() for columns in values.values() for grid in columns.values()):
+    if not values or any((grid == MISSING).any() for columns in values.values() for grid in columns.values()):
         raise BadInput(f"{path}: the table has gaps; every bearing needs a row for each temperature and speed")
-    if not all(np.isfinite(a).all() for a in (temperature, rpm)):
+    if not (np.isfinite(temperature).all() and np.isfinite(rpm).all()) or any(np.isinf(g).any() for columns in values.values() for g in columns.values()):
         raise BadInput(f"{path}: holds an infinite number; only finite ones are allowed")
     return StiffnessTable(temperature, rpm * RPM, values, unloads, provenance)

@@ -47,8 +47,8 @@ REFERENCE_HUB = 0.0259
 
 
 def mass_ratio(spindle: Spindle) -> float:
-    """Turning mass over that of the reference spindle."""
-    return spindle.turning_mass / REFERENCE_HUB
+    """Turning mass over that of the reference spindle; of a machine in which nothing turns the mass of all that moves."""
+    return (spindle.turning_mass or sum(b.mass for b in spindle.structure.bodies)) / REFERENCE_HUB
 
 
 ROWS, SECTION, TURNING, SHAFT = "ball row", "section", "turning body", "flexible shaft"
