@@ -32,13 +32,13 @@ def reference():
 @cache
 def machine_tool():
     spindle = load(ROOT / "scenes" / "five_bearing")
-    structure = with_theory(spindle.structure, spindle.materials, spindle.reference_temperature, (0.0, 0.0))
+    structure = with_theory(spindle.structure, spindle.materials, spindle.reference_temperature, (0.0, 0.5))
     return replace(spindle, structure=structure)
 
 
 @cache
 def on_trial(name):
-    """On the reference, or on a machine that has what the effect acts on: one with a flexible shaft in a housing, its beam without shear."""
+    """On the reference, or on a machine that has what the effect acts on: one with a flexible shaft in a housing, its beam short of shear and of half its rotary inertia."""
     effect = by_name(name)
     return trial(effect, next(s for s in (reference(), machine_tool()) if refusal(effect, s) is None))
 

@@ -1,0 +1,116 @@
+"""The five-bearing spindle against what is printed of it, its bearings against their catalogue, and sets of them against printed factors.
+
+Printed: vshabanov/spindlecad, `src/CourseWorkSpindle.lhs` at 530f201e (151.1 N/um at the nose; 162.4 with 230.4 N/um in every front bearing), and the FAG
+catalogue "Super precision bearings", p. 176 (axial rigidity of sets over that of a pair). To more digits and with shear: an independent beam code.
+"""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.conftest import ROOT
+from thermospindle.cli import main
+from thermospindle.model.bearing.catalogue import CatalogueRow, derived
+from thermospindle.model.bearing.pair import reference_motion, solve
+from thermospindle.model.errors import BadInput
+from thermospindle.model.machine import BearingSet, Condition
+from thermospindle.model.rotor.beam import with_theory
+from thermospindle.model.rotor.static import rated_chain, static
+from thermospindle.model.scene.reading import load, loaded_angle
+from thermospindle.sim.operating import operating_point
+
+SCENE = ROOT / "scenes" / "five_bearing"
+
+
+@pytest.fixture(scope="module")
+def five():
+    return load(SCENE)
+
+
+def nose(spindle, shares):
+    bent = replace(spindle, structure=with_theory(spindle.structure, spindle.materials, 20.0, shares))
+    return static(bent, rated_chain(bent, operating_point(bent, Condition(20.0)).chain), bent.points[0]).stiffness
+
+
+@pytest.mark.parametrize(("shares", "expected"), [((0.0, 0.0), 151.087e6), ((1.0, 1.0), 138.58e6)])
+def test_the_nose(five, shares, expected):
+    assert nose(five, shares) == pytest.approx(expected, rel=1e-4)
+
+
+def test_the_nose_with_equal_front_bearings(five):
+    equal = tuple(replace(b, rated_stiffness=230.4e6) if b.name.startswith("front") else b for b in five.bearings)
+    assert nose(replace(five, bearings=equal), (0.0, 0.0)) == pytest.approx(162.422e6, rel=1e-5)
+
+
+def test_static_answers_name_the_bearings(capsys):
+    assert main(["static", str(SCENE), "--beam", "euler-bernoulli", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)["points"]["nose"]
+    assert answer["stiffness_N_per_m"] == pytest.approx(151.087e6, rel=1e-5)
+    assert list(answer["reactions_N"]) == ["front1", "front2", "front3", "rear1", "rear2"]
+    assert sum(answer["reactions_N"].values()) == pytest.approx(-1.0, rel=1e-9)
+
+
+def test_computed_radial_stiffness_is_near_the_rated_one(five):
+    """The catalogue takes six times the pair's axial rigidity at its own light preload for the radial one; the rear set has that preload."""
+    state = operating_point(five, Condition(20.0)).state
+    assert state.bearing("rear1").radial_stiffness == pytest.approx(193.5e6, rel=0.02)
+
+
+def test_assumed_balls_carry_what_the_catalogue_says(five):
+    """Hertz's constant of the assumed balls is within a tenth of what the catalogue's rigidities ask for."""
+    for b in five.bearings:
+        assert b.constant_factor == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_catalogue_entry_in_the_wrong_order_is_refused():
+    with pytest.raises(BadInput, match="fit no ball bearing of 15 degrees"):
+        derived(CatalogueRow(np.radians(15), (283.0, 931.0, 1923.0), (6964.0, 3138.0, 880.0), (76.8e6, 131.9e6, 191.7e6)))
+
+
+# ---------------------------------------------------------------- sets
+
+
+def mounted(five, below, above, preload):
+    """`below` rows loaded along -z against `above` along +z, each group with `preload`, and their axial rigidity (N/m) together."""
+    bearings = []
+    for k in range(below + above):
+        lower = k < below
+        row = replace(five.bearing("front1"), name=f"b{k}", z=0.05 + 0.02 * k, sense=-1 if lower else 1, preload=preload / (below if lower else above))
+        bearings.append(replace(row, contact_angle=loaded_angle(five, row, np.radians(15))))
+    rows = tuple(bearings)
+    spindle = replace(five, bearings=rows, sets=(BearingSet("set", tuple(b.name for b in rows), preload),))
+    state = solve(spindle, Condition(20.0), {b.name: reference_motion(20.0) for b in rows})
+    loads = [b.preload for b in state.bearings]
+    assert sum(loads[:below]) == pytest.approx(sum(loads[below:]), rel=1e-9)
+    assert state.hub_movement == pytest.approx(0.0, abs=1e-14)
+    return sum(b.axial_stiffness for b in state.bearings)
+
+
+@pytest.mark.parametrize(
+    ("below", "above", "hertz", "printed"), [(2, 1, 1.630, 1.64), (2, 2, 2.0, 2.0), (3, 1, 2.221, 2.24), (3, 2, 2.645, 2.64)], ids=["TBT", "QBC", "QBT", "PBC"]
+)  # fmt: skip
+def test_rigidity_of_sets(five, below, above, hertz, printed):
+    """At the preload at which each row of the larger group has the pair's: sum of n (F/n)^(1/3) / 2 at constant angle, which the catalogue prints within
+    1 %; as angles rise with load, rows at a higher one are stiffer still, by up to 5 % at 15 degrees."""
+    pair = mounted(five, 1, 1, 20.0)
+    found = mounted(five, below, above, 20.0 * below) / pair
+    assert found == pytest.approx(hertz, rel=0.01)
+    assert found == pytest.approx(printed, rel=0.02)
+
+
+def test_a_spring_set_keeps_its_force(five):
+    """QBC with the upper two on one sleeve: whatever the rings do, both groups carry the spring's force, and each row half."""
+    from thermospindle.model.machine import PreloadSpring
+
+    rows = tuple(replace(five.bearings[k % 2], name=f"b{k}", z=0.05 + 0.02 * k, sense=-1 if k < 2 else 1) for k in range(4))
+    own = BearingSet("set", tuple(b.name for b in rows), 382.0, PreloadSpring(("b2", "b3")))
+    spindle = replace(five, bearings=rows, sets=(own,))
+    still = reference_motion(20.0)
+    apart = {b.name: replace(still, outer_z=3e-6 * k) for k, b in enumerate(rows)}
+    state = solve(spindle, Condition(20.0), apart)
+    loads = [b.preload for b in state.bearings]
+    assert sum(loads[:2]) == pytest.approx(382.0, rel=1e-9)
+    assert sum(loads[2:]) == pytest.approx(382.0, rel=1e-9)
+    assert loads[2] < loads[3]
