@@ -43,8 +43,9 @@ def without_roles(raw):
     return raw
 
 
-def test_the_reference_has_something_for_every_effect(spindle):
-    assert usable(spindle) == CATALOGUE
+def test_the_reference_has_something_for_every_effect_of_its_kind(spindle):
+    machine_tool = {"shear", "rotary_inertia", "housing_flexibility", "seat_clearance", "tandem_sharing", "cooling_imbalance"}
+    assert usable(spindle) == tuple(e for e in CATALOGUE if e.name not in machine_tool)
 
 
 @pytest.mark.parametrize(("name", "why"), ROLES.items())
