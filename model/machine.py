@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from thermospindle.model.errors import OutsideRange
+from thermospindle.model.errors import BadInput, OutsideRange
 from thermospindle.model.imperfections import Imperfections
 from thermospindle.model.shaft import Shaft
 
@@ -366,6 +366,8 @@ class Spindle:
     def turning(self) -> Body:
         """The body that turns; of several the one nearest their common centre of mass."""
         turning = [b for b in self.structure.bodies if b.turns]
+        if not turning:
+            raise BadInput(f"{self.file or self.name}: structure: nothing turns, so there is nothing to spin; a body or shaft needs turns = true")
         centre = sum(b.mass * b.z for b in turning) / sum(b.mass for b in turning)
         return min(turning, key=lambda b: abs(b.z - centre))
 

@@ -15,6 +15,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from thermospindle.model.bearing.pair import BearingState, LinearState, PairState
+from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import MOVES, Body, Point, Spindle, Structure
 from thermospindle.model.types import Array
 
@@ -110,7 +111,10 @@ def sprung(chain: RotorBase, names: Sequence[str], rate: float, mass: float) -> 
 
 def turning_at(chain: RotorBase, z: float) -> Body:
     """The turning body nearest a height (m)."""
-    return min((b for b in chain.bodies if b.turns), key=lambda b: abs(b.z - z))
+    turning = [b for b in chain.bodies if b.turns]
+    if not turning:
+        raise BadInput("structure: nothing turns, so there is nothing to spin; a body or shaft needs turns = true")
+    return min(turning, key=lambda b: abs(b.z - z))
 
 
 def joint_element(structure: Structure, index: int) -> Element:
