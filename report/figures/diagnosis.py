@@ -42,7 +42,8 @@ def leading(d: Diagnosis) -> Candidate | None:
 @rc_context(STYLE)
 def explanations(d: Diagnosis) -> Figure:
     """ln evidence of explanations over the model without effects; free forms beside those of the catalogue."""
-    best = sorted((*d.verdict.candidates[:MOST], *d.verdict.free[:4]), key=lambda c: -c.delta_evidence)[: MOST + 2]
+    asked = [c for c in (*d.verdict.candidates[:MOST], *d.verdict.free[:4]) if c.hypothesis.mechanisms]
+    best = sorted(asked, key=lambda c: -c.delta_evidence)[: MOST + 2]
     value = np.array([c.delta_evidence for c in best])
     paint = [FREE if c.free else NAMED if d.verdict.effects and set(c.names) <= set(d.verdict.effects) else OTHER for c in best]
     figure = Figure(figsize=(8.6, 0.85 + 0.27 * len(best)), layout="constrained")
