@@ -64,7 +64,8 @@ def _write(content: Shown, recording: rr.RecordingStream, file: Path) -> None:
     log_key(recording, content)
     log_motion(recording, content)
     log_section(recording, content, sections, factor)
-    log_bearings(recording, content, series)
+    if series:
+        log_bearings(recording, content, series)
     log_records(recording, content)
     text = rr.TextDocument(summary(run, content.peaks), media_type=rr.MediaType.MARKDOWN)
     recording.log("summary", text, static=True)
