@@ -29,6 +29,9 @@ def whole_folder(path: Path) -> Iterator[Path]:
     """
     path = path.resolve()
     _refuse_foreign(path)
+    for parent in path.parents:
+        if parent.is_file():
+            raise BadInput(f"--out {path}: {parent} is a file, so no folder can be made in it; name a new or empty folder")
     path.parent.mkdir(parents=True, exist_ok=True)
     with whole(path) as folder:
         folder.mkdir()
@@ -54,6 +57,8 @@ def _call(options: Mapping[str, Any]) -> str:
 def _refuse_foreign(path: Path) -> None:
     if not path.exists() and not path.is_symlink():
         return
+    if path.is_file():
+        raise BadInput(f"--out {path}: is a file; name a new or empty folder")
     if not path.is_dir() or (any(path.iterdir()) and not (path / MARK).is_file()):
         raise BadInput(f"--out {path}: holds something that spindle did not write; name a new or empty folder")
     written = _written(path)

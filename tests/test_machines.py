@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.conftest import ROOT
 from thermospindle.cli import main
+from thermospindle.model.errors import BadInput
+from thermospindle.sim.running.run import tilted_inertia
 
 FIVE, MK, FREE = (str(ROOT / "scenes" / name) for name in ("five_bearing", "mk7702", "free_shaft"))
 ANSWERS = [
@@ -54,3 +58,63 @@ def test_refusals_are_one_sentence(words: str, why: str, capsys: pytest.CaptureF
     said = capsys.readouterr().err
     assert why in said
     assert "Traceback" not in said
+
+
+BROKEN = [
+    ('["front1", "front2", "front3"]', '["front1", "front1", "front3"]', "sets.front.bearings: 'front1' stands twice"),
+    ('["rear1", "rear2"]', '["rear1", "rear2", "front3"]', "bearings.front3: is in 2 sets (front, rear)"),
+    ('["front1", "front2", "front3"]', '["front1", "front3"]', "bearings.front2: is in no set"),
+    ('name = "nose_y"', 'name = "nose"', "measuring.points: name = 'nose' stands twice"),
+    ("preload_N = 382.0", 'preload_N = "16"', "sets.front.preload_N = '16'"),
+    ("[133, 23]", "[133, 0]", "shafts.spindle.outer_mm.1"),
+    ("z_mm = 330.5", "z_mm = 630.5", "beyond the shaft 'spindle', which spans 0 to 440"),
+]
+
+
+@pytest.mark.parametrize(("right", "wrong", "why"), BROKEN, ids=[b[1] for b in BROKEN])
+def test_a_wrong_entry_is_named(right: str, wrong: str, why: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = (Path(FIVE) / "spindle.toml").read_text(encoding="utf-8")
+    assert right in text
+    (tmp_path / "spindle.toml").write_text(text.replace(right, wrong, 1), encoding="utf-8")
+    assert main(["modes", str(tmp_path)]) == 2
+    said = capsys.readouterr().err
+    assert why in said
+    assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize("words", [f"static {MK}", f"static {FIVE}", f"table {FIVE} --temperatures 20", "effects"], ids=["mk", "five", "table", "effects"])
+def test_tables_are_whole_at_80_columns(words: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main(words.split()) == 0
+    said = capsys.readouterr().out
+    assert "…" not in said
+    assert max(map(len, said.splitlines())) <= 80
+
+
+def test_unbalance_of_a_shaft_of_thin_segments_runs_as_in_the_frequency_domain(capsys: pytest.CaptureFixture[str]) -> None:
+    """Static and couple unbalance on a segment whose polar moment is the sum of the others."""
+    once = []
+    for path in ("simulated", "linear"):
+        assert main(["runout", FIVE, "--speed", "8000", "--seconds", "0.05", "--path", path, "--json"]) == 0
+        once.append(json.loads(capsys.readouterr().out)["once_per_revolution_um"]["radial"])
+    assert once[1] > 0.01
+    assert once[0] == pytest.approx(once[1], rel=1e-3)
+
+
+def test_an_inertia_is_tilted_no_further_than_a_body_can_be() -> None:
+    xx, yy, zz, _, xz, _ = tilted_inertia(np.array([1.0, 1.0, 2.0]), 0.01, "disc")
+    principal = np.linalg.eigvalsh([[xx, 0, xz], [0, yy, 0], [xz, 0, zz]])
+    assert principal[0] + principal[1] >= principal[2]
+    assert zz == pytest.approx(2.0, rel=2e-4)
+    assert tilted_inertia(np.array([1.0, 1.0, 1.5]), 0.01, "drum")[2] == 1.5
+    with pytest.raises(BadInput, match=r"tilts the inertia of disc"):
+        tilted_inertia(np.array([1.0, 1.0, 2.0]), 0.5, "disc")
+
+
+@pytest.mark.slow
+def test_warm_up_tells_whose_preload_and_watts(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["warmup", FIVE, "--minutes", "1"]) == 0
+    said = capsys.readouterr().out
+    assert said.splitlines()[1].split()[-1] == "front1"
+    assert said.splitlines()[2].split()[-1] == "preload"
+    assert " mW" not in said

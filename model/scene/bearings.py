@@ -239,6 +239,8 @@ def check_sets(rows: Mapping[str, Bearing], pair: BearingPair | None, sets: Mapp
         for bearing_name in own.bearings:
             if bearing_name not in rows:
                 raise ValueError(f"sets.{name}.bearings: {bearing_name!r} is no ball row; allowed are {', '.join(rows)}")
+            if own.bearings.count(bearing_name) > 1:
+                raise ValueError(f"sets.{name}.bearings: {bearing_name!r} stands twice; a set names each of its rows once")
         senses = {rows[n].sense for n in own.bearings}
         if len(senses) == 1 and own.preload_kind == "rigid":
             raise ValueError(f"sets.{name}.preload_kind = 'rigid': all its rows are loaded the same way and cannot preload each other; it must be spring")
@@ -251,4 +253,5 @@ def check_sets(rows: Mapping[str, Bearing], pair: BearingPair | None, sets: Mapp
             raise ValueError(f"bearings.{name}.sense is missing: +z or -z, the direction in which moving its outer ring loads it")
         held = [key for key, own in sets.items() if name in own.bearings]
         if len(held) != 1:
-            raise ValueError(f"bearings.{name}: is in {len(held)} sets; every ball row is in one, alone if nothing else is mounted against it")
+            where = f"is in {len(held)} sets ({', '.join(held)})" if held else "is in no set"
+            raise ValueError(f"bearings.{name}: {where}; every ball row is in one, alone if nothing else is mounted against it")

@@ -173,6 +173,8 @@ def check_structure(file: Path, spindle: Spindle) -> None:
     for point in spindle.points:
         if nodes.count(point.node) > 1:
             raise BadInput(f"{file}: measuring.points: node = {point.node} stands twice; nodes must differ")
+        if point.name and [p.name for p in spindle.points].count(point.name) > 1:
+            raise BadInput(f"{file}: measuring.points: name = {point.name!r} stands twice; names must differ")
         if point.body not in names:
             raise BadInput(f"{file}: measuring.points.{point.node}.body = {point.body!r}: allowed are {', '.join((*_plain(spindle), *shafts))}")
     for node in spindle.hammer.hammer_nodes:

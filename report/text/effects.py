@@ -21,8 +21,9 @@ def summary(effect: Effect) -> dict[str, Any]:
 def show_effects(console: Console, catalogue: Sequence[Effect], refused: Mapping[str, str] = {}) -> None:
     """The catalogue as a table; `refused` says of effects by name why they cannot be in a scene."""
     grid = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
-    for column in ("effect", "what it is", "main parameter", "typical", "unit"):
-        grid.add_column(column, justify="right" if column == "typical" else "left", no_wrap=column == "effect")
+    for column in ("effect", "what it is", "main\nparameter", "typical", "unit"):
+        words = column == "what it is"
+        grid.add_column(column, justify="right" if column == "typical" else "left", no_wrap=not words, overflow="fold")
     for e in map(summary, catalogue):
         grid.add_row(e["name"], e["title"], e["parameter"], f"{e['typical']:g}", e["unit"])
     console.print(grid)

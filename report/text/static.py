@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
 from thermospindle.model.rotor.static import Static
+from thermospindle.report.text.grid import show_grid
 
 
 def axis_name(direction: Sequence[float]) -> str:
@@ -33,13 +33,28 @@ def static_json(answers: Sequence[Static], bearings: str, beam: str) -> dict[str
 
 
 def show_static(console: Console, values: dict[str, Any]) -> None:
-    """A table of stiffness and reactions, and where the compliance of each point sits."""
-    table = Table(title=f"unit force at each point; bearings {values['bearings']}, beam {values['beam']}")
-    names = list(next(iter(values["points"].values()))["reactions_N"])
-    for column in ("point", "along", "N/um", *(f"{n} N" for n in names), "compliance"):
-        table.add_column(column, justify="left" if column in ("point", "along", "compliance") else "right")
-    for name, row in values["points"].items():
-        stiffness = "free to move" if row["free"] else "rigid" if row["stiffness_N_per_m"] is None else f"{row['stiffness_N_per_m'] / 1e6:.6g}"
-        shares = ", ".join(f"{k} {v:.1%}" for k, v in sorted(row["compliance_shares"].items(), key=lambda kv: -kv[1]) if v > 5e-4)
-        table.add_row(name, row["direction"], stiffness, *(f"{v:+.4f}" for v in row["reactions_N"].values()), shares)
-    console.print(table)
+    """A table of stiffness and bearing reactions, and one of where the compliance of each point sits."""
+    points = values["points"]
+    reactions, parts = ([*next(iter(points.values()))[key]] for key in ("reactions_N", "compliance_shares"))
+    told = f"bearings {values['bearings']}, beam {values['beam']}"
+    show_grid(
+        console,
+        f"Stiffness at each point, and what every bearing bears of 1 N there ({told})",
+        ["point", "along", "stiffness\nN/um", *(f"{name}\nN" for name in reactions)],
+        [[name, row["direction"], _stiffness(row), *(f"{v:+.4f}" for v in row["reactions_N"].values())] for name, row in points.items()],
+        words=("point", "along"),
+    )
+    console.print()
+    show_grid(
+        console,
+        "Share of the compliance at each point in every part, %",
+        ["point", *(f"{name}\n%" for name in parts)],
+        [[name, *(f"{100 * row['compliance_shares'].get(part, 0.0):.1f}" for part in parts)] for name, row in points.items()],
+        words=("point",),
+    )
+
+
+def _stiffness(row: dict[str, Any]) -> str:
+    if row["free"]:
+        return "free to move"
+    return "rigid" if row["stiffness_N_per_m"] is None else f"{row['stiffness_N_per_m'] / 1e6:.6g}"

@@ -105,12 +105,13 @@ def show_warmup(console: Console, warmup: Warmup) -> None:
     if lost:
         console.print(f"{lost[0].upper()}{lost[1:]}.\n", highlight=False)
     bearings = [b.name for b in warmup.spindle.bearings]
-    columns = ["time\nmin", *(f"{b}\nC" for b in bearings), "coolest\nC", "hottest\nC", "preload\nN", "friction\nmW"]
+    unit, scale = _power(warmup)
+    columns = ["time\nmin", *(f"{b}\nC" for b in bearings), "coolest\nC", "hottest\nC", f"{bearings[0]}\npreload\nN", f"friction\n{unit}"]
     columns += [f"f{k}\nHz" for k in range(1, len(warmup.modes) + 1)]
     rows = [
-        [f"{warmup.times[k] / MINUTE:.2f}", *_cells(warmup.moments[k], bearings, warmup.frequencies[k])] for k in _shown(warmup.times)
+        [f"{warmup.times[k] / MINUTE:.2f}", *_cells(warmup.moments[k], bearings, warmup.frequencies[k], scale)] for k in _shown(warmup.times)
     ]
-    show_grid(console, title, columns, [*rows, ["steady", *_cells(warmup.steady, bearings, warmup.steady_frequencies)]])
+    show_grid(console, title, columns, [*rows, ["steady", *_cells(warmup.steady, bearings, warmup.steady_frequencies, scale)]])
     kinds = ", ".join(f"f{k} {m.kind}" for k, m in enumerate(warmup.modes, 1))
     console.print(f"Bearings, coolest and hottest region; {kinds}.")
     total = energy(warmup)
@@ -137,13 +138,19 @@ def _all_loaded(moment: Moment) -> bool:
     return all(b.in_contact for b in moment.point.state.bearings)
 
 
-def _cells(moment: Moment, bearings: Sequence[str], frequency: Array) -> list[str]:
+def _power(warmup: Warmup) -> tuple[str, float]:
+    """The unit that friction is told in, and how many of it a watt is: a disk drive takes milliwatts, a machine tool watts."""
+    most = max(sum(m.friction.values()) for m in (*warmup.moments, warmup.steady))
+    return ("mW", 1e3) if most < 10 else ("W", 1.0)
+
+
+def _cells(moment: Moment, bearings: Sequence[str], frequency: Array, scale: float) -> list[str]:
     regions = moment.temperatures.values()
     temperatures = [*(moment.bearing_temperatures[b] for b in bearings), min(regions), max(regions)]
     return [
         *(f"{t:.2f}" for t in temperatures),
         f"{moment.preload[bearings[0]]:.3f}",
-        f"{1e3 * sum(moment.friction.values()):.0f}",
+        f"{scale * sum(moment.friction.values()):.0f}",
         *("-" if np.isnan(f) else f"{f:.1f}" for f in frequency),
     ]
 
@@ -163,11 +170,12 @@ def warmup_section(warmup: Warmup) -> tuple[str, str]:
         f"mode {k} ({escape(m.kind)}) {b - a:+.1f}"
         for k, (m, a, b) in enumerate(zip(warmup.modes, warmup.frequencies[0], warmup.steady_frequencies, strict=True), 1)
     )
+    unit, scale = _power(warmup)
     about = (
         f"<p>From {warmup.start:g} °C in air of {warmup.air:g} °C at {warmup.speed / RPM:.0f} rpm. The slowest time constant is "
-        f"{warmup.time_constant:.0f} s. In the steady state the bearings are at {escape(bearings)} °C, the preload is "
+        f"{warmup.time_constant:.0f} s. In the steady state the bearings are at {escape(bearings)} °C, the preload of {escape(first)} is "
         f"{last.preload[first]:.2f} N (at the start {warmup.moments[0].preload[first]:.2f} N) and bearing friction "
-        f"{1e3 * sum(last.friction.values()):.0f} mW; natural frequencies move by {shifts} Hz.</p>"
+        f"{scale * sum(last.friction.values()):.0f} {unit}; natural frequencies move by {shifts} Hz.</p>"
         f"<p>Heat: motor {total['motor']:.1f} J, bearings {total['friction']:.1f} J in; convection {total['convection']:.1f} J out; "
         f"stored {total['stored']:.1f} J.</p>"
     )

@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from scipy.signal import firwin, upfirdn
 
 from thermospindle.model.errors import BadInput
+from thermospindle.model.rotor.chain import turning_at
 from thermospindle.model.rotor.mjcf import joint_names, spin_dofs
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.hammer.test import check_step
@@ -37,6 +38,7 @@ FILTER_REACH = 24  # samples on either side that the anti-alias filter sees
 PIECE = 0.05  # s, simulated at a time
 BLOCK = 256  # steps for which sines are tabulated
 FLYWHEEL = 1e3  # armature of the spin hinge over the body's own polar inertia
+POLAR_GIVEN = 0.01  # share of its polar moment that a tilted segment may give up to stay a body
 
 
 @dataclass(frozen=True)
@@ -149,8 +151,8 @@ def _every(points: Sequence[OperatingPoint], step: float, sample_rate: float) ->
 
 
 def running_model(point: OperatingPoint, element: str = "linear", step: float | None = None) -> mujoco.MjModel:
-    """The MuJoCo model of a running spindle: mass centre and inertia of the turning body off the axis by the unbalance, a flywheel's
-    armature on the spin, and without hammers and vibrometers.
+    """The MuJoCo model of a running spindle, without hammers and vibrometers: mass centre and inertia of the turning body nearest the
+    unbalance (of a flexible shaft, a segment) off the axis by it, and a flywheel's armature on the spin.
 
     A static unbalance U at height h above the mass centre moves it by U / m and adds the product of inertia U h; a couple W adds W.
     """
@@ -161,15 +163,36 @@ def running_model(point: OperatingPoint, element: str = "linear", step: float | 
     own, turning = point.imperfections, [b for b in point.chain.bodies if b.turns]
     for body in turning:
         spec.joint(f"{body.name}.spin").armature = FLYWHEEL * body.inertia[2]
-    body = spec.body(turning[0].name)
+    carrier = turning_at(point.chain, own.unbalance_z)
+    body = spec.body(carrier.name)
     static = own.unbalance * np.exp(1j * own.unbalance_phase)
-    product = static * (own.unbalance_z - turning[0].z) + own.couple_unbalance * np.exp(1j * own.couple_phase)
+    product = static * (own.unbalance_z - carrier.z) + own.couple_unbalance * np.exp(1j * own.couple_phase)
     body.ipos = [static.real / body.mass, static.imag / body.mass, 0.0]
     if product != 0.0:
-        xx, yy, zz = body.inertia
+        full = tilted_inertia(np.asarray(body.inertia), product, carrier.name)
         body.inertia = [0.0, 0.0, 0.0]
-        body.fullinertia = [xx, yy, zz, 0.0, -product.real, -product.imag]
+        body.fullinertia = full
     return spec.compile()
+
+
+def tilted_inertia(inertia: Array, product: complex, name: str) -> list[float]:
+    """Moments and products of inertia (xx, yy, zz, xy, xz, yz) of a body whose principal axes an unbalance tilts.
+
+    A segment of a beam is a thin disc, whose polar moment is the sum of the others: tilted by no more than a hair its principal moments
+    would be those of no body. What they lack, of second order in the tilt, is taken off the polar moment.
+    """
+    xx, yy, zz = inertia
+    tilt = np.array([[0.0, 0.0, -product.real], [0.0, 0.0, -product.imag], [-product.real, -product.imag, 0.0]])
+    lacking = 0.0
+    for _ in range(3):
+        small, middle, large = np.linalg.eigvalsh(np.diag([xx, yy, zz - lacking]) + tilt)
+        lacking += 1.01 * max(large - small - middle, 0.0)
+    if lacking > POLAR_GIVEN * zz:
+        raise BadInput(
+            f"imperfections: the unbalance tilts the inertia of {name} by {1e9 * abs(product):.3g} g mm2, which is too much for its "
+            f"{1e9 * zz:.3g} g mm2 about the axis"
+        )
+    return [xx, yy, zz - lacking, 0.0, -product.real, -product.imag]
 
 
 class _Run:

@@ -53,3 +53,12 @@ def test_a_copied_mark_does_not_make_a_folder_ours(tmp_path):
     (home / MARK).write_text("{}")
     with pytest.raises(BadInput, match="did not write"):
         write(home, a="1")
+
+
+def test_a_file_in_the_way_is_named(tmp_path):
+    (tmp_path / "file").write_text("precious")
+    with pytest.raises(BadInput, match=r"file: is a file; name a new"):
+        write(tmp_path / "file", a="1")
+    with pytest.raises(BadInput, match=r"file is a file, so no folder can be made in it"):
+        write(tmp_path / "file" / "deep" / "out", a="1")
+    assert (tmp_path / "file").read_text() == "precious"
