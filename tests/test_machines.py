@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -118,3 +119,13 @@ def test_warm_up_tells_whose_preload_and_watts(capsys: pytest.CaptureFixture[str
     assert said.splitlines()[1].split()[-1] == "front1"
     assert said.splitlines()[2].split()[-1] == "preload"
     assert " mW" not in said
+
+
+def test_a_spindle_on_one_bearing_is_free_to_tilt(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = (Path(MK) / "spindle.toml").read_text(encoding="utf-8")
+    tables = re.sub(r"^\[bearings\.(front2|front3|rear1)(\.numbers)?\].*?(?=^\[|^# -)", "", text, flags=re.DOTALL | re.MULTILINE)
+    (tmp_path / "spindle.toml").write_text(tables, encoding="utf-8")
+    assert main(["static", str(tmp_path)]) == 0
+    said = capsys.readouterr().out
+    assert "free to move" in said
+    assert "Share of the compliance" in said

@@ -35,21 +35,23 @@ def static_json(answers: Sequence[Static], bearings: str, beam: str) -> dict[str
 def show_static(console: Console, values: dict[str, Any]) -> None:
     """A table of stiffness and bearing reactions, and one of where the compliance of each point sits."""
     points = values["points"]
-    reactions, parts = ([*next(iter(points.values()))[key]] for key in ("reactions_N", "compliance_shares"))
+    reactions, parts = (list(dict.fromkeys(name for row in points.values() for name in row[key])) for key in ("reactions_N", "compliance_shares"))
     told = f"bearings {values['bearings']}, beam {values['beam']}"
     show_grid(
         console,
         f"Stiffness at each point, and what every bearing bears of 1 N there ({told})",
         ["point", "along", "stiffness\nN/um", *(f"{name}\nN" for name in reactions)],
-        [[name, row["direction"], _stiffness(row), *(f"{v:+.4f}" for v in row["reactions_N"].values())] for name, row in points.items()],
+        [[name, row["direction"], _stiffness(row), *("-" if row["free"] else f"{row['reactions_N'].get(b, 0.0):+.4f}" for b in reactions)] for name, row in points.items()],
         words=("point", "along"),
     )
+    if not parts:
+        return  # every point is free to move
     console.print()
     show_grid(
         console,
         "Share of the compliance at each point in every part, %",
         ["point", *(f"{name}\n%" for name in parts)],
-        [[name, *(f"{100 * row['compliance_shares'].get(part, 0.0):.1f}" for part in parts)] for name, row in points.items()],
+        [[name, *("-" if row["free"] else f"{100 * row['compliance_shares'].get(part, 0.0):.1f}" for part in parts)] for name, row in points.items()],
         words=("point",),
     )
 
