@@ -129,3 +129,11 @@ def test_a_spindle_on_one_bearing_is_free_to_tilt(tmp_path: Path, capsys: pytest
     said = capsys.readouterr().out
     assert "free to move" in said
     assert "Share of the compliance" in said
+
+
+def test_a_section_without_ball_rows_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = (Path(FIVE) / "spindle.toml").read_text(encoding="utf-8")
+    text = re.sub(r"^\[(bearings|sets)\.\w+\].*?(?=^\[|^# -)", "", text, flags=re.DOTALL | re.MULTILINE)
+    (tmp_path / "spindle.toml").write_text(text, encoding="utf-8")
+    assert main(["modes", str(tmp_path)]) == 2
+    assert "section: no bearing is a ball row" in capsys.readouterr().err

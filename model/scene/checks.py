@@ -30,6 +30,8 @@ def _touch(a: Region, b: Region) -> bool:
 
 
 def check_section(file: Path, spindle: Spindle) -> None:
+    if spindle.regions and not spindle.bearings:
+        raise BadInput(f"{file}: section: no bearing is a ball row, and only ball rows feel its expansion; leave it out, or give a bearing its row")
     names = [g.name for g in spindle.regions]
     for name in names:
         if names.count(name) > 1:
