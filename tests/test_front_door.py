@@ -216,7 +216,11 @@ def test_runout_of_nothing_hints(capsys, scene):
 # ---------------------------------------------------------------- terminal
 
 
-@pytest.mark.parametrize("verb", [["table"], ["modes"], ["warmup"], ["map"], ["runout", "--speed", "7200", "--path", "linear"]], ids=" ".join)
+LONG = [pytest.param([verb], marks=pytest.mark.slow, id=verb) for verb in ("warmup", "map")]
+SHORT = [pytest.param(verb.split(), id=verb) for verb in ("table", "modes", "runout --speed 7200 --path linear")]
+
+
+@pytest.mark.parametrize("verb", SHORT + LONG)
 def test_names_are_no_markup_and_nothing_is_cut_off(capsys, scene, verb):
     """80 columns, a bearing called [/x]: MarkupError, or … in place of digits, before."""
     named = scene((r"bearings\.lower", 'bearings."[/x] [red]"'), count=0)

@@ -306,6 +306,7 @@ def virtual(spindle):
     return ladder(spindle, read_campaign(VIRTUAL), [by_name("ring_growth")])
 
 
+@pytest.mark.slow
 def test_computed_responses_lie_on_those_of_the_time_domain(virtual):
     step = virtual.step("axial equilibrium")
     for t, o in enumerate(virtual.measured.observations):
@@ -318,6 +319,7 @@ def test_computed_responses_lie_on_those_of_the_time_domain(virtual):
             assert np.mean(np.abs(fixed - measured)[0, 0, band]) > 10 * np.mean(np.abs(computed - measured)[0, 0, band])
 
 
+@pytest.mark.slow
 def test_log_moves_on_the_timeline_step(virtual, tmp_path):
     write_ladder(virtual, tmp_path)
     reader = RrdReader(tmp_path / "ladder.rrd")
