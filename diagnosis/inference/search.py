@@ -23,7 +23,7 @@ from thermospindle.model.parallel import in_parallel
 
 EARLY = 2  # number in TEMPERS at which large effects are told from each other
 BEHIND = 12.0  # tempered ln evidence behind the best from which a mechanism is not followed
-NAMED, FREE = 7, 3  # mechanisms fitted at most, of the catalogue and free forms
+NAMED, FREE = 14, 4  # mechanisms fitted at most, of the catalogue and free forms
 LEADS, CLOSE = 2, 60.0  # single mechanisms of the catalogue to which a second is joined: so many, so near the best in ln evidence
 SECONDS = 2  # of each kind, joined to each of them
 PAIRS = 6  # fitted at most
