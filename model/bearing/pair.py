@@ -21,8 +21,31 @@ from thermospindle.model.machine import Bearing, BearingSet, Condition, LinearBe
 from thermospindle.model.types import Array
 
 
+class ByDirection:
+    """The entries of a bearing's stiffness (5, 5) that have names."""
+
+    stiffness: Array
+
+    @property
+    def radial_stiffness(self) -> float:
+        return float(self.stiffness[0, 0])
+
+    @property
+    def axial_stiffness(self) -> float:
+        return float(self.stiffness[2, 2])
+
+    @property
+    def tilt_stiffness(self) -> float:
+        return float(self.stiffness[3, 3])
+
+    @property
+    def coupling_stiffness(self) -> float:
+        """Radial force per tilt, k_x,tilt_y (N/rad)."""
+        return float(self.stiffness[0, 4])
+
+
 @dataclass(frozen=True)
-class BearingState:
+class BearingState(ByDirection):
     """One bearing at its operating point; forces in N, lengths in m, angles in rad.
 
     `stiffness`, `damping`: (5, 5) between the inner and the outer body at the ring centre, order x, y, z, tilt_x, tilt_y.
@@ -44,49 +67,15 @@ class BearingState:
     in_contact: bool
     movement: float = 0.0
 
-    @property
-    def radial_stiffness(self) -> float:
-        return float(self.stiffness[0, 0])
-
-    @property
-    def axial_stiffness(self) -> float:
-        return float(self.stiffness[2, 2])
-
-    @property
-    def tilt_stiffness(self) -> float:
-        return float(self.stiffness[3, 3])
-
-    @property
-    def coupling_stiffness(self) -> float:
-        """Radial force per tilt, k_x,tilt_y (N/rad)."""
-        return float(self.stiffness[0, 4])
-
 
 @dataclass(frozen=True)
-class LinearState:
+class LinearState(ByDirection):
     """A bearing given by numbers at one condition: stiffness and damping (5, 5) between its two bodies at its height."""
 
     name: str
     z: float
     stiffness: Array
     damping: Array
-
-    @property
-    def radial_stiffness(self) -> float:
-        return float(self.stiffness[0, 0])
-
-    @property
-    def axial_stiffness(self) -> float:
-        return float(self.stiffness[2, 2])
-
-    @property
-    def tilt_stiffness(self) -> float:
-        return float(self.stiffness[3, 3])
-
-    @property
-    def coupling_stiffness(self) -> float:
-        """Radial force per tilt, k_x,tilt_y (N/rad)."""
-        return float(self.stiffness[0, 4])
 
 
 @dataclass(frozen=True)
