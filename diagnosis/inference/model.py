@@ -239,7 +239,7 @@ class CampaignModel:
             return first + len(moved)
 
         at = fill(0, response.moved(rates.mass[t], rates.damping[t], rates.stiffness[t]))
-        w = self.reference.over(linear.matrices.dofs)
+        w = response.over(self.reference.over(linear.matrices.dofs))
         left = np.ascontiguousarray((response.left @ w).transpose(2, 1, 0)) * response.factor  # (m, n_resp, L)
         right = np.ascontiguousarray((w.T @ response.right).transpose(1, 2, 0))  # (m, n_ref, L)
         for (_, i, j, whole), s in zip(pairs, (np.ones(1), response.s), strict=True):

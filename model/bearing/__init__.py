@@ -8,6 +8,7 @@ hertz            Hertz point contact with exact elliptic integrals
 kinematics       how fast cage and balls turn, and at which frequencies a running spindle is excited
 pair             the ball rows of all sets against each other: axial equilibrium at a temperature, and the bearing
                  states that follow
+movement         how far rings move until their axial forces balance
 springs          balls as springs between points of two bodies: what a ball-by-ball bearing element is made of
 stiffness_table  the stiffness table: bearing properties over temperature and speed, as a CSV with units in its header
                  and its provenance above

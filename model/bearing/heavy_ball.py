@@ -29,7 +29,7 @@ Matrix = tuple[float, float, float, float]
 
 STEPS = 100
 HALVINGS = 30
-LONGEST = 2e-6  # m, of one step
+LONGEST = 0.05  # of the distance between the groove centres, in one step
 LEAST_STRETCH = 0.02e-6  # m, pressed into the races at the start
 
 
@@ -114,6 +114,7 @@ def settled(ball: HeavyBall, line: Vector, tolerance: float, least: float) -> Ba
     """
     share = (ball.inner_constant / ball.outer_constant) ** (2 / 3)
     length = hypot(*line)
+    longest = LONGEST * length
     stretch = max(length - ball.inner_length - ball.outer_length, LEAST_STRETCH)
     reach = (ball.inner_length + stretch / (1 + share)) / length
     r, z = line[0] * reach, line[1] * reach
@@ -126,7 +127,7 @@ def settled(ball: HeavyBall, line: Vector, tolerance: float, least: float) -> Ba
         inverse = _inverse((s[0] + g[0] + least, s[1] + g[1], s[2] + g[2], s[3] + g[3] + least))
         step_r = inverse[0] * here.resultant[0] + inverse[1] * here.resultant[1]
         step_z = inverse[2] * here.resultant[0] + inverse[3] * here.resultant[1]
-        factor = min(1.0, LONGEST / max(hypot(step_r, step_z), 1e-30))
+        factor = min(1.0, longest / max(hypot(step_r, step_z), 1e-30))
         for _ in range(HALVINGS):
             trial = (r + factor * step_r, z + factor * step_z)
             here = balance(ball, trial, line)

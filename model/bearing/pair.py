@@ -8,14 +8,15 @@ every row's axial force rises monotonically with the hub's movement, so the root
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import brentq, root
+from scipy.optimize import root
 
 from thermospindle.model.bearing.ball_row import BallInertia, BallRow, RowForce, centred_axial_force, respond
 from thermospindle.model.bearing.hertz import in_series, race_contact
+from thermospindle.model.bearing.movement import balanced
 from thermospindle.model.errors import NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Bearing, BearingSet, Condition, LinearBearing, RingMotion, Spindle
 from thermospindle.model.types import Array
@@ -186,7 +187,7 @@ def _positions(spindle: Spindle, rows: Mapping[str, BallRow], group: Sequence[Be
     def slid(at: Mapping[str, BallRow], sleeve: _Sleeve, hub: float) -> float:
         """Movement of the rings on a sleeve: they carry f(R) = push - rate (R - H), which rises with R."""
         own = [at[name] for name in sleeve.rows]
-        return _root(own, lambda rows, r: sum(centred_axial_force(row, r) for row in rows) + sleeve.rate * (r - towards[sleeve.rows[0]] * hub) - sleeve.push)
+        return balanced(own, lambda rows, r: sum(centred_axial_force(row, r) for row in rows) + sleeve.rate * (r - towards[sleeve.rows[0]] * hub) - sleeve.push)
 
     def imbalance(at: Sequence[BallRow], hub: float) -> float:
         by_name = dict(zip(rows, at, strict=True))
@@ -199,7 +200,7 @@ def _positions(spindle: Spindle, rows: Mapping[str, BallRow], group: Sequence[Be
                 found += towards[sleeve.rows[0]] * sleeve.push
         return found - load
 
-    hub = _root(list(rows.values()), imbalance)
+    hub = balanced(list(rows.values()), imbalance)
     moved = {name: towards[name] * hub for name in rows}
     for sleeve in sleeves:
         moved |= dict.fromkeys(sleeve.rows, slid(rows, sleeve, hub))
@@ -335,23 +336,6 @@ def ring_speeds(spindle: Spindle, b: Bearing, speed: float) -> tuple[float, floa
         return body.speed_ratio * speed if body.turns else 0.0
 
     return of(b.inner_body), of(b.outer_body)
-
-
-def _root(rows: list[BallRow], imbalance: Callable[[list[BallRow], float], float]) -> float:
-    """The movement without imbalance, by bracketing; balls with inertia are bracketed about the answer of balls without."""
-    massless = [replace(row, inertia=None) for row in rows]
-    start = _bracketed(lambda h: imbalance(massless, h), 0.0, 1e-6)
-    if all(row.inertia is None for row in rows):
-        return start
-    return _bracketed(lambda h: imbalance(rows, h), start, 1e-9)
-
-
-def _bracketed(imbalance: Callable[[float], float], start: float, reach: float) -> float:
-    while reach < 5e-3:
-        if imbalance(start - reach) <= 0 <= imbalance(start + reach):
-            return float(brentq(imbalance, start - reach, start + reach, xtol=1e-17, rtol=1e-14))
-        reach *= 4
-    raise NoEquilibrium(f"the bearings find no axial equilibrium within {reach * 1e3:.1f} mm of hub movement")
 
 
 def bearing_state(spindle: Spindle, b: Bearing, row: BallRow) -> BearingState:

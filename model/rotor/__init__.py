@@ -9,6 +9,7 @@ modes       modes and exact FRFs of a linearised spindle
 section     the axisymmetric section: which region owns which rectangle, and the mass and inertia that follow
 beam        beam elements of flexible shafts: nodes that are bodies, joined by elements that are joints
 shaft_look  what a flexible shaft looks like: a cut-away slice for every node, which moves with it
+reduced     a reduced basis for the response of a flexible shaft within a band, with an error that is known
 static      static answers: stiffness at points, bearing reactions, and which part gives how much
 ==========  ================================================================================================================
 """

@@ -7,8 +7,9 @@ Sources: Genta, *Dynamics of Rotating Systems* (2005), ch. 5; Ewins, *Modal Test
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -43,13 +44,31 @@ class Mode:
         return abs(self.pole.imag) / (2 * np.pi)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Degrees of freedom that move by themselves: their numbers (m,) of n, vectors (2m, 2m) of the state (q, q'), and M^-1 (m, m)."""
+
+    own: Integers
+    vectors: ComplexArray
+    inverse: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Poles:
     """All 2n poles (rad/s) with right vectors (n, 2n) and left vectors (2n, n) scaled so that H = right / (i w - pole) left."""
 
     value: ComplexArray
     right: ComplexArray
-    left: ComplexArray
+    blocks: tuple[Block, ...]
+
+    @cached_property
+    def left(self) -> ComplexArray:
+        found, at = np.zeros(self.right.shape[::-1], complex), 0
+        for b in self.blocks:
+            m = len(b.own)
+            found[at : at + 2 * m, b.own] = np.linalg.inv(b.vectors)[:, m:] @ b.inverse
+            at += 2 * m
+        return found
 
 
 LARGE = 40
@@ -59,12 +78,25 @@ LARGE = 40
 def poles(linear: Matrices) -> Poles:
     """Poles and vectors of M q'' + C q' + K q = f."""
     n = len(linear.mass)
-    if n > LARGE:
-        pattern = sum(_coupled(matrix) for matrix in (linear.mass, linear.damping, linear.stiffness))
-        count, label = connected_components(csr_array(pattern), directed=False)
-        if count > 1:
-            return _together(linear, [np.flatnonzero(label == k) for k in range(count)])
-    return _poles(linear)
+    value, right, blocks = np.zeros(2 * n, complex), np.zeros((n, 2 * n), complex), []
+    at = 0
+    for own in _apart(linear):
+        m, grid = len(own), np.ix_(own, own)
+        value[at : at + 2 * m], block = _poles(linear.mass[grid], linear.damping[grid], linear.stiffness[grid], own)
+        right[own, at : at + 2 * m] = block.vectors[:m]
+        blocks.append(block)
+        at += 2 * m
+    return Poles(value, right, tuple(blocks))
+
+
+def _apart(linear: Matrices) -> list[Integers]:
+    """Degrees of freedom in blocks that nothing couples; a small chain stays one."""
+    n = len(linear.mass)
+    if n <= LARGE:
+        return [np.arange(n)]
+    pattern = sum(_coupled(matrix) for matrix in (linear.mass, linear.damping, linear.stiffness))
+    count, label = connected_components(csr_array(pattern), directed=False)
+    return [np.flatnonzero(label == k) for k in range(count)]
 
 
 def _coupled(matrix: Array) -> Array:
@@ -73,34 +105,16 @@ def _coupled(matrix: Array) -> Array:
     return np.asarray(np.abs(matrix) > 1e-12 * np.outer(size, size), float)
 
 
-def _together(linear: Matrices, blocks: Sequence[Integers]) -> Poles:
-    """The poles of blocks of degrees of freedom that nothing couples."""
-    n = len(linear.mass)
-    value, right, left = np.zeros(2 * n, complex), np.zeros((n, 2 * n), complex), np.zeros((2 * n, n), complex)
-    at = 0
-    for own in blocks:
-        grid = np.ix_(own, own)
-        part = _poles(Matrices(linear.mass[grid], linear.damping[grid], linear.stiffness[grid], tuple(linear.dofs[i] for i in own)))
-        columns = np.arange(at, at + 2 * len(own))
-        value[columns] = part.value
-        right[np.ix_(own, columns)] = part.right
-        left[np.ix_(columns, own)] = part.left
-        at += 2 * len(own)
-    return Poles(value, right, left)
-
-
-def _poles(linear: Matrices) -> Poles:
-    n = len(linear.mass)
-    inverse = np.linalg.inv(linear.mass)
+def _poles(mass: Array, damping: Array, stiffness: Array, own: Integers) -> tuple[ComplexArray, Block]:
+    n = len(mass)
+    inverse: Array = np.asarray(np.linalg.inv(mass), float)
     state = np.zeros((2 * n, 2 * n))
     state[:n, n:] = np.eye(n)
-    state[n:, :n] = -inverse @ linear.stiffness
-    state[n:, n:] = -inverse @ linear.damping
+    state[n:, :n] = -inverse @ stiffness
+    state[n:, n:] = -inverse @ damping
     scale = np.concatenate([np.ones(n), np.full(n, np.sqrt(np.trace(-state[n:, :n]) / n))])  # balances q against q'
     value, vectors = np.linalg.eig(state * scale / scale[:, None])
-    vectors = vectors * scale[:, None]
-    left = np.linalg.inv(vectors)[:, n:] @ inverse
-    return Poles(value, vectors[:n], left)
+    return value, Block(own, vectors * scale[:, None], inverse)
 
 
 def frf(linear: Matrices, response: Array, reference: Array, frequency: Array | ComplexArray, kind: str = "receptance") -> ComplexArray:
