@@ -189,10 +189,10 @@ def _parser() -> tuple[_Parser, dict[str, argparse.ArgumentParser]]:
         added = verbs.add_parser(name, help=text, description=text, argument_default=argparse.SUPPRESS)
         added.set_defaults(verb=function)
         if what:
-            added.add_argument(what, metavar={"scene": "SCENE", "log": "FILE.rrd", "diagnosis": "DIAGNOSIS.json"}[what], type=Path)
+            added.add_argument(what, metavar={"scene": "SCENE", "log": "FILE.rrd", "diagnosis": "DIAGNOSIS.json", "name": "NAME"}[what], type=str if what == "name" else Path)
         added.add_argument("--json", action="store_true", help="one JSON object on standard output, nothing else")
         added.add_argument("--out", type=Path, metavar="DIR", help="folder to write, whole or not at all")
-        if what not in ("log", "diagnosis"):
+        if what not in ("log", "diagnosis", "name"):
             added.add_argument(
                 "--effect", dest="effect_files", type=Path, action="append", metavar="FILE.py",
                 help="a file with an effect of your own, beside those of the catalogue; may be given again",
@@ -325,6 +325,8 @@ def _parser() -> tuple[_Parser, dict[str, argparse.ArgumentParser]]:
     resonances.add_argument("--temperatures", type=_temperature, nargs="+", metavar="C", help="the scene's range in 21 steps by default")
     speeds(resonances, "0 to twice the nominal speed in 41 steps by default")
     resonances.add_argument("--multiples", type=_count(MULTIPLES), metavar="K", help="of the number of balls, and even ball orders")
+    new = verb("new", ("starting", "new"), "a commented scene of your own to start from, which every verb takes", what="name")
+    new.add_argument("--like", choices=("hdd", "machine-tool", "grinding", "rotor"), required=True, help="the machine it is like; --out is the new folder, ./NAME by default")
     verb("inspect", ("inspect", "inspect"), "what a Rerun log of spindle holds, and its FRFs as numbers", what="log")
     return parser, dict(verbs.choices)
 

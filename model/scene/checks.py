@@ -11,6 +11,7 @@ from thermospindle.model.bearing.hertz import in_series
 from thermospindle.model.bearing.pair import contact_constants, reference_motion, ring_speeds
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Bearing, Region, Spindle
+from thermospindle.model.shaft import SAME_HEIGHT
 
 # ---------------------------------------------------------------- geometry
 
@@ -88,7 +89,7 @@ def check_bearings(file: Path, spindle: Spindle) -> None:
         if (outer.part == "rotating") != (b.turning_ring == "outer"):
             raise BadInput(
                 f"{file}: bearing_pair.turning_ring = {b.turning_ring!r}: but {b.outer_ring!r} is on the {outer.part} part"
-                if len(spindle.sets) == 1 and spindle.sets[0].name == "pair"
+                if _as_pair(spindle)
                 else f"{where}.outer_ring = {b.outer_ring!r}: is on the {outer.part} part, but of its bodies {b.outer_body!r} "
                 f"{'turns' if b.turning_ring == 'outer' else 'does not turn'}"
             )
@@ -119,7 +120,7 @@ def check_raceways(file: Path, spindle: Spindle) -> None:
     for a, b in combinations(spindle.bearings, 2):
         for ring in {a.inner_ring, a.outer_ring} & {b.inner_ring, b.outer_ring}:
             lower, upper = sorted((spindle.raceway(ring, a), spindle.raceway(ring, b)))
-            if lower[1] > upper[0]:
+            if lower[1] > upper[0] + SAME_HEIGHT:
                 raise BadInput(
                     f"{file}: bearings.{b.name}.raceway_width_mm: the raceways of {a.name!r} and {b.name!r} on {ring!r}, z_mm = {_mm(lower)} "
                     f"and {_mm(upper)}, overlap; allowed are widths that leave them apart"
@@ -184,6 +185,11 @@ def check_structure(file: Path, spindle: Spindle) -> None:
             raise BadInput(f"{file}: hammer_test.hammer_nodes: {node} is no measuring point; allowed are {nodes}")
 
 
+def _as_pair(spindle: Spindle) -> bool:
+    """Whether the scene tells its bearings as a `bearing_pair`."""
+    return "bearing_pair.preload_N" in spindle.provenance
+
+
 def _plain(spindle: Spindle) -> list[str]:
     """Names of the bodies that are no nodes of a shaft."""
     return [b.name for b in spindle.structure.bodies if spindle.structure.carrier(b.name) == b.name]
@@ -201,7 +207,7 @@ def _check_mountings(file: Path, spindle: Spindle) -> None:
         if b.inner_body == b.outer_body:
             raise BadInput(f"{file}: bearings.{b.name}: both rings are on {b.inner_body!r}; a bearing lies between two bodies")
     turning = {b.name for b in structure.bodies if b.turns}
-    if spindle.sets and spindle.sets[0].name == "pair":  # as the one pair of a scene says it
+    if _as_pair(spindle):
         first = spindle.bearings[0]
         wanted = first.outer_body if first.turning_ring == "outer" else first.inner_body
         if not {b.name for b in structure.bodies if structure.carrier(b.name) == structure.carrier(wanted)} == turning:

@@ -13,6 +13,7 @@ importing  import
 inspect    inspect
 ladder     ladder
 running    runout, warmup, map
-states     table, modes
+starting   new, check
+states     table, modes, static
 =========  =============================================================================================================
 """

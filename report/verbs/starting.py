@@ -1,0 +1,40 @@
+"""The verbs `new` and `check`: a scene of one's own, and what the program understands of it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from rich.console import Console
+
+from thermospindle.model.errors import BadInput
+from thermospindle.model.scene.fields import read_toml
+from thermospindle.model.scene.reading import SCENES
+from thermospindle.report.folder import whole_folder
+from thermospindle.report.verbs.answer import Answer
+
+TEMPLATES = SCENES / "templates"
+"""Commented scenes to start from, a file each."""
+
+
+def new(name: str, like: str, out: Path | None = None) -> Answer:
+    """A commented scene called `name` to start from, in the new folder `out`, by default ./`name`."""
+    if not name.strip() or any(c in name for c in "/\\") or name in (".", ".."):
+        raise BadInput(f"NAME {name!r}: is no name of a folder; --out takes a path")
+    kinds = sorted(file.stem for file in TEMPLATES.glob("*.toml"))
+    if like not in kinds:
+        raise BadInput(f"--like {like}: allowed are {', '.join(kinds)}")
+    folder = Path(name) if out is None else Path(out)
+    if folder.exists() or folder.is_symlink():
+        raise BadInput(f"{folder}: is there already; new overwrites nothing, so name another folder with --out")
+    text = (TEMPLATES / f"{like}.toml").read_text(encoding="utf-8")
+    with whole_folder(folder) as written:
+        (written / "spindle.toml").write_text(text.replace('"TITLE"', json.dumps(name, ensure_ascii=False), 1), encoding="utf-8")
+        read_toml(written / "spindle.toml")  # whatever characters its name has
+    file = folder / "spindle.toml"
+
+    def show(console: Console) -> None:
+        console.print(f"{file}: a spindle like {like}, every key explained. Then:", highlight=False)
+        console.print(f"  spindle check {folder}     what the program understands of it\n  spindle modes {folder}", highlight=False)
+
+    return Answer({"scene": str(folder), "file": str(file), "like": like, "warnings": []}, show)
