@@ -78,7 +78,6 @@ def evidence(model: CampaignModel, fit: Fit, near: Learned | None = None) -> Evi
     p = len(fit.nuisance)
     kinds = {q.kind for q in model.parameters}
     grids = {kind: grid for kind, grid in GRIDS.items() if kind in kinds}
-    scales = [1.0] if fit.temper < 1.0 else [float(s) for s in _error_scales(whole, fit.count)]
     own_grid = list(_mechanism_grid(fit))
     priors = [mechanism_covariance(model, fit.mechanisms, fit.roots, own) for own in own_grid]
 
@@ -93,6 +92,7 @@ def evidence(model: CampaignModel, fit: Fit, near: Learned | None = None) -> Evi
         s, sizes = near.errors, dict(near.sizes)
         total, own_best = rated(s, sizes)
     else:
+        scales = [1.0] if fit.temper < 1.0 else [float(s) for s in _error_scales(whole, fit.count)]
         s, sizes = scales[len(scales) // 2], {kind: 0.0 for kind in grids}
         total, own_best = rated(s, sizes)
         for _ in range(SWEEPS):
@@ -187,10 +187,25 @@ def _marginal(q: Quadratic, diagonal: Array, p: int) -> _Marginal:
 
 
 def _posterior(q: Quadratic, prior: Array) -> tuple[Array, Array]:
-    """Mean and covariance under N(0, prior), which may be singular."""
-    root = np.linalg.cholesky(prior + 1e-14 * np.eye(len(prior)))
-    inner = np.linalg.inv(root.T @ q.a @ root + np.eye(len(prior)))
-    covariance = root @ inner @ root.T
+    """Mean and covariance under N(0, prior), which may be singular; most of the prior is a diagonal, and so is its root."""
+    n = len(prior)
+    diagonal = np.diag(prior)
+    beside = np.flatnonzero((prior - np.diag(diagonal)).any(axis=1))
+    alone = int(beside[0]) if len(beside) else n  # the first parameters, each independent of all others
+    scale = np.sqrt(diagonal[:alone] + 1e-14)
+    root = np.asarray(np.linalg.cholesky(prior[alone:, alone:] + 1e-14 * np.eye(n - alone)), float)
+
+    def between(matrix: Array, left: Array) -> Array:
+        """R^T matrix R with R = diag(scale) beside `left`."""
+        found = matrix.copy()
+        found[:alone] *= scale[:, None]
+        found[:, :alone] *= scale
+        found[alone:] = left.T @ found[alone:]
+        found[:, alone:] = found[:, alone:] @ left
+        return found
+
+    inner = np.asarray(np.linalg.inv(np.asarray(between(q.a, root) + np.eye(n), float)), float)
+    covariance = between(inner, np.asarray(root.T, float))
     return covariance @ q.b, covariance
 
 

@@ -7,7 +7,7 @@ whose law is wrong, or an effect that no catalogue has, does not.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -24,15 +24,21 @@ from thermospindle.sim.effects.effect import Effect, Parameter, Values
 
 STIFFNESS_WIDTH, DAMPING_WIDTH, PRELOAD_WIDTH = 3.0, 20.0, 5.0  # %
 RING_WIDTH = 0.2  # um
+OF_BEAMS: list[tuple[str, tuple[int, ...]]] = [("axial", (2,)), ("shear", (0, 1)), ("bending", (3, 4))]
+"""What each stiffness of a beam element resists, as its moves are told in `model.rotor.beam`."""
 
 
 def free_forms(spindle: Spindle) -> list[Mechanism]:
     """One mechanism for everything that might drift; its size in per cent (of ln) or um is what changes in each test."""
     found = []
-    for joint in spindle.structure.joints:
-        for label, moves in _groups(joint.stiffness):
-            found.append(_form(f"{joint.name} {label} stiffness", "%", STIFFNESS_WIDTH, chain=_scaled(joint.name, moves, damping_too=True)))
-        found.append(_form(f"{joint.name} damping", "%", DAMPING_WIDTH, chain=_scaled(joint.name, range(0), damping_too=True, damping_only=True)))
+    shafts = spindle.structure.shafts
+    joints = [j for j in spindle.structure.joints if not any(j.name in s.elements for s in shafts)]
+    parts: list[tuple[str, tuple[str, ...], list[tuple[str, tuple[int, ...]]]]] = [(j.name, (j.name,), _groups(j.stiffness)) for j in joints]
+    parts += [(s.name, s.elements, OF_BEAMS) for s in shafts]  # a shaft is one piece: its elements drift together
+    for name, elements, groups in parts:
+        for label, moves in groups:
+            found.append(_form(f"{name} {label} stiffness", "%", STIFFNESS_WIDTH, chain=_scaled(elements, moves, damping_too=True)))
+        found.append(_form(f"{name} damping", "%", DAMPING_WIDTH, chain=_scaled(elements, range(0), damping_too=True, damping_only=True)))
     names = [b.name for b in spindle.bearings]
     sets = [("bearings", names), *([(name, [name]) for name in names] if len(names) > 1 else [])]
     for label, own in sets:
@@ -76,14 +82,14 @@ def _congruent(matrix: Array, moves, factor: float) -> Array:
     return d[:, None] * matrix * d[None, :]
 
 
-def _scaled(name: str, moves, damping_too: bool, damping_only: bool = False):
+def _scaled(names: Sequence[str], moves, damping_too: bool, damping_only: bool = False):
     def chain(spindle: Spindle, condition: Condition, values: Values, chain: RotorBase) -> RotorBase:
         f = _factor(values)
         elements = []
         for e in chain.elements:
-            if e.name == name and damping_only:
+            if e.name in names and damping_only:
                 e = replace(e, damping=f * e.damping)
-            elif e.name == name:
+            elif e.name in names:
                 e = replace(e, stiffness=_congruent(e.stiffness, moves, f), damping=_congruent(e.damping, moves, f) if damping_too else e.damping)
             elements.append(e)
         return replace(chain, elements=tuple(elements))

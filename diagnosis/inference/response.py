@@ -48,10 +48,8 @@ class Response:
             self._basis = small.basis
             self._matrices = small.mass, small.damping, small.stiffness
             rows, references = rows @ small.basis, references @ small.basis
-        mass, damping, stiffness = self._matrices
-        self._dynamic: ComplexArray = self.s[:, None, None] ** 2 * mass + self.s[:, None, None] * damping + stiffness
         self._rows, self._references = rows, references.T
-        self.right: ComplexArray = np.asarray(np.linalg.solve(self._dynamic, references.T), complex)  # (L, r, n_ref)
+        self.right: ComplexArray = np.asarray(np.linalg.solve(self._dynamic(), references.T), complex)  # (L, r, n_ref)
         self.factor: ComplexArray = (
             (gain[:n_resp] * chain.gain[:n_resp])[:, None]
             * np.exp(-1j * omega * chain.delay[:n_resp, None])
@@ -63,10 +61,16 @@ class Response:
         if cut:
             self.value = self.value + cut * self.cut_off
 
+    def _dynamic(self) -> ComplexArray:
+        """Dynamic stiffness (L, r, r)."""
+        mass, damping, stiffness = self._matrices
+        s = self.s[:, None, None]
+        return np.asarray(s**2 * mass + s * damping + stiffness, complex)
+
     @cached_property
     def left(self) -> ComplexArray:
         """What every response reads of a force on the degrees of freedom, (L, n_resp, r)."""
-        return np.asarray(np.linalg.solve(self._dynamic.transpose(0, 2, 1), self._rows.T).transpose(0, 2, 1), complex)
+        return np.asarray(np.linalg.solve(self._dynamic().transpose(0, 2, 1), self._rows.T).transpose(0, 2, 1), complex)
 
     @cached_property
     def cut_off(self) -> ComplexArray:

@@ -15,6 +15,10 @@ from thermospindle.diagnosis.inference.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.prior import Learned
 from thermospindle.model.parallel import in_parallel
 from thermospindle.model.types import Array, Integers
+from thermospindle.sim.effects.effect import HOOKS
+
+SEEN = tuple(hook for hook in HOOKS if hook != "imperfections")
+"""What of an effect a hammer test can see: imperfections show in the runout alone."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +71,8 @@ def _screened(model: CampaignModel, about: Fit, sizes: Learned, nothing: float, 
     problem = Problem(model, [*about.mechanisms, mechanism])
     first = len(about.point)
     p = np.concatenate([about.point, np.zeros(problem.length - first)])
+    if not any(getattr(mechanism.effect, hook) for hook in SEEN):
+        return Screened(mechanism, -np.inf, p, 0.0)
     x, own_sizes, shapes = problem.parts(p)
     by_test, seen = [], []
     for t, at in enumerate(_fitted(model, about)):
