@@ -20,6 +20,8 @@ from thermospindle.model.types import Array, Integers
 
 TEMPERS = (3e-4, 3e-3, 0.03, 0.3, 1.0)
 LONGEST = 3.0  # prior standard deviations in one step
+MOST_STEPS = (30, 40)  # while errors are taken too large, and at the end
+MOST_REFUSED = 6  # steps one after the other, each shorter
 ENOUGH = 0.1  # of the cost, from which a fit goes on
 SIZE_STEP = 0.02  # of a size's or shape parameter's prior standard deviation, for differences
 
@@ -45,7 +47,7 @@ class Fit:
     count: int
     rates: Rates
     temper: float
-    cost: float = np.nan  # chi2 and priors, those that it was fitted with
+    cost: float = np.nan  # chi2, its errors 1 / temper times the data's, and priors: those that it was fitted with
 
     @property
     def nuisance(self) -> Array:
@@ -155,6 +157,12 @@ class Problem:
             return None
         return found if all(np.all(np.isfinite(r)) for r in found) else None
 
+    def cost(self, p: Array, temper: float, residuals: Sequence[Array] | None = None) -> float:
+        """chi2 with errors 1 / `temper` times the data's, and priors; infinite where no spindle can be built."""
+        if residuals is None:
+            residuals = self.residuals(p)
+        return np.inf if residuals is None else temper**2 * sum(float(r @ r) for r in residuals) + float(p @ self.precision @ p)
+
 
 class Linearisation:
     """Derivatives of all tests at one point: information J^T J, and gradients J^T r of residuals there or near."""
@@ -179,61 +187,64 @@ class Linearisation:
 
 
 def fit(
-    model: CampaignModel, mechanisms: Sequence[Mechanism] = (), start: Array | None = None, rates: Rates | None = None,
-    tempers: Sequence[float] = TEMPERS, steps: int = 4, learned: Learned | None = None,
+    model: CampaignModel, mechanisms: Sequence[Mechanism] = (), start: Array | Sequence[Array] | None = None, rates: Rates | None = None,
+    tempers: Sequence[float] = TEMPERS, learned: Learned | None = None,
 ) -> Fit:
-    """The fit with the reference widths of all priors, or those `learned`. While errors are taken too large, the thinned model serves.
+    """The fit with the reference widths of all priors, or those `learned`; of several starts from the one of least cost. While errors are taken
+    too large, the thinned model serves.
 
     Raises what the model raises where even the start cannot be built.
     """
     problem = Problem(model, mechanisms, learned)
-    p = np.zeros(problem.length) if start is None else start.copy()
+    if start is None:
+        p = np.zeros(problem.length)
+    elif isinstance(start, np.ndarray):
+        p = start.copy()
+    else:
+        p = min(start, key=lambda at: problem.cost(at, tempers[0])).copy()
     for temper in tempers:
         problem = Problem(model if temper == 1.0 else model.thinned, mechanisms, learned)
         rates = problem.model.rates(problem.parts(p)[0], problem.effects_of(p), rates)
-        p, lines, residuals = _settled(problem, p, rates, temper, steps, fresh=temper == 1.0)
+        p, lines, residuals = _settled(problem, p, rates, temper)
         done = problem, p, rates, temper, lines, residuals
     return _finished(*done)
 
 
-def _settled(problem: Problem, p: Array, rates: Rates, temper: float, steps: int, fresh: bool) -> tuple[Array, Linearisation, list[Array]]:
-    """Steps at one temper until the cost stands still. Derivatives are taken anew only where steps do not do what they promise, and
-    with `fresh` at the end."""
+def _settled(problem: Problem, p: Array, rates: Rates, temper: float) -> tuple[Array, Linearisation, list[Array]]:
+    """Levenberg-Marquardt steps at one temper until the cost stands still. Derivatives are taken anew only where a step does not do what it
+    promises, and at the end of the last temper."""
+    last = temper == 1.0
     lines = problem.linearisation(p, rates)
-    residuals, current, damping = lines.residuals, True, 1e-4
-    cost = _cost(problem, residuals, p, temper)
-    for _ in range(8 * steps if temper == 1.0 else 3 * steps):
+    residuals, current, damping, refused = lines.residuals, True, 1e-4, 0
+    cost = problem.cost(p, temper, residuals)
+    for _ in range(MOST_STEPS[last]):
         gradient = temper**2 * np.sum(lines.gradients(residuals), axis=0) + problem.precision @ p
         normal = temper**2 * lines.information + problem.precision
-        for _ in range(6):
-            move = -np.linalg.solve(normal + damping * np.diag(np.diag(normal)), gradient)
-            share = min(1.0, LONGEST / max(float((np.abs(move) * problem.reach).max()), 1e-300))
-            move *= share
-            promised = -2 * float(gradient @ move) - float(move @ normal @ move)
-            there = problem.residuals(p + move)
-            new = np.inf if there is None else _cost(problem, there, p + move, temper)
-            if new < cost or not current:
-                break
-            damping = max(10 * damping, 1e-3)
-        gained = cost - new
-        if gained > 0 and there is not None:
-            p, residuals, cost, damping, current = p + move, there, new, damping / 10, False
-        done = gained < (ENOUGH if temper == 1.0 else max(1.0, 0.02 * cost))
-        if (done and current) or (done and gained > -np.inf and promised < ENOUGH):
+        move = -np.linalg.solve(normal + damping * np.diag(np.diag(normal)), gradient)
+        move *= min(1.0, LONGEST / max(float((np.abs(move) * problem.reach).max()), 1e-300))
+        promised = -2 * float(gradient @ move) - float(move @ normal @ move)
+        enough = ENOUGH if last else max(1.0, 0.02 * cost)
+        if promised < ENOUGH and current:
             break
-        if gained < 0.6 * promised or done:
+        there = problem.residuals(p + move)
+        gained = -np.inf if there is None else cost - problem.cost(p + move, temper, there)
+        if gained > 0 and there is not None:
+            p, residuals, cost, damping, refused = p + move, there, cost - gained, damping * (0.1 if gained > 0.6 * promised else 1.0), 0
+            if gained < enough and (current or not last):
+                break
+        elif current:
+            damping, refused = max(10 * damping, 1e-3), refused + 1
+            if refused == MOST_REFUSED:
+                break
+        if gained < 0.6 * promised and (gained > 0 or not current):
             lines, current = problem.linearisation(p, rates), True
             residuals = lines.residuals
-            if done and not fresh:
-                break
-    if fresh and not current:
+        elif gained > 0:
+            current = False
+    if last and not current:
         lines = problem.linearisation(p, rates)
         residuals = lines.residuals
     return p, lines, residuals
-
-
-def _cost(problem: Problem, residuals: Sequence[Array], p: Array, temper: float) -> float:
-    return temper**2 * sum(float(r @ r) for r in residuals) + float(p @ problem.precision @ p)
 
 
 def _finished(problem: Problem, p: Array, rates: Rates, temper: float, lines: Linearisation, residuals: Sequence[Array]) -> Fit:
@@ -253,5 +264,5 @@ def _finished(problem: Problem, p: Array, rates: Rates, temper: float, lines: Li
         sum(d.count for d in problem.model.tests),
         rates,
         temper,
-        _cost(problem, residuals, p, 1.0),
+        problem.cost(p, temper, residuals),
     )

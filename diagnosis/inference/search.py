@@ -20,6 +20,7 @@ from thermospindle.diagnosis.inference.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.prior import DRIFTING, Learned, steady
 from thermospindle.diagnosis.inference.screening import Screened, screen
 from thermospindle.model.parallel import in_parallel
+from thermospindle.model.types import Array
 
 EARLY = 2  # number in TEMPERS at which large effects are told from each other
 BEHIND = 12.0  # tempered ln evidence behind the best from which a mechanism is not followed
@@ -84,10 +85,8 @@ def search(
     progress("effects screened")
     chosen = _chosen(looked, strained)
     # tolerances strained to stand in for an effect must give way with it; while errors are enlarged they are not strained yet
-    starts = [np.concatenate([about.point, s.start[len(about.point) :]]) if strained else s.start for s in chosen]
-    hoped = [-np.inf if strained else none.evidence.ln + s.gain for s in chosen]
-    tasks = [((s.mechanism,), start, hope) for s, start, hope in zip(chosen, starts, hoped, strict=True)]
-    most = fit(model, (), none.evidence.mean, none.fit.rates, TEMPERS[-1:], learned=expected).cost
+    tasks = [_task((), about, s, -np.inf if strained else none.evidence.ln + s.gain, far=not strained) for s in chosen]
+    most = fit(model, (), (none.evidence.mean, none.fit.point), none.fit.rates, TEMPERS[-1:], learned=expected).cost
     singles = _fitted_all(model, tasks, strained, about, most, expected, workers)
     progress("effects fitted")
     pairs = _joined(model, none, singles, [*named, *free], most, expected, workers)
@@ -99,11 +98,30 @@ def search(
     return Search(model, none, tuple(sorted([none, *ranked], key=lambda h: -h.evidence.ln)), tuple(looked))
 
 
+@dataclass(frozen=True, eq=False)
+class Task:
+    """Mechanisms to be fitted: from the best of some starts; `hoped` is the ln evidence that they should reach."""
+
+    mechanisms: tuple[Mechanism, ...]
+    starts: tuple[Array, ...]
+    hoped: float
+
+
+def _task(lead: tuple[Mechanism, ...], about: Fit, s: Screened, hoped: float, far: bool) -> Task:
+    """A screened mechanism beside those of the fit `about`: from there with its size, and with `far` from where screening says it leads or from
+    there without it."""
+    own = s.start[len(about.point) :]
+    starts = (s.start, np.concatenate([about.point, 0 * own])) if far else (np.concatenate([about.point, own]),)
+    return Task((*lead, s.mechanism), starts, hoped)
+
+
 def _settled(model: CampaignModel, h: Hypothesis) -> Hypothesis:
-    """Fitted anew with priors as wide as was learned, until that moves nothing: the quadratic then stands where the answer is."""
+    """Fitted anew with priors as wide as was learned, until that moves nothing: the quadratic then stands where the answer is.
+
+    It starts from its own answer, or from the fit where the model is no quadratic as far as that."""
     for _ in range(REFITS):
         try:
-            found = fit(model, h.mechanisms, h.evidence.mean, h.fit.rates, TEMPERS[-1:], learned=h.evidence.learned)
+            found = fit(model, h.mechanisms, (h.evidence.mean, h.fit.point), h.fit.rates, TEMPERS[-1:], learned=h.evidence.learned)
         except FAILED:
             return h
         before, h = h.evidence, Hypothesis(found, evidence(model, found))
@@ -143,36 +161,40 @@ def _fitted_all(model, tasks, strained: bool, about: Fit, most: float, expected:
         return []
     if not strained:
         return _fits(model, tasks, TEMPERS[-1:], about, most, expected, workers)
-    alive = list(tasks)
+    alive, early = list(tasks), True
     for temper in TEMPERS[EARLY:]:
-        found = _fits(model, alive, (temper,), about, most, expected, workers)
+        found = _fits(model, alive, (temper,), about, most, expected, workers, afresh=early)
+        early = False
         best = max(h.evidence.ln for h in found)
         keep = {id(h) for kind in (False, True) for h in sorted((h for h in found if h.free == kind), key=lambda h: -h.evidence.ln)[:2]}
         kept = [h for h in found if id(h) in keep or h.evidence.ln > best - BEHIND]
         if temper == TEMPERS[-1]:
             return found
-        alive = [(h.mechanisms, h.fit.point, -np.inf) for h in kept]
+        alive = [Task(h.mechanisms, (h.fit.point,), -np.inf) for h in kept]
     return []
 
 
-def _fits(model, tasks, tempers, about: Fit, most: float, expected: Learned, workers) -> list[Hypothesis]:
-    found = in_parallel(partial(_fit_one, model, about.rates, tuple(tempers), most, expected), tasks, workers)
+def _fits(model, tasks, tempers, about: Fit, most: float, expected: Learned, workers, afresh: bool = False) -> list[Hypothesis]:
+    found = in_parallel(partial(_fit_one, model, about.rates, tuple(tempers), most, expected, afresh), tasks, workers)
     return [
-        Hypothesis(replace(h.fit, mechanisms=mechanisms), h.evidence) for h, (mechanisms, _, _) in zip(found, tasks, strict=True) if h is not None
+        Hypothesis(replace(h.fit, mechanisms=task.mechanisms), h.evidence) for h, task in zip(found, tasks, strict=True) if h is not None
     ]
 
 
-def _fit_one(model: CampaignModel, rates, tempers, most: float, expected: Learned, task) -> Hypothesis | None:
-    """A fit; once more with errors enlarged where it did not reach `most`, the cost of a model that it contains, or the evidence that screening
-    `hoped` for: then it had stalled."""
-    mechanisms, start, hoped = task
+def _fit_one(model: CampaignModel, rates, tempers, most: float, expected: Learned, afresh: bool, task: Task) -> Hypothesis | None:
+    """A fit; with `afresh` also from nothing through all tempers before, the better of both. Once more with errors enlarged where it did not
+    reach `most`, the cost of a model that it contains, or the evidence that screening `hoped` for: then it had stalled."""
+    mechanisms = task.mechanisms
     prior = steady(expected, mechanisms)
     try:
-        found = fit(model, mechanisms, start, rates, tempers, learned=prior)
+        found = fit(model, mechanisms, task.starts, rates, tempers, learned=prior)
+        if afresh:
+            before = TEMPERS[: TEMPERS.index(tempers[0])]
+            found = min(found, fit(model, mechanisms, None, rates, (*before, *tempers), learned=prior), key=lambda f: f.cost)
         reached = Hypothesis(found, evidence(model, found))
-        if found.temper == 1.0 and (found.cost > most + LITTLE or reached.evidence.ln < hoped - LITTLE):
-            afresh = np.concatenate([np.zeros(len(model.parameters)), start[len(model.parameters) :]])
-            again = fit(model, mechanisms, afresh, rates, TEMPERS[1:], learned=prior)
+        if found.temper == 1.0 and (found.cost > most + LITTLE or reached.evidence.ln < task.hoped - LITTLE):
+            loose = np.concatenate([np.zeros(len(model.parameters)), task.starts[0][len(model.parameters) :]])
+            again = fit(model, mechanisms, loose, rates, TEMPERS[1:], learned=prior)
             if again.cost < found.cost:
                 reached = Hypothesis(again, evidence(model, again))
         return reached
@@ -214,9 +236,9 @@ def _beside(model, leads: Sequence[Hypothesis], mechanisms: Sequence[Mechanism],
                 names = frozenset({s.mechanism.name, *lead.names})
                 if names not in done:
                     done.add(names)
-                    tasks.append((lead.evidence.ln + s.gain, (*lead.mechanisms, s.mechanism), s.start, lead.evidence.ln - OCCAM))
-    tasks = sorted(tasks, key=lambda t: -t[0])[:PAIRS]
-    if not tasks:
+                    tasks.append((lead.evidence.ln + s.gain, _task(lead.mechanisms, lead.fit, s, lead.evidence.ln - OCCAM, far=True)))
+    chosen = [task for _, task in sorted(tasks, key=lambda t: -t[0])[:PAIRS]]
+    if not chosen:
         return []
     tempers = TEMPERS[-1:] if leads[0].evidence.learned.errors == 1.0 else TEMPERS[-2:]
-    return _fits(model, [(mechanisms, start, hoped) for _, mechanisms, start, hoped in tasks], tempers, leads[0].fit, most, expected, workers)
+    return _fits(model, chosen, tempers, leads[0].fit, most, expected, workers)

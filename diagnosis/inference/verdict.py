@@ -24,6 +24,7 @@ from thermospindle.diagnosis.inference.search import STRAIN, Hypothesis, Search
 PRIOR = {"none": 0.5, "one": 0.33, "two": 0.08, "free": 0.05, "two free": 0.02, "one and free": 0.02, "three": 0.01}
 WRONG, FALSE_ALARM, MISSED, SET, HALF = 10.0, 20.0, 5.0, 1.0, 3.0
 ENOUGH = 0.95  # posterior probability that a set holds the truth
+NEGLIGIBLE = 1e-3  # probability that adds nothing to a set
 LARGEST = 6  # names in a set, beyond which it says little
 NUMERICS = (1e-4, 0.01)  # drift of frequencies and of damping that two honest programs may differ by
 MOSTLY = 0.6  # of the ln evidence of an explanation with free drift in it, that what it names must reach alone to be the answer
@@ -181,17 +182,20 @@ def _least_loss(candidates: Sequence[Candidate], none: float, free: Sequence[Can
     for names in dict.fromkeys([c.names for c in candidates[:8]] + [named_part(c) for c in beside[:3]]):
         key = " + ".join(names)
         losses[key], answers[key] = named_loss(set(names)), ("identified" if len(names) == 1 else "two effects", names)
-    chosen, share = list[Candidate](), 0.0
-    for c in candidates:
-        if share >= ENOUGH * something or len({n for k in chosen for n in k.names}) >= LARGEST:
+    explained = sorted([*candidates, *beside], key=lambda c: -c.probability)
+    chosen = list[Candidate]()
+    for c in explained:
+        held = sum(k.probability for k in chosen)
+        if held >= ENOUGH * something or c.probability < NEGLIGIBLE or len({n for k in chosen for n in named_part(k)}) >= LARGEST:
             break
         chosen.append(c)
-        share += c.probability
-    names = tuple(dict.fromkeys(n for c in chosen for n in c.names))
+    names = tuple(dict.fromkeys(n for c in chosen for n in named_part(c)))
     if len(names) > 1:
-        outside = sum(c.probability for c in candidates) - share
+        share = sum(c.probability for c in chosen if not c.free)
+        half = sum(c.probability for c in chosen if c.free)
+        outside = sum(c.probability for c in explained) - share - half
         key = "one of " + ", ".join(names)
-        losses[key] = FALSE_ALARM * none + SET * share * (1 + 0.1 * max(len(names) - 3, 0)) + (SET + MISSED) * (outside + p_unknown) + HALF * p_beside
+        losses[key] = FALSE_ALARM * none + SET * share * (1 + 0.1 * max(len(names) - 3, 0)) + HALF * half + (SET + MISSED) * (outside + p_unknown)
         answers[key] = ("ambiguous", names)
     losses["unexplained"] = FALSE_ALARM * none + SET * 2 * sum(c.probability for c in candidates) + SET * p_beside
     answers["unexplained"] = ("unexplained", ())
