@@ -11,6 +11,7 @@ Under an exponential window the noise of neighbouring lines is correlated, which
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -52,7 +53,7 @@ class LineData:
     noise_from: str
     raw: int
 
-    @property
+    @cached_property
     def duration(self) -> float:
         """Length (s) of the record that lines so far apart are the transform of."""
         return np.inf if self.test.frf is None else record_length(self.test.frf)

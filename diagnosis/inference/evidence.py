@@ -79,7 +79,7 @@ def evidence(model: CampaignModel, fit: Fit, near: Learned | None = None) -> Evi
     kinds = {q.kind for q in model.parameters}
     grids = {kind: grid for kind, grid in GRIDS.items() if kind in kinds}
     own_grid = list(_mechanism_grid(fit))
-    priors = [mechanism_covariance(model, fit.mechanisms, fit.roots, own) for own in own_grid]
+    priors = [mechanism_covariance(model, fit.mechanisms, own) for own in own_grid]
 
     def rated(s: float, sizes: Mapping[str, float]) -> tuple[float, int]:
         """ln evidence, the mean over widths and departures; and which of these is best."""

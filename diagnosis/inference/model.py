@@ -18,7 +18,7 @@ from thermospindle.diagnosis.data.mode_table import ModeData
 from thermospindle.diagnosis.inference import nuisance as kinds_of
 from thermospindle.diagnosis.inference.mode_residual import mode_residual, partners
 from thermospindle.diagnosis.inference.nuisance import Nuisance, ReferenceModes, nuisances, reference_modes
-from thermospindle.diagnosis.inference.response import Linear, Response, same_chain
+from thermospindle.diagnosis.inference.response import Linear, Products, Response, products, same_chain
 from thermospindle.model.errors import NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Condition, RingMotion, Spindle
 from thermospindle.model.rotor.chain import Matrices, matrices
@@ -250,7 +250,7 @@ class CampaignModel:
             jacobian[first : first + len(moved), 0], jacobian[first : first + len(moved), 1] = moved.real, moved.imag
             return first + len(moved)
 
-        at = fill(0, response.moved(rates.mass[t], rates.damping[t], rates.stiffness[t]))
+        at = fill(0, response.moved(rates.products[t]))
         w = response.over(self.reference.over(linear.matrices.dofs))
         left = np.ascontiguousarray((response.left @ w).transpose(2, 1, 0)) * response.factor  # (m, n_resp, L)
         right = np.ascontiguousarray((w.T @ response.right).transpose(1, 2, 0))  # (m, n_ref, L)
@@ -281,7 +281,7 @@ class CampaignModel:
         response = self._standing(t, x, first, at)
         if same:
             difference = [(getattr(moved.matrices, k) - getattr(at.matrices, k))[None] / apart for k in ("mass", "damping", "stiffness")]
-            return self.whitened(t, response.moved(*difference)[0], 0.0)
+            return self.whitened(t, response.moved(products(*difference))[0], 0.0)
         return self.whitened(t, (self._response(t, x, moved).value - response.value) / apart, 0.0)
 
     # ------------------------------------------------------------ derivatives of the matrices
@@ -355,6 +355,10 @@ class Rates:
     mass: tuple[Array, ...]
     damping: tuple[Array, ...]
     stiffness: tuple[Array, ...]
+
+    @cached_property
+    def products(self) -> list[Products]:
+        return [products(*of_test) for of_test in zip(self.mass, self.damping, self.stiffness, strict=True)]
 
 
 def replace_measuring(point: OperatingPoint, effects: Applied) -> OperatingPoint:

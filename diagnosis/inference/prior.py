@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -11,6 +12,7 @@ from scipy.linalg import solve_triangular
 from thermospindle.diagnosis.inference import nuisance as kinds_of
 from thermospindle.diagnosis.inference.mechanism import REFERENCE_DEPARTURE, REFERENCE_WIDTH, Mechanism, size_covariance
 from thermospindle.diagnosis.inference.model import CampaignModel
+from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
 
 REFERENCE = {
@@ -59,25 +61,29 @@ def nuisance_variances(model: CampaignModel, sizes: Mapping[str, float]) -> Arra
     return np.array([(sizes[p.kind] / REFERENCE[p.kind]) ** 2 if p.kind in sizes else 1.0 for p in model.parameters])
 
 
-def mechanism_covariance(
-    model: CampaignModel, mechanisms: Sequence[Mechanism], roots: Sequence[Array], own: Sequence[tuple[float, float]]
-) -> Array:
+def mechanism_covariance(model: CampaignModel, mechanisms: Sequence[Mechanism], own: Sequence[tuple[float, float]]) -> Array:
     """Prior covariance of [z, u] of all mechanisms, each with its (width, departure)."""
-    conditions = [d.condition for d in model.tests]
-    prior, at = np.eye(sum(len(conditions) + len(m.shape) for m in mechanisms)), 0
-    for m, root, (width, departure) in zip(mechanisms, roots, own, strict=True):
-        sizes = size_covariance(conditions, width * m.size.prior_sd, departure)
-        half = solve_triangular(root, sizes, lower=True)
-        prior[at : at + len(root), at : at + len(root)] = solve_triangular(root, half.T, lower=True)
-        at += len(root) + len(m.shape)
+    tests = len(model.tests)
+    prior, at = np.eye(sum(tests + len(m.shape) for m in mechanisms)), 0
+    for m, (width, departure) in zip(mechanisms, own, strict=True):
+        prior[at : at + tests, at : at + tests] = _whitened(tuple(d.condition for d in model.tests), width, departure)
+        at += tests + len(m.shape)
     return prior
+
+
+@lru_cache(maxsize=256)
+def _whitened(conditions: tuple[Condition, ...], width: float, departure: float) -> Array:
+    """Covariance (tests, tests) of z = root^-1 (sizes - neutral): the same for every mechanism, as widths are counted in its own standard deviation."""
+    root = np.linalg.cholesky(size_covariance(conditions, REFERENCE_WIDTH, REFERENCE_DEPARTURE))
+    half = solve_triangular(root, size_covariance(conditions, width, departure), lower=True)
+    return np.asarray(solve_triangular(root, half.T, lower=True))
 
 
 def covariance(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned) -> Array:
     """Prior covariance (n, n) of all parameters at learned sizes; singular where a size is zero."""
     diagonal = nuisance_variances(model, learned.sizes)
     n = len(diagonal)
-    own = mechanism_covariance(model, mechanisms, roots_of(model, mechanisms), list(zip(learned.widths, learned.departures, strict=True)))
+    own = mechanism_covariance(model, mechanisms, list(zip(learned.widths, learned.departures, strict=True)))
     prior = np.zeros((n + len(own), n + len(own)))
     prior[:n, :n] = np.diag(diagonal)
     prior[n:, n:] = own

@@ -11,11 +11,12 @@ from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.model.rotor.chain import Matrices
 from thermospindle.model.rotor.modes import LARGE, poles
 from thermospindle.model.rotor.reduced import reduced
-from thermospindle.model.types import Array, ComplexArray
+from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.campaign.beside import POWER
 from thermospindle.sim.effects.effect import Measurement
 
 SILENT = 1e-6  # of a mode's answer, left at the end of a record
+EXACT = 1e-11  # of the largest singular value of a change: products that are left out
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,25 +95,52 @@ class Response:
         """Columns (n, m) of generalised forces in the coordinates (r,) of `left` and `right`."""
         return columns if self._basis is None else self._basis.T @ columns
 
-    def moved(self, mass: Array, damping: Array, stiffness: Array) -> ComplexArray:
-        """Derivatives (k, n_resp, n_ref, L) for dM, dC, dK (k, n, n)."""
-        changes = [d if self._basis is None or not d.any() else self._basis.T @ d @ self._basis for d in (mass, damping, stiffness)]
-        left, right = self.left, self.right
-        turned = left.shape[1] < right.shape[2]  # the product is begun on the side with the fewer vectors
-        if turned:
-            left, right = right.transpose(0, 2, 1), left.transpose(0, 2, 1)
-            changes = [d.transpose(0, 2, 1) for d in changes]
-        (lines, responses, r), references, k = left.shape, right.shape[2], len(mass)
-        columns = np.ascontiguousarray(right.transpose(1, 0, 2))  # (r, L, n_ref)
-        total: ComplexArray = np.zeros((lines, r, k, references), complex)
-        for power, d in zip((2, 1, 0), changes, strict=True):
-            if d.any():
-                own = columns * (self.s**power)[:, None] if power else columns
-                part = d.reshape(k * r, -1) @ own.reshape(own.shape[0], -1).view(float)  # real times complex, in real numbers
-                total += part.view(complex).reshape(k, r, lines, references).transpose(2, 1, 0, 3)
-        value = (left @ total.reshape(lines, r, k * references)).reshape(lines, responses, k, references)
-        value = value.transpose(2, 3, 1, 0) if turned else value.transpose(2, 1, 3, 0)
-        return -value * self.factor[:, None, :]
+    def moved(self, by: Products) -> ComplexArray:
+        """Derivatives (k, n_resp, n_ref, L) by the parameters of `by`."""
+        _, responses, _ = self.left.shape
+        lines, _, references = self.right.shape
+        found: ComplexArray = np.zeros((by.count, responses, references, lines), complex)
+        if len(by.of):
+            left = np.ascontiguousarray((self.left @ self.over(by.left)).transpose(2, 1, 0))  # (r, n_resp, L)
+            right = np.ascontiguousarray((self.over(by.right).T @ self.right).transpose(1, 2, 0))  # (r, n_ref, L)
+            right *= -(self.s[None, :] ** by.power[:, None])[:, None, :]
+            found[by.of] = np.add.reduceat(left[:, :, None] * right[:, None], by.first, axis=0) * self.factor[:, None, :]
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Products:
+    """Changes of M, C and K by k parameters as sums of few products of two vectors, for an element moves few degrees of freedom: the change of
+    the dynamic stiffness by parameter `of`[i] is the sum over its rows r of s^`power`[r] `left`[:, r] `right`[:, r]^T, of which `first`[i] is the first."""
+
+    count: int
+    of: Integers
+    first: Integers
+    power: Integers
+    left: Array
+    right: Array
+
+
+def products(mass: Array, damping: Array, stiffness: Array) -> Products:
+    """The products of dM, dC, dK (k, n, n), to `EXACT` of the largest of each."""
+    of, first, power, left, right = [], [], [], [], []
+    for k in range(len(mass)):
+        start = len(power)
+        for exponent, change in ((2, mass[k]), (1, damping[k]), (0, stiffness[k])):
+            if change.any():
+                u, size, v = np.linalg.svd(change)
+                kept = np.flatnonzero(size > EXACT * size[0])
+                power += [exponent] * len(kept)
+                left.append(u[:, kept] * size[kept])
+                right.append(v[kept].T)
+        if len(power) > start:
+            of.append(k)
+            first.append(start)
+    n = mass.shape[1]
+    none = [np.zeros((n, 0))]
+    return Products(
+        len(mass), np.array(of, int), np.array(first, int), np.array(power, int), np.concatenate(left or none, axis=1), np.concatenate(right or none, axis=1)
+    )
 
 
 def same_chain(a: Measurement, b: Measurement) -> bool:

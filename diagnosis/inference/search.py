@@ -30,6 +30,7 @@ SECONDS = 2  # of each kind, joined to each of them
 PAIRS = 6  # fitted at most
 ENOUGH, PLENTY = 5.0, 12.0  # ln evidence that a second mechanism must promise: beside one that leaves a misfit, and one that leaves none
 OCCAM = 20.0  # ln evidence that a second mechanism of no size may cost at most: less tells of a fit that stalled
+STALLED = 0.1  # of the enlarged errors, which the model without effects must reach if fits are to start from it alone
 STRAIN = 1.02  # times the errors, from which the model without effects leaves a misfit
 FINALISTS = {1: 3, 2: 2, 3: 1}  # explanations of one, two and three mechanisms that are fitted anew at the end, of the catalogue and free
 NEAR = 100.0  # ln evidence behind the best, so far
@@ -161,7 +162,7 @@ def _fitted_all(model, tasks, strained: bool, about: Fit, most: float, expected:
         return []
     if not strained:
         return _fits(model, tasks, TEMPERS[-1:], about, most, expected, workers)
-    alive, early = list(tasks), True
+    alive, early = list(tasks), about.temper * np.sqrt(about.chi2 / about.count) > STALLED
     for temper in TEMPERS[EARLY:]:
         found = _fits(model, alive, (temper,), about, most, expected, workers, afresh=early)
         early = False
