@@ -3,6 +3,7 @@
 ============  ==========================================================================================================
 folder        output folders: replaced only where they hold nothing but what spindle wrote
 typeset       numbers as a page shows them: true minus signs, signs, standard errors to their own digit
+check/        what the program understands of a scene: words, picture, page
 figures/      figures, drawn with matplotlib's object-oriented interface as SVG and PNG
 log/          Rerun logs, written and read back; the only place that imports rerun
 page/         HTML pages that need no network

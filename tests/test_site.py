@@ -47,6 +47,7 @@ def test_references_hold_every_key():
     [
         ("table", [SCENE, "--temperatures", 20]),
         ("modes", [SCENE]),
+        ("check", [SCENE]),
         ("effects", []),
         ("compare", [SCENE, SCENE / "measured" / "jang_2003"]),
         pytest.param("diagnose", [SCENE, SCENE / "measured" / "jang_2003"], marks=pytest.mark.slow),

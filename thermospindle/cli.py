@@ -327,6 +327,7 @@ def _parser() -> tuple[_Parser, dict[str, argparse.ArgumentParser]]:
     resonances.add_argument("--multiples", type=_count(MULTIPLES), metavar="K", help="of the number of balls, and even ball orders")
     new = verb("new", ("starting", "new"), "a commented scene of your own to start from, which every verb takes", what="name")
     new.add_argument("--like", choices=("hdd", "machine-tool", "grinding", "rotor"), required=True, help="the machine it is like; --out is the new folder, ./NAME by default")
+    verb("check", ("starting", "check"), "what the program understands of a scene, what it assumes and what it finds odd; --out draws it")
     verb("inspect", ("inspect", "inspect"), "what a Rerun log of spindle holds, and its FRFs as numbers", what="log")
     return parser, dict(verbs.choices)
 

@@ -8,6 +8,7 @@ from typing import Protocol
 from thermospindle.model import machine as m
 from thermospindle.model.scene.bearings import BearingPair, BearingSet
 from thermospindle.model.scene.fields import Table
+from thermospindle.model.scene.section import Section
 from thermospindle.model.scene.shafts import COARSE, ShaftForm
 from thermospindle.model.scene.thermal import MOVED_AIR, STILL_AIR, Thermal
 
@@ -24,6 +25,9 @@ class Told(Protocol):
 
     @property
     def tolerances(self) -> Table: ...
+
+    @property
+    def section(self) -> Section: ...
 
     @property
     def thermal(self) -> Thermal: ...
@@ -59,11 +63,12 @@ def assumed(scene: Told, told: Mapping[str, m.Provenance]) -> dict[str, m.Proven
                 chosen = value is None or value == []
                 said = "chosen by the program" if chosen else f"{value}"
                 found[f"{table}.{key}"] = m.Provenance("assumed", f"assumed default: {said}")
-    if not scene.thermal.convection:
+    warms = bool(scene.section.regions)
+    if warms and not scene.thermal.convection:
         found["thermal.convection"] = m.Provenance(
             "assumed", f"assumed default: {STILL_AIR:g} W/m2 K on standing regions, {MOVED_AIR:g} on turning ones"
         )
-    if "friction" not in scene.thermal.model_fields_set:
+    if warms and "friction" not in scene.thermal.model_fields_set:
         found["thermal.friction"] = m.Provenance("assumed", "assumed default: a light grease, f0 = 2, 26 mm2/s at 40 C")
     if scene.nominal_speed_rpm is None:
         said = f"assumed default: {scene.speed_rpm():g} rpm, a speed parameter of {GENTLE:g} mm rpm"
@@ -85,6 +90,8 @@ def assumed(scene: Told, told: Mapping[str, m.Provenance]) -> dict[str, m.Proven
     if pair is None and scene.sets and scene.ball_inertia is None:
         found["ball_inertia"] = m.Provenance("assumed", "assumed default: 1, balls with their centrifugal force and gyroscopic moment")
     for shaft in scene.shafts:
+        if "beam" not in shaft.model_fields_set:
+            found[f"shafts.{shaft.name}.beam"] = m.Provenance("assumed", "assumed default: timoshenko, with shear and rotary inertia")
         if shaft.longest_element_mm is None:
             found[f"shafts.{shaft.name}.longest_element_mm"] = m.Provenance(
                 "assumed", f"assumed default: {COARSE:g} of its length, and nodes where bearings, joints and points are"

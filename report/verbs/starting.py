@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 
 from thermospindle.model.errors import BadInput
+from thermospindle.model.machine import Condition
 from thermospindle.model.scene.fields import read_toml
 from thermospindle.model.scene.reading import SCENES
+from thermospindle.report.check.odd import looked, odd
+from thermospindle.report.check.page import write_check
+from thermospindle.report.check.understood import understood
+from thermospindle.report.check.words import show_check
 from thermospindle.report.folder import whole_folder
-from thermospindle.report.verbs.answer import Answer
+from thermospindle.report.verbs.answer import Answer, answered, with_effects, write_json
+from thermospindle.sim.operating import operating_point
 
 TEMPLATES = SCENES / "templates"
 """Commented scenes to start from, a file each."""
@@ -38,3 +46,13 @@ def new(name: str, like: str, out: Path | None = None) -> Answer:
         console.print(f"  spindle check {folder}     what the program understands of it\n  spindle modes {folder}", highlight=False)
 
     return Answer({"scene": str(folder), "file": str(file), "like": like, "warnings": []}, show)
+
+
+def check(scene: Path, effect_files: Sequence[Path] = (), out: Path | None = None) -> Answer:
+    """What the program understands of a scene, assumes and finds odd; a folder holds `check.json`, `check.html` and the picture."""
+    asked = dict(locals())
+    spindle, catalogue = with_effects(scene, effect_files)
+    point = operating_point(spindle, Condition(spindle.reference_temperature))
+    values: dict[str, Any] = understood(point, catalogue) | {"odd": odd(looked(spindle, point))}
+    write = write_json("check.json", lambda folder: write_check(point, values, folder))
+    return answered(values, lambda console: show_check(console, values), out, {"verb": "check"} | asked, write)

@@ -1,0 +1,108 @@
+"""What the program understood of a scene, in the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from rich.console import Console
+
+from thermospindle.report.text.grid import show_grid
+
+
+def show_check(console: Console, values: Mapping[str, Any], verbose: bool = False) -> None:
+    """The answer of `check` for a person: sentences, then tables of bearings, shafts and points, then what is assumed and what is odd."""
+    console.print(values["title"], style="bold", markup=False, highlight=False)
+    for sentence in sentences(values):
+        console.print(sentence, markup=False, highlight=False)
+    for title, head, rows in grids(values):
+        console.print()
+        show_grid(console, title, head, rows, words=[h for h, cell in zip(head, rows[0], strict=True) if not _numeric(cell)])
+    _list(console, "Assumed, where the scene says nothing", [f"{a['key']}: {a['what']}" for a in values["assumed"]])
+    _list(console, "Odd", values["odd"] or ["nothing"])
+
+
+def sentences(values: Mapping[str, Any]) -> list[str]:
+    """What the whole is, in a few sentences."""
+    turning, standing = values["parts"]["turning"], values["parts"]["standing"]
+    low, high = values["temperature_range_C"]
+    found = [f"Turning: {_and(turning) or 'nothing'}" + (f" ({values['turning_mass_kg']:.4g} kg)" if turning else "") + f". Standing: {_and(standing) or 'the ground alone'}."]
+    for name, s in values["sets"].items():
+        slides = f"; the rings of {_and(s['sprung'])} slide on {_spring(s)}" if s["sprung"] else ""
+        found.append(f"Set {name}: {_and(s['bearings'])}, {s['arrangement']}, preload {s['preload_N']:g} N, {s['kind']}{slides}.")
+    if values["sets"]:
+        found.append(f"Balls with {values['ball_inertia']:.0%} of their inertia." if values["ball_inertia"] else "Balls without inertia: speed changes no bearing.")
+    if values["axial_load_N"]:
+        found.append(f"External axial load {values['axial_load_N']:g} N along z.")
+    h, modes = values["hammer"], values["modes_Hz"]
+    points = [name for name, p in values["points"].items() if p["hammer"]]
+    found.append(
+        f"Hammer on {_and(points)}: {h['band_Hz'][0]:g} to {h['band_Hz'][1]:g} Hz, a pulse of {h['pulse_us']:.3g} us that first vanishes at {h['vanishes_at_Hz']:.0f} Hz; "
+        f"steps of {h['step_us']:.3g} us."
+    )
+    shown = ", ".join(f"{f:.0f}" for f in modes[:8]) + (" ..." if len(modes) > 8 else "")
+    found.append(f"At {values['reference_temperature_C']:g} C at rest {len(modes)} modes up to {h['band_Hz'][1]:g} Hz" + (f": {shown} Hz." if modes else "."))
+    found.append(f"Meant for {low:g} to {high:g} C" + (f" and {values['nominal_speed_rpm']:g} rpm." if turning else "."))
+    effects = values["effects"]
+    count = len(effects["can_act"]) + len(effects["nothing_to_act_on"])
+    own = f"Effects in it: {_and(effects['of_the_scene'])}. " if effects["of_the_scene"] else ""
+    found.append(f"{own}Of {count} effects {len(effects['can_act'])} can act here (spindle effects --scene tells why the others cannot).")
+    return found
+
+
+def grids(values: Mapping[str, Any]) -> list[tuple[str, list[str], list[list[str]]]]:
+    """Title, heads and rows of the tables of bearings, shafts, bodies, joints and points; tables without rows are left out."""
+    bearings = [
+        [
+            name, f"{b['z_mm']:g}", f"{b['inner_on']} - {b['outer_on']}", b.get("sense", "-"),
+            f"{b['preload_N']:.4g}" if "preload_N" in b else "-", f"{b['contact_angle_deg']:.2f}" if "contact_angle_deg" in b else "-",
+            f"{b['load_lines_meet_axis_at_mm']:.1f}" if "contact_angle_deg" in b else "-",
+            f"{b['radial_stiffness_N_per_um']:.4g}", f"{b['axial_stiffness_N_per_um']:.4g}",
+        ]
+        for name, b in values["bearings"].items()
+    ]  # fmt: skip
+    shafts = [
+        [
+            name, f"{s['z_mm'][0]:g} - {s['z_mm'][1]:g}", f"{s['outer_diameter_mm'][0]:g} - {s['outer_diameter_mm'][1]:g}", f"{s['mass_kg']:.4g}",
+            str(s["elements"]), s["beam"], "yes" if s["turns"] else "no",
+        ]
+        for name, s in values["shafts"].items()
+    ]  # fmt: skip
+    bodies = [
+        [name, f"{b['z_mm']:.2f}", f"{b['mass_kg']:.4g}", f"{b['inertia_kg_m2'][0]:.3g}", f"{b['inertia_kg_m2'][2]:.3g}", "yes" if b["turns"] else "no", " ".join(b["moves"])]
+        for name, b in values["bodies"].items()
+    ]
+    joints = [
+        [name, " - ".join(j["between"]), f"{j['z_mm']:g}", *(f"{k:.3g}" if k else "-" for k in (max(j["stiffness"][:2]), j["stiffness"][2], max(j["stiffness"][3:])))]
+        for name, j in values["joints"].items()
+    ]
+    points = [
+        [str(p["node"]), name, p["on"], ", ".join(f"{x:g}" for x in p["position_mm"]), p["direction"], "yes" if p["hammer"] else ""]
+        for name, p in values["points"].items()
+    ]
+    every = [
+        ("Bearings at the reference", ["bearing", "z\nmm", "between", "sense", "preload\nN", "angle\ndeg", "meets\naxis, mm", "radial\nN/um", "axial\nN/um"], bearings),
+        ("Flexible shafts", ["shaft", "z\nmm", "diameter\nmm", "mass\nkg", "elements", "beam", "turns"], shafts),
+        ("Rigid bodies", ["body", "z\nmm", "mass\nkg", "tilt\nkg m2", "polar\nkg m2", "turns", "moves"], bodies),
+        ("Joints", ["joint", "between", "z\nmm", "lateral\nN/m", "axial\nN/m", "tilt\nN m/rad"], joints),
+        ("Points", ["node", "point", "on", "x, y, z\nmm", "along", "hammer"], points),
+    ]
+    return [g for g in every if g[2]]
+
+
+def _spring(s: Mapping[str, Any]) -> str:
+    return "a constant force" if s["rate_N_per_m"] is None else f"a spring of {s['rate_N_per_m']:g} N/m"
+
+
+def _and(names: list[str]) -> str:
+    return ", ".join(names[:-1]) + (" and " if len(names) > 1 else "") + names[-1] if names else ""
+
+
+def _numeric(cell: str) -> bool:
+    return cell.replace(".", "", 1).replace("e-", "").replace("e+", "").replace("-", "", 1).isdigit()
+
+
+def _list(console: Console, title: str, items: list[str]) -> None:
+    console.print(f"\n{title}:", style="bold")
+    for item in items:
+        console.print(f"  - {item}", markup=False, highlight=False)

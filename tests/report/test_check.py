@@ -1,0 +1,143 @@
+"""`spindle check`: what is understood of a scene, what is assumed, what is odd, and its picture."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.conftest import ROOT
+from thermospindle.cli import main
+from thermospindle.model.machine import Condition
+from thermospindle.model.scene.reading import load
+from thermospindle.report.check.drawing import drawing
+from thermospindle.report.check.understood import arrangement
+from thermospindle.sim.operating import operating_point
+
+SCENES = {name: ROOT / "scenes" / name / "spindle.toml" for name in ("hdd_2003", "mk7702", "five_bearing", "free_shaft")}
+SCENES |= {kind: ROOT / "scenes" / "templates" / f"{kind}.toml" for kind in ("hdd", "machine-tool", "grinding", "rotor")}
+
+
+def checked(scene: Path, capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
+    assert main(["check", str(scene), "--json"]) == 0
+    found: dict[str, Any] = json.loads(capsys.readouterr().out)
+    return found
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_words_and_picture_name_every_part(name: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    assert main(["check", str(SCENES[name]), "--out", str(tmp_path / "c")]) == 0
+    said = capsys.readouterr().out
+    values = json.loads((tmp_path / "c" / "check.json").read_text(encoding="utf-8"))
+    page = (tmp_path / "c" / "check.html").read_text(encoding="utf-8")
+    picture = (tmp_path / "c" / "section.svg").read_text(encoding="utf-8")
+    for part in (*values["bearings"], *values["shafts"], *values["bodies"], *values["points"]):
+        assert part in said
+        assert part in page
+        assert part in picture
+    assert (tmp_path / "c" / "section.png").stat().st_size > 10_000
+    assert "…" not in said
+
+
+def test_the_set_of_five_bearings_is_understood(capsys: pytest.CaptureFixture[str]) -> None:
+    found = checked(SCENES["five_bearing"], capsys)
+    assert found["parts"] == {"turning": ["spindle"], "standing": ["housing"]}
+    assert found["sets"]["front"]["arrangement"] == "two against one, back-to-back"
+    assert found["sets"]["rear"]["arrangement"] == "back-to-back"
+    front3, free = found["bearings"]["front3"], 15.0
+    assert front3["free_contact_angle_deg"] == pytest.approx(free, abs=1e-6)
+    assert found["shafts"]["spindle"]["mass_kg"] == pytest.approx(10.66, abs=0.005)  # machines of others: 10.66 kg
+    # back-to-back load lines meet the axis outside the set, half the pitch circle times the tangent of the angle away
+    for name, sense in (("front1", -1), ("front3", 1)):
+        b = found["bearings"][name]
+        reach = b["pitch_diameter_mm"] / 2 * np.tan(np.radians(b["contact_angle_deg"]))
+        assert b["load_lines_meet_axis_at_mm"] == pytest.approx(b["z_mm"] + sense * reach, abs=1e-5)
+
+
+def test_a_load_line_passes_the_ball_and_ends_on_the_axis() -> None:
+    point = operating_point(load(SCENES["five_bearing"]), Condition(20.0))
+    [axes] = drawing(point).axes
+    lines = [np.array(line.get_xydata()) for line in axes.lines if len(line.get_xydata()) == 2 and line.get_ydata()[0] > 0 == line.get_ydata()[1]]
+    assert len(lines) == 5
+    for b, line in zip(point.spindle.bearings, lines, strict=True):
+        outer, end = line
+        assert end[1] == 0.0
+        share = (outer[1] - b.pitch_diameter * 500) / (outer[1] - end[1])
+        assert outer[0] + share * (end[0] - outer[0]) == pytest.approx(b.z * 1e3, abs=1e-9)
+        angle = np.arctan2(abs(end[0] - outer[0]), outer[1] - end[1])
+        assert angle == pytest.approx(point.state.bearing(b.name).contact_angle, abs=1e-12)
+        assert np.sign(end[0] - outer[0]) == b.sense
+
+
+@pytest.mark.parametrize(
+    ("senses", "words"),
+    [
+        ("-", "single"),
+        ("-+", "back-to-back"),
+        ("+-", "face-to-face"),
+        ("--", "two in tandem"),
+        ("--+", "two against one, back-to-back"),
+        ("++--", "two against two, face-to-face"),
+        ("---+", "three against one, back-to-back"),
+        ("-+-", "two against one, mixed"),
+    ],
+)
+def test_arrangements_have_their_names(senses: str, words: str) -> None:
+    from dataclasses import replace
+
+    b = load(SCENES["five_bearing"]).bearings[0]
+    rows = [replace(b, z=0.01 * k, sense=1 if s == "+" else -1) for k, s in enumerate(senses)]
+    assert arrangement(rows[::-1]) == words
+
+
+def test_defaults_are_told(capsys: pytest.CaptureFixture[str]) -> None:
+    told = {a["key"]: a["what"] for a in checked(SCENES["five_bearing"], capsys)["assumed"]}
+    assert told["hammer_test.step_us"] == "chosen by the program"
+    assert "timoshenko" in told["shafts.spindle.beam"]
+    assert "thermal.convection" not in told
+    assert not any(key.startswith("thermal") for key in {a["key"] for a in checked(SCENES["free_shaft"], capsys)["assumed"]})
+
+
+ODD = [
+    ("five_bearing", "tip_stiffness_N_per_m = 3.0e7", "tip_stiffness_N_per_m = 3.0e6", "the hammer gives no force above 2615 Hz"),
+    ("five_bearing", "hammer_mass_g = 100.0", "hammer_mass_g = 370.0", "less than a tenth of its force"),
+    ("five_bearing", "position_mm = [66.5, 0.0, 36.0]", "position_mm = [80.5, 0.0, 36.0]", "point flange: lies 14 mm off 'spindle'"),
+    ("hdd_2003", "position_mm = [12.5, 0.0, 15.0]", "position_mm = [15.5, 0.0, 15.0]", "point hub_side0: lies 3 mm off 'hub'"),
+    ("mk7702", "z_mm = 101.0", "z_mm = 81.0", "bearings front1 and front2 sit at the same place, z_mm = 81, between the same parts"),
+    ("mk7702", "damping_ratio = 0.03\norigins = { damping_ratio = \"assumed\", axial", "damping_ratio = 0.9\norigins = { damping_ratio = \"assumed\", axial", "of critical"),
+    ("five_bearing", "temperature_range_C = [20.0, 60.0]", "temperature_range_C = [20.0, 160.0]", "160 C lies outside"),
+    ("five_bearing", "nominal_speed_rpm = 8000.0", "nominal_speed_rpm = 40000.0", "means a speed factor n dm of 3.8e+06"),
+    ("five_bearing", "[[82, 13], [133, 23], [120, 8], [75, 100]", "[[82, 13], [133, 23], [120, 8], [90, 100]", "begins at a radius of 37.5 mm, and the shaft 'spindle' has 45 mm there"),
+    ("five_bearing", "band_Hz = [300.0, 4000.0]", "band_Hz = [1000.0, 4000.0]", "natural frequencies below the band"),
+    ("five_bearing", "record_length_s = 0.25", "record_length_s = 0.02", "has not died out when the record of 0.02 s ends"),
+    ("free_shaft", "damping_ratio = 1.0e-4", "damping_ratio = 1.0e-9", "4 modes up to 1100 Hz are undamped"),
+    ("grinding", "outer_conformity = 0.53", "outer_conformity = 0.60", "the outer groove's radius is 0.6 ball diameters"),
+    ("free_shaft", "[tolerances]", "[[effects]]\nname = \"preload_loss\"\n[tolerances]", "effect preload_loss: nothing to act on here"),
+    ("rotor", "nominal_speed_rpm = 4000.0", "nominal_speed_rpm = 7200.0", "lies at the nominal speed"),
+    ("rotor", "outer_mm = [[30, 600]]", "outer_mm = [[30, 300], [150, 300]]", "its diameter jumps from 30 to 150 mm at z_mm = 300"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "right", "wrong", "sentence"), ODD, ids=[f"{o[0]} {o[3][:30]}" for o in ODD])
+def test_what_is_odd_is_said(name: str, right: str, wrong: str, sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of the changed scene, and not of the one that it was."""
+    text = SCENES[name].read_text(encoding="utf-8")
+    assert right in text
+    (tmp_path / "spindle.toml").write_text(text.replace(right, wrong), encoding="utf-8")
+    assert any(sentence in words for words in checked(tmp_path, capsys)["odd"])
+    assert not any(sentence in words for words in checked(SCENES[name], capsys)["odd"])
+
+
+def test_what_moves_freely_and_what_is_constant_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    assert any("against 2 motions" in words for words in checked(SCENES["free_shaft"], capsys)["odd"])
+    assert any("constant numbers" in words for words in checked(SCENES["mk7702"], capsys)["odd"])
+    assert checked(SCENES["hdd_2003"], capsys)["odd"] == []
+
+
+def test_what_cannot_be_used_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "spindle.toml").write_text(SCENES["mk7702"].read_text(encoding="utf-8").replace("z_mm = 81.0", 'z_mm = "81"'), encoding="utf-8")
+    assert main(["check", str(tmp_path)]) == 2
+    assert "bearings.front1.z_mm = '81': input should be a valid number" in capsys.readouterr().err
