@@ -8,6 +8,7 @@ from typing import Protocol
 from thermospindle.model import machine as m
 from thermospindle.model.scene.bearings import BearingPair, BearingSet
 from thermospindle.model.scene.fields import Table
+from thermospindle.model.scene.measuring import Measuring, Point
 from thermospindle.model.scene.section import Section
 from thermospindle.model.scene.shafts import COARSE, ShaftForm
 from thermospindle.model.scene.thermal import MOVED_AIR, STILL_AIR, Thermal
@@ -25,6 +26,11 @@ class Told(Protocol):
 
     @property
     def tolerances(self) -> Table: ...
+
+    @property
+    def measuring(self) -> Measuring: ...
+
+    def points(self) -> list[Point]: ...
 
     @property
     def section(self) -> Section: ...
@@ -63,6 +69,9 @@ def assumed(scene: Told, told: Mapping[str, m.Provenance]) -> dict[str, m.Proven
                 chosen = value is None or value == []
                 said = "chosen by the program" if chosen else f"{value}"
                 found[f"{table}.{key}"] = m.Provenance("assumed", f"assumed default: {said}")
+    if not scene.measuring.points:
+        named = ", ".join(p.name for p in scene.points())
+        found["measuring.points"] = m.Provenance("assumed", f"assumed default: {named} on the axis at the ends of {scene.points()[0].body if named else ''!r}")
     warms = bool(scene.section.regions)
     if warms and not scene.thermal.convection:
         found["thermal.convection"] = m.Provenance(
@@ -70,6 +79,10 @@ def assumed(scene: Told, told: Mapping[str, m.Provenance]) -> dict[str, m.Proven
         )
     if warms and "friction" not in scene.thermal.model_fields_set:
         found["thermal.friction"] = m.Provenance("assumed", "assumed default: a light grease, f0 = 2, 26 mm2/s at 40 C")
+    elif warms:
+        for key, value in (("f0", "2"), ("f1", "0.0003"), ("conductance_W_per_K", "0.05"), ("kinematic_viscosity_mm2_per_s", "26 at 40 C, a light grease's")):
+            if key not in scene.thermal.friction.model_fields_set:
+                found[f"thermal.friction.{key}"] = m.Provenance("assumed", f"assumed default: {value}")
     if scene.nominal_speed_rpm is None:
         said = f"assumed default: {scene.speed_rpm():g} rpm, a speed parameter of {GENTLE:g} mm rpm"
         found["nominal_speed_rpm"] = m.Provenance("assumed", said)

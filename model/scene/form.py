@@ -17,10 +17,10 @@ from thermospindle.model.scene.bearings import BallRow, Bearing, BearingPair, Be
 from thermospindle.model.scene.defaults import GENTLE, WARMER, assumed
 from thermospindle.model.scene.fields import Finite, Name, NotNegative, Positive, Table, Temperature, TemperatureSpan, first_error
 from thermospindle.model.scene.imperfections import Imperfections
-from thermospindle.model.scene.measuring import HammerTest, Measuring, Point
+from thermospindle.model.scene.measuring import HammerTest, Measuring, Point, assumed_points
 from thermospindle.model.scene.section import Material, Section
 from thermospindle.model.scene.shafts import ShaftForm, resolved_body
-from thermospindle.model.scene.structure import Structure
+from thermospindle.model.scene.structure import Structure, StructureBody
 from thermospindle.model.scene.thermal import Thermal
 from thermospindle.model.units import MM, RPM
 
@@ -77,7 +77,7 @@ class Scene(Table):
     structure: Structure
     shafts: list[ShaftForm] = Field(default_factory=list)
     thermal: Thermal = Thermal()
-    measuring: Measuring
+    measuring: Measuring = Measuring()
     hammer_test: HammerTest = HammerTest()
     tolerances: Tolerances = Tolerances()
     effects: list[Effect] = Field(default_factory=list)
@@ -119,12 +119,27 @@ class Scene(Table):
         rows = {n: b for n, b in self.bearings.items() if b.row is not None}
         return dict(sorted(rows.items(), key=lambda item: item[1].z_mm))
 
+    def points(self) -> list[Point]:
+        """The measuring points; where none are told those of `assumed_points` on the first thing that turns, or that moves at all."""
+        if self.measuring.points:
+            return self.measuring.points
+        moving: list[ShaftForm | StructureBody] = [*self.shafts, *self.structure.bodies]
+        if not moving:
+            return []
+        own = next((b for b in moving if b.turns), moving[0])
+        if isinstance(own, ShaftForm):
+            ends = own.start_z_mm, own.start_z_mm + sum(p[-1] for p in own.outer_mm)
+        else:
+            heights = [z for g in self.section.regions if g.name in own.regions for z in g.z_mm] or [own.z_mm or 0.0]
+            ends = min(heights), max(heights)
+        return assumed_points(own.name, ends, own.moves)
+
     def _heights_on(self, shaft: str) -> list[float]:
         """Heights (m) of all that sits on a shaft: bearings, joints, measuring points."""
         default = self.structure.inner_body, self.structure.outer_body
         found = [b.z_mm for b in self.bearings.values() if shaft in (b.inner_body or default[0], b.outer_body or default[1])]
         found += [j.z_mm for j in self.structure.joints if shaft in j.between]
-        found += [p.position_mm[2] for p in self.measuring.points if p.body == shaft]
+        found += [p.position_mm[2] for p in self.points() if p.body == shaft]
         return [MM * z for z in found]
 
     def spindle(self, name: str, file: Path, provenance: dict[str, m.Provenance]) -> m.Spindle:
@@ -161,7 +176,7 @@ class Scene(Table):
                 linear.append(b.linear(key, inner, outer, file.parent))
         bearings = tuple(b.bearing(key, self.ball_rows, senses[key], mounted(key, b)) for key, b in rows.items())
         regions = tuple(r.region() for r in self.section.regions)
-        points = tuple(replace(p, body=resolved_body(shafts, p.body, p.position[2])) for p in (p.point() for p in self.measuring.points))
+        points = tuple(replace(p, body=resolved_body(shafts, p.body, p.position[2])) for p in (p.point() for p in self.points()))
         return m.Spindle(
             name=name,
             title=self.title,

@@ -40,7 +40,20 @@ FEWEST_LINES, MOST_STEPS = 50, 1e8  # of an FRF, and of a record
 
 
 class Measuring(Table):
-    points: list[Point] = Field(min_length=1)
+    """Without points they are assumed: at both ends of what turns, on the axis (`assumed_points`)."""
+
+    points: list[Point] = Field(default_factory=list)
+
+
+def assumed_points(body: str, ends: tuple[float, float], moves: Sequence[str]) -> list[Point]:
+    """Points on the axis at both `ends` (mm) of a body or shaft, along x and y, and along z at the upper one, as far as it `moves` there."""
+    low, high = ends
+    wanted = [("top_x", high, "x"), ("top_y", high, "y"), ("top_z", high, "z")]
+    wanted += [("low_x", low, "x"), ("low_y", low, "y")] if low < high else []
+    told = [(name, z, move) for name, z, move in wanted if move in moves]
+    return [
+        Point(node=k, name=name, body=body, position_mm=(0.0, 0.0, z), direction=f"+{move.upper()}") for k, (name, z, move) in enumerate(told, 1)
+    ]
 
 
 class HammerTest(Table):

@@ -30,23 +30,20 @@ class Gap(Table):
     coefficient_W_per_m2_K: NotNegative
 
 
+BASE_OIL = LawTable(temperature_C=[-20.0, 0.0, 20.0, 40.0, 60.0, 80.0, 100.0, 120.0], value=[1110.0, 209.0, 63.1, 26.0, 13.2, 7.79, 5.1, 3.6])
+"""mm2/s: 26 at 40 C and 5.1 at 100 C, between them by ASTM D341."""
+
+
 class Friction(Table):
-    f0: NotNegative
-    f1: NotNegative
-    kinematic_viscosity_mm2_per_s: LawValue
-    conductance_W_per_K: NotNegative
+    """Assumed where a scene says nothing: a greased angular contact row (Palmgren; Harris, ch. 14) with a base oil of 26 mm2/s at 40 C."""
+
+    f0: NotNegative = 2.0
+    f1: NotNegative = 0.0003
+    kinematic_viscosity_mm2_per_s: LawValue = BASE_OIL
+    conductance_W_per_K: NotNegative = 0.05
 
 
 STILL_AIR, MOVED_AIR = 10.0, 40.0  # W/(m2 K): free convection from standing faces, and that of a face that turns
-GREASE = Friction(
-    f0=2.0,
-    f1=0.0003,
-    conductance_W_per_K=0.05,
-    kinematic_viscosity_mm2_per_s=LawTable(
-        temperature_C=[-20.0, 0.0, 20.0, 40.0, 60.0, 80.0, 100.0, 120.0], value=[1110.0, 209.0, 63.1, 26.0, 13.2, 7.79, 5.1, 3.6]
-    ),
-)
-"""Assumed where a scene says nothing: a greased angular contact row (Palmgren; Harris, ch. 14) with a base oil of 26 mm2/s at 40 C."""
 
 
 class Thermal(Table):
@@ -56,7 +53,7 @@ class Thermal(Table):
     convection: list[Convection] = Field(default_factory=list)
     sources: list[Source] = Field(default_factory=list)
     gaps: list[Gap] = Field(default_factory=list)
-    friction: Friction = GREASE
+    friction: Friction = Friction()
 
     def thermal(self, regions: Sequence[m.Region]) -> m.Thermal:
         """`regions` are those of the section, cooled as assumed where no convection is told."""

@@ -141,3 +141,46 @@ def test_what_cannot_be_used_is_refused(tmp_path: Path, capsys: pytest.CaptureFi
     (tmp_path / "spindle.toml").write_text(SCENES["mk7702"].read_text(encoding="utf-8").replace("z_mm = 81.0", 'z_mm = "81"'), encoding="utf-8")
     assert main(["check", str(tmp_path)]) == 2
     assert "bearings.front1.z_mm = '81': input should be a valid number" in capsys.readouterr().err
+
+
+def without(text: str, *tables: str) -> str:
+    """A scene's text without some tables and what is in them."""
+    import re
+
+    for table in tables:
+        text = re.sub(rf"^\[+{table}(\.[^\]]*)?\]+.*?(?=^\[+(?!{table})|\Z)", "", text, flags=re.DOTALL | re.MULTILINE)
+    return text
+
+
+@pytest.mark.parametrize(
+    ("name", "points"),
+    [
+        ("hdd_2003", ["top_x", "top_y", "top_z", "low_x", "low_y"]),
+        ("five_bearing", ["top_x", "top_y", "top_z", "low_x", "low_y"]),
+        ("free_shaft", ["top_x", "low_x"]),  # it moves in one plane
+    ],
+)
+def test_heat_tolerances_points_and_hammer_may_be_left_out(name: str, points: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = without(SCENES[name].read_text(encoding="utf-8"), "thermal", "tolerances", "measuring", "hammer_test")
+    assert "[measuring" not in text
+    (tmp_path / "spindle.toml").write_text(text, encoding="utf-8")
+    found = checked(tmp_path, capsys)
+    assert list(found["points"]) == points
+    told = {a["key"]: a["what"] for a in found["assumed"]}
+    assert points[0] in told["measuring.points"]
+    assert told["tolerances.preload"] == "0.03"
+    assert ("thermal.friction" in told) == bool(load(tmp_path).regions)
+    ends = {p["position_mm"][2] for p in found["points"].values()}
+    shaft = next(iter(found["shafts"].values()), None)
+    assert ends == set(shaft["z_mm"] if shaft else (1.0, 20.0))  # the hub's magnet begins at 1 mm
+    assert main(["static", str(tmp_path)]) == 0
+
+
+def test_parts_of_the_friction_may_be_left_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = SCENES["five_bearing"].read_text(encoding="utf-8")
+    assert "f1 = 0.0003" in text
+    (tmp_path / "spindle.toml").write_text(text.replace("f1 = 0.0003\n", ""), encoding="utf-8")
+    told = {a["key"]: a["what"] for a in checked(tmp_path, capsys)["assumed"]}
+    assert told["thermal.friction.f1"] == "0.0003"
+    assert "thermal.friction.f0" not in told
+    assert load(tmp_path).thermal == load(SCENES["five_bearing"]).thermal
