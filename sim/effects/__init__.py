@@ -9,6 +9,7 @@ trial         an effect tried on a spindle
 temperature/  temperature and expansion
 bearing/      bearings
 structure/    joints, bodies, shaft
+holder/       what holds a tool
 running/      what excites a running spindle
 measuring/    the measuring chain
 ============  ====================================================================================================
@@ -38,6 +39,7 @@ from thermospindle.sim.effects.bearing import (
     tandem_sharing,
 )
 from thermospindle.sim.effects.effect import Effect, Values, fitted_to, refusal
+from thermospindle.sim.effects.holder import drawbar_force, taper_contact
 from thermospindle.sim.effects.measuring import channel_delay, hammer_position, sensor_gain, window_damping
 from thermospindle.sim.effects.own import OwnEffect, effect_of, installed
 from thermospindle.sim.effects.running import ball_size, ball_waviness, cage_unbalance, race_waviness, unbalance
@@ -93,6 +95,9 @@ CATALOGUE: tuple[Effect, ...] = (
     seat_clearance.EFFECT,
     added_disk.EFFECT,
     sensor_mass.EFFECT,
+    # what holds a tool
+    taper_contact.EFFECT,
+    drawbar_force.EFFECT,
     # what excites a running spindle
     unbalance.EFFECT,
     race_waviness.EFFECT,

@@ -121,7 +121,7 @@ def test_friswell(example: str, spindle: Spindle, rpm: float, printed: list[floa
 
 
 def test_friswell_5_9_3_mixed_modes() -> None:
-    """Very unequal bearings; numbers in Hz. Their sum of squares is what is asserted within 1 rad/s there; here each to 2e-3."""
+    """Very unequal bearings; numbers in Hz, asserted loosely there, to 2e-3 here."""
     found = [m.frequency for m in lateral(two_discs(1e6, 2e5), 4000)][:6]
     assert found == pytest.approx([8.545, 13.77, 22.35, 44.06, 78.76, 120.4], rel=2e-3)
 

@@ -9,6 +9,7 @@ from tests.conftest import ROOT
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.beam import shear_factor, with_theory
 from thermospindle.model.rotor.chain import matrices
+from thermospindle.model.rotor.static import static
 from thermospindle.model.scene.reading import load
 from thermospindle.sim.effects import by_name
 from thermospindle.sim.effects.effect import refusal
@@ -104,3 +105,49 @@ def test_cooling_imbalance_parts_shaft_and_housing(machine):
 @pytest.mark.parametrize("name", ["shear", "rotary_inertia", "housing_flexibility", "seat_clearance", "tandem_sharing", "cooling_imbalance"])
 def test_they_have_nothing_to_act_on_in_a_disk_drive(spindle, name):
     assert str(refusal(by_name(name), spindle)).startswith("nothing to act on here: ")
+
+
+# ---------------------------------------------------------------- what holds a tool
+
+
+@pytest.fixture(scope="module")
+def tooled():
+    return load(ROOT / "scenes" / "templates" / "machine-tool.toml")
+
+
+def tip_compliance(spindle, condition, name, values):
+    """m/N across at the tip of the tool, at a condition, with an effect."""
+    point = operating_point(spindle, condition, [(by_name(name), values)])
+    return 1 / static(point.spindle, point.chain, next(p for p in spindle.points if p.name == "tip")).stiffness
+
+
+def holder(spindle):
+    """Lateral and tilt stiffness of the taper, and its distance from the tip: all the force on the tip goes through it."""
+    taper = next(j for j in spindle.structure.joints if j.role == "holder")
+    return taper.stiffness[0], taper.stiffness[4], taper.z - next(p for p in spindle.points if p.name == "tip").position[2]
+
+
+@pytest.mark.parametrize("share", [0.1, 0.4])
+def test_taper_contact_gives_as_an_elastic_foundation(tooled, share):
+    """Force and moment in the taper follow from statics: the tip's compliance grows by what the shorter contact gives to both."""
+    lateral, tilt, arm = holder(tooled)
+    rest = Condition(20.0)
+    grown = tip_compliance(tooled, rest, "taper_contact", {"share": share, "tilt_power": 3.0}) - tip_compliance(tooled, rest, "taper_contact", {"share": 0.0, "tilt_power": 3.0})
+    left = 1 - share
+    assert grown == pytest.approx((1 / left - 1) / lateral + (left**-3 - 1) * arm**2 / tilt, rel=1e-6)
+
+
+@pytest.mark.parametrize("share_of_speed", [0.0, 1.0, 0.5])
+def test_drawbar_force_goes_with_the_root_of_the_force(tooled, share_of_speed):
+    lateral, tilt, arm = holder(tooled)
+    condition = Condition(20.0, share_of_speed * tooled.nominal_speed)
+    loss, growth = 0.3, 0.5
+    force = 1 - loss * (1 + growth * share_of_speed**2)
+    grown = tip_compliance(tooled, condition, "drawbar_force", {"loss": loss, "growth": growth}) - tip_compliance(tooled, condition, "drawbar_force", {"loss": 0.0, "growth": growth})
+    assert grown == pytest.approx((force**-0.5 - 1) * (1 / lateral + arm**2 / tilt), rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["taper_contact", "drawbar_force"])
+def test_without_a_holder_there_is_nothing_to_act_on(machine, tooled, name):
+    assert refusal(by_name(name), machine) == "nothing to act on here: the scene has no joint with role 'holder'"
+    assert refusal(by_name(name), tooled) is None

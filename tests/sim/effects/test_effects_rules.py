@@ -37,10 +37,16 @@ def machine_tool():
 
 
 @cache
+def with_tool():
+    return load(ROOT / "scenes" / "templates" / "machine-tool.toml")
+
+
+@cache
 def on_trial(name):
-    """On the reference, or on a machine that has what the effect acts on: one with a flexible shaft in a housing, its beam short of shear and of half its rotary inertia."""
+    """On the reference, or on a machine that has what the effect acts on: one with a flexible shaft in a housing, its beam short of shear and of half its
+    rotary inertia; or one with a tool."""
     effect = by_name(name)
-    return trial(effect, next(s for s in (reference(), machine_tool()) if refusal(effect, s) is None))
+    return trial(effect, next(s for s in (made() for made in (reference, machine_tool, with_tool)) if refusal(effect, s) is None))
 
 
 FILES = {
