@@ -102,9 +102,48 @@ def new_scene(
         build, note = _build_of(effects, answer, diagnosis, old, file)
     hand = _by_effect(effects, by_hand)
     added = tuple(_added(e, fitted.get(e.name, {}), hand[e.name], diagnosis) for e in effects)
+    _write(file, effects, added, build, answer.tests if answer else (), f"fitted, from {diagnosis}", folder, out, catalogue)
+    return NewScene(added, build, note)
+
+
+def scene_with(
+    target: Path,
+    values: Mapping[str, Mapping[str, float]],
+    deviations: Mapping[str, float],
+    tests: Sequence[str],
+    source: str,
+    folder: Path,
+    out: Path,
+    catalogue: Sequence[Effect] = CATALOGUE,
+) -> NewScene:
+    """Write the scene of `target` with effects at given `values` and its toleranced parameters off by `deviations` from what they are there.
+
+    `tests` are those it was fitted to, and `source` says by whom; the rest is as in `new_scene`.
+    """
+    file = scene_path(target)
+    old = load(file)
+    effects = [fitted_to(by_name(name, catalogue), old) for name in values]
+    added = tuple(Added(e.name, checked(e, values[e.name]), {p.name: p.unit for p in e.parameters}, "calibrated", _of_own(e, source)) for e in effects)
+    build = _further(old, deviations) if deviations else {}
+    _write(file, effects, added, build, tests, source, folder, out, catalogue)
+    return NewScene(added, build, f"{len(build)} build tolerances" if build else "")
+
+
+def _write(
+    file: Path,
+    effects: Sequence[Effect],
+    added: Sequence[Added],
+    build: Mapping[str, float],
+    tests: Sequence[str],
+    source: str,
+    folder: Path,
+    out: Path,
+    catalogue: Sequence[Effect],
+) -> None:
+    """The text of the old scene with its additions, into `folder`, and loaded once."""
     text = file.read_text(encoding="utf-8")
-    if build and answer:
-        text = _without_build(text).rstrip("\n") + "\n\n" + _build_table(build, answer.tests, diagnosis)
+    if build:
+        text = _without_build(text).rstrip("\n") + "\n\n" + _build_table(build, tests, source)
     for effect, row in zip(effects, added, strict=True):
         text = text.rstrip("\n") + "\n\n" + _effect_table(effect, row.values, row.origin, row.source)
     (folder / "spindle.toml").write_text(text, encoding="utf-8")
@@ -115,7 +154,6 @@ def new_scene(
         resolved(load(folder), catalogue)
     except BadInput as error:
         raise BadInput(str(error).replace(str(folder), str(out))) from None
-    return NewScene(added, build, note)
 
 
 def _added(effect: Effect, fitted: Mapping[str, float], by_hand: Mapping[str, float], diagnosis: Path | None) -> Added:
@@ -126,10 +164,13 @@ def _added(effect: Effect, fitted: Mapping[str, float], by_hand: Mapping[str, fl
         "set by hand": list(by_hand),
     }
     source = "; ".join(f"{what}: {', '.join(names)}" for what, names in origins.items() if names)
-    if isinstance(effect, OwnEffect):
-        source += f"; the effect is not of the catalogue but of {effect.where}"
     units = {p.name: p.unit for p in effect.parameters}
-    return Added(effect.name, values, units, "calibrated" if fitted else "assumed", source)
+    return Added(effect.name, values, units, "calibrated" if fitted else "assumed", _of_own(effect, source))
+
+
+def _of_own(effect: Effect, source: str) -> str:
+    """The source of values, and where the effect is from that is not of the catalogue."""
+    return f"{source}; the effect is not of the catalogue but of {effect.where}" if isinstance(effect, OwnEffect) else source
 
 
 def _by_effect(effects: Sequence[Effect], by_hand: Sequence[tuple[str, float]]) -> dict[str, dict[str, float]]:
@@ -163,14 +204,25 @@ def read_answer(file: Path) -> Answer:
         raise BadInput(f"--from {file}: cannot be read: no such file")
     try:
         raw = json.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise BadInput(f"--from {file}: cannot be read: {error.strerror}") from None
+    except (ValueError, RecursionError):
+        raise BadInput(f"--from {file}: {NO_ANSWER}") from None
+    return answer_of(raw, f"--from {file}")
+
+
+NO_ANSWER = "is not an answer of spindle diagnose --json, with candidates of effects and parameters"
+
+
+def answer_of(raw: Any, where: str) -> Answer:
+    """The same from the object of such an answer; `where` it is from is what a refusal begins with."""
+    try:
         candidates = tuple((tuple(map(_text, c["effects"])), dict(c["parameters"])) for c in raw["candidates"])
         tolerances = {name: _finite(row["value"]) for name, row in raw.get("tolerances", {}).items()}
         best = candidates[0][0] if candidates and raw.get("effects") else ()
         scene_hash = raw.get("scene_hash")
-    except OSError as error:
-        raise BadInput(f"--from {file}: cannot be read: {error.strerror}") from None
-    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
-        raise BadInput(f"--from {file}: is not an answer of spindle diagnose --json, with candidates of effects and parameters") from None
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError):
+        raise BadInput(f"{where}: {NO_ANSWER}") from None
     build = {name: float(f"{v:.8g}") for name, v in tolerances.items() if not name.startswith((OF_TEST, OF_CHANNEL))}
     tests = tuple(name.removeprefix(OF_TEST) for name in tolerances if name.startswith(OF_TEST))
     return Answer(candidates, best, build, tests, scene_hash)
@@ -239,13 +291,18 @@ def _build_of(effects: Sequence[Effect], answer: Answer, diagnosis: Path, old: S
         return {}, note
     if answer.scene_hash != content_hash(old):
         raise BadInput(f"{file}: build: holds the tolerances of another diagnosis than {diagnosis}; add to the scene that was diagnosed")
-    both = {**old.build.deviations, **answer.build}
-    return {n: (1 + old.build.deviations.get(n, 0.0)) * (1 + answer.build.get(n, 0.0)) - 1 for n in both}, note
+    return _further(old, answer.build), note
 
 
-def _build_table(build: Mapping[str, float], tests: Sequence[str], diagnosis: Path | None) -> str:
+def _further(old: Spindle, deviations: Mapping[str, float]) -> dict[str, float]:
+    """Deviations from the drawing of a spindle that is off by `deviations` from the old one."""
+    before = old.build.deviations if old.build else {}
+    return {n: (1 + before.get(n, 0.0)) * (1 + deviations.get(n, 0.0)) - 1 for n in {**before, **deviations}}
+
+
+def _build_table(build: Mapping[str, float], tests: Sequence[str], source: str) -> str:
     lines = ["# How the built spindle differs from its drawing: relative deviations, already fitted", "[build]", 'origin = "calibrated"']
-    lines += [f"source = {toml(f'fitted, from {diagnosis}')}", f"tests = {toml(list(tests))}", "", "[build.deviations]"]
+    lines += [f"source = {toml(source)}", f"tests = {toml(list(tests))}", "", "[build.deviations]"]
     return "\n".join([*lines, *(f"{toml(name)} = {toml(float(value))}" for name, value in build.items())]) + "\n"
 
 

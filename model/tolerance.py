@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 
 from thermospindle.model.bearing.hertz import in_series
 from thermospindle.model.bearing.pair import contact_constants, reference_deformation, reference_motion
+from thermospindle.model.errors import BadInput, NoEquilibrium
 from thermospindle.model.machine import MOVES, Body, Joint, Spindle
 from thermospindle.model.shaft import Shaft
 
@@ -60,6 +61,26 @@ def toleranced(spindle: Spindle) -> list[Toleranced]:
     if spindle.bearings or spindle.linear_bearings:
         found.append(Toleranced("bearing damping", t.damping, _scale_bearing_damping))
     return found
+
+
+def deviated(spindle: Spindle, deviations: Mapping[str, float]) -> Spindle:
+    """The spindle with relative deviations of toleranced parameters, by name, from the numbers it has.
+
+    Raises `BadInput` for a name that is none, and for a deviation that gives no spindle; what it says follows the scene's file.
+    """
+    parameters = {p.name: p for p in toleranced(spindle)}
+    for name in deviations:
+        if name not in parameters:
+            raise BadInput(f"build.deviations.{name}: is no toleranced parameter; allowed are {', '.join(parameters)}")
+    built = spindle
+    for name, parameter in parameters.items():
+        deviation = deviations.get(name, 0.0)
+        if deviation != 0.0:
+            try:
+                built = parameter.apply(built, deviation)
+            except (ValueError, NoEquilibrium) as error:
+                raise BadInput(f"build.deviations.{name} = {deviation:g}: gives no spindle: {error}") from None
+    return built
 
 
 def scaled_preload(spindle: Spindle, factor: float, sets: Sequence[str] | None = None) -> Spindle:

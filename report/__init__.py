@@ -8,6 +8,7 @@ figures/      figures, drawn with matplotlib's object-oriented interface as SVG 
 log/          Rerun logs, written and read back; the only place that imports rerun
 page/         HTML pages that need no network
 text/         results as JSON objects and in the terminal, a module a verb
+workbench/    the page of `spindle workbench`; the only place that imports bokeh
 verbs/        the work of each verb of the command line, as a function
 ============  ==========================================================================================================
 """

@@ -20,6 +20,7 @@ HOW = {
     "runout.png": "spindle runout hdd_2003 --speed 7200 --temperature 40 --out out; rerun out/*.rrd --screenshot-to docs/runout.png --window-size 1400x900",
     "map.png": "spindle map hdd_2003 --speed 7200 --out out; rerun out/map.rrd --screenshot-to docs/map.png --window-size 1400x900",
     "diagnosis.png": "spindle diagnose hdd_2003 tests/data/foreign_bond --out out; out/explanations.png",
+    "workbench.png": "python -m tests.report.workbench_picture",
     "blind.txt": "python -m tests.blind.study --seeds A B; python -m tests.blind.score",
 }
 

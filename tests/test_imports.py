@@ -14,6 +14,8 @@ ONLY_IN = {
     "mujoco": lambda f: f == Path("model/rotor/mjcf.py") or f.parts[0] == "sim",
     "rerun": lambda f: f.parts[:2] == ("report", "log"),
     "pyuff": lambda f: f == Path("sim/campaign/uff.py"),
+    "bokeh": lambda f: f.parts[:2] == ("report", "workbench"),
+    "tornado": lambda f: f.parts[:2] == ("report", "workbench"),
     "matplotlib": lambda f: f.parts[0] == "report",
 }
 

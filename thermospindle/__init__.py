@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from thermospindle.front import add as add
     from thermospindle.front import campaign as campaign
     from thermospindle.front import compare as compare
+    from thermospindle.front import deviate as deviate
     from thermospindle.front import diagnose as diagnose
     from thermospindle.front import frf as frf
     from thermospindle.front import impact as impact
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from thermospindle.front import read_log as read_log
     from thermospindle.model.errors import BadInput as BadInput
 
-__all__ = ["BadInput", "add", "campaign", "compare", "diagnose", "frf", "impact", "load", "modes", "point", "read_log"]
+__all__ = ["BadInput", "add", "campaign", "compare", "deviate", "diagnose", "frf", "impact", "load", "modes", "point", "read_log"]
 
 
 def __getattr__(name: str) -> Any:

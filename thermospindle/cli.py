@@ -81,6 +81,7 @@ def _run(arguments: list[str]) -> int:
         answer.show(Console(markup=False))  # names of scenes and files may look like markup
     if sys.stdout is not None:  # closed by the caller
         sys.stdout.flush()
+    answer.then()
     return 0
 
 
@@ -156,6 +157,12 @@ def _count(most: int) -> Callable[[str], int]:
         return int(text)
 
     return count
+
+
+def _port(text: str) -> int:
+    if not (text.isascii() and text.isdigit()) or not 1 <= int(text) <= 65535:
+        raise argparse.ArgumentTypeError(f"{text} is not a port, 1 to 65535")
+    return int(text)
 
 
 def _seed(text: str) -> int:
@@ -284,6 +291,11 @@ def _parser() -> tuple[_Parser, dict[str, argparse.ArgumentParser]]:
     ladder = verb("ladder", ("ladder", "ladder"), "model forms, tolerances and effects taken in one after the other, and the error at every step")
     ladder.add_argument("campaign", metavar="CAMPAIGN", type=Path)
     ladder.add_argument("--effects", nargs="+", metavar="NAME", help="effects to add, in this order (those that diagnose names by default)")
+    bench = verb("workbench", ("workbench", "workbench"), "a page in the browser, on this machine alone: move effects and parameters, see FRFs and errors change")
+    bench.add_argument("campaign", metavar="CAMPAIGN", type=Path, nargs="?", default=None, help="tests to set the model beside; without them it is set beside itself")
+    bench.add_argument("--diagnosis", type=Path, metavar="DIAGNOSIS.json", help="explanations to begin with: the answer of diagnose --json")
+    bench.add_argument("--port", type=_port, help="of this machine's loopback interface (a free one by default)")
+    bench.add_argument("--no-browser", action="store_true", help="print the address, and open no browser")
     effects = verb("effects", ("catalogue", "effects"), "the catalogue of physical effects, or one of them explained", what="")
     effects.add_argument("name", metavar="NAME", nargs="?")
     effects.add_argument("--scene", type=Path, metavar="SCENE", help="typical sizes for this scene, and which effects cannot be in it")

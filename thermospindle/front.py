@@ -10,7 +10,7 @@ import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does, before numpy loads
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
@@ -22,11 +22,13 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Addition, Condition, Spindle
 from thermospindle.model.rotor.modes import Mode
 from thermospindle.model.scene.reading import load as load_scene
+from thermospindle.model.tolerance import deviated
 from thermospindle.model.units import RPM
 from thermospindle.sim.campaign.beside import POWER
 from thermospindle.sim.campaign.campaign import Campaign, read_campaign
-from thermospindle.sim.effects import by_name, checked
+from thermospindle.sim.effects import CATALOGUE, by_name, checked
 from thermospindle.sim.effects.effect import fitted_to, refusal
+from thermospindle.sim.effects.own import effect_of, installed
 from thermospindle.sim.effects.rules import equipped
 from thermospindle.sim.hammer.test import ImpactTest, impact_tests
 from thermospindle.sim.identification.frf import Frf
@@ -147,25 +149,33 @@ def diagnose(
     """
     from thermospindle.diagnosis.runout.lines import modal_tests
     from thermospindle.diagnosis.verdict import diagnose as search
-    from thermospindle.sim.effects import CATALOGUE
 
     catalogue = CATALOGUE if effects is None else tuple(by_name(name) for name in effects)
     return search(_spindle(spindle), modal_tests(_campaign(tests)), catalogue, progress)
 
 
-def add(spindle: Spindle | str | Path, effect: str, **values: float) -> Spindle:
-    """The spindle with an effect of the catalogue more; parameters that `values` do not name are typical ones (`spindle effects NAME`).
+def add(spindle: Spindle | str | Path, effect: str | Path, **values: float) -> Spindle:
+    """The spindle with an effect more, by its name in the catalogue or the `Path` of a file of your own; parameters that `values` do not name are
+    typical ones (`spindle effects NAME`).
 
     Nothing is written; `spindle add` writes a scene.
     """
     drawing = _spindle(spindle)
-    found = fitted_to(by_name(effect), drawing)
+    found = fitted_to(effect_of(effect) if isinstance(effect, Path) else by_name(effect, (*CATALOGUE, *installed())), drawing)
     if why := refusal(found, drawing):
-        raise BadInput(f"effect {effect}: {why}")
-    if any(a.effect == effect for a in drawing.effects):
-        raise BadInput(f"effect {effect}: {drawing.name} has it already")
+        raise BadInput(f"effect {found.name}: {why}")
+    if any(a.effect == found.name for a in drawing.effects):
+        raise BadInput(f"effect {found.name}: {drawing.name} has it already")
     own = checked(found, found.typical() | values)
-    return replace(drawing, effects=(*drawing.effects, Addition(effect, own)))
+    return replace(drawing, effects=(*drawing.effects, Addition(found.name, own, found)))
+
+
+def deviate(spindle: Spindle | str | Path, deviations: Mapping[str, float]) -> Spindle:
+    """The spindle as it would be built with relative deviations of toleranced parameters, by name: {"preload": -0.05} is 5 % less.
+
+    The names are those of `[build.deviations]` of a scene; nothing is written.
+    """
+    return deviated(_spindle(spindle), deviations)
 
 
 def read_log(file: str | Path) -> Log:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from thermospindle.diagnosis.data.observe import Observation
 from thermospindle.diagnosis.inference.model import Applied
@@ -44,6 +45,8 @@ def with_temperature(o: Observation, slope: Array, sd: float) -> Observation:
     return replace(o, covariance=o.covariance + sd**2 * np.outer(slope, slope))
 
 
-def squares(difference: Array, covariance: Array) -> float:
-    """r^T C^-1 r for the errors (n,) and their covariance (n, n)."""
-    return float(difference @ np.linalg.solve(covariance, difference)) if len(difference) else 0.0
+def whitened(difference: Array, covariance: Array) -> Array:
+    """Errors (n,) with covariance C (n, n) as n independent ones of unit variance, L^-1 r with C = L L^T: their squares add up to r^T C^-1 r."""
+    if not len(difference):
+        return np.zeros(0)
+    return np.asarray(solve_triangular(np.linalg.cholesky(covariance), difference, lower=True), float)

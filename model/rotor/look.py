@@ -91,7 +91,10 @@ def shaft_meshes(spindle: Spindle) -> list[RegionMesh]:
 def plate_meshes(spindle: Spindle) -> list[RegionMesh]:
     """A ring plate for every body that no region shows, as wide as its measuring points lie, its top at their height."""
     shown = set(region_bodies(spindle).values()) | {name for shaft in spindle.structure.shafts for name in shaft.bodies}
-    return [_plate(spindle, body) for body in spindle.structure.bodies if body.name not in shown]
+    return [
+        RegionMesh(f"{body.name} plate", body.name, *revolve([plate(spindle, body)]), (*PLATE, 1.0))
+        for body in spindle.structure.bodies if body.name not in shown
+    ]
 
 
 def stripe_meshes(spindle: Spindle) -> list[RegionMesh]:
@@ -225,13 +228,13 @@ def _bulk(region: Region) -> float:
     return (region.r[1] ** 2 - region.r[0] ** 2) * (region.z[1] - region.z[0])
 
 
-def _plate(spindle: Spindle, body: Body) -> RegionMesh:
+def plate(spindle: Spindle, body: Body) -> Cell:
+    """The ring plate that stands for a body of which no region is drawn."""
     reach = extent(spindle)[0]
     points = [p.position for p in spindle.points if p.body == body.name]
     outer = 1.05 * max((float(np.hypot(x, y)) for x, y, _ in points), default=1.2 * reach)
     top = min((z for *_, z in points), default=body.z)
-    tile = Cell(body.name, (min(0.85 * reach, 0.7 * outer), outer), (top - 0.1 * reach, top))
-    return RegionMesh(f"{body.name} plate", body.name, *revolve([tile]), (*PLATE, 1.0))
+    return Cell(body.name, (min(0.85 * reach, 0.7 * outer), outer), (top - 0.1 * reach, top))
 
 
 # ---------------------------------------------------------------- MuJoCo

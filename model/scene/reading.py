@@ -20,7 +20,7 @@ from scipy.optimize import brentq
 from thermospindle.model.bearing.catalogue import derived
 from thermospindle.model.bearing.pair import reference_motion, solve
 from thermospindle.model.drawn import GRADES, drawn
-from thermospindle.model.errors import BadInput, NoEquilibrium
+from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Bearing, Condition, Provenance, Spindle
 from thermospindle.model.rotor.beam import with_shafts
 from thermospindle.model.rotor.chain import matrices, rotor_base
@@ -30,7 +30,7 @@ from thermospindle.model.scene import form as scene_file
 from thermospindle.model.scene.checks import check_bearings, check_raceways, check_section, check_structure, constant
 from thermospindle.model.scene.fields import read_toml
 from thermospindle.model.shaft import SAME_HEIGHT
-from thermospindle.model.tolerance import toleranced
+from thermospindle.model.tolerance import deviated
 
 SCENES = Path(__file__).parents[2] / "scenes"
 """The shipped scenes: beside the packages, in a checkout as installed."""
@@ -217,16 +217,7 @@ def _as_built(file: Path, spindle: Spindle) -> Spindle:
     """The spindle with the deviations of its `build` table in its numbers."""
     if spindle.build is None:
         return spindle
-    parameters = {p.name: p for p in toleranced(spindle)}
-    for name in spindle.build.deviations:
-        if name not in parameters:
-            raise BadInput(f"{file}: build.deviations.{name}: is no toleranced parameter; allowed are {', '.join(parameters)}")
-    built = spindle
-    for name, parameter in parameters.items():
-        deviation = spindle.build.deviations.get(name, 0.0)
-        if deviation != 0.0:
-            try:
-                built = parameter.apply(built, deviation)
-            except (ValueError, NoEquilibrium) as error:
-                raise BadInput(f"{file}: build.deviations.{name} = {deviation:g}: gives no spindle: {error}") from None
-    return built
+    try:
+        return deviated(spindle, spindle.build.deviations)
+    except BadInput as error:
+        raise BadInput(f"{file}: {error}") from None

@@ -15,5 +15,6 @@ ladder     ladder
 running    runout, warmup, map
 starting   new, check
 states     table, modes, static
+workbench  workbench
 =========  =============================================================================================================
 """

@@ -25,10 +25,12 @@ STEPS = 5  # of temperature over a scene's range, unless a verb is given others
 
 @dataclass(frozen=True)
 class Answer:
-    """What a verb found: `values` for a script, with a list `warnings` of sentences, and `show`, which prints the same for a person."""
+    """What a verb found: `values` for a script, with a list `warnings` of sentences, and `show`, which prints the same for a person; what it does
+    `then`, when that has been printed."""
 
     values: dict[str, Any]
     show: Callable[[Console], None]
+    then: Callable[[], None] = lambda: None
 
 
 def answered(

@@ -1,0 +1,48 @@
+"""The verb `workbench`: a page in the browser on which effects and parameters are moved by hand."""
+
+from __future__ import annotations
+
+import os
+import webbrowser
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from thermospindle.report.verbs.answer import Answer, progress_bar
+from thermospindle.report.workbench.bench import open_bench
+from thermospindle.report.workbench.explanations import read_explanations
+from thermospindle.report.workbench.server import serve, server
+
+
+def workbench(
+    scene: Path,
+    campaign: Path | None = None,
+    diagnosis: Path | None = None,
+    port: int = 0,
+    no_browser: bool = False,
+    effect_files: Sequence[Path] = (),
+    out: Path | None = None,
+) -> Answer:
+    """A page on this machine alone, served until it is interrupted; what is saved there goes into folders of `out`. `port` 0 is any free one."""
+    if campaign is None:
+        bench = open_bench(scene, None, effect_files)
+    else:
+        with progress_bar(1) as progress:
+            bench = open_bench(scene, campaign, effect_files, progress)
+    known = read_explanations(diagnosis, bench) if diagnosis else None
+    out = Path("out") / f"{bench.spindle.name}_workbench" if out is None else out
+    made, address = server(bench, out, known, port)
+    values: dict[str, Any] = {"address": address, "token": address.rstrip("/").rpartition("/")[2], "pid": os.getpid(), "out": str(out), "warnings": []}
+
+    def show(console: Console) -> None:
+        console.print(f"The workbench of {bench.spindle.name} is at\n\n  {address}\n", highlight=False, soft_wrap=True)
+        console.print(f"on this machine alone. Saved there goes to {out}. End it with Ctrl-C.", highlight=False, soft_wrap=True)
+
+    def then() -> None:
+        if not no_browser:
+            webbrowser.open(address)
+        serve(made)
+
+    return Answer(values, show, then)

@@ -1,0 +1,166 @@
+"""The controls: a slider for every parameter of the effects that were added, and for every tolerance; which of them are fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import floor, log10
+from typing import Any
+
+from bokeh.models import Button, Checkbox, Column, CustomJSTickFormatter, Div, Row, Select, Slider, Toggle
+from markupsafe import Markup
+
+from thermospindle.report.workbench.bench import Bench
+from thermospindle.report.workbench.state import (
+    Setting,
+    key_of,
+    remove_effect,
+    set_deviation,
+    set_free,
+    set_value,
+    span,
+    span_of_tolerance,
+)  # fmt: skip
+from thermospindle.sim.effects.effect import Effect, Parameter
+
+STEPS = 400  # of a slider, about
+WIDE: Any = {"sizing_mode": "stretch_width"}
+LOOK = """
+:host { color: var(--ink); font: inherit; }
+label, .bk-input-group, .bk-slider-title, .bk-slider-value { color: var(--ink); font-size: 0.92rem; }
+.bk-input { color: var(--ink); background: var(--paper); border: 1px solid var(--soft); min-height: 2.1rem; }
+.bk-btn { color: var(--ink); background: var(--shade); border: 1px solid var(--soft); min-height: 2.1rem; }
+.bk-btn:hover { background: var(--line); }
+.bk-btn.bk-active { color: var(--paper); background: var(--accent); border-color: var(--accent); }
+.bk-btn[disabled], .bk-btn[disabled]:hover { color: var(--soft); background: var(--paper); border: 1px dashed var(--line); opacity: 1; }
+select.bk-input { background-image: linear-gradient(45deg, transparent 50%, var(--ink) 50%), linear-gradient(-45deg, transparent 50%, var(--ink) 50%);
+  background-size: 5px 6px; background-position: right 13px center, right 8px center; background-repeat: no-repeat; }
+.noUi-target { background: var(--line); border: none; box-shadow: none; }
+.noUi-handle { background: var(--paper); border: 2px solid var(--accent); box-shadow: none; }
+.noUi-tooltip { color: var(--ink); background: var(--paper); }
+.bk-input-group > .bk-inline { flex-wrap: wrap; }
+p { margin: 0.2rem 0; } .soft { color: var(--soft); } .bad { color: var(--bad); font-weight: 600; }
+h3 { font-size: 0.98rem; margin: 0.5rem 0 0; }
+table { border-collapse: collapse; font-size: 0.9rem; font-variant-numeric: tabular-nums; width: 100%; }
+th, td { padding: 0.25rem 0.5rem 0.25rem 0; text-align: right; border-bottom: 1px solid var(--line); font-weight: 400; vertical-align: top; }
+th:first-child { text-align: left; } thead th { font-weight: 600; }
+.bk-inline { display: flex; flex-wrap: wrap; gap: 0.2rem 0.9rem; }
+.bk-inline > label { margin: 0 !important; }
+.bk-input:focus-visible, .bk-btn:focus-visible, .noUi-handle:focus-visible, input:focus-visible
+  { outline: 3px solid var(--focus) !important; outline-offset: 2px; box-shadow: none; }
+"""
+"""The page's colours inside of Bokeh's widgets, and a focus that is seen."""
+PLAIN, PERCENT = "return parseFloat(tick.toPrecision(5)).toString()", "return (100 * tick).toFixed(2) + ' %'"
+
+Change = Callable[[Callable[[Setting], Setting], bool], None]
+"""Called with what makes a setting of a setting, and whether a slider is still being dragged."""
+
+
+def labelled(name: str) -> dict[str, str]:
+    """The attribute from which the page's script names what the browser could not."""
+    return {"data-label": name}
+
+
+class Controls:
+    """Rows for the effects and tolerances of a setting; `change` is told what a user does."""
+
+    def __init__(self, bench: Bench, s: Setting, change: Change) -> None:
+        self.bench, self.change = bench, change
+        self.sliders: dict[str, Slider | Select] = {}
+        self.ticks: dict[str, Checkbox] = {}
+        self.rows: dict[str, Column] = {}
+        options = [("", "choose an effect ..."), *((e.name, f"{e.name}: {e.title}") for e in bench.effects)]
+        self.add = Select(title="Add an effect", value="", options=options, stylesheets=[LOOK], name="add", **WIDE)
+        self.effects = Column(**WIDE)
+        self.tolerances = Column(*(self._tolerance(t.name, t.sd, s) for t in bench.tolerances), visible=False, **WIDE)
+        self.open = Toggle(label=f"Tolerances ({len(bench.tolerances)})", stylesheets=[LOOK], name="tolerances", **WIDE)
+        self.open.on_change("active", lambda attr, old, new: self.tolerances.update(visible=new))
+        self.show(s)
+
+    def show(self, s: Setting) -> None:
+        """Bring every control to a setting; rows stay where they are."""
+        for name in [n for n in self.rows if n not in s.effects]:
+            del self.rows[name]
+            for key in [k for k in self.sliders if k.rpartition(".")[0] == name]:
+                del self.sliders[key]
+                self.ticks.pop(key, None)
+        for name in s.effects:
+            if name not in self.rows:
+                self.rows[name] = self._effect(self.bench.effect(name), s)
+        children = [self.rows[name] for name in s.effects]
+        if self.effects.children != children:
+            self.effects.children = children
+        for name, values in s.effects.items():
+            for p in self.bench.effect(name).parameters:
+                self._bring(key_of(name, p.name), values[p.name], span(p, values[p.name]))
+        for t in self.bench.tolerances:
+            value = s.deviations.get(t.name, 0.0)
+            self._bring(t.name, value, span_of_tolerance(t.sd, value))
+        for key, tick in self.ticks.items():
+            if tick.active != (key in s.free):
+                tick.active = key in s.free
+
+    def _bring(self, key: str, value: float, ends: tuple[float, float]) -> None:
+        control = self.sliders[key]
+        if isinstance(control, Select):
+            if control.value != f"{value:g}":
+                control.value = f"{value:g}"
+            return
+        low, high = min(control.start, ends[0]), max(control.end, ends[1])
+        if (control.start, control.end) != (low, high):
+            control.update(start=low, end=high)
+        if control.value != value:
+            control.value = value
+
+    # ------------------------------------------------------------ rows
+
+    def _effect(self, effect: Effect, s: Setting) -> Column:
+        head = Div(text=str(Markup("<h3>{}</h3><p class=soft>{}</p>").format(effect.name, effect.title)), stylesheets=[LOOK], **WIDE)
+        drop = Button(label="Remove", stylesheets=[LOOK], width=90, html_attributes=labelled(f"remove {effect.name}"))
+        drop.on_click(lambda: self.change(lambda now: remove_effect(now, effect.name), False))
+        rows = [self._parameter(effect, p, s) for p in effect.parameters]
+        return Column(Row(head, drop, **WIDE), *rows, **WIDE)
+
+    def _parameter(self, effect: Effect, p: Parameter, s: Setting) -> Row:
+        key, value, unit = key_of(effect.name, p.name), s.effects[effect.name][p.name], "" if p.unit == "1" else f", {p.unit}"
+        says = {"description": None, "html_attributes": {**labelled(f"{p.name}{unit}"), "title": p.meaning}}
+        if p.choices:
+            chosen = Select(title=p.name, value=f"{value:g}", options=[f"{c:g}" for c in p.choices], stylesheets=[LOOK], **says, **WIDE)
+            chosen.on_change("value", lambda attr, old, new: self._set(effect.name, p.name, float(new), False))
+            self.sliders[key] = chosen
+            return Row(chosen, **WIDE)
+        low, high = span(p, value)
+        del says["description"]
+        slider = Slider(
+            title=f"{p.name}{unit}", start=low, end=high, value=value, step=step_of(low, high), format=CustomJSTickFormatter(code=PLAIN), stylesheets=[LOOK], tooltips=False, name=key, **says, **WIDE
+        )
+        slider.on_change("value", lambda attr, old, new: self._set(effect.name, p.name, new, True))
+        slider.on_change("value_throttled", lambda attr, old, new: self._set(effect.name, p.name, new, False))
+        self.sliders[key] = slider
+        return Row(slider, self._tick(key, s), **WIDE)
+
+    def _set(self, effect: str, parameter: str, value: float, dragging: bool) -> None:
+        self.change(lambda s: set_value(s, effect, parameter, value) if effect in s.effects else s, dragging)
+
+    def _tolerance(self, name: str, sd: float, s: Setting) -> Row:
+        low, high = span_of_tolerance(sd)
+        slider = Slider(
+            title=f"{name} (± {sd:.2%})", start=low, end=high, value=s.deviations.get(name, 0.0), step=step_of(low, high), format=CustomJSTickFormatter(code=PERCENT), stylesheets=[LOOK], tooltips=False,
+            name=name, html_attributes=labelled(name), **WIDE,
+        )  # fmt: skip
+        slider.on_change("value", lambda attr, old, new: self.change(lambda s: set_deviation(s, name, new), True))
+        slider.on_change("value_throttled", lambda attr, old, new: self.change(lambda s: set_deviation(s, name, new), False))
+        self.sliders[name] = slider
+        return Row(slider, self._tick(name, s), **WIDE)
+
+    def _tick(self, key: str, s: Setting) -> Checkbox:
+        tick = Checkbox(label="fit", active=key in s.free, width=52, stylesheets=[LOOK], html_attributes=labelled(f"fit {key}"), name=f"fit {key}", visible=self.bench.campaign is not None)
+        tick.on_change("active", lambda attr, old, new: self.change(lambda s: set_free(s, key, new), False))
+        self.ticks[key] = tick
+        return tick
+
+
+def step_of(low: float, high: float) -> float:
+    """A round step, about `STEPS` of them from one end to the other."""
+    size = (high - low) / STEPS
+    decade = 10.0 ** floor(log10(size))
+    return float(f"{decade * max(k for k in (1, 2, 5) if k * decade <= size * 1.0000001):.6g}")

@@ -1,0 +1,32 @@
+// Names for a screen reader what Bokeh's widgets leave without one, wherever in their shadow trees, as widgets come and go.
+function label(root, above) {
+  for (const host of root.querySelectorAll("*")) {
+    const inside = host.shadowRoot
+    if (!inside) continue
+    const own = host.dataset.label || inside.querySelector(".bk-slider-title")?.firstChild?.textContent
+    if (own) name(inside, "input, select, button, .noUi-handle", own)
+    if (own || above) name(inside, ".bk-events", own || above)
+    name(inside, ".bk-tool-overflow", "more tools")
+    label(inside, own || above)
+  }
+}
+function name(inside, which, said) {
+  for (const part of inside.querySelectorAll(which)) {
+    if (part.getAttribute("aria-label") !== said) part.setAttribute("aria-label", said)
+    if (which === ".bk-events") part.setAttribute("role", "img")
+  }
+}
+setInterval(() => label(document, ""), 500)
+
+// Colours of the pictures follow the page's: drawn again when light turns to dark. A mode moves at once, unless that is not wanted.
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+  for (const doc of window.Bokeh?.documents ?? []) for (const model of doc.roots()) window.Bokeh.index.get(model)?.request_paint?.()
+})
+const started = setInterval(() => {
+  const doc = window.Bokeh?.documents?.[0]
+  const play = doc?.get_model_by_name("play")
+  if (!play || !doc.is_idle) return
+  clearInterval(started)
+  document.body.dataset.ready = "yes"
+  if (!matchMedia("(prefers-reduced-motion: reduce)").matches) play.active = true
+}, 200)

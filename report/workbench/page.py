@@ -1,0 +1,361 @@
+"""The page of one browser tab: it shows a session, and turns what a user does into actions on it. All computing is in `bench`, all states in `state`.
+
+While a slider is dragged, only the newest value is computed; where all tests together take longer than `SMOOTH`, only the shown one is, and where
+that takes longer than `SMOOTH` too, nothing until the slider is let go. The page says which of these it does.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from bokeh.document import Document
+from bokeh.models import Button, CheckboxGroup, Div, RadioButtonGroup, Select, TextInput
+from markupsafe import Markup, escape
+
+from thermospindle.diagnosis.inference.model import FAILED
+from thermospindle.model.units import RPM
+from thermospindle.report.text.compare import AGREES, ALMOST
+from thermospindle.report.workbench import explanations as told
+from thermospindle.report.workbench.bench import Bench, Errors, Shown, channels, curves, errors, fitted, modes_of
+from thermospindle.report.workbench.controls import LOOK, WIDE, Controls, labelled
+from thermospindle.report.workbench.explanations import Explanations
+from thermospindle.report.workbench.plots import ErrorMap, FrfPlots, MovingSection, worst
+from thermospindle.report.workbench.save import save
+from thermospindle.report.workbench.section import moving, pieces
+from thermospindle.report.workbench.state import (
+    Session,
+    Setting,
+    add_effect,
+    computed,
+    do,
+    keep,
+    leave_out,
+    redo,
+    set_named,
+    take_up,
+    undo,
+)  # fmt: skip
+
+SMOOTH = 0.15  # s, up to which something is computed while a slider is dragged
+
+
+class Stopped(Exception):
+    """A user, or the end of the page, stopped work in the background."""
+
+
+class Page:
+    """Widgets by name, the session, and what was last computed."""
+
+    def __init__(self, bench: Bench, document: Document, out: Path, known: Explanations | None = None) -> None:
+        self.bench, self.document, self.out, self.known = bench, document, out, known
+        self.session = Session(Setting(free=frozenset(t.name for t in bench.tolerances) if bench.campaign else frozenset()))
+        self.wanted: Setting | None = None  # what a slider is being dragged to
+        self.seen: Setting | None = None
+        self.found = Errors((), None, None)
+        self.cost = {"all": 0.0, "shown": 0.0}
+        self.stop = threading.Event()
+        self.working = ""
+        self.frf, self.map, self.section = FrfPlots(), ErrorMap(bench), MovingSection(pieces(bench.spindle))
+        self.controls = Controls(bench, self.session.now, self.change)
+        self._widgets()
+        self._wire()
+        self.choose_test()
+        self.show_rest()
+
+    # ------------------------------------------------------------ widgets
+
+    def _widgets(self) -> None:
+        look: dict[str, Any] = {"stylesheets": [LOOK]}
+        tests = [(s.id, _words(s)) for s in self.bench.shown]
+        self.test = Select(title="Test" if self.bench.campaign else "Condition", options=tests, value=self.bench.shown[0].id, name="test", **look, **WIDE)
+        self.response, self.hammer = (Select(title=t, name=t.lower(), **look, **WIDE) for t in ("Response", "Hammer"))
+        self.mode = Select(title="Mode", name="mode", **look, **WIDE)
+        self.quantity = RadioButtonGroup(labels=["Frequency", "Damping ratio"], active=0, name="quantity", **look)
+        self.undo, self.redo = (Button(label=t, name=t.lower(), disabled=True, width=80, **look) for t in ("Undo", "Redo"))
+        self.left_out = CheckboxGroup(labels=[s.id for s in self.bench.shown], inline=True, name="left_out", **look)
+        self.fit = Button(label="Fit the ticked", name="fit", disabled=self.bench.campaign is None, **look, **WIDE)
+        self.keep = Button(label="Keep as a step", name="keep", **look, **WIDE)
+        self.rung = Select(title="Step", options=[], name="rung", **look, **WIDE)
+        self.take_up = Button(label="Take up again", name="take_up", disabled=True, **look, **WIDE)
+        self.explanation = Select(title="Explanation", options=[], name="explanation", **look, **WIDE)
+        self.take = Button(label="Take in its values", name="take", disabled=True, **look, **WIDE)
+        self.diagnose = Button(label="Diagnose (a minute or more)", name="diagnose", disabled=self.bench.campaign is None, **look, **WIDE)
+        self.name = TextInput(title=f"Folder in {self.out}", value="mine", name="name", **look, **WIDE)
+        self.save = Button(label="Save scene, report and script" if self.bench.campaign else "Save scene and script", name="save", **look, **WIDE)
+        self.halt = Button(label="Stop", name="halt", width=80, visible=False, html_attributes=labelled("stop the work in the background"), **look)
+        self.status, self.ladder, self.reasons, self.message = (
+            Div(text="", name=n, html_attributes={"role": "status"} if n in ("status", "message") else {}, **look, **WIDE) for n in ("status", "ladder", "reasons", "message")
+        )
+        self.section.play.stylesheets = [LOOK]
+
+    def roots(self) -> dict[str, Any]:
+        """What the template places, by name."""
+        own = {k: getattr(self, k) for k in (
+            "test", "response", "hammer", "mode", "quantity", "undo", "redo", "left_out", "fit", "keep", "rung", "take_up", "explanation", "take",
+            "diagnose", "name", "save", "halt", "status", "ladder", "reasons", "message",
+        )}  # fmt: skip
+        drawn = {"magnitude": self.frf.size, "phase": self.frf.phase, "map": self.map.figure, "section": self.section.figure, "play": self.section.play}
+        c = self.controls
+        return own | drawn | {"add": c.add, "effects": c.effects, "tolerances": c.open, "tolerance_rows": c.tolerances}
+
+    def _wire(self) -> None:
+        self.test.on_change("value", lambda attr, old, new: self.choose_test())
+        for chosen in (self.response, self.hammer):
+            chosen.on_change("value", lambda attr, old, new: self.show_frf(self.session.now))
+        self.mode.on_change("value", lambda attr, old, new: self.show_mode())
+        self.quantity.on_change("active", lambda attr, old, new: self.show_map())
+        self.left_out.on_change("active", lambda attr, old, new: self.change(lambda s: leave_out(s, [self.bench.shown[k].id for k in new]), False))
+        self.controls.add.on_change("value", lambda attr, old, new: self._add(new))
+        self.undo.on_click(lambda: self.become(undo(self.session)))
+        self.redo.on_click(lambda: self.become(redo(self.session)))
+        self.keep.on_click(lambda: self.become(keep(self.session, self.found.fitted, self.found.left_out)))
+        self.take_up.on_click(lambda: self.become(take_up(self.session, int(self.rung.value))))
+        self.take.on_click(self._take)
+        self.fit.on_click(self._fit)
+        self.diagnose.on_click(self._diagnose)
+        self.save.on_click(self._save)
+        self.halt.on_click(self.stop.set)
+
+    # ------------------------------------------------------------ actions
+
+    def change(self, action: Callable[[Setting], Setting], dragging: bool) -> None:
+        """Do something to the setting; of what a drag asks for in the meantime only the newest is computed."""
+        setting = action(self.session.now)
+        if not dragging:
+            self.wanted = None
+            self.become(do(self.session, setting))
+        elif setting != (self.wanted or self.session.now):
+            if self.wanted is None:
+                self.document.add_next_tick_callback(self._dragged)
+            self.wanted = setting
+
+    def _dragged(self) -> None:
+        setting, self.wanted = self.wanted, None
+        if setting is None or computed(setting) == self.seen:
+            return
+        if self.cost["all"] < SMOOTH:
+            self.compute(setting)
+        elif self.cost["shown"] < SMOOTH:
+            self.show_frf(setting)
+            self.seen = None
+
+    def become(self, session: Session) -> None:
+        """Show another session."""
+        before, self.session = self.session, session
+        if computed(session.now) != self.seen:
+            self.compute(session.now)
+            self.list_modes()
+        if session is not before:
+            self.show_rest()
+
+    def _add(self, name: str) -> None:
+        if name:
+            self.controls.add.value = ""
+            self.change(lambda s: s if name in s.effects else add_effect(s, self.bench.effect(name)), False)
+
+    def _take(self) -> None:
+        if self.known and self.explanation.value:
+            row = self.known.rows[int(self.explanation.value)]
+            self.change(lambda s: told.taken(self.bench, s, row), False)
+
+    # ------------------------------------------------------------ computing and showing
+
+    @property
+    def shown(self) -> Shown:
+        return self.bench.show(self.test.value)
+
+    def compute(self, s: Setting) -> None:
+        """Everything at a setting; where no spindle can be built there, the page says why and keeps what it showed."""
+        began = time.perf_counter()
+        try:
+            self.found = errors(self.bench, s)
+        except FAILED as error:
+            self.say(f"No spindle can be built there: {error}", bad=True)
+            self.seen = None
+            return
+        self.seen = computed(s)
+        self.show_frf(s)
+        self.cost["all"] = time.perf_counter() - began
+        self.show_map(s)
+        self.show_status(s)
+
+    def show_frf(self, s: Setting) -> None:
+        if not (self.response.value and self.hammer.value):
+            return
+        began = time.perf_counter()
+        try:
+            self.frf.show(curves(self.bench, s, self.shown, int(self.response.value), int(self.hammer.value)))
+        except FAILED as error:
+            self.say(f"No spindle can be built there: {error}", bad=True)
+            return
+        self.cost["shown"] = time.perf_counter() - began
+        if self.message.text.startswith("<p class=bad>No spindle"):
+            self.say("")
+
+    def show_map(self, s: Setting | None = None) -> None:
+        self.map.show(self.found, s or self.session.now, self.quantity.active == 1)
+
+    def show_status(self, s: Setting) -> None:
+        furthest = worst(self.found.cells)
+        said: list[str] = []
+        if self.found.fitted is not None or self.found.left_out is not None:
+            for value, count, which in (
+                (self.found.fitted, len(self.bench.shown) - len(s.left_out), "fitted"), (self.found.left_out, len(s.left_out), "left-out"),
+            ):  # fmt: skip
+                if value is not None:
+                    good = "agrees" if value < AGREES else "nearly agrees" if value < ALMOST else "does not agree"
+                    said.append(Markup("<b>{:.3g}</b> standard errors over {} {} test{} ({})").format(value, count, which, "s" * (count > 1), good))
+        if furthest:
+            unit = "standard errors" if self.bench.campaign else "% from the scene as it was opened"
+            said.append(str(escape(f"furthest off: mode {furthest.mode} in {furthest.test}, {furthest.frequency:+.3g} {unit}")))
+        drag = "all tests" if self.cost["all"] < SMOOTH else "the shown test" if self.cost["shown"] < SMOOTH else "nothing until you let go"
+        lost = "".join(f"<li>{escape(r)}</li>" for r in self.found.remarks)
+        timing = f"<p class=soft>{1e3 * self.cost['all']:.0f} ms for all; while a slider moves, this computes {drag}.</p>"
+        self.status.text = f"<p>{'; '.join(said)}.</p>" + timing + (f"<details><summary>Modes without a partner</summary><ul>{lost}</ul></details>" if lost else "")
+
+    def choose_test(self) -> None:
+        """Another test: its channels, its modes, its FRF."""
+        responses, hammers = channels(self.bench, self.shown)
+        for select, nodes in ((self.response, responses), (self.hammer, hammers)):
+            select.options = [(str(node), name) for node, name in nodes.items()]
+            if select.value not in [str(n) for n in nodes]:
+                select.value = str(next(iter(nodes)))
+        self.compute(self.session.now) if self.seen is None else self.show_frf(self.session.now)
+        self.list_modes()
+
+    def list_modes(self) -> None:
+        try:
+            self.point, self.modes = modes_of(self.bench, self.session.now, self.shown)
+        except FAILED:
+            return
+        self.mode.options = [(str(k), f"{k + 1} {m.kind}, {m.frequency:.1f} Hz, {m.damping_ratio:.2%}" + (f", {m.whirl}" if m.whirl != "none" and self.point.condition.speed else "")) for k, m in enumerate(self.modes)]
+        if not self.mode.value or int(self.mode.value) >= len(self.modes):
+            self.mode.value = "0"
+        self.show_mode()
+
+    def show_mode(self) -> None:
+        if self.modes and self.mode.value:
+            self.section.show(moving(self.section.drawn, self.point.chain, self.modes[int(self.mode.value)]))
+
+    def show_rest(self) -> None:
+        """Controls, undo, ladder and explanations as the session has them."""
+        s = self.session
+        self.controls.show(s.now)
+        active = [k for k, shown in enumerate(self.bench.shown) if shown.id in s.now.left_out]
+        if self.left_out.active != active:
+            self.left_out.active = active
+        self.undo.disabled, self.redo.disabled = not s.past, not s.future
+        self.ladder.text = _ladder(s)
+        rungs = [(str(k), r.name) for k, r in enumerate(s.ladder)]
+        if self.rung.options != rungs:
+            self.rung.options = rungs
+            self.rung.value = rungs[-1][0] if rungs else ""
+        self.take_up.disabled = not rungs
+        if self.known:
+            options = [(str(k), e.words) for k, e in enumerate(self.known.rows)]
+            self.reasons.text = told.table(self.known)
+            if self.explanation.options != options:
+                self.explanation.options = options
+                self.explanation.value = "0" if options else ""
+            self.take.disabled = not options
+        elif not self.reasons.text:
+            self.reasons.text = "<p class=soft>None yet: diagnose here, or start with --diagnosis found/diagnosis.json.</p>"
+
+    def say(self, text: str, bad: bool = False) -> None:
+        self.message.text = f"<p{' class=bad' * bad}>{escape(text)}</p>" if text else ""
+
+    # ------------------------------------------------------------ work in the background
+
+    def work(self, name: str, task: Callable[[Callable[[str], None]], Any], done: Callable[[Any], None]) -> None:
+        """Run `task` beside the page; it is given what to tell its progress, and `done` what it found."""
+        if self.working:
+            self.say(f"{self.working} is still at work; stop it first.")
+            return
+        self.working, self.halt.visible = name, True
+        self.stop.clear()
+        self.say(f"{name} ...")
+
+        def progress(text: str) -> None:
+            if self.stop.is_set():
+                raise Stopped
+            self.document.add_next_tick_callback(lambda: self.say(f"{name}: {text}"))
+
+        def ended(found: Any, problem: str) -> None:
+            self.working, self.halt.visible = "", False
+            self.say(problem, bad=True) if problem else done(found)
+
+        def run() -> None:
+            found, problem = None, ""
+            try:
+                found = task(progress)
+            except Stopped:
+                problem = f"{name} was stopped."
+            except (*FAILED, OSError) as error:
+                problem = f"{name}: {error}"
+            self.document.add_next_tick_callback(lambda: ended(found, problem))
+
+        threading.Thread(target=run, name=name, daemon=True).start()
+
+    def _fit(self) -> None:
+        s = self.session.now
+
+        def done(found: Any) -> None:
+            self.become(do(self.session, set_named(self.session.now, found.value)))
+            said = [f"{key} {value:.4g} ± {found.sd[key]:.2g}" for key, value in found.value.items() if "." in key]
+            self.say(f"Fitted in {found.steps} steps. {', '.join(said)}")
+
+        self.work("Fit", lambda progress: fitted(self.bench, s, progress), done)
+
+    def _diagnose(self) -> None:
+        s, steps, at = self.session.now, told.steps(self.bench, self.session.now), iter(range(1, 10**6))
+
+        def done(found: Explanations) -> None:
+            self.known = found
+            self.show_rest()
+            self.say(f"Diagnosis: {found.word}. {found.reason}")
+
+        self.work("Diagnosis", lambda progress: told.find(self.bench, s, lambda text: progress(f"{next(at)} of {steps}: {text}")), done)
+
+    def _save(self) -> None:
+        name = self.name.value.strip()
+        if not name or name in (".", "..") or "/" in name or "\\" in name:
+            self.say(f"{name!r} is no name of a folder; use letters, digits and - _", bad=True)
+            return
+        s, folder = self.session, self.out / name
+        self.work(
+            "Saving", lambda progress: save(self.bench, s.now, self.found, s.ladder, folder),
+            lambda written: self.say(f"Saved in {folder}: {', '.join(written)}"),
+        )  # fmt: skip
+
+
+def _words(shown: Shown) -> str:
+    c, t = shown.condition, shown.test
+    if t is None:
+        return shown.id
+    speed = f"{c.speed / RPM:.0f} rpm" if c.speed else "at rest"
+    return f"{t.id}: {c.temperature:g} °C, {speed}" + (f", {t.level:g} N" if t.level else "")
+
+
+def _ladder(session: Session) -> str:
+    if not session.ladder:
+        return "<p class=soft>Nothing kept yet.</p>"
+    rows = Markup("").join(
+        Markup("<tr><th scope=row>{}{}</th><td>{}</td><td>{}</td></tr>").format(
+            r.name, " (now)" if r.setting == session.now else "", *("–" if v is None else f"{v:.3g}" for v in (r.fitted, r.left_out))
+        )
+        for r in session.ladder
+    )
+    head = Markup("<table><thead><tr><th scope=col>step: what was set</th><th scope=col>fitted, s.e.</th><th scope=col>left out, s.e.</th></tr></thead><tbody>")
+    return str(head + rows + Markup("</tbody></table>"))
+
+
+def with_left_out(page: Page, tests: tuple[str, ...]) -> None:
+    """Begin with tests left out, which is no step to undo."""
+    page.session = replace(page.session, now=leave_out(page.session.now, tests))
+    page.compute(page.session.now)
+    page.show_rest()

@@ -1,0 +1,307 @@
+"""The workbench served: refusals over real HTTP and websocket, and a real browser that adds, drags, undoes, leaves out, fits and saves."""
+
+import asyncio
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
+
+import pytest
+from tornado.httpclient import HTTPClientError, HTTPRequest
+from tornado.websocket import websocket_connect
+
+from tests.conftest import ROOT, SCENE
+from tests.report.browser import Browser, installed, until
+from thermospindle.cli import main
+
+CAMPAIGN = SCENE / "measured" / "jang_2003"
+needs_a_browser = pytest.mark.skipif(installed() is None, reason="no Chromium or Chrome is installed on this machine")
+
+
+def started(folder: Path, *more: object) -> tuple[subprocess.Popen, dict]:
+    """`spindle workbench` in a process of its own, and what it printed."""
+    command = [sys.executable, "-m", "thermospindle", "workbench", *map(str, more), "--json", "--no-browser", "--out", str(folder / "saved")]
+    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=(folder / "stderr").open("w"), text=True)
+    line = process.stdout.readline()
+    assert line, (folder / "stderr").read_text()
+    return process, json.loads(line)
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory):
+    process, told = started(tmp_path_factory.mktemp("served"), SCENE, CAMPAIGN)
+    yield told
+    process.send_signal(signal.SIGINT)
+    rest, _ = process.communicate(timeout=20)
+    assert process.returncode == 0
+    assert rest == "", "one JSON object and nothing else"
+
+
+def status(address, method="GET", **headers):
+    try:
+        with urlopen(Request(address, headers=headers, method=method)) as answer:
+            return answer.status, answer.read().decode(errors="replace")
+    except HTTPError as error:
+        return error.code, error.read().decode()
+
+
+def upgraded(address, origin):
+    """The status with which a websocket is refused, 101 where it is not."""
+
+    async def ask():
+        try:
+            socket = await websocket_connect(HTTPRequest(address, headers={"Origin": origin} if origin else {}), subprotocols=["bokeh", "x"])
+        except HTTPClientError as error:
+            return error.code
+        socket.close()
+        return 101
+
+    return asyncio.run(ask())
+
+
+# ---------------------------------------------------------------- who is let in
+
+
+def test_it_tells_address_token_and_process(served):
+    assert set(served) == {"address", "token", "pid", "out", "warnings"}
+    assert re.fullmatch(rf"http://127\.0\.0\.1:\d+/{served['token']}/", served["address"])
+    assert len(served["token"]) == 48
+    os.kill(served["pid"], 0)
+
+
+def test_with_the_token_the_page_comes_and_needs_no_other_host(served):
+    code, text = status(served["address"])
+    assert code == 200
+    assert "<title>Workbench: HDD spindle" in text
+    hosts = set(re.findall(r"(?:src|href)=[\"'](https?://[^/\"']+)", text))
+    assert hosts <= {served["address"].split("/" + served["token"])[0]}
+
+
+@pytest.mark.parametrize("path", ["", "ws", "static/js/bokeh.min.js", "0" * 48 + "/", "favicon.ico", "autoload.js"])
+def test_without_the_token_nothing_is_served(served, path):
+    base = served["address"].removesuffix(served["token"] + "/")
+    code, text = status(base + path)
+    assert code in ((403,) if path != "favicon.ico" else (200, 403))
+    assert code == 200 or "needs the token that `spindle workbench` printed" in text
+    assert served["token"] not in text
+
+
+@pytest.mark.parametrize("method", ["POST", "PUT", "DELETE"])
+def test_whatever_the_method(served, method):
+    assert status(served["address"].removesuffix(served["token"] + "/") + "x", method)[0] == 403
+
+
+def test_the_websocket_wants_the_token_and_the_own_origin(served):
+    base, own = served["address"].replace("http", "ws"), served["address"].split("/" + served["token"])[0]
+    assert upgraded(base.replace(served["token"], "0" * 48) + "ws", own) == 403
+    assert upgraded(base + "ws", "http://evil.example") == 403
+    assert upgraded(base + "ws", "null") == 403
+
+
+def test_it_listens_on_the_loopback_interface_alone(served):
+    """By the kernel's own table of sockets, where there is one."""
+    table = Path("/proc/net/tcp")
+    if not table.exists():
+        pytest.skip("no /proc/net/tcp on this system")
+    port = int(re.search(r":(\d+)/", served["address"]).group(1))
+    listening = [row.split()[1] for row in table.read_text().splitlines()[1:] if row.split()[3] == "0A"]
+    assert [a for a in listening if a.endswith(f":{port:04X}")] == [f"0100007F:{port:04X}"]
+
+
+def test_a_port_that_is_taken_is_said(served, capsys):
+    port = re.search(r":(\d+)/", served["address"]).group(1)
+    assert main(["workbench", str(SCENE), "--port", port, "--no-browser"]) == 2
+    assert re.match(rf"spindle: --port {port}: Address already in use; another port, or none for a free one", capsys.readouterr().err)
+
+
+@pytest.mark.parametrize("port", ["0", "70000", "http"])
+def test_a_port_that_is_none_is_refused(port, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["workbench", str(SCENE), "--port", port])
+    assert ended.value.code == 2
+    assert "is not a port, 1 to 65535" in capsys.readouterr().err
+
+
+# ---------------------------------------------------------------- a real browser
+
+
+@pytest.fixture(scope="module")
+def chromium(tmp_path_factory):
+    browser = Browser(tmp_path_factory.mktemp("chromium"))
+    browser.scheme("light")
+    yield browser
+    browser.close()
+
+
+@pytest.fixture
+def tab(chromium, served):
+    """A fresh page; nothing may have gone wrong in it."""
+    chromium.size(1400, 1000)
+    chromium.errors.clear()
+    chromium.open(served["address"])
+    chromium.wait("document.body?.dataset.ready === 'yes'")
+    yield chromium
+    assert chromium.errors == []
+
+
+BUTTON = "find(e => e.tagName === 'BUTTON' && e.textContent.startsWith({!r}))"
+HANDLE = "find(e => e.classList?.contains('noUi-handle') && e.getAttribute('aria-label')?.startsWith({!r}))"
+
+
+def choose(tab, name, text):
+    """Choose an option of a list as a user does, by its beginning."""
+    expression = f"(e => {{ e.selectedIndex = [...e.options].findIndex(o => o.text.startsWith({text!r})); e.dispatchEvent(new Event('change')); return e.selectedIndex }})"
+    assert tab.run(f"{expression}(find(e => e.name === {name!r}))") >= 0
+
+
+def errors_told(tab):
+    return tab.run(f"{tab.model('status')}.text")
+
+
+@needs_a_browser
+def test_dragging_changes_curves_and_errors_while_dragging(tab):
+    before = errors_told(tab)
+    choose(tab, "add", "preload_loss")
+    tab.wait(f"!!{HANDLE.format('loss')}")
+    added = until(lambda: errors_told(tab) != before and errors_told(tab), 10)
+    curve = "Bokeh.documents[0].get_model_by_name('magnitude').renderers[1].data_source.data.size[400]"
+    at_first = tab.run(curve)
+    tab.run(f"{HANDLE.format('loss')}.scrollIntoView({{block: 'center'}}) ?? true")
+    x, y = tab.run(f"(e => {{ const r = e.getBoundingClientRect(); return [r.x + r.width / 2, r.y + r.height / 2] }})({HANDLE.format('loss')})")
+    tab.mouse("mousePressed", x, y)
+    for step in range(1, 11):
+        tab.mouse("mouseMoved", x + 6 * step, y)
+    until(lambda: errors_told(tab) != added, 10)
+    until(lambda: tab.run(curve) != at_first, 10)
+    assert tab.run(f"{tab.model('undo')}.disabled") is False
+    tab.mouse("mouseReleased", x + 60, y)
+    value = f"{tab.model('preload_loss.loss')}.value"
+    moved = tab.wait(value)
+    assert moved > 0.16
+    tab.click(BUTTON.format("Undo"))
+    tab.wait(f"{value} === 0.15")
+    tab.click(BUTTON.format("Redo"))
+    tab.wait(f"{value} === {moved}")
+    tab.click(BUTTON.format("Remove"))
+    until(lambda: errors_told(tab).split("ms for all")[0][:40] == before.split("ms for all")[0][:40], 10)
+
+
+@needs_a_browser
+def test_a_test_is_left_out_the_rest_fitted_the_step_kept(tab):
+    choose(tab, "add", "preload_loss")
+    tab.wait(f"!!{tab.model('preload_loss.loss')}")
+    tab.click("find(e => e.type === 'checkbox' && e.parentElement?.textContent.trim() === Bokeh.documents[0].get_model_by_name('left_out').labels[1])")
+    tab.wait(f"{tab.model('status')}.text.includes('1 left-out test')")
+    tab.wait(f"{tab.model('map')}.x_range.factors.some(f => f[0] === 'left out')")
+    tab.click(BUTTON.format("Fit the ticked"))
+    tab.wait(f"{tab.model('message')}.text.includes('Fitted in')", 60)
+    tab.click(BUTTON.format("Keep as a step"))
+    tab.wait(f"{tab.model('ladder')}.text.includes('1: preload_loss')")
+
+
+@needs_a_browser
+def test_everything_is_reached_by_keyboard_with_a_name_and_a_visible_focus(tab):
+    choose(tab, "add", "bond_softening")
+    tab.wait(f"!!{HANDLE.format('transition')}")
+    tab.click(BUTTON.format("Tolerances"))
+    tab.wait(f"{tab.model('tolerance_rows')}.visible")
+    tab.run("document.activeElement.blur() ?? true")
+    deepest = "(() => { let e = document.activeElement; while (e?.shadowRoot?.activeElement) e = e.shadowRoot.activeElement; return e })()"
+    tab.wait(f"!!{HANDLE.format('bearing damping')}")
+    seen = {}
+    for _ in range(110):
+        tab.key("Tab", 9)
+        said = tab.run(
+            f"(e => {{ if (!e || e === document.body) return null; const s = getComputedStyle(e); const label = e.getAttribute('aria-label')"
+            " || e.labels?.[0]?.textContent || e.getRootNode().querySelector?.(`label[for='${e.id}']`)?.textContent || e.title || e.textContent;"
+            f" return [e.tagName, (label || '').trim(), s.outlineStyle !== 'none' && parseFloat(s.outlineWidth) >= 1 || s.boxShadow !== 'none'] }})({deepest})"
+        )
+        if said is None:  # from the end to the beginning
+            continue
+        assert said[1], f"a {said[0]} without a name, after {list(seen)[-1:]}"
+        assert said[2], f"{said[:2]}: its focus is not seen"
+        seen[said[1]] = said[0]
+    names = " | ".join(seen)
+    for wanted in ("Test", "Response", "Hammer", "Add an effect", "hot_compliance", "fit bond_softening.transition", "remove bond_softening", "Tolerances",
+                   "hub mass", "Fit the ticked", "Undo", "Keep as a step", "Mode", "Play", "Diagnose", "Folder", "Save", "Frequency"):  # fmt: skip
+        assert wanted in names, f"{wanted} is not reached: {names}"
+
+
+@needs_a_browser
+def test_a_slider_moves_by_arrow_keys(tab):
+    choose(tab, "add", "preload_loss")
+    tab.wait(f"!!{HANDLE.format('loss')}")
+    tab.run(f"{HANDLE.format('loss')}.focus() ?? true")
+    tab.key("ArrowRight", 39)
+    tab.wait(f"{tab.model('preload_loss.loss')}.value > 0.15")
+    tab.wait(f"{tab.model('undo')}.disabled === false")
+
+
+@needs_a_browser
+@pytest.mark.parametrize("width", [1400, 400])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_it_fits_the_window_and_can_be_read(tab, width, scheme):
+    tab.size(width, 1000)
+    tab.scheme(scheme)
+    tab.wait(f"document.documentElement.scrollWidth <= {width}")
+    ink, paper = tab.run("['color', 'backgroundColor'].map(k => getComputedStyle(document.body)[k].match(/\\d+/g).map(Number))")
+    assert contrast(ink, paper) > 7
+    label = tab.run("getComputedStyle(find(e => e.classList?.contains('bk-btn') && !e.disabled)).color.match(/\\d+/g).map(Number)")
+    ground = tab.run("getComputedStyle(find(e => e.classList?.contains('bk-btn') && !e.disabled)).backgroundColor.match(/\\d+/g).map(Number)")
+    assert contrast(label, ground) > 4.5
+    tab.scheme("light")
+
+
+def contrast(a, b):
+    """Of WCAG 2.1, 1.4.3."""
+
+    def luminance(rgb):
+        shares = [c / 255 for c in rgb[:3]]
+        return sum(w * (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4) for w, c in zip((0.2126, 0.7152, 0.0722), shares, strict=True))
+
+    high, low = sorted((luminance(a), luminance(b)), reverse=True)
+    return (high + 0.05) / (low + 0.05)
+
+
+@needs_a_browser
+def test_the_section_moves_when_it_is_asked_to(tab):
+    corner = f"{tab.model('section')}.renderers[1].data_source.data.z[0][0]"
+    first = tab.run(corner)
+    assert tab.run(f"{tab.model('play')}.active") is False, "whoever wants less motion is not shown any"
+    tab.click(BUTTON.format("Play"))
+    until(lambda: tab.run(corner) != first, 10)
+    tab.click(BUTTON.format("Pause"))
+    tab.wait(f"!{tab.model('play')}.active")
+
+
+@needs_a_browser
+@pytest.mark.slow
+def test_saving_from_the_page(tab, served):
+    choose(tab, "add", "preload_loss")
+    tab.wait(f"!!{tab.model('preload_loss.loss')}")
+    tab.click(BUTTON.format("Save scene"))
+    tab.wait(f"{tab.model('message')}.text.includes('Saved in')", 60)
+    assert (Path(served["out"]) / "mine" / "scene" / "spindle.toml").is_file()
+
+
+@needs_a_browser
+@pytest.mark.slow
+@pytest.mark.parametrize("scene", ["five_bearing", "mk7702", "free_shaft"])
+def test_other_scenes_without_tests(scene, chromium, tmp_path):
+    process, told = started(tmp_path, scene)
+    chromium.errors.clear()
+    try:
+        chromium.open(told["address"])
+        chromium.wait("document.body?.dataset.ready === 'yes'", 60)
+        assert "while a slider moves, this computes" in errors_told(chromium)
+        assert chromium.run(f"{chromium.model('map')}.y_range.factors.length") > 3
+    finally:
+        process.send_signal(signal.SIGTERM)
+        process.communicate(timeout=20)
+    assert process.returncode == 0
+    assert chromium.errors == []
