@@ -85,6 +85,10 @@ class OperatingPoint:
         """All oscillating modes, in order of frequency."""
         return modes(self.chain, self.linear)
 
+    def modes_below(self, highest: float) -> list[Mode]:
+        """Oscillating modes below `highest` (Hz); of a flexible shaft quicker than all `modes`."""
+        return modes(self.chain, self.linear, highest) if "modes" not in self.__dict__ else [m for m in self.modes if m.frequency < highest]
+
     def frf(self, frequency: Array, window_decay: float = 0.0) -> ComplexArray:
         """Exact mobility (n_resp, n_ref, n) of the linear model at `frequency` (Hz), as the measuring chain shows it.
 

@@ -72,7 +72,7 @@ def modes(source: OperatingPoint | ImpactTest | Frf, *, highest_Hz: float = np.i
     Hz, `.damping` (m,), `.shape` (m, responses), and `.frequency_sd` (m,) and so on, their standard errors.
     """
     if isinstance(source, OperatingPoint):
-        return [m for m in source.modes if m.frequency <= highest_Hz]
+        return source.modes_below(highest_Hz)
     if isinstance(source, Frf):
         use = source.frequency <= highest_Hz
         sd = None if source.sd is None else source.sd[..., use]

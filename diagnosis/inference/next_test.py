@@ -136,7 +136,7 @@ def _frequencies(found: Search, h: Hypothesis, spindle: Spindle, plan: Condition
     for m, size, shape in zip(h.mechanisms, sizes, h.fit.shapes, strict=True):
         applied.append((m.effect, m.values(float(np.clip(size, *m.size.limits)), shape)))
     band = spindle.hammer.band[1]
-    modes = [mode for mode in operating_point(spindle, plan, applied).modes if mode.frequency < band]
+    modes = operating_point(spindle, plan, applied).modes_below(band)
     return np.array([mode.frequency for mode in modes]), np.array([mode.damping_ratio for mode in modes])
 
 

@@ -17,6 +17,7 @@ from scipy.sparse.csgraph import connected_components
 
 from thermospindle.model.machine import MOVES, Spindle
 from thermospindle.model.rotor.chain import Matrices, RotorBase, element_rows, matrices, motion_rows, point_row
+from thermospindle.model.rotor.reduced import FINE, reduced
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.model.units import HERTZ
 
@@ -144,38 +145,64 @@ def point_rows(spindle: Spindle, chain: RotorBase, nodes: tuple[int, ...] | None
 
 
 def modes(chain: RotorBase, linear: Matrices | None = None, highest: float = np.inf) -> list[Mode]:
-    """Oscillating modes below `highest` (Hz) in order of frequency; `linear` defaults to the chain's own matrices."""
+    """Oscillating modes below `highest` (Hz) in order of frequency; `linear` defaults to the chain's own matrices.
+
+    Those of a flexible shaft below a finite `highest` come from its reduced model, frequencies to 1e-9.
+    """
     linear = linear or matrices(chain)
-    p = poles(linear)
-    found = oscillating(p, highest)
-    shapes = p.right[:, found]
-    shapes = shapes / shapes[np.argmax(np.abs(shapes), axis=0), np.arange(len(found))]
-    strain = np.array([_quadratic(element_rows(chain, e) @ shapes, e.stiffness) for e in chain.elements])
+    value, shapes = _below(linear, highest)
+    shapes = shapes / shapes[np.argmax(np.abs(shapes), axis=0), np.arange(len(value))]
+    every = np.concatenate([element_rows(chain, e) for e in chain.elements]) @ shapes
+    strain = np.array([_quadratic(part, e.stiffness) for part, e in zip(every.reshape(-1, 5, len(value)), chain.elements, strict=True)])
     strain = strain / strain.sum(axis=0)
+    names = [e.name for e in chain.elements]
     kind = kinds(linear, shapes)
     return [
         Mode(
-            frequency=float(abs(p.value[i]) / (2 * np.pi)),
-            damping_ratio=float(-p.value[i].real / abs(p.value[i])),
+            frequency=float(abs(p) / (2 * np.pi)),
+            damping_ratio=float(-p.real / abs(p)),
             kind=kind[m],
             whirl="none" if kind[m] == "axial" else _whirl(chain, shapes[:, m]),
-            energy={e.name: float(share) for e, share in zip(chain.elements, strain[:, m], strict=True)},
+            energy=dict(zip(names, strain[:, m].tolist(), strict=True)),
             shape=shapes[:, m],
-            pole=complex(p.value[i]),
+            pole=complex(p),
         )
-        for m, i in enumerate(found)
+        for m, p in enumerate(value)
     ]
 
 
-def oscillating(p: Poles, highest: float = np.inf) -> list[int]:
+def _below(linear: Matrices, highest: float) -> tuple[ComplexArray, ComplexArray]:
+    """Poles (m,) of the oscillating modes below `highest` (Hz), one of each conjugate pair, and their right vectors (n, m)."""
+    n = len(linear.mass)
+    if n <= LARGE or not np.isfinite(highest):
+        p = poles(linear)
+        found = oscillating(p, highest)
+        return p.value[found], p.right[:, found]
+    values, columns, stiffest = [], [], 0.0
+    for own in _apart(linear):  # each by itself, so that equal modes of two planes stay in their planes
+        grid = np.ix_(own, own)
+        part = Matrices(linear.mass[grid], linear.damping[grid], linear.stiffness[grid], ())
+        small = reduced(part, np.zeros((0, len(own))), HERTZ * highest, *FINE)
+        p = poles(Matrices(small.mass, small.damping, small.stiffness, ()))
+        right = np.zeros((n, len(p.value)), complex)
+        right[own] = small.basis @ p.right
+        values.append(p.value)
+        columns.append(right)
+        stiffest = max(stiffest, small.stiffest)
+    whole = Poles(np.concatenate(values), np.concatenate(columns, axis=1), ())
+    found = oscillating(whole, highest, stiffest)
+    return whole.value[found], whole.right[:, found]
+
+
+def oscillating(p: Poles, highest: float = np.inf, stiffest: float = 0.0) -> list[int]:
     """Indices of the oscillating poles below `highest` (Hz), one of each conjugate pair, in order of frequency.
 
     A body that nothing holds, as a hub whose bearings have lost contact, moves without oscillating: its double pole at zero comes
-    out as a pair of the size sqrt(rounding) of the largest pole.
+    out as a pair of the size sqrt(rounding) of the largest pole, or of `stiffest` (rad/s) where the model was reduced from a stiffer one.
     """
     size = np.abs(p.value)
     order = np.argsort(size, kind="stable")
-    return [int(i) for i in order if p.value[i].imag > FREE * size.max() and size[i] < HERTZ * highest]
+    return [int(i) for i in order if p.value[i].imag > FREE * max(size.max(), stiffest) and size[i] < HERTZ * highest]
 
 
 def _quadratic(vectors: ComplexArray, matrix: Array) -> Array:

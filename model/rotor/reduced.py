@@ -17,34 +17,37 @@ import numpy as np
 from thermospindle.model.rotor.chain import Matrices
 from thermospindle.model.types import Array
 
-BEYOND = 1.5  # times the band: modes kept as they are
+BEYOND, SMALL = 1.5, 1e-4
+"""Modes up to so many times the band are kept as they are; of the answers of those above what is smaller than this share of the largest is left out."""
+FINE = 2.0, 1e-5
+"""The same for modes and their shapes: frequencies in the band to 1e-9."""
 ORDER = 2  # of the answers of the modes above
-SMALL = 1e-4  # of the largest of these answers: directions that are left out
 
 
 @dataclass(frozen=True, eq=False)
 class Reduced:
-    """M, C + G and K (r, r) over the columns of `basis` (n, r)."""
+    """M, C + G and K (r, r) over the columns of `basis` (n, r); `stiffest` (rad/s) is the highest undamped frequency of the whole model."""
 
     basis: Array
     mass: Array
     damping: Array
     stiffness: Array
+    stiffest: float
 
 
-def reduced(linear: Matrices, rows: Array, highest: float) -> Reduced:
+def reduced(linear: Matrices, rows: Array, highest: float, beyond: float = BEYOND, small: float = SMALL) -> Reduced:
     """The reduced model of a chain with lumped (diagonal) mass for forces and responses along `rows` (m, n), up to `highest` (rad/s)."""
-    q = basis(linear, rows, highest)
-    return Reduced(q, q.T @ linear.mass @ q, q.T @ linear.damping @ q, q.T @ linear.stiffness @ q)
+    q, stiffest = _basis(linear, rows, highest, beyond, small)
+    return Reduced(q, q.T @ linear.mass @ q, q.T @ linear.damping @ q, q.T @ linear.stiffness @ q, stiffest)
 
 
-def basis(linear: Matrices, rows: Array, highest: float) -> Array:
-    """The basis (n, r) of `reduced`, with Q^T M Q = 1."""
+def _basis(linear: Matrices, rows: Array, highest: float, beyond: float, small: float) -> tuple[Array, float]:
+    """The basis (n, r) of `reduced`, with Q^T M Q = 1, and the highest undamped frequency (rad/s)."""
     root = np.sqrt(np.diag(linear.mass))
     squares, vectors = np.linalg.eigh((linear.stiffness + linear.stiffness.T) / 2 / np.outer(root, root))
-    kept = squares < (BEYOND * highest) ** 2
+    kept, stiffest = squares < (beyond * highest) ** 2, float(np.sqrt(squares[-1]))
     if kept.all():
-        return np.asarray(vectors / root[:, None])
+        return np.asarray(vectors / root[:, None]), stiffest
     damping = vectors.T @ (linear.damping / np.outer(root, root)) @ vectors
     flexible = 1 / squares[~kept, None]
     asked = vectors[:, ~kept].T @ (rows / root).T * flexible
@@ -56,5 +59,5 @@ def basis(linear: Matrices, rows: Array, highest: float) -> Array:
         last = np.concatenate([highest**2 * flexible * last, highest * flexible * (inner @ last)], axis=1)
         every.append(last)
     directions, sizes, _ = np.linalg.svd(np.concatenate(every, axis=1), full_matrices=False)
-    directions = directions[:, sizes > SMALL * sizes[0]]
-    return np.asarray(np.concatenate([vectors[:, kept], vectors[:, ~kept] @ directions], axis=1) / root[:, None])
+    directions = directions[:, sizes > small * sizes[0]]
+    return np.asarray(np.concatenate([vectors[:, kept], vectors[:, ~kept] @ directions], axis=1) / root[:, None]), stiffest

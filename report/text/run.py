@@ -57,7 +57,7 @@ def modes_json(point: OperatingPoint, highest: float) -> dict[str, Any]:
         "temperature_C": point.condition.temperature,
         "speed_rpm": point.condition.speed / RPM,
         "status": point.state.status,
-        "modes": [_mode_json(point, m) for m in point.modes if m.frequency <= highest],
+        "modes": [_mode_json(point, m) for m in point.modes_below(highest)],
     }
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.chain import Matrices
-from thermospindle.model.rotor.modes import oscillating, poles
+from thermospindle.model.rotor.modes import modes, oscillating, poles
 from thermospindle.model.rotor.reduced import reduced
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import HERTZ, RPM
@@ -59,3 +59,19 @@ def test_a_basis_of_all_modes_is_exact():
     assert len(small.mass) == len(whole.mass)
     np.testing.assert_allclose(np.sort_complex(poles(Matrices(small.mass, small.damping, small.stiffness, ())).value.imag).real,
                                np.sort_complex(poles(whole).value.imag).real, rtol=1e-6, atol=1.0)  # fmt: skip
+
+
+@pytest.mark.parametrize(("scene", "rpm"), CASES)
+def test_modes_of_the_band_are_those_of_the_whole_model(scene: str, rpm: float):
+    spindle = load(scene)
+    point = operating_point(spindle, Condition(30.0, rpm * RPM))
+    top = spindle.hammer.band[1]
+    few, every = modes(point.chain, highest=top), [m for m in modes(point.chain) if m.frequency <= top]
+    assert [(m.kind, m.whirl) for m in few] == [(m.kind, m.whirl) for m in every]
+    np.testing.assert_allclose([m.frequency for m in few], [m.frequency for m in every], rtol=1e-9)
+    np.testing.assert_allclose([m.damping_ratio for m in few], [m.damping_ratio for m in every], rtol=1e-7)
+    for mode in few:  # of a pair at one frequency any combination is a mode
+        alike = np.array([m.shape for m in every if abs(m.frequency - mode.frequency) < 1e-6 * mode.frequency]).T
+        left = mode.shape - alike @ np.linalg.lstsq(alike, mode.shape, rcond=None)[0]
+        assert np.linalg.norm(left) < 1e-4 * np.linalg.norm(mode.shape)
+        assert sum(mode.energy.values()) == pytest.approx(1.0)
