@@ -123,7 +123,8 @@ class Products:
 
 def products(mass: Array, damping: Array, stiffness: Array) -> Products:
     """The products of dM, dC, dK (k, n, n), to `EXACT` of the largest of each."""
-    of, first, power, left, right = [], [], [], [], []
+    of, first, left, right = [], [], [], []
+    power: list[int] = []
     for k in range(len(mass)):
         start = len(power)
         for exponent, change in ((2, mass[k]), (1, damping[k]), (0, stiffness[k])):
