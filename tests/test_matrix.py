@@ -193,11 +193,7 @@ def test_verbs_write_their_folders(name, verb, scene, capsys, tmp_path):
     assert all(f.stat().st_size for f in files)
 
 
-ONE_OF_TWO = pytest.mark.xfail(
-    strict=True,
-    reason="two lateral modes 2 Hz apart at 5 % damping are identified as one, off by 0.03 %, where modes beyond the band's edge leave more than noise",
-)
-OWN = [n if n in ("symmetric", "inner ring turning") else pytest.param(n, marks=[pytest.mark.slow, *[ONE_OF_TWO] * (n == "spring preload")]) for n in SCENES]
+OWN = [n if n in ("symmetric", "inner ring turning") else pytest.param(n, marks=pytest.mark.slow) for n in SCENES]
 
 
 @pytest.mark.parametrize("name", OWN)

@@ -126,7 +126,7 @@ def extract(
     return _modes(*_accepted(lines, search(lines)), unit, given, frf.shape[:2])
 
 
-def _accepted(lines: Lines, found: Fit) -> tuple[Lines, Fit, bool, list[tuple[complex, complex]]]:
+def _accepted(lines: Lines, found: Fit) -> tuple[Lines, Fit, float, list[tuple[complex, complex]]]:
     """The poles found as modes: as they are where the data accept them so, else those at one place with one shape merged.
 
     The free residues of two modes nearly at one place are mixed, and look alike before rank one is imposed on them.
@@ -139,28 +139,37 @@ def _accepted(lines: Lines, found: Fit) -> tuple[Lines, Fit, bool, list[tuple[co
     return *impose_rank_one(lines, free), twice
 
 
-def impose_rank_one(lines: Lines, free: Fit) -> tuple[Lines, Fit, bool]:
-    """The fit with R = shape participation^T for the believed poles in the band, and whether the data accept it.
+def impose_rank_one(lines: Lines, free: Fit) -> tuple[Lines, Fit, float]:
+    """The fit with R = shape participation^T for the believed poles in the band, and its strain: the rise of chi-square over what the constraints
+    alone cost, one where they cost no more; zero where the data refuse them.
 
-    It is refused if chi-square rises by more than five standard deviations over what the constraints alone cost. Then poles whose
-    residues are far from rank one are tried as two modes at nearly one place each, and if that does not help, residues stay free:
+    They are taken as they are if chi-square rises by no more than five standard deviations over their number. If not, poles whose residues are far
+    from rank one are tried as two modes at nearly one place each. What then still rises more may be what modes beyond the band leave: where the
+    information criterion prefers rank one nevertheless it stands, strained, and errors are enlarged by the strain's root. Else residues stay free:
     every function is a response of its own to one reference.
     """
     responses, references, n = lines.frf.shape
     first = believed(lines, free.poles)
     if not first.any():
-        return lines, free, True
+        return lines, free, 1.0
+    strained: list[tuple[float, Fit]] = []
     if min(responses, references) > 1:
         for trial in (make() for make in (lambda: free, lambda: split(lines, free))):
             fit = refine(lines, start_rank_one(lines, trial), 1e-3)
-            constraints = trial.unknowns - fit.unknowns
-            accepted = (fit.chi2 - trial.chi2) / trial.scale() < constraints + 5 * np.sqrt(2 * constraints)
-            if accepted and not same_mode(lines, fit.poles[: len(fit.shape)], fit.shape, 0.95).any():
-                return lines, fit, True
+            constraints, rise = trial.unknowns - fit.unknowns, (fit.chi2 - trial.chi2) / trial.scale()
+            if same_mode(lines, fit.poles[: len(fit.shape)], fit.shape, 0.95).any():
+                continue
+            if rise < constraints + 5 * np.sqrt(2 * constraints):
+                return lines, fit, 1.0
+            if not better(lines, trial, fit):
+                strained.append((rise / constraints, fit))
+    if strained:
+        strain, fit = min(strained, key=lambda found: found[0])
+        return lines, fit, strain
     flat = Lines(lines.s, lines.frf.reshape(-1, 1, n), lines.weight.reshape(-1, 1, n), lines.power)
     free = refine(lines, free, 1e-3)
     poles = np.append(free.poles[first], free.poles[~first])
-    return flat, project(flat, poles, free.residues[first], np.ones((first.sum(), 1), complex)), min(responses, references) == 1
+    return flat, project(flat, poles, free.residues[first], np.ones((first.sum(), 1), complex)), float(min(responses, references) == 1)
 
 
 def merge(lines: Lines, free: Fit) -> tuple[Fit, list[tuple[complex, complex]]]:
@@ -204,7 +213,7 @@ def start_rank_one(lines: Lines, free: Fit) -> Fit:
 def _modes(
     lines: Lines,
     fit: Fit,
-    rank_one: bool,
+    strain: float,
     twice: list[tuple[complex, complex]],
     unit: float,
     given: bool,
@@ -218,7 +227,7 @@ def _modes(
     size = np.sqrt(np.abs(np.diag(matrix)))
     known, directions = np.linalg.eigh(matrix / size / size[:, None])
     directions = directions / size[:, None] / np.sqrt(np.maximum(known, 1e-12))  # what is not known at all gets a huge error
-    covariance = directions @ directions.T * fit.scale()
+    covariance = directions @ directions.T * fit.scale() * max(strain, 1.0)
     half = len(size) // 2  # unknowns are complex: real parts first, then imaginary ones
 
     poles = fit.poles[:a]
@@ -266,7 +275,8 @@ def _modes(
     chi2 = fit.chi2 / (lines.count - fit.unknowns)
     words = ["noise as given" if given else "noise estimated from neighbouring lines"]
     words += [f"chi-square {chi2:.3g} per degree of freedom" + (", errors enlarged by its root" if chi2 > 1 else "")]
-    words += [] if rank_one else ["residues of rank one refused by the data, left free"]
+    words += [] if strain else ["residues of rank one refused by the data, left free"]
+    words += [f"residues of rank one strained, errors enlarged by {np.sqrt(strain):.2g}"] if strain > 1 else []
     words += [f"{moved} modes at two places with one shape, errors enlarged by their distance"] if moved else []
     words += [f"{np.sum(~sure)} faint or uncertain poles not reported"] if not sure.all() else []
     edges = np.round(lines.s.imag[[0, -1]] * unit / (2 * np.pi), 6)
@@ -280,6 +290,6 @@ def _modes(
         chi2,
         (np.abs(fit.residual) ** 2).mean(1).reshape(responses, references) / 2,
         (float(edges[0]), float(edges[1]), len(lines.s)),
-        rank_one,
+        strain > 0,
         "; ".join(words),
     )
