@@ -21,6 +21,7 @@ from thermospindle.model.types import Array
 
 REFERENCE = 20.0  # C at which laws are told
 KELVIN = 273.15
+LEAST = -0.999  # of what was: nothing falls further
 NEAR = 10.0  # criterion within which rivals are named in the file
 
 
@@ -126,11 +127,11 @@ def draft(diagnosis: Path, name: str, element: str | None = None) -> str:
     """
     place = _place(diagnosis, element)
     unit = place["unit"]
-    key = "relative" if unit == "%" else f"change_{unit}"
-    factor = 100.0 if unit == "%" else 1.0
     rows = place["change"]
-    temperature, speed = (np.array([float(r[k]) for r in rows]) for k in ("temperature_C", "speed_rpm"))
-    change, sd = factor * np.array([float(r[key]) for r in rows]), factor * np.array([float(r["sd"]) for r in rows])
+    temperature, speed, sd = (np.array([float(r[k]) for r in rows]) for k in ("temperature_C", "speed_rpm", "sd"))
+    change = np.array([float(r["relative" if unit == "%" else f"change_{unit}"]) for r in rows])
+    if unit == "%":  # free forms count per cent of a logarithm
+        change, sd = 100 * np.log1p(np.maximum(change, LEAST)), 100 * sd / (1 + np.maximum(change, LEAST))
     top = float(np.max(np.abs(speed))) or 1.0
     share = np.abs(speed) / top
     candidates = [fit_law(law, temperature, share, change, np.maximum(sd, 1e-9)) for law in laws(np.ptp(temperature) > 1, np.ptp(speed) > 1)]
@@ -169,6 +170,7 @@ def _text(name: str, place: Mapping[str, Any], ranked: Sequence[Fitted], top: fl
         f"size {size:.4g} +- {best.sd[0]:.2g} {unit}; what is there everywhere {offset:.4g} +- {best.sd[1]:.2g} {unit}"
         + "".join(f", {s[0]} {v:.4g} +- {e:.2g} {s[1]}" for s, v, e in shape)
         + ".",
+        *([f"Per cent of a logarithm: {place['element']} is exp(change / 100) of what it was."] if unit == "%" else []),
         f"Rivals by the Bayesian information criterion: {rivals}.",
         '"""',
         "",

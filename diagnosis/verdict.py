@@ -41,6 +41,14 @@ class Drift:
     pattern: Chosen | None
     gain: float
 
+    @property
+    def told(self) -> list[tuple[float, float]]:
+        """Change and standard error of every test: what free forms count in per cent of a logarithm as a share of what was."""
+        if self.unit != "%":
+            return [(float(a), float(s)) for a, s in zip(self.change, self.sd, strict=True)]
+        factor = np.exp(self.change / 100)
+        return [(float(100 * (f - 1)), float(f * s)) for f, s in zip(factor, self.sd, strict=True)]
+
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:

@@ -86,7 +86,7 @@ def drifts(d: Diagnosis) -> Figure:
     figure = Figure(figsize=(8.6, 2.3 * len(shown) + 0.3), layout="constrained")
     for k, p in enumerate(shown):
         axes = figure.add_subplot(len(shown), 1, k + 1)
-        _over_temperature(axes, p.conditions, p.change, p.sd)
+        _over_temperature(axes, p.conditions, *np.array(p.told).T)
         axes.set_ylabel(f"change, {'%' if p.unit == '%' else 'µm'}")
         axes.set_title(f"{p.element}: {p.gain:.0f} in ln evidence")
     return figure

@@ -68,7 +68,7 @@ def _verdict(answer: dict[str, Any]) -> str:
     ]
     grid = _grid("Error, rms in standard errors: with tolerances fitted, and with what the verdict names.", ["", "before", "after"], rows)
     card = f'<div class="cards"><div class="card"><span>verdict</span><b>{escape(answer["verdict"] + named)}</b></div></div>'
-    said = "".join(f"<p>{prose(answer[key])}</p>" for key in ("reason", "would_change"))
+    said = "".join(f"<p>{prose(answer[key])}</p>" for key in ("reason", "would_change")) + "".join(f"<p>{prose(s)}</p>" for s in answer["law_departs"])
     free = f"<p>Without any catalogue: {prose(answer['misfit']['words'][0])}</p>" if answer["misfit"]["rejected"] else ""
     return card + said + free + grid
 

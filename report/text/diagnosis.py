@@ -17,6 +17,8 @@ from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 
 SHOWN = 12  # candidates
+DEPARTS = 0.3  # of the size, from which a law is said not to hold
+ALIKE = 0.9  # of the evidence of what the verdict names, from which a free drift does as well
 ASKED = 5.0  # ln evidence from which an effect is seen: where `detectable` lies
 
 
@@ -31,6 +33,7 @@ def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
         "effects": list(v.effects),
         "reason": v.reason,
         "would_change": would_change(d),
+        "law_departs": law_words(d),
         "probability": {"none": v.probability_none, "unknown": v.probability_unknown},
         "expected_loss": dict(v.losses),
         "candidates": [_candidate(c, d) for c in v.candidates[:SHOWN]],
@@ -167,7 +170,7 @@ def _place(p: Drift, d: Diagnosis) -> dict[str, Any]:
         "unit": p.unit,
         "change": [
             {**_condition(c), ("relative" if p.unit == "%" else f"change_{p.unit}"): _scaled(a, p.unit), "sd": _scaled(s, p.unit)}
-            for c, a, s in zip(p.conditions, p.change, p.sd, strict=True)
+            for c, (a, s) in zip(p.conditions, p.told, strict=True)
         ],
         "with": p.pattern.shape.name if p.pattern else "",
         "removes": float(np.clip(p.gain / best, 0.0, 1.0)) if best > 0 else 0.0,
@@ -216,15 +219,29 @@ def drift_words(d: Diagnosis) -> list[str]:
     """What would have to drift, in sentences."""
     if d.verdict.word == "none":
         return ["No element has to drift: tolerances and measuring errors explain the data."]
-    told = []
-    for p in d.drifts[:3]:
-        low, high = int(np.argmin(p.change)), int(np.argmax(p.change))
-        goes = f", {p.pattern.shape.name}" if p.pattern and p.pattern.shape.name != "constant" else ""
-        told.append(
-            f"{p.element}: from {p.change[low]:+.3g} +- {p.sd[low]:.1g} {p.unit} {_where(p.conditions[low])} to {p.change[high]:+.3g} +- "
-            f"{p.sd[high]:.1g} {p.unit} {_where(p.conditions[high])}{goes} ({p.gain:.0f} in ln evidence)."
-        )
-    return told or ["No single element explains the misfit by drifting."]
+    return [f"{_drift_words(p)} ({p.gain:.0f} in ln evidence)." for p in d.drifts[:3]] or ["No single element explains the misfit by drifting."]
+
+
+def _drift_words(p: Drift) -> str:
+    low, high = int(np.argmin(p.change)), int(np.argmax(p.change))
+    goes = f", {p.pattern.shape.name}" if p.pattern and p.pattern.shape.name != "constant" else ""
+    (least, its_sd), (most, sd) = p.told[low], p.told[high]
+    return (
+        f"{p.element}: from {least:+.3g} +- {its_sd:.1g} {p.unit} {_where(p.conditions[low])} to {most:+.3g} +- "
+        f"{sd:.1g} {p.unit} {_where(p.conditions[high])}{goes}"
+    )
+
+
+def law_words(d: Diagnosis) -> list[str]:
+    """Of every effect that the verdict names and whose law the data do not have: that, and what they have instead."""
+    v, found = d.verdict, []
+    lead = next((c for c in v.candidates if c.hypothesis is v.accepted), None)
+    for m, departure in zip(lead.hypothesis.mechanisms, v.accepted.evidence.learned.departures, strict=True) if lead else ():
+        if departure >= DEPARTS:
+            same = [p for p in d.drifts if p.pattern and lead and p.gain > ALIKE * lead.delta_evidence]
+            instead = f"; {_drift_words(same[0])}, does as well without any law" if same else ""
+            found.append(f"The data do not have the law that {m.name} assumes{instead}.")
+    return found
 
 
 def _where(c: Condition) -> str:
@@ -272,6 +289,8 @@ def show_diagnosis(console: Console, answer: dict[str, Any], verbose: bool = Tru
     joined = (" and " if answer["verdict"] == "two effects" else ", ").join(answer["effects"])
     console.print(f"{answer['verdict']}: {SENTENCES[answer['verdict']].format(joined)}", style="bold")
     console.print(answer["reason"])
+    for sentence in answer["law_departs"]:
+        console.print(sentence)
     console.print(answer["would_change"])
     error = answer["error"]
     console.print(
