@@ -294,6 +294,7 @@ def _parser() -> tuple[_Parser, dict[str, argparse.ArgumentParser]]:
     bench = verb("workbench", ("workbench", "workbench"), "a page in the browser, on this machine alone: move effects and parameters, see FRFs and errors change")
     bench.add_argument("campaign", metavar="CAMPAIGN", type=Path, nargs="?", default=None, help="tests to set the model beside; without them it is set beside itself")
     bench.add_argument("--diagnosis", type=Path, metavar="DIAGNOSIS.json", help="explanations to begin with: the answer of diagnose --json")
+    held_out(bench, "tests to leave out of the fit at the beginning (by default those that the scene's build table does not list)")
     bench.add_argument("--port", type=_port, help="of this machine's loopback interface (a free one by default)")
     bench.add_argument("--no-browser", action="store_true", help="print the address, and open no browser")
     effects = verb("effects", ("catalogue", "effects"), "the catalogue of physical effects, or one of them explained", what="")

@@ -22,15 +22,16 @@ def workbench(
     diagnosis: Path | None = None,
     port: int = 0,
     no_browser: bool = False,
+    held_out_tests: Sequence[str] = (),
     effect_files: Sequence[Path] = (),
     out: Path | None = None,
 ) -> Answer:
     """A page on this machine alone, served until it is interrupted; what is saved there goes into folders of `out`. `port` 0 is any free one."""
     if campaign is None:
-        bench = open_bench(scene, None, effect_files)
+        bench = open_bench(scene, None, effect_files, left_out=held_out_tests)
     else:
         with progress_bar(1) as progress:
-            bench = open_bench(scene, campaign, effect_files, progress)
+            bench = open_bench(scene, campaign, effect_files, progress, held_out_tests)
     known = read_explanations(diagnosis, bench) if diagnosis else None
     out = Path("out") / f"{bench.spindle.name}_workbench" if out is None else out
     made, address = server(bench, out, known, port)

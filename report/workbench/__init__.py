@@ -7,6 +7,7 @@ section       the section as polygons that move with their bodies
 explanations  explanations with their probabilities, from a diagnosis read or made here
 save          scene, report, and the script that does the same without the page
 plots         FRFs, the map of errors and the moving section as Bokeh figures
+words         what the page says in words and tables
 controls      a slider for every parameter and tolerance
 page          one tab: it shows a session and turns what a user does into actions on it
 server        the page served on the loopback interface, under a token

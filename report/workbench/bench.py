@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from thermospindle.diagnosis.compare.before_after import held_out
 from thermospindle.diagnosis.compare.compare import TestComparison, compare, rms_residual
 from thermospindle.diagnosis.compare.fit import Fitted, Free, fit
 from thermospindle.diagnosis.data.observe import Observation, condition_of, observe
@@ -59,6 +60,7 @@ class Bench:
     campaign: Campaign | None = None
     observations: tuple[Observation, ...] = ()
     effect_files: tuple[Path, ...] = ()
+    left_out: tuple[str, ...] = ()  # tests that are left out at the beginning
     modes: dict[str, list[Mode]] = field(default_factory=dict)  # of the scene as it was opened, where there are no tests
 
     def effect(self, name: str) -> Effect:
@@ -105,23 +107,33 @@ class Errors:
 
 
 def open_bench(
-    scene: Path, campaign: Path | None = None, effect_files: Sequence[Path] = (), progress: Callable[[str], None] = lambda done: None
+    scene: Path,
+    campaign: Path | None = None,
+    effect_files: Sequence[Path] = (),
+    progress: Callable[[str], None] = lambda done: None,
+    left_out: Sequence[str] = (),
 ) -> Bench:
-    """Read a scene and a campaign; FRFs are turned into modes once. `BadInput` for what cannot be used, a campaign of runout alone among it."""
+    """Read a scene and a campaign; FRFs are turned into modes once. Tests `left_out` are those that the scene was not fitted to where none are named.
+
+    `BadInput` for what cannot be used, a campaign of runout alone among it.
+    """
     file = scene_path(scene)
     spindle, catalogue = equipped(load(file), effect_files)
     present = {a.effect for a in spindle.effects}
     seen = tuple(e for e in usable(spindle, catalogue) if e.name not in present and any(getattr(e, h) for h in HOOKS if h != "imperfections"))
     bench = Bench(file, spindle, seen, tuple(toleranced(spindle)), (), effect_files=tuple(effect_files))
     if campaign is None:
+        if left_out:
+            raise BadInput(f"--held-out {left_out[0]}: without a campaign there is no test to leave out")
         bench = replace(bench, shown=tuple(_conditions(spindle)))
         return replace(bench, modes={s.id: _point(bench, spindle, s).modes for s in bench.shown})
     tests = modal_tests(read_campaign(campaign))
     if not tests.tests:
         raise BadInput(f"{campaign}: holds runout tests alone; the workbench needs tests of modes (spindle compare and diagnose take runout)")
+    unseen = held_out(spindle, tests, left_out)
     observed = observe(tests, spindle, progress)
     shown = tuple(Shown(t.id, condition_of(t), t) for t in tests.tests)
-    return replace(bench, campaign=tests, observations=tuple(observed), shown=shown)
+    return replace(bench, campaign=tests, observations=tuple(observed), shown=shown, left_out=unseen)
 
 
 def _conditions(spindle: Spindle) -> list[Shown]:
@@ -203,12 +215,13 @@ def _rms(tests: Sequence[TestComparison], s: Setting, left_out: bool) -> float |
 
 def _changes(bench: Bench, s: Setting, shown: Shown) -> list[Cell]:
     first = [m for m in bench.modes[shown.id] if m.frequency <= ABOVE * bench.spindle.hammer.band[1]]
+    kinds = [m.kind for m in bench.modes[bench.shown[0].id]]  # a row has one name at all conditions
     point = _point(bench, built(bench, s), shown)
     mass, then = point.linear.mass, point.modes
     alike = bool(first) and len(first[0].shape) == len(mass)
     partner = follow(mass, first, then) if alike else list(range(min(len(first), len(then))))
     return [
-        Cell(f"{k} {m.kind}", shown.id, 100 * (then[j].frequency / m.frequency - 1), 100 * (then[j].damping_ratio / m.damping_ratio - 1),
+        Cell(f"{k} {kinds[k - 1] if k <= len(kinds) else m.kind}", shown.id, 100 * (then[j].frequency / m.frequency - 1), 100 * (then[j].damping_ratio / m.damping_ratio - 1),
              f"{m.frequency:.1f} Hz as opened, {then[j].frequency:.1f} Hz now")
         for k, (m, j) in enumerate(zip(first, partner, strict=False), 1) if j >= 0
     ]  # fmt: skip

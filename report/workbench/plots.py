@@ -25,7 +25,7 @@ from matplotlib.colors import to_hex
 from thermospindle.model.types import ComplexArray
 from thermospindle.report.figures.common import residual_norm, signed_short
 from thermospindle.report.figures.compare import UNITS
-from thermospindle.report.workbench.bench import Bench, Cell, Curves, Errors
+from thermospindle.report.workbench.bench import Bench, Curves, Errors
 from thermospindle.report.workbench.section import LARGEST, Piece
 from thermospindle.report.workbench.state import Setting
 
@@ -130,10 +130,6 @@ class ErrorMap:
         return (CONDITIONS if self.bench.campaign is None else LEFT_OUT if test in s.left_out else FITTED, test)
 
 
-def worst(cells: Sequence[Cell]) -> Cell | None:
-    return max(cells, key=lambda c: abs(c.frequency), default=None)
-
-
 # ---------------------------------------------------------------- the moving section
 
 
@@ -164,7 +160,7 @@ class MovingSection:
         self.figure.grid.grid_line_color = None
         self.figure.xaxis.axis_label = "r, mm"
         self.figure.yaxis.axis_label = "z, mm"
-        self.figure.axis.ticker = SingleIntervalTicker(interval=_round_step(half[0] / 2))
+        self.figure.axis.ticker = SingleIntervalTicker(interval=_round_step(max(half) / 2))
         self.play = Toggle(label="Play", active=False, name="play", width=90)
         move = CustomJS(args={"motion": self.motion, "now": self.now, "play": self.play}, code=MOVE)
         self.play.js_on_change("active", move)

@@ -8,6 +8,7 @@ from pprint import pformat
 from thermospindle.diagnosis.add import check_place, scene_with
 from thermospindle.diagnosis.compare.compare import compare
 from thermospindle.model.errors import BadInput
+from thermospindle.model.scene.reading import SCENES
 from thermospindle.report.folder import mark, whole_folder
 from thermospindle.report.page.compare import write_comparison
 from thermospindle.report.workbench.bench import Bench, Errors, built
@@ -45,7 +46,8 @@ def save(bench: Bench, s: Setting, errors: Errors, ladder: tuple[Rung, ...], out
 
 def script(bench: Bench, s: Setting) -> str:
     """A Python script that builds the same spindle and prints the same errors."""
-    scene, files = str(bench.scene.resolve().parent), [str(f.resolve()) for f in bench.effect_files]
+    folder, files = bench.scene.resolve().parent, [str(f.resolve()) for f in bench.effect_files]
+    scene = folder.name if folder.parent == SCENES.resolve() else str(folder)
     lines = [
         '"""What was set on the workbench of Thermospindle, without its page."""',
         "",

@@ -14,6 +14,8 @@ from bokeh.application.handlers.function import FunctionHandler
 from bokeh.core.validation import silence
 from bokeh.core.validation.warnings import EMPTY_LAYOUT
 from bokeh.document import Document
+from bokeh.events import ConnectionLost
+from bokeh.models import CustomJS
 from bokeh.server.server import Server
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
@@ -49,7 +51,7 @@ def server(bench: Bench, out: Path, known: Explanations | None = None, port: int
     try:
         made = Server(
             Application(FunctionHandler(page_of(bench, out, known))), port=chosen, address=LOOPBACK, prefix=secret,
-            allow_websocket_origin=[f"{LOOPBACK}:{chosen}"], check_unused_sessions_milliseconds=5000, unused_session_lifetime_milliseconds=15000,
+            allow_websocket_origin=[f"{LOOPBACK}:{chosen}"], ico_path="none", check_unused_sessions_milliseconds=5000, unused_session_lifetime_milliseconds=15000,
         )  # fmt: skip
     except OSError as error:
         raise BadInput(f"--port {chosen}: {error.strerror or error}; another port, or none for a free one, is needed") from None
@@ -72,6 +74,7 @@ def page_of(bench: Bench, out: Path, known: Explanations | None) -> Callable[[Do
         for name, model in page.roots().items():
             model.name = name
             document.add_root(model)
+        document.js_on_event(ConnectionLost, CustomJS(code="dispatchEvent(new Event('spindle:lost'))"))
         document.title = f"Workbench: {bench.spindle.title}"
         document.template = template
         document.template_variables.update(words(bench))

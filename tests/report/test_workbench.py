@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 import time
+from collections import deque
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from bokeh.document import Document
 
 from tests.conftest import DATA, SCENE
+from thermospindle.diagnosis.add import scene_with
 from thermospindle.diagnosis.compare.compare import compare
 from thermospindle.model.errors import BadInput
 from thermospindle.report.workbench import bench as benches
@@ -212,7 +214,7 @@ def test_slow_machines_compute_less_while_dragging(page, monkeypatch):
         ({"all": 0.3, "shown": 0.01}, ["shown"], "the shown test"),
         ({"all": 0.9, "shown": 0.3}, [], "nothing until you let go"),
     ):
-        page.cost = cost
+        page.costs = {what: deque([1.0, seconds]) for what, seconds in cost.items()}
         page.show_status(page.session.now)
         assert f"this computes {says}" in page.status.text
         computed.clear()
@@ -229,6 +231,30 @@ def test_left_out_tests_stand_apart(page):
     hatched = {x[1]: h for x, h in zip(page.map.source.data["x"], page.map.source.data["hatch"], strict=True)}
     assert hatched == {"T20_n0": "right_diagonal_line", "T60_n0": "blank"}
     assert "1 left-out test" in page.status.text
+
+
+def test_the_map_is_there_as_a_table_of_the_same_numbers(page):
+    told_ = {c.frequency for c in page.found.cells if c.test == "T60_n0"}
+    assert page.numbers.text.count("<th scope=row>") == len(told_)
+    assert all(f"<td>{v:+.2f}</td>" in page.numbers.text for v in told_)
+    page.quantity.active = 1
+    damping = next(c.damping for c in page.found.cells)
+    assert f"<td>{damping:+.2f}</td>" in page.numbers.text
+    assert f"{damping:+.1f}".replace("-", "−") in page.map.source.data["text"]
+
+
+def test_tests_that_a_scene_was_not_fitted_to_are_left_out_at_first(bench, tmp_path):
+    s = state.leave_out(state.set_deviation(Setting(), "hub mass", 0.001), ["T60_n0"])
+    tests = [x.id for x in bench.shown if x.id not in s.left_out]
+    (tmp_path / "scene").mkdir()
+    scene_with(SCENE, {}, s.deviations, tests, "a test", tmp_path / "scene", tmp_path / "scene")
+    again = benches.open_bench(tmp_path / "scene", SCENE / "measured" / "jang_2003")
+    assert again.left_out == ("T20", "T60")
+    assert Page(again, Document(), tmp_path).session.now.left_out == {"T20", "T60"}
+    with pytest.raises(BadInput, match="--held-out T99: is no test"):
+        benches.open_bench(SCENE, SCENE / "measured" / "jang_2003", left_out=["T99"])
+    with pytest.raises(BadInput, match="without a campaign there is no test"):
+        benches.open_bench(SCENE, left_out=["T20"])
 
 
 def test_where_no_spindle_can_be_built_the_page_says_so(page, monkeypatch):

@@ -86,8 +86,8 @@ def test_with_the_token_the_page_comes_and_needs_no_other_host(served):
 def test_without_the_token_nothing_is_served(served, path):
     base = served["address"].removesuffix(served["token"] + "/")
     code, text = status(base + path)
-    assert code in ((403,) if path != "favicon.ico" else (200, 403))
-    assert code == 200 or "needs the token that `spindle workbench` printed" in text
+    assert code == (404 if path == "favicon.ico" else 403)
+    assert path == "favicon.ico" or "needs the token that `spindle workbench` printed" in text
     assert served["token"] not in text
 
 
@@ -300,8 +300,11 @@ def test_other_scenes_without_tests(scene, chromium, tmp_path):
         chromium.wait("document.body?.dataset.ready === 'yes'", 60)
         assert "while a slider moves, this computes" in errors_told(chromium)
         assert chromium.run(f"{chromium.model('map')}.y_range.factors.length") > 3
+        assert chromium.errors == []
     finally:
         process.send_signal(signal.SIGTERM)
         process.communicate(timeout=20)
     assert process.returncode == 0
-    assert chromium.errors == []
+    chromium.wait("document.getElementById('lost').hidden === false")
+    chromium.open("about:blank")  # a page whose server is gone goes on asking for it
+    chromium.run("0")
