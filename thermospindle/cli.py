@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from thermospindle.model.errors import BadInput, NoEquilibrium, NotConverged, OutsideRange, Unanswered, instead
-from thermospindle.model.rotor.elements import ELEMENTS
+from thermospindle.model.rotor.elements import ELEMENTS, HAMMER
 from thermospindle.model.shaft import THEORIES
 from thermospindle.report.folder import COMMAND
 
@@ -226,7 +226,8 @@ def _parser() -> tuple[_Parser, dict[str, argparse.ArgumentParser]]:
 
     def hammer(added: argparse.ArgumentParser) -> None:
         speed(added)
-        element(added)
+        text = "bearing element of the time simulation; reduced computes the linear model's records without it, for long records and stiff beams"
+        added.add_argument("--element", choices=HAMMER, help=text)
         added.add_argument("--hits", type=_count(HITS), help="hits on each hammer point (the scene's by default)")
         added.add_argument("--level", type=_up_to(NEWTONS, unit=" N"), metavar="N", help="peak force of the hammer (the scene's by default)")
         added.add_argument("--seed", type=_seed, help="of hammer scatter and sensor noise")

@@ -1,4 +1,8 @@
-"""The bearing elements of the time simulation."""
+"""The bearing elements of the time simulation, and what else a hammer test can be computed with."""
 
 ELEMENTS = ("linear", "ball-by-ball")
 """The tangent stiffness at the operating point, or every ball by itself."""
+
+REDUCED = "reduced"
+HAMMER = (*ELEMENTS, REDUCED)
+"""Of a hammer test: also the linear spindle by its reduced model, stepped exactly and without MuJoCo."""

@@ -124,7 +124,7 @@ def add_matrices(out: mujoco.MjSpec, name: str, stiffness: Array, damping: Array
     sizes = {"stiffness": value if k.any() else np.zeros(len(value)), "damping": np.diag(along)}
     for i, row in enumerate(vector.T @ rows):
         present = {kind: [size[i], 0, 0] for kind, size in sizes.items() if abs(size[i]) > 1e-14 * np.abs(size).max(initial=0.0)}
-        if present:
+        if present and row.any():
             _wrap(out.add_tendon(name=f"{name}{i}", **present), chain, row)
 
 

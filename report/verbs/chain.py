@@ -11,6 +11,7 @@ from rich.console import Console
 from thermospindle.model import sense
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.rotor.elements import ELEMENTS
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import NM, RPM
 from thermospindle.report.folder import mark, whole_folder
@@ -26,6 +27,7 @@ from thermospindle.report.verbs.answer import (
 )
 from thermospindle.sim.campaign.campaign import Campaign, write_campaign
 from thermospindle.sim.campaign.simulated import runout_campaign
+from thermospindle.sim.hammer.test import stages
 from thermospindle.sim.run import Run
 from thermospindle.sim.run import run as whole_chain
 
@@ -48,7 +50,7 @@ def run(
     out = Path("out") / load(scene).name if out is None else out
     spindle = with_hammer(with_effects(scene, effect_files)[0], hits, level)
     steps = temperatures_or_range(temperatures, spindle)
-    with whole_folder(out) as folder, progress_bar(3 * len(steps) + 4) as progress:
+    with whole_folder(out) as folder, progress_bar(2 * len(steps) + stages(spindle.hammer, len(steps)) + 4) as progress:
         result = whole_chain(spindle, steps, speed_rpm * RPM, element, seed, progress)
         text.write_run(result, folder, progress)
         values = text.run_json(result) | {"out": str(out), "warnings": _doubts(result)}
@@ -101,6 +103,8 @@ def simulate(
         raise BadInput("--out: simulate needs the campaign folder to write")
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise BadInput(f"--out {out}: is not empty; a campaign is written to a new or empty folder")
+    if runout and element not in ELEMENTS:
+        raise BadInput(f"--element {element}: is for hammer tests; a turning spindle is stepped with {' or '.join(ELEMENTS)}")
     if speeds_rpm is not None and not runout:
         raise BadInput("--speeds: is for --runout; hammer tests take one --speed")
     for option, value in (("--seconds", seconds), ("--noise-nm", noise_nm)):
@@ -159,7 +163,7 @@ def report(
 
 
 def _virtual_tests(spindle: Spindle, temperatures: Sequence[float], speed_rpm: float, element: str, seed: int) -> Run:
-    with progress_bar(3 * len(temperatures)) as progress:
+    with progress_bar(2 * len(temperatures) + stages(spindle.hammer, len(temperatures))) as progress:
         return whole_chain(spindle, temperatures, speed_rpm * RPM, element, seed, progress)
 
 

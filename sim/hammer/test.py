@@ -12,7 +12,9 @@ import copy
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import islice
+from functools import partial
+from itertools import islice, pairwise
+from math import ceil
 from typing import TypeVar
 
 import mujoco
@@ -22,16 +24,17 @@ from scipy.signal import resample_poly
 
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import HammerTest
+from thermospindle.model.rotor.elements import REDUCED
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import Measurement
 from thermospindle.sim.hammer.estimate import Estimate, Windows, estimate
 from thermospindle.sim.hammer.pulse import Hit, check_band, draw_hits, force, pulse_duration
+from thermospindle.sim.hammer.reduced import MARGIN, PIECES, simulate_reduced, with_long_step
 from thermospindle.sim.operating import OperatingPoint
 
 T = TypeVar("T")
 
 MOST_STEPS = 5_000_000  # of one record: a minute of a large model
-MARGIN = 64  # samples of quiet simulated past the record, so that the anti-alias filter ends outside it
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,25 +68,27 @@ def impact_tests(
 ) -> list[ImpactTest]:
     """Impact tests at several operating points of one spindle, with as many hits side by side as there are cores.
 
-    `settings` default to the scene's. `element` is a bearing element of `model.rotor.mjcf`. The same seed gives the same test.
-    `progress` is told when a point is done.
+    `settings` default to the scene's. `element` is one of `model.rotor.elements.HAMMER`. The same seed gives the same test.
+    `progress` is told of every piece of the records and of every point, `stages` times in all.
     """
     test = settings or points[0].spindle.hammer
     check_band(test, str(points[0].spindle.file or points[0].spindle.name))
+    if element == REDUCED:
+        test = with_long_step(test)
     every, steps = sampling(test)
     if steps > MOST_STEPS:
         raise BadInput(
             f"{points[0].spindle.file or points[0].spindle.name}: the stiffest mode of the model asks for steps of {test.step * 1e6:.3g} us, {steps:.2g} of them a "
-            "record; shafts with beam = timoshenko or rayleigh, longer elements or a shorter record_length_s take fewer"
+            "record; shafts with beam = timoshenko or rayleigh, longer elements or a shorter record_length_s take fewer, and --element reduced needs none"
         )
-    for point in points:
-        check_step(point, test.step)
-    at_once = max(1, (os.cpu_count() or 1) // (test.hits * len(test.hammer_nodes)))
+    if element != REDUCED:
+        for point in points:
+            check_step(point, test.step)
     results = []
-    for batch in batched(enumerate(points), at_once):
+    for batch in batched(enumerate(points), _at_once(test)):
         hits = [[draw_hits(test, np.random.default_rng([seed, i, node])) for node in test.hammer_nodes] for i, _ in batch]
-        models = [p.model if element == "linear" else p.spec(element).compile() for _, p in batch]
-        simulated = simulate([_with_step(model, test.step) for model in models], test, hits, steps)
+        named = ", ".join(f"{p.condition.temperature:g} C" for _, p in batch)
+        simulated = _simulated([p for _, p in batch], test, element, hits, steps, partial(_told, progress, named))
         for (i, point), (held, velocity) in zip(batch, simulated, strict=True):
             random = np.random.default_rng([seed, i]) if noise else None
             record = acquire(test, held, velocity, every, random, point.measurement)
@@ -97,6 +102,30 @@ def batched(items: Iterable[T], size: int) -> Iterator[list[T]]:
     iterator = iter(items)
     while batch := list(islice(iterator, size)):
         yield batch
+
+
+def _told(progress: Callable[[str], None], where: str, done: str) -> None:
+    progress(f"{where}: {done}")
+
+
+def _simulated(
+    points: Sequence[OperatingPoint], test: HammerTest, element: str, hits: Sequence[Sequence[Sequence[Hit]]], steps: int, progress: Callable[[str], None]
+) -> list[tuple[Array, Array]]:
+    if element == REDUCED:
+        found = [simulate_reduced(point, test, own, steps) for point, own in zip(points[:-1], hits[:-1], strict=True)]
+        return [*found, simulate_reduced(points[-1], test, hits[-1], steps, progress)]
+    models = [p.model if element == "linear" else p.spec(element).compile() for p in points]
+    return simulate([_with_step(model, test.step) for model in models], test, hits, steps, progress)
+
+
+def stages(test: HammerTest, points: int) -> int:
+    """How often `impact_tests` tells of its progress."""
+    return points + PIECES * ceil(points / _at_once(test))
+
+
+def _at_once(test: HammerTest) -> int:
+    """Points whose hits are simulated side by side."""
+    return max(1, (os.cpu_count() or 1) // (test.hits * len(test.hammer_nodes)))
 
 
 def sampling(test: HammerTest) -> tuple[int, int]:
@@ -120,26 +149,36 @@ def check_step(point: OperatingPoint, step: float) -> None:
 
 
 def simulate(
-    models: Sequence[mujoco.MjModel], test: HammerTest, hits: Sequence[Sequence[Sequence[Hit]]], steps: int
+    models: Sequence[mujoco.MjModel],
+    test: HammerTest,
+    hits: Sequence[Sequence[Sequence[Hit]]],
+    steps: int,
+    progress: Callable[[str], None] = lambda done: None,
 ) -> list[tuple[Array, Array]]:
     """Held force (references, hits, steps) and velocity (references, hits, responses, steps) of every model's hits, all at once in C.
 
-    `hits[model][reference]` are the hits on one hammer node.
+    `hits[model][reference]` are the hits on one hammer node. Records are made in `PIECES`, each from where the last one ended: what is between
+    needs no memory, and `progress` is told.
     """
     held = np.array([[[force(hit, test.step, steps) for hit in row] for row in own] for own in hits])
     count, references, repeats = held.shape[:3]
-    control = np.zeros((count, references, repeats, steps, models[0].nu))
-    for r, node in enumerate(test.hammer_nodes):
-        control[:, r, :, :, models[0].actuator(f"hammer{node}").id] = held[:, r]
-    state = np.array([loaded_state(model) for model in models])
-    threads = min(os.cpu_count() or 1, count * references * repeats)
     many = [model for model in models for _ in range(references * repeats)]
+    state = np.repeat(np.array([loaded_state(model) for model in models]), references * repeats, axis=0)
+    actuators = [models[0].actuator(f"hammer{node}").id for node in test.hammer_nodes]
+    velocity = np.empty((len(many), models[0].nsensordata, steps))
+    threads = min(os.cpu_count() or 1, len(many))
+    edges = np.linspace(0, steps, PIECES + 1).astype(int)
     with Rollout(nthread=threads) as pool:
         data = [mujoco.MjData(models[0]) for _ in range(threads)]
-        start = np.repeat(state, references * repeats, axis=0)
-        _, sensors = pool.rollout(many, data, start, control.reshape(len(many), steps, -1))
-    velocity = np.moveaxis(sensors.reshape(count, references, repeats, steps, -1), 4, 3)
-    return list(zip(held, velocity, strict=True))
+        for k, (first, after) in enumerate(pairwise(edges.tolist()), 1):
+            control = np.zeros((count, references, repeats, after - first, models[0].nu))
+            for r, actuator in enumerate(actuators):
+                control[:, r, :, :, actuator] = held[:, r, :, first:after]
+            states, sensors = pool.rollout(many, data, state, control.reshape(len(many), after - first, -1))
+            state = np.ascontiguousarray(states[:, -1])
+            velocity[:, :, first:after] = sensors.transpose(0, 2, 1)
+            progress(f"{len(many)} hits, {k * 100 // PIECES} % of the records simulated")
+    return list(zip(held, velocity.reshape(count, references, repeats, -1, steps), strict=True))
 
 
 def _with_step(model: mujoco.MjModel, step: float) -> mujoco.MjModel:

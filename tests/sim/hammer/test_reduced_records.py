@@ -1,0 +1,65 @@
+"""Records by the reduced model: against exact FRFs of the whole linear model, against MuJoCo, and where MuJoCo's step would be too short."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.conftest import ROOT
+from tests.sim.hammer.test_impact import error, exact_frf
+from thermospindle.model.errors import BadInput
+from thermospindle.model.machine import Condition
+from thermospindle.model.scene.reading import load
+from thermospindle.model.units import RPM
+from thermospindle.sim.hammer import test as hammer_test
+from thermospindle.sim.hammer.reduced import IMAGES
+from thermospindle.sim.hammer.test import impact_tests, stages
+from thermospindle.sim.operating import operating_point
+from thermospindle.sim.run import identify
+
+SCENES = ROOT / "scenes"
+
+
+def quick_point(name, rpm=0.0, **changes):
+    spindle = load(SCENES / name)
+    spindle = replace(spindle, hammer=replace(spindle.hammer, hits=1, **changes))
+    return operating_point(spindle, Condition(25.0, rpm * RPM))
+
+
+@pytest.mark.parametrize(("scene", "rpm"), [("five_bearing", 0.0), ("five_bearing", 12000.0), ("hdd_2003", 7200.0)])
+def test_records_hold_the_exact_frfs(scene, rpm):
+    """Of the whole model, gyroscopic terms included, to the images of the held force, which show most between resonances."""
+    test = impact_tests([quick_point(scene, rpm)], element="reduced", noise=False)[0]
+    assert error(test, exact_frf(test, test.estimate.window_decay)) < 8 * IMAGES
+
+
+def test_records_are_those_of_mujoco():
+    point = quick_point("five_bearing", record_length=0.02)
+    same = replace(point.spindle.hammer, hammer_nodes=(1,))
+    mujoco, small = (impact_tests([point], same, element, noise=False)[0].record for element in ("linear", "reduced"))
+    size = np.abs(mujoco.velocity).max()
+    assert np.abs(small.velocity - mujoco.velocity).max() < 2e-3 * size
+    assert size > 0
+
+
+def test_a_beam_too_stiff_to_step():
+    """A thin shaft without rotary inertia: MuJoCo's step would be 0.07 us; the message says what to ask for, and that finds its modes."""
+    point = quick_point("free_shaft")
+    with pytest.raises(BadInput, match="--element reduced"):
+        impact_tests([point])
+    test = impact_tests([point], element="reduced")[0]
+    found = identify(test)
+    wanted = [m.frequency for m in point.modes_below(1100.0)]
+    assert len(found.frequency) >= 2
+    for frequency in found.frequency:
+        assert min(abs(frequency / np.array(wanted) - 1)) < 1e-3
+
+
+def test_pieces_of_a_record_are_one_record(spindle, monkeypatch):
+    point = operating_point(spindle, Condition(20.0, 7200 * RPM))
+    short = replace(spindle.hammer, record_length=0.02, hits=1)
+    told: list[str] = []
+    whole = impact_tests([point], short, progress=told.append)[0].record.velocity
+    assert len(told) == stages(short, 1) > 10
+    monkeypatch.setattr(hammer_test, "PIECES", 1)
+    assert np.array_equal(impact_tests([point], short)[0].record.velocity, whole)
