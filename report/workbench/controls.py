@@ -32,9 +32,10 @@ label, .bk-input-group, .bk-slider-title, .bk-slider-value { color: var(--ink); 
 .bk-btn:hover { background: var(--line); }
 .bk-btn.bk-active { color: var(--paper); background: var(--accent); border-color: var(--accent); }
 .bk-btn[disabled], .bk-btn[disabled]:hover { color: var(--soft); background: var(--paper); border: 1px dashed var(--line); opacity: 1; }
-select.bk-input { background-image: linear-gradient(45deg, transparent 50%, var(--ink) 50%), linear-gradient(-45deg, transparent 50%, var(--ink) 50%);
+select.bk-input:not([multiple]) { background-image: linear-gradient(45deg, transparent 50%, var(--ink) 50%), linear-gradient(-45deg, transparent 50%, var(--ink) 50%);
   background-size: 5px 6px; background-position: right 13px center, right 8px center; background-repeat: no-repeat; }
 .noUi-target { background: var(--line); border: none; box-shadow: none; }
+.noUi-connect { background: color-mix(in srgb, var(--accent) 45%, transparent) !important; }
 .noUi-handle { background: var(--paper); border: 2px solid var(--accent); box-shadow: none; }
 .noUi-tooltip { color: var(--ink); background: var(--paper); }
 .bk-input-group > .bk-inline { flex-wrap: wrap; }
@@ -42,7 +43,7 @@ p { margin: 0.2rem 0; } .soft { color: var(--soft); } .bad { color: var(--bad); 
 h3 { font-size: 0.98rem; margin: 0.5rem 0 0; }
 table { border-collapse: collapse; font-size: 0.9rem; font-variant-numeric: tabular-nums; width: 100%; }
 th, td { padding: 0.25rem 0.5rem 0.25rem 0; text-align: right; border-bottom: 1px solid var(--line); font-weight: 400; vertical-align: top; }
-th:first-child { text-align: left; } thead th { font-weight: 600; }
+th:first-child { text-align: left; } td { white-space: nowrap; } thead th { font-weight: 600; }
 .bk-inline { display: flex; flex-wrap: wrap; gap: 0.2rem 0.9rem; }
 .bk-inline > label { margin: 0 !important; }
 .bk-input:focus-visible, .bk-btn:focus-visible, .noUi-handle:focus-visible, input:focus-visible

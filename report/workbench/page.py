@@ -89,8 +89,8 @@ class Page:
         self.name = TextInput(title=f"Folder in {self.out}", value="mine", name="name", **look, **WIDE)
         self.save = Button(label="Save scene, report and script" if self.bench.campaign else "Save scene and script", name="save", **look, **WIDE)
         self.halt = Button(label="Stop", name="halt", width=80, visible=False, html_attributes=labelled("stop the work in the background"), **look)
-        self.status, self.ladder, self.reasons, self.numbers, self.message = (
-            Div(text="", name=n, html_attributes={"role": "status"} if n in ("status", "message") else {}, **look, **WIDE) for n in ("status", "ladder", "reasons", "numbers", "message")
+        self.short, self.status, self.ladder, self.reasons, self.numbers, self.message = (
+            Div(text="", name=n, html_attributes={"role": "status"} if n in ("short", "message") else {}, **look, **WIDE) for n in ("short", "status", "ladder", "reasons", "numbers", "message")
         )
         self.section.play.stylesheets = [LOOK]
 
@@ -98,7 +98,7 @@ class Page:
         """What the template places, by name."""
         own = {k: getattr(self, k) for k in (
             "test", "response", "hammer", "mode", "quantity", "undo", "redo", "left_out", "fit", "keep", "rung", "take_up", "explanation", "take",
-            "diagnose", "name", "save", "halt", "status", "ladder", "reasons", "numbers", "message",
+            "diagnose", "name", "save", "halt", "short", "status", "ladder", "reasons", "numbers", "message",
         )}  # fmt: skip
         drawn = {"magnitude": self.frf.size, "phase": self.frf.phase, "map": self.map.figure, "section": self.section.figure, "play": self.section.play}
         c = self.controls
@@ -216,6 +216,7 @@ class Page:
 
     def show_status(self, s: Setting) -> None:
         drag = "all tests" if self.cost("all") < SMOOTH else "the shown test" if self.cost("shown") < SMOOTH else "nothing until you let go"
+        self.short.text = words.short(self.bench, self.found)
         self.status.text = words.status(self.bench, s, self.found) + words.timing(self.cost("all"), drag) + words.remarks(self.found)
 
     def choose_test(self) -> None:

@@ -23,6 +23,15 @@ def of_test(shown: Shown) -> str:
     return f"{t.id}: {c.temperature:g} °C, {speed}" + (f", {t.level:g} N" if t.level else "")
 
 
+def short(bench: Bench, found: Errors) -> str:
+    """The same in few words, for where the rest is out of sight."""
+    if bench.campaign is None:
+        furthest = max(found.cells, key=lambda c: abs(c.frequency), default=None)
+        return str(Markup("<p>{}: <b>{:+.3g} %</b></p>").format(furthest.mode, furthest.frequency)) if furthest and abs(furthest.frequency) > NOTHING else "<p>no change</p>"
+    said = [f"{which} <b>{value:.3g}</b>" for which, value in (("fitted", found.fitted), ("left out", found.left_out)) if value is not None]
+    return f"<p>{', '.join(said)} s.e.</p>"
+
+
 def status(bench: Bench, s: Setting, found: Errors) -> str:
     """How well it agrees on fitted and left-out tests, and where least; without tests what has changed most."""
     furthest = max(found.cells, key=lambda c: abs(c.frequency), default=None)
@@ -58,7 +67,7 @@ def numbers(found: Errors, tests: Sequence[str], damping: bool) -> str:
     head = Markup("").join(Markup("<th scope=col>{}</th>").format(t) for t in tests)
     rows = Markup("").join(
         Markup("<tr><th scope=row>{}</th>{}</tr>").format(
-            m, Markup("").join(Markup("<td>{}</td>").format("–" if (v := values.get((m, t))) is None else f"{v:+.2f}") for t in tests)
+            m, Markup("").join(Markup("<td>{}</td>").format("–" if (v := values.get((m, t))) is None else f"{v:+.2f}".replace("-", "−")) for t in tests)
         )
         for m in modes
     )

@@ -1,6 +1,7 @@
 """The workbench without a browser: what it computes is what `compare` tells, its page does what a user asks, and it saves what can be run again."""
 
 import json
+import runpy
 import subprocess
 import sys
 import time
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 from bokeh.document import Document
 
-from tests.conftest import DATA, SCENE
+from tests.conftest import DATA, ROOT, SCENE
 from thermospindle.diagnosis.add import scene_with
 from thermospindle.diagnosis.compare.compare import compare
 from thermospindle.model.errors import BadInput
@@ -236,10 +237,10 @@ def test_left_out_tests_stand_apart(page):
 def test_the_map_is_there_as_a_table_of_the_same_numbers(page):
     told_ = {c.frequency for c in page.found.cells if c.test == "T60_n0"}
     assert page.numbers.text.count("<th scope=row>") == len(told_)
-    assert all(f"<td>{v:+.2f}</td>" in page.numbers.text for v in told_)
+    assert all(f"<td>{v:+.2f}</td>".replace("-", "−") in page.numbers.text for v in told_)
     page.quantity.active = 1
     damping = next(c.damping for c in page.found.cells)
-    assert f"<td>{damping:+.2f}</td>" in page.numbers.text
+    assert f"<td>{damping:+.2f}</td>".replace("-", "−") in page.numbers.text
     assert f"{damping:+.1f}".replace("-", "−") in page.map.source.data["text"]
 
 
@@ -369,6 +370,18 @@ def test_saved_scene_and_script_of_the_model_alone(alone, tmp_path):
     here = operating_point(benches.built(alone, s), alone.shown[0].condition).modes
     there = operating_point(scene.spindle, alone.shown[0].condition).modes
     np.testing.assert_allclose([m.frequency for m in there], [m.frequency for m in here], rtol=1e-12)
+
+
+def test_the_script_takes_an_effect_of_ones_own(tmp_path, capsys):
+    own = ROOT / "docs" / "air_film.py"
+    bench = benches.open_bench(SCENE, effect_files=[own])
+    s = state.add_effect(Setting(), bench.effect("air_film"))
+    (tmp_path / "script.py").write_text(script(bench, s), encoding="utf-8")
+    runpy.run_path(str(tmp_path / "script.py"))
+    printed = [float(line.split()[-2]) for line in capsys.readouterr().out.splitlines() if line.startswith("60 C")]
+    point = operating_point(benches.built(bench, s), bench.show("60 °C").condition)
+    assert printed == pytest.approx([m.frequency for m in point.modes if m.frequency <= bench.spindle.hammer.band[1]], abs=1e-6)
+    assert max(abs(c.frequency) for c in benches.errors(bench, s).cells) > 1e-3
 
 
 @pytest.mark.slow
