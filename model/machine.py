@@ -129,6 +129,43 @@ class LinearBearing:
 
 
 @dataclass(frozen=True)
+class RollerBearing:
+    """Cylindrical roller rows side by side at `z` (m): line contacts with a radial clearance, free along the axis.
+
+    `clearance` is the diametral one of the mounted bearing at the reference temperature, negative where its rollers are preloaded. Its rings
+    are regions of the section, or none, whose clearance then stays.
+    """
+
+    name: str
+    z: float
+    inner_ring: str  # region; empty for none
+    outer_ring: str
+    rows: int
+    row_spacing: float  # m, between the middles of neighbouring rows
+    rollers: int  # of one row
+    roller_diameter: float
+    roller_length: float  # m, effective, of one roller
+    pitch_diameter: float
+    clearance: float
+    roller_material: str
+    ring_material: str
+    damping_ratio: float  # at Structure.damping_frequency
+    inner_body: str
+    outer_body: str
+    raceway_width: float | None = None  # m, as of a ball row
+
+    @property
+    def ball_diameter(self) -> float:
+        """Diameter of the rolling elements, under the name that ball rows have for it."""
+        return self.roller_diameter
+
+    @property
+    def ball_material(self) -> str:
+        """Material of the rolling elements, under the name that ball rows have for it."""
+        return self.roller_material
+
+
+@dataclass(frozen=True)
 class PreloadSpring:
     """The spring behind one ring of each of the bearings `rings_of`, which slide as one; the others locate the shaft and take axial loads.
 
@@ -338,6 +375,7 @@ class Spindle:
     ball_inertia: float = 0.0  # share of the balls' centrifugal force and gyroscopic moment in the equilibrium, 0 to 1
     axial_load: float = 0.0  # N, external axial force on what carries the outer rings, positive along z
     linear_bearings: tuple[LinearBearing, ...] = ()  # those given by numbers
+    roller_bearings: tuple[RollerBearing, ...] = ()  # cylindrical ones, lowest first
     effects: tuple[Addition, ...] = ()
     build: Build | None = None
     imperfections: Imperfections = field(default_factory=Imperfections)
@@ -345,10 +383,15 @@ class Spindle:
     file: Path | None = field(default=None, compare=False)
 
     @property
-    def all_bearings(self) -> tuple[Bearing | LinearBearing, ...]:
-        """Ball rows and bearings given by numbers, lowest first."""
-        every: list[Bearing | LinearBearing] = [*self.bearings, *self.linear_bearings]
+    def all_bearings(self) -> tuple[Bearing | LinearBearing | RollerBearing, ...]:
+        """Ball rows, bearings given by numbers and roller bearings, lowest first."""
+        every: list[Bearing | LinearBearing | RollerBearing] = [*self.bearings, *self.linear_bearings, *self.roller_bearings]
         return tuple(sorted(every, key=lambda b: b.z))
+
+    @property
+    def ringed(self) -> tuple[Bearing | RollerBearing, ...]:
+        """The bearings whose rings are regions of the section: ball rows, then roller bearings."""
+        return (*self.bearings, *(b for b in self.roller_bearings if b.inner_ring))
 
     def bearing(self, name: str) -> Bearing:
         """The ball row of that name."""
@@ -386,7 +429,7 @@ class Spindle:
         """The turning body nearest a height (m): a node of a flexible shaft, or the rigid hub wherever one asks."""
         return min((b for b in self.structure.bodies if b.turns), key=lambda b: abs(b.z - z))
 
-    def raceway(self, ring: str, bearing: Bearing) -> tuple[float, float]:
+    def raceway(self, ring: str, bearing: Bearing | RollerBearing) -> tuple[float, float]:
         """Heights (m) between which the raceway of `bearing` lies on its region `ring`.
 
         The bearing's height plus and minus half its `raceway_width`, inside the region. Without a width the whole height of a region that
@@ -394,7 +437,7 @@ class Spindle:
         """
         region, width = self.region(ring), bearing.raceway_width
         if width is None:
-            if sum(ring in (b.inner_ring, b.outer_ring) for b in self.bearings) == 1:
+            if sum(ring in (b.inner_ring, b.outer_ring) for b in self.ringed) == 1:
                 return region.z
             width = RACEWAY_WIDTH * bearing.ball_diameter
         return max(region.z[0], bearing.z - width / 2), min(region.z[1], bearing.z + width / 2)

@@ -58,7 +58,7 @@ def toleranced(spindle: Spindle) -> list[Toleranced]:
         found.append(Toleranced("preload" if len(spindle.sets) == 1 else f"{s.name} preload", t.preload, _scale_preload(s.name)))
     for given in spindle.linear_bearings:
         found.append(Toleranced(f"{given.name} stiffness", t.structure, _scale_linear_bearing(given.name)))
-    if spindle.bearings or spindle.linear_bearings:
+    if spindle.all_bearings:
         found.append(Toleranced("bearing damping", t.damping, _scale_bearing_damping))
     return found
 
@@ -162,7 +162,8 @@ def _scale_inertia(index: int, axes: tuple[int, ...]) -> Callable[[Spindle, floa
 def _scale_bearing_damping(spindle: Spindle, x: float) -> Spindle:
     rows = tuple(replace(b, damping_ratio=b.damping_ratio * (1 + x)) for b in spindle.bearings)
     given = tuple(replace(b, damping_ratio=b.damping_ratio * (1 + x)) for b in spindle.linear_bearings)
-    return replace(spindle, bearings=rows, linear_bearings=given)
+    rollers = tuple(replace(b, damping_ratio=b.damping_ratio * (1 + x)) for b in spindle.roller_bearings)
+    return replace(spindle, bearings=rows, linear_bearings=given, roller_bearings=rollers)
 
 
 def _scale_linear_bearing(name: str) -> Callable[[Spindle, float], Spindle]:

@@ -107,7 +107,7 @@ def warm_up(
     machine = _Machine(spindle, speed, effects, reading(model))
 
     def drive(_: float, nodal: Array) -> heat.Running:
-        return heat.Running(air, speed, {b.name: b.preload for b in machine.point(nodal).state.bearings})
+        return heat.Running(air, speed, machine.point(nodal).state.loads)
 
     try:
         field = heat.settled(model, lambda nodal: drive(0.0, nodal))
@@ -145,9 +145,8 @@ class _Machine:
 
     def moment(self, nodal: Array) -> Moment:
         model, point = self.read.model, self.point(nodal)
-        names = [b.name for b in model.spindle.bearings]
-        loads = {b.name: b.preload for b in point.state.bearings}
-        friction = heat.friction_heat(model, nodal, heat.Running(0.0, self.speed, loads))
+        names = [b.name for b in model.spindle.ringed]
+        friction = heat.friction_heat(model, nodal, heat.Running(0.0, self.speed, point.state.loads))
         return Moment(
             self.read.region_means(nodal),
             dict(zip(names, (model.bearing @ nodal).tolist(), strict=True)),

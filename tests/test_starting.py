@@ -17,7 +17,7 @@ TEMPLATES = {kind: (ROOT / "scenes" / "templates" / f"{kind}.toml").read_text(en
 PLAIN = {
     "origin", "origins", "source", "name", "part", "material", "ball_material", "ring_material", "outer_conformity", "outer_ring", "density_kg_per_m3", "damping_ratio",
     "speed_rpm", "temperature_C", "value", "body", "position_mm", "axial_stiffness_N_per_m", "mass_kg", "hammer_mass_g", "tip_stiffness_N_per_m",
-    "inner_conformity", "axial_rigidity_N_per_um", "preload_N", "turns", "role", "group", "z_mm", "conductivity_W_per_m_K", "regions",
+    "roller_diameter_mm", "roller_material", "inner_conformity", "axial_rigidity_N_per_um", "preload_N", "turns", "role", "group", "z_mm", "conductivity_W_per_m_K", "regions",
     "outer_body", "heat_capacity_J_per_kg_K", "tilt_stiffness_N_m_per_rad", "lateral_stiffness_N_per_m", "moves",
 }  # fmt: skip
 """Keys that say it all by their name, or stand beside the one that explains them."""

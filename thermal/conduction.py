@@ -17,7 +17,7 @@ from scipy.sparse import block_diag, coo_array, csr_array, diags_array
 from skfem import Basis, BilinearForm, FacetBasis, LinearForm
 from skfem.helpers import dot, grad
 
-from thermospindle.model.machine import AirGap, Bearing, Region, Spindle
+from thermospindle.model.machine import AirGap, Bearing, Region, RollerBearing, Spindle
 from thermospindle.thermal import influence
 from thermospindle.thermal.mesh import PartMesh, element
 from thermospindle.thermal.temperature import TemperatureField
@@ -93,7 +93,7 @@ def model(spindle: Spindle, sections: Mapping[str, PartMesh]) -> HeatModel:
     films = [_film(spindle, section) for section in sections.values()]
     convection: csr_array = csr_array(block_diag([matrix for matrix, _ in films]))
     film = np.concatenate([load for _, load in films])
-    faces = [_raceways(spindle, bearing, sections, spans) for bearing in spindle.bearings]
+    faces = [_raceways(spindle, bearing, sections, spans) for bearing in spindle.ringed]
     through = [spindle.thermal.friction.conductance * _square(outer - inner) for inner, outer in faces]
     across: list[csr_array] = []
     hidden: list[GapFace] = []
@@ -143,7 +143,7 @@ def _film(spindle: Spindle, section: PartMesh) -> tuple[csr_array, np.ndarray]:
 
 
 def _raceways(
-    spindle: Spindle, bearing: Bearing, sections: Mapping[str, PartMesh], spans: Mapping[str, slice]
+    spindle: Spindle, bearing: Bearing | RollerBearing, sections: Mapping[str, PartMesh], spans: Mapping[str, slice]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Weights (nodes,) of the mean over the inner and over the outer raceway face, every area of it counting alike."""
     weights = np.zeros((2, max(span.stop for span in spans.values())))

@@ -48,7 +48,7 @@ def _by_race(races: Sequence[Race], motion: np.ndarray) -> dict[Race, tuple[floa
 def ring_motions(spindle: Spindle, means: Mapping[str, float], moves: Mapping[Race, tuple[float, float]]) -> dict[str, RingMotion]:
     """Motion of every bearing's rings from what their races move by (r, z in m) and the region means (C)."""
     result = {}
-    for b in spindle.bearings:
+    for b in spindle.ringed:
         inner_race, outer_race = raceways(spindle, b)
         inner, outer = means[b.inner_ring], means[b.outer_ring]
         ring, ball = spindle.materials[b.ring_material], spindle.materials[b.ball_material]

@@ -7,26 +7,26 @@ load rating, so far below 0.001 under a light preload.
 
 from __future__ import annotations
 
-from thermospindle.model.machine import Bearing, Friction
+from thermospindle.model.machine import Bearing, Friction, RollerBearing
 from thermospindle.model.units import RPM
 
 
-def torque(friction: Friction, bearing: Bearing, speed: float, temperature: float, load: float) -> float:
+def torque(friction: Friction, bearing: Bearing | RollerBearing, speed: float, temperature: float, load: float) -> float:
     """Friction torque (N m, not negative) at `speed` (rad/s), `temperature` of the lubricant (C) and axial `load` (N).
 
-    The load part takes P1 = |load|, the pure axial case of angular contact. OutsideRange where the viscosity law does not
+    The load part takes P1 = |load|, the pure axial case of angular contact; for cylindrical rollers the sum of their contact loads. OutsideRange where the viscosity law does not
     reach. A bearing at rest gets its starting torque; it makes no heat.
     """
     return viscous_torque(friction, bearing, speed, temperature) + friction.f1 * abs(load) * bearing.pitch_diameter
 
 
-def viscous_torque(friction: Friction, bearing: Bearing, speed: float, temperature: float) -> float:
+def viscous_torque(friction: Friction, bearing: Bearing | RollerBearing, speed: float, temperature: float) -> float:
     """M0 (N m): churning and shearing of the lubricant."""
     product = friction.viscosity(temperature) * 1e6 * abs(speed) / RPM
     factor = 160e-7 if product < 2000 else 1e-7 * product ** (2 / 3)
     return factor * friction.f0 * (bearing.pitch_diameter * 1e3) ** 3 * 1e-3
 
 
-def heat(friction: Friction, bearing: Bearing, speed: float, temperature: float, load: float) -> float:
+def heat(friction: Friction, bearing: Bearing | RollerBearing, speed: float, temperature: float, load: float) -> float:
     """Friction heat (W): torque times speed."""
     return torque(friction, bearing, speed, temperature, load) * abs(speed)

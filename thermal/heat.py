@@ -16,6 +16,7 @@ from scipy.optimize import brentq
 from scipy.sparse import csc_array, csr_array
 from scipy.sparse.linalg import SuperLU, eigsh, splu
 
+from thermospindle.model.bearing.roller import reference_loads
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.machine import Spindle
 from thermospindle.thermal import friction
@@ -94,8 +95,8 @@ class History:
 
 
 def running(spindle: Spindle, air: float, speed: float, loads: Mapping[str, float] | None = None) -> Running:
-    """Running conditions; bearings carry the preload of the reference state unless `loads` says else."""
-    return Running(air, speed, {b.name: b.preload for b in spindle.bearings} if loads is None else dict(loads))
+    """Running conditions; bearings carry the loads of the reference state unless `loads` says else."""
+    return Running(air, speed, reference_loads(spindle) if loads is None else dict(loads))
 
 
 def steady(model: HeatModel, drive: Running) -> TemperatureField:
@@ -203,7 +204,7 @@ def _agreed(
     factors, response = _factors(model, h)
     last = drive(guess)
     cold = factors.solve(known + (h or 1.0) * _outer_load(model, last))  # without friction
-    if not last.speed or not model.spindle.bearings:
+    if not last.speed or not model.spindle.ringed:
         return cold, last
     for _ in range(60):
         nodal = cold + _bearing_heat(model, model.bearing @ cold, response @ model.bearing.T, last) @ response
@@ -237,8 +238,8 @@ def motor_heat(model: HeatModel, drive: Running) -> np.ndarray:
 def friction_heat(model: HeatModel, nodal: np.ndarray, drive: Running) -> np.ndarray:
     """Friction heat (W) of every bearing at nodal temperatures."""
     if not drive.speed:
-        return np.zeros(len(model.spindle.bearings))
-    law, bearings = model.spindle.thermal.friction, zip(model.spindle.bearings, model.bearing @ nodal, strict=True)
+        return np.zeros(len(model.spindle.ringed))
+    law, bearings = model.spindle.thermal.friction, zip(model.spindle.ringed, model.bearing @ nodal, strict=True)
     return np.array([friction.heat(law, b, drive.speed, float(t), drive.loads[b.name]) for b, t in bearings])
 
 
@@ -264,7 +265,7 @@ def _bearing_heat(model: HeatModel, cold: np.ndarray, gain: np.ndarray, drive: R
     Bearing after bearing, each by bracketing: friction falls with temperature and `gain` is symmetric and positive, so this
     is a descent on a convex function.
     """
-    law, bearings = model.spindle.thermal.friction, model.spindle.bearings
+    law, bearings = model.spindle.thermal.friction, model.spindle.ringed
     warmest = law.viscosity.temperature[-1] if len(law.viscosity.value) > 1 else np.inf
 
     def made(k: int, t: float) -> float:

@@ -15,7 +15,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from thermospindle.model.machine import Bearing, Region, Spindle
+from thermospindle.model.machine import Bearing, Region, RollerBearing, Spindle
 from thermospindle.thermal import store
 from thermospindle.thermal.elastic import Elasticity, Race, Response
 from thermospindle.thermal.mesh import PartMesh, tiled
@@ -163,11 +163,11 @@ def elasticity(spindle: Spindle, temperatures: Mapping[str, float] | None = None
 
 def races(spindle: Spindle, part: str) -> tuple[Race, ...]:
     """The raceway faces on `part`: the outside of inner rings, the bore of outer rings; lower bearing first."""
-    faces = [face for b in spindle.bearings for face in raceways(spindle, b)]
+    faces = [face for b in spindle.ringed for face in raceways(spindle, b)]
     return tuple(face for face in faces if spindle.region(face.ring).part == part)
 
 
-def raceways(spindle: Spindle, bearing: Bearing) -> tuple[Race, Race]:
+def raceways(spindle: Spindle, bearing: Bearing | RollerBearing) -> tuple[Race, Race]:
     """The raceway faces of the inner and the outer ring of a bearing; a ring of its own counts with its whole height."""
     found = []
     for ring, side in ((bearing.inner_ring, 1), (bearing.outer_ring, 0)):

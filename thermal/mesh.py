@@ -91,7 +91,7 @@ def section_mesh(spindle: Spindle, part: str, size: float, shape: str = "triangl
 
     `shape` is triangle or quadrilateral. ValueError when regions of the part do not hold together.
     """
-    raceways = [spindle.raceway(ring, b) for b in spindle.bearings for ring in (b.inner_ring, b.outer_ring)]
+    raceways = [spindle.raceway(ring, b) for b in spindle.ringed for ring in (b.inner_ring, b.outer_ring)]
     return tiled(part, part_regions(spindle, part), size, shape, raceways)
 
 

@@ -9,7 +9,9 @@ kinematics       how fast cage and balls turn, and at which frequencies a runnin
 pair             the ball rows of all sets against each other: axial equilibrium at a temperature, and the bearing
                  states that follow
 movement         how far rings move until their axial forces balance
+roller           cylindrical roller rows: line contacts in slices, clearance that follows the temperature, stiffness
 springs          balls as springs between points of two bodies: what a ball-by-ball bearing element is made of
+state            what a bearing is to the rotor: stiffness and damping, with names for their entries
 stiffness_table  the stiffness table: bearing properties over temperature and speed, as a CSV with units in its header
                  and its provenance above
 catalogue        spindle bearings as their catalogues print them: preload, unloading force and rigidity of a pair

@@ -17,32 +17,11 @@ from scipy.optimize import root
 from thermospindle.model.bearing.ball_row import BallInertia, BallRow, RowForce, centred_axial_force, respond
 from thermospindle.model.bearing.hertz import in_series, race_contact
 from thermospindle.model.bearing.movement import balanced
+from thermospindle.model.bearing.roller import RollerState, roller_state
+from thermospindle.model.bearing.state import ByDirection, LinearState
 from thermospindle.model.errors import NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Bearing, BearingSet, Condition, LinearBearing, RingMotion, Spindle
 from thermospindle.model.types import Array
-
-
-class ByDirection:
-    """The entries of a bearing's stiffness (5, 5) that have names."""
-
-    stiffness: Array
-
-    @property
-    def radial_stiffness(self) -> float:
-        return float(self.stiffness[0, 0])
-
-    @property
-    def axial_stiffness(self) -> float:
-        return float(self.stiffness[2, 2])
-
-    @property
-    def tilt_stiffness(self) -> float:
-        return float(self.stiffness[3, 3])
-
-    @property
-    def coupling_stiffness(self) -> float:
-        """Radial force per tilt, k_x,tilt_y (N/rad)."""
-        return float(self.stiffness[0, 4])
 
 
 @dataclass(frozen=True)
@@ -70,16 +49,6 @@ class BearingState(ByDirection):
 
 
 @dataclass(frozen=True)
-class LinearState(ByDirection):
-    """A bearing given by numbers at one condition: stiffness and damping (5, 5) between its two bodies at its height."""
-
-    name: str
-    z: float
-    stiffness: Array
-    damping: Array
-
-
-@dataclass(frozen=True)
 class PairState:
     """All bearings at one condition.
 
@@ -91,24 +60,30 @@ class PairState:
     bearings: tuple[BearingState, ...]  # in the order of Spindle.bearings
     hub_movement: float
     status: str  # "in contact", or which bearing lost contact
-    linear: tuple[LinearState, ...] = ()  # in the order of Spindle.linear_bearings
+    linear: tuple[LinearState, ...] = ()  # in the order of Spindle.linear_bearings, then of its roller bearings
 
     @property
     def words(self) -> str:
         """Status and the first ball row's preload, in words."""
         if not self.bearings:
-            return "bearings given by numbers" if self.linear else "no bearings"
+            kinds = {"roller bearings" if isinstance(b, RollerState) else "bearings given by numbers" for b in self.linear}
+            return " and ".join(sorted(kinds)) or "no bearings"
         return f"{self.status}, preload {self.bearings[0].preload:.2f} N"
 
     @property
     def all_bearings(self) -> tuple[BearingState | LinearState, ...]:
-        """Ball rows and bearings given by numbers, lowest first."""
+        """Ball rows, bearings given by numbers and roller bearings, lowest first."""
         every: list[BearingState | LinearState] = [*self.bearings, *self.linear]
         return tuple(sorted(every, key=lambda b: b.z))
 
     def any_bearing(self, name: str) -> BearingState | LinearState:
-        """The ball row, or bearing given by numbers, of that name."""
+        """The ball row, roller bearing, or bearing given by numbers, of that name."""
         return next(b for b in self.all_bearings if b.name == name)
+
+    @property
+    def loads(self) -> dict[str, float]:
+        """Load (N) on which friction depends, by bearing: preload of ball rows, sum of the contact loads of rollers."""
+        return {b.name: b.preload for b in self.bearings} | {b.name: b.load for b in self.linear if isinstance(b, RollerState)}
 
     def bearing(self, name: str) -> BearingState:
         return next(b for b in self.bearings if b.name == name)
@@ -135,7 +110,8 @@ def solve(spindle: Spindle, condition: Condition, motions: Mapping[str, RingMoti
     ]
     sliding = {name for s in spindle.sets if s.spring is not None for name in s.spring.rings_of}
     hub = next((moved[b.name] for b in spindle.bearings if b.name not in sliding), 0.0)
-    linear = tuple(linear_state(spindle, b, condition) for b in spindle.linear_bearings)
+    linear: tuple[LinearState, ...] = tuple(linear_state(spindle, b, condition) for b in spindle.linear_bearings)
+    linear += tuple(roller_state(spindle, b, motions.get(b.name), condition.temperature) for b in spindle.roller_bearings)
     return PairState(condition, tuple(states), hub, contact_status(tuple(states)), linear)
 
 

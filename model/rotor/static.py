@@ -80,7 +80,7 @@ def rated_chain(spindle: Spindle, chain: RotorBase) -> RotorBase:
     """The chain with every bearing a spring of its rated radial stiffness from what turns to rigid ground, as catalogues and design
     calculations have it: without tilt stiffness, coupling or housing. Bearings given by numbers keep theirs, to ground."""
     ratings = {b.name: b for b in spindle.bearings}
-    given = {b.name for b in spindle.linear_bearings}
+    given = {b.name for b in spindle.linear_bearings} | {r.name for r in spindle.roller_bearings}
     turning = {b.name for b in chain.bodies if b.turns}
     elements: list[Element] = []
     for e in chain.elements:

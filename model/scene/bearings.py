@@ -71,8 +71,36 @@ class BallRow(Table):
         )
 
 
+class RollerRow(Table):
+    """Cylindrical rollers, free along the axis. `mounted_clearance_um` is the diametral clearance at the reference temperature, as mounted:
+    negative where the rollers are preloaded."""
+
+    rollers: Annotated[int, Field(ge=3, le=1000)]
+    rows: Annotated[int, Field(ge=1, le=8)] = 1
+    row_spacing_mm: Positive | None = None
+    roller_diameter_mm: Annotated[float, Field(ge=1e-3, le=1e3)]
+    roller_length_mm: Annotated[float, Field(ge=1e-3, le=1e3)]
+    pitch_diameter_mm: Annotated[float, Field(ge=1e-2, le=1e4)]
+    mounted_clearance_um: Annotated[float, Field(ge=-1000, le=1000)] = 0.0
+    roller_material: str
+    ring_material: str
+    damping_ratio: Share
+
+    @model_validator(mode="after")
+    def _rollers_fit(self) -> RollerRow:
+        if self.rollers * self.roller_diameter_mm > np.pi * self.pitch_diameter_mm:
+            raise ValueError("that many rollers do not fit on the pitch circle; rollers * roller_diameter_mm must be below pi * pitch_diameter_mm")
+        if self.rows > 1 and self.row_spacing_mm is None:
+            raise ValueError("row_spacing_mm is missing: the distance between the middles of rows side by side")
+        if self.rows == 1 and self.row_spacing_mm is not None:
+            raise ValueError("row_spacing_mm is for several rows side by side, and here is one")
+        if self.row_spacing_mm is not None and self.row_spacing_mm < self.roller_length_mm:
+            raise ValueError(f"row_spacing_mm = {self.row_spacing_mm:g}: the rows would overlap; it must be at least roller_length_mm")
+        return self
+
+
 class Bearing(Table):
-    """A ball row (`row`, between two rings of the section), or a bearing given by numbers."""
+    """A ball row or roller row (`row`, between two rings of the section), or a bearing given by numbers."""
 
     z_mm: Place
     row: str | None = None
@@ -88,16 +116,45 @@ class Bearing(Table):
     @model_validator(mode="after")
     def _one_kind(self) -> Bearing:
         if (self.row is None) == (self.numbers is None):
-            raise ValueError("a bearing has either row, the name of its ball row, or numbers, a table of its stiffness")
-        if self.row is not None:
-            for key in ("inner_ring", "outer_ring"):
-                if getattr(self, key) is None:
-                    raise ValueError(f"{key} is missing; a ball row lies between two rings of the section")
-        else:
+            raise ValueError("a bearing has either row, the name of its ball row or roller row, or numbers, a table of its stiffness")
+        if self.row is None:
             for key in ("inner_ring", "outer_ring", "raceway_width_mm", "sense", "rated_radial_stiffness_N_per_um"):
                 if getattr(self, key) is not None:
                     raise ValueError(f"{key} is for a ball row; a bearing given by numbers has none")
         return self
+
+    def check_row(self, balls: bool) -> None:
+        """ValueError where a ball row lacks its rings, or a roller row has what only balls have, or half its rings."""
+        for key in ("inner_ring", "outer_ring") if balls else ():
+            if getattr(self, key) is None:
+                raise ValueError(f"{key} is missing; a ball row lies between two rings of the section")
+        for key in () if balls else ("sense", "rated_radial_stiffness_N_per_um"):
+            if getattr(self, key) is not None:
+                raise ValueError(f"{key} is for a ball row; rollers carry nothing along the axis and compute their own stiffness")
+        if not balls and (self.inner_ring is None) != (self.outer_ring is None):
+            raise ValueError("a roller row lies between two rings of the section or none: inner_ring and outer_ring go together")
+
+    def rollers(self, name: str, row: RollerRow, inner_body: str, outer_body: str) -> m.RollerBearing:
+        """The bearing on a roller row, between two bodies."""
+        return m.RollerBearing(
+            name=name,
+            z=self.z_mm * MM,
+            inner_ring=self.inner_ring or "",
+            outer_ring=self.outer_ring or "",
+            rows=row.rows,
+            row_spacing=(row.row_spacing_mm or 0.0) * MM,
+            rollers=row.rollers,
+            roller_diameter=row.roller_diameter_mm * MM,
+            roller_length=row.roller_length_mm * MM,
+            pitch_diameter=row.pitch_diameter_mm * MM,
+            clearance=row.mounted_clearance_um * 1e-6,
+            roller_material=row.roller_material,
+            ring_material=row.ring_material,
+            damping_ratio=row.damping_ratio,
+            inner_body=inner_body,
+            outer_body=outer_body,
+            raceway_width=None if self.raceway_width_mm is None else self.raceway_width_mm * MM,
+        )
 
     def bearing(self, name: str, rows: Mapping[str, BallRow], sense: int, mounted: Mounted) -> m.Bearing:
         """The bearing; one told by its free contact angle has it still as its loaded one, which `reading.build` mends."""

@@ -31,8 +31,11 @@ def _touch(a: Region, b: Region) -> bool:
 
 
 def check_section(file: Path, spindle: Spindle) -> None:
-    if spindle.regions and not spindle.bearings:
-        raise BadInput(f"{file}: section: no bearing is a ball row, and only ball rows feel its expansion; leave it out, or give a bearing its row")
+    if spindle.regions and not spindle.ringed:
+        raise BadInput(
+            f"{file}: section: no bearing is a ball row, or a roller row with its rings in the section, and only those feel its expansion; leave it out, "
+            "or give a bearing its row"
+        )
     names = [g.name for g in spindle.regions]
     for name in names:
         if names.count(name) > 1:
@@ -115,9 +118,35 @@ def check_bearings(file: Path, spindle: Spindle) -> None:
             )
 
 
+def check_rollers(file: Path, spindle: Spindle) -> None:
+    """Materials are there, and rings in the section leave room for the rollers, one of them on each part."""
+    for b in spindle.roller_bearings:
+        where = f"{file}: bearings.{b.name}"
+        for key, name in (("roller_material", b.roller_material), ("ring_material", b.ring_material)):
+            if name not in spindle.materials:
+                raise BadInput(f"{where}: {key} = {name!r}: allowed are {', '.join(spindle.materials)}")
+        if not b.inner_ring:
+            continue
+        for key, name in (("inner_ring", b.inner_ring), ("outer_ring", b.outer_ring)):
+            if name not in {g.name for g in spindle.regions}:
+                raise BadInput(f"{where}.{key} = {name!r}: names no section region")
+            ring = spindle.region(name)
+            if not ring.z[0] <= b.z <= ring.z[1]:
+                raise BadInput(f"{where}.z_mm = {b.z * 1e3:g}: outside its ring {name!r}, which spans z_mm = {_mm(ring.z)}")
+        inner, outer = spindle.region(b.inner_ring), spindle.region(b.outer_ring)
+        if inner.part == outer.part:
+            raise BadInput(f"{where}: both rings are on the {inner.part} part; one ring must turn")
+        gap = outer.r[0] - inner.r[1] - b.roller_diameter
+        if not -0.02 * b.roller_diameter < gap < 0.05 * b.roller_diameter:
+            raise BadInput(
+                f"{where}: the raceways leave {(gap + b.roller_diameter) * 1e3:g} mm for rollers of roller_diameter_mm = "
+                f"{b.roller_diameter * 1e3:g}; allowed is -2 % to +5 % of the roller in play"
+            )
+
+
 def check_raceways(file: Path, spindle: Spindle) -> None:
     """Raceways of bearings that share a region as a ring lie apart on it."""
-    for a, b in combinations(spindle.bearings, 2):
+    for a, b in combinations(spindle.ringed, 2):
         for ring in {a.inner_ring, a.outer_ring} & {b.inner_ring, b.outer_ring}:
             lower, upper = sorted((spindle.raceway(ring, a), spindle.raceway(ring, b)))
             if lower[1] > upper[0] + SAME_HEIGHT:

@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 
 from thermospindle.model import machine as m
 from thermospindle.model.errors import BadInput
-from thermospindle.model.scene.bearings import BallRow, Bearing, BearingPair, BearingSet, Mounted, check_sets
+from thermospindle.model.scene.bearings import BallRow, Bearing, BearingPair, BearingSet, Mounted, RollerRow, check_sets
 from thermospindle.model.scene.defaults import GENTLE, WARMER, assumed
 from thermospindle.model.scene.fields import Finite, Name, NotNegative, Positive, Table, Temperature, TemperatureSpan, first_error
 from thermospindle.model.scene.imperfections import Imperfections
@@ -69,6 +69,7 @@ class Scene(Table):
     materials: dict[str, Material] = Field(min_length=1)
     section: Section = Section()
     ball_rows: dict[str, BallRow] = Field(default_factory=dict)
+    roller_rows: dict[str, RollerRow] = Field(default_factory=dict)
     bearings: dict[str, Bearing] = Field(default_factory=dict)
     bearing_pair: BearingPair | None = None
     sets: dict[str, BearingSet] = Field(default_factory=dict)
@@ -86,14 +87,22 @@ class Scene(Table):
 
     @model_validator(mode="after")
     def _rows_exist(self) -> Scene:
+        both = set(self.ball_rows) & set(self.roller_rows)
+        if both:
+            raise ValueError(f"roller_rows.{min(both)}: a ball row has that name; names of rows must differ")
         for name, bearing in self.bearings.items():
-            if bearing.row is not None and bearing.row not in self.ball_rows:
-                raise ValueError(f"bearings.{name}.row = {bearing.row!r}: allowed are {', '.join(self.ball_rows)}")
+            if bearing.row is not None and bearing.row not in (*self.ball_rows, *self.roller_rows):
+                raise ValueError(f"bearings.{name}.row = {bearing.row!r}: allowed are {', '.join((*self.ball_rows, *self.roller_rows))}")
+            if bearing.row is not None:
+                try:
+                    bearing.check_row(bearing.row in self.ball_rows)
+                except ValueError as error:
+                    raise ValueError(f"bearings.{name}: {error}") from None
         return self
 
     @model_validator(mode="after")
     def _sets_hold_every_row(self) -> Scene:
-        check_sets({n: b for n, b in self.bearings.items() if b.row is not None}, self.bearing_pair, self.sets)
+        check_sets({n: b for n, b in self.bearings.items() if b.row in self.ball_rows}, self.bearing_pair, self.sets)
         return self
 
     @model_validator(mode="after")
@@ -105,8 +114,8 @@ class Scene(Table):
     @model_validator(mode="after")
     def _imperfections_fit_the_bearings(self) -> Scene:
         for name, row in self.imperfections.bearings.items():
-            if name not in self.bearings or (own := self.bearings[name].row) is None:
-                rows = [n for n, b in self.bearings.items() if b.row is not None]
+            if name not in self.bearings or (own := self.bearings[name].row) is None or own not in self.ball_rows:
+                rows = [n for n, b in self.bearings.items() if b.row in self.ball_rows]
                 raise ValueError(f"imperfections.bearings.{name}: names no bearing with a ball row; allowed are {', '.join(rows)}")
             try:
                 row.check(self.ball_rows[own].balls)
@@ -116,7 +125,7 @@ class Scene(Table):
 
     def rows(self) -> dict[str, Bearing]:
         """The bearings with a ball row, the lowest first."""
-        rows = {n: b for n, b in self.bearings.items() if b.row is not None}
+        rows = {n: b for n, b in self.bearings.items() if b.row in self.ball_rows}
         return dict(sorted(rows.items(), key=lambda item: item[1].z_mm))
 
     def points(self) -> list[Point]:
@@ -169,11 +178,14 @@ class Scene(Table):
             at = b.z_mm * MM
             return Mounted(resolved_body(shafts, inner, at), resolved_body(shafts, outer, at), turns, shares[key])
 
-        linear = []
+        linear, rollers = [], []
         for key, b in self.bearings.items():
-            if b.numbers is not None:
+            if b.row not in self.ball_rows:
                 inner, outer = (resolved_body(shafts, body, b.z_mm * MM) for body in ends(key, b))
-                linear.append(b.linear(key, inner, outer, file.parent))
+                if b.row is not None:
+                    rollers.append(b.rollers(key, self.roller_rows[b.row], inner, outer))
+                else:
+                    linear.append(b.linear(key, inner, outer, file.parent))
         bearings = tuple(b.bearing(key, self.ball_rows, senses[key], mounted(key, b)) for key, b in rows.items())
         regions = tuple(r.region() for r in self.section.regions)
         points = tuple(replace(p, body=resolved_body(shafts, p.body, p.position[2])) for p in (p.point() for p in self.points()))
@@ -195,6 +207,7 @@ class Scene(Table):
             ball_inertia=pair.ball_inertia if pair is not None else self.ball_inertia if self.ball_inertia is not None else 1.0,
             axial_load=self.axial_load_N,
             linear_bearings=tuple(sorted(linear, key=lambda b: b.z)),
+            roller_bearings=tuple(sorted(rollers, key=lambda b: b.z)),
             effects=tuple(m.Addition(effect=e.name, values=dict(e.values)) for e in self.effects),
             build=self.build.build() if self.build else None,
             imperfections=self.imperfections.imperfections({b.name: b.balls for b in bearings}),
@@ -206,6 +219,7 @@ class Scene(Table):
         """The nominal speed; where the file names none, two digits of `GENTLE` over the largest pitch diameter, or shaft diameter."""
         if self.nominal_speed_rpm is not None:
             return self.nominal_speed_rpm
-        diameters = [self.ball_rows[b.row].pitch_diameter_mm for b in self.bearings.values() if b.row is not None]
+        rows: dict[str, BallRow | RollerRow] = {**self.ball_rows, **self.roller_rows}
+        diameters = [rows[b.row].pitch_diameter_mm for b in self.bearings.values() if b.row is not None]
         diameters = diameters or [max(p[:-1]) for s in self.shafts for p in s.outer_mm] or [100.0]
         return float(f"{GENTLE / max(diameters):.1e}")

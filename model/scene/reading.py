@@ -27,7 +27,7 @@ from thermospindle.model.rotor.chain import matrices, rotor_base
 from thermospindle.model.rotor.modes import poles
 from thermospindle.model.rotor.section import cells, mass_properties
 from thermospindle.model.scene import form as scene_file
-from thermospindle.model.scene.checks import check_bearings, check_raceways, check_section, check_structure, constant
+from thermospindle.model.scene.checks import check_bearings, check_raceways, check_rollers, check_section, check_structure, constant
 from thermospindle.model.scene.fields import read_toml
 from thermospindle.model.shaft import SAME_HEIGHT
 from thermospindle.model.tolerance import deviated
@@ -74,6 +74,7 @@ def build(raw: dict[str, Any], file: Path) -> Spindle:
     check_section(file, spindle)
     spindle = _with_loaded_angles(form, spindle)
     check_bearings(file, spindle)
+    check_rollers(file, spindle)
     check_raceways(file, spindle)
     check_structure(file, spindle)
     spindle = _as_built(file, _with_section_inertia(spindle))
@@ -104,6 +105,9 @@ def content_hash(spindle: Spindle) -> str:
     content = asdict(spindle)
     for key in ("name", "title", "file", "provenance"):
         content.pop(key)
+    for key in ("roller_bearings",):  # what came later counts where there is any
+        if not content[key]:
+            content.pop(key)
     for addition in content["effects"]:
         addition.pop("definition")
     return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()[:12]

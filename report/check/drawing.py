@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch, Polygon, Rectangle
 
-from thermospindle.model.machine import Bearing, LinearBearing, Spindle
+from thermospindle.model.machine import Bearing, LinearBearing, RollerBearing, Spindle
 from thermospindle.model.shaft import Shaft
 from thermospindle.model.units import MM
 from thermospindle.report.check.understood import apex
@@ -66,6 +66,8 @@ def drawing(point: OperatingPoint) -> Figure:
     for b in spindle.all_bearings:
         if isinstance(b, Bearing):
             _row(axes, b, point.state.bearing(b.name).contact_angle, frame)
+        elif isinstance(b, RollerBearing):
+            _rollers(axes, b)
         else:
             _spring(axes, b, spindle, frame)
     _beams(axes, spindle, frame)
@@ -134,6 +136,15 @@ def _row(axes: Axes, b: Bearing, angle: float, frame: Frame) -> None:
     axes.add_patch(Circle((z, r), ball, fc="#fdfdfb", ec=INK, lw=0.8, zorder=3))
 
 
+def _rollers(axes: Axes, b: RollerBearing) -> None:
+    """A rectangle a row, with its load line across the axis."""
+    length, half = b.roller_length / MM, b.roller_diameter / MM / 2
+    for k in range(b.rows):
+        z, r = b.z / MM + (k - (b.rows - 1) / 2) * b.row_spacing / MM, b.pitch_diameter / MM / 2
+        axes.add_patch(Rectangle((z - length / 2, r - half), length, 2 * half, fc="#fdfdfb", ec=INK, lw=0.8, zorder=3))
+        axes.plot([z, z], [r + 1.4 * half, 0], color=LOAD, lw=0.9, ls=(0, (5, 2)), zorder=4)
+
+
 def _spring(axes: Axes, b: LinearBearing, spindle: Spindle, frame: Frame) -> None:
     """A spring from what is inside to a line that stands for what is outside."""
     z = b.z / MM
@@ -197,7 +208,7 @@ Label = tuple[str, float, float, str, float, int]
 def _labels(spindle: Spindle, frame: Frame) -> tuple[list[Label], list[Label]]:
     """Names above (bearings, points) and below (shafts, bodies, joints), staggered so that none covers another."""
     structure = spindle.structure
-    top = [(b.name, b.z / MM, b.pitch_diameter / MM / 2 if isinstance(b, Bearing) else frame.top, LOAD) for b in spindle.all_bearings]
+    top = [(b.name, b.z / MM, frame.top if isinstance(b, LinearBearing) else b.pitch_diameter / MM / 2, LOAD) for b in spindle.all_bearings]
     at: dict[tuple[float, float], list[str]] = {}
     hit: dict[tuple[float, float], bool] = {}
     for p in spindle.points:
@@ -238,7 +249,7 @@ def _staggered(labels: Sequence[tuple[str, float, float, str]], frame: Frame) ->
 
 def _legend(spindle: Spindle) -> list[Line2D | Patch]:
     handles: list[Line2D | Patch] = [Patch(fc=TURNING, ec=INK, lw=0.5, label="turns"), Patch(fc=STANDING, ec=INK, lw=0.5, label="stands")]
-    if spindle.bearings:
+    if spindle.bearings or spindle.roller_bearings:
         handles.append(Line2D([], [], color=LOAD, lw=0.9, ls=(0, (5, 2)), label="load line"))
     if spindle.linear_bearings:
         handles.append(Line2D([], [], color=LOAD, lw=1.1, label="bearing by numbers"))

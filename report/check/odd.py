@@ -9,6 +9,7 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from thermospindle.model import sense
+from thermospindle.model.bearing.roller import RollerState
 from thermospindle.model.errors import NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Condition, LinearBearing, Point, Spindle
 from thermospindle.model.rotor.static import FREE
@@ -64,6 +65,12 @@ def odd(found: Looked) -> list[str]:
 
 
 # ---------------------------------------------------------------- bearings
+
+
+def _loose(found: Looked) -> Iterator[str]:
+    for state in found.reference.state.linear:
+        if isinstance(state, RollerState) and state.load == 0.0:
+            yield f"bearing {state.name}: its rollers are loose by {1e6 * state.clearance:.3g} um, and no load presses them: it carries nothing"
 
 
 def _same_place(found: Looked) -> Iterator[str]:
@@ -249,5 +256,5 @@ def _count(n: int, one: str, many: str = "") -> str:
 
 
 QUESTIONS: tuple[Callable[[Looked], Iterator[str]], ...] = (
-    _same_place, _seats, _contacts, _preload, _sense, _tables, _free, _undamped, _damping, _critical, _sections, _points, _hammer, _running, _effects,
+    _loose, _same_place, _seats, _contacts, _preload, _sense, _tables, _free, _undamped, _damping, _critical, _sections, _points, _hammer, _running, _effects,
 )  # fmt: skip

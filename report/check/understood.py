@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from thermospindle.model.bearing.pair import BearingState
-from thermospindle.model.machine import Bearing, Body, LinearBearing, Spindle
+from thermospindle.model.bearing.roller import RollerState
+from thermospindle.model.machine import Bearing, Body, LinearBearing, RollerBearing, Spindle
 from thermospindle.model.shaft import THEORIES, Shaft
 from thermospindle.model.units import RPM
 from thermospindle.report.text.static import axis_name
@@ -117,7 +118,7 @@ def free_angle(b: Bearing, state: BearingState) -> float | None:
     return float(np.arccos(cosine)) if cosine <= 1 else None
 
 
-def _bearing(point: OperatingPoint, b: Bearing | LinearBearing) -> dict[str, Any]:
+def _bearing(point: OperatingPoint, b: Bearing | LinearBearing | RollerBearing) -> dict[str, Any]:
     spindle, state = point.spindle, point.state.any_bearing(b.name)
     found: dict[str, Any] = {
         "kind": "ball row" if isinstance(b, Bearing) else "numbers",
@@ -128,6 +129,18 @@ def _bearing(point: OperatingPoint, b: Bearing | LinearBearing) -> dict[str, Any
         "axial_stiffness_N_per_um": 1e-6 * state.axial_stiffness,
         "tilt_stiffness_N_m_per_rad": state.tilt_stiffness,
     }
+    if isinstance(b, RollerBearing):
+        assert isinstance(state, RollerState)
+        return found | {
+            "kind": "roller row",
+            "rows": b.rows,
+            "rollers": b.rollers,
+            "roller_diameter_mm": _mm(b.roller_diameter),
+            "roller_length_mm": _mm(b.roller_length),
+            "pitch_diameter_mm": _mm(b.pitch_diameter),
+            "clearance_um": 1e6 * state.clearance,
+            "roller_force_N": state.contact_force,
+        }
     if isinstance(b, LinearBearing):
         table = {"temperatures_C": list(b.temperature), "speeds_rpm": [s / RPM for s in b.speed]} if len(b.temperature) * len(b.speed) > 1 else None
         return found | {"table": table}

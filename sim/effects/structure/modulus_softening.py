@@ -106,7 +106,7 @@ def sensitivity(spindle: Spindle) -> tuple[Sensitivity, ...]:
     moduli = tuple(
         (m.youngs_modulus(spindle.reference_temperature), m.poisson_ratio) for m in (spindle.materials[g.material] for g in spindle.regions)
     )
-    faces = tuple(raceways(spindle, b) for b in spindle.bearings)
+    faces = tuple(raceways(spindle, b) for b in spindle.ringed)
     return _sensitivity(Section((spindle.regions, moduli, faces), spindle))
 
 

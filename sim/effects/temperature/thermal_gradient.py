@@ -13,6 +13,7 @@ import numpy as np
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
+from thermospindle.model.bearing.roller import reference_loads
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import ROWS, SECTION, Effect, Parameter, Values, scale_parameter
@@ -66,12 +67,12 @@ def heat(spindle: Spindle, condition: Condition, unit: UnitRise) -> Array:
     RuntimeError where they do not: a bearing that runs so hot that its viscosity falls by half in the rise itself.
     """
     law = spindle.thermal.friction
-    made = np.zeros(len(spindle.bearings))
+    made, loads = np.zeros(len(spindle.ringed)), reference_loads(spindle)
     for _ in range(100):
         warm = condition.temperature + made @ unit.bearing
         last, made = (
             made,
-            np.array([friction.heat(law, b, condition.speed, float(t), b.preload) for b, t in zip(spindle.bearings, warm, strict=True)]),
+            np.array([friction.heat(law, b, condition.speed, float(t), loads[b.name]) for b, t in zip(spindle.ringed, warm, strict=True)]),
         )
         if np.abs((made - last) @ unit.bearing).max() < 1e-9:
             return made
@@ -81,7 +82,7 @@ def heat(spindle: Spindle, condition: Condition, unit: UnitRise) -> Array:
 def unit_rise(spindle: Spindle) -> UnitRise:
     """Solved once for each section, set of conductivities and cooling."""
     conductivity = tuple(spindle.materials[g.material].conductivity for g in spindle.regions)
-    rings = tuple(raceways(spindle, b) for b in spindle.bearings)
+    rings = tuple(raceways(spindle, b) for b in spindle.ringed)
     thermal = spindle.thermal
     key = (spindle.regions, conductivity, rings, thermal.convections, thermal.gaps, thermal.friction.conductance)
     return _unit_rise(Conduction(key, spindle))
