@@ -18,7 +18,7 @@ from thermospindle.diagnosis.compare.fit import Fitted, Free, fit
 from thermospindle.diagnosis.data.observe import Observation, condition_of, observe
 from thermospindle.diagnosis.inference.mechanism import REFERENCE_WIDTH
 from thermospindle.diagnosis.runout.lines import modal_tests
-from thermospindle.model.errors import BadInput
+from thermospindle.model.errors import BadInput, NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Addition, Condition, Spindle
 from thermospindle.model.rotor.modes import Mode
 from thermospindle.model.scene.reading import load, scene_path
@@ -125,8 +125,11 @@ def open_bench(
     if campaign is None:
         if left_out:
             raise BadInput(f"--held-out {left_out[0]}: without a campaign there is no test to leave out")
-        bench = replace(bench, shown=tuple(_conditions(spindle)))
-        return replace(bench, modes={s.id: _point(bench, spindle, s).modes for s in bench.shown})
+        modes = {s: _modes_there(spindle, s) for s in _conditions(spindle)}
+        shown = tuple(s for s, found in modes.items() if found is not None)
+        if not shown:
+            raise BadInput(f"{file}: the bearings find no equilibrium at any temperature of the scene's range; spindle check says more")
+        return replace(bench, shown=shown, modes={s.id: found for s, found in modes.items() if found is not None})
     tests = modal_tests(read_campaign(campaign))
     if not tests.tests:
         raise BadInput(f"{campaign}: holds runout tests alone; the workbench needs tests of modes (spindle compare and diagnose take runout)")
@@ -144,6 +147,14 @@ def _conditions(spindle: Spindle) -> list[Shown]:
     if speed and any(b.turns for b in spindle.structure.bodies):
         found += [Shown(f"{t:g} °C, {speed / RPM:.0f} rpm", Condition(float(t), speed)) for t in temperatures[[0, -1]]]
     return found
+
+
+def _modes_there(spindle: Spindle, shown: Shown) -> list[Mode] | None:
+    """The modes at a condition, None where the spindle has no equilibrium there."""
+    try:
+        return operating_point(spindle, shown.condition).modes
+    except (NoEquilibrium, OutsideRange):
+        return None
 
 
 # ---------------------------------------------------------------- computing

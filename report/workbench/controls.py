@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import floor, log10
-from typing import Any
+from typing import Any, Protocol
 
 from bokeh.models import Button, Checkbox, Column, CustomJSTickFormatter, Div, Row, Select, Slider, Toggle
 from markupsafe import Markup
@@ -52,8 +52,10 @@ th:first-child { text-align: left; } td { white-space: nowrap; } thead th { font
 """The page's colours inside of Bokeh's widgets, and a focus that is seen."""
 PLAIN, PERCENT = "return parseFloat(tick.toPrecision(5)).toString()", "return (100 * tick).toFixed(2) + ' %'"
 
-Change = Callable[[Callable[[Setting], Setting], bool], None]
-"""Called with what makes a setting of a setting, and whether a slider is still being dragged."""
+class Change(Protocol):
+    """Called with what makes a setting of a setting, whether a slider is still being dragged, and which one it is."""
+
+    def __call__(self, action: Callable[[Setting], Setting], dragging: bool, slider: str = "") -> None: ...
 
 
 def labelled(name: str) -> dict[str, str]:
@@ -140,7 +142,7 @@ class Controls:
         return Row(slider, self._tick(key, s), **WIDE)
 
     def _set(self, effect: str, parameter: str, value: float, dragging: bool) -> None:
-        self.change(lambda s: set_value(s, effect, parameter, value) if effect in s.effects else s, dragging)
+        self.change(lambda s: set_value(s, effect, parameter, value) if effect in s.effects else s, dragging, key_of(effect, parameter))
 
     def _tolerance(self, name: str, sd: float, s: Setting) -> Row:
         low, high = span_of_tolerance(sd)
@@ -148,8 +150,8 @@ class Controls:
             title=f"{name} (± {sd:.2%})", start=low, end=high, value=s.deviations.get(name, 0.0), step=step_of(low, high), format=CustomJSTickFormatter(code=PERCENT), stylesheets=[LOOK], tooltips=False,
             name=name, html_attributes=labelled(name), **WIDE,
         )  # fmt: skip
-        slider.on_change("value", lambda attr, old, new: self.change(lambda s: set_deviation(s, name, new), True))
-        slider.on_change("value_throttled", lambda attr, old, new: self.change(lambda s: set_deviation(s, name, new), False))
+        slider.on_change("value", lambda attr, old, new: self.change(lambda s: set_deviation(s, name, new), True, name))
+        slider.on_change("value_throttled", lambda attr, old, new: self.change(lambda s: set_deviation(s, name, new), False, name))
         self.sliders[name] = slider
         return Row(slider, self._tick(name, s), **WIDE)
 

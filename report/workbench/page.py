@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import threading
 import time
+import traceback
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
@@ -30,6 +31,7 @@ from thermospindle.report.workbench.state import (
     Session,
     Setting,
     add_effect,
+    amend,
     computed,
     do,
     keep,
@@ -41,6 +43,7 @@ from thermospindle.report.workbench.state import (
 )  # fmt: skip
 
 SMOOTH = 0.15  # s, up to which something is computed while a slider is dragged
+AGAIN = 1.0  # s
 RECENT = 5  # times that something was computed, of which the shortest counts
 
 
@@ -58,6 +61,7 @@ class Page:
         self.seen: Setting | None = None
         self.found = Errors((), None, None)
         self.costs: dict[str, deque[float]] = {"all": deque(maxlen=RECENT), "shown": deque(maxlen=RECENT)}
+        self.moved = (0.0, "")  # when which slider was last let go
         self.stop = threading.Event()
         self.working = ""
         self.frf, self.map, self.section = FrfPlots(), ErrorMap(bench), MovingSection(pieces(bench.spindle))
@@ -112,8 +116,8 @@ class Page:
         self.quantity.on_change("active", lambda attr, old, new: self.show_errors())
         self.left_out.on_change("active", lambda attr, old, new: self.change(lambda s: leave_out(s, [self.bench.shown[k].id for k in new]), False))
         self.controls.add.on_change("value", lambda attr, old, new: self._add(new))
-        self.undo.on_click(lambda: self.become(undo(self.session)))
-        self.redo.on_click(lambda: self.become(redo(self.session)))
+        self.undo.on_click(lambda: self._walk(undo))
+        self.redo.on_click(lambda: self._walk(redo))
         self.keep.on_click(lambda: self.become(keep(self.session, self.found.fitted, self.found.left_out)))
         self.take_up.on_click(lambda: self.become(take_up(self.session, int(self.rung.value))))
         self.take.on_click(self._take)
@@ -124,12 +128,19 @@ class Page:
 
     # ------------------------------------------------------------ actions
 
-    def change(self, action: Callable[[Setting], Setting], dragging: bool) -> None:
-        """Do something to the setting; of what a drag asks for in the meantime only the newest is computed."""
+    def change(self, action: Callable[[Setting], Setting], dragging: bool, slider: str = "") -> None:
+        """Do something to the setting; of what a drag asks for in the meantime only the newest is computed.
+
+        A slider moved again within `AGAIN`, as by keys, is one step to undo.
+        """
         setting = action(self.session.now)
         if not dragging:
             self.wanted = None
-            self.become(do(self.session, setting))
+            now, (before, moved) = time.perf_counter(), self.moved
+            if setting != self.session.now:
+                self.moved = now, slider
+            step = amend if slider and slider == moved and now - before < AGAIN else do
+            self.become(step(self.session, setting))
         elif setting != (self.wanted or self.session.now):
             if self.wanted is None:
                 self.document.add_next_tick_callback(self._dragged)
@@ -158,6 +169,10 @@ class Page:
             self.show_numbers()
         if session is not before:
             self.show_rest()
+
+    def _walk(self, where: Callable[[Session], Session]) -> None:
+        self.moved = (0.0, "")
+        self.become(where(self.session))
 
     def _add(self, name: str) -> None:
         if name:
@@ -298,6 +313,9 @@ class Page:
                 problem = f"{name} was stopped."
             except (*FAILED, OSError) as error:
                 problem = f"{name}: {error}"
+            except Exception as error:  # the page must not wait for ever; the terminal has the rest
+                traceback.print_exc()
+                problem = f"{name} failed: {type(error).__name__}: {error}"
             self.document.add_next_tick_callback(lambda: ended(found, problem))
 
         threading.Thread(target=run, name=name, daemon=True).start()

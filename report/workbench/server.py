@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import secrets
 import signal
 import socket
@@ -85,13 +86,17 @@ def page_of(bench: Bench, out: Path, known: Explanations | None) -> Callable[[Do
 
 def words(bench: Bench) -> dict[str, Any]:
     campaign = bench.campaign
-    under = f"{campaign.title}: {len(bench.shown)} tests" if campaign else "Without tests: the model alone, beside itself as it was opened"
+    count = len(bench.shown)
+    under = f"{campaign.title}: {count} test{'s' * (count > 1)}" if campaign else "Without tests: the model alone, beside itself as it was opened"
+    present = ", ".join(a.effect for a in bench.spindle.effects)
+    under += f". Effects in the scene itself: {present}" if present else ""
     labels = Markup((HERE / "labels.js").read_text(encoding="utf-8"))
     return {"heading": bench.spindle.title, "under": under, "measured": campaign is not None, "labels": labels, "colours": (MEASURED, COMPUTED)}
 
 
 def serve(made: Server) -> None:
     """Serve until interrupted or told to end."""
+    logging.getLogger("tornado.access").setLevel(logging.ERROR)  # who is refused is not told to the terminal
     loop = made.io_loop
     before = {s: signal.signal(s, lambda *_: loop.add_callback_from_signal(loop.stop)) for s in (signal.SIGINT, signal.SIGTERM)}
     try:

@@ -123,6 +123,13 @@ def do(session: Session, setting: Setting) -> Session:
     return replace(session, now=setting, past=(*session.past, session.now)[-MOST:], future=())
 
 
+def amend(session: Session, setting: Setting) -> Session:
+    """The session with another setting in place of the last, as one step: keys of a slider pressed one after the other."""
+    if setting == session.now:
+        return session
+    return replace(session, now=setting, future=()) if session.past else do(session, setting)
+
+
 def undo(session: Session) -> Session:
     if not session.past:
         return session

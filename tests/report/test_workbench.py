@@ -199,6 +199,20 @@ def test_adding_dragging_undoing(page):
     assert page.controls.sliders["preload_loss.loss"].value == 0.15
 
 
+def test_a_slider_moved_by_keys_is_one_step_to_undo(page, monkeypatch):
+    page.controls.add.value = "preload_loss"
+    slider = page.controls.sliders["preload_loss.loss"]
+    for value in (0.16, 0.17, 0.18):
+        slider.trigger("value_throttled", slider.value, value)
+    assert len(page.session.past) == 2
+    monkeypatch.setattr(pages, "AGAIN", 0.0)
+    slider.trigger("value_throttled", slider.value, 0.19)
+    assert len(page.session.past) == 3
+    page.undo._trigger_event(click(page.undo))
+    page.undo._trigger_event(click(page.undo))
+    assert page.session.now.effects["preload_loss"]["loss"] == 0.15
+
+
 def click(button):
     from bokeh.events import ButtonClick
 
@@ -302,6 +316,16 @@ def test_work_can_be_stopped(page):
     finish(page)
     assert "Waiting was stopped." in page.message.text
     assert not page.halt.visible
+
+
+def test_work_that_goes_wrong_does_not_go_on_for_ever(page, capsys):
+    def wrong(progress):
+        raise AttributeError("a mistake of ours")
+
+    page.work("Work", wrong, lambda found: None)
+    finish(page)
+    assert "Work failed: AttributeError: a mistake of ours" in page.message.text
+    assert "Traceback" in capsys.readouterr().err
 
 
 # ---------------------------------------------------------------- explanations

@@ -77,6 +77,15 @@ def test_undo_and_redo_walk_through_what_was_done():
     assert state.undo(back).now == Setting()
 
 
+def test_keys_pressed_in_a_row_are_one_step():
+    session = state.do(Session(), state.set_deviation(Setting(), "preload", 0.01))
+    again = state.amend(state.amend(session, state.set_deviation(Setting(), "preload", 0.02)), state.set_deviation(Setting(), "preload", 0.03))
+    assert again.now.deviations == {"preload": 0.03}
+    assert state.undo(again).now == Setting()
+    assert state.amend(again, again.now) is again
+    assert state.undo(state.amend(Session(), again.now)).now == Setting(), "the first step is one in any case"
+
+
 def test_something_new_after_undo_ends_what_could_be_redone():
     session = state.undo(state.do(Session(), state.set_deviation(Setting(), "preload", 0.01)))
     session = state.do(session, state.set_deviation(Setting(), "hub mass", 0.01))
