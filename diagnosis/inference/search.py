@@ -14,7 +14,7 @@ from functools import partial
 import numpy as np
 
 from thermospindle.diagnosis.inference.evidence import Evidence, evidence
-from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit
+from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, Problem, fit
 from thermospindle.diagnosis.inference.mechanism import Mechanism
 from thermospindle.diagnosis.inference.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.prior import DRIFTING, Learned, steady
@@ -31,6 +31,7 @@ PAIRS = 6  # fitted at most
 ENOUGH, PLENTY = 5.0, 12.0  # ln evidence that a second mechanism must promise: beside one that leaves a misfit, and one that leaves none
 OCCAM = 20.0  # ln evidence that a second mechanism of no size may cost at most: less tells of a fit that stalled
 STALLED = 0.1  # of the enlarged errors, which the model without effects must reach if fits are to start from it alone
+SCAN = (-10.0, -6.0, -3.0, -1.5, 1.5, 3.0, 6.0, 10.0)  # prior standard deviations of a size
 STRAIN = 1.02  # times the errors, from which the model without effects leaves a misfit
 FINALISTS = {1: 3, 2: 2, 3: 1}  # explanations of one, two and three mechanisms that are fitted anew at the end, of the catalogue and free
 NEAR = 100.0  # ln evidence behind the best, so far
@@ -183,7 +184,7 @@ def _fits(model, tasks, tempers, about: Fit, most: float, expected: Learned, wor
 
 
 def _fit_one(model: CampaignModel, rates, tempers, most: float, expected: Learned, afresh: bool, task: Task) -> Hypothesis | None:
-    """A fit; with `afresh` also from nothing through all tempers before, the better of both. Once more with errors enlarged where it did not
+    """A fit; with `afresh` also from the best of a `scan` through all tempers before, the better of both. Once more with errors enlarged where it did not
     reach `most`, the cost of a model that it contains, or the evidence that screening `hoped` for: then it had stalled."""
     mechanisms = task.mechanisms
     prior = steady(expected, mechanisms)
@@ -191,7 +192,7 @@ def _fit_one(model: CampaignModel, rates, tempers, most: float, expected: Learne
         found = fit(model, mechanisms, task.starts, rates, tempers, learned=prior)
         if afresh:
             before = TEMPERS[: TEMPERS.index(tempers[0])]
-            found = min(found, fit(model, mechanisms, None, rates, (*before, *tempers), learned=prior), key=lambda f: f.cost)
+            found = min(found, fit(model, mechanisms, scan(model, mechanisms), rates, (*before, *tempers), learned=prior), key=lambda f: f.cost)
         reached = Hypothesis(found, evidence(model, found))
         if found.temper == 1.0 and (found.cost > most + LITTLE or reached.evidence.ln < task.hoped - LITTLE):
             loose = np.concatenate([np.zeros(len(model.parameters)), task.starts[0][len(model.parameters) :]])
@@ -201,6 +202,22 @@ def _fit_one(model: CampaignModel, rates, tempers, most: float, expected: Learne
         return reached
     except FAILED:
         return None
+
+
+def scan(model: CampaignModel, mechanisms: Sequence[Mechanism]) -> tuple[Array, ...]:
+    """Starts with no tolerance off its drawing and one mechanism of a size, the same in all tests: what moves peaks by many of their widths has no
+    slope to follow from where it does not act."""
+    problem = Problem(model, mechanisms)
+    starts, at = [np.zeros(problem.length)], problem.nuisances
+    for m, root in zip(mechanisms, problem.roots, strict=True):
+        low, high = m.size.limits
+        for size in (m.size.neutral + s * m.size.prior_sd for s in SCAN):
+            if low <= size <= high:
+                start = np.zeros(problem.length)
+                start[at : at + len(root)] = np.linalg.solve(root, np.full(len(root), size - m.size.neutral))
+                starts.append(start)
+        at += len(root) + len(m.shape)
+    return tuple(starts)
 
 
 def _joined(

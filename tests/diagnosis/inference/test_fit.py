@@ -13,6 +13,7 @@ from thermospindle.diagnosis.inference.fit import Problem, fit
 from thermospindle.diagnosis.inference.mechanism import variants
 from thermospindle.diagnosis.inference.model import CampaignModel
 from thermospindle.diagnosis.inference.nuisance import BUILD, DRIFT, GAIN, STIFFNESS, TEMPERATURE
+from thermospindle.diagnosis.inference.search import scan
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
@@ -103,6 +104,32 @@ def test_the_size_of_what_is_hidden(spindle):
     assert Problem(model, (m,)).length == len(done.point)
     apart, sd = found.sizes[0] - 0.2, np.sqrt(np.diag(found.size_covariance[0]))
     assert np.all(np.abs(apart) < 4 * sd)
+
+
+def test_of_several_starts_the_best_is_taken(spindle):
+    """A start that no step leads back from is passed over for one that is near, whatever their order."""
+    model, done, _ = fitted(spindle, COLD_AND_WARM, 2, frequency=np.arange(400.0, 6000.1, 16.0))
+    far = done.point.copy()
+    far[: len(model.build)] += 5.0
+    for starts in ((far, done.point), (done.point, far)):
+        again = fit(model, start=starts, tempers=(1.0,))
+        assert again.cost < done.cost + 0.2
+
+
+@pytest.mark.parametrize(("compliance", "scanned"), [(0.2, False), (0.5, True)])
+def test_peaks_that_move_by_many_widths_are_followed(spindle, compliance, scanned):
+    """A mount that gives by a fifth more is found from the drawing, through all tempers, to the noise; by half as much again from a scan of sizes."""
+    softer = effect("mount_compliance")
+    values = {"compliance": compliance, "thermal_share": 0.0}
+    errors = drawn(spindle, 2, 4)
+    campaign = virtual_campaign(
+        spindle, COLD_AND_WARM, 4, [(softer, values)], errors, responses=(1, 3, 6), frequency=np.arange(400.0, 6000.1, 8.0)
+    )
+    model = model_of(spindle, campaign)
+    m = next(v for v in variants(softer) if v.choices == {"thermal_share": 0.0})
+    done = fit(model, (m,), scan(model, (m,)) if scanned else None)
+    assert done.chi2 / done.count == pytest.approx(1.0, abs=0.1)
+    assert evidence(model, done).sizes[0] == pytest.approx([compliance, compliance], abs=0.1 * compliance)
 
 
 @pytest.mark.slow

@@ -134,6 +134,13 @@ def test_evidence_is_worth_less_where_the_model_is_a_little_wrong(sizes, errors,
     assert coarsening(wrong[0]) == worth
 
 
+def test_a_set_holds_only_what_is_probable():
+    """One effect alone, with another, or with something that drifts: the set is those two, not what the rest of the catalogue reaches far behind."""
+    v = decide(made({("left", "right"): 58.0, "left": 53.5, ("left", "~drift"): 56.0, "behind": 5.0, "far": -40.0}))
+    assert 0.5 < max(c.probability for c in v.candidates) < 0.95
+    assert (v.word, set(v.effects)) == ("ambiguous", {"left", "right"})
+
+
 def test_the_order_of_hypotheses_does_not_matter():
     search = made({"a": 12.0, "b": 11.0, "~x": 9.0, ("a", "c"): 10.0})
     turned = replace(search, hypotheses=search.hypotheses[::-1])
