@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from thermospindle.diagnosis.data.mode_table import ModeData
 from thermospindle.diagnosis.inference.response import Linear
 from thermospindle.model.rotor.modes import kinds, oscillating, poles
 from thermospindle.model.types import Array
+from thermospindle.sim.identification import pairing
+from thermospindle.sim.identification.pairing import ModeSet
 
 
 def partners(data: ModeData, linear: Linear):
@@ -16,13 +17,11 @@ def partners(data: ModeData, linear: Linear):
     p = poles(linear.matrices)
     found = oscillating(p, 2.5 * float(data.frequency.max()))
     frequency = np.abs(p.value[found]) / (2 * np.pi)
-    unlike = np.array(data.kind)[:, None] != np.array(kinds(linear.matrices, p.right[:, found]))[None, :]
-    # squares: two modes of a kind on one side of two measured ones cost the same either way in absolute differences, and would swap at random
-    cost = np.log(data.frequency[:, None] / frequency[None, :]) ** 2 + 9.0 * unlike
-    if cost.shape[1] < cost.shape[0]:
+    computed = ModeSet(frequency, kind=kinds(linear.matrices, p.right[:, found]))
+    partner = pairing.partners(ModeSet(data.frequency, kind=data.kind), computed, pairing.OF_A_TABLE)
+    if np.any(partner < 0):
         raise ValueError("the model has fewer modes than the table")
-    rows, columns = linear_sum_assignment(cost)
-    return found, columns[np.argsort(rows)], p
+    return found, partner, p
 
 
 def mode_residual(data: ModeData, linear: Linear) -> Array:

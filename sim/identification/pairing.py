@@ -59,6 +59,10 @@ REPEATED = Policy(width=0.36, alone=0.7)
 NEAREST = Policy(width=1.0, power=1)
 """Modes known by their frequencies alone: as many as there are, at the least sum of distances."""
 
+OF_A_TABLE = Policy(width=1.0, kind=9.0)
+"""Modes of a table, whose shapes nobody told, and those of a model that fits it: squares, for two modes of a kind on one side of two measured ones cost
+the same either way in absolute differences, and would swap at random."""
+
 
 @dataclass(frozen=True, eq=False)
 class ModeSet:
