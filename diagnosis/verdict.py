@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 
@@ -11,8 +11,9 @@ import numpy as np
 from thermospindle.diagnosis.data.lines import line_data
 from thermospindle.diagnosis.data.mode_table import mode_data
 from thermospindle.diagnosis.data.observe import condition_of
+from thermospindle.diagnosis.inference.detectable import smallest
 from thermospindle.diagnosis.inference.freeform import free_forms
-from thermospindle.diagnosis.inference.mechanism import variants
+from thermospindle.diagnosis.inference.mechanism import Mechanism, variants
 from thermospindle.diagnosis.inference.model import CampaignModel, TestData, campaign_model, expected_noise
 from thermospindle.diagnosis.inference.next_test import NextTest, next_tests
 from thermospindle.diagnosis.inference.search import Hypothesis, Search, search
@@ -25,7 +26,7 @@ from thermospindle.sim.campaign.campaign import Campaign, Noise, Test
 from thermospindle.sim.effects import CATALOGUE, of_scene, usable
 from thermospindle.sim.effects.effect import Effect
 
-STEPS = 6  # of progress, beside one a test
+STEPS = 7  # of progress, beside one a test
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +53,7 @@ class Drift:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """All that `spindle diagnose` tells."""
+    """All that `spindle diagnose` tells; `detectable`: of every effect the variant and size (from neutral, in its unit) that would have shown."""
 
     spindle: Spindle
     campaign: Campaign
@@ -60,6 +61,7 @@ class Diagnosis:
     verdict: Verdict
     drifts: tuple[Drift, ...]
     tests: tuple[NextTest, ...]
+    detectable: Mapping[str, tuple[Mechanism, float]]
 
 
 def diagnose(
@@ -74,7 +76,9 @@ def diagnose(
     drifts = tuple(_drift(found, c.hypothesis, c.delta_evidence) for c in verdict.free if len(c.hypothesis.mechanisms) == 1)
     tests = tuple(next_tests(found, verdict)) if verdict.word != "none" else ()
     progress("next tests weighed")
-    return Diagnosis(spindle, campaign, found, verdict, drifts, tests)
+    seen = smallest(model, found.base.fit, found.screened)
+    progress("smallest sizes found")
+    return Diagnosis(spindle, campaign, found, verdict, drifts, tests, seen)
 
 
 def campaign_data(spindle: Spindle, campaign: Campaign, progress: Callable[[str], None] = lambda done: None) -> CampaignModel:

@@ -11,6 +11,7 @@ freeform   what would have to drift where nobody names a cause
 fit        tempered Gauss-Newton with priors
 evidence   Laplace evidence with everything of unknown size learned
 screening  what a mechanism promises beside a fitted model
+detectable  smallest sizes that would have shown
 search     fits, pairs: the evidence of every explanation
 verdict    posterior probabilities, and the answer with the least expected loss
 next_test  which test would decide between the explanations that survive

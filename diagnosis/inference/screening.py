@@ -53,7 +53,7 @@ def screen(
     return [replace(s, mechanism=m) for s, m in zip(found, mechanisms, strict=True)]
 
 
-def _fitted(model: CampaignModel, about: Fit) -> list[Fitted]:
+def fitted(model: CampaignModel, about: Fit) -> list[Fitted]:
     """All tests of the model `about`; the last one asked for is kept with the model."""
     key = (about.point.tobytes(), len(about.mechanisms))
     if key not in model.kept:
@@ -75,7 +75,7 @@ def _screened(model: CampaignModel, about: Fit, sizes: Learned, nothing: float, 
         return Screened(mechanism, -np.inf, p, 0.0)
     x, own_sizes, shapes = problem.parts(p)
     by_test, seen = [], []
-    for t, at in enumerate(_fitted(model, about)):
+    for t, at in enumerate(fitted(model, about)):
         effects, _ = problem.applied(t, own_sizes, shapes)
         try:
             column = problem.by_size(t, x, effects, len(about.mechanisms))

@@ -144,7 +144,7 @@ def _detectable(answer: dict[str, Any]) -> str:
         ]
         for name, row in sorted(answer["detectable_in"].items())
     ]  # fmt: skip
-    caption = "Size from which each effect would have been separated from the tolerances, which are fitted anew beside it: first order about the fit without effects."
+    caption = "Size from which each effect would have been separated from the tolerances, which are fitted anew beside it; its own lines are worked out at that size."
     return _grid(caption, ["effect", "parameter", "smallest", "unit", ""], rows)
 
 

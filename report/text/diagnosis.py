@@ -19,7 +19,6 @@ from thermospindle.model.units import RPM
 SHOWN = 12  # candidates
 DEPARTS = 0.3  # of the size, from which a law is said not to hold
 ALIKE = 0.9  # of the evidence of what the verdict names, from which a free drift does as well
-ASKED = 5.0  # ln evidence from which an effect is seen: where `detectable` lies
 
 
 def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
@@ -37,9 +36,9 @@ def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
         "probability": {"none": v.probability_none, "unknown": v.probability_unknown},
         "expected_loss": dict(v.losses),
         "candidates": [_candidate(c, d) for c in v.candidates[:SHOWN]],
-        "invisible": sorted({s.mechanism.name for s in d.search.screened if not s.mechanism.free} - set(_detectable(d, 1.0))),
-        "detectable": {name: size for name, (size, _) in _detectable(d).items()},
-        "detectable_in": {name: {"parameter": p.name, "unit": p.unit, "size": size} for name, (size, p) in _detectable(d).items()},
+        "invisible": _invisible(d),
+        "detectable": {name: size for name, (_, size) in d.detectable.items()},
+        "detectable_in": {name: {"parameter": m.size.name, "unit": m.size.unit, "size": size} for name, (m, size) in d.detectable.items()},
         "error": {"before": before, "after": after, "held_out_before": v.held_out_before, "held_out_after": v.held_out_after},
         "where": [_place(p, d) for p in d.drifts],
         "next_test": [
@@ -150,17 +149,13 @@ def _believable(c: Candidate) -> bool:
     return True
 
 
-def _detectable(d: Diagnosis, asked: float = np.sqrt(2 * ASKED)) -> dict[str, tuple[float, Any]]:
-    """Smallest size of every effect that these data would have shown, beside all nuisances: `asked` standard errors."""
-    found: dict[str, tuple[float, Any]] = {}
+def _invisible(d: Diagnosis) -> list[str]:
+    """Effects whose typical size these data do not show by one standard error, whatever variant."""
+    best: dict[str, float] = {}
     for s in d.search.screened:
-        m = s.mechanism
-        if m.free or s.visibility <= 0 or (asked == 1.0 and s.visibility < 1.0):
-            continue
-        size = abs(m.size.typical - m.size.neutral) * asked / s.visibility
-        if m.name not in found or size < found[m.name][0]:
-            found[m.name] = (float(size), m.size)
-    return found
+        if not s.mechanism.free:
+            best[s.mechanism.name] = max(best.get(s.mechanism.name, 0.0), s.visibility)
+    return sorted(name for name, seen in best.items() if seen < 1.0)
 
 
 def _place(p: Drift, d: Diagnosis) -> dict[str, Any]:

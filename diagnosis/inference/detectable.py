@@ -1,0 +1,101 @@
+"""The smallest size of every effect that a campaign would have shown.
+
+What an effect of some size really does to every line is worked out, and tolerances and measuring errors are fitted anew beside it; the size is changed
+until what is left is worth `ASKED` in ln evidence. First order alone, as screening has it, would be far too small or too large for what grows
+otherwise than in proportion: a film that must first part the surfaces, a seat that must first lose its play.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+
+from thermospindle.diagnosis.inference.fit import Fit
+from thermospindle.diagnosis.inference.mechanism import Mechanism
+from thermospindle.diagnosis.inference.model import FAILED, Applied, CampaignModel
+from thermospindle.diagnosis.inference.screening import Fitted, Screened, fitted
+from thermospindle.model.parallel import in_parallel
+from thermospindle.model.types import Array
+
+ASKED = 5.0  # ln evidence
+NEAR = 0.05  # relative error of a size
+TRIES = 8  # sizes of an effect
+STEPS = 6  # at most, of everything else beside it
+
+
+def smallest(model: CampaignModel, about: Fit, screened: Sequence[Screened], workers: int | None = None) -> dict[str, tuple[Mechanism, float]]:
+    """The variant of every effect of the catalogue that shows at the smallest size, and that size less the neutral one, in its unit: none where
+    it does not show within its limits. `about` is the fit without effects."""
+    best: dict[str, tuple[float, Mechanism]] = {}
+    for s in screened:
+        m = s.mechanism
+        if not m.free and s.visibility > 0:
+            size = abs(m.size.typical - m.size.neutral) * np.sqrt(2 * ASKED) / s.visibility
+            best[m.name] = min(best.get(m.name, (np.inf, m)), (size, m), key=lambda row: row[0])
+    tasks = list(best.values())
+    sizes = in_parallel(partial(_smallest, model.thinned, about), tasks, workers)
+    return {m.name: (m, size) for (_, m), size in zip(tasks, sizes, strict=True) if size is not None}
+
+
+def _smallest(model: CampaignModel, about: Fit, task: tuple[float, Mechanism]) -> float | None:
+    """By the rule of three from the size of first order, then by halves between what is too small and too large."""
+    size, m = task
+    sign = 1.0 if m.size.typical >= m.size.neutral else -1.0
+    limit = abs((m.size.limits[1] if sign > 0 else m.size.limits[0]) - m.size.neutral)
+    low, high, asked = 0.0, limit, np.sqrt(2 * ASKED)
+    size = min(size, limit)
+    for _ in range(TRIES):
+        seen = visibility(model, about, m, m.size.neutral + sign * size)
+        if abs(seen / asked - 1) < NEAR:
+            break
+        if seen < asked:
+            if size == limit:
+                return None
+            low = size
+        else:
+            high = size
+        size = float(np.clip(size * asked / max(seen, asked / 10), low, high))
+        if size in (low, high) and size != limit:
+            size = (low + high) / 2
+    return size
+
+
+def visibility(model: CampaignModel, about: Fit, m: Mechanism, size: float) -> float:
+    """Standard errors that are left of an effect of `size` in all tests after all else is fitted anew beside it; infinite where no spindle can be
+    built with it.
+
+    The spindle `about` with the effect is taken for measured, without noise. Steps of Gauss and Newton with the derivatives of `about` (the chord method:
+    Ortega & Rheinboldt, *Iterative Solution of Nonlinear Equations*, 1970, 7.1) move everything else until they gain little.
+    """
+    base, shape = fitted(model, about), [q.neutral for q in m.shape]
+    moved = _moved(model, about.nuisance, [(m.effect, m.values(size, shape))], base)
+    if moved is None:
+        return np.inf
+    normal = np.eye(len(about.point))
+    for at in base:
+        normal[np.ix_(at.numbers, at.numbers)] += at.information
+    step, residual, best = np.zeros(len(normal)), [-r for r in moved], np.inf
+    for _ in range(STEPS):
+        cost = sum(float(r @ r) for r in residual) + float(step @ step)
+        if cost > (1 - NEAR) * best:
+            break
+        best, gradient = cost, step.copy()
+        for at, r in zip(base, residual, strict=True):
+            gradient[at.numbers] += at.derivatives @ r
+        step = step - np.linalg.solve(normal, gradient)
+        there = _moved(model, about.nuisance + step, [], base)
+        if there is None:
+            break
+        residual = [r - d for r, d in zip(there, moved, strict=True)]
+    return float(np.sqrt(min(best, sum(float(r @ r) for r in residual) + float(step @ step))))
+
+
+def _moved(model: CampaignModel, x: Array, effects: Applied, base: Sequence[Fitted]) -> list[Array] | None:
+    """How far all residuals move from those of `base`; None where no spindle can be built."""
+    try:
+        found = [model.residual(t, x, effects) - at.residual for t, at in enumerate(base)]
+    except FAILED:
+        return None
+    return found if all(np.all(np.isfinite(r)) for r in found) else None
