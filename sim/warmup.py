@@ -32,6 +32,9 @@ from thermospindle.thermal.readout import Reading, reading
 
 TOLERANCE = 0.01  # K, estimated error of one time step
 TIME_CONSTANTS = 8.0  # of the slowest decay that a warm-up lasts by default: the rest is 0.03 %
+PARTS = 20  # of the time, after each of which progress is told
+STAGES = PARTS + 3
+"""How often a warm-up tells of its progress."""
 STEPS = 48  # at least, over a warm-up of that length
 
 
@@ -118,12 +121,20 @@ def warm_up(
     constant = heat.slowest(model, field, drive(0.0, final))
     progress(f"steady state, time constant {constant:.0f} s")
     whole = TIME_CONSTANTS * constant
-    history = heat.march(model, drive, start, duration or whole, tolerance, whole / STEPS)
+    told = 0
+
+    def passed(share: float) -> None:
+        nonlocal told
+        while told < min(int(share * PARTS + 1e-9), PARTS):
+            told += 1
+            progress(f"{100 * told // PARTS} % of the time")
+
+    history = heat.march(model, drive, start, duration or whole, tolerance, whole / STEPS, passed)
     progress(f"temperatures in {len(history.times) - 1} steps")
     moments = tuple(machine.moment(nodal) for nodal in history.nodal)
     steady = machine.moment(final)
     top = spindle.hammer.band[1] if highest is None else highest
-    first = tuple(m for m in modes(moments[0].point.chain) if m.frequency <= top)
+    first = tuple(modes(moments[0].point.chain, highest=top))
     followed = _followed(first, [*moments, steady])
     progress("natural frequencies")
     return Warmup(spindle, start, air, speed, history, moments, first, followed[:-1], steady, followed[-1], constant, left_out)

@@ -135,11 +135,12 @@ def transient(
 
 
 def march(
-    model: HeatModel, drive: Drive, start: float | TemperatureField, end: float, tolerance: float, longest: float = np.inf
+    model: HeatModel, drive: Drive, start: float | TemperatureField, end: float, tolerance: float, longest: float = np.inf,
+    told: Callable[[float], None] = lambda share: None,
 ) -> History:
     """Temperatures from time 0 to `end` (s) by TR-BDF2 steps, each with an estimated error of at most `tolerance` (K).
 
-    Steps double or halve, so few matrices are factorised, and are at most `longest` (s). Raises NotSettled where temperature and drive find no agreement, OutsideRange
+    Steps double or halve, so few matrices are factorised, and are at most `longest` (s); `told` hears after each what share of the time has passed. Raises NotSettled where temperature and drive find no agreement, OutsideRange
     where the viscosity law does not reach.
     """
     times, nodal, heat = [0.0], [model.nodal(start)], []
@@ -153,6 +154,7 @@ def march(
         times.append(times[-1] + length)
         nodal.append(done.end)
         heat.append(done.heat)
+        told(times[-1] / end)
         if done.error < tolerance / 10 and 2 * length <= longest:  # twice the step makes eight times the error
             length *= 2
     return History(model, np.array(times), np.array(nodal), tuple(heat))

@@ -15,7 +15,7 @@ from thermospindle.model.bearing.kinematics import Line
 from thermospindle.model.units import RPM
 from thermospindle.report.figures.common import INK, PALE, STYLE, svg
 from thermospindle.report.figures.warmup import MODES, name_ends, spread
-from thermospindle.sim.resonance.map import Coincidence, LineTrack, ResonanceMap, Track, strongest
+from thermospindle.sim.resonance.found import Coincidence, LineTrack, ResonanceMap, Track, strongest
 from thermospindle.sim.resonance.point import key
 
 WHIRL = {"forward": "#c9371c", "backward": "#2166ac", "none": "#1f8a70"}

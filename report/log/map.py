@@ -24,7 +24,7 @@ from thermospindle.report.log.columns import any_values, curve_look, log_curve, 
 from thermospindle.report.log.pictures import log_figure, log_figures, place, view
 from thermospindle.report.text.resonance import map_json, sentences
 from thermospindle.sim.operating import provenance
-from thermospindle.sim.resonance.map import LineTrack, ResonanceMap, strongest
+from thermospindle.sim.resonance.found import LineTrack, ResonanceMap, strongest
 
 CAMPBELL, SMALL = (8.5, 8.3), (6.5, 3.1)  # inches
 WHIRL = {"forward": (255, 110, 80), "backward": (90, 160, 255), "none": (90, 220, 160)}

@@ -14,7 +14,7 @@ from thermospindle.report.figures.resonance import figures_svg, write_figures
 from thermospindle.report.text.grid import show_grid
 from thermospindle.report.typeset import figure, prose, table, write_csv
 from thermospindle.sim.operating import provenance
-from thermospindle.sim.resonance.map import Coincidence, ResonanceMap, strongest
+from thermospindle.sim.resonance.found import Coincidence, ResonanceMap, strongest
 
 SHOWN = 18  # coincidences in the terminal and the report
 
@@ -44,8 +44,23 @@ def map_json(found: ResonanceMap) -> dict[str, Any]:
             "over_speed": _runout_json(found.nrro_speed, "speed_rpm", 1 / RPM),
             "over_temperature": _runout_json(found.nrro_temperature, "temperature_C", 1.0),
         },
+        "interpolated": _interpolated_json(found),
         "imperfections": "of the scene" if found.drawn_from is None else f"drawn with seed {found.drawn_from}",
         "provenance": provenance(found.spindle),
+    }
+
+
+def _interpolated_json(found: ResonanceMap) -> dict[str, Any] | None:
+    """How many coincidences are interpolated between grid points, and the errors where others were found both ways; None where all are exact."""
+    i = found.interpolated
+    if i is None:
+        return None
+    return {
+        "coincidences": i.crossings,
+        "checked": i.checked,
+        "largest_frequency_error": i.frequency_error,
+        "median_strength_error": i.strength_error,
+        "largest_strength_error": i.largest_strength_error,
     }
 
 
@@ -71,6 +86,7 @@ def _coincidence_json(c: Coincidence) -> dict[str, Any]:
         "margin_percent": 100 * c.margin,
         "nrro_um": 1e6 * c.nrro,
         "at_nominal_speed": c.at_nominal_speed,
+        "interpolated": c.interpolated,
     }
 
 
@@ -132,6 +148,13 @@ def show_map(console: Console, found: ResonanceMap) -> None:
         f"Margin: of the line from the mode at {found.nominal.temperature:g} C, {found.nominal.speed / RPM:g} rpm.",
         highlight=False,
     )
+    if found.interpolated:
+        i = found.interpolated
+        console.print(
+            f"{i.crossings} of them, the weaker ones, are interpolated between grid points; of the {i.checked} strongest, found both ways, frequencies "
+            f"differ by {100 * i.frequency_error:.2g} % at most and strengths by {100 * i.largest_strength_error:.2g} %.",
+            highlight=False,
+        )
 
 
 def _cells(c: Coincidence) -> list[str]:

@@ -26,10 +26,11 @@ from thermospindle.report.verbs.answer import (
     with_effects,
 )
 from thermospindle.sim.operating import operating_point
-from thermospindle.sim.resonance.map import ResonanceMap, resonance_map
+from thermospindle.sim.resonance.found import ResonanceMap
+from thermospindle.sim.resonance.map import resonance_map, stages
 from thermospindle.sim.running.runout import runout as simulated_runout
 from thermospindle.sim.running.runout import with_imperfections
-from thermospindle.sim.warmup import warm_up
+from thermospindle.sim.warmup import STAGES, warm_up
 
 STEPS_OF_TEMPERATURE, STEPS_OF_SPEED = 21, 41  # of a resonance map
 
@@ -87,7 +88,7 @@ def warmup(
     spindle, _ = with_effects(scene, effect_files)
     speed = (0.0 if soak is not None else spindle.nominal_speed) if speed_rpm is None else speed_rpm * RPM
     duration = None if minutes is None else MINUTE * minutes
-    with progress_bar(3) as progress:
+    with progress_bar(STAGES) as progress:
         found = warm_up(spindle, speed, temperature_or_reference(temperature, spindle), soak, duration, progress=progress)
     points = [m.point for m in (*found.moments, found.steady)]
     lost = lost_contact(found)
@@ -121,7 +122,7 @@ def resonances(
     nominal = Condition(temperature_or_reference(temperature, spindle), speed)
     grid = temperatures_or_range(temperatures, spindle, STEPS_OF_TEMPERATURE)
     speeds = [s * RPM for s in speeds_rpm] if speeds_rpm else np.linspace(0, 2 * speed, STEPS_OF_SPEED).tolist()
-    with progress_bar(3) as progress:
+    with progress_bar(stages(spindle, len(grid))) as progress:
         found = resonance_map(spindle, grid, speeds, nominal, multiples, progress=progress)
     conditions = [nominal, *(Condition(t, s) for t in grid for s in speeds)]
     return answered(

@@ -2,7 +2,8 @@
 
 Modes are followed by shape over the grid from the nominal condition, along temperature at the nominal speed and from there along speed.
 A line (`model.bearing.kinematics`) crosses a mode where their difference changes sign between neighbours of the grid; the crossing is then found
-with the exact operating point. It counts only where the line can excite the mode:
+with the exact operating point. Of a flexible spindle with hundreds of crossings only the strongest are found so, and the others are interpolated between the
+grid's points (`sim.resonance.between`), with an error that is measured on those found both ways. It counts only where the line can excite the mode:
 
 - an axial line an axial mode, a radial line a rocking or lateral one;
 - sense of whirl: of the modal force of a line, |psi f|^2, and of the same line whirling the other way, |psi f*|^2 (psi the left modal
@@ -26,98 +27,37 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.imperfections import Imperfections
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import matrices
-from thermospindle.model.rotor.modes import Mode, modes
+from thermospindle.model.rotor.modes import LARGE, Mode, modes
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 from thermospindle.sim.identification.pairing import follow
 from thermospindle.sim.operating import operating_point
+from thermospindle.sim.resonance.between import Between, between, strengths
+from thermospindle.sim.resonance.between import runout as between_runout
+from thermospindle.sim.resonance.found import Coincidence, Curve, Interpolated, LineTrack, ResonanceMap, Track, strongest
 from thermospindle.sim.resonance.point import Exact, key, line_amplitudes, nrro_rms, with_imperfections
 
 SENSE = 0.01
 MULTIPLES = 3  # of the number of balls, and even ball orders, whose lines are drawn
 CLOSE = 1e-3  # Hz, of line and mode at a crossing
 DENSER = 6  # coincidences about which runout is computed at more places
+BEYOND = 1.6  # times the highest mode at the nominal condition, up to which modes are looked for at others
+EXACT = 60  # crossings of a flexible spindle that are found exactly
+PARTS = 20  # of many crossings, after each of which progress is told
 SEED = 0  # of the imperfections of a scene that names none
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
-    """A mode over the grid: its number, kind and whirl at the nominal condition, `frequency` (T, S) in Hz, NaN where it was lost."""
+class Candidate:
+    """A change of sign of line less mode between two neighbours of the grid, `ends` with that difference (Hz) at each; `between` is the crossing as
+    interpolated."""
 
-    number: int
-    kind: str
-    whirl: str
-    frequency: Array
-
-
-@dataclass(frozen=True, eq=False)
-class LineTrack:
-    """A line over the grid, as it is at the nominal condition; `frequency` (T, S) in Hz; `amplitude` (m) of the hub in it there."""
-
-    line: Line
-    frequency: Array
-    amplitude: float
-
-
-@dataclass(frozen=True, eq=False)
-class Coincidence:
-    """A line meets a mode at a condition.
-
-    `sense`: share of the modal force that its sense of whirl has (1: all, 1/2: a standing mode); `strength` (m, zero to peak) at the
-    hub's probe under the map's imperfections, zero where they do not make this line; `unit_strength` (m) for 1 um of wave or ball size or 1 g mm;
-    `margin`: (line - mode) / mode at the nominal condition; `nrro` (m rms) of all nonrepeatable lines there, in the mode's direction;
-    `at_nominal_speed`: found along temperature at the nominal speed, else along speed.
-    """
-
-    line: Line
-    mode: Track
-    condition: Condition
-    frequency: float  # Hz, of the line
-    mode_frequency: float
-    sense: float
-    strength: float
-    unit_strength: float
+    line: LineTrack
+    track: Track
+    ends: tuple[tuple[tuple[float, float], float], tuple[tuple[float, float], float]]
+    between: Between
     margin: float
-    nrro: float
     at_nominal_speed: bool
-
-
-@dataclass(frozen=True, eq=False)
-class Curve:
-    """All crossings of one line and one mode over the grid: speed (rad/s) by temperature (C), interpolated between grid speeds."""
-
-    line: Line
-    mode: Track
-    temperature: Array
-    speed: Array
-
-
-@dataclass(frozen=True, eq=False)
-class ResonanceMap:
-    """Natural frequencies and lines on the grid `temperatures` (C) x `speeds` (rad/s), and where they meet.
-
-    `nrro_speed`, `nrro_temperature` (n, 3): place (rad/s or C), radial and axial rms (m), along speed at the nominal temperature and along
-    temperature at the nominal speed, denser about the strongest coincidences. `drawn_from` is the seed of imperfections that the scene does not name, None if it does.
-    """
-
-    spindle: Spindle
-    nominal: Condition
-    temperatures: Array
-    speeds: Array
-    modes: tuple[Track, ...]
-    lines: tuple[LineTrack, ...]
-    curves: tuple[Curve, ...]
-    coincidences: tuple[Coincidence, ...]
-    nrro_speed: Array
-    nrro_temperature: Array
-    drawn_from: int | None
-
-    @property
-    def nominal_index(self) -> tuple[int, int]:
-        """Place of the nominal condition on the grid."""
-        return int(np.argmin(np.abs(self.temperatures - self.nominal.temperature))), int(
-            np.argmin(np.abs(self.speeds - self.nominal.speed))
-        )
 
 
 def resonance_map(
@@ -142,28 +82,34 @@ def resonance_map(
     if over_s[0] < 0:
         raise BadInput(f"speeds: {over_s[0] / RPM:g} rpm; a map goes over speeds of one sense, so none may be negative")
     grid = _Grid(spindle, nominal, multiples, highest or spindle.hammer.band[1], imperfections)
-    tracks, of_lines = grid.follow(over_t, over_s)
+    tracks, of_lines = grid.follow(over_t, over_s, progress)
     progress(f"{len(over_t)} temperatures x {len(over_s)} speeds")
     t0, s0 = int(np.searchsorted(over_t, nominal.temperature)), int(np.searchsorted(over_s, nominal.speed))
-    curves, found = [], []
+    candidates: list[tuple[Curve, list[Candidate]]] = []
     for own in of_lines:
         for track in tracks:
-            if not _same_direction(own.line, track):
-                continue
-            gap = own.frequency - track.frequency
-            curve = Curve(own.line, track, *_along_speed(gap, over_t, over_s))
-            kept = grid.crossings(own, track, gap, curve, over_t, over_s, (t0, s0))
-            if kept:
-                curves.append(curve)
-                found += kept
-    progress(f"{len(found)} coincidences")
+            if _same_direction(own.line, track):
+                gap = own.frequency - track.frequency
+                curve = Curve(own.line, track, *_along_speed(gap, over_t, over_s))
+                candidates.append((curve, grid.candidates(own, track, gap, curve, over_t, over_s, (t0, s0))))
+    met_by, interpolated = grid.met([c for _, own in candidates for c in own], progress)
+    curves = [curve for curve, own in candidates if any(id(c) in met_by for c in own)]
+    found = [met_by[id(c)] for _, own in candidates for c in own if id(c) in met_by]
     found.sort(key=lambda c: (not c.at_nominal_speed, -c.strength, c.frequency))
     crossed = [c.condition.speed for c in strongest([c for c in found if c.condition.temperature == nominal.temperature])]
     met = [c.condition.temperature for c in strongest([c for c in found if c.at_nominal_speed])]
+    progress(f"{len(found)} coincidences")
     along_s = np.array([(s, *grid.nrro(Condition(nominal.temperature, s), (t0, _nearest(over_s, s)))) for s in _dense(over_s, crossed)])
     along_t = np.array([(t, *grid.nrro(Condition(t, nominal.speed), (_nearest(over_t, t), s0))) for t in _dense(over_t, met)])
     progress("runout along both axes")
-    return ResonanceMap(spindle, nominal, over_t, over_s, tracks, of_lines, tuple(curves), tuple(found), along_s, along_t, grid.drawn_from)
+    return ResonanceMap(
+        spindle, nominal, over_t, over_s, tracks, of_lines, tuple(curves), tuple(found), along_s, along_t, grid.drawn_from, interpolated
+    )
+
+
+def stages(spindle: Spindle, temperatures: int) -> int:
+    """How often `resonance_map` tells of its progress, about."""
+    return temperatures + PARTS * (2 if spindle.structure.shafts else 1) + 3
 
 
 def _nearest(values: Array, value: float) -> int:
@@ -189,6 +135,20 @@ def _along_speed(gap: Array, over_t: Array, over_s: Array) -> tuple[Array, Array
     return over_t[i], over_s[j] + share * (over_s[j + 1] - over_s[j])
 
 
+def _each(
+    find: Callable[[Candidate], Coincidence | None], candidates: Sequence[Candidate], progress: Callable[[str], None]
+) -> dict[int, Coincidence]:
+    """What is found of all candidates, by their identity; `progress` is told `PARTS` times."""
+    found = {}
+    for k, candidate in enumerate(candidates, 1):
+        answer = find(candidate)
+        if answer is not None:
+            found[id(candidate)] = answer
+        if k * PARTS // len(candidates) > (k - 1) * PARTS // len(candidates):
+            progress(f"{k} of {len(candidates)} crossings")
+    return found
+
+
 class _Grid:
     """Evaluates conditions of one spindle and follows its modes; conditions found once are kept."""
 
@@ -198,9 +158,11 @@ class _Grid:
         self.given, self.drawn_from = imperfections, None
         if imperfections is None and first.imperfections == Imperfections():
             self.given, self.drawn_from = drawn(spindle, SEED), SEED
-        start = [m for m in modes(first.chain) if m.frequency <= highest]
+        start = modes(first.chain, highest=highest)
         self.first = dict(enumerate(start, 1))
+        self.reach = BEYOND * highest
         self.kept: dict[tuple[float, float], Exact] = {}
+        self.lit: dict[tuple[float, float], Exact] = {}  # the same with the map's imperfections
         self.every: dict[tuple[int, int], Exact] = {}  # by place on the grid
 
     def exact(self, condition: Condition, near: Mapping[int, Mode]) -> Exact:
@@ -209,7 +171,7 @@ class _Grid:
         if place not in self.kept:
             point = operating_point(self.spindle, condition)
             linear = matrices(point.chain)
-            found = modes(point.chain, linear)
+            found = modes(point.chain, linear, self.reach if len(linear.mass) > LARGE else np.inf)
             partners = follow(linear.mass, list(near.values()), found)
             own = {k: found[p] for k, p in zip(near, partners, strict=True) if p >= 0}
             kin = row_kinematics(point.spindle, point.state)
@@ -219,9 +181,14 @@ class _Grid:
 
     def excited(self, found: Exact) -> Exact:
         """The same with the map's imperfections, where they are not the condition's own."""
-        return found if self.given is None else replace(found, point=with_imperfections(found.point, self.given))
+        if self.given is None:
+            return found
+        place = (found.point.condition.temperature, found.point.condition.speed)
+        if place not in self.lit:
+            self.lit[place] = replace(found, point=with_imperfections(found.point, self.given))
+        return self.lit[place]
 
-    def follow(self, over_t: Array, over_s: Array) -> tuple[tuple[Track, ...], tuple[LineTrack, ...]]:
+    def follow(self, over_t: Array, over_s: Array, progress: Callable[[str], None]) -> tuple[tuple[Track, ...], tuple[LineTrack, ...]]:
         t0, s0 = (int(np.searchsorted(a, v)) for a, v in ((over_t, self.nominal.temperature), (over_s, self.nominal.speed)))
 
         def walk(i: int, j: int, near: Mapping[int, Mode]) -> Mapping[int, Mode]:
@@ -237,6 +204,7 @@ class _Grid:
                 near = self.every[i, s0].modes
                 for j in way:
                     near = walk(i, j, near)
+            progress(f"modes at {over_t[i]:g} C over speed")
         shape = (len(over_t), len(over_s))
         tracks = {k: np.full(shape, np.nan) for k in self.first}
         keys = list(dict.fromkeys(k for e in self.every.values() for k in e.lines))
@@ -257,32 +225,68 @@ class _Grid:
 
     # ------------------------------------------------------------ crossings
 
-    def crossings(
+    def candidates(
         self, own: LineTrack, track: Track, gap: Array, curve: Curve, over_t: Array, over_s: Array, nominal: tuple[int, int]
-    ) -> list[Coincidence]:
+    ) -> list[Candidate]:
         """Crossings at the nominal speed along temperature, and along speed at the temperature nearest to the nominal one that has any."""
         t0, s0 = nominal
         margin = float(gap[t0, s0] / track.frequency[t0, s0])
         found = []
         for i in np.flatnonzero(gap[:-1, s0] * gap[1:, s0] < 0):
-            ends = [((float(over_t[k]), float(over_s[s0])), float(gap[k, s0])) for k in (i, i + 1)]
-            found.append(self.crossing(own, track, ends, margin, True))
+            low, high = (((float(over_t[k]), float(over_s[s0])), float(gap[k, s0])) for k in (i, i + 1))
+            at = between(over_t, gap[:, s0], track.frequency[:, s0], int(i))
+            found.append(Candidate(own, track, (low, high), at, margin, True))
         if len(curve.temperature):
             row = int(np.argmin(np.abs(over_t - curve.temperature[np.argmin(np.abs(curve.temperature - self.nominal.temperature))])))
             for j in np.flatnonzero(gap[row, :-1] * gap[row, 1:] < 0):
-                ends = [((float(over_t[row]), float(over_s[k])), float(gap[row, k])) for k in (j, j + 1)]
-                found.append(self.crossing(own, track, ends, margin, False))
-        return [c for c in found if c is not None]
+                low, high = (((float(over_t[row]), float(over_s[k])), float(gap[row, k])) for k in (j, j + 1))
+                at = between(over_s, gap[row], track.frequency[row], int(j))
+                found.append(Candidate(own, track, (low, high), at, margin, False))
+        return found
 
-    def crossing(
-        self, own: LineTrack, track: Track, ends: list[tuple[tuple[float, float], float]], margin: float, at_nominal_speed: bool
-    ) -> Coincidence | None:
+    def met(self, candidates: Sequence[Candidate], progress: Callable[[str], None]) -> tuple[dict[int, Coincidence], Interpolated | None]:
+        """The coincidences, by the identity of their candidates. A spindle of rigid bodies has each found exactly; of a flexible one with more than
+        `EXACT` candidates only so many strongest are, and the others stand as interpolated."""
+        flexible = len(next(iter(self.kept.values())).point.chain.dofs) > LARGE
+        rough: dict[int, Coincidence] = {}
+        chosen = list(candidates)
+        if flexible and len(candidates) > EXACT:
+            rough = _each(self.interpolated, candidates, progress)
+            chosen = sorted((c for c in candidates if id(c) in rough), key=lambda c: -rough[id(c)].strength)[:EXACT]
+        exact = _each(self.crossing, chosen, progress)
+        if not rough:
+            return exact, None
+        apart = [(rough[k], exact[k]) for k in exact]
+        frequency = [abs(a.frequency / b.frequency - 1) for a, b in apart]
+        strength = [abs(a.strength / b.strength - 1) for a, b in apart if b.strength > 0]
+        rest = {k: c for k, c in rough.items() if k not in {id(c) for c in chosen}}
+        worst = max(frequency, default=0.0), float(np.median(strength or [0.0])), max(strength, default=0.0)
+        return exact | rest, Interpolated(len(rest), len(apart), *worst)
+
+    def interpolated(self, c: Candidate) -> Coincidence | None:
+        """The crossing between two neighbours of the grid by what is known at both, or None where the line cannot excite the mode."""
+        which, number = key(c.line.line), c.track.number
+        (a, _), (b, _) = c.ends
+        ends = self.excited(self.kept[a]), self.excited(self.kept[b])
+        share, frequency = c.between.share, c.between.frequency
+        found = strengths(ends, share, number, which)
+        if found is None or found[0] < SENSE:
+            return None
+        condition = Condition(a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]))
+        line = next(e.lines[which] for e in (ends if share < 0.5 else ends[::-1]) if which in e.lines)
+        nrro = between_runout(ends, share, number, which, frequency)[1 if c.line.line.direction == "axial" else 0]
+        return Coincidence(
+            replace(line, frequency=frequency), c.track, condition, frequency, frequency, *found, c.margin, nrro, c.at_nominal_speed, interpolated=True
+        )
+
+    def crossing(self, c: Candidate) -> Coincidence | None:
         """The crossing between two neighbours of the grid, or None where the line cannot excite the mode.
 
         False position with Illinois' correction on the exact operating point, to `CLOSE`.
         """
+        own, track = c.line, c.track
         which = key(own.line)
-        (a, low), (b, high) = ends
+        (a, low), (b, high) = c.ends
         near = self.kept[a].modes
         share_a, share_b, side = 0.0, 1.0, 0
         for _ in range(60):
@@ -308,16 +312,8 @@ class _Grid:
         if sense < SENSE:
             return None
         nrro = float(nrro_rms(excited)[1 if own.line.direction == "axial" else 0])
-        return Coincidence(line, track, condition, line.frequency, mode.frequency, sense, strength, unit, margin, nrro, at_nominal_speed)
+        return Coincidence(line, track, condition, line.frequency, mode.frequency, sense, strength, unit, c.margin, nrro, c.at_nominal_speed)
 
     def nrro(self, condition: Condition, near: tuple[int, int]) -> tuple[float, float]:
         """Radial and axial NRRO (m rms) at a condition, given the place of its neighbour on the grid; nothing at rest."""
         return nrro_rms(self.excited(self.exact(condition, self.every[near].modes)))
-
-
-def strongest(coincidences: Sequence[Coincidence]) -> list[Coincidence]:
-    """Strongest first, of each cause, order, sense and mode only the bearing in which it is strongest."""
-    best: dict[tuple, Coincidence] = {}
-    for c in sorted(coincidences, key=lambda c: -c.strength):
-        best.setdefault((c.line.cause, c.line.order, c.line.direction, c.line.whirl, c.mode.number), c)
-    return list(best.values())

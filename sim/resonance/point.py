@@ -43,9 +43,16 @@ class Exact:
         return harmonics(self.point)
 
     @cached_property
-    def unit_forces(self) -> Harmonics:
-        """Of unit imperfections."""
-        return harmonics(with_imperfections(self.point, unit_imperfections(self.point.spindle, self.multiples)))
+    def _unit_forces(self) -> dict[str, Harmonics]:
+        return {}
+
+    def unit_forces(self, bearing: str) -> Harmonics:
+        """Of unit imperfections of one bearing, or of the rotor for the line of no bearing."""
+        if bearing not in self._unit_forces:
+            whole = unit_imperfections(self.point.spindle, self.multiples)
+            own = replace(whole, bearings={name: row for name, row in whole.bearings.items() if name == bearing})
+            self._unit_forces[bearing] = harmonics(with_imperfections(self.point, own))
+        return self._unit_forces[bearing]
 
     @cached_property
     def probes(self) -> Array:
@@ -56,16 +63,21 @@ class Exact:
         """Of the assembled chain."""
         return poles(matrices(self.point.chain))
 
-    def amplitudes(self, number: int, which: Key) -> tuple[float, float, float]:
-        """Sense, strength and unit strength (m) of a line on a mode at this condition."""
+    @cached_property
+    def modal_forces(self) -> ComplexArray:
+        """What every line does to every mode, (lines, 2 dofs)."""
+        return np.asarray(self.forces.force @ self.poles.left.T, complex)
+
+    def amplitudes(self, number: int, which: Key, resonant: bool = False) -> tuple[float, float, float]:
+        """Sense, strength and unit strength (m) of a line on a mode at this condition, with `resonant` as if the line stood on the mode."""
         p = self.poles
         at = int(np.argmin(np.abs(p.value - self.modes[number].pole)))
         axial = which[3] == "axial"
         values = []
-        for found in (self.forces, self.unit_forces):
+        for found in (self.forces, self.unit_forces(which[0])):
             force = next((f for line, f in zip(found.line, found.force, strict=True) if key(line) == which), None)
             values.append(np.zeros(p.left.shape[1], complex) if force is None else force)
-        frequency = self.lines[which].frequency
+        frequency = self.modes[number].frequency if resonant else self.lines[which].frequency
         modal = [complex(p.left[at] @ f) / (2j * np.pi * frequency - p.value[at]) for f in values]
         sizes = [_size(self.probes @ p.right[:, at] * q, axial) for q in modal]
         own, other = abs(p.left[at] @ values[1]) ** 2, abs(p.left[at] @ values[1].conj()) ** 2
@@ -107,7 +119,7 @@ def line_amplitudes(found: Exact) -> dict[Key, float]:
     forces = found.forces
     if not forces.line:
         return {}
-    at_probes = response(found.point, forces) @ found.probes.T
+    at_probes = response(found.point, forces, lambda: found.poles) @ found.probes.T
     return {key(line): _size(one, line.direction == "axial") for line, one in zip(forces.line, at_probes, strict=True)}
 
 
@@ -119,10 +131,14 @@ def nrro_rms(found: Exact) -> tuple[float, float]:
     forces, turning = found.forces, abs(found.point.condition.speed) / (2 * np.pi)
     if not forces.line or turning == 0.0:
         return 0.0, 0.0
-    at_probes = response(found.point, forces) @ found.probes.T  # (lines, 3)
-    orders = forces.frequency / turning
+    at_probes = response(found.point, forces, lambda: found.poles) @ found.probes.T
+    return rms_of_lines(forces.line, forces.frequency, turning, at_probes)
+
+
+def rms_of_lines(lines: Sequence[Line], frequency: Array, turning: float, at_probes: ComplexArray) -> tuple[float, float]:
+    """As `nrro_rms`, of phasors (lines, 3) m at the probes of lines at `frequency` (lines,) Hz of a rotor `turning` at so many Hz."""
     sums: dict[tuple[str, float], ComplexArray] = {}
-    for line, order, one in zip(forces.line, orders, at_probes, strict=True):
+    for line, order, one in zip(lines, frequency / turning, at_probes, strict=True):
         if abs(order - round(order)) > 1e-6:
             where = (line.bearing, round(float(order), 9))
             sums[where] = sums.get(where, np.zeros(3, complex)) + one

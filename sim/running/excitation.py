@@ -22,6 +22,7 @@ from __future__ import annotations
 import cmath
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -39,7 +40,7 @@ from thermospindle.model.bearing.kinematics import (
 from thermospindle.model.bearing.pair import BearingState
 from thermospindle.model.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.rotor.chain import RotorBase, element_rows, matrices, motion_rows, turning_at
-from thermospindle.model.rotor.modes import LARGE, poles
+from thermospindle.model.rotor.modes import LARGE, Poles, poles
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.operating import OperatingPoint
 
@@ -90,19 +91,19 @@ def at_speed(found: Excitation, ratio: float) -> Harmonics:
     return Harmonics(found.line, frequency, force)
 
 
-def response(point: OperatingPoint, forces: Harmonics) -> ComplexArray:
-    """Displacement phasors (n, dofs) of the chain under the forces, by the exact linear model at the point's speed.
+def response(point: OperatingPoint, forces: Harmonics, known: Callable[[], Poles] | None = None) -> ComplexArray:
+    """Displacement phasors (n, dofs) of the chain under the forces, by the exact linear model at the point's speed, whose poles may be `known`.
 
     q(t) = Re(sum of response exp(2 pi i frequency t)).
     """
-    return chain_response(point.chain, forces)
+    return chain_response(point.chain, forces, known)
 
 
-def chain_response(chain: RotorBase, forces: Harmonics) -> ComplexArray:
+def chain_response(chain: RotorBase, forces: Harmonics, known: Callable[[], Poles] | None = None) -> ComplexArray:
     """As `response`, of a chain."""
     linear = matrices(chain)
     if len(linear.mass) > LARGE:  # one eigenproblem for all lines
-        p = poles(linear)
+        p = known() if known else poles(linear)
         modal = forces.force @ p.left.T / (2j * np.pi * forces.frequency[:, None] - p.value)
         return np.asarray(modal @ p.right.T)
     omega = 2 * np.pi * forces.frequency[:, None, None]
@@ -223,8 +224,9 @@ def _felt(bearing: BearingState, kin: Kinematics, own: RowImperfections) -> Iter
             yield Felt(amplitude, float(rate), pull, _ball_namer(bearing.name, kin, order))
 
 
+@lru_cache(maxsize=256)
 def contact_pushes(row: BallRow) -> tuple[Array, Array]:
-    """Force (2,) N/m (r, z) on the outer ring's holder for a ball that is too thick at its inner, and at its outer contact.
+    """Force (2,) N/m (r, z) on the outer ring's holder for a ball that is too thick at its inner, and at its outer contact; read only.
 
     k_n e for both where the ball has no inertia; else by central differences of the ball's equilibrium (1e-8).
     """

@@ -19,7 +19,8 @@ from thermospindle.report.log.map import write_map_log
 from thermospindle.report.log.read import describe, log_json, read_log
 from thermospindle.report.text.resonance import map_json, map_section, sentences
 from thermospindle.sim.operating import operating_point
-from thermospindle.sim.resonance.map import resonance_map, strongest
+from thermospindle.sim.resonance.found import strongest
+from thermospindle.sim.resonance.map import resonance_map
 from thermospindle.sim.resonance.point import Exact, key, nrro_rms
 from thermospindle.sim.running.excitation import harmonics, response
 from thermospindle.sim.running.runout import hub_probes, runout
