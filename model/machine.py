@@ -374,6 +374,8 @@ class Spindle:
     temperatures: tuple[float, float]  # C, between which it is meant to run
     ball_inertia: float = 0.0  # share of the balls' centrifugal force and gyroscopic moment in the equilibrium, 0 to 1
     axial_load: float = 0.0  # N, external axial force on what carries the outer rings, positive along z
+    radial_load: tuple[float, float] = (0.0, 0.0)  # N, external force along x and y on what turns
+    radial_load_z: float = 0.0  # m, where it acts
     linear_bearings: tuple[LinearBearing, ...] = ()  # those given by numbers
     roller_bearings: tuple[RollerBearing, ...] = ()  # cylindrical ones, lowest first
     effects: tuple[Addition, ...] = ()

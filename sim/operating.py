@@ -18,6 +18,7 @@ from thermospindle.model.imperfections import Imperfections
 from thermospindle.model.machine import Condition, RingMotion, Spindle
 from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.chain import Matrices, RotorBase, matrices, rotor_base
+from thermospindle.model.rotor.loaded import loaded
 from thermospindle.model.rotor.modes import Mode, frf, modes, point_rows
 from thermospindle.model.scene.reading import content_hash
 from thermospindle.model.types import Array, ComplexArray
@@ -120,7 +121,7 @@ def operating_point(
     for effect, values in present:
         if effect.motions:
             motions = effect.motions(spindle, condition, values, motions)
-    state = solve(spindle, condition, motions)
+    state = loaded(spindle, solve(spindle, condition, motions))
     for effect, values in present:
         if effect.pair:
             state = effect.pair(spindle, condition, values, state)

@@ -19,7 +19,7 @@ from thermospindle.model.bearing.hertz import in_series, race_contact
 from thermospindle.model.bearing.movement import balanced
 from thermospindle.model.bearing.roller import RollerState, roller_state
 from thermospindle.model.bearing.state import ByDirection, LinearState
-from thermospindle.model.errors import NoEquilibrium, OutsideRange
+from thermospindle.model.errors import BadInput, NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Bearing, BearingSet, Condition, LinearBearing, RingMotion, Spindle
 from thermospindle.model.types import Array
 
@@ -29,7 +29,7 @@ class BearingState(ByDirection):
     """One bearing at its operating point; forces in N, lengths in m, angles in rad.
 
     `stiffness`, `damping`: (5, 5) between the inner and the outer body at the ring centre, order x, y, z, tilt_x, tilt_y.
-    `row` is the ball row at its loaded position. `movement` is the rigid axial
+    `row` is the ball row at its loaded position, centred. `movement` is the rigid axial
     movement of its outer ring against its inner one, beyond thermal expansion.
     """
 
@@ -46,6 +46,8 @@ class BearingState(ByDirection):
     row: BallRow
     in_contact: bool
     movement: float = 0.0
+    displacement: tuple[float, ...] = ()  # (5,), of its outer ring under a radial load; empty for centred rings
+    radial_force: tuple[float, float] = (0.0, 0.0)  # on its outer ring under that load, to hold it there
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,12 @@ class PairState:
 
     def bearing(self, name: str) -> BearingState:
         return next(b for b in self.bearings if b.name == name)
+
+
+def check_centred(state: PairState, what: str) -> None:
+    """`BadInput` where a radial load displaces rings, for `what` takes rows with centred ones."""
+    if any(b.displacement for b in state.bearings):
+        raise BadInput(f"{what} is for centred rings, and here radial_load_N displaces them; take it out, or ask what their stiffness decides: modes, table, static, impact with linear elements")
 
 
 def reference_motion(temperature: float) -> RingMotion:

@@ -59,6 +59,7 @@ class RollerState(LinearState):
     load: float
     contact_force: float  # N, of the most loaded roller
     row: RollerRow
+    radial_force: tuple[float, float] = (0.0, 0.0)  # on its outer ring under a radial load, to hold it there
 
 
 def line_constant(length: float, modulus: float = STEEL) -> float:
@@ -85,6 +86,18 @@ def respond(row: RollerRow, displacement: Array | None = None) -> RollerForce:
         tangent += np.einsum("js,jsk,jsl->kl", slope, outward, outward)
         loads.append(load.sum(axis=1))
     return RollerForce(force, tangent, np.array(loads))
+
+
+def energy(row: RollerRow, displacement: Array) -> float:
+    """Elastic energy (J): sum of c d^(n + 1) / (n + 1)."""
+    c, s = np.cos(row.azimuths)[:, None], np.sin(row.azimuths)[:, None]
+    x, y, _, tilt_x, tilt_y = displacement
+    total = 0.0
+    for offset in row.offsets:
+        height = offset + row.length / 2 * SLICES
+        pressed = np.maximum(-(c * (x + tilt_y * height) + s * (y - tilt_x * height)) - row.clearance / 2, 0.0)
+        total += float((pressed ** (EXPONENT + 1) @ (WEIGHTS / 2)).sum())
+    return row.constant * total / (EXPONENT + 1)
 
 
 def roller_row(spindle: Spindle, b: RollerBearing, motion: RingMotion | None, temperature: float) -> RollerRow:

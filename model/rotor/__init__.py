@@ -3,6 +3,7 @@
 ==========  ================================================================================================================
 chain       the rotor-base chain: rigid bodies joined by compliant elements, and its matrices M, C, G, K
 elements    the bearing elements of the time simulation
+loaded      bearings under an external radial load: the whole spindle in equilibrium
 look        what a spindle looks like: cut-away bodies of its section, and the visual part of its MuJoCo model
 mjcf        the rotor-base chain as a MuJoCo model
 modes       modes and exact FRFs of a linearised spindle

@@ -16,7 +16,7 @@ from xml.etree import ElementTree
 import mujoco
 import numpy as np
 
-from thermospindle.model.bearing.pair import BearingState, PairState
+from thermospindle.model.bearing.pair import BearingState, PairState, check_centred
 from thermospindle.model.bearing.springs import ball_springs, tangent
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import Element, Matrices, RotorBase, element_rows, point_row, rotor_base
@@ -36,6 +36,8 @@ def spec(spindle: Spindle, state: PairState, element: str = "linear", looks: boo
     if element not in ELEMENTS:
         raise ValueError(f"bearing element {element!r} is unknown; allowed are {', '.join(ELEMENTS)}")
     chain = chain or rotor_base(spindle, state)
+    if element == "ball-by-ball":
+        check_centred(state, "--element ball-by-ball")
     slides = {e.name for e in chain.elements if e.slides}  # balls of a ring on a spring stay one element, which knows its ring
     balls = {b.name: b for b in state.bearings if b.name not in slides} if element == "ball-by-ball" else {}
     out = chain_spec(chain, spindle.hammer.step, stiff=tuple(e.name for e in chain.elements if e.name not in balls))

@@ -50,6 +50,7 @@ Band = Annotated[tuple[NotNegative, Positive], Strict(False), AfterValidator(_ri
 """Hz."""
 TemperatureSpan = Annotated[tuple[Temperature, Temperature], Strict(False), AfterValidator(_rising)]
 Both = Annotated[tuple[NotNegative, NotNegative], Strict(False)]
+Pair = Annotated[tuple[Finite, Finite], Strict(False)]
 Position = Annotated[tuple[Place, Place, Place], Strict(False)]
 TwoNames = Annotated[tuple[str, str], Strict(False)]
 

@@ -15,7 +15,18 @@ from thermospindle.model import machine as m
 from thermospindle.model.errors import BadInput
 from thermospindle.model.scene.bearings import BallRow, Bearing, BearingPair, BearingSet, Mounted, RollerRow, check_sets
 from thermospindle.model.scene.defaults import GENTLE, WARMER, assumed
-from thermospindle.model.scene.fields import Finite, Name, NotNegative, Positive, Table, Temperature, TemperatureSpan, first_error
+from thermospindle.model.scene.fields import (
+    Finite,
+    Name,
+    NotNegative,
+    Pair,
+    Place,
+    Positive,
+    Table,
+    Temperature,
+    TemperatureSpan,
+    first_error,
+)
 from thermospindle.model.scene.imperfections import Imperfections
 from thermospindle.model.scene.measuring import HammerTest, Measuring, Point, assumed_points
 from thermospindle.model.scene.section import Material, Section
@@ -75,6 +86,8 @@ class Scene(Table):
     sets: dict[str, BearingSet] = Field(default_factory=dict)
     ball_inertia: Annotated[float, Field(ge=0, le=1)] | None = None
     axial_load_N: Finite = 0.0
+    radial_load_N: Pair = (0.0, 0.0)
+    radial_load_z_mm: Place | None = None
     structure: Structure
     shafts: list[ShaftForm] = Field(default_factory=list)
     thermal: Thermal = Thermal()
@@ -103,6 +116,15 @@ class Scene(Table):
     @model_validator(mode="after")
     def _sets_hold_every_row(self) -> Scene:
         check_sets({n: b for n, b in self.bearings.items() if b.row in self.ball_rows}, self.bearing_pair, self.sets)
+        return self
+
+    @model_validator(mode="after")
+    def _radial_load_has_a_place(self) -> Scene:
+        if any(self.radial_load_N) and self.radial_load_z_mm is None:
+            raise ValueError("radial_load_z_mm is missing: the height at which radial_load_N acts on what turns")
+        turns = [*(s.turns for s in self.shafts), *(b.turns for b in self.structure.bodies)]
+        if any(self.radial_load_N) and not any(turns):
+            raise ValueError("radial_load_N: nothing turns that it could act on; a body or shaft needs turns = true")
         return self
 
     @model_validator(mode="after")
@@ -206,6 +228,8 @@ class Scene(Table):
             temperatures=self.temperature_range_C or (reference, reference + WARMER),
             ball_inertia=pair.ball_inertia if pair is not None else self.ball_inertia if self.ball_inertia is not None else 1.0,
             axial_load=self.axial_load_N,
+            radial_load=self.radial_load_N,
+            radial_load_z=(self.radial_load_z_mm or 0.0) * MM,
             linear_bearings=tuple(sorted(linear, key=lambda b: b.z)),
             roller_bearings=tuple(sorted(rollers, key=lambda b: b.z)),
             effects=tuple(m.Addition(effect=e.name, values=dict(e.values)) for e in self.effects),

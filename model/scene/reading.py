@@ -105,9 +105,11 @@ def content_hash(spindle: Spindle) -> str:
     content = asdict(spindle)
     for key in ("name", "title", "file", "provenance"):
         content.pop(key)
-    for key in ("roller_bearings",):  # what came later counts where there is any
-        if not content[key]:
-            content.pop(key)
+    if not any(content["radial_load"]):  # what came later counts where there is any
+        content.pop("radial_load")
+        content.pop("radial_load_z")
+    if not content["roller_bearings"]:
+        content.pop("roller_bearings")
     for addition in content["effects"]:
         addition.pop("definition")
     return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()[:12]
@@ -134,7 +136,7 @@ def _provenance(file: Path, raw: Mapping[str, Any]) -> dict[str, Provenance]:
         elif isinstance(node, list) and node and isinstance(node[0], list):
             walk(node[0], key, origin, source)
         elif _is_number(node) or (isinstance(node, list) and node and all(map(_is_number, node))):
-            if key in ("reference_temperature_C", "nominal_speed_rpm", "temperature_range_C", "ball_inertia", "axial_load_N") or key.endswith(".node"):
+            if key in ("reference_temperature_C", "nominal_speed_rpm", "temperature_range_C", "ball_inertia", "axial_load_N", "radial_load_N", "radial_load_z_mm") or key.endswith(".node"):
                 return
             if origin is None:
                 raise BadInput(f"{file}: {key} = {node!r}: says no origin; its table needs origin = printed, assumed or calibrated")

@@ -34,6 +34,10 @@ def sentences(values: Mapping[str, Any]) -> list[str]:
         found.append(f"Balls with {values['ball_inertia']:.0%} of their inertia." if values["ball_inertia"] else "Balls without inertia: speed changes no bearing.")
     if values["axial_load_N"]:
         found.append(f"External axial load {values['axial_load_N']:g} N along z.")
+    if any(values["radial_load_N"]):
+        shares = [f"{name} {f[0]:+.3g}, {f[1]:+.3g}" for name, b in values["bearings"].items() if (f := b.get("radial_force_N"))]
+        fx, fy = values["radial_load_N"]
+        found.append(f"External radial load {fx:g}, {fy:g} N along x, y at z = {values['radial_load_z_mm']:g} mm, borne by {'; '.join(shares)} N.")
     h, modes = values["hammer"], values["modes_Hz"]
     points = [name for name, p in values["points"].items() if p["hammer"]]
     found.append(

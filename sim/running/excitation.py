@@ -37,7 +37,7 @@ from thermospindle.model.bearing.kinematics import (
     row_kinematics,
     unbalance_line,
 )
-from thermospindle.model.bearing.pair import BearingState
+from thermospindle.model.bearing.pair import BearingState, check_centred
 from thermospindle.model.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.rotor.chain import RotorBase, element_rows, matrices, motion_rows, turning_at
 from thermospindle.model.rotor.modes import LARGE, Poles, poles
@@ -114,6 +114,7 @@ def chain_response(chain: RotorBase, forces: Harmonics, known: Callable[[], Pole
 
 def excitation(point: OperatingPoint, imperfections: Imperfections | None = None) -> Excitation:
     """All lines that a point's imperfections, or others in their place, excite, in order of frequency."""
+    check_centred(point.state, "what imperfections excite")
     present = point.imperfections if imperfections is None else imperfections
     n = len(point.chain.dofs)
     parts: dict[Line, ComplexArray] = {}

@@ -131,6 +131,18 @@ def test_what_is_odd_is_said(name: str, right: str, wrong: str, sentence: str, t
     assert not any(sentence in words for words in checked(SCENES[name], capsys)["odd"])
 
 
+def test_shares_of_a_radial_load_add_up(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = SCENES["five_bearing"].read_text(encoding="utf-8").replace("ball_inertia = 1.0", "ball_inertia = 1.0\nradial_load_N = [300.0, -100.0]\nradial_load_z_mm = 0.0")
+    (tmp_path / "spindle.toml").write_text(text, encoding="utf-8")
+    found = checked(tmp_path, capsys)
+    assert found["radial_load_N"] == [300.0, -100.0]
+    assert np.sum([b["radial_force_N"] for b in found["bearings"].values()], axis=0) == pytest.approx([300.0, -100.0], rel=1e-6)
+    assert main(["check", str(tmp_path)]) == 0
+    assert "External radial load 300, -100 N" in capsys.readouterr().out
+    assert main(["runout", str(tmp_path), "--speed", "3000"]) == 2
+    assert "is for centred rings" in capsys.readouterr().err
+
+
 def test_what_moves_freely_and_what_is_constant_is_said(capsys: pytest.CaptureFixture[str]) -> None:
     assert any("against 2 motions" in words for words in checked(SCENES["free_shaft"], capsys)["odd"])
     assert any("constant numbers" in words for words in checked(SCENES["mk7702"], capsys)["odd"])

@@ -1,0 +1,195 @@
+"""External radial load: balance of forces and moments, shares, symmetry, small loads, stiffness as the derivative."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.conftest import ROOT
+from thermospindle.model.bearing.ball_row import respond
+from thermospindle.model.bearing.pair import reference_motion, solve
+from thermospindle.model.bearing.roller import EXPONENT, RollerState, line_constant
+from thermospindle.model.errors import BadInput, NoEquilibrium
+from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.rotor import mjcf
+from thermospindle.model.rotor.chain import point_row, rotor_base
+from thermospindle.model.rotor.loaded import loaded, motion
+from thermospindle.model.rotor.static import static
+from thermospindle.model.scene.reading import build
+
+FILE = ROOT / "tests" / "scenes" / "symmetric" / "spindle.toml"
+FIVE = ROOT / "scenes" / "five_bearing" / "spindle.toml"
+
+
+def raw_of(file):
+    return tomllib.loads(file.read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def pair() -> Spindle:
+    """A rigid hub on two opposed rows."""
+    return build(raw_of(FILE), FILE)
+
+
+@pytest.fixture(scope="module")
+def five() -> Spindle:
+    return build(raw_of(FIVE), FIVE)
+
+
+def under(spindle: Spindle, force: tuple[float, float], z: float, speed: float = 0.0):
+    """The state at the reference temperature under a radial load at a height."""
+    pushed = replace(spindle, radial_load=force, radial_load_z=z)
+    still = {b.name: reference_motion(spindle.reference_temperature) for b in spindle.ringed}
+    return pushed, loaded(pushed, solve(pushed, Condition(spindle.reference_temperature, speed), still))
+
+
+def shares(state):
+    """Radial forces on the outer rings (bearings, 2), N."""
+    return np.array([b.radial_force for b in state.bearings])
+
+
+def test_forces_and_moments_balance(pair: Spindle) -> None:
+    """The hub carries the outer rings: what the rows put on it and the load cancel, and so do their moments, tilt moments of the rows included."""
+    force, z = np.array([3.0, -1.0]), 0.025
+    _, state = under(pair, (3.0, -1.0), z)
+    assert shares(state).sum(axis=0) == pytest.approx(force, rel=1e-6)
+    held = [respond(b.row, np.array(b.displacement)).force for b in state.bearings]
+    about_x = sum(f[3] - b.z * f[1] for f, b in zip(held, state.bearings, strict=True))
+    about_y = sum(f[4] + b.z * f[0] for f, b in zip(held, state.bearings, strict=True))
+    assert about_x == pytest.approx(-z * force[1], rel=1e-6)
+    assert about_y == pytest.approx(z * force[0], rel=1e-6)
+    assert sum(f[2] for f in held) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_load_in_the_middle_is_shared_evenly(pair: Spindle) -> None:
+    middle = sum(b.z for b in pair.bearings) / 2
+    _, state = under(pair, (2.0, 0.0), middle)
+    lower, upper = shares(state)
+    assert lower == pytest.approx([1.0, 0.0], abs=1e-7)
+    assert upper == pytest.approx([1.0, 0.0], abs=1e-7)
+
+
+@pytest.mark.parametrize("turns", [1, 2, 5])  # of one ball
+def test_a_turned_load_turns_the_answer(pair: Spindle, turns: int) -> None:
+    """By whole steps of the balls nothing else changes."""
+    angle = 2 * np.pi * turns / pair.bearings[0].balls
+    c, s = np.cos(angle), np.sin(angle)
+    _, straight = under(pair, (4.0, 0.0), 0.02)
+    _, turned = under(pair, (4.0 * c, 4.0 * s), 0.02)
+    spin = np.array([[c, -s], [s, c]])
+    both = np.zeros((5, 5))
+    both[:2, :2], both[2, 2], both[3:, 3:] = spin, 1.0, spin
+    for a, b in zip(straight.bearings, turned.bearings, strict=True):
+        assert b.stiffness == pytest.approx(both @ a.stiffness @ both.T, abs=1e-6 * np.abs(a.stiffness).max())
+        assert b.contact_force == pytest.approx(a.contact_force, rel=1e-6)
+
+
+def test_a_small_load_leaves_the_stiffness(pair: Spindle) -> None:
+    _, state = under(pair, (1e-4, 0.0), 0.02)
+    _, none = under(pair, (0.0, 0.0), 0.02)
+    assert none.bearings[0].displacement == ()
+    for a, b in zip(state.bearings, none.bearings, strict=True):
+        assert a.stiffness == pytest.approx(b.stiffness, abs=1e-4 * np.abs(b.stiffness).max())
+        assert a.damping == pytest.approx(b.damping, abs=1e-4 * np.abs(b.damping).max())
+
+
+def test_a_large_load_unloads_balls_opposite_and_presses_others(pair: Spindle) -> None:
+    _, state = under(pair, (30.0, 0.0), 0.011)
+    _, none = under(pair, (0.0, 0.0), 0.0)
+    assert state.bearings[0].contact_force > 1.5 * none.bearings[0].contact_force
+    along, across = state.bearings[0].stiffness[0, 0], state.bearings[0].stiffness[1, 1]
+    assert along != pytest.approx(across, rel=0.02)
+
+
+@pytest.mark.parametrize("speed", [0.0, 800.0])
+def test_stiffness_is_the_derivative_of_the_motion(five: Spindle, speed: float) -> None:
+    """A little more load moves the nose by the static compliance of the chain in the loaded state, with balls' inertia too."""
+    nose = next(p for p in five.points if p.name == "nose")
+    force, step = 2000.0, 1.0
+    found = []
+    for more in (-step, step):
+        pushed, state = under(five, (force + more, 0.0), 0.0, speed)
+        found.append(sum(b.radial_force[0] for b in state.bearings))
+    assert found[1] - found[0] == pytest.approx(-2 * step, rel=1e-5)  # the shaft carries the inner rings
+    pushed, state = under(five, (force, 0.0), 0.0, speed)
+    compliance = 1 / static(pushed, rotor_base(pushed, state), nose).stiffness
+    ahead, behind = (_nose(five, force + more, speed) for more in (step, -step))
+    assert (ahead - behind) / (2 * step) == pytest.approx(compliance, rel=2e-3)
+
+
+def _nose(five: Spindle, force: float, speed: float) -> float:
+    """Motion (m) of the nose."""
+    pushed = replace(five, radial_load=(force, 0.0), radial_load_z=0.0)
+    still = {b.name: reference_motion(20.0) for b in five.ringed}
+    chain, moved = motion(pushed, solve(pushed, Condition(20.0, speed), still))
+    return float(point_row(chain, next(p for p in five.points if p.name == "nose")) @ moved)
+
+
+def test_the_front_rows_bear_most_of_a_load_at_the_nose(five: Spindle) -> None:
+    _, state = under(five, (1000.0, 0.0), 0.0)
+    along = -shares(state)[:, 0]
+    assert along.sum() == pytest.approx(1000.0, rel=1e-6)
+    assert along[0] > along[1] > along[2] > 0 > along[3:].sum()  # a lever: the rear set is lifted
+
+
+def rollers() -> Spindle:
+    """The small shaft on two loose roller rows and, along the axis, a bearing given by numbers."""
+    raw = raw_of(ROOT / "tests" / "scenes" / "inner_turning_spring" / "spindle.toml")
+    told = {"origin": "assumed", "source": "test"}
+    raw["roller_rows"] = {
+        "row": told
+        | {"rollers": 16, "roller_diameter_mm": 1.588, "roller_length_mm": 1.6, "pitch_diameter_mm": 9.1, "mounted_clearance_um": 4.0}
+        | {"roller_material": "steel", "ring_material": "steel", "damping_ratio": 0.02}
+    }
+    for b in raw["bearings"].values():
+        b["row"] = "row"
+    raw["bearings"]["thrust"] = told | {"z_mm": 10.0, "numbers": {"matrix_SI": np.diag([0, 0, 1e7, 0, 0]).tolist(), "damping_ratio": 0.01}}
+    for key in ("bearing_pair", "ball_rows"):
+        raw.pop(key)
+    return build(raw, FILE)
+
+
+def test_loose_rollers_are_pressed_by_the_load() -> None:
+    """Half of a load in the middle each, on the rollers that its zone holds: at the deepest c d^n, by the balance along the load."""
+    spindle = rollers()
+    middle = sum(b.z for b in spindle.roller_bearings) / 2
+    _, state = under(spindle, (0.0, 40.0), middle)
+    for b in state.linear:
+        if isinstance(b, RollerState):
+            assert b.radial_force == pytest.approx((0.0, -20.0), abs=1e-6)
+            deepest = (b.contact_force / line_constant(1.6e-3, 208e9 / (2 * (1 - 0.3**2)))) ** (1 / EXPONENT)
+            azimuth = 2 * np.pi * np.arange(16) / 16
+            pressed = np.maximum((deepest + 2e-6) * np.cos(azimuth) - 2e-6, 0.0)
+            carried = line_constant(1.6e-3, 208e9 / (2 * (1 - 0.3**2))) * (pressed**EXPONENT * np.cos(azimuth)).sum()
+            assert carried == pytest.approx(20.0, rel=1e-6)
+            assert b.stiffness[1, 1] > b.stiffness[0, 0] > 0
+
+
+def test_a_load_that_nothing_bears_is_refused() -> None:
+    spindle = rollers()
+    free = replace(spindle, roller_bearings=(), linear_bearings=spindle.linear_bearings)
+    with pytest.raises(NoEquilibrium, match="nothing bears the radial load"):
+        under(free, (1.0, 0.0), 0.0)
+
+
+def test_balls_by_themselves_are_for_centred_rings(pair: Spindle) -> None:
+    pushed, state = under(pair, (1.0, 0.0), 0.02)
+    with pytest.raises(BadInput, match="is for centred rings"):
+        mjcf.spec(pushed, state, "ball-by-ball")
+    assert mjcf.spec(pushed, state, "linear").compile().nv > 0
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        ({"radial_load_N": [1.0, 0.0]}, "radial_load_z_mm is missing"),
+        ({"radial_load_N": [1.0], "radial_load_z_mm": 0.0}, "radial_load_N"),
+        ({"radial_load_N": ["1", 0.0], "radial_load_z_mm": 0.0}, "radial_load_N.0 = '1': input should be a valid number"),
+    ],
+)
+def test_a_load_is_told_whole(change: dict, why: str) -> None:
+    with pytest.raises(BadInput, match=why):
+        build(raw_of(FILE) | change, FILE)
