@@ -6,11 +6,12 @@ from collections.abc import Callable
 from math import floor, log10
 from typing import Any, Protocol
 
-from bokeh.models import Button, Checkbox, Column, CustomJSTickFormatter, Div, Row, Select, Slider, Toggle
+from bokeh.models import Button, Checkbox, Column, CustomJSTickFormatter, Div, NumericInput, Row, Select, Slider, Toggle
 from markupsafe import Markup
 
 from thermospindle.report.workbench.bench import Bench
 from thermospindle.report.workbench.state import (
+    FURTHEST,
     Setting,
     key_of,
     remove_effect,
@@ -34,6 +35,7 @@ label, .bk-input-group, .bk-slider-title, .bk-slider-value { color: var(--ink); 
 .bk-btn[disabled], .bk-btn[disabled]:hover { color: var(--soft); background: var(--paper); border: 1px dashed var(--line); opacity: 1; }
 select.bk-input:not([multiple]) { background-image: linear-gradient(45deg, transparent 50%, var(--ink) 50%), linear-gradient(-45deg, transparent 50%, var(--ink) 50%);
   background-size: 5px 6px; background-position: right 13px center, right 8px center; background-repeat: no-repeat; }
+.bk-slider-title { white-space: normal; line-height: 1.2; font-size: 0.87rem !important; }
 .noUi-target { background: var(--line); border: none; box-shadow: none; }
 .noUi-connect { background: color-mix(in srgb, var(--accent) 45%, transparent) !important; }
 .noUi-handle { background: var(--paper); border: 2px solid var(--accent); box-shadow: none; }
@@ -70,6 +72,7 @@ class Controls:
         self.bench, self.change = bench, change
         self.sliders: dict[str, Slider | Select] = {}
         self.ticks: dict[str, Checkbox] = {}
+        self.numbers: dict[str, tuple[NumericInput, float]] = {}  # and what a value is multiplied with to be shown there
         self.rows: dict[str, Column] = {}
         options = [("", "choose an effect ..."), *((e.name, f"{e.name}: {e.title}") for e in bench.effects)]
         self.add = Select(title="Add an effect", value="", options=options, stylesheets=[LOOK], name="add", **WIDE)
@@ -86,6 +89,7 @@ class Controls:
             for key in [k for k in self.sliders if k.rpartition(".")[0] == name]:
                 del self.sliders[key]
                 self.ticks.pop(key, None)
+                self.numbers.pop(key, None)
         for name in s.effects:
             if name not in self.rows:
                 self.rows[name] = self._effect(self.bench.effect(name), s)
@@ -113,6 +117,9 @@ class Controls:
             control.update(start=low, end=high)
         if control.value != value:
             control.value = value
+        number, times = self.numbers[key]
+        if number.value != (shown := rounded(times * value)):
+            number.value = shown
 
     # ------------------------------------------------------------ rows
 
@@ -134,12 +141,13 @@ class Controls:
         low, high = span(p, value)
         del says["description"]
         slider = Slider(
-            title=f"{p.name}{unit}", start=low, end=high, value=value, step=step_of(low, high), format=CustomJSTickFormatter(code=PLAIN), stylesheets=[LOOK], tooltips=False, name=key, **says, **WIDE
+            title=f"{p.name}{unit}", start=low, end=high, value=value, step=step_of(low, high), format=CustomJSTickFormatter(code=PLAIN), stylesheets=[LOOK], tooltips=False, show_value=False, name=key, **says, **WIDE
         )
         slider.on_change("value", lambda attr, old, new: self._set(effect.name, p.name, new, True))
         slider.on_change("value_throttled", lambda attr, old, new: self._set(effect.name, p.name, new, False))
         self.sliders[key] = slider
-        return Row(slider, self._tick(key, s), **WIDE)
+        number = self._number(key, value, 1.0, lambda v: self._set(effect.name, p.name, min(max(v, p.limits[0]), p.limits[1]), False))
+        return Row(slider, number, self._tick(key, s), **WIDE)
 
     def _set(self, effect: str, parameter: str, value: float, dragging: bool) -> None:
         self.change(lambda s: set_value(s, effect, parameter, value) if effect in s.effects else s, dragging, key_of(effect, parameter))
@@ -147,19 +155,39 @@ class Controls:
     def _tolerance(self, name: str, sd: float, s: Setting) -> Row:
         low, high = span_of_tolerance(sd)
         slider = Slider(
-            title=f"{name} (± {sd:.2%})", start=low, end=high, value=s.deviations.get(name, 0.0), step=step_of(low, high), format=CustomJSTickFormatter(code=PERCENT), stylesheets=[LOOK], tooltips=False,
+            title=f"{name}, % (±\u00a0{100 * sd:.3g})", start=low, end=high, value=s.deviations.get(name, 0.0), step=step_of(low, high), format=CustomJSTickFormatter(code=PERCENT), stylesheets=[LOOK], tooltips=False, show_value=False,
             name=name, html_attributes=labelled(name), **WIDE,
         )  # fmt: skip
         slider.on_change("value", lambda attr, old, new: self.change(lambda s: set_deviation(s, name, new), True, name))
         slider.on_change("value_throttled", lambda attr, old, new: self.change(lambda s: set_deviation(s, name, new), False, name))
         self.sliders[name] = slider
-        return Row(slider, self._tick(name, s), **WIDE)
+        low, high = FURTHEST
+        number = self._number(name, slider.value, 100.0, lambda v: self.change(lambda s: set_deviation(s, name, min(max(v, low), high)), False))
+        return Row(slider, number, self._tick(name, s), **WIDE)
+
+    def _number(self, key: str, value: float, times: float, take: Callable[[float], None]) -> NumericInput:
+        """The value to be typed, times a factor (100: percent); a slider's own steps are round ones."""
+        number = NumericInput(value=rounded(times * value), mode="float", width=84, stylesheets=[LOOK], html_attributes=labelled(f"{key} as a number"), name=f"number {key}")
+
+        def typed(attr: str, old: float | None, new: float | None) -> None:
+            if new is not None and new != rounded(times * self.sliders[key].value):
+                take(new / times)
+
+        number.on_change("value", typed)
+        self.sliders[key].on_change("value", lambda attr, old, new: number.update(value=rounded(times * new)))
+        self.numbers[key] = number, times
+        return number
 
     def _tick(self, key: str, s: Setting) -> Checkbox:
         tick = Checkbox(label="fit", active=key in s.free, width=52, stylesheets=[LOOK], html_attributes=labelled(f"fit {key}"), name=f"fit {key}", visible=self.bench.campaign is not None)
         tick.on_change("active", lambda attr, old, new: self.change(lambda s: set_free(s, key, new), False))
         self.ticks[key] = tick
         return tick
+
+
+def rounded(value: float) -> float:
+    """As it is shown."""
+    return float(f"{value:.5g}")
 
 
 def step_of(low: float, high: float) -> float:

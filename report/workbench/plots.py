@@ -167,6 +167,8 @@ class MovingSection:
         self.motion.js_on_change("data", move)
 
     def show(self, moved: Sequence[tuple[ComplexArray, ComplexArray]]) -> None:
+        start = [(p.x + x.real, p.z + z.real) for p, (x, z) in zip(self.drawn, moved, strict=True)]
+        self.now.data = dict(self.now.data) | {"x": [x.tolist() for x, _ in start], "z": [z.tolist() for _, z in start]}
         parts = {"xa": [x.real for x, _ in moved], "xb": [x.imag for x, _ in moved], "za": [z.real for _, z in moved], "zb": [z.imag for _, z in moved]}
         self.motion.data = dict(self.motion.data) | {k: [row.tolist() for row in rows] for k, rows in parts.items()}
 

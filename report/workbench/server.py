@@ -91,7 +91,7 @@ def words(bench: Bench) -> dict[str, Any]:
     present = ", ".join(a.effect for a in bench.spindle.effects)
     under += f". Effects in the scene itself: {present}" if present else ""
     labels = Markup((HERE / "labels.js").read_text(encoding="utf-8"))
-    return {"heading": bench.spindle.title, "under": under, "measured": campaign is not None, "labels": labels, "colours": (MEASURED, COMPUTED)}
+    return {"heading": bench.spindle.title, "under": under, "measured": campaign is not None, "measured_frfs": campaign is not None and any(t.frf for t in campaign.tests), "labels": labels, "colours": (MEASURED, COMPUTED)}
 
 
 def serve(made: Server) -> None:

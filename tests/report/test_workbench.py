@@ -199,6 +199,23 @@ def test_adding_dragging_undoing(page):
     assert page.controls.sliders["preload_loss.loss"].value == 0.15
 
 
+def test_a_value_can_be_typed(page):
+    page.controls.add.value = "preload_loss"
+    number, slider = page.controls.numbers["preload_loss.loss"][0], page.controls.sliders["preload_loss.loss"]
+    number.value = 0.123456
+    assert page.session.now.effects["preload_loss"]["loss"] == slider.value == 0.123456
+    number.value = 5.0
+    assert page.session.now.effects["preload_loss"]["loss"] == 0.8, "no further than the limit"
+    mass = page.controls.numbers["hub mass"][0]
+    mass.value = 0.5
+    assert page.session.now.deviations == {"hub mass": 0.005}
+    page.undo._trigger_event(click(page.undo))
+    assert mass.value == 0.0
+    page.become(state.do(page.session, state.set_deviation(page.session.now, "hub mass", 0.00123456789)))
+    assert page.session.now.deviations["hub mass"] == 0.00123456789, "showing a rounded number changes nothing"
+    assert mass.value == 0.12346
+
+
 def test_a_slider_moved_by_keys_is_one_step_to_undo(page, monkeypatch):
     page.controls.add.value = "preload_loss"
     slider = page.controls.sliders["preload_loss.loss"]
