@@ -80,9 +80,14 @@ def _running(workers: int) -> bool:
 # ---------------------------------------------------------------- in a worker
 
 
-def _begin() -> None:
+def alone() -> None:
+    """From here on this process is a worker among many, started by somebody else: nothing is parallel within it."""
     global _inside
     _inside = True
+
+
+def _begin() -> None:
+    alone()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process that started this one says when to stop
 
 

@@ -96,6 +96,22 @@ def _tidy(path: Path) -> None:
             os.close(lock)
 
 
+@contextmanager
+def alone(folder: Path) -> Iterator[None]:
+    """The only process that writes into a folder bit by bit; `BadInput` where another one does, until it ends or dies.
+
+    Without locks of folders (Windows) nothing is said.
+    """
+    held = _lock(folder)
+    if held is None and fcntl is not None:
+        raise BadInput(f"{folder}: another run is writing there; wait for it to end, or name another folder")
+    try:
+        yield
+    finally:
+        if held is not None:
+            os.close(held)
+
+
 def _lock(work: Path) -> int | None:
     """A descriptor that holds the lock of a work folder until it is closed or the process ends; None where another has it."""
     if fcntl is None:

@@ -150,11 +150,11 @@ def drawing(spindle: Spindle, condition: Condition, effects: Sequence[tuple[Effe
 def stiffness_table(spindle: Spindle, temperatures: Sequence[float], speeds: Sequence[float] = (0.0,)) -> StiffnessTable:
     """Bearing properties over temperature (C) and speed (rad/s), and the temperature at which a bearing unloads."""
     states = [[operating_point(spindle, Condition(t, speed)).state for speed in sorted(set(speeds))] for t in sorted(set(temperatures))]
-    unloads = {b.name: _unloads(spindle, [row[0] for row in states], b.name) for b in spindle.bearings}
-    return tabulate(states, unloads, provenance(spindle))
+    lost = {b.name: unloads(spindle, [row[0] for row in states], b.name) for b in spindle.bearings}
+    return tabulate(states, lost, provenance(spindle))
 
 
-def _unloads(spindle: Spindle, states: Sequence[PairState], bearing: str) -> float | None:
+def unloads(spindle: Spindle, states: Sequence[PairState], bearing: str) -> float | None:
     """Temperature (C) between two neighbouring states at which a bearing loses contact, to a millikelvin."""
 
     def deformation(temperature: float) -> float:

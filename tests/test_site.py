@@ -19,7 +19,7 @@ SPEC.loader.exec_module(generated)
 ANSWERS = generated.tomllib.loads((SITE / "answers.toml").read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize("form", ["campaign", "mapping"])
+@pytest.mark.parametrize("form", ["campaign", "mapping", "study"])
 def test_every_key_of_a_file_is_explained(form):
     assert [f"{path} {key}" for path, key in generated.keys(form) if not generated.meaning(form, path, key)] == []
 
@@ -29,7 +29,7 @@ def test_most_keys_of_a_scene_are_explained():
     assert sum(bool(generated.meaning("scene", *k)) for k in known) > 0.9 * len(known)
 
 
-@pytest.mark.parametrize("form", ["campaign", "mapping"])
+@pytest.mark.parametrize("form", ["campaign", "mapping", "study"])
 def test_nothing_explained_is_stale(form):
     assert {m.split(".")[-1] for m in generated.MEANINGS[form]} <= {key for _, key in generated.keys(form)}
 

@@ -16,9 +16,10 @@ from thermospindle.sim.campaign.form import MODE_COLUMNS, CampaignTable, ModeTab
 from thermospindle.sim.effects import CATALOGUE
 from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.importing.mapping import MappingForm
+from thermospindle.sim.study.form import StudyForm
 
 MEANINGS = tomllib.loads((Path(__file__).parent / "meanings.toml").read_text(encoding="utf-8"))
-FORMS: dict[str, type[BaseModel]] = {"scene": Scene, "campaign": CampaignTable, "mapping": MappingForm}
+FORMS: dict[str, type[BaseModel]] = {"scene": Scene, "campaign": CampaignTable, "mapping": MappingForm, "study": StudyForm}
 
 
 def meaning(form: str, path: str, key: str) -> str:
@@ -212,6 +213,7 @@ def write_all(folder: Path) -> None:
         + ", ".join(f"`{c}`" for c in MODE_COLUMNS)
         + f". Empty cells are allowed under {', '.join(f'`{k}`' for k, f in ModeTable.model_fields.items() if not f.is_required())}.\n",
         "mapping": reference("mapping", "Mapping reference", 'Every key of the mapping of `spindle import`, as it is checked. A value `"?"` is an open question.'),
+        "study": reference("study", "Study reference", "Every key of the file of `spindle study`, as it is checked. Values of `[vary]` are lists, or tables of `from`, `to`, `steps` and `spacing`."),
         "cli": command_line(),
         "effects": effects(folder),
     }  # fmt: skip

@@ -12,6 +12,7 @@ resonance  figures of a resonance map: Campbell diagram, the same over temperatu
 run        small figures of a run for its Rerun log: bearing states over temperature, first hits, key to the FRFs
 runout     figures of runout: orbit and polar plots with the repeatable part in a heavy line, and the spectrum with its
            lines named
+study      figures of a study: along a sweep, spread and sensitivities, a fleet and who stands apart
 warmup     figures of a warm-up: temperatures, preload, friction heat and natural frequencies over time
 =========  =============================================================================================================
 """

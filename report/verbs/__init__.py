@@ -15,6 +15,7 @@ ladder     ladder
 running    runout, warmup, map
 starting   new, check
 states     table, modes, static
+study      study
 workbench  workbench
 =========  =============================================================================================================
 """

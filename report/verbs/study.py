@@ -1,0 +1,163 @@
+"""The verb `study`: many computations of one scene, kept as they come and gone on with after any interruption."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from matplotlib.figure import Figure
+from rich.console import Console
+
+from thermospindle.diagnosis.fleet import Fleet, apart
+from thermospindle.model.scene.fields import read_toml
+from thermospindle.model.scene.reading import content_hash, scene_path
+from thermospindle.report.figures import study as figures
+from thermospindle.report.folder import digest
+from thermospindle.report.text.grid import show_grid
+from thermospindle.report.verbs.answer import Answer, progress_bar, with_effects
+from thermospindle.sim.study.executors import Executor, on_cluster, on_this_machine
+from thermospindle.sim.study.form import FLEET, MONTE_CARLO, read_study
+from thermospindle.sim.study.parts import RESULTS, fill, opened, versions, write, write_table
+from thermospindle.sim.study.rows import Cases, cases
+from thermospindle.sim.study.sensitivity import APART
+from thermospindle.sim.study.summary import summary
+from thermospindle.sim.study.variants import check
+
+SUMMARY = "summary.json"
+OUTLIERS, CONDITIONS = 20, 6  # shown
+
+
+def study(file: Path, cluster: str | None = None, effect_files: Sequence[Path] = (), out: Path | None = None) -> Answer:
+    """Do a study, or go on with it: results stand in `out` (out/NAME by default) as they come, figures and summary when all are there."""
+    asked = read_study(Path(file))
+    spindle, catalogue = with_effects(asked.scene, effect_files)
+    scene = scene_path(asked.scene)
+    of: Cases | Fleet
+    if asked.kind == FLEET:
+        of = Fleet(spindle, asked.campaigns, catalogue, asked.work == "diagnose")
+    else:
+        raw = read_toml(scene)
+        check(asked, raw, scene, spindle, catalogue)
+        of = cases(asked, raw, scene, spindle, catalogue)
+    place = Path("out") / asked.file.stem if out is None else Path(out)
+    key: dict[str, Any] = {"study": asked.digest, "scene": content_hash(spindle), "effects": [digest(Path(f)) for f in effect_files]}
+    if asked.kind == FLEET:
+        key["campaigns"] = {str(k): _content(folder) for k, folder in enumerate(asked.campaigns)}
+    with opened(place, key, of.count, asked.chunk, of.schema()) as folder, _executor(cluster) as run:
+        there = folder.count - len(folder.missing())
+        with progress_bar(folder.count - there) as progress:
+            fill(folder, of.rows, run, progress)
+        table = folder.table()
+        told, drawn = _fleet_told(table) if isinstance(of, Fleet) else _told(of, table)
+        values = {"title": asked.title, "kind": asked.kind, "scene": spindle.name, "cases": of.count, **told}
+        write_table(table, folder.path / RESULTS)
+        write(folder.path / SUMMARY, json.dumps(values, indent=1))
+        figures.write_figures(drawn, folder.path)
+    values |= {"out": str(place), "parts": folder.count, "parts_found": there, "warnings": _warnings(values)}
+
+    def show(console: Console) -> None:
+        console.print(f"{asked.title}: {of.count} cases of {spindle.name}" + (f", {there} of {folder.count} parts found there" if there else ""))
+        (_show_fleet if isinstance(of, Fleet) else _show)(console, values)
+        console.print(f"\n{place}: {RESULTS}, {SUMMARY}, {', '.join(f'{name}.png' for name in drawn)}", soft_wrap=True)
+
+    return Answer(values, show)
+
+
+@contextmanager
+def _executor(cluster: str | None) -> Iterator[Executor]:
+    if cluster is None:
+        yield on_this_machine
+    else:
+        with on_cluster(cluster, versions) as run:
+            yield run
+
+
+def _content(campaign: Path) -> str:
+    """A name for what a campaign folder holds."""
+    parts = [(p.relative_to(campaign).as_posix(), digest(p)) for p in sorted(campaign.rglob("*")) if not p.is_dir()]
+    return hashlib.sha256(json.dumps([campaign.name, parts]).encode()).hexdigest()[:16]
+
+
+def _told(of: Cases, table: pa.Table) -> tuple[dict[str, Any], dict[str, Figure]]:
+    told = summary(of, table)
+    return told, figures.monte_carlo(of, table, told) if of.study.kind == MONTE_CARLO else figures.sweep(of, table)
+
+
+def _fleet_told(table: pa.Table) -> tuple[dict[str, Any], dict[str, Figure]]:
+    """Campaigns with the largest error first, and what of them lies beyond `APART` robust standard deviations."""
+    rows = table.to_pylist()
+    distance = apart(rows)
+    order = sorted(range(len(rows)), key=lambda k: -(rows[k]["rms_residual"] or np.inf))
+    found = [
+        {"campaign": rows[k]["campaign"], "of": name, "z": float(z[k])}
+        for name, z in distance.items()
+        for k in range(len(rows))
+        if np.isfinite(z[k]) and abs(z[k]) > APART
+    ]
+    found.sort(key=lambda o: -abs(o["z"]))
+    errors = [r["error"] for r in rows if r["error"]]
+    ranked = [{key: value for key, value in rows[k].items() if key != "case"} for k in order]
+    told = {"rows": len(rows), "errors": len(errors), "first_error": errors[0] if errors else None, "ranking": ranked, "outliers": found}
+    return told, figures.fleet(rows, distance)
+
+
+def _warnings(values: dict[str, Any]) -> list[str]:
+    if not values["errors"]:
+        return []
+    return [f"{values['errors']} of {values['rows']} rows have no result, and say why in their column error; the first: {values['first_error']}"]
+
+
+# ---------------------------------------------------------------- for people
+
+
+def _show(console: Console, values: dict[str, Any]) -> None:
+    for c in values["conditions"][:CONDITIONS]:
+        rows = [_line(f"{m['mode']} {m['kind']}, Hz", m["nominal_Hz"], m) for m in c["modes"]]
+        rows += [_line(f"preload {name}, N", p["nominal"], p) for name, p in c["preload_N"].items()]
+        lost = {name: share for name, share in c["in_contact"].items() if share is not None and share < 1}
+        head = ["", "scene", *(["mean", "s.d.", "2.5 %", "97.5 %", "most by", "r2"] if values["kind"] == MONTE_CARLO else ["least", "most"])]
+        show_grid(console, f"{c['temperature_C']:g} C, {c['speed_rpm']:g} rpm", head, rows, ("", "most by"))
+        for name, share in lost.items():
+            console.print(f"{name} has contact in {100 * share:.1f} % of them")
+    if (more := len(values["conditions"]) - CONDITIONS) > 0:
+        console.print(f"{more} more conditions stand in {SUMMARY}")
+    for name, u in values.get("unloads_C", {}).items():
+        if u["share"]:
+            s = u["spread"]
+            at = f" at {s['mean']:.1f} +- {s['sd']:.1f} C" if s else ""
+            console.print(f"{name} loses contact within the temperatures of the study in {100 * u['share']:.1f} % of the draws{at}")
+
+
+def _line(label: str, nominal: float, own: dict[str, Any]) -> list[str]:
+    if "least" in own:
+        return [label, *map(_short, (nominal, own["least"], own["most"]))]
+    s = own["spread"]
+    cells = [label, _short(nominal)] + (["-"] * 4 if s is None else [_short(v) for v in (s["mean"], s["sd"], s["quantiles"][0], s["quantiles"][-1])])
+    if (sensitive := own.get("sensitivity")) is None:
+        return [*cells, "-", "-"]
+    most = list(sensitive["coefficients"].items())[:2]
+    return [*cells, ", ".join(f"{name} {c['value']:+.2f}" for name, c in most), f"{sensitive['r2']:.3f}"]
+
+
+def _show_fleet(console: Console, values: dict[str, Any]) -> None:
+    diagnosed = any("verdict" in r for r in values["ranking"])
+    head = ["campaign", "rms residual", "worst", "modes", "missing", "extra"] + (["verdict", "effects"] if diagnosed else [])
+    rows = []
+    for r in values["ranking"]:
+        cells = [r["campaign"], *(_short(r[k]) for k in ("rms_residual", "worst_residual", "modes", "missing", "extra"))]
+        rows.append(cells + ([r["verdict"] or "-", ", ".join(r["effects"] or [])] if diagnosed else []))
+    show_grid(console, "The largest error first, in standard errors", head, rows, ("campaign", "verdict", "effects"))
+    for o in values["outliers"][:OUTLIERS]:
+        console.print(f"{o['campaign']} stands apart: {o['of']} {o['z']:+.1f} robust standard deviations from the fleet's middle")
+    if not values["outliers"]:
+        console.print(f"None stands more than {APART:g} robust standard deviations from the fleet's middle.")
+
+
+def _short(value: float | None) -> str:
+    return "-" if value is None else f"{value:.5g}"

@@ -1,0 +1,119 @@
+"""The scene with some of its keys and effect parameters changed: one point of a sweep."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from thermospindle.model.errors import BadInput, instead
+from thermospindle.model.machine import Addition, Spindle
+from thermospindle.model.scene.form import Scene, first_error
+from thermospindle.model.scene.reading import build
+from thermospindle.sim.effects import checked, resolved
+from thermospindle.sim.effects.effect import Effect, fitted_to, refusal
+from thermospindle.sim.study.form import Study
+
+EFFECTS = "effects"
+Varied = Sequence[tuple[str, tuple[Any, ...]]]
+
+
+def combination(vary: Varied, index: int) -> dict[str, Any]:
+    """The values of combination `index` of all varied keys, the last of them moving fastest."""
+    chosen = {}
+    for key, values in reversed(vary):
+        index, at = divmod(index, len(values))
+        chosen[key] = values[at]
+    return {key: chosen[key] for key, _ in vary}
+
+
+def variant(raw: Mapping[str, Any], file: Path, catalogue: Sequence[Effect], chosen: Mapping[str, Any]) -> Spindle:
+    """The spindle of the parsed scene `raw` with keys and effect parameters at chosen values, checked as any scene is.
+
+    A key is dotted as in the scene file, entries of a list of tables by name or node: `bearing_pair.preload_N`,
+    `structure.joints.base.lateral_N_per_m`; `effects.NAME.PARAMETER` is one of an effect, which the scene takes in where it has it not,
+    its other parameters typical.
+    """
+    changed = copy.deepcopy(dict(raw))
+    of_effects: dict[str, dict[str, float]] = {}
+    for key, value in chosen.items():
+        parts = key.split(".")
+        if parts[0] == EFFECTS:
+            of_effects.setdefault(parts[1], {})[parts[2]] = value
+        else:
+            _table(changed, parts[:-1], key)[parts[-1]] = value
+    spindle = build(changed, file)
+    return _with_effects(spindle, of_effects, catalogue)
+
+
+def check(study: Study, raw: Mapping[str, Any], file: Path, spindle: Spindle, catalogue: Sequence[Effect]) -> None:
+    """Refuse (`BadInput`) keys that are none of the scene, and values that its form or an effect does not allow, each by itself.
+
+    Values that only together give no spindle are rows of the study with their error.
+    """
+    for key, values in study.vary:
+        try:
+            parts = key.split(".")
+            if parts[0] == EFFECTS:
+                _check_effect(spindle, parts, values, catalogue)
+                continue
+            for value in values:
+                _check_value(raw, file, key, value)
+        except BadInput as error:
+            raise BadInput(f"{study.file}: vary.{key!r}: {error}") from None
+
+
+def _check_effect(spindle: Spindle, parts: list[str], values: Sequence[Any], catalogue: Sequence[Effect]) -> None:
+    if len(parts) != 3:
+        raise BadInput("a parameter of an effect is named as in effects.bond_softening.compliance_hot")
+    known = {e.name: e for e in catalogue}
+    if parts[1] not in known:
+        raise BadInput(f"no effect is called {parts[1]!r}; {instead(parts[1], known)}")
+    effect = fitted_to(known[parts[1]], spindle)
+    if why := refusal(effect, spindle):
+        raise BadInput(f"effect {effect.name}: {why}")
+    for value in values:
+        if not isinstance(value, int | float) or isinstance(value, bool):
+            raise BadInput(f"{value!r} is no number")
+        checked(effect, {parts[2]: value})
+
+
+def _check_value(raw: Mapping[str, Any], file: Path, key: str, value: Any) -> None:
+    changed = copy.deepcopy(dict(raw))
+    parts = key.split(".")
+    _table(changed, parts[:-1], key)[parts[-1]] = value
+    try:
+        Scene.model_validate(changed)
+    except ValidationError as error:
+        raise BadInput(first_error(file, changed, Scene, error)) from None
+
+
+def _table(raw: dict[str, Any], parts: Sequence[str], key: str) -> dict[str, Any]:
+    """The table that a dotted key lies in; tables that a scene leaves to their defaults are made."""
+    here: Any = raw
+    for depth, part in enumerate(parts):
+        if isinstance(here, list):
+            called = {str(e[k]): e for e in here if isinstance(e, dict) for k in ("name", "node") if k in e}
+            if part not in called:
+                raise BadInput(f"{'.'.join(parts[: depth + 1])} is not in the scene; {instead(part, called)}")
+            here = called[part]
+        elif isinstance(here, dict):
+            here = here.setdefault(part, {"origin": "assumed"} if depth == 0 else {})  # every number of a scene has an origin
+        else:
+            raise BadInput(f"{'.'.join(parts[:depth])} is no table of the scene")
+    if not isinstance(here, dict):
+        raise BadInput(f"{key} names no single value; entries of a list go by their name")
+    return here
+
+
+def _with_effects(spindle: Spindle, of_effects: Mapping[str, Mapping[str, float]], catalogue: Sequence[Effect]) -> Spindle:
+    known = {e.name: e for e in catalogue}
+    additions = {a.effect: a for a in spindle.effects}
+    for name, values in of_effects.items():
+        before = additions[name].values if name in additions else fitted_to(known[name], spindle).typical()
+        additions[name] = Addition(effect=name, values={**before, **values})
+    return resolved(replace(spindle, effects=tuple(additions.values())), catalogue)
