@@ -6,5 +6,6 @@ before_after  whether an addition to the model paid: the error before and after 
 compare       measurement beside model, as the scene stands: modes, dampings, shapes and FRFs of every test, and one
               number for the whole
 correlation   how alike measured and computed FRFs are: by FRF, by band, line by line, and after a shift in frequency
+fit           chosen parameters fitted to the errors that `compare` shows
 ============  ==========================================================================================================
 """
