@@ -33,9 +33,10 @@ def workbench(
         with progress_bar(1) as progress:
             bench = open_bench(scene, campaign, effect_files, progress, held_out_tests)
     known = read_explanations(diagnosis, bench) if diagnosis else None
+    doubts = [f"--diagnosis {diagnosis}: was made of another state of this scene; its tolerances may not fit"] if known and not known.of_scene else []
     out = Path("out") / f"{bench.spindle.name}_workbench" if out is None else out
     made, address = server(bench, out, known, port)
-    values: dict[str, Any] = {"address": address, "token": address.rstrip("/").rpartition("/")[2], "pid": os.getpid(), "out": str(out), "warnings": []}
+    values: dict[str, Any] = {"address": address, "token": address.rstrip("/").rpartition("/")[2], "pid": os.getpid(), "out": str(out), "warnings": doubts}
 
     def show(console: Console) -> None:
         console.print(f"The workbench of {bench.spindle.name} is at\n\n  {address}\n", highlight=False, soft_wrap=True)

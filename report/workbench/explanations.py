@@ -14,6 +14,7 @@ from thermospindle.diagnosis import verdict
 from thermospindle.diagnosis.add import answer_of, fitted_values, read_answer
 from thermospindle.diagnosis.compare.before_after import without
 from thermospindle.model.errors import BadInput
+from thermospindle.model.scene.reading import content_hash
 from thermospindle.report.text.diagnosis import diagnosis_json
 from thermospindle.report.workbench.bench import Bench
 from thermospindle.report.workbench.state import Setting, add_effect, set_deviation
@@ -43,6 +44,7 @@ class Explanations:
     rows: tuple[Explanation, ...]
     none: float
     unknown: float
+    of_scene: bool = True  # as it is on the workbench, as far as the answer says
 
 
 def read_explanations(file: Path, bench: Bench) -> Explanations:
@@ -68,7 +70,7 @@ def explanations(raw: Mapping[str, Any], bench: Bench, where: str) -> Explanatio
             own = answer.build if set(names) == set(answer.best) else {}
             rows.append(Explanation(names, float(candidate["probability"]), float(candidate["delta_evidence"]), values, own))
         odds = {key: float(raw["probability"][key]) for key in ("none", "unknown")}
-        return Explanations(str(raw["verdict"]), str(raw["reason"]), tuple(rows), odds["none"], odds["unknown"])
+        return Explanations(str(raw["verdict"]), str(raw["reason"]), tuple(rows), odds["none"], odds["unknown"], answer.scene_hash in (None, content_hash(bench.spindle)))
     except (KeyError, TypeError, ValueError) as error:
         if isinstance(error, BadInput):
             raise

@@ -35,6 +35,7 @@ from thermospindle.report.workbench.state import (
     computed,
     do,
     keep,
+    key_of,
     leave_out,
     redo,
     set_named,
@@ -85,7 +86,7 @@ class Page:
         self.left_out = CheckboxGroup(labels=[s.id for s in self.bench.shown], inline=True, name="left_out", **look)
         self.fit = Button(label="Fit the ticked", name="fit", disabled=self.bench.campaign is None, **look, **WIDE)
         self.keep = Button(label="Keep as a step", name="keep", **look, **WIDE)
-        self.rung = Select(title="Step", options=[], name="rung", **look, **WIDE)
+        self.step = Select(title="Step", options=[], name="step", **look, **WIDE)
         self.take_up = Button(label="Take up again", name="take_up", disabled=True, **look, **WIDE)
         self.explanation = Select(title="Explanation", options=[], name="explanation", **look, **WIDE)
         self.take = Button(label="Take in its values", name="take", disabled=True, **look, **WIDE)
@@ -101,7 +102,7 @@ class Page:
     def roots(self) -> dict[str, Any]:
         """What the template places, by name."""
         own = {k: getattr(self, k) for k in (
-            "test", "response", "hammer", "mode", "quantity", "undo", "redo", "left_out", "fit", "keep", "rung", "take_up", "explanation", "take",
+            "test", "response", "hammer", "mode", "quantity", "undo", "redo", "left_out", "fit", "keep", "step", "take_up", "explanation", "take",
             "diagnose", "name", "save", "halt", "short", "status", "ladder", "reasons", "numbers", "message",
         )}  # fmt: skip
         drawn = {"magnitude": self.frf.size, "phase": self.frf.phase, "map": self.map.figure, "section": self.section.figure, "play": self.section.play}
@@ -119,7 +120,7 @@ class Page:
         self.undo.on_click(lambda: self._walk(undo))
         self.redo.on_click(lambda: self._walk(redo))
         self.keep.on_click(lambda: self.become(keep(self.session, self.found.fitted, self.found.left_out)))
-        self.take_up.on_click(lambda: self.become(take_up(self.session, int(self.rung.value))))
+        self.take_up.on_click(lambda: self.become(take_up(self.session, int(self.step.value))))
         self.take.on_click(self._take)
         self.fit.on_click(self._fit)
         self.diagnose.on_click(self._diagnose)
@@ -267,11 +268,11 @@ class Page:
             self.left_out.active = active
         self.undo.disabled, self.redo.disabled = not s.past, not s.future
         self.ladder.text = words.ladder(s)
-        rungs = [(str(k), r.name) for k, r in enumerate(s.ladder)]
-        if self.rung.options != rungs:
-            self.rung.options = rungs
-            self.rung.value = rungs[-1][0] if rungs else ""
-        self.take_up.disabled = not rungs
+        steps = [(str(k), r.name) for k, r in enumerate(s.ladder)]
+        if self.step.options != steps:
+            self.step.options = steps
+            self.step.value = steps[-1][0] if steps else ""
+        self.take_up.disabled = not steps
         if self.known:
             options = [(str(k), e.words) for k, e in enumerate(self.known.rows)]
             self.reasons.text = told.table(self.known)
@@ -324,7 +325,9 @@ class Page:
         s = self.session.now
 
         def done(found: Any) -> None:
-            self.become(do(self.session, set_named(self.session.now, found.value)))
+            now = self.session.now
+            there = {t.name for t in self.bench.tolerances} | {key_of(e, p) for e, values in now.effects.items() for p in values}
+            self.become(do(self.session, set_named(now, {key: v for key, v in found.value.items() if key in there})))
             said = [f"{key} {value:.4g} ± {found.sd[key]:.2g}" for key, value in found.value.items() if "." in key]
             self.say(f"Fitted in {found.steps} steps. {', '.join(said)}")
 

@@ -12,13 +12,13 @@ from thermospindle.model.scene.reading import SCENES
 from thermospindle.report.folder import mark, whole_folder
 from thermospindle.report.page.compare import write_comparison
 from thermospindle.report.workbench.bench import Bench, Errors, built
-from thermospindle.report.workbench.state import Rung, Setting
+from thermospindle.report.workbench.state import Setting, Step
 from thermospindle.sim.effects.own import OwnEffect
 
 SOURCE = "set on the workbench"
 
 
-def save(bench: Bench, s: Setting, errors: Errors, ladder: tuple[Rung, ...], out: Path) -> list[str]:
+def save(bench: Bench, s: Setting, errors: Errors, ladder: tuple[Step, ...], out: Path) -> list[str]:
     """Write `scene/`, `workbench.py` and, where there is a campaign, `report/` into the folder `out`, whole or not at all; what was written.
 
     `BadInput` where something stands there that spindle did not write, or nothing was changed.

@@ -29,7 +29,7 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Rung:
+class Step:
     """A step that was kept: rms errors in standard errors of fitted and of left-out tests, None where there are none."""
 
     name: str
@@ -43,7 +43,7 @@ class Session:
     now: Setting = field(default_factory=Setting)
     past: tuple[Setting, ...] = ()
     future: tuple[Setting, ...] = ()
-    ladder: tuple[Rung, ...] = ()
+    ladder: tuple[Step, ...] = ()
 
 
 # ---------------------------------------------------------------- settings
@@ -146,13 +146,13 @@ def keep(session: Session, fitted: float | None, left_out: float | None) -> Sess
     """The session with the setting of now as a step of the ladder, unless it is the last one already."""
     if session.ladder and session.ladder[-1].setting == session.now:
         return session
-    rung = Rung(f"{len(session.ladder) + 1}: {words(session.now)}", session.now, fitted, left_out)
-    return replace(session, ladder=(*session.ladder, rung))
+    step = Step(f"{len(session.ladder) + 1}: {words(session.now)}", session.now, fitted, left_out)
+    return replace(session, ladder=(*session.ladder, step))
 
 
-def take_up(session: Session, rung: int) -> Session:
+def take_up(session: Session, step: int) -> Session:
     """The session with the setting of a step of the ladder, which can be undone."""
-    return do(session, session.ladder[rung].setting)
+    return do(session, session.ladder[step].setting)
 
 
 # ---------------------------------------------------------------- sliders

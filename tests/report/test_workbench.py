@@ -314,7 +314,7 @@ def test_fitting_keeping_and_taking_up(page):
     errors = [r.fitted for r in page.session.ladder]
     assert errors[2] < errors[1]
     assert page.ladder.text.count("<tr>") == 4
-    page.rung.value = "1"
+    page.step.value = "1"
     page.take_up._trigger_event(click(page.take_up))
     assert page.session.now.effects["preload_loss"]["loss"] == 0.15
 
@@ -363,6 +363,8 @@ def test_an_explanation_is_taken_in_with_its_tolerances(bench, tmp_path):
     page = Page(bench, Document(), tmp_path, known)
     assert "one &lt;effect&gt; explains it" in page.reasons.text
     assert "80.0%" in page.reasons.text
+    assert known.of_scene
+    assert not told.explanations(ANSWER | {"scene_hash": "0" * 12}, bench, "x").of_scene
     page.take._trigger_event(click(page.take))
     assert page.session.now.effects["bond_softening"] == by_name("bond_softening").typical() | {"hot_compliance": 11.9}
     assert page.session.now.deviations == {"hub mass": 0.002}

@@ -20,7 +20,7 @@ def main() -> None:
         process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
         assert process.stdout is not None
         address = json.loads(process.stdout.readline())["address"]
-        tab = Browser(Path(folder), 1400, 1130)
+        tab = Browser(Path(folder), 1400, 1480)
         try:
             tab.scheme("light")
             tab.open(address)
