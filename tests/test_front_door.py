@@ -58,7 +58,7 @@ def scene(tmp_path):
 
 def test_every_option_is_an_argument_of_its_verb():
     _, verbs = cli._parser()
-    assert len(verbs) == 21
+    assert len(verbs) == 22
     for parser in verbs.values():
         module, function = parser.get_default("verb")
         arguments = inspect.signature(getattr(import_module(f"thermospindle.report.verbs.{module}"), function)).parameters
