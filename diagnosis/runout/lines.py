@@ -123,6 +123,24 @@ def look(spindle: Spindle, test: Test) -> Seen:
     return Seen(test, condition, record.nodes, found, unexplained, slip, record.phased)
 
 
+def expected(spindle: Spindle, condition: Condition, nodes: tuple[int, ...], seconds: float, like: Seen) -> Seen:
+    """The lines that a test not made yet would show, without their phasors: a record of `seconds` at a condition, its slip, noise and probes as of `like`."""
+    record = like.test.runout
+    assert record is not None
+    point = operating_point(spindle, condition)
+    kin = row_kinematics(point.spindle, point.state)
+    reach = max(record.highest / 1.1, max(line.frequency for line in lines(point.spindle, kin, 1)))
+    known = [line for line in lines(point.spindle, slipped(kin, like.slip), MULTIPLE) if line.frequency < reach]
+    together = TOGETHER if record.kind == "time" else 2.0 * REACH[record.window] + 1
+    noise = np.median([line.sd for line in like.seen], axis=0) * np.sqrt(record.length / seconds)
+    sd = np.array([noise[like.nodes.index(n)] if n in like.nodes else np.median(noise) for n in nodes])
+    found = []
+    for cluster in _clusters(known, together / seconds):
+        frequency = float(np.mean(sorted({g.frequency for g in cluster})))
+        found.append(SeenLine(frequency, tuple(cluster), np.zeros(len(nodes), complex), sd))
+    return Seen(Test("planned", condition.temperature, condition.speed), condition, nodes, tuple(found), (), like.slip, like.phased)
+
+
 def slipped(kin: Mapping[str, Kinematics], slip: float) -> dict[str, Kinematics]:
     """Cage and ball speeds with d cos(angle) / D changed by a relative `slip` in every bearing."""
 

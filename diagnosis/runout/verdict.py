@@ -12,16 +12,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 from scipy.stats import chi2 as chi_squared
 
+from thermospindle.diagnosis.runout.explanation import Explanation, Variant, variants
 from thermospindle.diagnosis.runout.fit import Family, FamilyFit, families, fit_family, merged
+from thermospindle.diagnosis.runout.held_out import held_out
 from thermospindle.diagnosis.runout.lines import Seen, UnexplainedLine, look, runout_tests
-from thermospindle.diagnosis.runout.sources import SourceKey, Sources, of_effect, sources
+from thermospindle.diagnosis.runout.next_test import CERTAIN, NextRunout, next_runout
+from thermospindle.diagnosis.runout.sources import Sources, sources
 from thermospindle.model.machine import Spindle
-from thermospindle.model.types import Array
 from thermospindle.sim.campaign.campaign import Campaign
 from thermospindle.sim.effects import CATALOGUE, of_scene
 from thermospindle.sim.effects.effect import Effect
@@ -32,48 +33,12 @@ MISFIT = 1e-4  # probability below which a misfit is not chance
 FALLS = 1 / 3  # held-out error ratio that counts as a clear fall
 WORTH = 4.0  # chi2 of the sources of a variant, fitted without it, from which it is worth a fit of its own
 SLACK = 1.5  # chi2 a number up to which a misfit is laid to the errors of lines, which are known but roughly
-ONE = 1e-3  # of the typical size, at which an effect's sources are computed: they are linear in it
-
-
-@dataclass(frozen=True, eq=False)
-class Variant:
-    """One choice of an effect's discrete parameters; `amplitudes` of its sources a unit of its first parameter; `parts` numbers of its families."""
-
-    effect: Effect
-    values: Mapping[str, float]
-    amplitudes: Mapping[SourceKey, complex]
-    parts: tuple[int, ...]
-
-    @property
-    def prior(self) -> float:
-        return self.effect.parameters[0].prior_sd
-
-
-@dataclass(frozen=True, eq=False)
-class Explanation:
-    """Variants fitted together: `size` and `size_sd` of each; evidence over the model without effects; chi2 of all lines with priors."""
-
-    variants: tuple[Variant, ...]
-    size: Array
-    size_sd: Array
-    delta_evidence: float
-    chi2: float
-    probability: float = 0.0
-    held_out_ratio: float = 1.0
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        return tuple(v.effect.name for v in self.variants)
-
-    @property
-    def believable(self) -> bool:
-        limits = [v.effect.parameters[0].limits for v in self.variants]
-        return all(low < s < high for s, (low, high) in zip(self.size, limits, strict=True))
 
 
 @dataclass(frozen=True, eq=False)
 class RunoutDiagnosis:
-    """The verdict; `base` are the fits of all families without effects; `smallest` the size of each effect the data could show at `CLEAR`."""
+    """The verdict; `base` are the fits of all families without effects; `smallest` the size of each effect the data could show at `CLEAR`; `rivals`
+    what these data do not tell apart, or the leading explanation and the next; `next` the test that would, or `no_next` why there is none."""
 
     verdict: str
     effects: tuple[str, ...]
@@ -87,6 +52,9 @@ class RunoutDiagnosis:
     unexplained: tuple[UnexplainedLine, ...]
     held_out_before: float
     held_out_after: float
+    rivals: tuple[Explanation, ...] = ()
+    next: tuple[NextRunout, ...] = ()
+    no_next: str = ""
 
     @property
     def chi2(self) -> float:
@@ -116,23 +84,11 @@ def diagnose_runout(
     best = _best_of_each(fits)
     progress(f"{len(fits)} variants of {len(effects)} effects tried")
     pairs = _pairs(best, tried, parts, base)
-    return _verdict(seen, found, parts, base, effects, fits, best, pairs)
-
-
-def variants(effect: Effect, found: Sources, parts: Sequence[Family]) -> list[Variant]:
-    """Every choice of the effect's discrete parameters that shows in some line, each once."""
-    main = effect.parameters[0]
-    small = main.neutral + ONE * (main.typical - main.neutral)
-    distinct: dict[tuple[tuple[SourceKey, complex], ...], Variant] = {}
-    for chosen in product(*[p.choices or (p.typical,) for p in effect.parameters[1:]]):
-        values = {main.name: small, **{p.name: v for p, v in zip(effect.parameters[1:], chosen, strict=True)}}
-        amplitudes = {s: a / (small - main.neutral) for s, a in of_effect(found, effect, values).items()}
-        own = tuple(i for i, f in enumerate(parts) if any(source in amplitudes for source, _ in f.source))
-        largest = max((abs(a) for a in amplitudes.values()), default=1.0)
-        key = tuple((s, complex(np.round(amplitudes[s] / largest, 6))) for s in sorted(amplitudes))
-        if own and key not in distinct:
-            distinct[key] = Variant(effect, {k: v for k, v in values.items() if k != main.name}, amplitudes, own)
-    return list(distinct.values())
+    d = _verdict(seen, found, parts, base, effects, fits, best, pairs)
+    if len(d.rivals) < 2:
+        return replace(d, no_next="Nothing is left to be told apart." if d.verdict != "unexplained" else "No two explanations are left that a test could part.")
+    tests, words = next_runout(spindle, seen, campaign.points, d.rivals, progress)
+    return replace(d, next=tests, no_next=words)
 
 
 def _fitted(chosen: Sequence[Variant], parts: Sequence[Family], base: Sequence[FamilyFit], worth: bool = False) -> Explanation:
@@ -186,61 +142,6 @@ def _pairs(best: Sequence[Explanation], tried: Sequence[Variant], parts: Sequenc
             if other.effect.name not in found or pair.delta_evidence > found[other.effect.name].delta_evidence:
                 found[other.effect.name] = pair
     return sorted(found.values(), key=lambda f: -f.delta_evidence)
-
-
-# ---------------------------------------------------------------- held out
-
-
-def _squares(rows: Family, explained: Explanation | None) -> tuple[float, int]:
-    """Squared error of lines as the scene predicts them, or the scene with an effect of a given size, in its standard errors, and how many numbers.
-
-    What the scene has besides is of its likely size. Phases are those that suit the data best: nothing predicts them.
-    """
-    total, count = 0.0, 0
-    for t in np.unique(rows.test):
-        for frequency in np.unique(rows.frequency[rows.test == t]):
-            together = (rows.test == t) & (rows.frequency == frequency)
-            each = [together] if rows.phased[together].all() else [together & (rows.node == n) for n in np.unique(rows.node[together])]
-            for chosen in each:  # probes without phases each by itself
-                one, n = _squares_of_line(rows.only(chosen), explained)
-                total, count = total + one, count + n
-    return total, count
-
-
-def _squares_of_line(own: Family, explained: Explanation | None) -> tuple[float, int]:
-    """As `_squares`, of one line in one test."""
-    scene = np.diag(own.sd**2).astype(complex)
-    for same in np.unique(own.phase, axis=1).T:
-        column = own.shown * np.all(own.phase == same[:, None], axis=0) * own.likely
-        scene += column @ column.conj().T
-    whiten = np.linalg.inv(np.linalg.cholesky(scene))
-    left = whiten @ own.value
-    if explained is not None:
-        b = sum(
-            (s * own.of_effect(v.amplitudes) for v, s in zip(explained.variants, explained.size, strict=True)),
-            np.zeros(len(own.likely), complex),
-        )
-        for g in np.unique(own.phase):
-            shown = whiten @ ((own.shown * (own.phase == g)) @ b)
-            left = left - shown * np.exp(1j * np.angle(np.vdot(shown, left)))
-    return 2 * float(np.vdot(left, left).real), 2 * len(left)
-
-
-def held_out(found: Explanation, parts: Sequence[Family]) -> tuple[float, float]:
-    """Rms error of conditions left out one after the other: by the scene alone, and with the effects fitted to all others."""
-    family = merged([parts[i] for i in sorted({i for v in found.variants for i in v.parts})])
-    before, after, count = 0.0, 0.0, 0
-    for t in np.unique(family.test):
-        out = family.test == t
-        if out.all():
-            continue
-        rest = family.only(~out)
-        fit = fit_family(rest, [rest.of_effect(v.amplitudes) for v in found.variants], [v.prior for v in found.variants])
-        one, n = _squares(family.only(out), None)
-        before, after, count = before + one, after + _squares(family.only(out), replace(found, size=fit.size))[0], count + n
-    if count == 0:
-        return float("nan"), float("nan")
-    return float(np.sqrt(before / count)), float(np.sqrt(after / count))
 
 
 # ---------------------------------------------------------------- verdict
@@ -306,10 +207,10 @@ def _verdict(
         ratio = after / before if np.isfinite(before) else 1.0
         candidates = [replace(c, held_out_ratio=ratio) if c.variants == leading[0].variants else c for c in candidates]
 
-    def answer(verdict: str, names: Sequence[str], reason: str) -> RunoutDiagnosis:
+    def answer(verdict: str, names: Sequence[str], reason: str, rivals: Sequence[Explanation] = ()) -> RunoutDiagnosis:
         return RunoutDiagnosis(
             verdict, tuple(names), reason, tuple(candidates), tuple(seen), found, tuple(parts), tuple(base),
-            _smallest(effects, fits, found, parts), unexplained, before, after,
+            _smallest(effects, fits, found, parts), unexplained, before, after, tuple(rivals),
         )  # fmt: skip
 
     if unexplained:
@@ -331,9 +232,11 @@ def _verdict(
         return answer("unexplained", (), f"The lines are not those of the scene (misfit {chi2:.0f} for {count} numbers), and even with "
                       f"{' + '.join(chosen.effects)} a misfit of {chosen.chi2:.0f} is left.")  # fmt: skip
     fall = f"; on left-out conditions the error goes from {before:.2f} to {after:.2f} standard errors" if np.isfinite(before) else ""
+    near = [chosen, *(c for c in candidates if c.variants != chosen.variants and len(c.variants) == len(chosen.variants)
+                      and chosen.delta_evidence - c.delta_evidence < CERTAIN)]  # fmt: skip
     if needed:
         return answer("two effects", chosen.effects, f"{chosen.effects[0]} and {chosen.effects[1]} are both needed: without the second "
-                      f"{chosen.delta_evidence - first.delta_evidence:.1f} in ln evidence are lost{fall}.")  # fmt: skip
+                      f"{chosen.delta_evidence - first.delta_evidence:.1f} in ln evidence are lost{fall}.", near)  # fmt: skip
     rivals = [c for c in best if first.delta_evidence - c.delta_evidence < AHEAD]
     unusual = [c for c in (_of_any_size(e, parts, base) for e in best if e not in rivals and set(e.variants[0].parts) & set(first.variants[0].parts))
                if c.believable and first.delta_evidence - c.delta_evidence < AHEAD]  # fmt: skip
@@ -341,15 +244,15 @@ def _verdict(
         names = sorted({n for c in [*rivals, *unusual] for n in c.effects})
         sizes = ", ".join(f"{c.effects[0]} ({c.size[0]:.3g} {c.variants[0].effect.parameters[0].unit})" for c in unusual)
         return answer("ambiguous", names, f"{first.effects[0]} leads, but by its likely size alone: of an unusual size {sizes} would explain the "
-                      f"lines within {AHEAD:g} in ln evidence of it, or better{fall}.")  # fmt: skip
+                      f"lines within {AHEAD:g} in ln evidence of it, or better{fall}.", [first, *unusual, *rivals[1:]])  # fmt: skip
     if len(rivals) > 1 or not first.believable:
         names = sorted({n for c in rivals for n in c.effects})
-        return answer("ambiguous", names, f"{', '.join(names)} explain the lines within {AHEAD:g} in ln evidence of each other{fall}.")
+        return answer("ambiguous", names, f"{', '.join(names)} explain the lines within {AHEAD:g} in ln evidence of each other{fall}.", near)
     falls = (
         ""
         if not np.isfinite(before) or after < FALLS * before
         else ", less than threefold, since the size an imperfection has is known but roughly"
     )
     return answer(
-        "identified", first.effects, f"{first.effects[0]} leads every other explanation by more than {AHEAD:g} in ln evidence{fall}{falls}."
+        "identified", first.effects, f"{first.effects[0]} leads every other explanation by more than {AHEAD:g} in ln evidence{fall}{falls}.", near
     )

@@ -46,16 +46,22 @@ def explanations(d: Diagnosis) -> Figure:
     best = sorted(asked, key=lambda c: -c.delta_evidence)[: MOST + 2]
     value = np.array([c.delta_evidence for c in best])
     paint = [FREE if c.free else NAMED if d.verdict.effects and set(c.names) <= set(d.verdict.effects) else OTHER for c in best]
-    figure = Figure(figsize=(8.6, 0.85 + 0.27 * len(best)), layout="constrained")
+    return evidence_bars([" + ".join(c.names) + (" (drifts)" if c.free else "") for c in best], value, paint)
+
+
+@rc_context(STYLE)
+def evidence_bars(names: Sequence[str], value: Array, paint: Sequence[str]) -> Figure:
+    """Bars of ln evidence `value` (n,) in the colours `paint`, with their numbers."""
+    figure = Figure(figsize=(8.6, 0.85 + 0.27 * len(names)), layout="constrained")
     axes = figure.add_subplot()
-    axes.barh(range(len(best)), value, height=0.66, color=paint)
+    axes.barh(range(len(names)), value, height=0.66, color=list(paint))
     low, high = min(float(value.min()), 0.0), max(float(value.max()), 1.0)
     low = max(low, -0.2 * high)
     for y, v in enumerate(value):
         axes.text(max(v, 0.0) + 0.012 * (high - low), y, f"{v:+.1f}".replace("-", "−") if abs(v) < 1000 else f"{v:+.0f}", va="center", fontsize=8, color=INK)
     axes.axvline(0, color=INK, lw=0.8)
-    axes.set_yticks(range(len(best)), [" + ".join(c.names) + (" (drifts)" if c.free else "") for c in best])
-    axes.set(xlim=(1.05 * low, high + 0.14 * (high - low)), ylim=(len(best) - 0.4, -0.6))
+    axes.set_yticks(range(len(names)), names)
+    axes.set(xlim=(1.05 * low, high + 0.14 * (high - low)), ylim=(len(names) - 0.4, -0.6))
     axes.set_xlabel("ln evidence over the model without effects")
     axes.set_title("How far every explanation leads")
     axes.grid(visible=False, axis="y")

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from markupsafe import Markup
 from matplotlib import rc_context
 
 from thermospindle.diagnosis.compare.compare import Comparison
+from thermospindle.diagnosis.runout.compare import RunoutBeside
 from thermospindle.model.machine import Spindle
 from thermospindle.report.figures.common import STYLE, svg
 from thermospindle.report.figures.compare import figures, label
+from thermospindle.report.figures.runout_campaign import comparison_figures
 from thermospindle.report.log.compare import FrfsBeside, write_comparison_log
+from thermospindle.report.page import runout_compare as runout
 from thermospindle.report.page.report import Section, page
 from thermospindle.report.typeset import figure, minus, signed, table
 
@@ -50,16 +54,29 @@ def sections(c: Comparison) -> list[Section]:
     return found
 
 
-def write_comparison(c: Comparison, spindle: Spindle, folder: Path) -> None:
-    """`report.html`, a PNG and an SVG of every picture, and, where there are FRFs, `compare.rrd`, in a folder that exists."""
-    conditions = f"the conditions of {len(c.tests)} test{'s' if len(c.tests) > 1 else ''}: {c.campaign}"
-    (folder / "report.html").write_text(page(spindle, conditions, sections(c), "Comparison"), encoding="utf-8")
+def write_comparison(
+    c: Comparison | None,
+    spindle: Spindle,
+    folder: Path,
+    turning: Sequence[RunoutBeside] = (),
+    errors: Mapping[str, float | None] | None = None,
+    campaign: str = "",
+) -> None:
+    """`report.html`, a PNG and an SVG of every picture, and, where there are FRFs, `compare.rrd`, in a folder that exists.
+
+    `c` are tests of modes, `turning` tests of runout with the `errors` of two scenes; either may be missing. `campaign` is its title, where there is no `c`.
+    """
+    drawn = comparison_figures(turning)
+    every = [*(sections(c) if c else []), *(runout.sections(turning, drawn, errors) if turning else [])]
+    ids = {t.test.id for t in (c.tests if c else ())} | {t.test.id for t in turning}
+    conditions = f"the conditions of {len(ids)} test{'s' if len(ids) > 1 else ''}" + f": {c.campaign if c else campaign}"
+    (folder / "report.html").write_text(page(spindle, conditions, every, "Comparison"), encoding="utf-8")
     with rc_context(STYLE):
-        for name, one in figures(c).items():
+        for name, one in ((figures(c) if c else {}) | drawn).items():
             for kind in ("svg", "png"):
                 one.savefig(folder / f"{name}.{kind}", dpi=150, facecolor="white", metadata={"Date": None} if kind == "svg" else None)
-    shown = [FrfsBeside(t.test, found.beside.measured, found.computed) for t in c.tests if (found := t.correlation) is not None]
-    if shown:
+    shown = [FrfsBeside(t.test, found.beside.measured, found.computed) for t in c.tests if (found := t.correlation) is not None] if c else []
+    if c and shown:
         peaks = {t.test.id: [(m.number, m.kind, m.measured, m.sd, m.computed) for m in t.modes] for t in c.tests}
         write_comparison_log(spindle, c.campaign, shown, peaks, folder / "compare.rrd")
 

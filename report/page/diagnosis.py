@@ -10,9 +10,13 @@ from typing import Any
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
+from thermospindle.diagnosis.runout.verdict import RunoutDiagnosis
 from thermospindle.diagnosis.verdict import Diagnosis
+from thermospindle.model.machine import Spindle
 from thermospindle.report.figures.common import STYLE, svg
 from thermospindle.report.figures.diagnosis import figures
+from thermospindle.report.figures.runout_campaign import diagnosis_figures
+from thermospindle.report.page import runout_diagnosis
 from thermospindle.report.page.report import Section, page
 from thermospindle.report.text.diagnosis import plan_words
 from thermospindle.report.typeset import figure, minus, prose, table, with_error
@@ -45,15 +49,21 @@ def sections(d: Diagnosis, answer: dict[str, Any], drawn: dict[str, Figure] | No
     return found
 
 
-def write_diagnosis(d: Diagnosis, answer: dict[str, Any], folder: Path) -> None:
-    """`report.html`, and every picture as SVG and PNG, into a folder that exists."""
-    drawn = figures(d)
-    count = len(d.search.model.tests)
+def write_diagnosis(
+    d: Diagnosis | None, answer: dict[str, Any], spindle: Spindle, folder: Path, turning: RunoutDiagnosis | None = None, told: dict[str, Any] | None = None
+) -> None:
+    """`report.html`, and every picture as SVG and PNG, into a folder that exists; `turning` is the diagnosis of runout, `told` its answer."""
+    modal = figures(d) if d else {}
+    runout = diagnosis_figures(turning) if turning else {}
+    every = sections(d, answer, modal) if d else []
+    if told:
+        every += runout_diagnosis.sections(told, runout)
+    count = (len(d.search.model.tests) if d else 0) + (len(turning.seen) if turning else 0)
     conditions = f"the conditions of {count} test{'s' if count > 1 else ''}: {answer['campaign']}"
-    text = page(d.spindle, conditions, sections(d, answer, drawn), "Diagnosis")
+    text = page(spindle, conditions, every, "Diagnosis")
     (folder / "report.html").write_text(text, encoding="utf-8")
     with rc_context(STYLE):
-        for name, figure in drawn.items():
+        for name, figure in (modal | runout).items():
             figure.set_layout_engine("none")  # laid out for the page already
             figure.savefig(folder / f"{name}.svg", facecolor="white", metadata={"Date": None})
             figure.savefig(folder / f"{name}.png", dpi=130, facecolor="white")

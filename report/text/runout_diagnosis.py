@@ -7,8 +7,11 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
+from thermospindle.diagnosis.runout.explanation import Explanation
+from thermospindle.diagnosis.runout.moved import MovedLine, leading, moved_lines
+from thermospindle.diagnosis.runout.next_test import NextRunout
 from thermospindle.diagnosis.runout.sources import SourceKey
-from thermospindle.diagnosis.runout.verdict import CLEAR, Explanation, RunoutDiagnosis
+from thermospindle.diagnosis.runout.verdict import CLEAR, RunoutDiagnosis
 from thermospindle.model.units import RPM, TO_UM
 from thermospindle.sim.effects.effect import Effect
 
@@ -19,8 +22,7 @@ UNITS = {"unbalance": ("g mm", 1e6), "cage unbalance": ("g mm", 1e6)}
 
 
 def runout_diagnosis_json(d: RunoutDiagnosis, catalogue: tuple[Effect, ...]) -> dict[str, Any]:
-    best = d.explanations[0] if d.explanations else None
-    accepted = next((e for e in d.explanations if e.effects == d.effects), best) if d.verdict not in ("none", "unexplained") else None
+    accepted = leading(d)
     before = float(np.sqrt(d.chi2 / d.count))
     by_name = {e.name: e for e in catalogue}
     unseen = [n for n, e in by_name.items() if n not in d.smallest or d.smallest[n] > max(abs(v) for v in e.parameters[0].limits)]
@@ -32,6 +34,11 @@ def runout_diagnosis_json(d: RunoutDiagnosis, catalogue: tuple[Effect, ...]) -> 
         "candidates": [_candidate(e) for e in d.explanations[:SHOWN]],
         "invisible": sorted(unseen),
         "detectable": {name: size for name, size in d.smallest.items() if np.isfinite(size)},
+        "detectable_in": {
+            name: {"parameter": p.name, "unit": p.unit, "size": size}
+            for name, size in d.smallest.items()
+            if np.isfinite(size) and (p := by_name[name].parameters[0])
+        },
         "error": {
             "before": before,
             "after": float(np.sqrt(accepted.chi2 / d.count)) if accepted else before,
@@ -39,7 +46,9 @@ def runout_diagnosis_json(d: RunoutDiagnosis, catalogue: tuple[Effect, ...]) -> 
             "held_out_after": _number(d.held_out_after if accepted else d.held_out_before),
         },
         "where": where(d),
-        "next_test": [],
+        "moved_lines": [_moved_json(m) for m in moved_lines(d, accepted)] if accepted else [],
+        "next_test": [_next_json(t) for t in d.next],
+        "no_next_test": d.no_next,
         "unexplained_lines": [
             {"test": g.test, "frequency_Hz": g.frequency, "order": g.order, "amplitude_um": TO_UM * g.amplitude, "node": g.node}
             for g in d.unexplained
@@ -55,6 +64,33 @@ def runout_diagnosis_json(d: RunoutDiagnosis, catalogue: tuple[Effect, ...]) -> 
             for s in d.seen
         ],
     }
+
+
+def _moved_json(m: MovedLine) -> dict[str, Any]:
+    return {
+        "test": m.test, "frequency_Hz": m.frequency, "order": m.order, "name": m.name, "cause": m.cause, "node": m.node,
+        "measured_um": TO_UM * m.measured, "sd_um": TO_UM * m.measured_sd, "scene_um": TO_UM * m.scene, "with_effect_um": TO_UM * m.with_effect,
+    }  # fmt: skip
+
+
+def _next_json(t: NextRunout) -> dict[str, Any]:
+    at = t.plan.condition
+    return {
+        "condition": {
+            "temperature_C": at.temperature, "speed_rpm": round(at.speed / RPM, 6), "seconds": round(t.plan.seconds, 6), "nodes": list(t.plan.nodes),
+        },
+        "changed": t.plan.changed,
+        "separates": list(t.separates),
+        "odds": t.odds,
+        "tells": t.tells,
+        "predicted": {
+            name: [
+                {"frequency_Hz": p.frequency, "name": p.name, "node": p.node, "amplitude_um": TO_UM * p.amplitude[k], "scene_um": TO_UM * p.scene}
+                for p in t.predicted
+            ]
+            for k, name in enumerate(t.separates)
+        },
+    }  # fmt: skip
 
 
 def _number(value: float) -> float | None:
@@ -109,24 +145,28 @@ def would_change(d: RunoutDiagnosis) -> str:
         return "An excitation that turns or sounds at these frequencies and is none of a bearing's or of an unbalance's would explain them; the catalogue has none."
     if d.verdict == "unexplained":
         return "Longer records, or probes in another plane, would show which lines are not as computed."
-    speeds = {round(s.condition.speed / RPM) for s in d.seen}
-    one = (
-        " With one speed alone, what grows with speed cannot be separated from what does not: a test at another speed would."
-        if len(speeds) == 1
-        else ""
-    )
+    if d.next:
+        first, second = d.next[0].separates
+        return f"A test {d.next[0].plan.changed} would tell {first} from {second}."
     rivals = [e for e in d.explanations if set(e.effects) - set(d.effects) and len(e.effects) <= len(d.effects)]
     rival = (
         f"{' + '.join(rivals[0].effects)}, {rivals[0].delta_evidence - d.explanations[0].delta_evidence:.0f} in ln evidence"
         if rivals
         else "none"
     )
-    return f"Records that the next best explanation ({rival}) predicts better would change that.{one}"
+    return f"Records that the next best explanation ({rival}) predicts better would change that."
+
+
+def next_words(t: dict[str, Any]) -> str:
+    """The test to make, in a sentence."""
+    first, second = t["separates"]
+    odds = "more than a million" if t["odds"] >= 1e6 * (1 - 1e-9) else f"{t['odds']:.3g}"
+    return f"A test {t['changed']} would tell {first} from {second} with odds of {odds} to 1, most by {t['tells']}."
 
 
 def show_runout_diagnosis(console: Console, answer: dict[str, Any]) -> None:
     named = f": {', '.join(answer['effects'])}" if answer["effects"] else ""
-    console.print(f"[bold]runout: {answer['verdict']}{named}[/bold]")
+    console.print(f"runout: {answer['verdict']}{named}", style="bold")
     console.print(answer["reason"], highlight=False)
     console.print(answer["would_change"], highlight=False)
     error = answer["error"]
@@ -148,9 +188,13 @@ def show_runout_diagnosis(console: Console, answer: dict[str, Any]) -> None:
             for w in answer["where"][:5]:
                 c = w["change"][0]
                 console.print(
-                    f"  {w['element']} ({w['with']}): {c['amplitude']:.3g} {c['unit']}, {w['relative']:.1f} times its likely size",
+                    f"  {w['element']} ({w['with']}): {c['amplitude']:.4g} {c['unit']}, {w['relative']:.1f} times its likely size",
                     highlight=False,
                 )
+    for t in answer["next_test"]:
+        console.print(next_words(t), highlight=False)
+    if answer["no_next_test"] and answer["verdict"] not in ("none", "unexplained"):
+        console.print(answer["no_next_test"], highlight=False)
     for g in answer["unexplained_lines"]:
         console.print(
             f"  {g['test']}: {g['frequency_Hz']:.1f} Hz, {g['order']:.3f} orders, {g['amplitude_um']:.3g} um at node {g['node']}",

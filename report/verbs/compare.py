@@ -11,7 +11,7 @@ from rich.console import Console
 from thermospindle.diagnosis.compare.before_after import BeforeAfter, errors, held_out
 from thermospindle.diagnosis.compare.compare import compare as beside
 from thermospindle.diagnosis.data.observe import observe
-from thermospindle.diagnosis.runout.compare import compare_runout, rms_residual
+from thermospindle.diagnosis.runout.compare import RunoutBeside, compare_runout, rms_residual
 from thermospindle.diagnosis.runout.lines import modal_tests
 from thermospindle.model.machine import Spindle
 from thermospindle.report.page.compare import write_comparison
@@ -39,7 +39,8 @@ def compare(
     tests = modal_tests(whole)
     if turning and not tests.tests:
         values = {"spindle": spindle.name, "campaign": whole.title, **turning[0]}
-        return answered(values, turning[1], out, asked, write_json("comparison.json"))
+        alone = write_json("comparison.json", lambda folder: write_comparison(None, spindle, folder, *turning[2:], whole.title))
+        return answered(values, turning[1], out, asked, alone)
     with progress_bar((3 if earlier else 2) * len(tests.tests)) as progress:
         observed = observe(tests, spindle, progress)
         comparison = beside(spindle, tests, observed, progress)
@@ -57,14 +58,15 @@ def compare(
         if turning:
             turning[1](console)
 
-    write = write_json("comparison.json", lambda folder: write_comparison(comparison, spindle, folder))
+    write = write_json("comparison.json", lambda folder: write_comparison(comparison, spindle, folder, *(turning[2:] if turning else ())))
     return answered(values, show, out, asked, write)
 
 
 def _of_runout(
     spindle: Spindle, before: Spindle | None, campaign: Campaign, unseen: Sequence[str]
-) -> tuple[dict[str, Any], Callable[[Console], None]] | None:
-    """The runout tests of a campaign beside the scene, None where it has none; with `before` the errors of both scenes."""
+) -> tuple[dict[str, Any], Callable[[Console], None], list[RunoutBeside], dict[str, float | None] | None] | None:
+    """The runout tests of a campaign beside the scene, None where it has none: JSON, how it is told, and what the page needs; with `before` the errors of
+    both scenes."""
     if not any(test.runout for test in campaign.tests):
         return None
     with progress_bar(len(campaign.tests) * (2 if before else 1)) as progress:
@@ -80,4 +82,4 @@ def _of_runout(
         if before_after:
             show_errors(console, before_after)
 
-    return values, show
+    return values, show, found, before_after

@@ -15,7 +15,7 @@ from thermospindle.diagnosis.data.observe import observe
 from thermospindle.diagnosis.draft import draft as drafted
 from thermospindle.diagnosis.prediction.outcomes import outcomes
 from thermospindle.diagnosis.runout.lines import modal_tests
-from thermospindle.diagnosis.runout.verdict import diagnose_runout
+from thermospindle.diagnosis.runout.verdict import RunoutDiagnosis, diagnose_runout
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Spindle
 from thermospindle.model.scene.reading import content_hash
@@ -45,7 +45,13 @@ def diagnose(
     tests = modal_tests(whole)
     where = {"campaign": tests.title, "scene_hash": content_hash(spindle)}
     if turning and not tests.tests:
-        return answered(turning[0] | where, turning[1], out, asked, write_json("diagnosis.json"))
+        told, show_runout, of_runout = turning
+
+        def alone(folder: Path, answer: dict[str, Any]) -> None:
+            write_json("diagnosis.json")(folder, answer)
+            write_diagnosis(None, answer, spindle, folder, of_runout, answer)
+
+        return answered(told | where, show_runout, out, asked, alone)
     with progress_bar(len(tests.tests) + verdict.STEPS) as progress:
         found = verdict.diagnose(spindle, tests, catalogue, progress)
     values = diagnosis_json(found) | where
@@ -61,7 +67,7 @@ def diagnose(
 
     def write(folder: Path, answer: dict[str, Any]) -> None:
         write_json("diagnosis.json")(folder, answer)
-        write_diagnosis(found, answer, folder)
+        write_diagnosis(found, answer, spindle, folder, *((turning[2], turning[0]) if turning else ()))
 
     return answered(values, show, out, asked, write)
 
@@ -93,11 +99,12 @@ def draft(diagnosis: Path, name: str | None = None, element: str | None = None, 
 
 def _of_runout(
     spindle: Spindle, catalogue: tuple[Effect, ...], campaign: Campaign
-) -> tuple[dict[str, Any], Callable[[Console], None]] | None:
-    """The diagnosis of the runout tests of a campaign; None where it has none."""
+) -> tuple[dict[str, Any], Callable[[Console], None], RunoutDiagnosis] | None:
+    """The diagnosis of the runout tests of a campaign as JSON, how it is told, and itself; None where it has none."""
     tests = sum(test.runout is not None for test in campaign.tests)
     if not tests:
         return None
-    with progress_bar(tests + 2) as progress:
-        values = runout_diagnosis_json(diagnose_runout(spindle, campaign, catalogue, progress), catalogue)
-    return values, lambda console: show_runout_diagnosis(console, values)
+    with progress_bar(tests + 3) as progress:
+        found = diagnose_runout(spindle, campaign, catalogue, progress)
+    values = runout_diagnosis_json(found, catalogue)
+    return values, lambda console: show_runout_diagnosis(console, values), found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from tests.conftest import SCENE
 from thermospindle.cli import main
 from thermospindle.diagnosis.runout.compare import compare_runout, rms_residual
 from thermospindle.diagnosis.runout.lines import look
+from thermospindle.diagnosis.runout.next_test import next_runout
 from thermospindle.diagnosis.runout.verdict import RunoutDiagnosis, diagnose_runout
 from thermospindle.model.drawn import drawn
 from thermospindle.model.errors import BadInput
@@ -28,7 +30,7 @@ from thermospindle.sim.effects import CATALOGUE, by_name
 CONDITIONS = [Condition(20.0, 3600 * RPM), Condition(20.0, 5400 * RPM), Condition(20.0, 7200 * RPM)]
 
 
-def hidden(spindle: Spindle, effects: dict[str, dict[str, float]], seed: int, path: str = "linear", own: bool = False) -> Campaign:
+def hidden(spindle: Spindle, effects: dict[str, dict[str, float]], seed: int, path: str = "linear", own: bool = False, conditions: Sequence[Condition] = CONDITIONS) -> Campaign:
     """A campaign of a spindle with hidden effects, built within its tolerances, with other imperfections of the scene's size unless `own`."""
     random = np.random.default_rng(seed)
     true = replace(spindle, effects=tuple(Addition(n, by_name(n).typical() | v) for n, v in effects.items()))
@@ -39,7 +41,7 @@ def hidden(spindle: Spindle, effects: dict[str, dict[str, float]], seed: int, pa
         true = replace(true, imperfections=replace(others, bearings=rows))
     for parameter in toleranced(true):
         true = parameter.apply(true, parameter.sd * random.standard_normal())
-    return runout_campaign(true, CONDITIONS, 0.5, seed=seed, path=path)
+    return runout_campaign(true, conditions, 0.5, seed=seed, path=path)
 
 
 def found(spindle: Spindle, effects: dict[str, dict[str, float]], seed: int = 1, **options) -> RunoutDiagnosis:
@@ -262,3 +264,43 @@ def test_hidden_in_a_running_simulation(spindle, name) -> None:
 
 def test_probes_of_the_hub_are_points_that_a_campaign_can_name(spindle) -> None:
     assert len({p.node for p in (*spindle.points, *hub_points(spindle))}) == len(spindle.points) + 5
+
+
+# ---------------------------------------------------------------- the next test
+
+
+def test_the_test_that_is_proposed_parts_look_alikes_and_decides_for_the_true_one(spindle) -> None:
+    """A heavy cage and a large ball show one line at fc; at one speed its size could be either's."""
+    true = {"cage_unbalance": {"amount": 6.0, "phase": 0.0, "bearing": 1}}
+    made = hidden(spindle, true, 5)
+    one = replace(made, tests=made.tests[2:])
+    before = diagnose_runout(spindle, one)
+    assert before.verdict == "ambiguous"
+    (test,) = runout_diagnosis_json(before, CATALOGUE)["next_test"]
+    assert set(test["separates"]) == set(test["predicted"]) == {"ball_size", "cage_unbalance"}
+    assert test["condition"]["speed_rpm"] != 7200
+    assert test["odds"] > 1e3
+    proposed = hidden(spindle, true, 5, conditions=[CONDITIONS[2], before.next[0].plan.condition]).tests[1]
+    after = diagnose_runout(spindle, replace(made, tests=(*one.tests, proposed)))
+    assert (after.verdict, after.effects) == ("identified", ("cage_unbalance",)), after.reason
+    predicted = {name: rows[0] for name, rows in test["predicted"].items()}
+    seen = min(look(spindle, proposed).seen, key=lambda s: abs(s.frequency - predicted["ball_size"]["frequency_Hz"]))
+    measured = 1e6 * abs(seen.phasor[seen_at(proposed, predicted["ball_size"]["node"])])
+    assert measured == pytest.approx(predicted["cage_unbalance"]["amplitude_um"], rel=0.2)
+    assert abs(measured / predicted["ball_size"]["amplitude_um"] - 1) > 0.3
+
+
+def seen_at(test, node: int) -> int:
+    return test.runout.nodes.index(node)
+
+
+def test_what_no_test_parts_is_said_to_be_so(spindle) -> None:
+    """An explanation and itself under another name: nothing can tell them apart."""
+    made = hidden(spindle, {"unbalance": HIDDEN["unbalance"]}, 1)
+    d = diagnose_runout(spindle, replace(made, tests=made.tests[2:]))
+    lead = d.explanations[0]
+    alias = replace(lead, variants=tuple(replace(v, effect=replace(v.effect, name="another")) for v in lead.variants))
+    tests, words = next_runout(spindle, d.seen, made.points, [lead, alias], lambda done: None)
+    assert tests == ()
+    assert words.startswith("No test of those tried")
+    assert f"{lead.effects[0]} from another: at best odds of 1 to 1" in words

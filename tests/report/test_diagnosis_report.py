@@ -19,13 +19,17 @@ from thermospindle.diagnosis.inference.mechanism import variants
 from thermospindle.diagnosis.inference.next_test import ModePrediction, NextTest
 from thermospindle.diagnosis.inference.search import Hypothesis
 from thermospindle.diagnosis.inference.verdict import Candidate
+from thermospindle.diagnosis.runout.verdict import diagnose_runout
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import content_hash, load
 from thermospindle.model.tolerance import toleranced
+from thermospindle.model.units import RPM
 from thermospindle.report.figures.diagnosis import errors, explanations, law
 from thermospindle.report.page.diagnosis import sections, write_diagnosis
 from thermospindle.report.text.diagnosis import diagnosis_json, show_diagnosis
-from thermospindle.sim.effects import by_name, of_scene
+from thermospindle.report.text.runout_diagnosis import runout_diagnosis_json
+from thermospindle.sim.campaign.simulated import runout_campaign
+from thermospindle.sim.effects import CATALOGUE, by_name, of_scene
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +100,7 @@ def test_the_law_is_that_of_the_data(told):
 
 
 def test_files(told, tmp_path):
-    write_diagnosis(*told, tmp_path)
+    write_diagnosis(*told, told[0].spindle, tmp_path)
     pictures = {f.stem for f in tmp_path.iterdir()} - {"report"}
     assert {"errors", "explanations", "law"} <= pictures
     assert {p.name for p in tmp_path.iterdir()} == {"report.html"} | {f"{n}.{kind}" for n in pictures for kind in ("svg", "png")}
@@ -146,3 +150,15 @@ def test_add_takes_what_it_fitted(told, spindle, tmp_path, capsys):
     assert built.build.deviations == pytest.approx({n: answer["tolerances"][n]["value"] for n in names}, rel=1e-7)
     assert set(built.build.deviations) == names
     assert built.build.tests == tuple(t.id for t in told[0].campaign.tests)
+
+
+def test_runout_stands_on_the_same_page(told, spindle, tmp_path):
+    conditions = [Condition(20.0, 5400 * RPM), Condition(20.0, 7200 * RPM)]
+    turning = diagnose_runout(spindle, runout_campaign(spindle, conditions, 0.3, seed=3, path="linear"))
+    write_diagnosis(*told, told[0].spindle, tmp_path, turning, runout_diagnosis_json(turning, CATALOGUE))
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert page.index("<h2>Verdict") < page.index("<h2>Runout: verdict")
+    assert "none" in page[page.index("<h2>Runout: verdict") :]
+    identities = re.findall(r'id="([^"]+)"', page)
+    assert len(identities) == len(set(identities))
+    assert {"explanations.svg", "runout_explanations.svg"} <= {p.name for p in tmp_path.iterdir()}
