@@ -29,6 +29,7 @@ LARGEST = 6  # names in a set, beyond which it says little
 NUMERICS = (1e-4, 0.01)  # drift of frequencies and of damping that two honest programs may differ by
 MOSTLY = 0.6  # of the ln evidence of an explanation with free drift in it, that what it names must reach alone to be the answer
 COARSE = 4.0  # chosen on blind campaigns 1 to 16, by log score; others judge it
+DEPARTS = 0.3  # of the size, from which a law does not hold
 LAGS, SMALL = 12, 0.05  # lines over which residuals are compared, and the correlation that chance makes
 SPREAD = 3.0  # temperatures within so many tolerances of each other are one condition
 
@@ -70,7 +71,7 @@ def decide(found: Search) -> Verdict:
     free_count = len({s.mechanism.name for s in found.screened if s.mechanism.free and s.visibility > 0}) or 1
     base = found.base.evidence.ln
     worth = inflation(found.model, found.hypotheses[0]) * coarsening(found.hypotheses[0])
-    rows = [(h, _prior(h, named_count, free_count) + (h.evidence.ln - base) / worth) for h in found.hypotheses]
+    rows = [(h, _prior(h, named_count, free_count) + (_weighed(h, found.hypotheses) - base) / worth) for h in found.hypotheses]
     top = max(w for _, w in rows)
     total = np.log(sum(np.exp(w - top) for _, w in rows)) + top
     every = [
@@ -124,6 +125,16 @@ def coarsening(best: Hypothesis) -> float:
     learned = best.evidence.learned
     wrong = learned.errors > STRAIN or any(learned.sizes.get(kind, 0.0) > 0.0 for kind in (kinds_of.STIFFNESS, kinds_of.DAMPING))
     return COARSE if wrong else 1.0
+
+
+def _weighed(h: Hypothesis, every: Sequence[Hypothesis]) -> float:
+    """ln evidence, of which what one mechanism more gains counts a `COARSE`-th where the best explanation without it departs from its law: what is wrong
+    in a law looks like a little of something else, and an effect whose law is not quite its own is not quite its own in what it does either."""
+    parts = [o for o in every if o.mechanisms and set(o.names) < set(h.names)]
+    lead = max(parts, key=lambda o: o.evidence.ln, default=h)
+    if max(lead.evidence.learned.departures, default=0.0) < DEPARTS or h.evidence.ln < lead.evidence.ln:
+        return h.evidence.ln
+    return lead.evidence.ln + (h.evidence.ln - lead.evidence.ln) / COARSE
 
 
 def _adrift(h: Hypothesis) -> bool:

@@ -10,14 +10,13 @@ from rich.console import Console
 from thermospindle.diagnosis.inference import nuisance as kinds_of
 from thermospindle.diagnosis.inference.evidence import Evidence
 from thermospindle.diagnosis.inference.mechanism import Mechanism
-from thermospindle.diagnosis.inference.verdict import Candidate
+from thermospindle.diagnosis.inference.verdict import DEPARTS, Candidate
 from thermospindle.diagnosis.verdict import Diagnosis, Drift
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 
 SHOWN = 12  # candidates
-DEPARTS = 0.3  # of the size, from which a law is said not to hold
 ALIKE = 0.9  # of the evidence of what the verdict names, from which a free drift does as well
 
 

@@ -134,6 +134,16 @@ def test_evidence_is_worth_less_where_the_model_is_a_little_wrong(sizes, errors,
     assert coarsening(wrong[0]) == worth
 
 
+@pytest.mark.parametrize(("departure", "word"), [(0.1, "two effects"), (0.3, "ambiguous")])
+def test_a_little_more_beside_a_law_that_does_not_hold_is_no_second_effect(departure, word):
+    found = made({("first", "more"): 617.0, "first": 600.0, "more": 20.0})
+    first = found.hypotheses[1]
+    assert first.names == ("first",)
+    departs = replace(first, evidence=replace(first.evidence, learned=replace(first.evidence.learned, departures=(departure,))))
+    v = decide(replace(found, hypotheses=(found.hypotheses[0], departs, *found.hypotheses[2:])))
+    assert (v.word, v.effects[0]) == (word, "first")
+
+
 def test_a_set_holds_only_what_is_probable():
     """One effect alone, with another, or with something that drifts: the set is those two, not what the rest of the catalogue reaches far behind."""
     v = decide(made({("left", "right"): 58.0, "left": 53.5, ("left", "~drift"): 56.0, "behind": 5.0, "far": -40.0}))
