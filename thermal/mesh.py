@@ -34,10 +34,14 @@ class PartMesh:
         return np.flatnonzero(np.isin(self.region_of, [self.regions.index(name) for name in regions]))
 
     def side(self, region: str, axis: int, position: float) -> np.ndarray:
-        """Facets of `region` on the line r = position (axis 0) or z = position (axis 1); ValueError where there is none."""
-        facets = self.mesh.t2f[:, self.elements(region)].ravel()
+        """Facets of the outline of `region` on the line r = position (axis 0) or z = position (axis 1); ValueError where there is none.
+
+        Of the outline: a facet inside may come as near to the line where small elements are thin.
+        """
+        every, count = np.unique(self.mesh.t2f[:, self.elements(region)].ravel(), return_counts=True)
+        facets = every[count == 1]
         offset = np.abs(self.mesh.p[axis][self.mesh.facets[:, facets]] - position).max(axis=0)
-        found = np.unique(facets[offset < 1e-6 * np.ptp(self.mesh.p)])
+        found = facets[offset < 1e-6 * np.ptp(self.mesh.p)]
         if not found.size:
             raise ValueError(f"the mesh of the {self.part} part has no face of {region!r} at {'rz'[axis]} = {position:g} m")
         return found

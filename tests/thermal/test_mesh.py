@@ -5,12 +5,13 @@ from dataclasses import replace
 import meshio
 import numpy as np
 import pytest
+from skfem import MeshTri
 
 from thermospindle.model.machine import Region
 from thermospindle.thermal.elastic import Solid
 from thermospindle.thermal.expansion import influence
 from thermospindle.thermal.influence import elasticity, races
-from thermospindle.thermal.mesh import read_gmsh, section_mesh, tiled
+from thermospindle.thermal.mesh import PartMesh, read_gmsh, section_mesh, tiled
 from thermospindle.thermal.refine import strain_error
 
 SHAPES = ("triangle", "quadrilateral")
@@ -171,3 +172,12 @@ def test_a_gmsh_node_without_a_finite_place_is_refused(spindle, tmp_path):
     write_msh(tmp_path / "hub.msh", section, list(section.regions))
     with pytest.raises(ValueError, match="no finite number"):
         read_gmsh(tmp_path / "hub.msh", spindle, "rotating")
+
+
+def test_a_side_is_of_the_outline_alone():
+    """A thin element has a facet inside that lies as near to the line as rounding: it is no part of the side, whose length it would add to."""
+    points = np.array([[1.0, 2.0, 2.0, 1.0, 2.0 - 1e-8], [0.0, 0.0, 1.0, 1.0, 0.5]])
+    triangles = np.array([[1, 2, 4], [0, 1, 4], [2, 3, 4], [0, 4, 3]]).T
+    section = PartMesh("rotating", MeshTri(points, triangles), ("ring",), np.zeros(4, int))
+    [facet] = section.side("ring", 0, 2.0)
+    assert np.ptp(section.mesh.p[1][section.mesh.facets[:, facet]]) == 1.0
