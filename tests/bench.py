@@ -23,7 +23,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from tests import bench_sysid
+from tests import bench_beams, bench_sysid
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import matrices
 from thermospindle.model.rotor.mjcf import linearise
@@ -152,7 +152,18 @@ def main() -> None:
         row("spindle run: five temperatures, two hammer points, all outputs", f"{time.perf_counter() - start:.1f} s", "20 s")
     for cells in bench_sysid.rows(spindle):
         row(*cells)
+    five = load(SCENE.parent / "five_bearing")
+    short = replace(five, hammer=replace(five.hammer, record_length=0.05))
+    ours, own = time_domain(short)
+    row("five_bearing, one hit of 0.05 s: ours / MuJoCo's own stepping", f"{ours:.2f} / {own:.2f} s = {ours / own:.2f}", "1.2")
+    for element in ("linear", "reduced"):
+        start = time.perf_counter()
+        command = [sys.executable, "-m", "spindle", "impact", str(SCENE.parent / "five_bearing"), "--element", element, "--json"]
+        subprocess.run(command, check=True, capture_output=True)
+        row(f"spindle impact five_bearing --element {element}", f"{time.perf_counter() - start:.1f} s", "30 s")
     console.print(grid)
+    with tempfile.TemporaryDirectory() as folder:
+        bench_beams.show(console, Path(folder))
 
 
 if __name__ == "__main__":

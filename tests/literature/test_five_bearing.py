@@ -17,8 +17,11 @@ from thermospindle.model.bearing.pair import reference_motion, solve
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import BearingSet, Condition
 from thermospindle.model.rotor.beam import with_theory
+from thermospindle.model.rotor.chain import matrices, motion_rows
+from thermospindle.model.rotor.modes import frf, modes
 from thermospindle.model.rotor.static import rated_chain, static
 from thermospindle.model.scene.reading import load, loaded_angle
+from thermospindle.model.units import RPM
 from thermospindle.sim.operating import operating_point
 
 SCENE = ROOT / "scenes" / "five_bearing"
@@ -37,6 +40,36 @@ def nose(spindle, shares):
 @pytest.mark.parametrize(("shares", "expected"), [((0.0, 0.0), 151.087e6), ((1.0, 1.0), 138.58e6)])
 def test_the_nose(five, shares, expected):
     assert nose(five, shares) == pytest.approx(expected, rel=1e-4)
+
+
+ROSS = {  # rpm: Hz, lateral in both planes: ROSS 3.1 (38 nodes, same springs to rigid ground), run beside this project; at 6000 rpm ROSS 2.3
+    0: [1139.28, 1139.28, 1444.65, 1444.65, 1744.62, 1744.62],
+    6000: [1132.44, 1146.06, 1442.61, 1447.01, 1737.69, 1752.05],
+    12000: [1125.47, 1152.70, 1440.14, 1448.94, 1730.57, 1759.28],
+}
+RECEPTANCE = {  # Hz: m/N at the nose along x, of ROSS 2.3 at 12,000 rpm
+    100.0: 7.2685e-9, 400.0: 8.1672e-9, 900.0: 1.8296e-8, 1300.0: -1.844e-8, 2000.0: -3.6943e-9,
+}  # fmt: skip
+
+
+def shaft_alone(five, rpm):
+    """The undamped shaft in its rated bearings to rigid ground, turning."""
+    chain = rated_chain(five, operating_point(five, Condition(20.0)).chain)
+    kept = tuple(replace(e, damping=0 * e.damping) for e in chain.elements if "housing" not in (e.a, e.b))
+    return replace(chain, bodies=tuple(b for b in chain.bodies if b.name != "housing"), elements=kept, speed=rpm * RPM)
+
+
+@pytest.mark.parametrize("rpm", ROSS)
+def test_lateral_modes_are_those_of_a_rotor_code(five, rpm):
+    found = [m.frequency for m in modes(shaft_alone(five, rpm), highest=2000.0) if m.kind != "axial"]
+    assert found == pytest.approx(ROSS[rpm], rel=1e-3)
+
+
+def test_the_receptance_of_the_nose_is_that_of_a_rotor_code(five):
+    chain = shaft_alone(five, 12000)
+    nose_x = motion_rows(chain, "spindle 0", (0.0, 0.0, 0.0))[:1]
+    found = frf(matrices(chain), nose_x, nose_x, np.array(list(RECEPTANCE)))[0, 0].real
+    assert found == pytest.approx(list(RECEPTANCE.values()), rel=4e-3)
 
 
 def test_the_nose_with_equal_front_bearings(five):
