@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
+from thermospindle.model.bearing.roller import RollerState
+from thermospindle.model.machine import RollerBearing
 from thermospindle.model.types import Array
 from thermospindle.model.units import MINUTE, RPM
 from thermospindle.report.figures.warmup import figure_png, figure_svg
@@ -24,7 +26,7 @@ LINES = 16  # of the terminal table
 def warmup_json(warmup: Warmup) -> dict[str, Any]:
     """Series over `time_s`; a row of `frequencies_Hz` holds all followed modes at one time, null where one was lost.
 
-    `preload_N` is the first bearing's, `friction_W` all bearings' together; `bearings` has each its own.
+    `preload_N` is the first bearing's, `friction_W` all bearings' together; `bearings` has each its own, of rollers clearance instead of preload.
     """
     moments = warmup.moments
     first = warmup.spindle.bearings[0].name
@@ -46,13 +48,25 @@ def warmup_json(warmup: Warmup) -> dict[str, Any]:
                 "friction_W": [m.friction[b.name] for m in moments],
             }
             for b in warmup.spindle.bearings
-        },
+        }
+        | {b.name: _rollers(warmup, b.name) for b in warmup.spindle.ringed if isinstance(b, RollerBearing)},
         "status": moments[-1].point.state.status,
         "steady": _steady_json(warmup, first),
         "time_constant_s": warmup.time_constant,
         "energy_J": energy(warmup),
         "left_out_effects": list(warmup.left_out),
         "provenance": provenance(warmup.spindle),
+    }
+
+
+def _rollers(warmup: Warmup, name: str) -> dict[str, list[float]]:
+    """Series of a roller bearing, which has clearance where ball rows have preload and angle."""
+    states = [m.point.state.any_bearing(name) for m in warmup.moments]
+    return {
+        "temperature_C": [m.bearing_temperatures[name] for m in warmup.moments],
+        "clearance_um": [1e6 * s.clearance for s in states if isinstance(s, RollerState)],
+        "radial_stiffness_N_per_m": [s.radial_stiffness for s in states],
+        "friction_W": [m.friction[name] for m in warmup.moments],
     }
 
 

@@ -19,6 +19,7 @@ from thermospindle.model.machine import Condition, RingMotion
 from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.chain import matrices
 from thermospindle.model.scene.reading import build
+from thermospindle.model.units import RPM
 from thermospindle.sim.effects import by_name, usable
 from thermospindle.sim.effects.effect import refusal
 from thermospindle.sim.operating import operating_point
@@ -219,10 +220,19 @@ def test_verbs_take_rollers(verb: str, tmp_path: Path, capsys: pytest.CaptureFix
 
 @pytest.mark.slow
 def test_rollers_warm_up(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Their friction heats the spindle: without load part the same viscous torque as of balls of that pitch circle."""
+    """Their clearance opens as the housing warms, and their friction is Palmgren's, by the sum of their contact loads."""
     write(tmp_path)
-    assert main(["warmup", str(tmp_path), "--speed", "3000", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)
+    assert main(["warmup", str(tmp_path), "--speed", "3000", "--minutes", "30", "--json"]) == 0
+    bearings = json.loads(capsys.readouterr().out)["bearings"]
+    assert list(bearings) == ["lower", "upper"]
+    upper = bearings["upper"]
+    assert upper["clearance_um"][0] == pytest.approx(-3.0, abs=1e-6)
+    assert upper["clearance_um"][-1] > upper["clearance_um"][0]
+    assert upper["radial_stiffness_N_per_m"][-1] < upper["radial_stiffness_N_per_m"][0]
+    spindle = build(rollers_above(), FILE)
+    pressed = 16 * line_constant(0.0016, 208e9 / (2 * (1 - 0.3**2))) * 1.5e-6**EXPONENT
+    more = spindle.thermal.friction.f1 * (pressed - 16.0) * 9.1e-3 * 3000 * RPM  # than the ball row under its 16 N
+    assert upper["friction_W"][0] - bearings["lower"]["friction_W"][0] == pytest.approx(more, rel=1e-6)
 
 
 def write(folder: Path, clearance: float = -3.0) -> None:
