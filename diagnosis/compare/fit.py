@@ -23,7 +23,7 @@ from thermospindle.sim.campaign.campaign import Campaign
 
 STEP = 0.01  # of a prior standard deviation, for differences
 LONGEST = 25  # steps
-NEARLY = 1e-4  # of the squares, below which another step gains nothing
+NEARLY, STILL = 1e-7, 1e-5  # of the squares, and of the parameters, below which another step gains nothing
 IMPOSSIBLE = 1e4  # standard errors, where no spindle can be built
 
 
@@ -90,6 +90,6 @@ def fit(
         return np.stack(columns, axis=1)
 
     inside = np.clip(z0, low + 1e-9 * (high - low), high - 1e-9 * (high - low))
-    found = least_squares(residuals, inside, jacobian, bounds=(low, high), max_nfev=LONGEST, ftol=NEARLY, xtol=NEARLY)
+    found = least_squares(residuals, inside, jacobian, bounds=(low, high), max_nfev=LONGEST, ftol=NEARLY, xtol=STILL)
     error = sd * np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac)))
     return Fitted(named(found.x), {p.name: float(e) for p, e in zip(parameters, error, strict=True)}, int(found.nfev))

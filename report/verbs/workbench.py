@@ -14,6 +14,7 @@ from thermospindle.report.verbs.answer import Answer, progress_bar
 from thermospindle.report.workbench.bench import open_bench
 from thermospindle.report.workbench.explanations import read_explanations
 from thermospindle.report.workbench.server import serve, server
+from thermospindle.sim.campaign.campaign import read_campaign
 
 
 def workbench(
@@ -30,8 +31,9 @@ def workbench(
     if campaign is None:
         bench = open_bench(scene, None, effect_files, left_out=held_out_tests)
     else:
-        with progress_bar(1) as progress:
-            bench = open_bench(scene, campaign, effect_files, progress, held_out_tests)
+        tests = read_campaign(campaign)
+        with progress_bar(len(tests.tests)) as progress:
+            bench = open_bench(scene, tests, effect_files, progress, held_out_tests)
     known = read_explanations(diagnosis, bench) if diagnosis else None
     doubts = [f"--diagnosis {diagnosis}: was made of another state of this scene; its tolerances may not fit"] if known and not known.of_scene else []
     out = Path("out") / f"{bench.spindle.name}_workbench" if out is None else out

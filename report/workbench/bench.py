@@ -108,7 +108,7 @@ class Errors:
 
 def open_bench(
     scene: Path,
-    campaign: Path | None = None,
+    campaign: Campaign | Path | None = None,
     effect_files: Sequence[Path] = (),
     progress: Callable[[str], None] = lambda done: None,
     left_out: Sequence[str] = (),
@@ -130,9 +130,10 @@ def open_bench(
         if not shown:
             raise BadInput(f"{file}: the bearings find no equilibrium at any temperature of the scene's range; spindle check says more")
         return replace(bench, shown=shown, modes={s.id: found for s, found in modes.items() if found is not None})
-    tests = modal_tests(read_campaign(campaign))
+    every = campaign if isinstance(campaign, Campaign) else read_campaign(campaign)
+    tests = modal_tests(every)
     if not tests.tests:
-        raise BadInput(f"{campaign}: holds runout tests alone; the workbench needs tests of modes (spindle compare and diagnose take runout)")
+        raise BadInput(f"{every.folder or every.title}: holds runout tests alone; the workbench needs tests of modes (spindle compare and diagnose take runout)")
     unseen = held_out(spindle, tests, left_out)
     observed = observe(tests, spindle, progress)
     shown = tuple(Shown(t.id, condition_of(t), t) for t in tests.tests)
