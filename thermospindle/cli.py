@@ -212,8 +212,8 @@ def _parser() -> tuple[_Parser, dict[str, argparse.ArgumentParser]]:
     def one(added: argparse.ArgumentParser) -> None:
         added.add_argument("--temperature", type=_temperature, metavar="C", help="the scene's reference temperature by default")
 
-    def speed(added: argparse.ArgumentParser, text: str | None = None, required: bool = False) -> None:
-        added.add_argument("--speed", dest="speed_rpm", type=speed_number, metavar="RPM", help=text, required=required)
+    def speed(added: argparse.ArgumentParser, text: str | None = None) -> None:
+        added.add_argument("--speed", dest="speed_rpm", type=speed_number, metavar="RPM", help=text)
 
     def speeds(added: argparse.ArgumentParser, text: str | None = None) -> None:
         added.add_argument("--speeds", dest="speeds_rpm", type=speed_number, nargs="+", metavar="RPM", help=text)
@@ -316,7 +316,7 @@ def _parser() -> tuple[_Parser, dict[str, argparse.ArgumentParser]]:
     draft.add_argument("--name", metavar="NAME", help="name of the effect (the file's by default)")
     runout = verb("runout", ("running", "runout"), "repeatable and nonrepeatable runout of the turning spindle, and the lines it is made of")
     one(runout)
-    speed(runout, required=True)
+    speed(runout, "the scene's nominal speed by default")
     runout.add_argument("--seconds", type=_up_to(SECONDS, unit=" s"), metavar="S", help="length of the record (by default half a second to a second)")
     runout.add_argument("--seed", type=_seed, help="draw plausible imperfections instead of the scene's")
     element(runout)

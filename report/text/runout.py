@@ -116,7 +116,8 @@ def line_json(line: FoundLine) -> dict[str, Any]:
 
 
 def show_runout(console: Console, answer: dict[str, Any]) -> None:
-    title = f"Runout at {answer['temperature_C']:g} C, {answer['speed_rpm']:g} rpm, {answer['revolutions']} revolutions, um"
+    nominal = f" ({answer['speed_from']})" if answer["speed_from"] != "--speed" else ""
+    title = f"Runout at {answer['temperature_C']:g} C, {answer['speed_rpm']:g} rpm{nominal}, {answer['revolutions']} revolutions, um"
     title += f" (bearings {answer['status']})"
     quoted = grid(title, ("", "radial\n(hub x)", "axial"), words=("",))
     for key, meaning in STATISTICS.items():

@@ -37,7 +37,7 @@ STEPS_OF_TEMPERATURE, STEPS_OF_SPEED = 21, 41  # of a resonance map
 
 def runout(
     scene: Path,
-    speed_rpm: float,
+    speed_rpm: float | None = None,
     temperature: float | None = None,
     seconds: float | None = None,
     seed: int | None = None,
@@ -46,7 +46,7 @@ def runout(
     effect_files: Sequence[Path] = (),
     out: Path | None = None,
 ) -> Answer:
-    """Repeatable and nonrepeatable runout of the turning spindle and its lines; `seed` draws imperfections instead of the scene's.
+    """Repeatable and nonrepeatable runout of the turning spindle and its lines, at the scene's nominal speed unless told otherwise; `seed` draws imperfections instead of the scene's.
 
     A folder holds tables, figures and a Rerun log with a waterfall.
     """
@@ -55,10 +55,11 @@ def runout(
     if seed is not None:
         spindle = with_imperfections(spindle, drawn(spindle, seed))
     with progress_bar(5) as progress:
-        point = operating_point(spindle, Condition(temperature_or_reference(temperature, spindle), speed_rpm * RPM))
+        speed = spindle.nominal_speed if speed_rpm is None else speed_rpm * RPM
+        point = operating_point(spindle, Condition(temperature_or_reference(temperature, spindle), speed))
         found = simulated_runout(point, seconds, element, path)
         progress("record analysed")
-        values = runout_json(found, path, element, seed)
+        values = runout_json(found, path, element, seed) | {"speed_from": "the scene's nominal speed" if speed_rpm is None else "--speed"}
         doubts = sense.of_conditions(spindle, [point.condition]) + sense.of_states(spindle, [point.state.bearings])
         if not found.lines:
             doubts.append(
