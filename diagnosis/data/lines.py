@@ -10,6 +10,7 @@ Under an exponential window the noise of neighbouring lines is correlated, which
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -21,7 +22,7 @@ from thermospindle.diagnosis.data.window import left_by, neighbours, windowed
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.campaign.campaign import Noise, Test
-from thermospindle.sim.identification.frf import Frf
+from thermospindle.sim.identification.frf import Frf, out_of
 from thermospindle.sim.identification.modal import noise_model, scatter
 
 NODES = 5  # of a block: polynomials of degree 4
@@ -70,28 +71,29 @@ def record_length(frf: Frf) -> float:
 
 
 def line_data(test: Test, condition: Condition, stated: Noise | None, expected: Noise) -> LineData:
-    """The lines of a test's FRFs above 0 Hz. Noise is that of the file (repeats, coherence), or `stated` by the campaign, or found in the
+    """The lines of a test's FRFs above 0 Hz, without those of the running speed. Noise is that of the file (repeats, coherence), or `stated` by the campaign, or found in the
     scatter of neighbouring lines, starting from what the scene's measuring chain is `expected` to have."""
     frf = test.frf
     assert frf is not None
-    use = frf.frequency > 0
+    use = (frf.frequency > 0) & ~out_of(frf, test.speed).out
+    gaps = (np.flatnonzero(np.diff(np.flatnonzero(use)) > 1) + 1).tolist()
     frequency, value = frf.frequency[use], frf.value[:, :, use]
     damped = test.window_decay * record_length(frf)
     damped = damped if windowed(value, damped) else 0.0
     sd, noise_from = _noise(frf, value, use, stated, expected, damped)
     least = SILENT * float(np.abs(value).max())  # where symmetry forbids an answer there is rounding alone
     sd = np.maximum(sd, least)
-    known, blocks = sd if noise_from in KNOWN else None, _blocks(value, sd, damped)
+    known, blocks = sd if noise_from in KNOWN else None, _blocks(value, sd, damped, gaps)
     seen = _within_blocks(value, blocks, damped)
     if seen is None and len(frequency) > LINES_THAT_SCATTER:  # noise stated too small divides every block to single lines
-        blocks = _blocks(value, np.maximum(sd, _smooth_sd(value, scatter(value) / np.sqrt(neighbours(damped)))), damped)
+        blocks = _blocks(value, np.maximum(sd, _smooth_sd(value, scatter(value) / np.sqrt(neighbours(damped)))), damped, gaps)
         seen = _within_blocks(value, blocks, damped)
     for _ in range(2):
         if seen is None:
             break
         sd_seen = np.maximum(np.sqrt(seen), least)
         if known is not None and np.sqrt(np.mean(sd_seen**2 / known**2)) < CONFIRMED:
-            sd, blocks = known, _blocks(value, known, damped)
+            sd, blocks = known, _blocks(value, known, damped, gaps)
             break
         sd = sd_seen if known is None else np.maximum(known, sd_seen)
         noise_from = SCATTER if known is None else noise_from
@@ -133,11 +135,12 @@ def _basis(k: int, p: int = NODES) -> tuple[Array, Array, Array]:
     return _at_nodes(x, k, p), nodes + (k - 1) / 2, weights
 
 
-def _blocks(value: ComplexArray, sd: Array, damped: float) -> list[tuple[int, int]]:
-    """Ranges of lines [first, after) whose polynomial leaves nothing but noise, from the whole band down by halves."""
+def _blocks(value: ComplexArray, sd: Array, damped: float, gaps: Sequence[int] = ()) -> list[tuple[int, int]]:
+    """Ranges of lines [first, after) whose polynomial leaves nothing but noise, from the whole band down by halves; none reaches over `gaps`, the
+    lines before which some were left out."""
     n, found = value.shape[-1], []
-    parts = np.linspace(0, n, n // LONGEST + 2).astype(int)
-    open_ranges = list(pairwise(parts.tolist()))
+    parts = sorted({*np.linspace(0, n, n // LONGEST + 2).astype(int).tolist(), *gaps})
+    open_ranges = list(pairwise(parts))
     while open_ranges:
         first, after = open_ranges.pop()
         k = after - first

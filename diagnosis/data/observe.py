@@ -13,6 +13,7 @@ from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.parallel import in_parallel
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.campaign.campaign import Campaign, Noise, Test
+from thermospindle.sim.identification.frf import out_of, without
 from thermospindle.sim.identification.modal import extract, noise_model
 from thermospindle.sim.identification.pairing import REPEATED, ModeSet, pairs
 
@@ -110,8 +111,8 @@ def condition_of(test: Test) -> Condition:
 
 
 def _from_frf(test: Test, noise: Noise) -> Observation:
-    frf = test.frf
-    assert frf is not None
+    assert test.frf is not None
+    frf = without(test.frf, out_of(test.frf, test.speed).out)
     sd = frf.sd
     if sd is None or not np.all(np.isfinite(sd)):  # a single hit has no scatter
         sd = noise_model(frf.value, noise.of_value, noise.of_largest)

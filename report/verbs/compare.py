@@ -18,6 +18,7 @@ from thermospindle.report.page.compare import write_comparison
 from thermospindle.report.text.compare import comparison_json, show_before_after, show_comparison
 from thermospindle.report.text.runout_compare import runout_comparison_json, show_errors, show_runout_comparison
 from thermospindle.report.verbs.answer import Answer, answered, progress_bar, with_effects, write_json
+from thermospindle.sim.campaign.beside import left_out
 from thermospindle.sim.campaign.campaign import Campaign, read_campaign
 
 
@@ -59,7 +60,7 @@ def compare(
             turning[1](console)
 
     write = write_json("comparison.json", lambda folder: write_comparison(comparison, spindle, folder, *(turning[2:] if turning else ())))
-    return answered(values, show, out, asked, write)
+    return answered(values, show, out, asked, write, left_out(tests))
 
 
 def _of_runout(

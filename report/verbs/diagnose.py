@@ -24,6 +24,7 @@ from thermospindle.report.page.diagnosis import write_diagnosis
 from thermospindle.report.text.diagnosis import diagnosis_json, show_diagnosis
 from thermospindle.report.text.runout_diagnosis import runout_diagnosis_json, show_runout_diagnosis
 from thermospindle.report.verbs.answer import Answer, answered, progress_bar, with_effects, write_json
+from thermospindle.sim.campaign.beside import left_out
 from thermospindle.sim.campaign.campaign import Campaign, read_campaign
 from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.effects.own import effect_of
@@ -69,7 +70,7 @@ def diagnose(
         write_json("diagnosis.json")(folder, answer)
         write_diagnosis(found, answer, spindle, folder, *((turning[2], turning[0]) if turning else ()))
 
-    return answered(values, show, out, asked, write)
+    return answered(values, show, out, asked, write, left_out(tests))
 
 
 def draft(diagnosis: Path, name: str | None = None, element: str | None = None, out: Path | None = None) -> Answer:

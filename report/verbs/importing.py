@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from thermospindle.model.errors import BadInput, Unanswered
 from thermospindle.model.units import RPM
 from thermospindle.model.whole import whole
 from thermospindle.report.verbs.answer import Answer, with_effects
+from thermospindle.sim.campaign.beside import left_out
 from thermospindle.sim.campaign.campaign import Campaign, write_campaign
 from thermospindle.sim.importing.assemble import campaign_of, read
 from thermospindle.sim.importing.mapping import read_mapping
@@ -95,7 +97,7 @@ def _written(campaign: Campaign, out: Path, notes: list[str], scene: Path | None
             for t in campaign.tests
         ],
         "notes": notes,
-        "warnings": [],
+        "warnings": left_out(replace(campaign, folder=out)),
     }
 
     def show(console: Console) -> None:

@@ -8,8 +8,8 @@ import numpy as np
 
 from thermospindle.model.machine import Condition, Point, Spindle
 from thermospindle.model.types import Array, ComplexArray
-from thermospindle.sim.campaign.campaign import Test
-from thermospindle.sim.identification.frf import Frf
+from thermospindle.sim.campaign.campaign import Campaign, Test
+from thermospindle.sim.identification.frf import Frf, out_of, without
 from thermospindle.sim.operating import OperatingPoint, operating_point
 
 POWER = {"receptance": -1, "mobility": 0, "accelerance": 1}
@@ -18,7 +18,7 @@ POWER = {"receptance": -1, "mobility": 0, "accelerance": 1}
 
 @dataclass(frozen=True, eq=False)
 class Beside:
-    """One test: `measured` FRFs at the lines above 0 Hz, and `point`, the model at the test's condition with the test's points."""
+    """One test: `measured` FRFs at the lines above 0 Hz without those of the running speed, and `point`, the model at the test's condition with the test's points."""
 
     test: Test
     measured: Frf
@@ -48,7 +48,12 @@ def beside(spindle: Spindle, points: tuple[Point, ...], test: Test, condition: C
     """A test of a campaign with these points, and the scene at its condition; None for a table of modes."""
     if test.frf is None:
         return None
-    lines = test.frf.frequency > 0
-    coherence, sd = (None if v is None else v[:, :, lines] for v in (test.frf.coherence, test.frf.sd))
-    measured = replace(test.frf, frequency=test.frf.frequency[lines], value=test.frf.value[:, :, lines], coherence=coherence, sd=sd)
+    measured = without(test.frf, out_of(test.frf, test.speed).out | (test.frf.frequency <= 0))
     return Beside(test, measured, operating_point(measured_at(spindle, points, test.frf), condition))
+
+
+def left_out(campaign: Campaign) -> list[str]:
+    """A sentence for every test in whose FRFs lines of the running speed stand: those are compared with nothing."""
+    where = f"{campaign.folder / 'campaign.toml'}: " if campaign.folder else ""
+    found = [(t.id, out_of(t.frf, t.speed)) for t in campaign.tests if t.frf is not None]
+    return [f"{where}tests.{id_}: {lines.words()}" for id_, lines in found if lines.multiples]

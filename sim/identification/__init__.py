@@ -1,12 +1,15 @@
 """From FRFs to modes: physical checks, poles by maximum likelihood, modes with standard errors, and which mode is which.
 
-=========  =============================================================================================================
-frf        FRFs of one modal test, and the physical checks that measured and virtual ones must pass before anything is
-           built on them
-modal      modes of a measured matrix of frequency response functions, with standard errors
-numbering  the modes of a run numbered at its first step and followed, measured and identified modes set beside them
-pairing    which mode of one set is which of another: one cost, one assignment, and a policy for each use
-poles      poles of a matrix of frequency response functions by maximum likelihood, and where to start looking for them
-shift      the shift of a natural frequency from one condition to another, with its standard error
-=========  =============================================================================================================
+=============  =========================================================================================================
+frf            FRFs of one modal test, and the physical checks that measured and virtual ones must pass before anything
+               is built on them
+modal          modes of a measured matrix of frequency response functions, with standard errors
+numbering      the modes of a run numbered at its first step and followed, measured and identified modes set beside them
+pairing        which mode of one set is which of another: one cost, one assignment, and a policy for each use
+poles          poles of a matrix of frequency response functions by maximum likelihood, and where to start looking for
+               them
+running_lines  lines of the running speed in measured FRFs: on a turning spindle the motion of unbalance and races
+               stands beside the answer to the hammer
+shift          the shift of a natural frequency from one condition to another, with its standard error
+=============  =========================================================================================================
 """

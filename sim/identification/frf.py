@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thermospindle.model.errors import BadInput
+from thermospindle.sim.identification.running_lines import RunningLines, running_lines
 
 TO_POWER = {"receptance": 1j, "mobility": 1.0, "accelerance": -1j}
 """What an FRF may be, with the phase that turns it to mobility."""
@@ -57,6 +59,31 @@ def _same(a: Any, b: Any) -> bool:
     return type(a) is type(b) and bool(a == b)
 
 
+def out_of(frf: Frf, speed: float) -> RunningLines:
+    """The lines of the running speed (rad/s) that stand in FRFs."""
+    return running_lines(frf.frequency, frf.value, speed)
+
+
+def without(frf: Frf, lines: NDArray[np.bool_]) -> Frf:
+    """The FRFs without some `lines` (n,)."""
+    if not lines.any():
+        return frf
+    kept = ~lines
+    coherence, sd = (None if v is None else v[:, :, kept] for v in (frf.coherence, frf.sd))
+    return replace(frf, frequency=frf.frequency[kept], value=frf.value[:, :, kept], coherence=coherence, sd=sd)
+
+
+def bridged(frf: Frf, lines: NDArray[np.bool_]) -> Frf:
+    """The FRFs with some `lines` (n,) on straight ones between their neighbours: for checks of the whole band that need even steps."""
+    if not lines.any():
+        return frf
+    x = np.arange(len(lines))
+    value = frf.value.copy()
+    for one in value.reshape(-1, len(lines)):
+        one[lines] = np.interp(x[lines], x[~lines], one.real[~lines]) + 1j * np.interp(x[lines], x[~lines], one.imag[~lines])
+    return replace(frf, value=value)
+
+
 @dataclass(frozen=True)
 class Limits:
     """What FRFs must keep to be accepted; the reasons stand at the checks."""
@@ -76,6 +103,7 @@ def check_frf(where: str | Path, frf: Frf, speed: float, limits: Limits = LIMITS
 
     `where` is the file for the message, `speed` in rad/s.
     """
+    quiet = bridged(frf, out_of(frf, speed).out)  # the running speed's own lines answer no hammer
     for i, response in enumerate(frf.response_nodes):
         if not frf.value[i].any():
             raise BadInput(f"{where}: response {response}: zero on every line; a dead channel is not allowed")
@@ -87,9 +115,9 @@ def check_frf(where: str | Path, frf: Frf, speed: float, limits: Limits = LIMITS
                 _check_coherence(key, frf.coherence[i, j], np.abs(value), limits if answers else replace(limits, coherence=0.0))
             if frf.sd is not None and not np.all(frf.sd[i, j] > 0):
                 raise BadInput(f"{key}: standard error = {frf.sd[i, j].min():g}: must be positive on every line")
-            _check_direction_of_time(key, value)
+            _check_direction_of_time(key, quiet.value[i, j])
             if response == reference:
-                _check_driving_point(key, frf.frequency, value * TO_POWER[frf.quantity], _noise(frf, i, j), limits)
+                _check_driving_point(key, frf.frequency, quiet.value[i, j] * TO_POWER[frf.quantity], _noise(frf, i, j), limits)
     if speed == 0:
         _check_reciprocity(where, frf, limits)
 

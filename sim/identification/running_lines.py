@@ -1,0 +1,104 @@
+"""Lines of the running speed in measured FRFs: on a turning spindle the motion of unbalance and races stands beside the answer to the hammer.
+
+At whole multiples of the turning frequency a line or two stick out of FRFs that are smooth there otherwise. What is smooth is told from the lines on either
+side, as a polynomial and as a ratio of polynomials with one denominator for all FRFs, which follows a resonance (the local rational method: Geerardyn,
+Lataire, Schoukens & Pintelon, *IEEE Trans. Instrum. Meas.* 63 (2014) 1203). A line sticks out if it is beyond the scatter of its neighbours about both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import f as fisher
+
+from thermospindle.model.types import Array, ComplexArray
+
+SIDE = 9  # neighbours on either side from which a line is told
+OUT = 2  # lines on either side of one that its own spike may reach
+FEWEST = 10  # neighbours
+DEGREE, POLES = 3, 2  # of numerators and the common denominator
+CHANCE = 1e-6  # of a spike in a test without any
+LEAST = 1e-8  # of the mean square of the neighbours: scatter that is believed
+DRIFT = 2e-3  # relative, by which the speed may differ from the one told
+
+
+@dataclass(frozen=True, eq=False)
+class RunningLines:
+    """`out` (n,) which lines of FRFs are left out; `multiples` of the turning frequency that stick out, at `frequency` (Hz)."""
+
+    out: NDArray[np.bool_]
+    multiples: tuple[int, ...]
+    frequency: tuple[float, ...]
+
+    def words(self) -> str:
+        """Which they are, in a sentence."""
+        each = ", ".join(f"{f:.1f} Hz ({k}x)" for k, f in zip(self.multiples, self.frequency, strict=True))
+        many = len(self.multiples) > 1
+        return f"{'lines' if many else 'a line'} of the running speed stand{'' if many else 's'} in the FRFs, at {each}: {int(self.out.sum())} lines are left out"
+
+
+def running_lines(frequency: Array, value: ComplexArray, speed: float) -> RunningLines:
+    """The lines at multiples of `speed` (rad/s) that stick out of FRFs `value` (responses, references, n) at `frequency` (n,) Hz; none at rest, or where
+    lines are too few to tell."""
+    turning = abs(speed) / (2 * np.pi)
+    out = np.zeros(len(frequency), bool)
+    none = RunningLines(out, (), ())
+    step = float(np.median(np.diff(frequency))) if len(frequency) > 2 * FEWEST else 0.0
+    if turning == 0.0 or step <= 0.0:
+        return none
+    multiples = np.arange(1, int(frequency[-1] / turning) + 1)
+    multiples = multiples[multiples * turning >= max(frequency[0], step)]
+    reach = np.maximum(1.5 * step, DRIFT * multiples * turning)
+    suspect = np.zeros(len(frequency), bool)
+    for f, r in zip(multiples * turning, reach, strict=True):
+        suspect |= np.abs(frequency - f) <= r
+    limit = CHANCE / max(int(suspect.sum()) * value.shape[0] * value.shape[1], 1)
+    found: list[tuple[int, float]] = []
+    for k, r in zip(multiples.tolist(), reach, strict=True):
+        own = [int(j) for j in np.flatnonzero(np.abs(frequency - k * turning) <= r) if frequency[j] > 0]
+        unlikely = {j: _chance(value, j, suspect) for j in own}
+        if unlikely and min(unlikely.values()) < limit:
+            top = min(unlikely, key=lambda j: unlikely[j])
+            found.append((k, float(frequency[top])))
+            out[[j for j in own if unlikely[j] < limit or abs(j - top) < OUT]] = True
+    return RunningLines(out, tuple(k for k, _ in found), tuple(f for _, f in found))
+
+
+def _chance(value: ComplexArray, j: int, suspect: NDArray[np.bool_]) -> float:
+    """Probability of the line `j` being so far off by the scatter of its neighbours, in the FRF where it is farthest off."""
+    near = np.arange(max(0, j - SIDE - OUT), min(value.shape[-1], j + SIDE + OUT + 1))
+    near = near[(np.abs(near - j) > OUT) & ~suspect[near]]
+    if len(near) < FEWEST or (near < j).sum() < 3 or (near > j).sum() < 3:
+        return 1.0
+    x = (near - j) / (SIDE + OUT)
+    here = value[:, :, near].reshape(-1, len(near))
+    size = np.sqrt(np.mean(np.abs(here) ** 2, axis=1))
+    used = size > 0
+    here, at = here[used] / size[used, None], value[:, :, j].reshape(-1)[used] / size[used]
+    if not len(at):
+        return 1.0
+    powers = np.vander(x, DEGREE + 1, increasing=True)
+    return float(max(np.min(_tail(here, at, powers, np.zeros(0, complex), x)), np.min(_tail(here, at, powers, _denominator(here, powers, x), x))))
+
+
+def _denominator(here: ComplexArray, powers: Array, x: Array) -> ComplexArray:
+    """d (POLES,) of 1 + d_1 x + d_2 x^2, by least squares over all FRFs (rows of `here`) with the numerators' polynomials projected out."""
+    q = np.linalg.qr(powers)[0]
+    left = np.array([here * x**p for p in range(POLES + 1)])
+    left = left - (left @ q) @ q.T
+    columns = left[1:].reshape(POLES, -1).T
+    return np.asarray(np.linalg.lstsq(columns, -left[0].ravel(), rcond=1e-10)[0])
+
+
+def _tail(here: ComplexArray, at: ComplexArray, powers: Array, d: ComplexArray, x: Array) -> Array:
+    """By FRF the probability (F distribution) of `at`, the value at x = 0, by what `here` leaves of its fit."""
+    below = 1 + sum((c * x ** (p + 1) for p, c in enumerate(d)), np.zeros(len(x), complex))
+    numerator = np.linalg.lstsq(powers, (here * below).T, rcond=None)[0]
+    left = here - (powers @ numerator).T / below
+    freedom = len(x) - powers.shape[1] - len(d) / len(here)
+    variance = (np.abs(left) ** 2).sum(axis=1) / freedom
+    leverage = float(np.linalg.inv(powers.T @ powers)[0, 0])
+    off = np.abs(at - numerator[0]) ** 2 / (1 + leverage)
+    return np.asarray(fisher.sf(off / np.maximum(variance, LEAST), 2, 2 * freedom))

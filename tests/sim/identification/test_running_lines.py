@@ -1,0 +1,101 @@
+"""Lines of the running speed in FRFs of a turning spindle: found, named, left out; and not found where there are none."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.conftest import SCENE
+from thermospindle.cli import main
+from thermospindle.diagnosis.data.lines import line_data
+from thermospindle.diagnosis.data.observe import condition_of, observe
+from thermospindle.model.machine import Condition
+from thermospindle.sim.campaign.campaign import Campaign, Noise, Test, write_campaign
+from thermospindle.sim.identification.frf import Frf, out_of, without
+from thermospindle.sim.operating import operating_point
+
+LINES = np.arange(400.0, 3000.0, 2.0)
+SPEED = 2 * np.pi * 119.5  # of the shaft; harmonics fall between lines
+NOISE = Noise(0.003, 2e-4)
+
+
+def measured(spindle, seed: int, speed: float = SPEED) -> Frf:
+    """FRFs of the turning scene with noise."""
+    value = operating_point(spindle, Condition(20.0, speed)).frf(LINES)
+    sd = NOISE.of_value * np.abs(value) + NOISE.of_largest * np.abs(value).max()
+    error = sd * np.random.default_rng(seed).standard_normal((2, *value.shape)) / np.sqrt(2)
+    return Frf(LINES, value + error[0] + 1j * error[1], tuple(p.node for p in spindle.points), spindle.hammer.hammer_nodes, "mobility")
+
+
+def with_spikes(frf: Frf, multiples: list[int], size: float) -> Frf:
+    """The same with spikes of `size` times the largest value at multiples of the running speed, on the line and its neighbour, of random phase."""
+    random, value = np.random.default_rng(0), frf.value.copy()
+    for k in multiples:
+        i = round((k * SPEED / (2 * np.pi) - LINES[0]) / 2.0)
+        for at, share in ((i, 1.0), (i + 1, 0.5)):
+            value[:, :, at] += share * size * np.abs(value).max() * np.exp(2j * np.pi * random.random(value.shape[:2]))
+    return replace(frf, value=value)
+
+
+def campaign(spindle, *frfs: Frf) -> Campaign:
+    tests = tuple(Test(f"t{k}", 20.0, SPEED, frf=f) for k, f in enumerate(frfs, 1))
+    return Campaign("turning", spindle.name, "mobility", spindle.points, tests, NOISE)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_nothing_is_found_where_nothing_stands(spindle, seed):
+    found = out_of(measured(spindle, seed), SPEED)
+    assert found.multiples == ()
+    assert not found.out.any()
+
+
+def test_resonances_without_noise_are_no_spikes(spindle):
+    """The sharpest modes of the scene, with a speed whose multiples fall on each of them in turn."""
+    for mode in operating_point(spindle, Condition(20.0, SPEED)).modes_below(2900.0):
+        if mode.frequency > 450.0:
+            speed = 2 * np.pi * mode.frequency / 6
+            value = operating_point(spindle, Condition(20.0, SPEED)).frf(LINES)
+            found = out_of(Frf(LINES, value, tuple(p.node for p in spindle.points), spindle.hammer.hammer_nodes, "mobility"), speed)
+            assert found.multiples == (), mode.frequency
+
+
+def test_spikes_are_found_and_named_and_nothing_else_is_left_out(spindle):
+    frf = with_spikes(measured(spindle, 3), [5, 6, 13], 0.05)
+    found = out_of(frf, SPEED)
+    assert found.multiples == (5, 6, 13)
+    assert found.frequency == pytest.approx([k * SPEED / (2 * np.pi) for k in (5, 6, 13)], abs=2.0)
+    assert 6 <= found.out.sum() <= 12
+    assert found.words().startswith("lines of the running speed stand in the FRFs, at 59")
+    assert out_of(frf, 0.0).multiples == ()  # at rest there is no running speed
+    assert without(frf, found.out).value.shape[-1] == len(LINES) - found.out.sum()
+
+
+def test_modes_and_data_are_as_without_spikes(spindle):
+    clean = measured(spindle, 3)
+    spiked = with_spikes(clean, [5, 6, 13], 0.2)
+    left = out_of(spiked, SPEED).out
+    one, other, same = observe(campaign(spindle, clean, spiked, without(clean, left)), spindle)
+    assert len(other.frequency) == len(one.frequency)
+    sd = np.sqrt(np.diag(one.covariance)[: len(one.frequency)])
+    assert np.all(np.abs(np.log(other.frequency / one.frequency)) < sd)
+    assert other.frequency == pytest.approx(same.frequency, rel=1e-9)  # exactly as if these lines had never been
+    a, b = (line_data(t, condition_of(t), NOISE, NOISE) for t in campaign(spindle, clean, spiked).tests)
+    assert b.raw == a.raw - left.sum()
+    assert np.mean(np.abs(b.sd)) == pytest.approx(np.mean(np.abs(a.sd)), rel=0.05)
+    exact = operating_point(spindle, Condition(20.0, SPEED)).frf(b.frequency)
+    assert np.mean(np.abs((b.value - exact) / b.sd) ** 2) == pytest.approx(1.0, abs=0.15)
+    raw = without(spiked, np.zeros(len(LINES), bool)).value
+    assert np.abs(raw - operating_point(spindle, Condition(20.0, SPEED)).frf(LINES)).max() > 0.15 * np.abs(raw).max()  # they were there
+
+
+def test_compare_warns_and_names_them(spindle, tmp_path, capsys):
+    write_campaign(campaign(spindle, with_spikes(measured(spindle, 3), [6], 0.2)), tmp_path / "c")
+    assert main(["compare", str(SCENE), str(tmp_path / "c"), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    (warning,) = answer["warnings"]
+    assert "campaign.toml: tests.t1: a line of the running speed stands in the FRFs, at 71" in warning
+    assert "(6x)" in warning
+    assert answer["rms_pull"] < 2.0
