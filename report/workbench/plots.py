@@ -144,7 +144,8 @@ class MovingSection:
         self.motion = ColumnDataSource(data={"x": x, "z": z, "xa": still, "xb": still, "za": still, "zb": still})
         self.now = ColumnDataSource(data={"x": x, "z": z, "colour": colours})
         across, along = (np.concatenate([getattr(p, k) for p in drawn]) if drawn else np.zeros(1) for k in ("x", "z"))
-        half = [max(0.5 + LARGEST, 0.55) * max(float(np.ptp(v)), 1.0) for v in (across, along)]
+        sides = [max(float(np.ptp(v)), 1.0) for v in (across, along)]
+        half = [0.53 * side + LARGEST * max(sides) for side in sides]  # of what is shown: all of it, also where it moves to
         middle = float(along.min() + along.max()) / 2
         self.figure = _figure(
             "section, moving in the chosen mode", height=int(np.clip(400 * half[1] / half[0], 240, 520)), tools="", name="section", x_range=Range1d(-half[0], half[0]),
