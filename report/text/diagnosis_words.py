@@ -1,0 +1,167 @@
+"""A diagnosis in sentences, and in the terminal."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from thermospindle.diagnosis.inference.verdict import DEPARTS
+from thermospindle.diagnosis.verdict import Diagnosis, Drift
+from thermospindle.model.machine import Condition
+from thermospindle.model.units import RPM
+
+ALIKE = 0.9  # of the evidence of what the verdict names, from which a free drift does as well
+
+
+SENTENCES = {
+    "none": "No effect is missing.",
+    "identified": "Missing: {}.",
+    "two effects": "Missing: {}.",
+    "ambiguous": "Missing is one of: {}.",
+    "unexplained": "Something is missing that the catalogue does not hold.",
+}
+
+
+def condition(c: Condition) -> dict[str, Any]:
+    """A condition as answers have it, with units in the keys."""
+    found: dict[str, Any] = {"temperature_C": c.temperature, "speed_rpm": round(c.speed / RPM, 6)}
+    if c.level:
+        found["level_N"] = c.level
+    if np.isfinite(c.soak_time):
+        found["soak_time_min"] = c.soak_time / 60
+    return found
+
+
+def drift_words(d: Diagnosis) -> list[str]:
+    """What would have to drift, in sentences."""
+    if d.verdict.word == "none":
+        return ["No element has to drift: tolerances and measuring errors explain the data."]
+    return [f"{_drift_words(p)} ({p.gain:.0f} in ln evidence)." for p in d.drifts[:3]] or ["No single element explains the misfit by drifting."]
+
+
+def _drift_words(p: Drift) -> str:
+    low, high = int(np.argmin(p.change)), int(np.argmax(p.change))
+    goes = f", {p.pattern.shape.name}" if p.pattern and p.pattern.shape.name != "constant" else ""
+    (least, its_sd), (most, sd) = p.told[low], p.told[high]
+    return (
+        f"{p.element}: from {least:+.3g} +- {its_sd:.1g} {p.unit} {_where(p.conditions[low])} to {most:+.3g} +- "
+        f"{sd:.1g} {p.unit} {_where(p.conditions[high])}{goes}"
+    )
+
+
+def law_words(d: Diagnosis) -> list[str]:
+    """Of every effect that the verdict names and whose law the data do not have: that, and what they have instead."""
+    v, found = d.verdict, []
+    lead = next((c for c in v.candidates if c.hypothesis is v.accepted), None)
+    for m, departure in zip(lead.hypothesis.mechanisms, v.accepted.evidence.learned.departures, strict=True) if lead else ():
+        if departure >= DEPARTS:
+            same = [p for p in d.drifts if p.pattern and lead and p.gain > ALIKE * lead.delta_evidence]
+            instead = f"; {_drift_words(same[0])}, does as well without any law" if same else ""
+            found.append(f"The data do not have the law that {m.name} assumes{instead}.")
+    return found
+
+
+def _where(c: Condition) -> str:
+    return f"at {c.temperature:g} C, {c.speed / RPM:.0f} rpm"
+
+
+def would_change(d: Diagnosis) -> str:
+    """What would make this verdict another one, in a sentence or two."""
+    v = d.verdict
+    test = f" A test {plan_words(condition(d.tests[0].condition))} tells {d.tests[0].separates[0]} from {d.tests[0].separates[1]}." if d.tests else ""
+    if v.word == "none":
+        return "An effect larger than these data could have hidden would change that; how large that is, is listed for each."
+    if v.word == "unexplained":
+        place = f"; `spindle draft` writes one from the drift of {d.drifts[0].element}" if d.drifts else ""
+        return f"An effect that the catalogue does not hold would change that{place}.{test}"
+    rivals = [c for c in v.candidates if set(c.names) - set(v.effects)]
+    rival = f"{' + '.join(rivals[0].names)}, {rivals[0].delta_evidence - v.candidates[0].delta_evidence:.0f} in ln evidence" if rivals else "none"
+    return f"Data that the next best explanation ({rival}) predicts better would change that.{test}"
+
+
+def plan_words(condition: dict[str, Any]) -> str:
+    words = f"at {condition['temperature_C']:g} C, {condition['speed_rpm']:.0f} rpm"
+    words += f", hit with {condition['level_N']:g} N" if "level_N" in condition else ""
+    return words + (f", after {condition['soak_time_min']:g} min in the chamber" if "soak_time_min" in condition else "")
+
+
+def show_diagnosis(console: Console, answer: dict[str, Any], verbose: bool = True) -> None:
+    """The verdict in one sentence and why; with `verbose` every explanation, drift and next test, and what would have been seen."""
+    joined = (" and " if answer["verdict"] == "two effects" else ", ").join(answer["effects"])
+    console.print(f"{answer['verdict']}: {SENTENCES[answer['verdict']].format(joined)}", style="bold")
+    console.print(answer["reason"])
+    for sentence in answer["law_departs"]:
+        console.print(sentence)
+    console.print(answer["would_change"])
+    error = answer["error"]
+    console.print(
+        f"Error, rms in standard errors: {error['before']:.2f} -> {error['after']:.2f}; on conditions left out "
+        f"{error['held_out_before']:.2f} -> {error['held_out_after']:.2f}"
+    )
+    if not verbose:
+        _show_little(console, answer)
+        return
+    if answer["candidates"]:
+        console.print("\nExplanations, ln evidence over the model without effects and posterior probability:")
+    for c in answer["candidates"][:5]:
+        console.print(f"  {' + '.join(c['effects'])}: {c['delta_evidence']:+.1f}, {_percent(c['probability'])}; {_values(c)}")
+    best = answer["candidates"][0] if answer["candidates"] else None
+    if best and answer["effects"]:
+        for name, rows in best["law"].items():
+            if best["departure_from_law"][name]:
+                console.print(f"\nThe size of {name} as the data have it, test by test (one size would be its own law):")
+                console.print("  " + ", ".join(f"{r['test']} {r['size']:.3g} +- {r['sd']:.1g}" for r in rows))
+    if answer["verdict"] != "none":
+        console.print("\nWithout any catalogue, what would have to drift:")
+        for sentence in answer["misfit"]["words"]:
+            console.print(f"  {sentence}")
+    for t in answer["next_test"]:
+        console.print(f"\n{_next(t)}")
+    for o in answer.get("predictions", []):
+        console.print(
+            f"\nPredicted earlier by {o['explanation']} for {o['test']}: {o['verdict']}, {o['rms']:.2g} standard errors rms over {o['modes']} modes"
+        )
+    if answer["verdict"] == "none":
+        small = sorted(answer["detectable_in"].items())
+        console.print("\nSmallest size these data would have shown:")
+        for name, row in small:
+            console.print(f"  {name}: {row['parameter']} {row['size']:.2g}{_unit(row['unit'])}")
+        console.print(f"Not visible in these data at a typical size: {', '.join(answer['invisible']) or 'nothing'}")
+
+
+def _show_little(console: Console, answer: dict[str, Any]) -> None:
+    """The explanations that the verdict names with their values, the test to make next, and where the rest is."""
+    for c in answer["candidates"]:
+        if set(c["effects"]) <= set(answer["effects"]) and answer["effects"]:
+            console.print(f"  {' + '.join(c['effects'])}, {_percent(c['probability'])}: {_values(c)}")
+    for t in answer["next_test"][:1]:
+        console.print(_next(t))
+    for o in answer.get("predictions", []):
+        console.print(f"Predicted earlier by {o['explanation']} for {o['test']}: {o['verdict']}, {o['rms']:.2g} standard errors rms")
+    console.print("--verbose shows every explanation, what would drift, and what these data could have shown.", style="dim")
+
+
+def _values(candidate: dict[str, Any]) -> str:
+    """Fitted parameters with their errors and units."""
+    return ", ".join(f"{k.split('.', 1)[1]} {v['value']:.4g}{_error(v['sd'])}{_unit(v['unit'])}" for k, v in candidate["parameters"].items())
+
+
+def _next(test: dict[str, Any]) -> str:
+    first, second = test["separates"]
+    odds = "more than a million" if test["odds"] >= 1e6 * (1 - 1e-9) else f"{test['odds']:.3g}"
+    return f"A test {plan_words(test['condition'])} would tell {first} from {second} with odds of {odds} to 1, most by {test['tells']}."
+
+
+def _percent(probability: float) -> str:
+    return f"{probability:.1%}" if probability > 1e-3 else "less than 0.1 %"
+
+
+def _error(sd: float) -> str:
+    """What was chosen, not fitted, has none."""
+    return f" +- {sd:.2g}" if sd else ""
+
+
+def _unit(unit: str) -> str:
+    return "" if unit == "1" else f" {unit}"
