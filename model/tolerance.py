@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from thermospindle.model.bearing.hertz import in_series
 from thermospindle.model.bearing.pair import contact_constants, reference_deformation, reference_motion
@@ -104,7 +104,7 @@ def scaled_preload(spindle: Spindle, factor: float, sets: Sequence[str] | None =
             return float(b.balls * k * deformation**1.5 * np.sin(angle) - preload)
 
         free = float(np.arccos(min(radial / b.unloaded_distance, 1.0)))
-        bearings.append(replace(b, contact_angle=float(brentq(excess, free, 0.99 * np.pi / 2, xtol=1e-13)), preload=preload))
+        bearings.append(replace(b, contact_angle=float(scipy.optimize.brentq(excess, free, 0.99 * np.pi / 2, xtol=1e-13)), preload=preload))
     scaled = tuple(replace(s, preload=factor * s.preload) if s in changed else s for s in spindle.sets)
     return replace(spindle, bearings=tuple(bearings), sets=scaled)
 

@@ -1,6 +1,8 @@
 """Imports run one way only and in no circle, and each heavy library is imported where the design says."""
 
 import ast
+import subprocess
+import sys
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -65,3 +67,12 @@ def test_no_circles():
 def test_the_walk_sees_files():
     assert len(FILES) > 150
     assert "numpy" in imported(ROOT / "model" / "bearing" / "hertz.py")
+
+
+def test_the_catalogue_is_told_without_the_libraries_that_compute():
+    """Half a second is what a verb may take that simulates nothing: these alone take longer."""
+    program = "import sys; from thermospindle.cli import main; main(['effects', '--json']); print(*sorted(sys.modules), file=sys.stderr)"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=ROOT, check=True)
+    loaded = set(done.stderr.split())
+    assert "thermospindle.sim.effects" in loaded
+    assert not loaded & {"scipy.optimize", "scipy.sparse", "scipy.interpolate", "skfem", "mujoco", "matplotlib", "rerun", "pydantic"}

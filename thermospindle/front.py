@@ -28,8 +28,8 @@ from thermospindle.sim.campaign.beside import POWER
 from thermospindle.sim.campaign.campaign import Campaign, read_campaign
 from thermospindle.sim.effects import CATALOGUE, by_name, checked
 from thermospindle.sim.effects.effect import fitted_to, refusal
+from thermospindle.sim.effects.known import equipped
 from thermospindle.sim.effects.own import effect_of, installed
-from thermospindle.sim.effects.rules import equipped
 from thermospindle.sim.hammer.test import ImpactTest, impact_tests
 from thermospindle.sim.identification.frf import Frf
 from thermospindle.sim.identification.modal import Modes, extract

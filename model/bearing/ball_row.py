@@ -15,8 +15,8 @@ from functools import cached_property
 from math import hypot, sqrt
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import minimize, root
 
 from thermospindle.model.bearing.heavy_ball import LEAST_STRETCH, Balance, BallInertia, HeavyBall, settled
 from thermospindle.model.bearing.hertz import in_series
@@ -185,8 +185,8 @@ def displacement_under(row: BallRow, load: Array) -> Array:
         return respond(massless, v * unit).tangent * np.outer(unit, unit) / work + 1e-12 * np.eye(5)
 
     start = np.sign(load) * np.array([1.0, 1.0, 1.0, 0.1, 0.1])
-    found = minimize(potential, start, jac=gradient, hess=hessian, method="trust-exact", options={"gtol": 1e-9, "maxiter": 500})
-    end = root(
+    found = scipy.optimize.minimize(potential, start, jac=gradient, hess=hessian, method="trust-exact", options={"gtol": 1e-9, "maxiter": 500})
+    end = scipy.optimize.root(
         lambda v: (respond(row, v * unit).force - load) * unit / work,
         found.x,
         jac=lambda v: respond(row, v * unit).tangent * np.outer(unit, unit) / work,

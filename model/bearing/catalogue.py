@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.optimize import brentq, least_squares
+import scipy
 
 from thermospindle.model.errors import BadInput
 from thermospindle.model.types import Array
@@ -52,7 +52,7 @@ def derived(row: CatalogueRow) -> Derived:
     best = None
     for distance in (2e-4, 4e-4, 8e-4):
         begin = np.log([distance, start])
-        fit = least_squares(_residuals, begin, bounds=(begin - 2.5, begin + 2.5), args=(row,), xtol=1e-12, ftol=1e-12)
+        fit = scipy.optimize.least_squares(_residuals, begin, bounds=(begin - 2.5, begin + 2.5), args=(row,), xtol=1e-12, ftol=1e-12)
         best = fit if best is None or fit.cost < best.cost else best
     assert best is not None
     misfit = float(np.sqrt(np.mean(best.fun**2)))
@@ -81,7 +81,7 @@ def pair(distance: float, constant: float, angle: float, preload: float) -> tupl
     reach = 1e-6
     while axial(distance, constant, angle, reach)[0] < preload:
         reach *= 2
-    z = brentq(lambda z: axial(distance, constant, angle, z)[0] - preload, 0.0, reach, xtol=1e-15)
+    z = scipy.optimize.brentq(lambda z: axial(distance, constant, angle, z)[0] - preload, 0.0, reach, xtol=1e-15)
     return axial(distance, constant, angle, 2 * z)[0], 2 * axial(distance, constant, angle, z)[1]
 
 

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.special import ellipe, ellipk, ellipkm1
+import scipy
 
 
 @dataclass(frozen=True)
@@ -26,7 +25,7 @@ class Contact:
     def half_axes(self, load: float) -> tuple[float, float]:
         """Half axes (a, b) of the contact ellipse (m) at `load` (N), a across the rolling direction."""
         k = self.ellipticity
-        e = float(ellipe(1 - 1 / k**2))
+        e = float(scipy.special.ellipe(1 - 1 / k**2))
         cube = 6 * e * load / (np.pi * self.curvature_sum * self.effective_modulus)
         return float((k**2 * cube) ** (1 / 3)), float((cube / k) ** (1 / 3))
 
@@ -42,13 +41,13 @@ def ellipticity(curvature_difference: float) -> float:
     def difference(log_k: float) -> float:
         k2 = np.exp(2 * log_k)
         m = -np.expm1(-2 * log_k)
-        e = ellipe(m)
-        return float(((k2 + 1) * e - 2 * ellipkm1(1 / k2)) / ((k2 - 1) * e))
+        e = scipy.special.ellipe(m)
+        return float(((k2 + 1) * e - 2 * scipy.special.ellipkm1(1 / k2)) / ((k2 - 1) * e))
 
     nearly_round = 1e-3  # below this the quotient cancels, and log k is proportional to the difference
     if curvature_difference <= difference(nearly_round):
         return float(np.exp(nearly_round * curvature_difference / difference(nearly_round)))
-    return float(np.exp(brentq(lambda log_k: difference(log_k) - curvature_difference, nearly_round, 17.0, xtol=1e-14, rtol=1e-14)))
+    return float(np.exp(scipy.optimize.brentq(lambda log_k: difference(log_k) - curvature_difference, nearly_round, 17.0, xtol=1e-14, rtol=1e-14)))
 
 
 @lru_cache(maxsize=4096)
@@ -66,7 +65,7 @@ def point_contact(
         raise ValueError("the groove is tighter than the ball; conformity must exceed 0.5")
     k = ellipticity(abs(along - across) / total)
     m = 1 - 1 / k**2
-    first, second = float(ellipk(m)), float(ellipe(m))
+    first, second = float(scipy.special.ellipk(m)), float(scipy.special.ellipe(m))
     modulus = 2 / sum((1 - nu**2) / e for e, nu in (ball, race))
     stiffness = np.pi * k * modulus * np.sqrt(2 * second / (9 * total * first**3))
     return Contact(float(stiffness), k, total, modulus)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from scipy.optimize import brentq
+import scipy
 
 from thermospindle.model.bearing.ball_row import BallRow
 from thermospindle.model.errors import NoEquilibrium
@@ -45,6 +45,6 @@ def _near(imbalance: Callable[[float], float], start: float) -> float:
 def _bracketed(imbalance: Callable[[float], float], start: float, reach: float) -> float:
     while reach < 5e-3:
         if imbalance(start - reach) <= 0 <= imbalance(start + reach):
-            return float(brentq(imbalance, start - reach, start + reach, xtol=1e-17, rtol=1e-14))
+            return float(scipy.optimize.brentq(imbalance, start - reach, start + reach, xtol=1e-17, rtol=1e-14))
         reach *= 4
     raise NoEquilibrium(f"the bearings find no axial equilibrium within {reach * 1e3:.1f} mm of hub movement")

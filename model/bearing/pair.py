@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import root
+import scipy
 
 from thermospindle.model.bearing.ball_row import BallInertia, BallRow, RowForce, centred_axial_force, respond
 from thermospindle.model.bearing.hertz import in_series, race_contact
@@ -219,8 +219,8 @@ def _many_positions(
         return np.asarray(motion.T @ (force - outside)) / scale
 
     massless = [replace(row, inertia=None) for row in rows.values()]
-    start = root(imbalance, np.zeros(len(unknown)), args=(massless,), options={"xtol": 1e-13})
-    end = root(imbalance, start.x, args=(list(rows.values()),), options={"xtol": 1e-13})
+    start = scipy.optimize.root(imbalance, np.zeros(len(unknown)), args=(massless,), options={"xtol": 1e-13})
+    end = scipy.optimize.root(imbalance, start.x, args=(list(rows.values()),), options={"xtol": 1e-13})
     if np.abs(end.fun).max() > 1e-6:
         raise NoEquilibrium(f"the bearings between {', '.join(carriers)} find no axial equilibrium")
     return {name: float(m) for name, m in zip(names, motion @ (1e-6 * end.x), strict=True)}

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+import scipy
 
 from thermospindle.model.bearing.pair import BearingState, LinearState, PairState
 from thermospindle.model.cells import cell, name_of
@@ -62,7 +62,7 @@ def _between(grid: Array, values: Array, where: float, name: str, unit: str) -> 
         raise OutsideRange(f"the table spans {name} {grid[0]:g} to {grid[-1]:g} {unit} and was asked at {where:g} {unit}")
     if len(grid) == 1:
         return float(values[0])
-    return float(PchipInterpolator(grid, values)(np.clip(where, grid[0], grid[-1])))
+    return float(scipy.interpolate.PchipInterpolator(grid, values)(np.clip(where, grid[0], grid[-1])))
 
 
 def tabulate(states: Sequence[Sequence[PairState]], unloads: Mapping[str, float | None], provenance: Mapping[str, str]) -> StiffnessTable:

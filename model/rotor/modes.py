@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
+import scipy
 
 from thermospindle.model.machine import MOVES, Spindle
 from thermospindle.model.rotor.chain import Matrices, RotorBase, element_rows, matrices, motion_rows, point_row
@@ -96,7 +95,7 @@ def _apart(linear: Matrices) -> list[Integers]:
     if n <= LARGE:
         return [np.arange(n)]
     pattern = sum(_coupled(matrix) for matrix in (linear.mass, linear.damping, linear.stiffness))
-    count, label = connected_components(csr_array(pattern), directed=False)
+    count, label = scipy.sparse.csgraph.connected_components(scipy.sparse.csr_array(pattern), directed=False)
     return [np.flatnonzero(label == k) for k in range(count)]
 
 

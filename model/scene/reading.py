@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 from pydantic import ValidationError
-from scipy.optimize import brentq
 
 from thermospindle.model.bearing.catalogue import derived
 from thermospindle.model.bearing.pair import reference_motion, solve
@@ -181,7 +181,7 @@ def loaded_angle(spindle: Spindle, b: Bearing, free: float) -> float:
             b.balls * constant(spindle, replace(b, contact_angle=angle)) * deformation**1.5 * np.sin(angle) - b.preload
         )
 
-    return float(brentq(excess, free, 0.99 * np.pi / 2, xtol=1e-14))
+    return float(scipy.optimize.brentq(excess, free, 0.99 * np.pi / 2, xtol=1e-14))
 
 
 def _with_shafts(file: Path, spindle: Spindle) -> Spindle:

@@ -15,10 +15,9 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Spindle
-from thermospindle.model.scene.reading import load
 from thermospindle.report.folder import mark, whole_folder
 from thermospindle.sim.effects.effect import Effect
-from thermospindle.sim.effects.rules import equipped
+from thermospindle.sim.effects.known import equipped
 
 STEPS = 5  # of temperature over a scene's range, unless a verb is given others
 
@@ -52,6 +51,8 @@ def answered(
 
 def with_effects(scene: Path, effect_files: Sequence[Path]) -> tuple[Spindle, tuple[Effect, ...]]:
     """The spindle of a scene with its effects found, a user's own among them; and every effect there is."""
+    from thermospindle.model.scene.reading import load  # the forms of scenes take their time to load: not where none is read
+
     return equipped(load(scene), effect_files)
 
 

@@ -15,7 +15,7 @@ from thermospindle.report.text.effects import show_effect, show_effects, summary
 from thermospindle.report.verbs.answer import Answer, answered, with_effects, write_json
 from thermospindle.sim.effects import by_name
 from thermospindle.sim.effects.effect import refusal
-from thermospindle.sim.effects.rules import catalogue
+from thermospindle.sim.effects.known import catalogue
 
 
 def effects(

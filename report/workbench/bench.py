@@ -30,7 +30,7 @@ from thermospindle.sim.campaign.beside import beside
 from thermospindle.sim.campaign.campaign import Campaign, Test, read_campaign
 from thermospindle.sim.effects import usable
 from thermospindle.sim.effects.effect import HOOKS, Effect
-from thermospindle.sim.effects.rules import equipped
+from thermospindle.sim.effects.known import equipped
 from thermospindle.sim.identification.pairing import follow
 from thermospindle.sim.operating import OperatingPoint, operating_point
 

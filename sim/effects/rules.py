@@ -10,7 +10,6 @@ from __future__ import annotations
 import pickle
 from collections.abc import Callable, Sequence
 from math import isfinite
-from pathlib import Path
 
 import numpy as np
 
@@ -19,9 +18,8 @@ from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.chain import matrices
 from thermospindle.model.rotor.elements import ELEMENTS
-from thermospindle.sim.effects import CATALOGUE, checked, own_effects, resolved
-from thermospindle.sim.effects.effect import HOOKS, Effect, Parameter, fitted_to
-from thermospindle.sim.effects.own import OwnEffect
+from thermospindle.sim.effects import CATALOGUE, checked
+from thermospindle.sim.effects.effect import HOOKS, Effect, Parameter
 from thermospindle.sim.effects.trial import Broken, Trial, moved, told, trial
 from thermospindle.sim.operating import operating_point
 from thermospindle.thermal.expansion import expand
@@ -224,25 +222,6 @@ def check(effect: Effect, spindle: Spindle, known: Sequence[Effect] = CATALOGUE,
             rule(on)
         except Broken as error:
             raise BadInput(f"{_where(effect, where)}: {error}") from None
-
-
-def catalogue(files: Sequence[Path] = ()) -> tuple[Effect, ...]:
-    """Every effect there is: the catalogue, installed ones and those of a user's `files`, their words checked."""
-    own = own_effects(files)
-    known = (*CATALOGUE, *own)
-    for effect in own:
-        check_words(effect, known, effect.where)
-    return known
-
-
-def equipped(spindle: Spindle, files: Sequence[Path] = ()) -> tuple[Spindle, tuple[Effect, ...]]:
-    """A spindle with the effects its scene names in it, and every effect there is; a user's own are tried on the spindle first."""
-    known = catalogue(files)
-    for effect in known:
-        if isinstance(effect, OwnEffect):
-            check(effect, spindle, known, effect.where)
-    known = tuple(fitted_to(e, spindle) for e in known)
-    return resolved(spindle, known), known
 
 
 def _where(effect: Effect, where: str) -> str:

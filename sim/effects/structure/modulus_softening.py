@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,8 +20,9 @@ from thermospindle.model.machine import Condition, Law, Material, RingMotion, Sp
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import Effect, Parameter, Values, scale_parameter
 from thermospindle.sim.effects.roles import with_stiffness
-from thermospindle.thermal.elastic import Race
-from thermospindle.thermal.influence import influence, raceways
+
+if TYPE_CHECKING:
+    from thermospindle.thermal.elastic import Race
 
 SLOPE = 22.0
 """-d ln E / d(thermal strain)."""
@@ -56,6 +58,8 @@ def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
 
 def motions(spindle: Spindle, condition: Condition, values: Values, by_bearing: dict[str, RingMotion]) -> dict[str, RingMotion]:
     """Ring motions by the chamber's temperature as softer materials change them, to first order in the softening."""
+    from thermospindle.thermal.influence import raceways  # finite elements, which the catalogue is read without
+
     scale = values["scale"]
     if scale == 0.0 or condition.temperature == spindle.reference_temperature:
         return by_bearing
@@ -103,6 +107,8 @@ class Section:
 
 def sensitivity(spindle: Spindle) -> tuple[Sensitivity, ...]:
     """Solved once for each section and set of moduli, part by part."""
+    from thermospindle.thermal.influence import raceways
+
     moduli = tuple(
         (m.youngs_modulus(spindle.reference_temperature), m.poisson_ratio) for m in (spindle.materials[g.material] for g in spindle.regions)
     )
@@ -112,6 +118,8 @@ def sensitivity(spindle: Spindle) -> tuple[Sensitivity, ...]:
 
 @lru_cache(maxsize=8)
 def _sensitivity(section: Section) -> tuple[Sensitivity, ...]:
+    from thermospindle.thermal.influence import influence
+
     spindle = section.spindle
     found = []
     for part, hard in influence(spindle).responses.items():

@@ -10,15 +10,13 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
-from scipy.sparse import csc_array
-from scipy.sparse.linalg import splu
+import scipy
 
 from thermospindle.model.bearing.roller import reference_loads
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import ROWS, SECTION, Effect, Parameter, Values, scale_parameter
-from thermospindle.thermal import conduction, friction
-from thermospindle.thermal.influence import influence, raceways
+from thermospindle.thermal import friction
 
 
 @dataclass(frozen=True)
@@ -81,6 +79,8 @@ def heat(spindle: Spindle, condition: Condition, unit: UnitRise) -> Array:
 
 def unit_rise(spindle: Spindle) -> UnitRise:
     """Solved once for each section, set of conductivities and cooling."""
+    from thermospindle.thermal.influence import raceways
+
     conductivity = tuple(spindle.materials[g.material].conductivity for g in spindle.regions)
     rings = tuple(raceways(spindle, b) for b in spindle.ringed)
     thermal = spindle.thermal
@@ -90,10 +90,13 @@ def unit_rise(spindle: Spindle) -> UnitRise:
 
 @lru_cache(maxsize=8)
 def _unit_rise(question: Conduction) -> UnitRise:
+    from thermospindle.thermal import conduction
+    from thermospindle.thermal.influence import influence  # finite elements, which the catalogue is read without
+
     model = conduction.model(question.spindle, influence(question.spindle).sections)
     if not model.film.any():
         raise ValueError("a spindle without convection has no steady temperature")
-    rise = splu(csc_array(model.conductance), permc_spec="MMD_AT_PLUS_A").solve(np.ascontiguousarray(model.bearing.T)).T
+    rise = scipy.sparse.linalg.splu(scipy.sparse.csc_array(model.conductance), permc_spec="MMD_AT_PLUS_A").solve(np.ascontiguousarray(model.bearing.T)).T
     means = [model.field(r).region_means() for r in rise]
     regions = tuple(means[0])
     return UnitRise(regions, np.array([[m[name] for name in regions] for m in means]), rise @ model.bearing.T)

@@ -16,7 +16,7 @@ from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import build
 from thermospindle.sim.effects import CATALOGUE, by_name, usable
 from thermospindle.sim.effects.effect import fitted_to, refusal
-from thermospindle.sim.effects.rules import equipped
+from thermospindle.sim.effects.known import equipped
 from thermospindle.sim.effects.structure import mount_compliance
 from thermospindle.sim.effects.temperature import soak_lag
 

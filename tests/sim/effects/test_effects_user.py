@@ -24,7 +24,8 @@ from thermospindle.report.text.diagnosis import diagnosis_json
 from thermospindle.sim.effects import CATALOGUE, by_name, of_scene, own_effects, resolved
 from thermospindle.sim.effects import own as effect_file
 from thermospindle.sim.effects.effect import Effect
-from thermospindle.sim.effects.rules import catalogue, check, equipped
+from thermospindle.sim.effects.known import catalogue, equipped
+from thermospindle.sim.effects.rules import check
 from thermospindle.sim.operating import operating_point
 
 FILE = ROOT / "docs" / "air_film.py"
