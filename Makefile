@@ -3,7 +3,7 @@ PYTHON ?= python3
 SPINDLE = .venv/bin/spindle
 READY = .venv/ready
 
-.PHONY: demo test test-all lint bench blind docs clean
+.PHONY: demo test test-all lint bench blind torture docs clean
 
 demo: $(READY)
 	$(SPINDLE) run scenes/hdd_2003 --out out/hdd_2003
@@ -23,6 +23,11 @@ SEEDS ?= 1000 1300
 blind: $(READY)
 	.venv/bin/python -m tests.blind.study --seeds $(SEEDS)
 	.venv/bin/python -m tests.blind.score
+
+# Random machines and damaged files: a result that keeps the laws of mechanics, or a named error, and the counts at the end.
+EXAMPLES ?= 1000
+torture: $(READY)
+	TORTURE_EXAMPLES=$(EXAMPLES) .venv/bin/pytest tests/torture -m ''
 
 # The documentation as one static site in out/site; its own libraries come with it.
 docs: $(READY)

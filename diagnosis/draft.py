@@ -22,6 +22,7 @@ from thermospindle.model.types import Array
 REFERENCE = 20.0  # C at which laws are told
 KELVIN = 273.15
 LEAST = -0.999  # of what was: nothing falls further
+LARGEST = 1e9  # of any number that is read
 NEAR = 10.0  # criterion within which rivals are named in the file
 
 
@@ -140,20 +141,35 @@ def draft(diagnosis: Path, name: str, element: str | None = None) -> str:
 
 
 def _place(diagnosis: Path, element: str | None) -> Mapping[str, Any]:
+    if not diagnosis.is_file():
+        raise BadInput(f"{diagnosis}: cannot be read: no such file")
     try:
         places = json.loads(diagnosis.read_text(encoding="utf-8"))["where"]
         found = [p for p in places if element is None or p["element"] == element]
         if found:
-            [float(r["temperature_C"]) + float(r["speed_rpm"]) + float(r["sd"]) for r in found[0]["change"]]
+            unit = found[0]["unit"]
+            keys = ("temperature_C", "speed_rpm", "sd", "relative" if unit == "%" else f"change_{unit}")
+            _plain(found[0]["element"], unit, diagnosis.name)
+            if not found[0]["change"] or not all(abs(float(r[key])) <= LARGEST for r in found[0]["change"] for key in keys):
+                raise ValueError
             return found[0]
         named = [str(p["element"]) for p in places]
     except OSError as error:
         raise BadInput(f"{diagnosis}: cannot be read: {error.strerror}") from None
-    except (ValueError, KeyError, TypeError):
+    except BadInput:
+        raise
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
         raise BadInput(f"{diagnosis}: is not an answer of spindle diagnose --json with elements that drift in `where`") from None
     if element is None:
         raise BadInput(f"{diagnosis}: where: is empty; the diagnosis found nothing that drifts, and there is nothing to draft")
     raise BadInput(f"--element {element}: does not drift in {diagnosis}; allowed are {', '.join(named) or 'none'}")
+
+
+def _plain(*texts: str) -> None:
+    """Refuse what would be more than a word in the Python file that is drafted: nothing of a data file becomes code."""
+    for text in texts:
+        if not isinstance(text, str) or not text.isprintable() or set(text) & set("\"\\{}"):
+            raise BadInput(f"{str(text)[:80]!r}: cannot be written into an effect file; names without quotes, braces, backslashes and line ends are allowed")
 
 
 def _text(name: str, place: Mapping[str, Any], ranked: Sequence[Fitted], top: float, unit: str, diagnosis: Path) -> str:

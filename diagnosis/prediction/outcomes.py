@@ -38,6 +38,8 @@ def outcomes(file: Path, observations: Sequence[Observation]) -> list[Outcome]:
     Tests with an added mass or a harder hit must say so themselves: they are matched by temperature and speed, and by level and soak
     time where planned.
     """
+    if not file.is_file():
+        raise BadInput(f"--predictions {file}: cannot be read: no such file")
     try:
         planned = json.loads(file.read_text(encoding="utf-8"))["next_test"]
         rows = [(dict(p["condition"]), dict(p["predicted"])) for p in planned]

@@ -112,7 +112,8 @@ def _poles(mass: Array, damping: Array, stiffness: Array, own: Integers) -> tupl
     state[:n, n:] = np.eye(n)
     state[n:, :n] = -inverse @ stiffness
     state[n:, n:] = -inverse @ damping
-    scale = np.concatenate([np.ones(n), np.full(n, np.sqrt(np.trace(-state[n:, :n]) / n))])  # balances q against q'
+    size = np.sqrt(abs(np.trace(state[n:, :n])) / n) or 1.0  # 0 of what nothing holds
+    scale = np.concatenate([np.ones(n), np.full(n, size)])  # balances q against q'
     value, vectors = np.linalg.eig(state * scale / scale[:, None])
     return value, Block(own, vectors * scale[:, None], inverse)
 
@@ -152,7 +153,7 @@ def modes(chain: RotorBase, linear: Matrices | None = None, highest: float = np.
     value, shapes = _below(linear, highest)
     shapes = shapes / shapes[np.argmax(np.abs(shapes), axis=0), np.arange(len(value))]
     every = np.concatenate([element_rows(chain, e) for e in chain.elements]) @ shapes
-    strain = np.array([_quadratic(part, e.stiffness) for part, e in zip(every.reshape(-1, 5, len(value)), chain.elements, strict=True)])
+    strain = np.array([_quadratic(part, e.stiffness) for part, e in zip(every.reshape(len(chain.elements), 5, len(value)), chain.elements, strict=True)])
     strain = strain / strain.sum(axis=0)
     names = [e.name for e in chain.elements]
     kind = kinds(linear, shapes)

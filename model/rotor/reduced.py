@@ -46,6 +46,7 @@ def _basis(linear: Matrices, rows: Array, highest: float, beyond: float, small: 
     root = np.sqrt(np.diag(linear.mass))
     squares, vectors = np.linalg.eigh((linear.stiffness + linear.stiffness.T) / 2 / np.outer(root, root))
     kept, stiffest = squares < (beyond * highest) ** 2, float(np.sqrt(squares[-1]))
+    kept[0] = True  # where there is none in the band and no force, something is left
     if kept.all():
         return np.asarray(vectors / root[:, None]), stiffest
     damping = vectors.T @ (linear.damping / np.outer(root, root)) @ vectors

@@ -101,6 +101,8 @@ def values_within(low: float, high: float) -> AfterValidator:
 
 def read_toml(file: Path) -> dict[str, Any]:
     """The tables of a TOML file; `BadInput` for what is none, or is written so that it cannot be read."""
+    if not file.is_file():  # a pipe would be waited for
+        raise BadInput(f"{file}: no such file")
     try:
         return tomllib.loads(file.read_text(encoding="utf-8"))
     except RecursionError:

@@ -44,6 +44,9 @@ class Read:
 
 def read(files: Sequence[Path], form: MappingForm, scene: Spindle | None, mapping: Path | None = None) -> Read:
     """Read every file as the mapping (`form`, of the file `mapping`) says; what it does not say is among the questions. Raises `BadInput` for damaged files."""
+    for f in files:
+        if not f.is_file():
+            raise BadInput(f"{f}: no such file")
     if len({f.resolve() for f in files}) < len(files):
         raise BadInput(f"{listed(f.name for f in files)}: a file is named twice")
     unused = [t.file for t in form.files if not any(fits(t, f) for f in files)]

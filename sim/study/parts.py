@@ -10,7 +10,7 @@ import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -62,6 +62,7 @@ class Folder:
         return found
 
 
+@cache
 def versions() -> dict[str, str]:
     """What numbers depend on beside the study: this program and the libraries that compute."""
     return {name: version(name) for name in ("thermospindle", "mujoco", "numpy", "scipy", "scikit-fem", "pyarrow")}

@@ -12,6 +12,7 @@ from thermospindle.model.errors import BadInput
 
 SEPARATORS = ("\t", ";", ",", None)  # None: any white space
 COMMENT = re.compile(r"^\s*(#|%|//|!)+\s?")
+LONGEST_HEADING = 200
 LARGEST_FILE = 400e6  # bytes
 
 
@@ -54,6 +55,8 @@ def read_table(file: Path) -> TextTable:
     heading = tuple(c.strip() for c in rows_above[-1]) if rows_above else unit
     if len(rows_above) > 1 and _are_units(rows_above[-1]):
         heading, unit = tuple(c.strip() for c in rows_above[-2]), heading
+    if (longest := max(map(len, (*heading, *unit)), default=0)) > LONGEST_HEADING:
+        raise BadInput(f"{file}: a heading of {longest} letters; at most {LONGEST_HEADING} are allowed")
     dtype = complex if any(isinstance(c, complex) for c in rows[0]) or any(isinstance(c, complex) for c in rows[-1]) else float
     try:
         values = np.array(rows, dtype)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from thermospindle.model.errors import BadInput
 from thermospindle.sim.campaign.uff import AXIS, FORCE, KINDS, STANDARD_ERROR, read_uff
 from thermospindle.sim.importing import units
 from thermospindle.sim.importing.files.labels import end
@@ -22,6 +23,16 @@ RATIO = {8: "m/N", 11: "(m/s)/N", 12: "(m/s^2)/N"}
 
 
 def from_uff(file: Path, settings: FileForm) -> Content:
+    """What a UFF file holds. Raises `BadInput` for one that is damaged."""
+    try:
+        return _from_uff(file, settings)
+    except BadInput:
+        raise
+    except (ValueError, KeyError, IndexError, TypeError, OverflowError, AttributeError) as error:  # sets whose numbers do not go together
+        raise BadInput(f"{file}: is damaged: its sets cannot be put together ({type(error).__name__}: {error})") from None
+
+
+def _from_uff(file: Path, settings: FileForm) -> Content:
     """The content of a UFF file. Raises `BadInput` for what is damaged; sets that are of no use here are named in the notes."""
     sets = read_uff(file, padded=True)
     system = next((s for s in sets if s["type"] == 164), None)

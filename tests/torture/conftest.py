@@ -1,0 +1,89 @@
+"""How many examples are tried, and what became of them: a few in every run of the tests, the same each time; as many as
+TORTURE_EXAMPLES says under `make torture`, others each time."""
+
+import os
+import signal
+from collections import Counter
+from contextlib import contextmanager
+
+import pytest
+from hypothesis import HealthCheck, Phase, settings
+
+from thermospindle.model.errors import BadInput, NoEquilibrium, NotConverged, OutsideRange
+
+if os.name == "nt":  # alarms, pipes and limits of memory are not there
+    collect_ignore_glob = ["test_*.py"]
+EXAMPLES = int(os.environ.get("TORTURE_EXAMPLES", "0"))
+FEW, SECONDS, BYTES = 6, 30, 8 << 30
+NAMED = (BadInput, NoEquilibrium, NotConverged, OutsideRange)
+COUNTS: dict[str, Counter] = {}
+
+settings.register_profile(
+    "torture",
+    max_examples=EXAMPLES or FEW,
+    derandomize=not EXAMPLES,
+    deadline=None,
+    database=None,
+    print_blob=True,
+    phases=(Phase.explicit, Phase.generate),  # an example as it is: to shrink one that takes long takes too long
+    suppress_health_check=list(HealthCheck),
+)
+settings.load_profile("torture")
+
+
+class Hangs(Exception):
+    """More than `SECONDS` for one example."""
+
+
+@contextmanager
+def outcome(what: str):
+    """Counts how the block ends; only well, or with a named error of one sentence, is let pass."""
+    count = COUNTS.setdefault(what, Counter())
+
+    def stop(number: int, frame: object) -> None:
+        raise Hangs(f"{what}: still running after {SECONDS} s")
+
+    before = signal.signal(signal.SIGALRM, stop)
+    signal.alarm(SECONDS)
+    try:
+        yield
+    except NAMED as error:
+        if not 0 < len(str(error).strip()) < 4000:
+            raise AssertionError("a named error says what is wrong, in a sentence") from error
+        count[type(error).__name__] += 1
+    except BaseException:
+        count["other"] += 1
+        raise
+    else:
+        count["result"] += 1
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def bounded(tmp_path_factory):
+    """Nothing may ask for all memory there is; what is computed of random machines does not fill the user's cache."""
+    import resource
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    if EXAMPLES:
+        resource.setrlimit(resource.RLIMIT_AS, (BYTES, hard))
+    kept = os.environ.get("THERMOSPINDLE_CACHE")
+    os.environ["THERMOSPINDLE_CACHE"] = str(tmp_path_factory.mktemp("cache"))
+    yield
+    os.environ.pop("THERMOSPINDLE_CACHE")
+    if kept is not None:
+        os.environ["THERMOSPINDLE_CACHE"] = kept
+    if EXAMPLES:
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+
+
+def pytest_terminal_summary(terminalreporter):
+    if not EXAMPLES:
+        return
+    terminalreporter.section("torture")
+    for what, count in sorted(COUNTS.items()):
+        told = ", ".join(f"{number} {name}" for name, number in count.most_common())
+        terminalreporter.write_line(f"{what:26} {sum(count.values()):7} examples: {told}")
+    terminalreporter.write_line(f"{'all':26} {sum(sum(c.values()) for c in COUNTS.values()):7} examples")

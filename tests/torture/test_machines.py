@@ -1,0 +1,109 @@
+"""Random machines at random conditions: a result that keeps the laws of mechanics, or a named error."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+
+from tests.torture.conftest import EXAMPLES, outcome
+from tests.torture.machines import Moved, conditions, expansions, moved, rotors, stub
+from thermospindle.model.machine import Condition
+from thermospindle.model.rotor.modes import modes
+from thermospindle.model.rotor.static import static
+from thermospindle.model.scene.reading import build
+from thermospindle.model.units import RPM
+from thermospindle.sim.operating import operating_point
+
+HERE = Path("random") / "spindle.toml"  # serves messages only
+
+
+def symmetric(matrix, within):
+    size = np.sqrt(np.abs(np.outer(np.diag(matrix), np.diag(matrix)))).max()
+    return np.abs(matrix - matrix.T).max() <= within * max(size, np.abs(matrix).max(), 1e-300)
+
+
+def keeps_the_laws(point):
+    """Invariants of any spindle at any condition."""
+    spindle, state, linear = point.spindle, point.state, point.linear
+    for matrix in (linear.mass, linear.damping, linear.stiffness):
+        assert np.all(np.isfinite(matrix))
+    assert symmetric(linear.mass, 1e-12), "mass"
+    for b in state.all_bearings:
+        assert np.all(np.isfinite(b.stiffness))
+        assert symmetric(b.stiffness, 1e-6 if spindle.ball_inertia and point.condition.speed else 1e-9), "stiffness of a bearing"
+    assert symmetric(linear.stiffness, 1e-6), "stiffness"
+    for b in state.bearings:
+        assert b.deformation >= 0 or not b.in_contact
+        assert np.isfinite([b.preload, b.contact_angle, b.deformation, b.contact_force]).all()
+    own = modes(point.chain, linear, 2 * spindle.hammer.band[1])
+    for m in own:
+        assert np.isfinite(m.frequency)
+        assert m.frequency > 0
+        assert np.isfinite(m.damping_ratio)
+        assert abs(sum(m.energy.values()) - 1) < 1e-9, "energy"
+        assert np.all(np.isfinite(m.shape))
+    return own
+
+
+def reciprocal(point, frequency):
+    """H_ij at one sense of rotation is H_ji at the other; at rest, of one and the same matrix."""
+    if any(np.any(b.damping != b.damping.T) for b in point.state.all_bearings):
+        return
+    w = 2 * np.pi * frequency
+    linear = point.linear
+    dynamic = linear.stiffness + 1j * w * linear.damping - w**2 * linear.mass
+    back = linear.stiffness + 1j * w * linear.damping.T - w**2 * linear.mass
+    if np.linalg.cond(dynamic) < 1e10:
+        a, b = np.linalg.inv(dynamic), np.linalg.inv(back).T
+        assert np.abs(a - b).max() <= 1e-4 * np.abs(a).max(), "reciprocity"
+
+
+def balanced(point):
+    """The axial forces of all ball rows on a rigid rotor, and the load on it, are in balance; springs bear what they bear."""
+    spindle, state = point.spindle, point.state
+    if len(spindle.bearings) < 2 or any(s.spring is not None for s in spindle.sets) or point.condition.speed:
+        return
+    senses = [b.sense for b in spindle.bearings]
+    if len(set(senses)) < 2 or len({(b.inner_body, b.outer_body) for b in spindle.bearings}) > 1:
+        return
+    forces = np.array([s * b.preload for s, b in zip(senses, state.bearings, strict=True)])
+    assert abs(abs(forces.sum()) - abs(spindle.axial_load)) <= 1e-6 * max(np.abs(forces).max(), abs(spindle.axial_load), 1e-9), "axial balance"
+
+
+def checked(raw, condition, expansion=None):
+    spindle = build(raw, HERE)
+    point = operating_point(spindle, Condition(condition[0], condition[1] * RPM), expansion=expansion)
+    own = keeps_the_laws(point)
+    reciprocal(point, 1.1 * own[0].frequency if own else 100.0)
+    balanced(point)
+    return spindle, point
+
+
+NOTHING_HOLDS_A_TILT = Moved("grinding", ((("structure", "joints", 1, "tilt_stiffness_N_m_per_rad", 0), 0.0),))
+
+
+@given(moved(), conditions, expansions())
+@example(NOTHING_HOLDS_A_TILT, (20.0, 0.0), None)
+def test_a_machine_keeps_the_laws_or_is_refused(machine, condition, expansion):
+    with outcome("machines"):
+        spindle, point = checked(machine.raw(), condition, expansion)
+        assert np.all(np.isfinite(point.frf(np.linspace(*spindle.hammer.band, 7)))), "FRF"
+
+
+@pytest.mark.slow
+@settings(max_examples=max(2, EXAMPLES // 20))
+@given(moved(), conditions)
+def test_so_does_one_with_its_own_temperature_field(machine, condition):
+    with outcome("machines with a field"):
+        checked(machine.raw(), condition)
+
+
+@given(rotors(), conditions)
+@example(stub(), (20.0, 0.0))
+def test_a_rotor_keeps_the_laws_or_is_refused(raw, condition):
+    with outcome("rotors"):
+        spindle, point = checked(raw, condition)
+        for p in spindle.points[:2]:
+            answer = static(spindle, point.chain, p)
+            assert not answer.shares or abs(sum(answer.shares.values()) - 1) < 1e-9, "shares of the compliance"
