@@ -22,6 +22,7 @@ from thermospindle.diagnosis.misfit.patterns import Chosen, choose_for
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.parallel import in_parallel
 from thermospindle.model.types import Array
+from thermospindle.sim.campaign.beside import check_points
 from thermospindle.sim.campaign.campaign import Campaign, Noise, Test
 from thermospindle.sim.effects import CATALOGUE, of_scene, usable
 from thermospindle.sim.effects.effect import Effect
@@ -82,7 +83,8 @@ def diagnose(
 
 
 def campaign_data(spindle: Spindle, campaign: Campaign, progress: Callable[[str], None] = lambda done: None) -> CampaignModel:
-    """The model of a campaign beside the data of all its tests."""
+    """The model of a campaign beside the data of all its tests; BadInput for points on bodies that the scene has not."""
+    check_points(spindle, campaign)
     noise = expected_noise(spindle)
     data = in_parallel(partial(_data, campaign.noise, noise), campaign.tests, done=lambda d: progress(f"{d.test.id} read"))
     return campaign_model(spindle, campaign, data)

@@ -19,10 +19,9 @@ from thermospindle.diagnosis.data.observe import Observation, observe
 from thermospindle.diagnosis.prediction.modes import Predicted, predict
 from thermospindle.diagnosis.prediction.partners import BELIEVABLE, crossings, expected_shapes, group, numbered, partners
 from thermospindle.diagnosis.prediction.temperature import temperature_slope, whitened, with_temperature
-from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array, ComplexArray, Integers
-from thermospindle.sim.campaign.beside import beside, measured_at
+from thermospindle.sim.campaign.beside import beside, check_points, measured_at
 from thermospindle.sim.campaign.campaign import Campaign, Test
 from thermospindle.sim.effects import of_scene
 
@@ -128,13 +127,7 @@ def compare(
 
     Raises `BadInput` for points on bodies the scene has not.
     """
-    for point in campaign.points:
-        bodies = [b.name for b in spindle.structure.bodies]
-        if point.body not in bodies:
-            raise BadInput(
-                f"{campaign.folder or campaign.title}: points.{point.node}.body = {point.body!r}: "
-                f"no body of scene {spindle.name}; allowed are {', '.join(bodies)}"
-            )
+    check_points(spindle, campaign)
     observed = observe(campaign, spindle, progress) if observations is None else observations
     predicted = [_as_measured(spindle, campaign, o) for o in observed]
     chosen = [partners(o, p) for o, p in zip(observed, predicted, strict=True)]

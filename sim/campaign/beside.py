@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition, Point, Spindle
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.campaign.campaign import Campaign, Test
@@ -32,6 +33,20 @@ class Beside:
         s = 2j * np.pi * frequency + self.test.window_decay
         value = self.point.frf(frequency, self.test.window_decay) * s ** POWER[self.measured.quantity]
         return np.asarray(value[: len(self.measured.response_nodes)], complex)
+
+
+def check_points(spindle: Spindle, campaign: Campaign) -> None:
+    """Raises `BadInput` for a campaign with a point on a body that the scene has not."""
+    bodies = {b.name for b in spindle.structure.bodies}
+    for point in campaign.points:
+        if point.body not in bodies:
+            shafts = spindle.structure.shafts
+            whole = sorted(bodies - {name for s in shafts for name in s.bodies})
+            allowed = [*whole, *(f"{s.bodies[0]} to {len(s.bodies) - 1}" for s in shafts)]
+            raise BadInput(
+                f"{campaign.folder or campaign.title}: points.{point.node}.body = {point.body!r}: "
+                f"no body of scene {spindle.name}; allowed are {', '.join(allowed)}"
+            )
 
 
 def measured_at(spindle: Spindle, points: tuple[Point, ...], frf: Frf | None) -> Spindle:
