@@ -197,8 +197,10 @@ def command_line() -> str:
         for action in verb._actions:
             if action.option_strings and action.dest not in ("help", "json", "out"):
                 lines.append(f"| `{action.option_strings[-1]}` | {(action.help or '').replace('|', '/')} |")
-        if keys_ := answers.get(name):
-            lines += ["", "Answer of `--json`:", "", "| key | what it is |", "|---|---|", *(f"| `{k}` | {v} |" for k, v in keys_.items())]
+        for form, keys_ in answers.items():
+            if form == name or form.startswith(f"{name},"):
+                head = "Answer of `--json`" + form.removeprefix(name) + (", in addition" if ", and " in form else "")
+                lines += ["", f"{head.replace(', and ', ' ')}:", "", "| key | what it is |", "|---|---|", *(f"| `{k}` | {v} |" for k, v in keys_.items())]
         lines.append("")
     return "\n".join(lines)
 

@@ -17,6 +17,7 @@ from tornado.websocket import websocket_connect
 
 from tests.conftest import ROOT, SCENE
 from tests.report.browser import Browser, installed, until
+from tests.test_site import ANSWERS
 from thermospindle.cli import main
 
 CAMPAIGN = SCENE / "measured" / "jang_2003"
@@ -68,7 +69,7 @@ def upgraded(address, origin):
 
 
 def test_it_tells_address_token_and_process(served):
-    assert set(served) == {"address", "token", "pid", "out", "warnings"}
+    assert set(served) == {*ANSWERS["workbench"], "warnings"}
     assert re.fullmatch(rf"http://127\.0\.0\.1:\d+/{served['token']}/", served["address"])
     assert len(served["token"]) == 48
     os.kill(served["pid"], 0)
