@@ -3,9 +3,17 @@
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+LONGEST = 3000  # letters of a message
+
 
 class BadInput(ValueError):
-    """A file, key, value or option that cannot be used; the message names it and says what is allowed."""
+    """A file, key, value or option that cannot be used; the message names it and says what is allowed.
+
+    What a damaged file makes endless is told by its beginning and its end.
+    """
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(message if len(message) <= LONGEST else f"{message[: LONGEST // 2]} ... {message[-LONGEST // 3 :]}")
 
 
 class Unanswered(BadInput):

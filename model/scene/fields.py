@@ -159,8 +159,11 @@ def _allowed_keys(form: Any, path: tuple[str | int, ...]) -> list[str]:
         if isinstance(part, int):
             continue
         fields = getattr(table, "model_fields", None)
-        table = _table_in(fields[part].annotation if fields and part in fields else get_args(table)[1])
-    return list(table.model_fields)
+        if fields and part in fields:
+            table = _table_in(fields[part].annotation)
+        elif len(inner := get_args(table)) > 1:  # a table by name; else the name of one of several forms that an entry may have
+            table = _table_in(inner[1])
+    return [field.alias or name for name, field in getattr(table, "model_fields", {}).items()]
 
 
 def _table_in(annotation: Any) -> Any:

@@ -28,6 +28,7 @@ import pyuff
 
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Point
+from thermospindle.model.types import Integers
 from thermospindle.sim.campaign.uff_frame import check_frame
 from thermospindle.sim.identification.frf import Frf
 
@@ -91,11 +92,18 @@ def read_uff(path: Path, padded: bool = False) -> list[dict[str, Any]]:
         if dataset == 58 and content.get("fp_format", 2) != 2:
             raise BadInput(f"{where}: floating point format {content['fp_format']}; only 2, IEEE 754, can be read")
         if dataset == 82:
-            content["nodes"] = content["nodes"][: content["n_nodes"]].astype(int)
+            content["nodes"] = _whole_numbers(where, content["nodes"][: content["n_nodes"]])
         if dataset == 15:
-            content |= {key: np.array(content[key], dtype=int) for key in ("node_nums", "def_cs", "disp_cs", "color")}
+            content |= {key: _whole_numbers(where, content[key]) for key in ("node_nums", "def_cs", "disp_cs", "color")}
         sets.append(content)
     return sets
+
+
+def _whole_numbers(where: str, values: Any) -> Integers:
+    numbers = np.asarray(values, float)
+    if not np.all(np.abs(numbers) < 2**31):
+        raise BadInput(f"{where}: a node, colour or coordinate system has a number beyond {2**31 - 1}, or none")
+    return numbers.astype(np.intp)
 
 
 def read_frf(path: Path, quantity: str, points: Sequence[Point]) -> Frf:

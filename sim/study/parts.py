@@ -88,7 +88,7 @@ def opened(path: Path, key: Mapping[str, Any], cases: int, chunk: int, schema: p
             write(file, json.dumps(told, indent=1))
         for name, value in _begun(file).items():
             if told.get(name) != value:
-                raise BadInput(f"--out {path}: was begun with another {name} ({_short(value)}, now {_short(told.get(name))}); name a new folder to begin anew")
+                raise BadInput(f"--out {path}: was begun with another {_short(name)} ({_short(value)}, now {_short(told.get(name))}); name a new folder to begin anew")
         (path / PARTS).mkdir(exist_ok=True)
         yield Folder(path, cases, chunk, schema)
 
