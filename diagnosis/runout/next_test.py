@@ -35,12 +35,14 @@ TOLD = 0.01  # of all that tells, from which a line is
 
 @dataclass(frozen=True)
 class Plan:
-    """A runout test that could be made: probes at `nodes`, a record of `seconds`; `changed` is how it differs from the tests so far, in words."""
+    """A runout test that could be made: probes at `nodes`, a record of `seconds`; `changed` is how it differs from the tests so far, in words; `phased` whether
+    phases between probes are kept."""
 
     condition: Condition
     nodes: tuple[int, ...]
     seconds: float
     changed: str
+    phased: bool = True
 
 
 @dataclass(frozen=True)
@@ -109,10 +111,12 @@ def plans(spindle: Spindle, seen: Sequence[Seen], base: Seen) -> list[Plan]:
     for c in conditions:
         if (round(c.temperature, 1), round(c.speed, 1)) not in made:
             words = f"at {abs(c.speed) / RPM:.0f} rpm" if c.speed != at.speed else f"at {c.temperature:g} C"
-            found.append(Plan(c, record.nodes, record.length, words))
-    found.append(Plan(at, record.nodes, LONGER * record.length, f"with records {LONGER:g} times as long"))
+            found.append(Plan(c, record.nodes, record.length, words, base.phased))
+    found.append(Plan(at, record.nodes, LONGER * record.length, f"with records {LONGER:g} times as long", base.phased))
+    if not base.phased:
+        found.append(Plan(at, record.nodes, record.length, "with the phases of all probes"))
     further = [p for p in spindle.points if p.node not in record.nodes]
-    return found + [Plan(at, (*record.nodes, p.node), record.length, f"with a probe at node {p.node} too") for p in further]
+    return found + [Plan(at, (*record.nodes, p.node), record.length, f"with a probe at node {p.node} too", base.phased) for p in further]
 
 
 def named(first: Explanation, second: Explanation) -> tuple[str, str]:
@@ -132,7 +136,7 @@ def named(first: Explanation, second: Explanation) -> tuple[str, str]:
 
 def _families(spindle: Spindle, plan: Plan, like: Seen, points: Sequence[Point]) -> list[Family]:
     """The lines of a planned test with probes as good as those of an earlier one."""
-    seen = expected(spindle, plan.condition, plan.nodes, plan.seconds, like)
+    seen = replace(expected(spindle, plan.condition, plan.nodes, plan.seconds, like), phased=plan.phased)
     return families([seen], sources(spindle, [seen], points))
 
 

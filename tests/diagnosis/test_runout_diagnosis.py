@@ -160,6 +160,8 @@ def test_amplitudes_without_phases_name_the_effect_but_not_the_sense_of_its_whir
     ]
     assert {(v["multiple"], v["ring"], v["bearing"]) for v in near} == {(1, 0, 1)}
     assert {v["offset"] for v in near} == {-1, 1}
+    (test,) = [t for t in d.next if set(t.separates) == {"race_waviness (offset -1)", "race_waviness (offset 1)"}]
+    assert test.plan.changed == "with the phases of all probes"
 
 
 def test_a_contact_angle_a_little_off_is_found_from_the_record(spindle) -> None:
