@@ -29,6 +29,11 @@ _last: tuple[int, float] = (0, 0.0)  # how many workers were last at work, until
 _inside = False  # this process is a worker
 
 
+def cores() -> int:
+    """Processor cores that this process may use."""
+    return int(cpu_count())
+
+
 def in_parallel(
     function: Callable[[Item], Result],
     items: Iterable[Item],
@@ -46,7 +51,7 @@ def in_parallel(
     Within a worker nothing is parallel.
     """
     waiting, results = list(items), list[Result]()
-    workers = min(workers or cpu_count(), len(waiting))
+    workers = min(workers or cores(), len(waiting))
     patience = 0.0 if _running(workers) else START
     began = time.perf_counter()
     while waiting and (workers < 2 or _inside or len(waiting) == 1 or time.perf_counter() - began < patience):

@@ -3,8 +3,7 @@
 =========  ========================================================================================================
 nuisance   build tolerances, measuring errors, and the model's own constant discrepancy
 model      residuals of every test in standard errors, with exact derivatives
-response   FRFs at the lines of a test, with what their derivatives need
-mode_residual  the residual of a table of modes
+response   FRFs at the lines of a test, with what their derivatives need; the residual of a table of modes
 prior      priors at reference widths, or at those learned
 mechanism  what an effect changes, and its law as a prior over conditions
 freeform   what would have to drift where nobody names a cause

@@ -16,9 +16,8 @@ import numpy as np
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.mode_table import ModeData
 from thermospindle.diagnosis.inference import nuisance as kinds_of
-from thermospindle.diagnosis.inference.mode_residual import mode_residual, partners
 from thermospindle.diagnosis.inference.nuisance import Nuisance, ReferenceModes, nuisances, reference_modes
-from thermospindle.diagnosis.inference.response import Linear, Products, Response, products, same_chain
+from thermospindle.diagnosis.inference.response import Linear, Products, Response, mode_residual, partners, products, same_chain
 from thermospindle.model.errors import NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Condition, RingMotion, Spindle
 from thermospindle.model.rotor.chain import Matrices, matrices

@@ -1,4 +1,4 @@
-"""FRFs of one test's linear model at the lines of its data, with what their derivatives need."""
+"""What one test's linear model says of its data: FRFs at its lines, with what their derivatives need, or the residual of its table of modes."""
 
 from __future__ import annotations
 
@@ -8,12 +8,15 @@ from functools import cached_property
 import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
+from thermospindle.diagnosis.data.mode_table import ModeData
 from thermospindle.model.rotor.chain import Matrices
-from thermospindle.model.rotor.modes import LARGE, poles
+from thermospindle.model.rotor.modes import LARGE, kinds, oscillating, poles
 from thermospindle.model.rotor.reduced import reduced
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.campaign.beside import POWER
 from thermospindle.sim.effects.effect import Measurement
+from thermospindle.sim.identification import pairing
+from thermospindle.sim.identification.pairing import ModeSet
 
 SILENT = 1e-6  # of a mode's answer, left at the end of a record
 EXACT = 1e-11  # of the largest singular value of a change: products that are left out
@@ -149,3 +152,25 @@ def same_chain(a: Measurement, b: Measurement) -> bool:
         a.decay == b.decay
         and all(np.array_equal(getattr(a, k), getattr(b, k)) for k in ("response_rows", "reference_rows", "gain", "delay"))
     )
+
+
+def partners(data: ModeData, linear: Linear):
+    """Poles of the model in order of frequency, and which of them is which measured mode: of its kind, near in ln frequency."""
+    p = poles(linear.matrices)
+    found = oscillating(p, 2.5 * float(data.frequency.max()))
+    frequency = np.abs(p.value[found]) / (2 * np.pi)
+    computed = ModeSet(frequency, kind=kinds(linear.matrices, p.right[:, found]))
+    partner = pairing.partners(ModeSet(data.frequency, kind=data.kind), computed, pairing.OF_A_TABLE)
+    if np.any(partner < 0):
+        raise ValueError("the model has fewer modes than the table")
+    return found, partner, p
+
+
+def mode_residual(data: ModeData, linear: Linear) -> Array:
+    found, partner, p = partners(data, linear)
+    pole = p.value[found][partner] - linear.chain.decay
+    frequency, damping = np.abs(pole) / (2 * np.pi), -pole.real / np.abs(pole)
+    known = np.isfinite(data.damping_sd)
+    by_frequency = np.log(frequency / data.frequency) / data.frequency_sd
+    by_damping = np.log(np.maximum(damping[known], 1e-9) / data.damping[known]) / data.damping_sd[known]
+    return np.concatenate([by_frequency, by_damping])

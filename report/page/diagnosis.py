@@ -18,7 +18,7 @@ from thermospindle.report.figures.diagnosis import figures
 from thermospindle.report.figures.runout_campaign import diagnosis_figures
 from thermospindle.report.page import runout_diagnosis
 from thermospindle.report.page.report import Section, page
-from thermospindle.report.text.diagnosis_words import plan_words
+from thermospindle.report.text.diagnosis.words import plan_words
 from thermospindle.report.typeset import figure, minus, prose, table, with_error
 
 CAPTIONS = {

@@ -3,7 +3,7 @@
 ================  ======================================================================================================
 compare           a comparison as JSON and in terminal tables
 effects           the catalogue of effects in words: the list, and one effect explained
-diagnosis         the diagnosis of a campaign, as JSON and for people
+diagnosis/        the diagnosis of a campaign, as JSON and in sentences
 grid              tables of the terminal, in as many pieces as its width asks for
 ladder_table      a ladder as JSON, and as the table that grows in the terminal
 ladder            what a ladder shows, in sentences with numbers

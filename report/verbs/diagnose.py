@@ -21,8 +21,8 @@ from thermospindle.model.machine import Spindle
 from thermospindle.model.scene.reading import content_hash
 from thermospindle.model.whole import whole
 from thermospindle.report.page.diagnosis import write_diagnosis
-from thermospindle.report.text.diagnosis import diagnosis_json
-from thermospindle.report.text.diagnosis_words import show_diagnosis
+from thermospindle.report.text.diagnosis.answer import diagnosis_json
+from thermospindle.report.text.diagnosis.words import show_diagnosis
 from thermospindle.report.text.runout_diagnosis import runout_diagnosis_json, show_runout_diagnosis
 from thermospindle.report.verbs.answer import Answer, answered, progress_bar, with_effects, write_json
 from thermospindle.sim.campaign.beside import left_out

@@ -15,7 +15,7 @@ from thermospindle.diagnosis.add import answer_of, fitted_values, read_answer
 from thermospindle.diagnosis.compare.before_after import without
 from thermospindle.model.errors import BadInput
 from thermospindle.model.scene.reading import content_hash
-from thermospindle.report.text.diagnosis import diagnosis_json
+from thermospindle.report.text.diagnosis.answer import diagnosis_json
 from thermospindle.report.workbench.bench import Bench
 from thermospindle.report.workbench.state import Setting, add_effect, set_deviation
 

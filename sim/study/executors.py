@@ -13,8 +13,6 @@ from importlib.util import find_spec
 from itertools import islice
 from typing import Any
 
-from loky import cpu_count
-
 from thermospindle.model import parallel
 from thermospindle.model.errors import BadInput
 
@@ -26,7 +24,7 @@ PATIENCE = 10  # s for a scheduler to answer
 
 def on_this_machine(function: Callable[[int], Any], numbers: Sequence[int], done: Callable[[int, Any], None]) -> None:
     """All cores of this machine (`model.parallel`)."""
-    for some in _batched(numbers, AHEAD * cpu_count()):
+    for some in _batched(numbers, AHEAD * cores()):
         parallel.in_parallel(partial(_numbered, function), some, done=lambda result: done(*result))
 
 

@@ -27,7 +27,7 @@ from tests.blind.world import Made, Plan, World, campaign, described, plans, vis
 from thermospindle.diagnosis.verdict import diagnose
 from thermospindle.model.machine import Spindle
 from thermospindle.model.scene.reading import load
-from thermospindle.report.text.diagnosis import diagnosis_json
+from thermospindle.report.text.diagnosis.answer import diagnosis_json
 from thermospindle.sim.effects import CATALOGUE, usable
 
 ROOT = Path(__file__).parents[2]

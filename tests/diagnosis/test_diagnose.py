@@ -9,7 +9,7 @@ from tests.conftest import DATA
 from thermospindle.diagnosis.inference.verdict import conditions_of
 from thermospindle.diagnosis.verdict import diagnose
 from thermospindle.model.machine import Condition
-from thermospindle.report.text.diagnosis import diagnosis_json
+from thermospindle.report.text.diagnosis.answer import diagnosis_json
 from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Test, read_campaign
 from thermospindle.sim.effects import by_name
 from thermospindle.sim.operating import operating_point

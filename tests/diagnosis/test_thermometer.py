@@ -9,7 +9,7 @@ from scipy.optimize import minimize_scalar
 from thermospindle.diagnosis.compare.compare import compare
 from thermospindle.diagnosis.data.observe import FREQUENCY_FLOOR, Observation
 from thermospindle.diagnosis.prediction.modes import predict
-from thermospindle.diagnosis.prediction.temperature import squares, temperature_slope, with_temperature
+from thermospindle.diagnosis.prediction.temperature import temperature_slope, whitened, with_temperature
 from thermospindle.model.machine import Condition
 from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Test
 from thermospindle.sim.operating import operating_point
@@ -35,6 +35,11 @@ def test_slope_is_that_of_the_modes(spindle, temperature):
     assert found == pytest.approx(expected, rel=0.05)
     assert found[2] == pytest.approx(expected[2], rel=0.02)
     assert len(slope) == 2 * len(p.frequency)
+
+
+def squares(difference, covariance):
+    left = whitened(difference, covariance)
+    return float(left @ left)
 
 
 def test_squares_are_those_of_the_best_offset():

@@ -26,8 +26,8 @@ from thermospindle.model.tolerance import toleranced
 from thermospindle.model.units import RPM
 from thermospindle.report.figures.diagnosis import errors, explanations, law
 from thermospindle.report.page.diagnosis import sections, write_diagnosis
-from thermospindle.report.text.diagnosis import diagnosis_json
-from thermospindle.report.text.diagnosis_words import show_diagnosis
+from thermospindle.report.text.diagnosis.answer import diagnosis_json
+from thermospindle.report.text.diagnosis.words import show_diagnosis
 from thermospindle.report.text.runout_diagnosis import runout_diagnosis_json
 from thermospindle.sim.campaign.simulated import runout_campaign
 from thermospindle.sim.effects import CATALOGUE, by_name, of_scene

@@ -20,7 +20,7 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Addition, Condition
 from thermospindle.model.rotor.chain import matrices
 from thermospindle.model.scene.reading import load
-from thermospindle.report.text.diagnosis import diagnosis_json
+from thermospindle.report.text.diagnosis.answer import diagnosis_json
 from thermospindle.sim.effects import CATALOGUE, by_name, of_scene, own_effects, resolved
 from thermospindle.sim.effects import own as effect_file
 from thermospindle.sim.effects.effect import Effect

@@ -397,13 +397,6 @@ def test_what_cannot_be_used_is_one_sentence(options, words, capsys):
     assert len(told.splitlines()) == 1
 
 
-def test_the_speed_must_be_given(capsys):
-    with pytest.raises(SystemExit) as stopped:
-        main(["runout", str(SCENE)])
-    assert stopped.value.code == 2
-    assert "--speed" in capsys.readouterr().err
-
-
 def test_a_spindle_without_sections_to_look_at_is_refused(spindle):
     bodies = tuple(replace(b, regions=()) if b.turns else b for b in spindle.structure.bodies)
     with pytest.raises(BadInput, match="turning body made of section regions"):

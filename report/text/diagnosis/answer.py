@@ -12,7 +12,7 @@ from thermospindle.diagnosis.inference.mechanism import Mechanism
 from thermospindle.diagnosis.inference.verdict import Candidate
 from thermospindle.diagnosis.verdict import Diagnosis, Drift
 from thermospindle.model.types import Array
-from thermospindle.report.text.diagnosis_words import condition, drift_words, law_words, would_change
+from thermospindle.report.text.diagnosis.words import condition, drift_words, law_words, would_change
 
 SHOWN = 12  # candidates
 def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
