@@ -40,7 +40,7 @@ def test_a_new_scene_has_its_name(scenes: Path, kind: str) -> None:
     assert f'title = "my {kind}"' in (scenes / kind / "spindle.toml").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("verb", ["modes", "static", "table", "map", "runout"])
+@pytest.mark.parametrize("verb", ["modes", "static", "table", pytest.param("map", marks=pytest.mark.slow), "runout"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_new_scene_runs(scenes: Path, kind: str, verb: str, capsys: pytest.CaptureFixture[str]) -> None:
     more = {

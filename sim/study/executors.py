@@ -24,7 +24,7 @@ PATIENCE = 10  # s for a scheduler to answer
 
 def on_this_machine(function: Callable[[int], Any], numbers: Sequence[int], done: Callable[[int, Any], None]) -> None:
     """All cores of this machine (`model.parallel`)."""
-    for some in _batched(numbers, AHEAD * cores()):
+    for some in _batched(numbers, AHEAD * parallel.cores()):
         parallel.in_parallel(partial(_numbered, function), some, done=lambda result: done(*result))
 
 

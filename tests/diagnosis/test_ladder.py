@@ -368,6 +368,7 @@ def test_picture_and_report_section_name_every_step(virtual, tmp_path):
     assert "as drawn" in html
 
 
+@pytest.mark.slow
 def test_json_of_the_command(capsys, tmp_path):
     out = tmp_path / "climbed"
     campaign = str(SCENE / "measured" / "jang_2003")

@@ -203,6 +203,7 @@ def test_the_scene_that_made_the_records_agrees_with_them_and_another_does_not(s
         assert part.measured > 2 * part.measured_rms
 
 
+@pytest.mark.slow
 def test_command_line_from_hidden_effect_to_error_that_falls(spindle, tmp_path, capsys) -> None:
     made = hidden(spindle, {"race_waviness": HIDDEN["race_waviness"]}, 1)
     write_campaign(made, tmp_path / "c")

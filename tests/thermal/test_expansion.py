@@ -30,6 +30,7 @@ def fine(spindle):
     return influence(spindle, tolerance=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", PARTS)
 def test_self_refined_mesh_is_as_good_as_it_says(spindle, fine, part):
     """The estimate bounds the true error, taken from a mesh ten times better, and is not a wild overestimate."""

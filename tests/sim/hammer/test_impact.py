@@ -71,6 +71,7 @@ def test_frf_against_the_linear_model(spindle, quick, temperature, speed):
     assert error(test, exact_frf(test)) < folded(quick.step) < 3e-3
 
 
+@pytest.mark.slow
 def test_the_error_falls_as_the_square_of_the_step(spindle, quick):
     """What is left are images of the held force: a quarter at half the step, whatever the sampling rate and the length of the record."""
     point = operating_point(spindle, Condition(20.0))

@@ -22,6 +22,7 @@ def test_a_cubic_difference_is_met_where_it_is_zero():
     assert straight.frequency == pytest.approx(900.0 + 3.0 * zero - 0.2 * zero**2, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_crossings_of_a_flexible_spindle(monkeypatch):
     """With few found exactly the others stand as interpolated; both ways agree, on a grid of 700 rpm and 10 K."""
     spindle = load(ROOT / "scenes" / "five_bearing")
