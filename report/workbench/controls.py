@@ -27,7 +27,7 @@ STEPS = 400  # of a slider, about
 WIDE: Any = {"sizing_mode": "stretch_width"}
 LOOK = """
 :host { color: var(--ink); font: inherit; }
-label, .bk-input-group, .bk-slider-title, .bk-slider-value { color: var(--ink); font-size: 0.92rem; overflow-wrap: anywhere; }
+label, .bk-input-group, .bk-slider-title, .bk-slider-value { color: var(--ink); font-size: 0.92rem; }
 .bk-input { color: var(--ink); background: var(--paper); border: 1px solid var(--soft); min-height: 2.1rem; }
 .bk-btn { color: var(--ink); background: var(--shade); border: 1px solid var(--soft); min-height: 2.1rem; }
 .bk-btn:hover { background: var(--line); }

@@ -91,7 +91,7 @@ class Page:
         self.explanation = Select(title="Explanation", options=[], name="explanation", **look, **WIDE)
         self.take = Button(label="Take in its values", name="take", disabled=True, **look, **WIDE)
         self.diagnose = Button(label="Diagnose (a minute or more)", name="diagnose", disabled=self.bench.campaign is None, **look, **WIDE)
-        self.name = TextInput(title=f"Folder in {self.out}", value="mine", name="name", **look, **WIDE)
+        self.name = TextInput(title=f"Folder in {self.out.name}", value="mine", name="name", **look, **WIDE)
         self.save = Button(label="Save scene, report and script" if self.bench.campaign else "Save scene and script", name="save", **look, **WIDE)
         self.halt = Button(label="Stop", name="halt", width=80, visible=False, html_attributes=labelled("stop the work in the background"), **look)
         self.short, self.status, self.ladder, self.reasons, self.numbers, self.message = (
