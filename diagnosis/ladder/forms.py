@@ -60,7 +60,7 @@ def _held_axially(spindle: Spindle, condition: Condition, values: Values, state:
     if share == 0.0:
         return state
     bearings = tuple(_held(spindle, spindle.bearing(b.name), b, share) for b in state.bearings)
-    return PairState(state.condition, bearings, (1 - share) * state.hub_movement, contact_status(bearings))
+    return replace(state, bearings=bearings, hub_movement=(1 - share) * state.hub_movement, status=contact_status(bearings))
 
 
 def _held(spindle: Spindle, drawing: Bearing, b: BearingState, share: float) -> BearingState:

@@ -20,7 +20,7 @@ from thermospindle.diagnosis.ladder.forms import FIXED_STIFFNESS, FORMS, RADIAL_
 from thermospindle.diagnosis.ladder.ladder import CLEAR, DISCREPANCY, TOLERANCES, conditions, ladder, named_by
 from thermospindle.diagnosis.ladder.step import as_drawn
 from thermospindle.diagnosis.verdict import campaign_data
-from thermospindle.model.bearing.pair import reference_motion, solve
+from thermospindle.model.bearing.pair import PairState, reference_motion, solve
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Addition, Condition
 from thermospindle.model.units import RPM
@@ -77,6 +77,12 @@ def test_outer_race_moved_outward_at_fixed_axial_position(spindle, outward_um, p
     assert held.bearing("lower").preload == pytest.approx(spindle.sets[0].preload, rel=1e-9)
     assert state.bearing("upper").preload == pytest.approx(state.bearing("lower").preload, rel=1e-9)
     assert state.bearing("upper").preload > 1.02 * preload
+
+
+def test_a_form_keeps_bearings_that_it_does_not_change(spindle):
+    """Those given by numbers, and rollers: a form of ball rows leaves them where they are."""
+    state = PairState(Condition(20.0), (), 0.0, "in contact", linear=("a row of rollers",))  # type: ignore[arg-type]
+    assert RADIAL_EXPANSION.pair(spindle, Condition(20.0), {"share": 1.0}, state).linear == state.linear
 
 
 def test_radial_expansion_keeps_the_axial_distance_and_grows_radially(spindle):
