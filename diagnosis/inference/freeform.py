@@ -13,7 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from thermospindle.diagnosis.inference.fit import Problem
 from thermospindle.diagnosis.inference.mechanism import Mechanism
+from thermospindle.diagnosis.inference.model import CampaignModel
 from thermospindle.model.bearing.pair import PairState
 from thermospindle.model.machine import MOVES, Condition, RingMotion, Spindle
 from thermospindle.model.rotor.chain import RotorBase
@@ -24,6 +26,7 @@ from thermospindle.sim.effects.effect import Effect, Parameter, Values
 
 STIFFNESS_WIDTH, DAMPING_WIDTH, PRELOAD_WIDTH = 3.0, 20.0, 5.0  # %
 RING_WIDTH = 0.2  # um
+ALIKE = 2e-4  # of the squares of what an effect moves, that a free form which is its own change may leave
 OF_BEAMS: list[tuple[str, tuple[int, ...]]] = [("axial", (2,)), ("shear", (0, 1)), ("bending", (3, 4))]
 """What each stiffness of a beam element resists, as its moves are told in `model.rotor.beam`."""
 
@@ -127,6 +130,22 @@ def _moved(names: list[str], coordinate: str):
 
 def _preloaded(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
     return scaled_preload(spindle, _factor(values))
+
+
+def alike(model: CampaignModel, x: Array, free: Mechanism, named: Mechanism) -> bool:
+    """Whether a free form changes what an effect of the catalogue changes, whatever the law: whether in every test the two move all lines in the same
+    direction, to `ALIKE` of their squares. `x` (P,) are the nuisances where that is asked."""
+    apart = whole = 0.0
+    columns = []
+    for m in (free, named):
+        at = [(m.effect, m.values(m.size.neutral, [q.neutral for q in m.shape]))]
+        columns.append([Problem(model, (m,)).by_size(t, x, at, 0) for t in range(len(model.tests))])
+    for of_free, of_named in zip(*columns, strict=True):
+        square, other = float(of_named @ of_named), float(of_free @ of_free)
+        if square > 0:
+            whole += square
+            apart += square - (float(of_free @ of_named) ** 2 / other if other else 0.0)
+    return whole > 0 and apart < ALIKE * whole
 
 
 def drifting(

@@ -7,14 +7,15 @@ to fit what they cannot. What falls behind there is not fitted further (successi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 
 from thermospindle.diagnosis.inference.evidence import Evidence, evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, Problem, fit
+from thermospindle.diagnosis.inference.freeform import alike
 from thermospindle.diagnosis.inference.mechanism import Mechanism
 from thermospindle.diagnosis.inference.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.prior import DRIFTING, Learned, steady
@@ -61,12 +62,14 @@ class Hypothesis:
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """Everything tried: the model without effects, all hypotheses with the best first, and what screening said."""
+    """Everything tried: the model without effects, all hypotheses with the best first, what screening said, and which effects of the catalogue
+    are a free form's own change with a law."""
 
     model: CampaignModel
     base: Hypothesis
     hypotheses: tuple[Hypothesis, ...]
     screened: tuple[Screened, ...]
+    alike: Mapping[str, frozenset[str]] = field(default_factory=dict)
 
 
 def search(
@@ -97,7 +100,14 @@ def search(
     settled = dict(zip(map(id, finalists), in_parallel(partial(_settled, model), finalists, workers), strict=True))
     ranked = [replace(settled[id(h)], fit=replace(settled[id(h)].fit, mechanisms=h.mechanisms)) if id(h) in settled else h for h in [*singles, *pairs]]
     progress("the best fitted anew")
-    return Search(model, none, tuple(sorted([none, *ranked], key=lambda h: -h.evidence.ln)), tuple(looked))
+    hypotheses = tuple(sorted([none, *ranked], key=lambda h: -h.evidence.ln))
+    return Search(model, none, hypotheses, tuple(looked), _alike(model, none.fit.nuisance, hypotheses))
+
+
+def _alike(model: CampaignModel, x: Array, hypotheses: Sequence[Hypothesis]) -> dict[str, frozenset[str]]:
+    """Of every free form in a hypothesis the effects in others that change the same."""
+    every = {m.name: m for h in hypotheses for m in h.mechanisms}
+    return {f.name: frozenset(m.name for m in every.values() if not m.free and alike(model, x, f, m)) for f in every.values() if f.free}
 
 
 @dataclass(frozen=True, eq=False)

@@ -87,7 +87,7 @@ def decide(found: Search) -> Verdict:
         free = tuple(sorted(free, key=lambda c: -c.probability))
         none = 0.0
     unknown = sum(c.probability for c in free)
-    word, effects, losses = _least_loss(candidates, none, free)
+    word, effects, losses = _least_loss(candidates, none, free, found.alike)
     accepted = _accepted(found, word, effects, candidates, free)
     groups = conditions_of(found)
     before = left_out(found.model, found.base.fit, found.base.evidence, groups)
@@ -169,18 +169,24 @@ def _mostly_named(c: Candidate, alone: Mapping[frozenset[str], float]) -> bool:
     return max((gain for names, gain in alone.items() if names <= own), default=-np.inf) > MOSTLY * c.delta_evidence
 
 
-def _least_loss(candidates: Sequence[Candidate], none: float, free: Sequence[Candidate]) -> tuple[str, Names, dict[str, float]]:
+def _least_loss(
+    candidates: Sequence[Candidate], none: float, free: Sequence[Candidate], alike: Mapping[str, frozenset[str]]
+) -> tuple[str, Names, dict[str, float]]:
     unknown = [c for c in free if all(m.free for m in c.hypothesis.mechanisms)]  # also the model whose every mode drifts
     beside = [c for c in free if not all(m.free for m in c.hypothesis.mechanisms)]  # a named effect and something unknown
     something = 1 - none
     losses: dict[str, float] = {"none": MISSED * something}
     answers: dict[str, tuple[str, Names]] = {"none": ("none", ())}
-    p_unknown, p_beside = sum(c.probability for c in unknown), sum(c.probability for c in beside)
+    p_beside = sum(c.probability for c in beside)
     alone = {frozenset(c.names): c.delta_evidence for c in candidates}
+
+    def missed(own: set[str], at_worst: float) -> float:
+        """Of names where something unknown is true: half right where it changes what they change, by another law."""
+        return sum(c.probability * (HALF if any(own & alike.get(n, frozenset()) for n in c.names) else at_worst) for c in unknown)
 
     def named_loss(own: set[str]) -> float:
         """Of naming one effect, or two: half right where one of two is named, or one beside something unknown."""
-        loss = FALSE_ALARM * none + WRONG * p_unknown
+        loss = FALSE_ALARM * none + missed(own, WRONG)
         for c in candidates:
             hit = own & set(c.names)
             loss += c.probability * (0.0 if own == set(c.names) else HALF if hit else WRONG)
@@ -206,7 +212,8 @@ def _least_loss(candidates: Sequence[Candidate], none: float, free: Sequence[Can
         half = sum(c.probability for c in chosen if c.free)
         outside = sum(c.probability for c in explained) - share - half
         key = "one of " + ", ".join(names)
-        losses[key] = FALSE_ALARM * none + SET * share * (1 + 0.1 * max(len(names) - 3, 0)) + HALF * half + (SET + MISSED) * (outside + p_unknown)
+        losses[key] = FALSE_ALARM * none + SET * share * (1 + 0.1 * max(len(names) - 3, 0)) + HALF * half
+        losses[key] += (SET + MISSED) * outside + missed(set(names), SET + MISSED)
         answers[key] = ("ambiguous", names)
     losses["unexplained"] = FALSE_ALARM * none + SET * 2 * sum(c.probability for c in candidates) + SET * p_beside
     answers["unexplained"] = ("unexplained", ())

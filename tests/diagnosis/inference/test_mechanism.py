@@ -7,7 +7,7 @@ import pytest
 
 from tests.virtual_campaign import mode_campaign, model_of, virtual_campaign
 from thermospindle.diagnosis.inference.fit import Problem
-from thermospindle.diagnosis.inference.freeform import free_forms
+from thermospindle.diagnosis.inference.freeform import alike, free_forms
 from thermospindle.diagnosis.inference.mechanism import Mechanism, likeness, size_covariance, variants
 from thermospindle.diagnosis.inference.nuisance import RECORD
 from thermospindle.model.machine import Condition
@@ -82,6 +82,18 @@ def test_values_at_neutral_go_through_the_effect_unchanged(spindle, model):
             with_it = model.residual(t, np.zeros(len(model.parameters)), [(m.effect, m.values(0.0, []))])
             without = model.residual(t, np.zeros(len(model.parameters)), [])
             assert with_it == pytest.approx(without, abs=1e-6 * np.abs(without).max()), m.name
+
+
+@pytest.mark.parametrize(
+    ("form", "names"),
+    [("preload", {"preload_loss"}), ("mount axial stiffness", {"mount_compliance"}), ("bearings damping", {"grease_damping"}), ("flange damping", set())],
+)
+def test_a_free_form_is_alike_to_effects_that_change_the_same(spindle, model, form, names):
+    """Whatever their laws; an effect of the same bearings that changes them otherwise is another."""
+    free = next(m for m in free_forms(spindle) if m.name == form)
+    asked = ("preload_loss", "mount_compliance", "grease_damping", "clearance_opening", "soak_lag", "modulus_softening")
+    named = [v for e in usable(spindle) if e.name in asked for v in variants(e)]
+    assert {m.name for m in named if alike(model, np.zeros(len(model.parameters)), free, m)} == names
 
 
 @pytest.mark.parametrize("name", ["preload_loss", "lubricant_film", "thermal_gradient"])

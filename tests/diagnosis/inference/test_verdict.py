@@ -151,6 +151,20 @@ def test_a_set_holds_only_what_is_probable():
     assert (v.word, set(v.effects)) == ("ambiguous", {"left", "right"})
 
 
+@pytest.mark.parametrize(("own", "word"), [({"a"}, "identified"), ({"b"}, "unexplained"), (set(), "unexplained")])
+def test_a_free_form_of_the_same_change_is_no_other_name(own, word):
+    """An effect, and the same change by another law nearly as probable: its name is half right there, where any other would be wrong."""
+    found = replace(made({"a": 60.0, "~x": 59.95}), alike={"~x": frozenset(own)})
+    v = decide(found)
+    assert 0.1 < v.probability_unknown < 0.3
+    assert v.word == word
+
+
+def test_a_free_form_that_leads_clearly_is_unexplained_though_an_effect_changes_the_same():
+    found = replace(made({"a": 60.0, "~x": 66.0}), alike={"~x": frozenset({"a"})})
+    assert decide(found).word == "unexplained"
+
+
 def test_the_order_of_hypotheses_does_not_matter():
     search = made({"a": 12.0, "b": 11.0, "~x": 9.0, ("a", "c"): 10.0})
     turned = replace(search, hypotheses=search.hypotheses[::-1])
