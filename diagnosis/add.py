@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from thermospindle.model.errors import BadInput
+from thermospindle.model.files.formats import DIAGNOSIS, migrated
 from thermospindle.model.machine import Spindle
 from thermospindle.model.scene.reading import content_hash, load, scene_path
 from thermospindle.sim.campaign.form import toml
@@ -208,7 +209,7 @@ def read_answer(file: Path) -> Answer:
         raise BadInput(f"--from {file}: cannot be read: {error.strerror}") from None
     except (ValueError, RecursionError):
         raise BadInput(f"--from {file}: {NO_ANSWER}") from None
-    return answer_of(raw, f"--from {file}")
+    return answer_of(migrated(DIAGNOSIS, raw, f"--from {file}"), f"--from {file}")
 
 
 NO_ANSWER = "is not an answer of spindle diagnose --json, with candidates of effects and parameters"

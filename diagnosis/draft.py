@@ -17,6 +17,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from thermospindle.model.errors import BadInput
+from thermospindle.model.files.formats import DIAGNOSIS, migrated
 from thermospindle.model.types import Array
 
 REFERENCE = 20.0  # C at which laws are told
@@ -144,7 +145,7 @@ def _place(diagnosis: Path, element: str | None) -> Mapping[str, Any]:
     if not diagnosis.is_file():
         raise BadInput(f"{diagnosis}: cannot be read: no such file")
     try:
-        places = json.loads(diagnosis.read_text(encoding="utf-8"))["where"]
+        places = migrated(DIAGNOSIS, json.loads(diagnosis.read_text(encoding="utf-8")), diagnosis)["where"]
         found = [p for p in places if element is None or p["element"] == element]
         if found:
             unit = found[0]["unit"]

@@ -9,10 +9,10 @@ tolerance      the toleranced build parameters of a spindle
 imperfections  unbalance, waviness, ball sizes, cage unbalance
 drawn          plausible imperfections from a seed
 scene/         `spindle.toml`: its form, reading and checking
+files/         what all files share: formats and their migrations, cells of CSV files
 bearing/       contact, ball, row, sets; stiffness over temperature and speed; bearing frequencies
 rotor/         the section's masses, the rotor-base chain, modes and FRFs, and the same as a MuJoCo model
 sense          limits of sense of conditions and states: they warn
-cells          names and numbers as cells of a CSV file
 units          the units people write and read
 errors         what goes wrong in one sentence
 whole          files and folders that are written whole or not at all

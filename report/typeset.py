@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup, escape
 
-from thermospindle.model.cells import cells
+from thermospindle.model.files.cells import cells
 
 
 def minus(text: str) -> str:

@@ -13,6 +13,7 @@ from scipy.stats import chi2 as chi_squared
 
 from thermospindle.diagnosis.data.observe import Observation
 from thermospindle.model.errors import BadInput
+from thermospindle.model.files.formats import DIAGNOSIS, migrated
 from thermospindle.model.units import RPM
 from thermospindle.sim.identification.pairing import NEAREST, ModeSet, pairs
 
@@ -41,7 +42,7 @@ def outcomes(file: Path, observations: Sequence[Observation]) -> list[Outcome]:
     if not file.is_file():
         raise BadInput(f"--predictions {file}: cannot be read: no such file")
     try:
-        planned = json.loads(file.read_text(encoding="utf-8"))["next_test"]
+        planned = migrated(DIAGNOSIS, json.loads(file.read_text(encoding="utf-8")), f"--predictions {file}")["next_test"]
         rows = [(dict(p["condition"]), dict(p["predicted"])) for p in planned]
         return [
             _outcome(o, name, _table(modes))
@@ -52,6 +53,8 @@ def outcomes(file: Path, observations: Sequence[Observation]) -> list[Outcome]:
         ]
     except OSError as error:
         raise BadInput(f"--predictions {file}: cannot be read: {error.strerror}") from None
+    except BadInput:
+        raise
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
         raise BadInput(f"--predictions {file}: is not an answer of spindle diagnose --json with predictions in next_test") from None
 

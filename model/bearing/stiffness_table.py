@@ -13,8 +13,8 @@ import numpy as np
 import scipy
 
 from thermospindle.model.bearing.pair import BearingState, LinearState, PairState
-from thermospindle.model.cells import cell, name_of
 from thermospindle.model.errors import BadInput, OutsideRange
+from thermospindle.model.files.cells import cell, name_of
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 

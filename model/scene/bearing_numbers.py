@@ -9,8 +9,8 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, Strict, model_validator
 
-from thermospindle.model.cells import plain_number
 from thermospindle.model.errors import BadInput
+from thermospindle.model.files.cells import plain_number
 from thermospindle.model.scene.fields import Finite, NotNegative, Positive, Share, Table
 from thermospindle.model.units import RPM
 

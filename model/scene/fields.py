@@ -14,6 +14,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 
 from thermospindle.model import machine as m
 from thermospindle.model.errors import BadInput
+from thermospindle.model.files.formats import CURRENT, migrated
 
 LARGEST, SMALLEST = 1e15, 1e-15  # of any number of a file: products of a few stay within what can be computed with
 
@@ -83,6 +84,11 @@ def _constant(value: Any) -> Any:
     return value if isinstance(value, dict | LawTable) else {"temperature_C": [0.0], "value": [value]}
 
 
+def format_of(kind: str) -> Any:
+    """The type of the key `format` of a kind of file, once it is migrated."""
+    return Annotated[int, Field(ge=1, le=CURRENT[kind])]
+
+
 LawValue = Annotated[LawTable, BeforeValidator(_constant)]
 """A number, or a table of `temperature_C` and `value`."""
 
@@ -109,6 +115,12 @@ def read_toml(file: Path) -> dict[str, Any]:
         raise BadInput(f"{file}: its tables are nested too deep to be read") from None
     except ValueError as error:  # of TOML, of UTF-8, of numbers with thousands of digits
         raise BadInput(f"{file}: not a TOML file: {error}") from None
+
+
+def read_file(kind: str, file: Path) -> dict[str, Any]:
+    """The same in today's format of its kind (`model.files.formats`)."""
+    tables: dict[str, Any] = migrated(kind, read_toml(file), file)
+    return tables
 
 
 def first_error(where: str | Path, raw: Any, form: type[BaseModel], error: ValidationError) -> str:

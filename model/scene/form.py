@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 
 from thermospindle.model import machine as m
 from thermospindle.model.errors import BadInput
+from thermospindle.model.files.formats import CURRENT, SCENE
 from thermospindle.model.scene.bearings import BallRow, Bearing, BearingPair, BearingSet, Mounted, RollerRow, check_sets
 from thermospindle.model.scene.defaults import GENTLE, WARMER, assumed
 from thermospindle.model.scene.fields import (
@@ -26,6 +27,7 @@ from thermospindle.model.scene.fields import (
     Temperature,
     TemperatureSpan,
     first_error,
+    format_of,
 )
 from thermospindle.model.scene.imperfections import Imperfections
 from thermospindle.model.scene.measuring import HammerTest, Measuring, Point, assumed_points
@@ -73,6 +75,7 @@ class Build(Table):
 
 
 class Scene(Table):
+    format: format_of(SCENE) = CURRENT[SCENE]  # type: ignore[valid-type]
     title: Name
     reference_temperature_C: Temperature
     nominal_speed_rpm: Annotated[float, Field(ge=1e-3, le=1e8)] | None = None

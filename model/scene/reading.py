@@ -21,6 +21,7 @@ from thermospindle.model.bearing.catalogue import derived
 from thermospindle.model.bearing.pair import reference_motion, solve
 from thermospindle.model.drawn import GRADES, drawn
 from thermospindle.model.errors import BadInput
+from thermospindle.model.files.formats import KEY, SCENE, migrated
 from thermospindle.model.machine import Bearing, Condition, Provenance, Spindle
 from thermospindle.model.rotor.beam import with_shafts
 from thermospindle.model.rotor.chain import matrices, rotor_base
@@ -28,7 +29,7 @@ from thermospindle.model.rotor.modes import poles
 from thermospindle.model.rotor.section import cells, mass_properties
 from thermospindle.model.scene import form as scene_file
 from thermospindle.model.scene.checks import check_bearings, check_raceways, check_rollers, check_section, check_structure, constant
-from thermospindle.model.scene.fields import read_toml
+from thermospindle.model.scene.fields import read_file
 from thermospindle.model.shaft import SAME_HEIGHT
 from thermospindle.model.tolerance import deviated
 
@@ -43,7 +44,7 @@ def load(path: str | Path) -> Spindle:
     that cannot be built.
     """
     file = scene_path(path)
-    return build(read_toml(file), file)
+    return build(read_file(SCENE, file), file)
 
 
 def scene_path(path: str | Path) -> Path:
@@ -65,6 +66,7 @@ def shipped() -> tuple[str, ...]:
 
 def build(raw: dict[str, Any], file: Path) -> Spindle:
     """The spindle of the parsed TOML `raw`; `file` serves messages only."""
+    raw = migrated(SCENE, raw, file)
     try:
         form = scene_file.Scene.model_validate(raw)
     except ValidationError as error:
@@ -136,7 +138,7 @@ def _provenance(file: Path, raw: Mapping[str, Any]) -> dict[str, Provenance]:
         elif isinstance(node, list) and node and isinstance(node[0], list):
             walk(node[0], key, origin, source)
         elif _is_number(node) or (isinstance(node, list) and node and all(map(_is_number, node))):
-            if key in ("reference_temperature_C", "nominal_speed_rpm", "temperature_range_C", "ball_inertia", "axial_load_N", "radial_load_N", "radial_load_z_mm") or key.endswith(".node"):
+            if key in (KEY, "reference_temperature_C", "nominal_speed_rpm", "temperature_range_C", "ball_inertia", "axial_load_N", "radial_load_N", "radial_load_z_mm") or key.endswith(".node"):
                 return
             if origin is None:
                 raise BadInput(f"{file}: {key} = {node!r}: says no origin; its table needs origin = printed, assumed or calibrated")

@@ -17,6 +17,7 @@ from thermospindle.diagnosis.prediction.outcomes import outcomes
 from thermospindle.diagnosis.runout.lines import modal_tests
 from thermospindle.diagnosis.runout.verdict import RunoutDiagnosis, diagnose_runout
 from thermospindle.model.errors import BadInput
+from thermospindle.model.files.formats import CURRENT, DIAGNOSIS, KEY
 from thermospindle.model.machine import Spindle
 from thermospindle.model.scene.reading import content_hash
 from thermospindle.model.whole import whole
@@ -45,7 +46,7 @@ def diagnose(
     (spindle, catalogue), whole = with_effects(scene, effect_files), without(read_campaign(campaign), held_out_tests)
     turning = _of_runout(spindle, catalogue, whole)
     tests = modal_tests(whole)
-    where = {"campaign": tests.title, "scene_hash": content_hash(spindle)}
+    where = {KEY: CURRENT[DIAGNOSIS], "campaign": tests.title, "scene_hash": content_hash(spindle)}
     if turning and not tests.tests:
         told, show_runout, of_runout = turning
 

@@ -15,7 +15,8 @@ from matplotlib.figure import Figure
 from rich.console import Console
 
 from thermospindle.diagnosis.fleet import Fleet, apart
-from thermospindle.model.scene.fields import read_toml
+from thermospindle.model.files.formats import SCENE
+from thermospindle.model.scene.fields import read_file
 from thermospindle.model.scene.reading import content_hash, scene_path
 from thermospindle.report.figures import study as figures
 from thermospindle.report.folder import digest
@@ -42,7 +43,7 @@ def study(file: Path, cluster: str | None = None, effect_files: Sequence[Path] =
     if asked.kind == FLEET:
         of = Fleet(spindle, asked.campaigns, catalogue, asked.work == "diagnose")
     else:
-        raw = read_toml(scene)
+        raw = read_file(SCENE, scene)
         check(asked, raw, scene, spindle, catalogue)
         of = cases(asked, raw, scene, spindle, catalogue)
     place = Path("out") / asked.file.stem if out is None else Path(out)

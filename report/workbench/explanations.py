@@ -14,6 +14,7 @@ from thermospindle.diagnosis import verdict
 from thermospindle.diagnosis.add import answer_of, fitted_values, read_answer
 from thermospindle.diagnosis.compare.before_after import without
 from thermospindle.model.errors import BadInput
+from thermospindle.model.files.formats import DIAGNOSIS, migrated
 from thermospindle.model.scene.reading import content_hash
 from thermospindle.report.text.diagnosis.answer import diagnosis_json
 from thermospindle.report.workbench.bench import Bench
@@ -55,7 +56,8 @@ def read_explanations(file: Path, bench: Bench) -> Explanations:
         read_answer(file)
     except BadInput as error:
         raise BadInput(str(error).replace("--from", "--diagnosis", 1)) from None
-    return explanations(json.loads(file.read_text(encoding="utf-8")), bench, f"--diagnosis {file}")
+    raw = migrated(DIAGNOSIS, json.loads(file.read_text(encoding="utf-8")), f"--diagnosis {file}")
+    return explanations(raw, bench, f"--diagnosis {file}")
 
 
 def explanations(raw: Mapping[str, Any], bench: Bench, where: str) -> Explanations:

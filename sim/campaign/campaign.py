@@ -16,10 +16,11 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from thermospindle.model.cells import cells, name_of
 from thermospindle.model.errors import BadInput
+from thermospindle.model.files.cells import cells, name_of
+from thermospindle.model.files.formats import CAMPAIGN, CURRENT, KEY
 from thermospindle.model.machine import Point
-from thermospindle.model.scene.fields import first_error, read_toml
+from thermospindle.model.scene.fields import first_error, read_file
 from thermospindle.model.units import MINUTE, MM, RPM
 from thermospindle.model.whole import whole
 from thermospindle.sim.campaign.form import MODE_COLUMNS, ModeTable, checked, in_unit, toml
@@ -90,7 +91,7 @@ def read_campaign(folder: Path, limits: Limits = LIMITS) -> Campaign:
     file = folder / "campaign.toml"
     if not file.is_file():
         raise BadInput(f"{folder}: no campaign there; expected a folder with campaign.toml")
-    raw = read_toml(file)
+    raw = read_file(CAMPAIGN, file)
     table = checked(file, raw)
     points = tuple(p.point() for p in table.points)
     rows = _read_modes(folder / table.modes, [t.id for t in table.tests]) if table.modes else []
@@ -209,6 +210,7 @@ def _write_modes(file: Path, campaign: Campaign) -> None:
 def _toml_text(campaign: Campaign) -> str:
     modes = "modes.csv" if any(t.modes for t in campaign.tests) else None
     head = {
+        KEY: CURRENT[CAMPAIGN],
         "title": campaign.title,
         "spindle": campaign.spindle,
         "quantity": campaign.quantity,

@@ -12,8 +12,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
-from thermospindle.model.cells import plain_number
 from thermospindle.model.errors import BadInput
+from thermospindle.model.files.cells import plain_number
+from thermospindle.model.files.formats import CAMPAIGN, CURRENT
+from thermospindle.model.scene.fields import format_of
 from thermospindle.model.scene.form import Finite, Name, NotNegative, Positive, first_error
 from thermospindle.model.scene.form import Point as PointTable
 
@@ -53,6 +55,7 @@ class TestTable(Table):
 
 
 class CampaignTable(Table):
+    format: format_of(CAMPAIGN) = CURRENT[CAMPAIGN]  # type: ignore[valid-type]
     title: Name
     spindle: Name
     quantity: Literal["receptance", "mobility", "accelerance", "displacement"]

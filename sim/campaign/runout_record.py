@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from thermospindle.model.cells import plain_number
 from thermospindle.model.errors import BadInput
+from thermospindle.model.files.cells import plain_number
 from thermospindle.model.machine import Point
 from thermospindle.sim.campaign.uff import read_motion
 

@@ -12,7 +12,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidationError
 
 from thermospindle.model.errors import BadInput
-from thermospindle.model.scene.fields import first_error, read_toml
+from thermospindle.model.files.formats import CURRENT, MAPPING, migrated
+from thermospindle.model.scene.fields import first_error, format_of, read_toml
 from thermospindle.model.scene.form import Finite, Name, NotNegative, Positive
 from thermospindle.model.scene.measuring import Point as PointForm
 from thermospindle.sim.campaign.form import PlainName, Table
@@ -81,6 +82,7 @@ class RecordForm(Table):
 
 
 class MappingForm(Table):
+    format: format_of(MAPPING) = CURRENT[MAPPING]  # type: ignore[valid-type]
     title: Name | None = None
     spindle: Name | None = None
     quantity: Quantity | None = None
@@ -97,7 +99,7 @@ def read_mapping(path: Path | None) -> MappingForm:
     """The mapping of a file, open answers left out; an empty one without a file. Raises `BadInput`."""
     if path is None:
         return MappingForm()
-    raw = _answered(read_toml(path))
+    raw = migrated(MAPPING, _answered(read_toml(path)), path)
     try:
         form = MappingForm.model_validate(raw)
     except ValidationError as error:

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from thermospindle.model.files.formats import CURRENT, KEY, MAPPING
 from thermospindle.model.machine import Spindle
 from thermospindle.model.units import MM
 from thermospindle.sim.campaign.form import in_unit, toml
@@ -33,7 +34,7 @@ SPEED = re.compile(r"(?:^|[_\W])(\d+)\s*_?rpm|(?:^|[_\W])n(\d+)(?=$|[_\W])", re.
 
 def template(found: Read, files: Sequence[Path], scene: Spindle | None) -> str:
     """The text of a mapping for these files."""
-    lines = [HEAD, f'title = {toml(f"imported from {listed((f.name for f in files), 3)}")}']
+    lines = [HEAD, f"{KEY} = {CURRENT[MAPPING]}", f'title = {toml(f"imported from {listed((f.name for f in files), 3)}")}']
     lines.append(f"spindle = {toml(scene.name)}" if scene else 'spindle = "?"    # name of the scene')
     if any(q.key == "frequency_sd_Hz" for q in found.questions):
         lines.append('frequency_sd_Hz = "?"    # how sure hand-picked frequencies are: one standard deviation')

@@ -12,7 +12,8 @@ import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
 from thermospindle.model.errors import BadInput
-from thermospindle.model.scene.fields import Name, Temperature, first_error, read_toml
+from thermospindle.model.files.formats import CURRENT, STUDY
+from thermospindle.model.scene.fields import Name, Temperature, first_error, format_of, read_file
 from thermospindle.sim.campaign.form import Table
 
 SWEEP, MONTE_CARLO, FLEET = "sweep", "monte-carlo", "fleet"
@@ -42,6 +43,7 @@ class Steps(Table):
 
 
 class StudyForm(Table):
+    format: format_of(STUDY) = CURRENT[STUDY]  # type: ignore[valid-type]
     title: Name
     kind: Literal["sweep", "monte-carlo", "fleet"]
     scene: Name
@@ -114,7 +116,7 @@ def read_study(file: Path) -> Study:
     """The study of a file; paths in it are from its folder. Raises `BadInput` for what cannot be one."""
     if not file.is_file():
         raise BadInput(f"{file}: no study file there; expected a TOML file with title, kind and scene")
-    raw = read_toml(file)
+    raw = read_file(STUDY, file)
     try:
         form = StudyForm.model_validate(raw)
     except ValidationError as error:

@@ -14,7 +14,7 @@ from thermospindle.model.errors import BadInput, NoEquilibrium, NotConverged, Ou
 if os.name == "nt":  # alarms, pipes and limits of memory are not there
     collect_ignore_glob = ["test_*.py"]
 EXAMPLES = int(os.environ.get("TORTURE_EXAMPLES", "0"))
-FEW, SECONDS, BYTES = 6, 30, 8 << 30
+FEW, SECONDS, WAIT, BYTES = 6, 30, 300, 8 << 30
 NAMED = (BadInput, NoEquilibrium, NotConverged, OutsideRange)
 COUNTS: dict[str, Counter] = {}
 
@@ -32,7 +32,7 @@ settings.load_profile("torture")
 
 
 class Hangs(Exception):
-    """More than `SECONDS` for one example."""
+    """More than `SECONDS` of the processor's time for one example, or more than `WAIT` s on a clock."""
 
 
 @contextmanager
@@ -41,10 +41,11 @@ def outcome(what: str):
     count = COUNTS.setdefault(what, Counter())
 
     def stop(number: int, frame: object) -> None:
-        raise Hangs(f"{what}: still running after {SECONDS} s")
+        raise Hangs(f"{what}: still running after {SECONDS} s of the processor's time, or {WAIT} s")
 
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.alarm(SECONDS)
+    before = {number: signal.signal(number, stop) for number in (signal.SIGALRM, signal.SIGPROF)}
+    signal.setitimer(signal.ITIMER_PROF, SECONDS)
+    signal.alarm(WAIT)
     try:
         yield
     except NAMED as error:
@@ -58,7 +59,9 @@ def outcome(what: str):
         count["result"] += 1
     finally:
         signal.alarm(0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 @pytest.fixture(scope="session", autouse=True)

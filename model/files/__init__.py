@@ -1,0 +1,7 @@
+"""What all files that people write or read back have in common.
+
+=======  ==========================================================================
+cells    names and numbers as cells of a CSV file
+formats  the format that a file is written in, and how an older one becomes today's
+=======  ==========================================================================
+"""
