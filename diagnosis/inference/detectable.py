@@ -12,9 +12,9 @@ from functools import partial
 
 import numpy as np
 
-from thermospindle.diagnosis.inference.fit import Fit
+from thermospindle.diagnosis.inference.fit import Fit, built
 from thermospindle.diagnosis.inference.mechanism import Mechanism
-from thermospindle.diagnosis.inference.model import FAILED, Applied, CampaignModel
+from thermospindle.diagnosis.inference.model import Applied, CampaignModel
 from thermospindle.diagnosis.inference.screening import Fitted, Screened, fitted
 from thermospindle.model.parallel import in_parallel
 from thermospindle.model.types import Array
@@ -94,8 +94,4 @@ def visibility(model: CampaignModel, about: Fit, m: Mechanism, size: float) -> f
 
 def _moved(model: CampaignModel, x: Array, effects: Applied, base: Sequence[Fitted]) -> list[Array] | None:
     """How far all residuals move from those of `base`; None where no spindle can be built."""
-    try:
-        found = [model.residual(t, x, effects) - at.residual for t, at in enumerate(base)]
-    except FAILED:
-        return None
-    return found if all(np.all(np.isfinite(r)) for r in found) else None
+    return built(lambda t: model.residual(t, x, effects) - base[t].residual, len(base))

@@ -7,7 +7,7 @@ Methods*, 1990). Steps are damped as Levenberg and Marquardt do; a step to where
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,6 +81,15 @@ class Problem:
             at += len(m.shape)
         return p[: self.nuisances], np.array(sizes).reshape(len(self.mechanisms), self.tests), shapes
 
+    def start(self, sizes: Mapping[int, float]) -> Array:
+        """The drawing (n,), with mechanism number k at size `sizes[k]`, in its unit and the same in all tests, and the others at none."""
+        p, at = np.zeros(self.length), self.nuisances
+        for k, (m, root) in enumerate(zip(self.mechanisms, self.roots, strict=True)):
+            if k in sizes:
+                p[at : at + self.tests] = np.linalg.solve(root, np.full(self.tests, sizes[k] - m.size.neutral))
+            at += self.tests + len(m.shape)
+        return p
+
     def applied(self, t: int, sizes: Array, shapes: Sequence[Array]) -> tuple[list, list[float]]:
         """The effects that act in test `t`, and how far each size lies beyond its limit."""
         effects, beyond = [], []
@@ -151,17 +160,22 @@ class Problem:
 
     def residuals(self, p: Array) -> list[Array] | None:
         """Residuals of every test; None where no spindle can be built."""
-        try:
-            found = [self.residual(t, p) for t in range(self.tests)]
-        except FAILED:
-            return None
-        return found if all(np.all(np.isfinite(r)) for r in found) else None
+        return built(lambda t: self.residual(t, p), self.tests)
 
     def cost(self, p: Array, temper: float, residuals: Sequence[Array] | None = None) -> float:
         """chi2 with errors 1 / `temper` times the data's, and priors; infinite where no spindle can be built."""
         if residuals is None:
             residuals = self.residuals(p)
         return np.inf if residuals is None else temper**2 * sum(float(r @ r) for r in residuals) + float(p @ self.precision @ p)
+
+
+def built(residual: Callable[[int], Array], tests: int) -> list[Array] | None:
+    """`residual` of every test; None where no spindle can be built."""
+    try:
+        found = [residual(t) for t in range(tests)]
+    except FAILED:
+        return None
+    return found if all(np.all(np.isfinite(r)) for r in found) else None
 
 
 class Linearisation:

@@ -44,6 +44,11 @@ def steady(learned: Learned, mechanisms: Sequence[Mechanism] = ()) -> Learned:
     """What was learned of constant discrepancies and of gains, for a fit of `mechanisms`: how much modes drift is left as it is on paper, so that
     drift does not take what the mechanisms should explain."""
     sizes = {kind: max(REFERENCE[kind], learned.sizes[kind]) if kind not in DRIFTING else REFERENCE[kind] for kind in learned.sizes}
+    return as_stated(sizes, mechanisms)
+
+
+def as_stated(sizes: Mapping[str, float], mechanisms: Sequence[Mechanism] = ()) -> Learned:
+    """Discrepancies of some sizes, errors as stated and mechanisms at their reference widths."""
     return Learned(sizes, 1.0, (REFERENCE_WIDTH,) * len(mechanisms), (REFERENCE_DEPARTURE,) * len(mechanisms))
 
 

@@ -218,16 +218,8 @@ def scan(model: CampaignModel, mechanisms: Sequence[Mechanism]) -> tuple[Array, 
     """Starts with no tolerance off its drawing and one mechanism of a size, the same in all tests: what moves peaks by many of their widths has no
     slope to follow from where it does not act."""
     problem = Problem(model, mechanisms)
-    starts, at = [np.zeros(problem.length)], problem.nuisances
-    for m, root in zip(mechanisms, problem.roots, strict=True):
-        low, high = m.size.limits
-        for size in (m.size.neutral + s * m.size.prior_sd for s in SCAN):
-            if low <= size <= high:
-                start = np.zeros(problem.length)
-                start[at : at + len(root)] = np.linalg.solve(root, np.full(len(root), size - m.size.neutral))
-                starts.append(start)
-        at += len(root) + len(m.shape)
-    return tuple(starts)
+    scanned = [(k, m.size.neutral + s * m.size.prior_sd, m.size.limits) for k, m in enumerate(mechanisms) for s in SCAN]
+    return problem.start({}), *(problem.start({k: size}) for k, size, (low, high) in scanned if low <= size <= high)
 
 
 def _joined(

@@ -19,7 +19,7 @@ from thermospindle.diagnosis.inference.evidence import GRIDS, Evidence, evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, Problem, fit
 from thermospindle.diagnosis.inference.mechanism import Mechanism, variants
 from thermospindle.diagnosis.inference.model import FAILED, CampaignModel, TestData
-from thermospindle.diagnosis.inference.prior import REFERENCE, Learned
+from thermospindle.diagnosis.inference.prior import Learned, as_stated, precision
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import Effect, Values
@@ -50,16 +50,13 @@ def _empty(model: CampaignModel, t: int) -> TestData:
 
 @dataclass(frozen=True, eq=False)
 class Settled:
-    """A fit with the discrepancy at the size that the data ask for: `model` has it in its priors, and lacks what is not needed.
-
-    `first` is the fit at the reference sizes from which it went on, `sizes` what was learned of the discrepancies, by kind.
-    """
+    """A fit with every discrepancy at the size that the data ask for, as `learned`; `first` is the fit at the reference sizes from which it went on."""
 
     model: CampaignModel
     fit: Fit
     evidence: Evidence
     first: Fit
-    sizes: dict[str, float]
+    learned: Learned
 
     @property
     def mechanisms(self) -> tuple[Mechanism, ...]:
@@ -71,8 +68,12 @@ class Settled:
 
     @cached_property
     def covariance(self) -> Array:
-        """Posterior covariance (n, n) of all parameters of the fit, whose priors are N(0, 1)."""
-        return np.asarray(np.linalg.inv(self.fit.information + np.eye(len(self.fit.point))), float)
+        """Posterior covariance (n, n) of all parameters of the fit."""
+        return np.asarray(np.linalg.inv(self.fit.information + self._precision), float)
+
+    @cached_property
+    def _precision(self) -> Array:
+        return precision(self.model, self.mechanisms, self.learned)
 
     @cached_property
     def posterior(self) -> tuple[Array, Array]:
@@ -95,7 +96,7 @@ class Settled:
 
     def determined(self) -> float:
         """How many combinations of parameters the data, not the priors, decide: trace of the resolution matrix, at most the data's number."""
-        return float(len(self.fit.point) - np.trace(self.covariance))
+        return float(len(self.fit.point) - np.sum(self.covariance * self._precision))
 
     def values(self) -> dict[str, dict[str, tuple[float, float]]]:
         """Every effect's parameters with standard errors; its size is the mean over the tests, weighted by what they tell."""
@@ -142,12 +143,8 @@ def settled(model: CampaignModel, below: Settled | None = None, effects: Sequenc
 def _starts(model: CampaignModel, mechanisms: Sequence[Mechanism], present: int, both: bool) -> list[Array]:
     """The drawing with new mechanisms at no size, and at their typical one in all tests."""
     problem = Problem(model, mechanisms)
-    neutral, typical, at = np.zeros(problem.length), np.zeros(problem.length), problem.nuisances
-    for k, (m, root) in enumerate(zip(mechanisms, problem.roots, strict=True)):
-        if k >= present:
-            typical[at : at + len(root)] = np.linalg.solve(root, np.full(len(root), m.size.typical - m.size.neutral))
-        at += len(root) + len(m.shape)
-    return [neutral, typical] if both and typical.any() else [neutral]
+    typical = problem.start({k: m.size.typical for k, m in enumerate(mechanisms) if k >= present})
+    return [problem.start({}), typical] if both and typical.any() else [problem.start({})]
 
 
 def _tried(model: CampaignModel, mechanisms: Sequence[Mechanism], start: Array) -> Fit | None:
@@ -168,19 +165,10 @@ def _at_learned(model: CampaignModel, first: Fit) -> Settled:
     by more than their width.
     """
     kinds = [kind for kind in GRIDS if any(p.kind == kind for p in model.parameters)]
-    tried = [dict(zip(kinds, row, strict=True)) for row in product(*(GRIDS[kind] for kind in kinds))]
-    learned = max(tried, key=lambda sizes: evidence(model, first, _as_stated(sizes)).ln)
-    times = np.array([learned[p.kind] / REFERENCE[p.kind] if p.kind in learned else 1.0 for p in model.parameters])
-    kept = np.flatnonzero(times)
-    own = replace(model, parameters=tuple(replace(model.parameters[i], sd=model.parameters[i].sd * times[i]) for i in kept))
-    start = np.concatenate([first.point[kept] / times[kept], first.point[len(times) :]])
-    found = fit(own, first.mechanisms, start, tempers=TEMPERS[-2:])
-    now = {kind: REFERENCE[kind] for kind, size in learned.items() if size}  # which the priors of `own` are
-    return Settled(own, found, evidence(own, found, _as_stated(now)), first, learned)
-
-
-def _as_stated(sizes: dict[str, float]) -> Learned:
-    return Learned(sizes, 1.0, (), ())
+    tried = [as_stated(dict(zip(kinds, row, strict=True)), first.mechanisms) for row in product(*(GRIDS[kind] for kind in kinds))]
+    learned = max(tried, key=lambda sizes: evidence(model, first, sizes).ln)
+    found = fit(model, first.mechanisms, first.point, tempers=TEMPERS[-2:], learned=learned)
+    return Settled(model, found, evidence(model, found, learned), first, learned)
 
 
 # ---------------------------------------------------------------- what was left out

@@ -9,7 +9,6 @@ a part (pi f step)^2 / 3 of the FRF, 0.3 % at 6 kHz and 5 us.
 from __future__ import annotations
 
 import copy
-import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -24,6 +23,7 @@ from scipy.signal import resample_poly
 
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import HammerTest
+from thermospindle.model.parallel import cores
 from thermospindle.model.rotor.elements import REDUCED
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import Measurement
@@ -125,7 +125,7 @@ def stages(test: HammerTest, points: int) -> int:
 
 def _at_once(test: HammerTest) -> int:
     """Points whose hits are simulated side by side."""
-    return max(1, (os.cpu_count() or 1) // (test.hits * len(test.hammer_nodes)))
+    return max(1, cores() // (test.hits * len(test.hammer_nodes)))
 
 
 def sampling(test: HammerTest) -> tuple[int, int]:
@@ -166,7 +166,7 @@ def simulate(
     state = np.repeat(np.array([loaded_state(model) for model in models]), references * repeats, axis=0)
     actuators = [models[0].actuator(f"hammer{node}").id for node in test.hammer_nodes]
     velocity = np.empty((len(many), models[0].nsensordata, steps))
-    threads = min(os.cpu_count() or 1, len(many))
+    threads = min(cores(), len(many))
     edges = np.linspace(0, steps, PIECES + 1).astype(int)
     with Rollout(nthread=threads) as pool:
         data = [mujoco.MjData(models[0]) for _ in range(threads)]

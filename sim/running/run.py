@@ -16,7 +16,6 @@ Long records are simulated piece by piece; each is decimated by a linear-phase f
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -27,6 +26,7 @@ from numpy.typing import NDArray
 from scipy.signal import firwin, upfirdn
 
 from thermospindle.model.errors import BadInput
+from thermospindle.model.parallel import cores
 from thermospindle.model.rotor.chain import turning_at
 from thermospindle.model.rotor.mjcf import joint_names, spin_dofs
 from thermospindle.model.types import Array, ComplexArray
@@ -107,7 +107,7 @@ def run_spindle(
     taps = firwin(2 * FILTER_REACH * every + 1, 0.85 / every, window=("kaiser", 8.6))
     per_piece = max(1, round(PIECE * sample_rate))
     needed = settled + samples + 2 * FILTER_REACH
-    threads = min(os.cpu_count() or 1, len(runs))
+    threads = min(cores(), len(runs))
     state = np.array([run.start for run in runs])
     nv = runs[0].model.nv
     tail = np.zeros((len(runs), 2 * FILTER_REACH * every, nv))

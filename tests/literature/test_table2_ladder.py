@@ -66,7 +66,7 @@ def test_ten_numbers_carry_no_more_than_they_can(climbed):
     assert top.error < 2
     assert top.stretch < 1.2
     assert top.evidence > strict.evidence + 5
-    assert top.fitted.sizes[STIFFNESS] == pytest.approx(1e-2)
+    assert top.fitted.learned.sizes[STIFFNESS] == pytest.approx(1e-2)
     assert top.fitted.fit.count == 10
     assert 3 < top.fitted.determined() < 9
     assert strict.held_out > 1.1 * strict.error  # a temperature left out is predicted worse than it is fitted
