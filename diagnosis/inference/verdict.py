@@ -31,6 +31,7 @@ MOSTLY = 0.6  # of the ln evidence of an explanation with free drift in it, that
 COARSE = 4.0  # chosen on blind campaigns 1 to 16, by log score; others judge it
 DEPARTS = 0.3  # of the size, from which a law does not hold
 LAGS, SMALL = 12, 0.05  # lines over which residuals are compared, and the correlation that chance makes
+ALIKE = 0.5  # correlation of what is left in one test with what is left in another, from which it is called constant
 SPREAD = 3.0  # temperatures within so many tolerances of each other are one condition
 
 Names = tuple[str, ...]
@@ -70,7 +71,8 @@ def decide(found: Search) -> Verdict:
     named_count = len({s.mechanism.name for s in found.screened if not s.mechanism.free and s.visibility > 0}) or 1
     free_count = len({s.mechanism.name for s in found.screened if s.mechanism.free and s.visibility > 0}) or 1
     base = found.base.evidence.ln
-    worth = inflation(found.model, found.hypotheses[0]) * coarsening(found.hypotheses[0])
+    same = overlap(found.model, found.hypotheses[0])
+    worth = same.inflation * coarsening(found.hypotheses[0])
     rows = [(h, _prior(h, named_count, free_count) + (_weighed(h, found.hypotheses) - base) / worth) for h in found.hypotheses]
     top = max(w for _, w in rows)
     total = np.log(sum(np.exp(w - top) for _, w in rows)) + top
@@ -92,28 +94,53 @@ def decide(found: Search) -> Verdict:
     groups = conditions_of(found)
     before = left_out(found.model, found.base.fit, found.base.evidence, groups)
     after = left_out(found.model, accepted.fit, accepted.evidence, groups)
-    reason = _reason(found, word, effects, candidates, free, none, before, after)
+    reason = _reason(found, word, effects, candidates, free, none, before, after) + _constant(found.hypotheses[0], same)
     return Verdict(word, effects, reason, candidates, free, none, unknown, losses, before, after, accepted)
 
 
-def inflation(model: CampaignModel, best: Hypothesis) -> float:
-    """By how much neighbouring lines say the same: 1 + 2 sum of the autocorrelation of the residuals that the best explanation leaves.
+@dataclass(frozen=True)
+class Overlap:
+    """How far residuals say the same: `lines`, 1 + 2 sum of their autocorrelation over neighbouring lines; `tests`, the mean correlation of one test's
+    with another's. `inflation` is by how much fewer numbers they are worth.
 
-    One for noise. What a model misses is smooth over lines, and so many numbers are then worth fewer (Bartlett 1946; Bayley &
-    Hammersley, *J. R. Statist. Soc. Suppl.* 8 (1946) 184): ln evidence is divided by it.
+    1, 0 and 1 for noise. What a model misses is smooth over lines, and what it misses everywhere (a resonance of the table) is there in every test:
+    ln evidence is divided by the inflation (Bartlett 1946; Bayley & Hammersley, *J. R. Statist. Soc. Suppl.* 8 (1946) 184).
     """
-    problem, total, square = Problem(model, best.mechanisms), np.zeros(LAGS), 0.0
-    for t, data in enumerate(model.tests):
-        if not isinstance(data, LineData):
-            continue
-        r = problem.residual(t, best.fit.point).reshape(-1, data.value.shape[-1])
-        square += float(np.mean(r * r)) if r.size else 0.0
-        total += [float(np.mean(r[:, k:] * r[:, :-k])) if r.shape[1] > k else 0.0 for k in range(1, LAGS + 1)]
+
+    lines: float
+    tests: float
+    inflation: float
+
+
+def overlap(model: CampaignModel, best: Hypothesis) -> Overlap:
+    """Of the residuals that an explanation leaves in FRF lines."""
+    problem = Problem(model, best.mechanisms)
+    left = [
+        (d.frequency, problem.residual(t, best.fit.point).reshape(-1, len(d.frequency)))
+        for t, d in enumerate(model.tests)
+        if isinstance(d, LineData) and d.count
+    ]
+    total, square = np.zeros(LAGS), sum(float(np.mean(r * r)) for _, r in left)
     if square <= 0.0:
-        return 1.0
+        return Overlap(1.0, 0.0, 1.0)
+    for _, r in left:
+        total += [float(np.mean(r[:, k:] * r[:, :-k])) if r.shape[1] > k else 0.0 for k in range(1, LAGS + 1)]
     correlation = total / square
     seen = np.cumprod(correlation > SMALL).astype(bool)  # up to where it is lost in chance
-    return float(1 + 2 * correlation[seen].sum())
+    lines, tests = float(1 + 2 * correlation[seen].sum()), between_tests(left)
+    return Overlap(lines, tests, lines * (1 + (len(left) - 1) * tests))
+
+
+def between_tests(left: Sequence[tuple[Array, Array]]) -> float:
+    """Mean correlation of residuals (channels, lines) at frequencies (lines,) of one test with those of another at its nearest lines; what chance makes counts as none."""
+    found = []
+    for a, (lines, r) in enumerate(left):
+        for b, (other_lines, other) in enumerate(left):
+            if a != b and len(r) == len(other):
+                there = other[:, np.abs(other_lines[None, :] - lines[:, None]).argmin(axis=1)]
+                correlation = float(np.mean(r * there) / np.sqrt(max(np.mean(r * r) * np.mean(there * there), 1e-300)))
+                found.append(correlation if correlation > SMALL else 0.0)
+    return float(np.mean(found)) if found else 0.0
 
 
 def coarsening(best: Hypothesis) -> float:
@@ -241,6 +268,16 @@ def conditions_of(found: Search) -> list[list[int]]:
         else:
             groups.append([int(t)])
     return groups
+
+
+def _constant(best: Hypothesis, same: Overlap) -> str:
+    """What is left where the best explanation still misses the data and misses them alike in all tests."""
+    if best.evidence.learned.errors <= STRAIN or same.tests < ALIKE:
+        return ""
+    return (
+        f" What is left even so is {best.evidence.learned.errors:.1f} times the errors, and much the same in every test (correlation {same.tests:.2f}): "
+        "something constant that the model lacks, such as a resonance of the table or the fixture, not a change over the conditions."
+    )
 
 
 def _reason(found: Search, word: str, effects: Names, candidates, free, none: float, before: float, after: float) -> str:

@@ -15,7 +15,7 @@ from thermospindle.diagnosis.inference.nuisance import DAMPING, STIFFNESS
 from thermospindle.diagnosis.inference.prior import Learned
 from thermospindle.diagnosis.inference.screening import Screened
 from thermospindle.diagnosis.inference.search import Hypothesis, Search
-from thermospindle.diagnosis.inference.verdict import COARSE, FALSE_ALARM, MISSED, WRONG, Verdict, coarsening, conditions_of, decide
+from thermospindle.diagnosis.inference.verdict import COARSE, FALSE_ALARM, MISSED, WRONG, Verdict, between_tests, coarsening, conditions_of, decide
 from thermospindle.model.machine import Condition
 from thermospindle.sim.effects.effect import Effect, Parameter
 
@@ -132,6 +132,18 @@ def test_evidence_is_worth_less_where_the_model_is_a_little_wrong(sizes, errors,
     first, second = (next(c for c in v.candidates if c.names == (k,)).probability for k in "ab")
     assert np.log(first / second) == pytest.approx(6.0 / worth)
     assert coarsening(wrong[0]) == worth
+
+
+@pytest.mark.parametrize("share", [0.0, 0.6, 0.95])
+def test_what_is_missed_in_every_test_is_one_finding(share):
+    """Noise beside a misfit that is the same in four tests at lines of their own: their correlation is its share of the squares."""
+    random = np.random.default_rng(7)
+    left = []
+    for k in range(4):
+        lines = np.linspace(400.0, 6000.0, 300 + 10 * k)
+        same = np.array([np.sin(lines / 500 + channel) for channel in range(14)]) * np.sqrt(2)
+        left.append((lines, np.sqrt(share) * same + np.sqrt(1 - share) * random.standard_normal(same.shape)))
+    assert between_tests(left) == pytest.approx(share, abs=0.02)
 
 
 @pytest.mark.parametrize(("departure", "word"), [(0.1, "two effects"), (0.3, "ambiguous")])
