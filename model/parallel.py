@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import signal
 import time
+import warnings
 from collections.abc import Callable, Iterable, Iterator
 from functools import lru_cache, partial
 from typing import Any, TypeVar
@@ -67,6 +68,7 @@ def in_parallel(
 def _sent(function: Callable[[Item], Result], items: list[Item], workers: int) -> Iterator[Result]:
     global _last
     workers = _last[0] if _running(workers) else workers  # a pool that is larger is not made smaller
+    warnings.filterwarnings("ignore", "A worker was restarted", UserWarning)  # which loses nothing, and is no news to whoever waits
     pool = get_reusable_executor(workers, timeout=IDLE, initializer=_begin, env=ENVIRONMENT)
     try:
         yield from pool.map(partial(_call, cloudpickle.dumps(function)), items)

@@ -77,7 +77,7 @@ def search(
     workers: int | None = None,
 ) -> Search:
     first = fit(model)
-    none = _settled(model, Hypothesis(first, evidence(model, first)))
+    none = settled(model, Hypothesis(first, evidence(model, first)))
     progress("fitted without effects")
     learned = none.evidence.learned
     strained = learned.errors > STRAIN or any(learned.sizes.get(kind, 0.0) > 0 for kind in DRIFTING)
@@ -97,8 +97,8 @@ def search(
     pairs = _joined(model, none, singles, [*named, *free], most, expected, workers)
     progress("pairs fitted")
     finalists = _finalists([*singles, *pairs])
-    settled = dict(zip(map(id, finalists), in_parallel(partial(_settled, model), finalists, workers), strict=True))
-    ranked = [replace(settled[id(h)], fit=replace(settled[id(h)].fit, mechanisms=h.mechanisms)) if id(h) in settled else h for h in [*singles, *pairs]]
+    anew = dict(zip(map(id, finalists), in_parallel(partial(settled, model), finalists, workers), strict=True))
+    ranked = [replace(anew[id(h)], fit=replace(anew[id(h)].fit, mechanisms=h.mechanisms)) if id(h) in anew else h for h in [*singles, *pairs]]
     progress("the best fitted anew")
     hypotheses = tuple(sorted([none, *ranked], key=lambda h: -h.evidence.ln))
     return Search(model, none, hypotheses, tuple(looked), _alike(model, none.fit.nuisance, hypotheses))
@@ -127,7 +127,7 @@ def _task(lead: tuple[Mechanism, ...], about: Fit, s: Screened, hoped: float, fa
     return Task((*lead, s.mechanism), starts, hoped)
 
 
-def _settled(model: CampaignModel, h: Hypothesis) -> Hypothesis:
+def settled(model: CampaignModel, h: Hypothesis) -> Hypothesis:
     """Fitted anew with priors as wide as was learned, until that moves nothing: the quadratic then stands where the answer is.
 
     It starts from its own answer, or from the fit where the model is no quadratic as far as that."""

@@ -168,6 +168,8 @@ def show(console: Console, rows: Sequence[Row]) -> None:
     console.print(f"wrong name, something of the catalogue hidden: {share(inside, lambda r: outcome(r) == 'wrong')}")
     console.print(f"unexplained, outside and visible: {share(outside, lambda r: outcome(r) == 'right')}")
     console.print(f"  and the right element first: {share(outside, lambda r: outcome(r) == 'right' and element_found(r))}")
+    drafts = [r for r in outside if r.get("drafted")]
+    console.print(f"  and the error left out halved by what draft writes: {share(drafts, lambda r: r['drafted'][1] < r['drafted'][0] / 2)}")
     console.print(f"sets of at most three: {share(sets, lambda r: len(r['effects']) <= 3)}")
     for scene in sorted({r["scene"] for r in rows}):
         own = [r for r in rows if r["scene"] == scene]

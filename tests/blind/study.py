@@ -18,17 +18,26 @@ import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
 from tests.blind.hidden import Hidden, Mechanism, mechanisms
 from tests.blind.world import Made, Plan, World, campaign, described, plans, visibility
-from thermospindle.diagnosis.verdict import diagnose
+from thermospindle.diagnosis.draft import draft
+from thermospindle.diagnosis.inference.evidence import evidence, left_out
+from thermospindle.diagnosis.inference.fit import TEMPERS, Problem, fit
+from thermospindle.diagnosis.inference.mechanism import variants
+from thermospindle.diagnosis.inference.prior import steady
+from thermospindle.diagnosis.inference.search import Hypothesis, settled
+from thermospindle.diagnosis.inference.verdict import conditions_of
+from thermospindle.diagnosis.verdict import Diagnosis, diagnose
 from thermospindle.model.machine import Spindle
 from thermospindle.model.scene.reading import load
 from thermospindle.report.text.diagnosis.answer import diagnosis_json
 from thermospindle.sim.effects import CATALOGUE, usable
+from thermospindle.sim.effects.own import effect_of
 
 ROOT = Path(__file__).parents[2]
 SCENES = ("scenes/hdd_2003", "tests/scenes/symmetric", "tests/scenes/inner_turning_spring")
@@ -98,10 +107,12 @@ def judge(seed: int, without: Sequence[str] = ()) -> dict[str, Any]:
     row |= described(made, drawn.spindle) | {"visibility": visibility(made, drawn.spindle) if drawn.hidden else []}
     start = time.perf_counter()
     try:
-        told = diagnosis_json(diagnose(drawn.spindle, made.campaign))
+        found = diagnose(drawn.spindle, made.campaign)
+        told = diagnosis_json(found)
     except Exception as error:
         row |= {"verdict": "error", "effects": [], "error": f"{type(error).__name__}: {error}", "trace": traceback.format_exc()[-800:]}
         return row | {"probability": {"none": 0.0, "unknown": 0.0}, "candidates": [], "drifts": [], "seconds": time.perf_counter() - start}
+    seconds = time.perf_counter() - start
     return row | {
         "verdict": told["verdict"],
         "effects": told["effects"],
@@ -113,8 +124,29 @@ def judge(seed: int, without: Sequence[str] = ()) -> dict[str, Any]:
         "held_out": [told["error"]["held_out_before"], told["error"]["held_out_after"]],
         "learned": told["learned"],
         "noise": sorted(set(told["noise"].values())),
-        "seconds": time.perf_counter() - start,
+        "seconds": seconds,
+        "drafted": drafted(found, told) if told["verdict"] == "unexplained" and told["where"] else None,
     }
+
+
+def drafted(found: Diagnosis, told: dict[str, Any]) -> list[float]:
+    """Root mean square error, in standard errors, of conditions predicted from all others: without effects, and with the effect of one's own that
+    `spindle draft` writes of the first drift."""
+    with TemporaryDirectory() as folder:
+        answer, file = Path(folder) / "diagnosis.json", Path(folder) / "drafted.py"
+        answer.write_text(json.dumps(told), encoding="utf-8")
+        file.write_text(draft(answer, "drafted"), encoding="utf-8")
+        mechanisms = variants(effect_of(file).effect)
+    model, base, groups = found.search.model, found.search.base, conditions_of(found.search)
+    fits = []
+    for m in mechanisms:
+        prior = steady(base.evidence.learned, (m,))
+        problem = Problem(model, (m,))
+        starts = [problem.start({0: m.size.typical}), problem.start({})]
+        own = fit(model, (m,), starts, tempers=TEMPERS[1:], learned=prior)
+        fits.append(settled(model, Hypothesis(own, evidence(model, own))))
+    best = max(fits, key=lambda h: h.evidence.ln)
+    return [left_out(model, h.fit, h.evidence, groups) for h in (base, best)]
 
 
 def commit() -> str:
