@@ -20,6 +20,7 @@ from thermospindle.diagnosis.inference.evidence import left_out
 from thermospindle.diagnosis.inference.fit import Problem
 from thermospindle.diagnosis.inference.model import CampaignModel
 from thermospindle.diagnosis.inference.search import STRAIN, Hypothesis, Search
+from thermospindle.model.types import Array
 
 PRIOR = {"none": 0.5, "one": 0.33, "two": 0.08, "free": 0.05, "two free": 0.02, "one and free": 0.02, "three": 0.01}
 WRONG, FALSE_ALARM, MISSED, SET, HALF = 10.0, 20.0, 5.0, 1.0, 3.0

@@ -15,7 +15,17 @@ from thermospindle.diagnosis.inference.nuisance import DAMPING, STIFFNESS
 from thermospindle.diagnosis.inference.prior import Learned
 from thermospindle.diagnosis.inference.screening import Screened
 from thermospindle.diagnosis.inference.search import Hypothesis, Search
-from thermospindle.diagnosis.inference.verdict import COARSE, FALSE_ALARM, MISSED, WRONG, Verdict, between_tests, coarsening, conditions_of, decide
+from thermospindle.diagnosis.inference.verdict import (
+    COARSE,
+    FALSE_ALARM,
+    MISSED,
+    WRONG,
+    Verdict,
+    between_tests,
+    coarsening,
+    conditions_of,
+    decide,
+)
 from thermospindle.model.machine import Condition
 from thermospindle.sim.effects.effect import Effect, Parameter
 
