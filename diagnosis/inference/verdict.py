@@ -138,8 +138,9 @@ def between_tests(left: Sequence[tuple[Array, Array]]) -> float:
     for a, (lines, r) in enumerate(left):
         for b, (other_lines, other) in enumerate(left):
             if a != b and len(r) == len(other):
-                there = other[:, np.abs(other_lines[None, :] - lines[:, None]).argmin(axis=1)]
-                correlation = float(np.mean(r * there) / np.sqrt(max(np.mean(r * r) * np.mean(there * there), 1e-300)))
+                there = other[:, np.abs(other_lines[None, :] - lines[:, None]).argmin(axis=1)].ravel()
+                size = float(np.linalg.norm(r) * np.linalg.norm(there))
+                correlation = float(r.ravel() @ there) / size if size else 0.0
                 found.append(correlation if correlation > SMALL else 0.0)
     return float(np.mean(found)) if found else 0.0
 
