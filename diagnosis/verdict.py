@@ -11,7 +11,7 @@ import numpy as np
 from thermospindle.diagnosis.data.lines import line_data
 from thermospindle.diagnosis.data.mode_table import mode_data
 from thermospindle.diagnosis.data.observe import condition_of
-from thermospindle.diagnosis.inference.detectable import smallest
+from thermospindle.diagnosis.inference.detectable import smallest, unseen_beside
 from thermospindle.diagnosis.inference.freeform import free_forms
 from thermospindle.diagnosis.inference.mechanism import Mechanism, variants
 from thermospindle.diagnosis.inference.model import CampaignModel, TestData, campaign_model, expected_noise
@@ -54,7 +54,8 @@ class Drift:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """All that `spindle diagnose` tells; `detectable`: of every effect the variant and size (from neutral, in its unit) that would have shown."""
+    """All that `spindle diagnose` tells; `detectable`: of every effect the variant and size (from neutral, in its unit) that would have shown; `may_hide`
+    what could act beside what the verdict names, unseen."""
 
     spindle: Spindle
     campaign: Campaign
@@ -63,6 +64,7 @@ class Diagnosis:
     drifts: tuple[Drift, ...]
     tests: tuple[NextTest, ...]
     detectable: Mapping[str, tuple[Mechanism, float]]
+    may_hide: tuple[str, ...] = ()
 
 
 def diagnose(
@@ -74,12 +76,12 @@ def diagnose(
     named = [v for e in usable(spindle, catalogue) if e.name not in present for v in variants(e)]
     found = search(model, named, free_forms(spindle), progress)
     verdict = decide(found)
-    drifts = tuple(_drift(found, c.hypothesis, c.delta_evidence) for c in verdict.free if len(c.hypothesis.mechanisms) == 1)
+    drifts = tuple(_drift(found, c.hypothesis, c.delta_evidence) for c in verdict.free if len(c.hypothesis.mechanisms) == 1 and c.delta_evidence > 0)
     tests = tuple(next_tests(found, verdict)) if verdict.word != "none" else ()
     progress("next tests weighed")
     seen = smallest(model, found.base.fit, found.screened)
     progress("smallest sizes found")
-    return Diagnosis(spindle, campaign, found, verdict, drifts, tests, seen)
+    return Diagnosis(spindle, campaign, found, verdict, drifts, tests, seen, unseen_beside(found, verdict.accepted))
 
 
 def campaign_data(spindle: Spindle, campaign: Campaign, progress: Callable[[str], None] = lambda done: None) -> CampaignModel:

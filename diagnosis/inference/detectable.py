@@ -15,7 +15,8 @@ import numpy as np
 from thermospindle.diagnosis.inference.fit import Fit, built
 from thermospindle.diagnosis.inference.mechanism import Mechanism
 from thermospindle.diagnosis.inference.model import Applied, CampaignModel
-from thermospindle.diagnosis.inference.screening import Fitted, Screened, fitted
+from thermospindle.diagnosis.inference.screening import Fitted, Screened, fitted, screen
+from thermospindle.diagnosis.inference.search import Hypothesis, Search
 from thermospindle.model.parallel import in_parallel
 from thermospindle.model.types import Array
 
@@ -23,6 +24,7 @@ ASKED = 5.0  # ln evidence
 NEAR = 0.05  # relative error of a size
 TRIES = 8  # sizes of an effect
 STEPS = 6  # at most, of everything else beside it
+SHOWS, HIDES = 3.0, 1.0  # standard errors of a typical size, from which an effect alone shows, and up to which it hides beside another
 
 
 def smallest(model: CampaignModel, about: Fit, screened: Sequence[Screened], workers: int | None = None) -> dict[str, tuple[Mechanism, float]]:
@@ -37,6 +39,17 @@ def smallest(model: CampaignModel, about: Fit, screened: Sequence[Screened], wor
     tasks = list(best.values())
     sizes = in_parallel(partial(_smallest, model.thinned, about), tasks, workers)
     return {m.name: (m, size) for (_, m), size in zip(tasks, sizes, strict=True) if size is not None}
+
+
+def unseen_beside(found: Search, accepted: Hypothesis) -> tuple[str, ...]:
+    """Of the effects that resemble those of an explanation the ones whose typical size these data would show alone, but not beside it: how much of
+    what it explains is theirs, nobody can tell."""
+    alike = {name for m in accepted.mechanisms for name in m.effect.resembles} - set(accepted.names)
+    alone = [s.mechanism for s in found.screened if s.mechanism.name in alike and not s.mechanism.free and s.visibility > SHOWS]
+    seen: dict[str, float] = {}
+    for s in screen(found.model, accepted.fit, 1.0, accepted.evidence.learned, alone):
+        seen[s.mechanism.name] = max(s.visibility, seen.get(s.mechanism.name, 0.0))
+    return tuple(name for name, standard_errors in seen.items() if standard_errors < HIDES)
 
 
 def _smallest(model: CampaignModel, about: Fit, task: tuple[float, Mechanism]) -> float | None:

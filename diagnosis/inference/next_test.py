@@ -14,8 +14,9 @@ import numpy as np
 from thermospindle.diagnosis.inference.mechanism import size_covariance
 from thermospindle.diagnosis.inference.model import FAILED
 from thermospindle.diagnosis.inference.search import Hypothesis, Search
-from thermospindle.diagnosis.inference.verdict import Candidate, Verdict
+from thermospindle.diagnosis.inference.verdict import Candidate, Verdict, beyond_limits
 from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.rotor.modes import modes
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 from thermospindle.sim.operating import operating_point
@@ -26,6 +27,7 @@ READING = 5e-5  # relative error of a frequency read from a hammer test
 CERTAIN = np.log(1e6)  # ln odds beyond which nothing is gained, and models are not to be trusted
 DECIDED = np.log(100.0)
 ALIVE = 0.01  # posterior probability from which an explanation is to be told from the best
+TELLS = 2.0  # odds from which a test is worth naming
 MOST = 3
 
 
@@ -56,6 +58,7 @@ def next_tests(found: Search, verdict: Verdict) -> list[NextTest]:
     alive = [c for c in verdict.candidates if set(c.names) <= set(verdict.effects) or c.probability > ALIVE][: MOST + 1]
     if len(alive) < 2:
         alive += [c for c in verdict.candidates if c not in alive][: 2 - len(alive)]
+    alive = [c for c in alive if c.names == verdict.effects or not beyond_limits(c.hypothesis)]
     if verdict.free and verdict.word != "identified":
         alive.append(verdict.free[0])
     if not alive:
@@ -70,6 +73,7 @@ def next_tests(found: Search, verdict: Verdict) -> list[NextTest]:
             a, b = first[plan], _predicted(found, rival.hypothesis, plan)
             if a and b and len(a) == len(b):
                 weighed.append(_weighed(plan, lead, rival, a, b))
+        weighed = [t for t in weighed if t.odds > TELLS]
         if weighed:
             tests.append(max(weighed, key=lambda t: (min(t.odds, np.exp(CERTAIN)), -abs(t.condition.temperature - 20), -t.condition.speed)))
     return tests
@@ -89,7 +93,8 @@ def _weighed(plan: Condition, lead: Candidate, rival: Candidate, a: Sequence[Mod
 
 
 def _predicted(found: Search, h: Hypothesis, plan: Condition) -> list[ModePrediction] | None:
-    """Modes in the band at a condition under one explanation: tolerances as fitted, sizes continued from the tests by their law.
+    """Modes in the band at a condition under one explanation: tolerances and the model's constant errors as fitted, sizes continued from the
+    tests by their law.
 
     Errors: of reading, of the thermometer, and of the sizes.
     """
@@ -136,8 +141,9 @@ def _frequencies(found: Search, h: Hypothesis, spindle: Spindle, plan: Condition
     for m, size, shape in zip(h.mechanisms, sizes, h.fit.shapes, strict=True):
         applied.append((m.effect, m.values(float(np.clip(size, *m.size.limits)), shape)))
     band = spindle.hammer.band[1]
-    modes = operating_point(spindle, plan, applied).modes_below(band)
-    return np.array([mode.frequency for mode in modes]), np.array([mode.damping_ratio for mode in modes])
+    point = operating_point(spindle, plan, applied)
+    found_modes = modes(point.chain, found.model.elsewhere(point.linear, h.evidence.mean), band)
+    return np.array([mode.frequency for mode in found_modes]), np.array([mode.damping_ratio for mode in found_modes])
 
 
 def in_words(condition: Condition) -> str:

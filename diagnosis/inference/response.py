@@ -10,7 +10,7 @@ import numpy as np
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.mode_table import ModeData
 from thermospindle.model.rotor.chain import Matrices
-from thermospindle.model.rotor.modes import LARGE, kinds, oscillating, poles
+from thermospindle.model.rotor.modes import LARGE, kinds, oscillating, poles, poles_below
 from thermospindle.model.rotor.reduced import reduced
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.campaign.beside import POWER
@@ -19,6 +19,7 @@ from thermospindle.sim.identification import pairing
 from thermospindle.sim.identification.pairing import ModeSet
 
 SILENT = 1e-6  # of a mode's answer, left at the end of a record
+REACH = 2.5  # times the highest measured frequency, up to which modes of the model may be those of a table
 EXACT = 1e-11  # of the largest singular value of a change: products that are left out
 
 
@@ -157,18 +158,21 @@ def same_chain(a: Measurement, b: Measurement) -> bool:
 def partners(data: ModeData, linear: Linear):
     """Poles of the model in order of frequency, and which of them is which measured mode: of its kind, near in ln frequency."""
     p = poles(linear.matrices)
-    found = oscillating(p, 2.5 * float(data.frequency.max()))
-    frequency = np.abs(p.value[found]) / (2 * np.pi)
-    computed = ModeSet(frequency, kind=kinds(linear.matrices, p.right[:, found]))
+    found = oscillating(p, REACH * float(data.frequency.max()))
+    return found, _partners(data, linear, p.value[found], p.right[:, found]), p
+
+
+def _partners(data: ModeData, linear: Linear, pole: ComplexArray, shape: ComplexArray) -> Integers:
+    computed = ModeSet(np.abs(pole) / (2 * np.pi), kind=kinds(linear.matrices, shape))
     partner = pairing.partners(ModeSet(data.frequency, kind=data.kind), computed, pairing.OF_A_TABLE)
     if np.any(partner < 0):
         raise ValueError("the model has fewer modes than the table")
-    return found, partner, p
+    return partner
 
 
 def mode_residual(data: ModeData, linear: Linear) -> Array:
-    found, partner, p = partners(data, linear)
-    pole = p.value[found][partner] - linear.chain.decay
+    every, shape = poles_below(linear.matrices, REACH * float(data.frequency.max()))
+    pole = every[_partners(data, linear, every, shape)] - linear.chain.decay
     frequency, damping = np.abs(pole) / (2 * np.pi), -pole.real / np.abs(pole)
     known = np.isfinite(data.damping_sd)
     by_frequency = np.log(frequency / data.frequency) / data.frequency_sd

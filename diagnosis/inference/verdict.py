@@ -187,6 +187,15 @@ def _prior(h: Hypothesis, named: int, free: int) -> float:
     return float(np.log(PRIOR["two free"] / max(comb(free, 2), 1)) if frees == 2 else np.log(PRIOR["one and free"] / (named * free)))
 
 
+def beyond_limits(h: Hypothesis) -> bool:
+    """Whether an effect would need a size that it cannot have, by more than twice its standard error."""
+    for m, size, covariance in zip(h.mechanisms, h.evidence.sizes, h.evidence.size_covariance, strict=True):
+        sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        if np.any((size < m.size.limits[0] - 2 * sd) | (size > m.size.limits[1] + 2 * sd)):
+            return True
+    return False
+
+
 def named_part(c: Candidate) -> Names:
     """The effects of the catalogue in an explanation that may hold free forms too."""
     return tuple(m.name for m in c.hypothesis.mechanisms if not m.free)
@@ -286,7 +295,10 @@ def _reason(found: Search, word: str, effects: Names, candidates, free, none: fl
     n, chi2 = found.base.fit.count, found.base.evidence.chi2
     if word == "none":
         best = f"; the best effect, {' + '.join(candidates[0].names)}, has a probability of {candidates[0].probability:.1%}" if candidates else ""
-        return f"Tolerances and measuring errors explain the data: chi2 is {chi2 / n:.2f} a number for {n} numbers{best}."
+        wrong = found.base.evidence.learned.sizes.get(kinds_of.STIFFNESS, 0.0)
+        which = "; one condition cannot tell that from a missing effect" if len(conditions_of(found)) == 1 else ""
+        constant = f", the model's frequencies being constantly wrong by about {wrong:.1g} of each{which}" if wrong > NUMERICS[0] else ""
+        return f"Tolerances and measuring errors explain the data: chi2 is {chi2 / n:.2f} a number for {n} numbers{constant}{best}."
     lead = candidates[0] if candidates else None
     if word == "unexplained":
         place = "nothing tried explains them"
@@ -298,7 +310,7 @@ def _reason(found: Search, word: str, effects: Names, candidates, free, none: fl
         rival = f"; the best of the catalogue, {' + '.join(lead.names)}, reaches {lead.delta_evidence:.0f}" if lead else ""
         return f"No effect of the catalogue explains the data as well as free drift does: {place}{rival} (chi2 without effects: {chi2 / n:.2f} a number)."
     named = " + ".join(effects)
-    checked = f"; conditions left out are predicted with {after:.2f} instead of {before:.2f} standard errors"
+    checked = f"; conditions left out are predicted with {after:.2f} instead of {before:.2f} standard errors" if np.isfinite(after) else ""
     if word == "ambiguous":
         rows = [c for c in candidates if set(c.names) <= set(effects)]
         share = sum(c.probability for c in rows)
@@ -306,9 +318,11 @@ def _reason(found: Search, word: str, effects: Names, candidates, free, none: fl
     disagreement = ", which does not confirm it" if after > 0.9 * before else ""
     told = [c for c in (*candidates, *free) if set(named_part(c)) == set(effects)]
     chosen = max(told, key=lambda c: c.probability)
+    without, within = (h.evidence.learned.sizes.get(kinds_of.STIFFNESS, 0.0) for h in (found.base, chosen.hypothesis))
+    instead = f"; without, the model's frequencies would have to be constantly wrong by about {without:.1g} of each" if without > 10 * within else ""
     rest = 1 - sum(c.probability for c in told)
     odds = "all else together is less probable than 1 in 1000" if rest < 1e-3 else f"all else together has a probability of {rest:.1%}"
     word_of = "is the explanation" if len(effects) == 1 else "are both needed" if len(effects) == 2 else "are all needed"
     drifting = [m.name for m in chosen.hypothesis.mechanisms if m.free]
     beside = f"; beside {'it' if len(effects) == 1 else 'them'} {' and '.join(drifting)} drifts a little" if drifting else ""
-    return f"{named} {word_of}: {chosen.delta_evidence:.0f} in ln evidence over the model without effects, {odds}{beside}{checked}{disagreement}."
+    return f"{named} {word_of}: {chosen.delta_evidence:.0f} in ln evidence over the model without effects, {odds}{beside}{instead}{checked}{disagreement}."

@@ -20,8 +20,11 @@ c^4 / 1440, the size of the consistent mass's error with the other sign. Measure
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
+from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
 
@@ -29,14 +32,16 @@ from thermospindle.model.machine import Body, Joint, Material, Structure
 from thermospindle.model.shaft import Segment, Shaft
 from thermospindle.model.types import Array
 
+T = TypeVar("T", float, Array)
+
 PLACES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 SLIGHT = 1e-4
 """Rotary inertia left to a node where its theory has none, over mass times length squared: MuJoCo wants some, bending frequencies move by half of it
 times (k l)^2."""
 
 
-def shear_factor(bore: float, poisson: float) -> float:
-    """Shear factor of a tube of radius ratio `bore`: Cowper, The shear coefficient in Timoshenko's beam theory, J. Appl. Mech., 1966."""
+def shear_factor(bore: T, poisson: float) -> T:
+    """Shear factor of a tube of radius ratio `bore` (a number or an array): Cowper, The shear coefficient in Timoshenko's beam theory, J. Appl. Mech., 1966."""
     m = (1 + bore**2) ** 2
     return 6 * (1 + poisson) * m / ((7 + 6 * poisson) * m + (20 + 12 * poisson) * bore**2)
 
@@ -58,14 +63,15 @@ def with_theory(
     changed_bodies: dict[str, Body] = {}
     changed_joints: dict[str, Joint] = {}
     told = {s.name: shares if isinstance(shares, tuple) else shares[s.name] for s in structure.shafts}
+    bodies, joints = {b.name: b for b in structure.bodies}, {j.name: j for j in structure.joints}
     shafts = tuple(replace(s, shear=told[s.name][0], rotary=told[s.name][1]) for s in structure.shafts)
     for old, new in zip(structure.shafts, shafts, strict=True):
         for a, b in zip(nodes(old, materials), nodes(new, materials), strict=True):
-            own = structure.body(a.name)
+            own = bodies[a.name]
             x, y, z = (i + after - before for i, after, before in zip(own.inertia, b.inertia, a.inertia, strict=True))
             changed_bodies[a.name] = replace(own, inertia=(x, y, z))
         for before, after in zip(elements(old, materials, temperature), elements(new, materials, temperature), strict=True):
-            joint = next(j for j in structure.joints if j.name == before.name)
+            joint = joints[before.name]
             k = [own * b / a for own, a, b in zip(joint.stiffness, before.stiffness, after.stiffness, strict=True)]
             changed_joints[joint.name] = replace(joint, stiffness=(k[0], k[1], k[2], k[3], k[4]))
     return replace(
@@ -78,68 +84,88 @@ def with_theory(
 
 def elements(shaft: Shaft, materials: Mapping[str, Material], temperature: float) -> list[Joint]:
     """The joints between neighbouring nodes of a shaft."""
-    found = []
-    for i, (low, high) in enumerate(zip(shaft.nodes, shaft.nodes[1:], strict=False)):
+    used = {segment.material: materials[segment.material] for segment in shaft.segments}
+    elastic = tuple((name, m.youngs_modulus(temperature), m.poisson_ratio) for name, m in used.items())
+    return [
+        Joint(
+            name=shaft.elements[i],
+            group=shaft.name,
+            bodies=(shaft.bodies[i], shaft.bodies[i + 1]),
+            z=z,
+            stiffness=(lateral, lateral, 1 / drawn, 1 / bent, 1 / bent),
+            damping_ratio=shaft.damping_ratio,
+            role="beam",
+            material=material,
+        )
+        for i, (z, bending, sheared, drawn, bent, material) in enumerate(_flexibilities(shaft.segments, shaft.nodes, elastic))
+        for lateral in [1 / (bending + shaft.shear * sheared)]
+    ]
+
+
+@lru_cache(maxsize=64)
+def _flexibilities(
+    segments: tuple[Segment, ...], heights: tuple[float, ...], elastic: tuple[tuple[str, float, float], ...]
+) -> tuple[tuple[float, float, float, float, float, str], ...]:
+    """Of every element its elastic centre (m), lateral flexibility in bending and in shear, axial and tilt flexibility, and its material where it
+    has but one; `elastic`: name, modulus and Poisson's ratio of every material. They do not know the beam theory, so that another one costs nothing."""
+    properties, found = {name: row for name, *row in elastic}, []
+    for low, high in pairwise(heights):
         bent, sheared, drawn, about = 0.0, 0.0, 0.0, 0.0  # integrals of 1/EI, 1/kappa G A, 1/EA and z/EI
         squares = 0.0  # of z^2 / EI, from the element's lower end
         used: list[str] = []
-        for segment, z, dz in _slices(shaft, low, high):
-            material = materials[segment.material]
+        for segment, z, dz in _slices(segments, low, high):
             used += [segment.material] if segment.material not in used else []
-            modulus, poisson = material.youngs_modulus(temperature), material.poisson_ratio
+            modulus, poisson = properties[segment.material]
             outer, bore = _radii(segment, segment.outer, z), _radii(segment, segment.bore, z)
             area, moment = np.pi * (outer**2 - bore**2), np.pi / 4 * (outer**4 - bore**4)
-            factor = _shear_factors(bore / outer, poisson)
+            factor = shear_factor(bore / outer, poisson)
             bent += float(np.sum(dz / (modulus * moment)))
             about += float(np.sum((z - low) * dz / (modulus * moment)))
             squares += float(np.sum((z - low) ** 2 * dz / (modulus * moment)))
             sheared += float(np.sum(dz / (factor * modulus / (2 * (1 + poisson)) * area)))
             drawn += float(np.sum(dz / (modulus * area)))
         centre = about / bent
-        lateral = 1 / (squares - centre * about + shaft.shear * sheared)
-        found.append(
-            Joint(
-                name=shaft.elements[i],
-                group=shaft.name,
-                bodies=(shaft.bodies[i], shaft.bodies[i + 1]),
-                z=low + centre,
-                stiffness=(lateral, lateral, 1 / drawn, 1 / bent, 1 / bent),
-                damping_ratio=shaft.damping_ratio,
-                role="beam",
-                material=used[0] if len(used) == 1 else "",
-            )
-        )
-    return found
+        found.append((low + centre, squares - centre * about, sheared, drawn, bent, used[0] if len(used) == 1 else ""))
+    return tuple(found)
 
 
 def nodes(shaft: Shaft, materials: Mapping[str, Material]) -> list[Body]:
     """The nodes of a shaft as bodies."""
-    mass, first, least = np.zeros(len(shaft.nodes)), np.zeros(len(shaft.nodes)), np.zeros(len(shaft.nodes))
-    rotary = np.zeros(len(shaft.nodes))
-    for i, (low, high) in enumerate(zip(shaft.nodes, shaft.nodes[1:], strict=False)):
+    densities = tuple((name, materials[name].density) for name in dict.fromkeys(segment.material for segment in shaft.segments))
+    found = []
+    for name, (z, mass, rotary, least) in zip(shaft.bodies, _lumps(shaft.segments, shaft.nodes, densities), strict=True):
+        tilt = max(shaft.rotary * rotary, least)
+        found.append(Body(name, mass, (tilt, tilt, 2 * tilt), z, shaft.moves, shaft.turns, (), shaft.role, shaft.speed_ratio))
+    return found
+
+
+@lru_cache(maxsize=64)
+def _lumps(
+    segments: tuple[Segment, ...], heights: tuple[float, ...], densities: tuple[tuple[str, float], ...]
+) -> tuple[tuple[float, float, float, float], ...]:
+    """Of every node the height of its centre of mass (m), mass, rotary inertia of its sections, and the least inertia that it is given."""
+    mass, first, least, rotary = np.zeros((4, len(heights)))
+    density = dict(densities)
+    for i, (low, high) in enumerate(pairwise(heights)):
         length = high - low
-        for segment, z, dz in _slices(shaft, low, high):
+        for segment, z, dz in _slices(segments, low, high):
             outer, bore = _radii(segment, segment.mass_outer, z), _radii(segment, segment.bore, z)
-            density, x = materials[segment.material].density, (z - low) / length
-            line = density * np.pi * (outer**2 - bore**2) * dz
-            inertia = density * np.pi / 4 * (outer**4 - bore**4) * dz
+            rho, x = density[segment.material], (z - low) / length
+            line = rho * np.pi * (outer**2 - bore**2) * dz
+            inertia = rho * np.pi / 4 * (outer**4 - bore**4) * dz
             inward = length / 2 * float(np.sum(line * x * (1 - x)))
             for node, share, sign in ((i, 1 - x, 1.0), (i + 1, x, -1.0)):
                 mass[node] += float(np.sum(line * share))
                 rotary[node] += float(np.sum(inertia * share))
                 least[node] += SLIGHT * float(np.sum(line * share)) * length**2
                 first[node] += sign * inward
-    found = []
-    for name, z, m, s, tilt, small in zip(shaft.bodies, shaft.nodes, mass, first, shaft.rotary * rotary, least, strict=True):
-        tilt = max(float(tilt), float(small))
-        z = z + float(s / m)
-        found.append(Body(name, float(m), (tilt, tilt, 2 * tilt), z, shaft.moves, shaft.turns, (), shaft.role, shaft.speed_ratio))
-    return found
+    rows = zip(heights, mass.tolist(), rotary.tolist(), least.tolist(), first.tolist(), strict=True)
+    return tuple((z + s / m, m, r, small) for z, m, r, small, s in rows)
 
 
-def _slices(shaft: Shaft, low: float, high: float) -> Iterator[tuple[Segment, Array, Array]]:
+def _slices(segments: Sequence[Segment], low: float, high: float) -> Iterator[tuple[Segment, Array, Array]]:
     """The segments between two heights, each with places (m) and weights (m) of Gauss's rule on it."""
-    for segment in shaft.segments:
+    for segment in segments:
         a, b = max(low, segment.z[0]), min(high, segment.z[1])
         if b - a > 1e-12:
             yield segment, (a + b) / 2 + (b - a) / 2 * PLACES, (b - a) / 2 * WEIGHTS
@@ -148,7 +174,3 @@ def _slices(shaft: Shaft, low: float, high: float) -> Iterator[tuple[Segment, Ar
 def _radii(segment: Segment, ends: tuple[float, float], z: Array) -> Array:
     """Radii (m) of a segment at heights."""
     return ends[0] + (ends[1] - ends[0]) * (z - segment.z[0]) / (segment.z[1] - segment.z[0])
-
-
-def _shear_factors(bore: Array, poisson: float) -> Array:
-    return np.array([shear_factor(float(b), poisson) for b in bore])

@@ -150,7 +150,7 @@ def modes(chain: RotorBase, linear: Matrices | None = None, highest: float = np.
     Those of a flexible shaft below a finite `highest` come from its reduced model, frequencies to 1e-9.
     """
     linear = linear or matrices(chain)
-    value, shapes = _below(linear, highest)
+    value, shapes = poles_below(linear, highest)
     shapes = shapes / shapes[np.argmax(np.abs(shapes), axis=0), np.arange(len(value))]
     every = np.concatenate([element_rows(chain, e) for e in chain.elements]) @ shapes
     strain = np.array([_quadratic(part, e.stiffness) for part, e in zip(every.reshape(len(chain.elements), 5, len(value)), chain.elements, strict=True)])
@@ -171,8 +171,9 @@ def modes(chain: RotorBase, linear: Matrices | None = None, highest: float = np.
     ]
 
 
-def _below(linear: Matrices, highest: float) -> tuple[ComplexArray, ComplexArray]:
-    """Poles (m,) of the oscillating modes below `highest` (Hz), one of each conjugate pair, and their right vectors (n, m)."""
+def poles_below(linear: Matrices, highest: float) -> tuple[ComplexArray, ComplexArray]:
+    """Poles (m,) of the oscillating modes below `highest` (Hz), one of each conjugate pair, and their right vectors (n, m); of a flexible shaft by
+    its reduced model, where `highest` is finite."""
     n = len(linear.mass)
     if n <= LARGE or not np.isfinite(highest):
         p = poles(linear)

@@ -18,7 +18,7 @@ from thermospindle.report.figures.diagnosis import figures
 from thermospindle.report.figures.runout_campaign import diagnosis_figures
 from thermospindle.report.page import runout_diagnosis
 from thermospindle.report.page.report import Section, page
-from thermospindle.report.text.diagnosis.words import plan_words
+from thermospindle.report.text.diagnosis.words import hidden_words, plan_words
 from thermospindle.report.typeset import figure, minus, prose, table, with_error
 
 CAPTIONS = {
@@ -72,13 +72,14 @@ def write_diagnosis(
 def _verdict(answer: dict[str, Any]) -> str:
     named = f": {', '.join(answer['effects'])}" if answer["effects"] else ""
     error = answer["error"]
+    kinds = [("all tests", ""), ("temperatures left out one after the other", "held_out_")]
     rows = [
-        [("all tests", 0), (f"{error['before']:.2f}", 1), (f"{error['after']:.2f}", 1)],
-        [("temperatures left out one after the other", 0), (f"{error['held_out_before']:.2f}", 1), (f"{error['held_out_after']:.2f}", 1)],
+        [(name, 0), *((f"{error[which + when]:.2f}", 1) for when in ("before", "after"))] for name, which in kinds if error[which + "after"] is not None
     ]
     grid = _grid("Error, rms in standard errors: with tolerances fitted, and with what the verdict names.", ["", "before", "after"], rows)
     card = f'<div class="cards"><div class="card"><span>verdict</span><b>{escape(answer["verdict"] + named)}</b></div></div>'
     said = "".join(f"<p>{prose(answer[key])}</p>" for key in ("reason", "would_change")) + "".join(f"<p>{prose(s)}</p>" for s in answer["law_departs"])
+    said += f"<p>{prose(hidden_words(answer['may_hide']))}</p>" if answer["may_hide"] else ""
     free = f"<p>Without any catalogue: {prose(answer['misfit']['words'][0])}</p>" if answer["misfit"]["rejected"] else ""
     return card + said + free + grid
 

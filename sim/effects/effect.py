@@ -39,7 +39,7 @@ class Parameter:
     meaning: str
     source: str
     choices: tuple[float, ...] = ()
-    counts: str = ""  # "bearings": its choices are the numbers of a spindle's bearings, from 0
+    counts: str = ""  # "bearings": its choices are the numbers of a spindle's ball bearings, from 0; "all bearings": of any kind
 
 
 REFERENCE_HUB = 0.0259
@@ -69,23 +69,25 @@ def fitted_to(effect: Effect, spindle: Spindle) -> Effect:
     if refusal(effect, spindle) is not None:
         return effect
     factors = effect.sized(spindle) if effect.sized else {}
-    rows = tuple(_fitted(p, factors.get(p.name, 1.0), len(spindle.bearings)) for p in effect.parameters)
+    counts = {"bearings": len(spindle.bearings), "all bearings": len(spindle.all_bearings)}
+    rows = tuple(_fitted(p, factors.get(p.name, 1.0), counts) for p in effect.parameters)
     return effect if rows == effect.parameters else replace(effect, parameters=rows, sized=None)
 
 
-def _fitted(p: Parameter, factor: float, bearings: int) -> Parameter:
-    if p.counts == "bearings":
-        numbers = tuple(float(k) for k in range(bearings))
+def _fitted(p: Parameter, factor: float, counts: Mapping[str, int]) -> Parameter:
+    """The whole of a value goes with the machine, what is neutral too: a radius twice as large is so where it changes nothing."""
+    if p.counts:
+        numbers = tuple(float(k) for k in range(counts[p.counts]))
         return replace(p, choices=numbers, limits=(0.0, max(numbers[-1], 1.0)), typical=min(p.typical, numbers[-1]))
     if float(f"{factor:.1e}") == 1.0:
         return p
 
     def scaled(value: float) -> float:
-        return p.neutral + float(f"{factor * (value - p.neutral):.1e}")
+        return float(f"{factor * value:.1e}")
 
     low, high = (scaled(limit) for limit in p.limits)
     limits = (min(low, p.limits[0]), max(high, p.limits[1]))
-    return replace(p, typical=scaled(p.typical), prior_sd=float(f"{factor * p.prior_sd:.1e}"), limits=limits)
+    return replace(p, neutral=scaled(p.neutral), typical=scaled(p.typical), prior_sd=scaled(p.prior_sd), limits=limits)
 
 
 def refusal(effect: Effect, spindle: Spindle) -> str | None:

@@ -26,6 +26,12 @@ def body(spindle: Spindle, role: str) -> Body | None:
     return next((b for b in spindle.structure.bodies if b.role == role), None)
 
 
+def held(spindle: Spindle) -> set[str]:
+    """The bearings one of whose rings is in a housing: in a body with that role, or in the ground, which then stands for a rigid one."""
+    housings = {b.name for b in spindle.structure.bodies if b.role == "housing"} | {"ground"}
+    return {b.name for b in spindle.all_bearings if b.inner_body in housings or b.outer_body in housings}
+
+
 def regions(spindle: Spindle, role: str) -> list[Region]:
     """The section's regions with a role: shaft, hub, insert (bonded into the hub) or support (what holds the shaft)."""
     return [g for g in spindle.regions if g.role == role]

@@ -30,10 +30,11 @@ def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
         "probability": {"none": v.probability_none, "unknown": v.probability_unknown},
         "expected_loss": dict(v.losses),
         "candidates": [_candidate(c, d) for c in v.candidates[:SHOWN]],
+        "may_hide": list(d.may_hide),
         "invisible": _invisible(d),
         "detectable": {name: size for name, (_, size) in d.detectable.items()},
         "detectable_in": {name: {"parameter": m.size.name, "unit": m.size.unit, "size": size} for name, (m, size) in d.detectable.items()},
-        "error": {"before": before, "after": after, "held_out_before": v.held_out_before, "held_out_after": v.held_out_after},
+        "error": {"before": before, "after": after, "held_out_before": _known(v.held_out_before), "held_out_after": _known(v.held_out_after)},
         "where": [_place(p, d) for p in d.drifts],
         "next_test": [
             {
@@ -58,6 +59,11 @@ def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
         "learned": _learned(accepted.evidence),
         "noise": {data.test.id: getattr(data, "noise_from", "the table of modes") for data in d.search.model.tests},
     }
+
+
+def _known(value: float) -> float | None:
+    """None of what could not be told: nothing can be left out of one condition."""
+    return value if np.isfinite(value) else None
 
 
 def _sd(evidence: Evidence) -> Array:
@@ -87,7 +93,7 @@ def _candidate(c: Candidate, d: Diagnosis) -> dict[str, Any]:
         "delta_evidence": c.delta_evidence,
         "probability": c.probability,
         "held_out_error_ratio": d.verdict.held_out_after / d.verdict.held_out_before
-        if c.hypothesis is d.verdict.accepted and d.verdict.held_out_before
+        if c.hypothesis is d.verdict.accepted and d.verdict.held_out_before > 0
         else float(np.sqrt(own.chi2 / max(d.search.base.evidence.chi2, 1e-300))),
         "parameters": parameters,
         "law": laws,

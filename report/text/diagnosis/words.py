@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from thermospindle.diagnosis.inference.verdict import DEPARTS
+from thermospindle.diagnosis.inference.verdict import DEPARTS, beyond_limits
 from thermospindle.diagnosis.verdict import Diagnosis, Drift
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
@@ -42,6 +42,9 @@ def drift_words(d: Diagnosis) -> list[str]:
 
 
 def _drift_words(p: Drift) -> str:
+    if len(p.change) == 1:
+        ((change, sd),) = p.told
+        return f"{p.element}: {change:+.3g} +- {sd:.1g} {p.unit} {_where(p.conditions[0])}"
     low, high = int(np.argmin(p.change)), int(np.argmax(p.change))
     goes = f", {p.pattern.shape.name}" if p.pattern and p.pattern.shape.name != "constant" else ""
     (least, its_sd), (most, sd) = p.told[low], p.told[high]
@@ -77,8 +80,18 @@ def would_change(d: Diagnosis) -> str:
         place = f"; `spindle draft` writes one from the drift of {d.drifts[0].element}" if d.drifts else ""
         return f"An effect that the catalogue does not hold would change that{place}.{test}"
     rivals = [c for c in v.candidates if set(c.names) - set(v.effects)]
+    if rivals and beyond_limits(rivals[0].hypothesis):
+        test += f" {' + '.join(rivals[0].names)} would need a size that it cannot have."
+    elif rivals and not d.tests:
+        test = f" No other temperature or speed tells {' + '.join(v.candidates[0].names)} from {' + '.join(rivals[0].names)}."
     rival = f"{' + '.join(rivals[0].names)}, {rivals[0].delta_evidence - v.candidates[0].delta_evidence:.0f} in ln evidence" if rivals else "none"
     return f"Data that the next best explanation ({rival}) predicts better would change that.{test}"
+
+
+def hidden_words(names: list[str]) -> str:
+    """What may act beside what the verdict names, unseen."""
+    they = "its" if len(names) == 1 else "their"
+    return f"Not to be told apart from it here: {', '.join(names)}; at {they} typical size beside it nothing of these data would show."
 
 
 def plan_words(condition: dict[str, Any]) -> str:
@@ -95,11 +108,11 @@ def show_diagnosis(console: Console, answer: dict[str, Any], verbose: bool = Tru
     for sentence in answer["law_departs"]:
         console.print(sentence)
     console.print(answer["would_change"])
+    if answer["may_hide"]:
+        console.print(hidden_words(answer["may_hide"]))
     error = answer["error"]
-    console.print(
-        f"Error, rms in standard errors: {error['before']:.2f} -> {error['after']:.2f}; on conditions left out "
-        f"{error['held_out_before']:.2f} -> {error['held_out_after']:.2f}"
-    )
+    unseen = f"; on conditions left out {error['held_out_before']:.2f} -> {error['held_out_after']:.2f}" if error["held_out_after"] is not None else ""
+    console.print(f"Error, rms in standard errors: {error['before']:.2f} -> {error['after']:.2f}{unseen}")
     if not verbose:
         _show_little(console, answer)
         return

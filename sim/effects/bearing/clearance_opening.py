@@ -29,7 +29,7 @@ def sized(spindle: Spindle) -> Mapping[str, float]:
 
 EFFECT = Effect(
     name="clearance_opening",
-    title="The diametral clearance of both bearings opens",
+    title="The diametral clearance of the bearings opens",
     equation=(
         "radial distance of the groove centres, inner less outer, falls by (opening / 2) (1 - w + w (T - T_ref) / 40 K), "
         "w = thermal_share (Jang et al. 2003, Eq. 1 with the outer race moved outward)"

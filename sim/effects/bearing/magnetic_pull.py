@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.machine import Condition, Region, Spindle
 from thermospindle.model.rotor.chain import Element, RotorBase
 from thermospindle.sim.effects.effect import TURNING, Effect, Parameter, Values, mass_ratio
 from thermospindle.sim.effects.roles import body
@@ -54,11 +54,21 @@ def sized(spindle: Spindle) -> Mapping[str, float]:
     return {"pull": max((s.preload for s in spindle.sets), default=16.0) / 16.0, "radial_ratio": mass_ratio(spindle) ** (-1 / 3)}
 
 
-def magnet_height(spindle: Spindle) -> float:
-    """Mean height (m) of the rotating regions in which the motor's loss is made; the turning body's own without any."""
+def magnet(spindle: Spindle) -> list[Region]:
+    """The rotating regions in which the motor's loss is made."""
     names = {name for source in spindle.thermal.sources for name in source.regions}
-    heights = [np.mean(g.z) for g in spindle.regions if g.name in names and g.part == "rotating"]
+    return [g for g in spindle.regions if g.name in names and g.part == "rotating"]
+
+
+def magnet_height(spindle: Spindle) -> float:
+    """Mean height (m) of the magnet; the turning body's own without any."""
+    heights = [np.mean(g.z) for g in magnet(spindle)]
     return float(np.mean(heights)) if heights else spindle.turning.z
+
+
+def idle(spindle: Spindle) -> str | None:
+    driven = not spindle.structure.shafts or magnet(spindle)  # a rigid hub has its motor in it
+    return None if driven else "the scene has no motor: no turning region in which a source of [thermal] makes heat"
 
 
 EFFECT = Effect(
@@ -134,5 +144,6 @@ EFFECT = Effect(
     spindle=spindle,
     chain=chain,
     sized=sized,
+    idle=idle,
     acts_on=(TURNING,),
 )

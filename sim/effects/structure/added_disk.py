@@ -15,15 +15,24 @@ def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
     if mass == 0.0:
         return spindle
     polar = mass * (values["outer_radius"] * 1e-3) ** 2 / 2
-    z = top(spindle) + values["height"] * 1e-3
-    bodies = tuple(with_mass(b, mass, z, (polar / 2, polar / 2, polar)) if b.turns else b for b in spindle.structure.bodies)
+    name, face, outward = seat(spindle)
+    z = face + outward * values["height"] * 1e-3
+    bodies = tuple(with_mass(b, mass, z, (polar / 2, polar / 2, polar)) if b.name == name else b for b in spindle.structure.bodies)
     return replace(spindle, structure=replace(spindle.structure, bodies=bodies))
 
 
-def top(spindle: Spindle) -> float:
-    """Height (m) of the turning body's upper face; of its centre of mass where no section is drawn."""
+def seat(spindle: Spindle) -> tuple[str, float, float]:
+    """The body that carries the disk, the height (m) of the face it sits on, and which way is outward.
+
+    The turning body's upper face; its centre of mass where no section is drawn; of a flexible shaft the end nearest the first hammer point.
+    """
+    turning = next((s for s in spindle.structure.shafts if s.turns), None)
+    if turning is not None:
+        low, high = turning.nodes[0], turning.nodes[-1]
+        hit = spindle.point(spindle.hammer.hammer_nodes[0]).position[2]
+        return (turning.bodies[-1], high, 1.0) if abs(hit - high) < abs(hit - low) else (turning.bodies[0], low, -1.0)
     body = spindle.turning
-    return max((spindle.region(name).z[1] for name in body.regions), default=body.z)
+    return body.name, max((spindle.region(name).z[1] for name in body.regions), default=body.z), 1.0
 
 
 def sized(spindle: Spindle) -> Mapping[str, float]:
@@ -67,7 +76,7 @@ EFFECT = Effect(
             typical=0.0,
             prior_sd=3.0,
             limits=(-50.0, 50.0),
-            meaning="height of the disk above the upper face of the turning body",
+            meaning="height of the disk above the upper face of the turning body, or before the end of a flexible shaft that is hammered",
             source="on top unless somebody looks",
         ),
     ),

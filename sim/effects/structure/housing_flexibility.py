@@ -9,28 +9,20 @@ import numpy as np
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import RotorBase
 from thermospindle.sim.effects.effect import Effect, Parameter, Values
-from thermospindle.sim.effects.roles import body, in_series, lacking
+from thermospindle.sim.effects.roles import held, in_series, lacking
 
 
 def chain(spindle: Spindle, condition: Condition, values: Values, chain: RotorBase) -> RotorBase:
     if values["radial"] == 0.0:
         return chain
-    seats = seated(spindle)
+    seats = held(spindle)
     radial, tilt = 1e-9 * values["radial"], 1e-6 * values["radial"] * values["tilt"]
     soft = np.diag([radial, radial, 0.0, tilt, tilt])
     return replace(chain, elements=tuple(in_series(e, soft) if e.name in seats else e for e in chain.elements))
 
 
-def seated(spindle: Spindle) -> set[str]:
-    """The bearings one of whose rings is in the body with role housing, or in a flexible one."""
-    housings = {b.name for b in spindle.structure.bodies if b.role == "housing"}
-    return {b.name for b in spindle.all_bearings if b.inner_body in housings or b.outer_body in housings}
-
-
 def idle(spindle: Spindle) -> str | None:
-    if body(spindle, "housing") is None:
-        return lacking("body", "housing")
-    return None if seated(spindle) else "no bearing sits in the housing"
+    return None if held(spindle) else lacking("body", "housing")
 
 
 EFFECT = Effect(

@@ -9,7 +9,7 @@ import numpy as np
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import RotorBase
 from thermospindle.sim.effects.effect import Effect, Parameter, Values
-from thermospindle.sim.effects.roles import body, lacking
+from thermospindle.sim.effects.roles import held, lacking
 
 
 def chain(spindle: Spindle, condition: Condition, values: Values, chain: RotorBase) -> RotorBase:
@@ -23,7 +23,7 @@ def chain(spindle: Spindle, condition: Condition, values: Values, chain: RotorBa
 
 
 def idle(spindle: Spindle) -> str | None:
-    return lacking("body", "housing") if body(spindle, "housing") is None else None
+    return None if held(spindle) else lacking("body", "housing")
 
 
 EFFECT = Effect(
@@ -40,7 +40,7 @@ EFFECT = Effect(
         ),
         Parameter(
             "bearing", "1", 0.0, 0.0, 1.0, (0.0, 1.0),
-            "which bearing is loose, counted from the lowest, 0", "unknown before looking", choices=(0.0, 1.0), counts="bearings",
+            "which bearing is loose, counted from the lowest, 0", "unknown before looking", choices=(0.0, 1.0), counts="all bearings",
         ),
     ),
     sees="rotor modes lower that move the shaft at that bearing, others not; the same at every temperature and speed",

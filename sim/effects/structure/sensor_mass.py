@@ -39,8 +39,8 @@ def loaded(body: Body, point: Point, mass: float, unbalanced: float) -> Body:
 
 
 def sized(spindle: Spindle) -> Mapping[str, float]:
-    """One takes a sensor to suit the machine."""
-    return {"mass": mass_ratio(spindle)}
+    """One takes a sensor to suit the machine: a gram on a hub of some 25 g, 20 g on a spindle of 10 kg, so by the root of the mass."""
+    return {"mass": mass_ratio(spindle) ** 0.5}
 
 
 EFFECT = Effect(
@@ -60,7 +60,7 @@ EFFECT = Effect(
             prior_sd=0.6,
             limits=(0.0, 100.0),
             meaning="mass of a sensor",
-            source="miniature accelerometers with their wax and cable end: 0.2 to 2 g by their makers' data sheets",
+            source="miniature accelerometers with their wax and cable end: 0.2 to 2 g by their makers' data sheets, those for machines 5 to 50 g",
         ),
         Parameter(
             "standing_share",

@@ -12,11 +12,16 @@ from thermospindle.sim.effects.roles import lacking, materials
 def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
     hub = values["hub_expansion"]
     rings = dict.fromkeys(b.ring_material for b in spindle.bearings)
-    errors = [(name, hub) for name in materials(spindle, "hub")] + [(name, values["ring_share"] * hub) for name in rings]
+    errors = [(name, hub) for name in carrying(spindle)] + [(name, values["ring_share"] * hub) for name in rings]
     for name, error in errors:
         if error != 0.0:
             spindle = with_material(spindle, expanding(spindle.materials[name], error))
     return spindle if values["shaft_share"] * hub == 0.0 else with_shaft(spindle, values["shaft_share"] * hub)
+
+
+def carrying(spindle: Spindle) -> tuple[str, ...]:
+    """Materials of what holds the outer rings: the hub, or in a spindle without one the housing."""
+    return materials(spindle, "hub") or materials(spindle, "support")
 
 
 def expanding(material: Material, error: float) -> Material:
@@ -37,15 +42,15 @@ def with_shaft(spindle: Spindle, error: float) -> Spindle:
 
 
 def idle(spindle: Spindle) -> str | None:
-    return None if materials(spindle, "hub") else lacking("region", "hub")
+    return None if carrying(spindle) else lacking("region", "hub", "support")
 
 
 EFFECT = Effect(
     name="expansion_mismatch",
-    title="Thermal expansion of hub, rings or shaft differs from its data sheet",
+    title="Thermal expansion of hub, housing, rings or shaft differs from its data sheet",
     equation=(
-        "alpha_hub = (1 + hub_expansion) alpha_data sheet, for the materials of the regions with role hub, wherever they are "
-        "used, and alpha_rings = (1 + ring_share hub_expansion) alpha_data sheet for the rings' material, of which shaft and balls may be too, the shaft's further by shaft_share hub_expansion; ring motions follow by thermo-elastic influence: u = gain . strain"
+        "alpha_hub = (1 + hub_expansion) alpha_data sheet, for the materials of the regions with role hub (without one support, the housing), wherever they "
+        "are used, and alpha_rings = (1 + ring_share hub_expansion) alpha_data sheet for the rings' material, of which shaft and balls may be too, the shaft's further by shaft_share hub_expansion; ring motions follow by thermo-elastic influence: u = gain . strain"
     ),
     parameters=(
         Parameter(
@@ -55,7 +60,7 @@ EFFECT = Effect(
             typical=0.05,
             prior_sd=0.04,
             limits=(-0.3, 0.3),
-            meaning="relative error of the expansion coefficient of the hub's main material",
+            meaning="relative error of the expansion coefficient of the hub's main material; of the housing's in a spindle without hub",
             source="spread of wrought and cast aluminium alloys, 21 to 24.5e-6/K (ASM Handbook vol. 2, 1990)",
         ),
         Parameter(

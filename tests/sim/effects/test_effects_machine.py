@@ -151,3 +151,40 @@ def test_drawbar_force_goes_with_the_root_of_the_force(tooled, share_of_speed):
 def test_without_a_holder_there_is_nothing_to_act_on(machine, tooled, name):
     assert refusal(by_name(name), machine) == "nothing to act on here: the scene has no joint with role 'holder'"
     assert refusal(by_name(name), tooled) is None
+
+
+def test_a_disk_sits_once_on_the_end_that_is_hammered(machine):
+    """On a shaft of many nodes it is one disk: the spindle is heavier by its mass, about the nose; the other end has none."""
+    values = by_name("added_disk").neutral() | {"mass": 400.0, "height": 20.0}
+    with_disk = operating_point(machine, Condition(20.0), [(by_name("added_disk"), values)]).spindle
+    assert with_disk.turning_mass - machine.turning_mass == pytest.approx(0.4)
+    nose = machine.structure.shafts[0].bodies[0]
+    before, after = machine.structure.body(nose), with_disk.structure.body(nose)
+    assert after.z == pytest.approx((before.mass * before.z - 0.4 * 0.020) / after.mass)
+    assert [b for b in with_disk.structure.bodies if b.name != nose] == [b for b in machine.structure.bodies if b.name != nose]
+
+
+def test_a_spindle_without_hub_expands_in_its_housing(machine):
+    effect = by_name("expansion_mismatch")
+    assert refusal(effect, machine) is None
+    own = operating_point(machine, Condition(40.0), [(effect, effect.neutral() | {"hub_expansion": 0.1})]).spindle.materials
+    assert own["cast iron"].thermal_expansion.value[0] == pytest.approx(1.1 * machine.materials["cast iron"].thermal_expansion.value[0])
+    assert own["steel"] == machine.materials["steel"]
+
+
+@pytest.mark.parametrize(
+    ("name", "scene", "words"),
+    [
+        ("magnetic_pull", "five_bearing", "nothing to act on here: the scene has no motor"),
+        ("added_disk", "free_shaft", "nothing to act on here: the scene has no turning body"),
+        ("housing_flexibility", "free_shaft", "nothing to act on here: the scene has no body with role 'housing'"),
+        ("housing_flexibility", "mk7702", None),  # a rigid housing, which the ground stands for
+        ("seat_clearance", "mk7702", None),
+        ("shear", "mk7702", "nothing to act on here: its flexible shafts shear already"),
+        ("taper_contact", "five_bearing", "nothing to act on here: the scene has no joint with role 'holder'"),
+        ("shaft_bending", "five_bearing", "outside its validity here"),
+    ],
+)
+def test_an_effect_says_where_it_has_nothing_to_act_on(name, scene, words):
+    found = refusal(by_name(name), load(ROOT / "scenes" / scene))
+    assert found is None if words is None else words in found

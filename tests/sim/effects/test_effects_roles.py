@@ -98,9 +98,9 @@ def test_sizes_follow_the_machine(spindle):
     bodies = tuple(heavy if b is body else b for b in spindle.structure.bodies)
     large = replace(spindle, structure=replace(spindle.structure, bodies=bodies), nominal_speed=spindle.nominal_speed / 2)
     sensor, disk, unbalance = (fitted_to(by_name(n), large).parameters for n in ("sensor_mass", "added_disk", "unbalance"))
-    assert (sensor[0].typical, sensor[0].prior_sd, sensor[0].limits) == (8.0, 4.8, (0.0, 800.0))
-    assert disk[1].typical == pytest.approx(12.5)  # it is neutral there, and its prior wider
-    assert disk[1].prior_sd == 10.0
+    assert (sensor[0].typical, sensor[0].prior_sd, sensor[0].limits) == (2.8, 1.7, (0.0, 280.0))  # by the root: sensors are chosen to suit
+    assert (disk[0].typical, disk[0].prior_sd, disk[0].limits) == (8.0, 5.6, (0.0, 4000.0))
+    assert (disk[1].neutral, disk[1].typical, disk[1].prior_sd, disk[1].limits) == (25.0, 25.0, 10.0, (0.0, 200.0))
     assert unbalance[0].typical == 8.0
     again = fitted_to(fitted_to(by_name("sensor_mass"), large), large)
     assert again.parameters == sensor

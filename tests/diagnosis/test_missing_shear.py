@@ -1,0 +1,75 @@
+"""The diagnosis of a measured free shaft whose scene has the plainest beam: one condition, four frequencies of a table."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.conftest import ROOT
+from thermospindle.diagnosis.inference import nuisance as kinds_of
+from thermospindle.diagnosis.verdict import diagnose
+from thermospindle.model.scene.reading import load
+from thermospindle.report.text.diagnosis.answer import diagnosis_json
+from thermospindle.sim.campaign.campaign import read_campaign
+from thermospindle.sim.effects import by_name
+
+SCENE = ROOT / "scenes" / "free_shaft"
+CATALOGUE = tuple(by_name(name) for name in ("shear", "rotary_inertia", "sensor_mass", "window_damping"))
+
+
+@pytest.fixture(scope="module")
+def coarse(tmp_path_factory):
+    """The shipped scene with a coarser mesh: its four frequencies move by 1e-4."""
+    folder = tmp_path_factory.mktemp("free_shaft")
+    text = (SCENE / "spindle.toml").read_text(encoding="utf-8")
+    (folder / "spindle.toml").write_text(text.replace("longest_element_mm = 25.0", "longest_element_mm = 65.0"), encoding="utf-8")
+    return load(folder)
+
+
+@pytest.fixture(scope="module")
+def campaign():
+    return read_campaign(SCENE / "measured" / "modelab")
+
+
+@pytest.fixture(scope="module")
+def measured(coarse, campaign):
+    return diagnose(coarse, campaign, CATALOGUE)
+
+
+def test_the_missing_shear_is_named(measured):
+    """Against a free constant error of every frequency, the only other thing that one condition could show."""
+    verdict = measured.verdict
+    assert (verdict.word, verdict.effects) == ("identified", ("shear",))
+    base, own = (h.evidence.learned.sizes for h in (measured.search.base, verdict.accepted))
+    assert base[kinds_of.STIFFNESS] == 1e-2
+    assert own[kinds_of.STIFFNESS] < 1e-3
+    assert "constantly wrong by about 0.01 of each" in verdict.reason
+
+
+def test_one_condition_shows_no_drift(measured):
+    assert not {kinds_of.STIFFNESS_DRIFT, kinds_of.DAMPING_DRIFT} & {p.kind for p in measured.search.model.parameters}
+    assert np.isnan(measured.verdict.held_out_after)  # nothing can be left out of one condition
+
+
+def test_what_cannot_be_told_apart_is_said(measured):
+    assert measured.may_hide == ("rotary_inertia",)
+    answer = diagnosis_json(measured)
+    assert answer["may_hide"] == ["rotary_inertia"]
+    assert answer["error"]["held_out_after"] is None
+    assert answer["next_test"] == []  # no other temperature tells them apart, either
+
+
+def test_a_beam_that_shears_lacks_nothing(coarse, campaign):
+    """With shear and rotary inertia in the scene and frequencies of that very beam, nothing is named."""
+    from thermospindle.model.machine import Condition
+    from thermospindle.model.rotor.beam import with_theory
+    from thermospindle.sim.operating import operating_point
+
+    whole = replace(coarse, structure=with_theory(coarse.structure, coarse.materials, 20.0, (1.0, 1.0)))
+    frequency = [m.frequency for m in operating_point(whole, Condition(20.0)).modes_below(1100.0)]
+    (test,) = campaign.tests
+    random = np.random.default_rng(3)
+    rows = tuple(replace(row, frequency=f + 0.05 * random.standard_normal()) for row, f in zip(test.modes, frequency, strict=True))
+    found = diagnose(whole, replace(campaign, tests=(replace(test, modes=rows),)), CATALOGUE)
+    assert found.verdict.word == "none"
+    assert found.may_hide == ()
