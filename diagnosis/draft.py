@@ -1,6 +1,6 @@
 """From drift to an effect of one's own: what a free form found, as the simplest law of physics that fits it, written as an effect file.
 
-Laws over temperature T and speed n: none, linear, exponential, Arrhenius, sigmoid, step; and a power of speed, alone or times one of these.
+Laws over temperature T and speed n: none, linear, exponential, Arrhenius, sigmoid, step; and a power of speed, alone, times one of these or beside it.
 Each is fitted to the drift of one element in every test, with a constant beside it, weighted by its standard errors; the Bayesian
 information criterion chooses (Schwarz, *Ann. Statist.* 6 (1978) 461).
 """
@@ -47,6 +47,7 @@ OF_TEMPERATURE = (
     Law("sigmoid in temperature", "1 / (1 + exp((middle - T) / width))", (("middle", "C", 40.0, (-40.0, 200.0)), ("width", "K", 4.0, (0.5, 40.0)))),
     Law("step in temperature", "where(T > middle, 1.0, 0.0)", (("middle", "C", 35.0, (-40.0, 200.0)),)),
 )
+SMOOTH = OF_TEMPERATURE[:4]
 OF_SPEED = (Law("linear in speed", "n"), Law("power of speed", "n ** power", (("power", "1", 1.0, (0.2, 4.0)),)))
 
 
@@ -57,6 +58,7 @@ def laws(with_temperature: bool, with_speed: bool) -> list[Law]:
     found += OF_SPEED if with_speed else ()
     if with_temperature and with_speed:
         found += [Law(f"{s.name}, {t.name}", f"({s.expression}) * (1 + {t.expression})", (*s.shape, *t.shape)) for s in OF_SPEED[:1] for t in OF_TEMPERATURE[:3]]
+        found += [Law(f"{t.name} and linear in speed", f"{t.expression} + of_speed * n", (*t.shape, ("of_speed", "1", 0.0, (-20.0, 20.0)))) for t in SMOOTH]
     return found
 
 
