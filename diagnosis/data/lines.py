@@ -5,6 +5,7 @@ lines is replaced by the values of its least-squares polynomial of degree p - 1 
 By discrete orthogonality (Gautschi, *Orthogonal Polynomials*, 2004, Theorem 1.31 and 1.4.1) these values have independent errors of
 variance sd^2 / weight, the weights adding up to k: nothing is lost, and the model is evaluated at p frequencies instead of k. A block is
 divided until what its polynomial leaves is noise; where poles are sharp, single lines remain. What blocks leave also tells the noise.
+Polynomials are in the lines' numbers: a sweep whose steps grow evenly (a logarithmic one) is as smooth in these as one of even steps.
 Under an exponential window the noise of neighbouring lines is correlated, which `window` takes into account where the lines show it.
 """
 
@@ -16,13 +17,14 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.optimize import nnls
 
 from thermospindle.diagnosis.data.window import left_by, neighbours, windowed
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.campaign.campaign import Noise, Test
-from thermospindle.sim.identification.frf import Frf, out_of
+from thermospindle.sim.identification.frf import Frf, even, out_of
 from thermospindle.sim.identification.modal import noise_model, scatter
 
 NODES = 5  # of a block: polynomials of degree 4
@@ -31,6 +33,7 @@ BEYOND = 4  # polynomials of the next degrees, where what a block lacks shows fi
 LACK_OF_FIT = 4.0  # standard deviations of a block's chi2, and of that of the next degrees alone, from which it is divided
 LINES_THAT_SCATTER = 50  # of an FRF at least, from whose neighbours its noise can be told
 RISES = (0, 2, 4)  # powers of frequency in which noise of largest is told: a hammer's force falls, and noise over it rises
+CHANGED = 1.5  # times the step before, from which lines are another piece
 ENOUGH = 200  # degrees of freedom from which the scatter within blocks tells the noise
 REPEATS, CAMPAIGN, SCATTER = "repeats", "the campaign", "scatter of neighbouring lines"
 KNOWN = (REPEATS, CAMPAIGN)
@@ -66,8 +69,8 @@ class LineData:
 
 
 def record_length(frf: Frf) -> float:
-    """Length (s) of the record that lines so far apart are the discrete Fourier transform of."""
-    return 1 / float(np.median(np.diff(frf.frequency))) if len(frf.frequency) > 1 else np.inf
+    """Length (s) of the record that lines so far apart are the discrete Fourier transform of; infinite for lines in uneven steps, which are of a sweep."""
+    return 1 / step if (step := even(frf.frequency)) else np.inf
 
 
 def line_data(test: Test, condition: Condition, stated: Noise | None, expected: Noise) -> LineData:
@@ -76,9 +79,11 @@ def line_data(test: Test, condition: Condition, stated: Noise | None, expected: 
     frf = test.frf
     assert frf is not None
     use = (frf.frequency > 0) & ~out_of(frf, test.speed).out
-    gaps = (np.flatnonzero(np.diff(np.flatnonzero(use)) > 1) + 1).tolist()
     frequency, value = frf.frequency[use], frf.value[:, :, use]
-    damped = test.window_decay * record_length(frf)
+    steps = np.diff(frequency)
+    change = np.abs(np.log(steps[1:] / steps[:-1])) > np.log(CHANGED)  # lines left out, and where another part of a sweep begins
+    gaps = sorted({*(np.flatnonzero(np.diff(np.flatnonzero(use)) > 1) + 1).tolist(), *((np.flatnonzero(change) + 1).tolist() if not even(frf.frequency) else ())})
+    damped = test.window_decay * record_length(frf) if np.isfinite(record_length(frf)) else 0.0
     damped = damped if windowed(value, damped) else 0.0
     sd, noise_from = _noise(frf, value, use, stated, expected, damped)
     least = SILENT * float(np.abs(value).max())  # where symmetry forbids an answer there is rounding alone
@@ -97,7 +102,7 @@ def line_data(test: Test, condition: Condition, stated: Noise | None, expected: 
             break
         sd = sd_seen if known is None else np.maximum(known, sd_seen)
         noise_from = SCATTER if known is None else noise_from
-        blocks = _blocks(value, sd, damped)
+        blocks = _blocks(value, sd, damped, gaps)
         seen = _within_blocks(value, blocks, damped)
     at, kept, error = _compressed(frequency, value, sd, blocks, damped)
     return LineData(test, condition, at, kept, error, frf.quantity, noise_from, len(frequency))
@@ -220,12 +225,18 @@ def _compressed(
             continue
         q, nodes, weights = _basis(k)
         polynomials = _at_nodes(nodes - (k - 1) / 2, k)  # (p nodes, p polynomials)
-        at.append(np.interp(nodes, np.arange(k), frequency[own]))
+        at.append(_between(nodes, frequency[own]))
         kept.append((value[:, :, own] @ q) @ polynomials.T)
         shares, _, _ = left_by(q, damped)
         variance = (sd[:, :, own] ** 2 @ q**2 * shares) @ (polynomials**2).T  # equal white noise gives sd^2 / weight
         error.append(np.sqrt(np.maximum(variance, shares.min() * (sd[:, :, own] ** 2).min(axis=-1, keepdims=True) / weights)))
     return np.concatenate(at), np.concatenate(kept, axis=-1), np.concatenate(error, axis=-1)
+
+
+def _between(nodes: Array, frequency: Array) -> Array:
+    """Frequencies at fractions of line numbers: straight between even lines, by a cubic spline between others, exact to 1e-9 on a logarithmic axis."""
+    lines = np.arange(float(len(frequency)))
+    return np.asarray(np.interp(nodes, lines, frequency) if even(frequency) else CubicSpline(lines, frequency)(nodes), float)
 
 
 def _at_nodes(x: Array, k: int, p: int = NODES) -> Array:

@@ -12,12 +12,11 @@ from rich.console import Console
 from thermospindle.model.errors import BadInput, Unanswered
 from thermospindle.model.units import RPM
 from thermospindle.model.whole import whole
-from thermospindle.report.verbs.answer import Answer, with_effects
+from thermospindle.report.verbs.answer import Answer, progress_bar, with_effects
 from thermospindle.sim.campaign.beside import left_out
 from thermospindle.sim.campaign.campaign import Campaign, write_campaign
-from thermospindle.sim.importing.assemble import campaign_of, read
-from thermospindle.sim.importing.mapping import read_mapping
-from thermospindle.sim.importing.measured import words_of
+from thermospindle.sim.importing.assemble import campaign_of, read, spoken
+from thermospindle.sim.importing.mapping import MappingForm, read_mapping
 from thermospindle.sim.importing.template import template
 
 
@@ -40,12 +39,15 @@ def bring(
         raise BadInput(f"--out {out}: is not empty; a campaign is written to a new or empty folder")
     spindle = with_effects(scene, effect_files)[0] if scene is not None else None
     form = read_mapping(None if fresh else mapping)
-    found = read(files, form, spindle, mapping)
-    if fresh and mapping is not None:
-        with whole(Path(mapping)) as file:
-            file.write_text(template(found, files, spindle), encoding="utf-8")
-    if out is None:
-        return _form_written(Path(str(mapping)), [words_of(q) for q in found.questions])
+    steps = len(files) * (2 if fresh and out is None else 1)
+    with progress_bar(steps) as done:
+        found = read(files, form, spindle, mapping, done)
+        if fresh and mapping is not None:
+            with whole(Path(mapping)) as file:
+                file.write_text(template(found, files, spindle), encoding="utf-8")
+        if out is None:
+            filled = read_mapping(mapping)
+            return _form_written(Path(str(mapping)), spoken(found, files), spoken(read(files, filled, spindle, mapping, done), files), _proposed(filled))
     try:
         campaign, notes = campaign_of(found, form, spindle, files, mapping)
     except Unanswered as error:
@@ -66,14 +68,31 @@ def _named(path: Path) -> list[Path]:
     return found
 
 
-def _form_written(mapping: Path, open_: list[str]) -> Answer:
-    values: dict[str, Any] = {"mapping": str(mapping), "open": open_, "warnings": []}
+def _proposed(form: MappingForm) -> list[str]:
+    """What a fresh form answers from the names of files alone."""
+    said = []
+    for t in form.tests:
+        of = [f.file for f in form.files if f.test == t.id]
+        told = [f"{t.temperature_C:g} C" if t.temperature_C is not None else "", f"{t.speed_rpm:g} rpm" if t.speed_rpm is not None else ""]
+        hit = [f"hit at {f.reference} in {f.file}" for f in form.files if f.test == t.id and f.reference is not None]
+        if any(told) or len(of) > 1 or hit:
+            said.append(f"{t.id}: {', '.join(x for x in (*told, f'{len(of)} files' if len(of) > 1 else '', *hit) if x)}")
+    return said
+
+
+def _form_written(mapping: Path, open_: list[str], left: list[str], proposed: list[str]) -> Answer:
+    values: dict[str, Any] = {"mapping": str(mapping), "open": open_, "proposed": proposed, "warnings": []}
 
     def show(console: Console) -> None:
-        console.print(f"{mapping} is written: {len(open_)} answers are open in it, or taken from names and to be checked.", highlight=False)
-        for k, item in enumerate(open_, 1):
+        count = f"{len(left)} answer{'s are' if len(left) != 1 else ' is'} open in it" if left else "nothing is open in it"
+        console.print(f"{mapping} is written: {count}.", highlight=False)
+        for k, item in enumerate(left, 1):
             console.print(f"  {k}. {item}", highlight=False)
-        console.print(f"Then: spindle import FILES --mapping {mapping} --out CAMPAIGN", highlight=False)
+        if proposed:
+            console.print("Read off the names of the files, to be checked in it:", highlight=False)
+            for item in proposed:
+                console.print(f"  {item}", highlight=False)
+        console.print("Then the same command with --out CAMPAIGN makes the campaign.", highlight=False)
 
     return Answer(values, show)
 

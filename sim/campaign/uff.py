@@ -12,6 +12,8 @@ function type 0    with ID line 2 'frequency axis': the frequencies in double pr
 
 `read_motion` knows those of a runout test: function type 1, time response, and 12, spectrum, of displacement.
 
+Frequencies in uneven steps, as of a logarithmic sweep, stand beside the values in every set (abscissa spacing 0).
+
 UFF has no official type for the last two of the table. Other datasets and function types are left alone. The format is described by UC-SDRL
 (www.ceas3.uc.edu/sdrluff). A unit is what its label says; without a label, SI over the factors of the file's dataset 164.
 pyuff 2.5.8 turns NaN into zero on writing, halves the byte count of complex sets, and drops a set without end: seen to here.
@@ -30,7 +32,7 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Point
 from thermospindle.model.types import Integers
 from thermospindle.sim.campaign.uff_frame import check_frame
-from thermospindle.sim.identification.frf import Frf
+from thermospindle.sim.identification.frf import Frf, even, gap
 
 STANDARD_ERROR, AXIS = "standard error", "frequency axis"
 LARGEST = 1e15  # of any value in any unit; sums of squares of larger ones would overflow
@@ -110,7 +112,7 @@ def read_frf(path: Path, quantity: str, points: Sequence[Point]) -> Frf:
     """The FRFs of a UFF file in SI, along the points' directions; every response must have an FRF from every reference.
 
     Raises `BadInput` naming file and set for units that are not those of `quantity` or not known, nodes that are no points,
-    directions off the point's axis, NaN, uneven or differing frequencies, and missing or doubled sets.
+    directions off the point's axis, NaN, missing lines among even ones, differing frequencies, and missing or doubled sets.
     """
     sets = read_uff(path)
     system = next((s for s in sets if s["type"] == 164), None)
@@ -226,7 +228,7 @@ def _sign(where: str, record: Mapping[str, Any], end: str, points: Sequence[Poin
 
 
 def _frequency(where: str, record: Mapping[str, Any], exact: np.ndarray | None) -> np.ndarray:
-    """Frequencies (n,) in Hz of a set, evenly spaced; the file's `exact` ones where it has them."""
+    """Frequencies (n,) in Hz of a set, rising; in even steps (the file's `exact` ones where it has them) unless the set says that they are not."""
     kind, label, lines = record["abscissa_spec_data_type"], record["abscissa_axis_units_lab"].strip(), record["x"]
     if kind not in (0, 18) or label not in ("Hz", "", "NONE") or (kind == 0 and label != "Hz"):
         raise BadInput(f"{where}: abscissa of type {kind} in {label!r}; only frequency (18) in Hz is allowed")
@@ -236,12 +238,10 @@ def _frequency(where: str, record: Mapping[str, Any], exact: np.ndarray | None) 
         lines = exact
     steps = np.diff(lines)
     step = np.median(steps) if len(steps) else 0.0
-    if step <= 0 or lines[0] < 0:
+    if step <= 0 or lines[0] < 0 or steps.min() <= 0:
         raise BadInput(f"{where}: abscissa: at least two lines of rising frequency, from 0 Hz, are needed")
-    uneven = np.abs(steps - step) > 0.02 * step + 1e-5 * lines[1:]  # ASCII abscissae have six digits
-    if uneven.any():
-        gap = int(np.argmax(uneven))
-        raise BadInput(f"{where}: from {lines[gap]:g} to {lines[gap + 1]:g} Hz among steps of {step:g} Hz; no line may be missing")
+    if (at := gap(lines, sweep=record["abscissa_spacing"] == 0)) is not None:
+        raise BadInput(f"{where}: from {lines[at]:g} to {lines[at + 1]:g} Hz among steps of {step:g} Hz; no line may be missing")
     return lines
 
 
@@ -274,7 +274,7 @@ def write_frf(path: Path, frf: Frf, points: Sequence[Point], title: str, test: s
             raise BadInput(f"{path}: {role}: needs finite numbers of shape {shape}, has shape {array.shape} or a NaN in it")
     start, step = frf.frequency[0], frf.frequency[1] - frf.frequency[0]
     header = float(f"{start:.5e}") + np.arange(shape[2]) * float(f"{step:.5e}")
-    if not np.array_equal(header, frf.frequency):
+    if even(frf.frequency) > 0 and not np.array_equal(header, frf.frequency):
         ends = {"rsp_node": 0, "rsp_dir": 0, "ref_node": 0, "ref_dir": 0}
         _append(
             path,
@@ -307,9 +307,10 @@ def _end(path: Path, end: str, points: Sequence[Point], node: int) -> dict[str, 
 
 
 def _append(path: Path, header: dict[str, Any], frf: Frf, data: np.ndarray) -> None:
-    """Append one evenly spaced 58b set with `data` (n,)."""
+    """Append one 58b set with `data` (n,), its frequencies beside the values where their steps are not even."""
     lines = {key: " ".join(header[key].split()).encode("ascii", "replace").decode()[:80] or "NONE" for key in ("id1", "id2", "id4")}
-    content = {"type": 58, "binary": 1, "abscissa_spacing": 1, "x": frf.frequency, "data": data}
+    spaced = even(frf.frequency) > 0
+    content = {"type": 58, "binary": 1, "abscissa_spacing": int(spaced), "x": frf.frequency, "data": data}
     content |= _unit("abscissa", 18, "Hz") | _unit("orddenom", 0, "NONE") | header | lines
     begin = path.stat().st_size if path.exists() else 0
     try:
@@ -319,7 +320,7 @@ def _append(path: Path, header: dict[str, Any], frf: Frf, data: np.ndarray) -> N
         raise
     with path.open("r+b") as file:  # pyuff counts 8 bytes for a complex value
         file.seek(begin + 38)
-        file.write(b"%12d" % data.nbytes)
+        file.write(b"%12d" % (data.nbytes + (0 if spaced else frf.frequency.nbytes)))
 
 
 def _raise_hidden(error: BaseException | None) -> None:

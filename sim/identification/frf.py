@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermospindle.model.errors import BadInput
+from thermospindle.sim.identification.modal import scatter
 from thermospindle.sim.identification.running_lines import RunningLines, running_lines
 
 TO_POWER = {"receptance": 1j, "mobility": 1.0, "accelerance": -1j}
@@ -59,6 +60,29 @@ def _same(a: Any, b: Any) -> bool:
     return type(a) is type(b) and bool(a == b)
 
 
+def even(values: np.ndarray) -> float:
+    """The step of an axis (n,) that rises in even ones; 0 where it does not. Text files and headers round: two percent of a step and six digits are allowed."""
+    steps = np.diff(values)
+    if len(steps) == 0 or not np.all(np.isfinite(values)):
+        return 0.0
+    step = (values[-1] - values[0]) / len(steps)
+    straight = values[0] + step * np.arange(len(values))
+    near = np.abs(values - straight) <= 0.02 * step + 2e-5 * np.abs(values).max()
+    return float(step) if step > 0 and near.all() and (steps > 0).all() else 0.0
+
+
+def gap(lines: np.ndarray, sweep: bool = True) -> int | None:
+    """The line (n,) before which others are missing, None where none are: a step unlike the others, which in a `sweep` may grow and stay so, but not
+    stand alone among even ones."""
+    steps = np.diff(lines)
+    step = np.median(steps)
+    uneven = np.abs(steps - step) > 0.02 * step + 1e-5 * lines[1:]  # ASCII abscissae have six digits
+    if sweep:
+        beside = np.pad(uneven, 1)
+        uneven &= ~(beside[:-2] | beside[2:])
+    return int(np.argmax(uneven)) if uneven.any() else None
+
+
 def out_of(frf: Frf, speed: float) -> RunningLines:
     """The lines of the running speed (rad/s) that stand in FRFs."""
     return running_lines(frf.frequency, frf.value, speed)
@@ -95,6 +119,8 @@ class Limits:
 
 LIMITS = Limits()
 FLOOR = 1e-3  # of the largest FRF of a test: its noise where no standard error is told, five times the 0.02 % of a good vibrometer
+FINER = 4  # lines for one of a sweep with uneven steps, where the direction of time is looked at
+ENOUGH = 16  # lines, from which their scatter tells noise
 SILENT = 0.02  # of the strongest answer to a hammer; below it symmetry forbids an answer, and noise alone has no coherence
 
 
@@ -115,7 +141,7 @@ def check_frf(where: str | Path, frf: Frf, speed: float, limits: Limits = LIMITS
                 _check_coherence(key, frf.coherence[i, j], np.abs(value), limits if answers else replace(limits, coherence=0.0))
             if frf.sd is not None and not np.all(frf.sd[i, j] > 0):
                 raise BadInput(f"{key}: standard error = {frf.sd[i, j].min():g}: must be positive on every line")
-            _check_direction_of_time(key, quiet.value[i, j])
+            _check_direction_of_time(key, frf.frequency, quiet.value[i, j])
             if response == reference:
                 _check_driving_point(key, frf.frequency, quiet.value[i, j] * TO_POWER[frf.quantity], _noise(frf, i, j), limits)
     if speed == 0:
@@ -123,8 +149,9 @@ def check_frf(where: str | Path, frf: Frf, speed: float, limits: Limits = LIMITS
 
 
 def _noise(frf: Frf, i: int, j: int) -> np.ndarray:
-    """Noise (n,) of an FRF: its standard errors, and `FLOOR` of the test's largest value where it has none (a single hit)."""
-    floor = FLOOR * np.abs(frf.value).max()
+    """Noise (n,) of an FRF: its standard errors; where it has none (a single hit), `FLOOR` of the test's largest value, or the scatter of neighbouring
+    lines where that is larger: a receptance of an accelerometer is noise alone at low frequencies."""
+    floor = np.maximum(FLOOR * np.abs(frf.value).max(), scatter(frf.value[i : i + 1, j : j + 1])[0, 0] if len(frf.frequency) > ENOUGH else 0.0)
     sd = np.full(len(frf.frequency), np.inf) if frf.sd is None else frf.sd[i, j]
     return np.where(np.isfinite(sd), sd, floor)
 
@@ -150,19 +177,25 @@ def _check_coherence(key: str, coherence: np.ndarray, size: np.ndarray, limits: 
         raise BadInput(f"{key}: coherence = {median:.3g} (median weighted by |H|); at least {limits.coherence:g} is allowed")
 
 
-def _check_direction_of_time(key: str, value: np.ndarray) -> None:
+def _check_direction_of_time(key: str, frequency: np.ndarray, value: np.ndarray) -> None:
     """A structure answers after the blow: the impulse response lies at t > 0, a conjugated FRF's at t < 0.
 
     Needs no resonance of its own at this point and no speed. Left out is |t| below the resolution of the Hann-weighted band,
     where prompt (mass-like) answers lie. Noise alone, as where symmetry forbids an answer, has half its energy on each side,
-    scattering as 0.6/sqrt(n); the limit is five of these above, so that few lines decide nothing.
+    scattering as 0.6/sqrt(n); the limit is five of these above, so that few lines decide nothing. Lines in uneven steps, as of a logarithmic
+    sweep, are joined by straight ones for this check alone.
     """
     n = len(value)
     if n < 16 or not value.any():
         return
+    limit = 0.5 + 3 / np.sqrt(n)
+    if not even(frequency):
+        n = min(FINER * n, int(np.ptp(frequency) / np.diff(frequency).min()) + 1)
+        lines = np.linspace(frequency[0], frequency[-1], n)
+        value = np.interp(lines, frequency, value.real) + 1j * np.interp(lines, frequency, value.imag)
     energy = np.abs(np.fft.ifft(value * np.hanning(n + 2)[1:-1])) ** 2
     after, before = energy[4 : n // 2].sum(), energy[n - n // 2 + 1 : n - 3].sum()
-    share, limit = before / (before + after), 0.5 + 3 / np.sqrt(n)
+    share = before / (before + after)
     if share > limit:
         raise BadInput(
             f"{key}: {share:.0%} of the impulse response lies before the blow: the FRF is conjugated; allowed is {limit:.0%}, "

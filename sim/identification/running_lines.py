@@ -45,11 +45,11 @@ def running_lines(frequency: Array, value: ComplexArray, speed: float) -> Runnin
     turning = abs(speed) / (2 * np.pi)
     out = np.zeros(len(frequency), bool)
     none = RunningLines(out, (), ())
-    step = float(np.median(np.diff(frequency))) if len(frequency) > 2 * FEWEST else 0.0
-    if turning == 0.0 or step <= 0.0:
+    if turning == 0.0 or len(frequency) <= 2 * FEWEST:
         return none
     multiples = np.arange(1, int(frequency[-1] / turning) + 1)
-    multiples = multiples[multiples * turning >= max(frequency[0], step)]
+    multiples = multiples[multiples * turning >= max(frequency[0], frequency[1] - frequency[0])]
+    step = np.interp(multiples * turning, (frequency[1:] + frequency[:-1]) / 2, np.diff(frequency))  # that of the lines there: sweeps have uneven ones
     reach = np.maximum(1.5 * step, DRIFT * multiples * turning)
     suspect = np.zeros(len(frequency), bool)
     for f, r in zip(multiples * turning, reach, strict=True):

@@ -6,9 +6,10 @@ everything that is open at once; `template.template` writes the mapping as a for
 =========  =============================================================================================================
 assemble   from files and a mapping to a campaign, or to everything that is still open, at once
 files/     what is in a file of each kind
-frfs       from placed curves to the FRFs of one test: SI, one quantity, common lines, running-speed lines out, checks
+frfs       from placed curves to the FRFs of one test: SI, one quantity, common lines, checks
 mapping    the form of a mapping file
 measured   what files hold before anything is decided about it: curves, time records, modes, places, questions
+names      what names of files seem to tell: temperature, speed, hammer, and which files are one test
 peaks      modes of FRFs that are magnitudes alone
 places     which point of the campaign each end of a curve is
 records    time records: hits found and judged, windows, FRFs with coherence and standard errors

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from thermospindle.sim.importing.files.reading import content
 from thermospindle.sim.importing.frfs import Placed, frf_of
 from thermospindle.sim.importing.mapping import FileForm, MappingForm, TestForm, fits, settings_of
 from thermospindle.sim.importing.measured import Content, Curve, End, ModeLine, Motion, Question, listed, words_of
+from thermospindle.sim.importing.names import plain
 from thermospindle.sim.importing.peaks import from_peaks
 from thermospindle.sim.importing.places import place, points_of, unplaced
 from thermospindle.sim.importing.records import frfs_of
@@ -42,7 +42,9 @@ class Read:
         return list(dict.fromkeys([*self.curves, *self.modes]))
 
 
-def read(files: Sequence[Path], form: MappingForm, scene: Spindle | None, mapping: Path | None = None) -> Read:
+def read(
+    files: Sequence[Path], form: MappingForm, scene: Spindle | None, mapping: Path | None = None, progress: Callable[[str], None] = lambda done: None
+) -> Read:
     """Read every file as the mapping (`form`, of the file `mapping`) says; what it does not say is among the questions. Raises `BadInput` for damaged files."""
     for f in files:
         if not f.is_file():
@@ -53,7 +55,10 @@ def read(files: Sequence[Path], form: MappingForm, scene: Spindle | None, mappin
     if unused:
         raise BadInput(f"{mapping}: files: file = {unused[0]!r}: is none of {listed(f.name for f in files)}")
     settings = {f: settings_of(form, f) for f in files}
-    contents = [content(f, settings[f]) for f in files]
+    contents = []
+    for f in files:
+        contents.append(content(f, settings[f]))
+        progress(f.name)
     points, questions = points_of(form, scene)
     notes = [n for c in contents for n in c.notes]
     questions += [q for c in contents for q in c.questions]
@@ -106,11 +111,6 @@ def _together(questions: Sequence[Question]) -> tuple[Question, ...]:
     for q in questions:
         about.setdefault((q.key, q.text, q.names), []).append(q.about)
     return tuple(Question(", ".join(dict.fromkeys(of)), *same) for same, of in about.items())
-
-
-def plain(stem: str) -> str:
-    """The name of a test from that of a file."""
-    return re.sub(r"[^A-Za-z0-9._+-]+", "_", stem).strip("._") or "test"
 
 
 def _turned(curve: Curve, settings: FileForm) -> Curve:
@@ -213,13 +213,18 @@ def _conditions(found: Read, form: MappingForm, scene: Spindle | None, mapping: 
     return questions
 
 
+def spoken(found: Read, files: Sequence[Path]) -> list[str]:
+    """The open questions as sentences."""
+    return [words_of(q, {"files": [f.name for f in files], "tests": found.tests}) for q in found.questions]
+
+
 def campaign_of(found: Read, form: MappingForm, scene: Spindle | None, files: Sequence[Path], mapping: Path | None) -> tuple[Campaign, list[str]]:
     """The campaign of all files, and what was done to them. Raises `Unanswered` with all that is open, `BadInput` for FRFs that no structure has."""
     if found.questions:
         count = len(found.questions)
         head = f"{count} thing{'s are' if count > 1 else ' is'} not told by the files:"
         tail = f"answer them in {mapping}" if mapping else "--mapping NEW.toml writes a form to answer them in"
-        raise Unanswered(head, [words_of(q) for q in found.questions], tail)
+        raise Unanswered(head, spoken(found, files), tail)
     if not found.tests:
         raise BadInput(f"{listed(f.name for f in files)}: hold no FRF, time record or mode; geometry alone is no campaign")
     forms = {t.id: t for t in form.tests}

@@ -1,4 +1,4 @@
-"""From placed curves to the FRFs of one test: SI units, one quantity, common lines, a full rectangle, lines of the running speed out."""
+"""From placed curves to the FRFs of one test: SI units, one quantity, common lines, a full rectangle."""
 
 from __future__ import annotations
 
@@ -11,12 +11,9 @@ import numpy as np
 from thermospindle.model.errors import BadInput
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.campaign.beside import POWER
-from thermospindle.sim.identification.frf import Frf, check_frf
-from thermospindle.sim.importing.measured import Curve, even, listed
+from thermospindle.sim.identification.frf import Frf, check_frf, even, gap
+from thermospindle.sim.importing.measured import Curve, listed
 
-BESIDE = 8  # lines on each side of a running-speed line, by which it is judged
-ABOVE, BELOW = 3, 2  # degrees of the numerator and the denominator through them: a mode, and what is beside it
-STANDS_OUT = 8.0  # of the scatter of those lines: a value that does is not the structure's
 FEWEST = 16  # lines of an FRF that is of use
 ADVICE = {
     "conjugated": "conjugate = true in its [[files]] turns it round",
@@ -60,10 +57,6 @@ def frf_of(
     frequency, value, columns = frequency[kept], value[:, kept], [c[kept] for c in columns]
     if len(frequency) < FEWEST:
         raise BadInput(f"{placed[0].curve.file}: test {test}: {len(frequency)} lines in common within the band; at least {FEWEST} are needed")
-    if speed:
-        value, replaced = without_running_lines(frequency, value, speed)
-        if replaced:
-            notes.append(f"test {test}: lines at {listed(f'{f:.4g}' for f in replaced)} Hz, multiples of the running speed, are replaced by what their neighbours give")
     responses, references = (tuple(dict.fromkeys(getattr(p, key) for p in placed)) for key in ("response", "reference"))
     order = {(p.response, p.reference): k for k, p in enumerate(placed)}
     index = np.array([[order[r, q] for q in references] for r in responses])
@@ -115,34 +108,45 @@ def _rectangle(placed: Sequence[Placed]) -> tuple[list[Placed], list[str]]:
 
 def _common_lines(test: str, placed: Sequence[Placed], band: Sequence[float] | None, notes: list[str]) -> tuple[Array, list[np.ndarray]]:
     """Frequencies (n,) above 0 Hz that all curves have, and which lines of each curve these are."""
-    steps = []
-    for p in placed:
-        steps.append(even(p.curve.frequency))
-        if steps[-1] == 0:
-            raise BadInput(
-                f"{p.curve.file}: {p.curve.where}: its frequencies do not rise in even steps, as FRFs of a campaign must; "
-                "a table of modes picked from it (frequency and damping a row) can be imported"
-            )
-    step = steps[0]
     low = max(p.curve.frequency[0] for p in placed)
     high = min(p.curve.frequency[-1] for p in placed)
     if band is not None:
         low, high = max(low, band[0]), min(high, band[1])
+    first = placed[0].curve
+    step = even(first.frequency)
     columns = []
-    for p, own in zip(placed, steps, strict=True):
-        offset = (placed[0].curve.frequency[0] - p.curve.frequency[0]) / step
-        if abs(own - step) * len(p.curve.frequency) > 0.1 * step or abs(offset - round(offset)) > 0.05:
+    for p in placed:
+        own = p.curve.frequency
+        if len(own) < 2 or not np.all(np.diff(own) > 0):
+            raise BadInput(f"{p.curve.file}: {p.curve.where}: its frequencies do not rise from line to line, as FRFs of a campaign must")
+        if not even(own) and (at := gap(own)) is not None:
+            raise BadInput(f"{p.curve.file}: {p.curve.where}: from {own[at]:g} to {own[at + 1]:g} Hz among steps of {np.median(np.diff(own)):g} Hz; no line may be missing")
+        if not _same_lines(own, first.frequency, step):
             raise BadInput(
-                f"{p.curve.file}: {p.curve.where}: has lines every {own:g} Hz from {p.curve.frequency[0]:g} Hz, {placed[0].curve.file.name} every "
-                f"{step:g} from {placed[0].curve.frequency[0]:g}; FRFs of one test ({test}) need the same, or a test = \"...\" of their own"
+                f"{p.curve.file}: {p.curve.where}: has {_spoken(own)}, {first.file.name} {_spoken(first.frequency)}; "
+                f'FRFs of one test ({test}) need the same, or a test = "..." of their own'
             )
-        inside = (p.curve.frequency >= low - 1e-6 * step) & (p.curve.frequency <= high + 1e-6 * step) & (p.curve.frequency > 0.5 * step)
-        columns.append(np.flatnonzero(inside))
+        least = 1e-6 * (step or np.diff(own).min())
+        columns.append(np.flatnonzero((own >= low - least) & (own <= high + least) & (own > 0.5 * step)))
     count = min(map(len, columns))
     if count == 0:
-        raise BadInput(f"{placed[0].curve.file}: test {test}: its FRFs have no line in common{'' if band is None else f' within band_Hz = {[*band]}'}")
-    first = placed[0].curve.frequency[columns[0][0]]
-    return first + step * np.arange(count), [c[:count] for c in columns]
+        raise BadInput(f"{first.file}: test {test}: its FRFs have no line in common{'' if band is None else f' within band_Hz = {[*band]}'}")
+    lines = first.frequency[columns[0][:count]]
+    return lines[0] + step * np.arange(count) if step else lines, [c[:count] for c in columns]
+
+
+def _same_lines(own: Array, first: Array, step: float) -> bool:
+    """Whether lines are those of the first FRF: on its even grid (`step`, Hz), of which they may begin and end elsewhere, or the very same."""
+    if step == 0:
+        return own.shape == first.shape and bool(np.allclose(own, first, rtol=1e-5, atol=0))
+    offset = (first[0] - own[0]) / step
+    return even(own) > 0 and abs(even(own) - step) * len(own) <= 0.1 * step and abs(offset - round(offset)) <= 0.05
+
+
+def _spoken(lines: Array) -> str:
+    """Lines in words: how many, how far apart, from where."""
+    step = even(lines)
+    return f"lines every {step:g} Hz from {lines[0]:g} Hz" if step else f"{len(lines)} lines in uneven steps from {lines[0]:g} to {lines[-1]:g} Hz"
 
 
 def _value(p: Placed, lines: np.ndarray, frequency: Array, quantity: str) -> ComplexArray:
@@ -169,44 +173,6 @@ def _with_values(value: ComplexArray, placed: Sequence[Placed], notes: list[str]
             first, last = max(first, int(there[0])), min(last, int(there[-1]) + 1)
             notes.append(f"{p.curve.file.name}: {p.name}: lines without a value at the ends of its band are left out")
     return slice(first, max(last, first))
-
-
-def without_running_lines(frequency: Array, value: ComplexArray, speed: float) -> tuple[ComplexArray, list[float]]:
-    """FRFs (m, n) without what turns: values at multiples of the speed (rad/s) that stand out of their neighbours, and where they stood.
-
-    What stands out is judged by the scatter of `BESIDE` lines on each side about the rational function (Levy 1959) through them, and is
-    replaced by its value.
-    """
-    step, turning = float(frequency[1] - frequency[0]), abs(speed) / (2 * np.pi)
-    value, found = value.copy(), []
-    for k in range(int(np.ceil(frequency[0] / turning)), int(frequency[-1] / turning) + 1):
-        middle = (k * turning - frequency[0]) / step
-        spoiled = np.arange(int(np.ceil(middle - 1.5)), int(np.floor(middle + 1.5)) + 1)
-        around = np.r_[spoiled[0] - BESIDE : spoiled[0], spoiled[-1] + 1 : spoiled[-1] + 1 + BESIDE]
-        around = around[(around >= 0) & (around < len(frequency))]
-        spoiled = spoiled[(spoiled >= 0) & (spoiled < len(frequency))]
-        if k == 0 or len(around) < BESIDE or len(spoiled) == 0 or turning < (BESIDE + 2) * step:
-            continue
-        x, there = (around - middle) / BESIDE, (spoiled - middle) / BESIDE
-        for row in value:
-            at_lines, expected = _rational(x, row[around], there)
-            scatter = np.sqrt(np.sum(np.abs(row[around] - at_lines) ** 2) / (len(around) - ABOVE - BELOW - 1))
-            if np.abs(row[spoiled] - expected).max() > STANDS_OUT * scatter + 1e-12 * np.abs(row).max():
-                row[spoiled] = expected
-                found.append(k * turning)
-    return value, sorted({*found})
-
-
-def _rational(x: Array, y: ComplexArray, there: Array) -> tuple[ComplexArray, ComplexArray]:
-    """Values at `x` and `there` of N(x) / (1 + b1 x + b2 x^2) through y(x), by linear least squares."""
-    above, below = np.vander(x, ABOVE + 1, increasing=True), np.vander(x, BELOW + 1, increasing=True)[:, 1:]
-    c = np.linalg.lstsq(np.hstack([above, -y[:, None] * below]).astype(complex), y, rcond=None)[0]
-
-    def at(z: Array) -> ComplexArray:
-        top = np.vander(z, ABOVE + 1, increasing=True) @ c[: ABOVE + 1]
-        return np.asarray(top / (1 + np.vander(z, BELOW + 1, increasing=True)[:, 1:] @ c[ABOVE + 1 :]))
-
-    return at(x), at(there)
 
 
 def _check(frf: Frf, placed: Sequence[Placed], speed: float) -> None:

@@ -9,11 +9,13 @@ from scipy.optimize import least_squares
 from scipy.signal import find_peaks
 
 from thermospindle.model.types import Array
+from thermospindle.sim.identification.modal import scatter
 from thermospindle.sim.importing.measured import Curve, ModeLine
 
 PROMINENCE = 2.0  # of a peak over the valleys beside it, as a ratio
 SHARED = 0.2  # of the FRFs of a test that must show a peak at one place, two at least where there are several
 TOGETHER = 1.5  # lines between peaks of different FRFs that are one mode's
+ABOVE_NOISE = 7.0  # standard deviations of the lines' own scatter, by which a peak stands over the valleys beside it
 AROUND = 12  # lines on each side of a peak that its fit sees, at most
 LEAST_SD = 0.05  # of a line: what one number a line can tell of a frequency at best
 HEAVY = 0.2  # damping ratio from which a hump is no mode
@@ -30,9 +32,10 @@ def from_peaks(curves: Sequence[Curve], speed: float) -> tuple[list[ModeLine], l
     step = float(np.median(np.diff(curves[0].frequency)))
     for curve in curves:
         size = np.asarray(curve.value, float)
-        tops, _ = find_peaks(np.log(np.maximum(size, 1e-9 * size.max())), prominence=np.log(PROMINENCE))
-        for top in tops.tolist():
-            if (mode := _fitted(curve.frequency, size, top, step)) is not None:
+        tops, of = find_peaks(np.log(np.maximum(size, 1e-9 * size.max())), prominence=np.log(PROMINENCE))
+        noise = scatter(size[None, None])[0, 0]
+        for top, drop in zip(tops.tolist(), of["prominences"], strict=True):
+            if size[top] * -np.expm1(-drop) > ABOVE_NOISE * noise[top] and (mode := _fitted(curve.frequency, size, top, step)) is not None:
                 found.setdefault(mode.frequency, []).append((mode.frequency, size[top], mode))
     every = [row for key in sorted(found) for row in found[key]]
     groups: list[list[ModeLine]] = []
@@ -77,7 +80,8 @@ def _fitted(frequency: Array, size: Array, top: int, step: float) -> ModeLine | 
         r = x / (p[0] * frequency[top])
         return np.abs(p[2] / (1 - r**2 + 2j * np.exp(p[1]) * r) + p[3] + 1j * p[4]) - y
 
-    fit = least_squares(left, [1.0, np.log(0.01), 0.02, 0.0, 0.0], x_scale=[1e-3, 1.0, 0.1, 0.1, 0.1], max_nfev=200)
+    limits = np.array([[0.5, -20.0, -np.inf, -np.inf, -np.inf], [2.0, 3.0, np.inf, np.inf, np.inf]])  # ln damping of 1e-9 to 20
+    fit = least_squares(left, [1.0, np.log(0.01), 0.02, 0.0, 0.0], x_scale=[1e-3, 1.0, 0.1, 0.1, 0.1], bounds=limits, max_nfev=200)
     damping, found = float(np.exp(fit.x[1])), float(fit.x[0] * frequency[top])
     if abs(found - frequency[top]) > 2 * step or not 1e-6 < damping < HEAVY or len(lines) < 7:
         return None

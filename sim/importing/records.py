@@ -53,15 +53,16 @@ class FromRecords:
 def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form: RecordForm) -> FromRecords:
     """The FRFs of all records that one hammer point made, each file with its force and responses."""
     notes: list[str] = []
-    name = listed(path.name for path, _ in files)
+    every = ", ".join(dict.fromkeys(path.name for path, _ in files))
+    name = listed(every.split(", "))
     ends = [m.end for m in files[0][1] if not m.force]
     if any([m.end for m in motions if not m.force] != ends for _, motions in files):
-        question = Question(name, "test", "other responses than the files of the same hammer point beside them: a test = \"...\" of their own")
+        question = Question(every, "test", "other responses than the files of the same hammer point beside them: a test = \"...\" of their own")
         return FromRecords((), 0.0, 0, (), (question,))
-    scales, questions = _scales(name, files[0][1])
+    scales, questions = _scales(every, files[0][1])
     steps = {m.step for _, motions in files for m in motions}
     if max(steps) > min(steps) * (1 + 1e-6):
-        questions.append(Question(name, "sample_rate_Hz", f"one sampling rate; its records have {listed(f'{1 / s:g} Hz' for s in sorted(steps))}"))
+        questions.append(Question(every, "sample_rate_Hz", f"one sampling rate; its records have {listed(f'{1 / s:g} Hz' for s in sorted(steps))}"))
     if questions:
         return FromRecords((), 0.0, 0, (), tuple(questions))
     step = min(steps)
@@ -74,7 +75,7 @@ def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form
             notes.append(f"{hit.where}: left out, {fault}")
     if not good:
         what = f"all {len(hits)} hits are left out ({'; '.join(n.split(': left out, ')[-1] for n in notes[:3])})" if hits else "no hit is found in its force"
-        return FromRecords((), 0.0, 0, tuple(notes), (Question(name, "records", f"a usable hit: {what}; double_hit_share and overload set what is refused"),))
+        return FromRecords((), 0.0, 0, tuple(notes), (Question(every, "records", f"a usable hit: {what}; double_hit_share and overload set what is refused"),))
     n = min(len(h.force) for h in good)
     force: Array = np.array([[h.force[:n] for h in good]], float) * scales[0]
     response: Array = np.array([[h.response[:, :n] for h in good]]) * np.array(scales[1:])[:, None]
@@ -113,14 +114,14 @@ def _scales(name: str, motions: Sequence[Motion]) -> tuple[list[float], list[Que
     force = next(m for m in motions if m.force)
     scales = [units.of_force(force.unit) or 0.0]
     if not scales[0]:
-        questions.append(Question(name, "columns", f"the unit of its force {force.where!r}, as in \"force [N]\"; found is {force.unit or 'none'!r}"))
+        questions.append(Question(name, "columns", f"the unit of its force {force.where!r}, as in \"force [N]\"; found is {force.unit or 'none'!r}", (force.where,)))
     for m in motions:
         if not m.force:
             told = units.of_response(m.unit)
             scales.append(told[1] if told else 0.0)
             if told is None:
                 questions.append(
-                    Question(name, "columns", f"the unit of its response {m.where!r}, as in \"response 3 [m/s^2]\"; found is {m.unit or 'none'!r}")
+                    Question(name, "columns", f"the unit of its response {m.where!r}, as in \"response 3 [m/s^2]\"; found is {m.unit or 'none'!r}", (m.where,))
                 )
     return scales, questions
 
@@ -169,8 +170,8 @@ def _fault(hit: Hit, ends: Sequence[End], step: float, form: RecordForm) -> str 
         limit = form.overload.get(name)
         if limit is not None and np.abs(value).max() >= limit:
             return f"overload: {name} reaches {np.abs(value).max():.4g}, limit {limit:g}"
-        if _held(value):
-            return f"overload: {name} reaches {value[np.argmax(np.abs(value))]:.4g} and never more, {HELD} times or oftener"
+        if held := _held(value):
+            return f"overload: {name} reaches {value[np.argmax(np.abs(value))]:.4g} and never more, {held} times"
     peak = int(np.argmax(hit.force[: round((PRE_TRIGGER + form.apart_s) / step)]))
     after = hit.force[peak:]
     released = np.flatnonzero(after < TOUCHING * hit.force[peak])
@@ -183,15 +184,17 @@ def _fault(hit: Hit, ends: Sequence[End], step: float, form: RecordForm) -> str 
     return None
 
 
-def _held(value: Array) -> bool:
+def _held(value: Array) -> int:
+    """How often a channel stands exactly at an extreme where that tells an overload, else 0."""
+    steps = np.abs(np.diff(value))
+    smallest = steps[steps > 0].min(initial=np.inf)
     for extreme in (value.max(), value.min()):
-        steps = np.abs(np.diff(value))
-        smallest = steps[steps > 0].min(initial=np.inf)
         if abs(extreme) < 0.5 * np.abs(value).max() or abs(extreme) < STEPS * smallest:
             continue
-        if np.count_nonzero(value == extreme) >= HELD:
-            return True
-    return False
+        held = int(np.count_nonzero(value == extreme))
+        if held >= HELD:
+            return held
+    return 0
 
 
 def _needed(response: Array) -> float:

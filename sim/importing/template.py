@@ -10,8 +10,10 @@ from thermospindle.model.files.formats import CURRENT, KEY, MAPPING
 from thermospindle.model.machine import Spindle
 from thermospindle.model.units import MM
 from thermospindle.sim.campaign.form import in_unit, toml
-from thermospindle.sim.importing.assemble import Read, plain
-from thermospindle.sim.importing.measured import End, listed
+from thermospindle.sim.importing.assemble import Read
+from thermospindle.sim.importing.files.labels import ROLES
+from thermospindle.sim.importing.measured import End, Question, listed
+from thermospindle.sim.importing.names import conditions_of, hit_at, plain, tests_of
 from thermospindle.sim.importing.places import body_names
 
 HEAD = """\
@@ -28,8 +30,6 @@ MORE = """\
 # [records]                     time records: estimator = "H1" | "H2" | "Hv", hit_length_s, exponential_end, double_hit_share, apart_s, band_Hz,
 #   overload = { force = 200.0, hub_top0 = 500.0 }   limits in the file's units, from which a hit is left out
 """
-TEMPERATURE = re.compile(r"(?:^|[_\W])T?(-?\d+(?:\.\d+)?)\s*(?:deg)?_?C(?=$|[_\W])|(?:^|[_\W])T(-?\d+(?:\.\d+)?)(?=$|[_\W])")
-SPEED = re.compile(r"(?:^|[_\W])(\d+)\s*_?rpm|(?:^|[_\W])n(\d+)(?=$|[_\W])", re.IGNORECASE)
 
 
 def template(found: Read, files: Sequence[Path], scene: Spindle | None) -> str:
@@ -38,40 +38,68 @@ def template(found: Read, files: Sequence[Path], scene: Spindle | None) -> str:
     lines.append(f"spindle = {toml(scene.name)}" if scene else 'spindle = "?"    # name of the scene')
     if any(q.key == "frequency_sd_Hz" for q in found.questions):
         lines.append('frequency_sd_Hz = "?"    # how sure hand-picked frequencies are: one standard deviation')
-    asked: dict[str, list[tuple[str, str]]] = {}
-    columns = {c.file.name: [n for q in c.questions for n in q.names] for c in found.contents}
-    for q in found.questions:
-        for file in files:
-            if file.name in q.about.split(", "):
-                asked.setdefault(file.name, []).append((q.key, q.text))
+    common, own = _shared(found.questions, files)
+    for suffix, questions in common.items():
+        many = sum(f.suffix == suffix for f in files)
+        lines += ["", "[[files]]", f"file = {toml(f'*{suffix}')}    # all {many} of them; the table of one file, below, may say otherwise", *_asked(questions)]
+    tests = tests_of(found.contents)
     for file in files:
-        own = asked.get(file.name, [])
-        lines += ["", "[[files]]", f"file = {toml(file.name)}", f"test = {toml(plain(file.stem))}    # files of one test have the same"]
-        blank = {"columns": toml(dict.fromkeys(columns.get(file.name, []), "?"))}
-        lines += [f"{key} = {blank.get(key, toml('?'))}    # {text}" for key, text in _once(own) if key not in ("records", "test")]
-    for test in found.tests:
+        lines += ["", "[[files]]", f"file = {toml(file.name)}", f"test = {toml(tests[file])}    # files of one test have the same"]
+        node = hit_at(file)
+        lines += _asked(own[file], node if node in found.points else None)
+    renamed = {plain(f.stem): test for f, test in tests.items()}
+    for test in dict.fromkeys(renamed.get(t, t) for t in found.tests):
         lines += ["", "[[tests]]", f"id = {toml(test)}", *_condition(test)]
     lines += [line for block in _points(found, scene) for line in block]
     return "\n".join([*lines, "", MORE])
 
 
-def _once(questions: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
+def _shared(questions: Sequence[Question], files: Sequence[Path]) -> tuple[dict[str, list[Question]], dict[Path, list[Question]]]:
+    """Questions about all files of one ending, by that ending, and those of each file alone."""
+    common: dict[str, list[Question]] = {}
+    own: dict[Path, list[Question]] = {f: [] for f in files}
+    for q in questions:
+        about = [f for f in files if f.name in q.about.split(", ")]
+        for suffix in dict.fromkeys(f.suffix for f in about):
+            alike = [f for f in files if f.suffix == suffix]
+            if q.key in ("records", "test"):
+                continue
+            if len(alike) > 1 and suffix and all(f in about for f in alike) and q.key != "reference":
+                common.setdefault(suffix, []).append(q)
+            else:
+                for f in alike:
+                    if f in about:
+                        own[f].append(q)
+    return common, own
+
+
+def _asked(questions: Sequence[Question], hit: int | None = None) -> list[str]:
+    """Lines of a [[files]] table with the questions as open answers; `hit` is the node that the file's name speaks of."""
     found: dict[str, list[str]] = {}
-    for key, text in questions:
-        found.setdefault(key, []).append(text)
-    return [(key, "; ".join(texts)) for key, texts in found.items()]
+    names = [n for q in questions if q.key == "columns" for n in q.names]
+    for q in questions:
+        found.setdefault(q.key, []).append(q.text.split(": columns = {")[0])
+    lines = []
+    for key, texts in found.items():
+        if key == "columns" and names:
+            continue
+        if key == "reference" and hit is not None:
+            lines.append(f"reference = {hit}    # the point that was hit, read off the name of the file; correct it where it is wrong")
+        else:
+            lines.append(f"{key} = {toml('?')}    # {'; '.join(texts)}")
+    if names:
+        lines += ["[files.columns]", *(f"# {text}" for text in found["columns"]), f"# allowed are {ROLES}, with the unit in brackets behind it"]
+        lines += [f"{toml(n)} = {toml('?')}" for n in dict.fromkeys(names)]
+    return lines
 
 
 def _condition(test: str) -> list[str]:
     """Temperature and speed, read off the name where it seems to tell them."""
-    lines = []
-    for key, pattern in (("temperature_C", TEMPERATURE), ("speed_rpm", SPEED)):
-        match = pattern.search(test)
-        if match:
-            lines.append(f"{key} = {float(next(g for g in match.groups() if g)):g}    # read off the name {test!r}; correct it where it is wrong")
-        else:
-            lines.append(f'{key} = "?"')
-    return lines
+    told = conditions_of(test)
+    return [
+        f"{key} = {told[key]:g}    # read off the name {test!r}; correct it where it is wrong" if key in told else f'{key} = "?"'
+        for key in ("temperature_C", "speed_rpm")
+    ]
 
 
 def _told(place: tuple[float, ...] | None, unscaled: tuple[float, ...] | None) -> str:

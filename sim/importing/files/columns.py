@@ -9,15 +9,21 @@ from typing import Any
 
 import numpy as np
 
+from thermospindle.model.errors import BadInput
 from thermospindle.model.types import Array
+from thermospindle.sim.identification.frf import even
 from thermospindle.sim.importing.files.labels import ROLES, Role, end, role_of
 from thermospindle.sim.importing.files.text import TextTable
 from thermospindle.sim.importing.mapping import FileForm
-from thermospindle.sim.importing.measured import Content, Curve, End, Motion, Question, even, listed
+from thermospindle.sim.importing.measured import Content, Curve, End, Motion, Question, listed
 
 FULL_TURN = 2 * np.pi + 0.01
 MATRIX = ("h", "frf", "frfs", "h1", "h2", "hv", "g", "transfer", "fft.h")
-LISTS = {"response_nodes": "response", "responses": "response", "reference_nodes": "reference", "references": "reference"}
+LISTS = {
+    **dict.fromkeys(("response_nodes", "responses", "resp", "resp_nodes", "output_nodes", "outputs"), "response"),
+    **dict.fromkeys(("reference_nodes", "references", "ref", "refs", "ref_nodes", "input_nodes", "inputs"), "reference"),
+}
+"""What lists of nodes are called."""
 RATES = ("fs", "sample_rate", "samplerate", "sample_rate_hz", "fs_hz")
 
 
@@ -58,7 +64,7 @@ def from_arrays(file: Path, arrays: Mapping[str, Any], settings: FileForm) -> Co
     for name, value in arrays.items():
         short = name.rsplit(".", 1)[-1]
         told = settings.columns.get(name) or settings.columns.get(short)
-        if short.lower() in LISTS and not told:
+        if short.lower() in LISTS and not told and np.ndim(value) < 2:
             lists[LISTS[short.lower()]] = [end(f"{v:g}" if isinstance(v, float) else str(v)) for v in np.atleast_1d(value).tolist()]
         elif short.lower() in RATES and np.size(value) == 1 and not told:
             rate = rate or float(value)
@@ -71,7 +77,9 @@ def from_arrays(file: Path, arrays: Mapping[str, Any], settings: FileForm) -> Co
                 role = role if role and role.kind in ("coherence", "sd") else Role("H", "complex" if np.iscomplexobj(value) else "magnitude")
             columns.append(Column(name, role, np.asarray(value)))
     widest = {kind: lists.get(kind) for kind in ("response", "reference")}
-    columns = [piece for column in columns for piece in _pieces(column, widest, axis_length)]
+    force = next((c.values for c in columns if c.role and c.role.kind == "force"), None)
+    hits = 0 if force is None else 1 if force.ndim == 1 else min(force.shape)
+    columns = [piece for column in columns for piece in _pieces(column, widest, axis_length, hits)]
     own = settings if rate is None else settings.model_copy(update={"sample_rate_Hz": rate})
     return _content(file, columns, own, arrays)
 
@@ -82,10 +90,17 @@ def _is_axis(name: str, value: Any, settings: FileForm) -> bool:
     return role is not None and role.kind in ("frequency", "time") and np.ndim(value) == 1 and not isinstance(value, str | list)
 
 
-def _pieces(column: Column, lists: Mapping[str, list[End] | None], length: int) -> list[Column]:
-    """A matrix of FRFs as single ones, its last axis that of the lines; what is no matrix as it is."""
+def _pieces(column: Column, lists: Mapping[str, list[End] | None], length: int, hits: int) -> list[Column]:
+    """A matrix of FRFs as single ones, its last axis that of the lines; responses over time by channel, as many `hits` as their force has; what is
+    no matrix as it is."""
     value, role = column.values, column.role
     if role is None or role.kind not in ("H", "coherence", "sd") or value.ndim == 1:
+        if role is not None and role.kind == "response" and value.ndim > 1:
+            value = np.moveaxis(value, int(np.argmax(value.shape)), -1)
+            if value.ndim == 2 and hits == 1 < len(value):  # channels of one hit
+                value = value[None]
+            if value.ndim == 3 and value.shape[0] != hits == value.shape[1]:  # (responses, hits, n)
+                value = value.swapaxes(0, 1)
         if role is not None and role.kind == "response" and value.ndim == 3:  # (hits, responses, n)
             ends = lists["response"] or [End(name=f"response {k + 1}") for k in range(value.shape[1])]
             return [replace(column, role=replace(role, response=e), values=value[:, k]) for k, e in enumerate(ends)]
@@ -161,7 +176,7 @@ def _curves(file: Path, columns: Sequence[Column], settings: FileForm) -> tuple[
         unit = settings.unit or (told.role.unit if told and told.role else "")
         coherence, sd = (np.asarray(parts[k].values.real, float) if k in parts else None for k in ("coherence", "sd"))
         where = listed(c.name for c in parts.values())
-        curves.append(Curve(file, where, response, reference, frequency, value, settings.quantity or "", "" if unit.startswith("dB") else unit, coherence, sd))
+        curves.append(Curve(file, where, response, reference, frequency, value, settings.quantity or "", unit, coherence, sd))
     return curves, questions
 
 
@@ -176,7 +191,7 @@ def _value(file: Path, parts: Mapping[str, Column], settings: FileForm) -> tuple
     if "real" in found or "imaginary" in found:
         missing = "imaginary" if "real" in found else "real"
         return None, [Question(file.name, "columns", f"which column is the {missing} part beside {name}")]
-    size = found["magnitude"].real if "magnitude" in found else 10 ** (found["decibel"].real / 20) if "decibel" in found else None
+    size = found["magnitude"].real if "magnitude" in found else 10 ** (found["decibel"].real / 20) * _level(parts) if "decibel" in found else None
     if size is None:
         return None, ([Question(file.name, "columns", f"which column is the magnitude beside {name}")] if "phase" in found else [])
     if "phase" not in found:
@@ -188,6 +203,11 @@ def _value(file: Path, parts: Mapping[str, Column], settings: FileForm) -> tuple
     if unit is None:
         return None, [Question(file.name, "phase_unit", f"whether the phase in {name} is in deg or rad")]
     return size * np.exp(1j * phase * (np.pi / 180 if unit == "deg" else 1.0)), []
+
+
+def _level(parts: Mapping[str, Column]) -> float:
+    role = parts["decibel"].role
+    return role.level if role else 1.0
 
 
 def _motions(file: Path, columns: Sequence[Column], moving: Sequence[Column], settings: FileForm) -> tuple[tuple[Motion, ...], list[Question]]:
@@ -214,6 +234,13 @@ def _motions(file: Path, columns: Sequence[Column], moving: Sequence[Column], se
         value = np.atleast_2d(np.asarray(c.values.real, float))
         value = value if value.shape[-1] >= value.shape[0] else value.T
         found.append(Motion(file, c.name, place if place.label else End(name="" if force else c.name), force, step or 1.0, value, c.role.unit))
+    hammer = next((m for m in found if m.force), None)
+    for m in found:
+        if hammer is not None and m.value.shape != hammer.value.shape:
+            raise BadInput(
+                f"{file}: {m.where}: has {m.value.shape[0]} hits of {m.value.shape[1]} samples, its force {hammer.where} {hammer.value.shape[0]} of "
+                f"{hammer.value.shape[1]}; they must be the same: time records are (hits, samples), or (hits, responses, samples)"
+            )
     if not any(m.force for m in found):
         questions.append(Question(file.name, "columns", "which column is the hammer's force"))
     elif all(m.force for m in found):

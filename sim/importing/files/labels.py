@@ -18,6 +18,7 @@ FUNCTIONS = ("h", "frf", "h1", "h2", "hv", "g", "tf")
 COHERENCE = ("coherence", "coh", "gamma2", "γ2", "γ²")
 FORCES = ("force", "hammer", "excitation", "kraft", "impact")
 RESPONSES = ("response", "acceleration", "accelerometer", "accel", "acc", "velocity", "vibrometer", "vel", "displacement", "disp")
+KINDS_OF_CHANNEL = {*FORCES, *RESPONSES}
 ROLES = 'frequency, time, "H(3,1)" with real, imaginary, magnitude, decibel or phase behind it, coherence(3,1), sd(3,1), force, response 3, ignore'
 """What may stand in `columns` of a mapping."""
 
@@ -27,18 +28,30 @@ NOWHERE = End()
 
 @dataclass(frozen=True)
 class Role:
-    """`kind`: frequency, time, H, coherence, sd, force, response or ignore; `part` of an H; `unit` as written in brackets."""
+    """`kind`: frequency, time, H, coherence, sd, force, response or ignore; `part` of an H; `unit` as written in brackets; `level` is what 0 dB are of it."""
 
     kind: str
     part: str = ""
     response: End = NOWHERE
     reference: End = NOWHERE
     unit: str = ""
+    level: float = 1.0
+
+
+DECIBEL = re.compile(r"dB(?:\s*(?:ref|rel|re|//)\W*\s*([\d.,]+(?:[eE][+-]?\d+)?)?\s*(.*))?", re.IGNORECASE)
 
 
 def role_of(heading: str) -> Role | None:
     """The role that a heading tells; None where it tells none."""
     text, unit = _without_unit(heading.strip())
+    if decibel := DECIBEL.fullmatch(unit):  # "mag [dB]", "[dB re 1 um/N]"
+        role = _role(text, (decibel[2] or "").strip())
+        return role and replace(role, part="decibel" if role.part in ("magnitude", "complex") else role.part, level=float((decibel[1] or "1").replace(",", ".")))
+    return _role(text, unit)
+
+
+def _role(text: str, unit: str) -> Role | None:
+    """The role that a heading without its unit tells."""
     low = text.lower().strip(" :_-")
     if low in AXES:
         return Role(AXES[low], unit=unit)
@@ -51,7 +64,9 @@ def role_of(heading: str) -> Role | None:
     short = re.fullmatch(r"([HhGg])[_ ]?(\d)(\d)|([HhGg])[_ ]?(\d+)[_/-](\d+)", text.split(" ")[0]) if pair is None else None
     if short is not None:  # H21, H_2_1
         digits = [d for d in short.groups() if d and d.isdigit()]
-        return role_of(f"H({digits[0]},{digits[1]}){text[len(text.split(' ')[0]) :]}" + (f" [{unit}]" if unit else ""))
+        return _role(f"H({digits[0]},{digits[1]}){text[len(text.split(' ')[0]) :]}", unit)
+    if pair is None and (over := re.fullmatch(r"([^\s/|]+)\s*[/|]\s*([^\s/|]+)[\s_:]+([A-Za-z]+)\W*", text)) and over[3].lower() in PARTS and not {*map(str.lower, over.groups()[:2])} & KINDS_OF_CHANNEL:
+        return _role(f"H({over[1]},{over[2]}) {over[3]}", unit)  # "hub/seat mag"
     rest = text[: pair.start()] + " " + text[pair.end() :] if pair else text
     words = [w for w in re.split(r"[^A-Za-zéγ²0-9]+", rest.lower()) if w]
     told = Role("H", "", *ends, unit)
@@ -67,6 +82,8 @@ def role_of(heading: str) -> Role | None:
             of = re.sub(rf"(?i)\b({'|'.join(PARTS)})\b", "", text).strip(" _-:")
             told = replace(told, response=End(name=of))
         return replace(told, part=part or "complex")
+    if part and {*words} & {*FORCES} and {*words} & {*RESPONSES}:  # "Acceleration/Force magnitude"
+        return replace(told, part=part)
     number = next((int(w) for w in words if w.isdigit()), 0)
     for kind, known in (("force", FORCES), ("response", RESPONSES)):
         if any(w.rstrip("0123456789") in known for w in words):
@@ -96,5 +113,5 @@ def _without_unit(text: str) -> tuple[str, str]:
     if match is None or (re.search(r"[,;|]", match[1]) is not None):
         return text, ""
     inside = match[1].strip()
-    known = inside in ("Hz", "kHz", "s", "ms", "dB", "deg", "°", "rad", "-", "1", "V") or units.of_frf(inside) or units.of_response(inside) or units.of_force(inside)
+    known = inside in ("Hz", "kHz", "s", "ms", "deg", "°", "rad", "-", "1", "V") or DECIBEL.fullmatch(inside) or units.of_frf(inside) or units.of_response(inside) or units.of_force(inside)
     return (text[: match.start()], inside) if known or match[0].strip().startswith("[") else (text, "")

@@ -115,6 +115,30 @@ def test_noise_is_found_in_the_scatter(damping, noise):
     assert np.sqrt((ratio**2).mean(axis=-1)) == pytest.approx(np.ones((3, 2)), abs=0.1)
 
 
+SWEEPS = {
+    "logarithmic": np.geomspace(400.0, 6000.0, 1400),
+    "in three parts": np.concatenate([np.arange(400.0, 1500.0, 2.0), np.arange(1500.0, 3000.0, 5.0), np.arange(3000.0, 6000.1, 8.0)]),
+}
+
+
+@pytest.mark.parametrize("sweep", SWEEPS)
+def test_lines_of_a_sweep_in_uneven_steps_lose_nothing(sweep):
+    """Residuals of the exact FRF have their stated errors, lines are compressed, and each mode's information is that of all lines."""
+    lines, random = SWEEPS[sweep], np.random.default_rng(11)
+    exact = modal_frf(lines)
+    frf = Frf(lines, noisy(exact, random, NOISE), (1, 3, 6), (1, 3), "mobility")
+    data = line_data(Test("a", 20.0, 0.0, frf=frf), Condition(20.0), NOISE, NOISE)
+    assert data.duration == np.inf
+    assert len(data.frequency) < 0.5 * len(lines)
+    assert np.sqrt(np.mean(residuals(data, modal_frf(data.frequency)) ** 2)) == pytest.approx(1.0, abs=0.06)
+    sd = noise_model(exact, NOISE.of_value, NOISE.of_largest)
+    for k in range(4):
+        moved = [f * (1 + 1e-6 * (i == k)) for i, f in enumerate(NATURAL)]
+        whole = np.sum(np.abs(modal_frf(lines, natural=tuple(moved)) - exact) ** 2 / sd**2)
+        kept = np.sum(np.abs(modal_frf(data.frequency, natural=tuple(moved)) - modal_frf(data.frequency)) ** 2 / data.sd**2)
+        assert kept == pytest.approx(whole, rel=0.1)
+
+
 def single_lines(data: LineData) -> np.ndarray:
     """Which of the frequencies are lines that were kept as they are."""
     apart = np.isclose(np.diff(data.frequency, prepend=0, append=0), 4.0)

@@ -13,8 +13,10 @@ from thermospindle.model.errors import BadInput, Unanswered
 from thermospindle.report.verbs.importing import bring
 from thermospindle.sim.campaign.campaign import read_campaign
 from thermospindle.sim.campaign.uff import write_frf
+from thermospindle.sim.identification.frf import out_of
 from thermospindle.sim.importing import units
 from thermospindle.sim.importing.files.labels import role_of
+from thermospindle.sim.importing.names import conditions_of, plain
 
 FRF = rotor_frf(noise=0.0005)
 SPINDLE = 'spindle = "hdd_2003"\n'
@@ -255,21 +257,22 @@ def test_missing_pairs_leave_the_largest_rectangle(tmp_path):
     assert any("H(6,1) left out" in n for n in notes)
 
 
-def test_lines_of_the_running_speed_are_replaced(tmp_path):
-    """480 rpm = 8 Hz beside lines of 1 Hz: a spike at every eighth line goes, what lies between stays."""
+def test_lines_of_the_running_speed_are_said_and_left_as_measured(tmp_path):
+    """1440 rpm = 24 Hz: a spike at every multiple is named, kept in the file, and left out where the test is compared."""
     frf = rotor_frf(noise=0.0002)
     spoiled = frf.value.copy()
-    spoiled[:, :, FREQUENCY % 24 == 0] += 0.3 * np.abs(frf.value).max()
+    hit = FREQUENCY % 24 == 0
+    spoiled[:, :, hit] += 0.3 * np.abs(frf.value).max()
     heads, found = columns("real", "(m/s)/N", spoiled)
     file = table(tmp_path / "T20.csv", ["Frequency", *heads], [FREQUENCY, *found])
     (tmp_path / "mapping.toml").write_text(SPINDLE + HEAD.replace("speed_rpm = 0.0", "speed_rpm = 1440.0"))
-    notes = bring([file], mapping=tmp_path / "mapping.toml", out=tmp_path / "c").values["notes"]
-    assert any("multiples of the running speed" in n for n in notes)
-    back = read_campaign(tmp_path / "c").tests[0].frf.value
-    hit = FREQUENCY % 24 == 0
-    assert np.abs(back - frf.value)[:, :, hit].max() < 0.05 * np.abs(frf.value).max()
-    far = np.abs((FREQUENCY + 12) % 24 - 12) > 1.6
-    np.testing.assert_allclose(back[:, :, far], frf.value[:, :, far], rtol=1e-8, atol=1e-12)
+    (warning,) = bring([file], mapping=tmp_path / "mapping.toml", out=tmp_path / "c").values["warnings"]
+    assert "lines of the running speed stand in the FRFs, at" in warning
+    test = read_campaign(tmp_path / "c").tests[0]
+    np.testing.assert_allclose(test.frf.value, spoiled, rtol=1e-8, atol=1e-12)
+    out = out_of(test.frf, test.speed).out
+    assert out[hit][1:-1].all()
+    assert not out[np.abs((FREQUENCY + 12) % 24 - 12) > 2.5].any()
 
 
 def test_modes_picked_by_hand(tmp_path):
@@ -314,6 +317,9 @@ def test_units_of_frfs(text, found):
         ("H(3,1) real [g/N]", "H", "real", ("3", "1"), "g/N"), ("Re H(3:+X, 1)", "H", "real", ("3:+X", "1"), ""), ("FRF(hub, seat) dB", "H", "decibel", ("hub", "seat"), ""),
         ("Magnitude", "H", "magnitude", ("", ""), ""), ("Coherence(3,1)", "coherence", "", ("3", "1"), ""), ("Frequency (Hz)", "frequency", "", ("", ""), "Hz"),
         ("force [N]", "force", "", ("", ""), "N"), ("acceleration 3 [g]", "response", "", ("3", ""), "g"), ("Time [s]", "time", "", ("", ""), "s"),
+        ("hub/seat mag [um/N]", "H", "magnitude", ("hub", "seat"), "um/N"), ("3+Z/1+Z Phase (deg)", "H", "phase", ("3:+Z", "1:+Z"), "deg"),
+        ("Acceleration/Force Magnitude [g/N]", "H", "magnitude", ("", ""), "g/N"), ("H(3,1) mag [dB]", "H", "decibel", ("3", "1"), ""),
+        ("H(3,1) [dB re 1 µm/N]", "H", "decibel", ("3", "1"), "µm/N"), ("H(3,1) dB (dB ref 1e-6 m/N)", "H", "decibel", ("3", "1"), "m/N"),
         ("FRF-2 real", "H", "real", ("FRF-2", ""), ""), ("H21", "H", "complex", ("2", "1"), ""), ("H_12_3 imag [g/N]", "H", "imaginary", ("12", "3"), "g/N"),
     ],
 )  # fmt: skip
@@ -322,6 +328,89 @@ def test_headings(heading, kind, part, ends, unit):
     assert role is not None
     assert (role.kind, role.part, role.unit) == (kind, part, unit)
     assert (role.response.label, role.reference.label) == ends
+
+
+def test_what_0_dB_are_of_a_unit_counts():
+    assert (role_of("H(3,1) [dB re 1e-6 m/N]").level, role_of("H(3,1) [dB re 1 µm/N]").level) == (1e-6, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [("Spindel_20C_0rpm", (20, 0)), ("T60_n7200", (60, 7200)), ("warm 41.5deg 3600 rpm", (41.5, 3600)), ("20_C_standstill", (20, 0)), ("test_4", (None, None)),
+     ("run_20_0", (None, None))],
+)  # fmt: skip
+def test_what_names_tell(name, told):
+    found = conditions_of(plain(name))
+    assert (found.get("temperature_C"), found.get("speed_rpm")) == told
+
+
+def test_files_of_one_test_are_put_together_in_the_form(tmp_path):
+    """A file a hammer point, in decibels over micrometres, decimal comma, UTF-16 with its mark: nothing is left to be asked."""
+    force = FRF.value / (2j * np.pi * FREQUENCY) * 1e6
+    for j, q in enumerate(FRF.reference_nodes):
+        heads = [f"H({r},{q}) {part}" for r in FRF.response_nodes for part in ("dB [dB re 1 µm/N]", "Phase [°]")]
+        found = [v for h in force[:, j] for v in (20 * np.log10(np.abs(h)), np.degrees(np.angle(h)))]
+        file = table(tmp_path / f"Spindel_20C_0rpm_Hammer{q}.csv", ["Frequenz [Hz]", *heads], [FREQUENCY, *found], ";", comma=True, above="Prüfer: K. Müller\n\n")
+        file.write_bytes(file.read_text(encoding="utf-8").encode("utf-16"))
+    mapping = tmp_path / "lab.toml"
+    values = bring([tmp_path / "*.csv"], mapping=mapping, scene="hdd_2003").values
+    assert values["proposed"] == ["Spindel_20C_0rpm: 20 C, 0 rpm, 2 files"]
+    bring([tmp_path / "*.csv"], mapping=mapping, scene="hdd_2003", out=tmp_path / "c")
+    (test,) = read_campaign(tmp_path / "c").tests
+    assert test.frf.quantity == "receptance"
+    np.testing.assert_allclose(test.frf["hub_side0", "seat90"], force[1, 1] * 1e-6, rtol=1e-8)
+
+
+def test_a_question_about_all_files_is_answered_once(tmp_path):
+    """What every file lacks stands once in the form, column by column; a point that two files would hold twice keeps them apart."""
+    for name in ("T20_hit1", "T20_hit2", "T60_hit1"):
+        table(tmp_path / f"{name}.csv", ["Frequency [Hz]", "left", "right"], [FREQUENCY, *np.abs(FRF.value[:2, 0])])
+    mapping = tmp_path / "lab.toml"
+    bring([tmp_path / "*.csv"], mapping=mapping, scene="hdd_2003")
+    text = mapping.read_text()
+    assert (text.count('"left" = "?"'), text.count('file = "*.csv"')) == (1, 1)
+    mapping.write_text(text.replace('"left" = "?"', '"left" = "H(1,1) mag"').replace('"right" = "?"', '"right" = "H(3,1) mag"').replace('speed_rpm = "?"', "speed_rpm = 0"))
+    values = bring([tmp_path / "*.csv"], mapping=mapping, scene="hdd_2003", out=tmp_path / "c").values
+    assert [t["id"] for t in values["tests"]] == ["T20", "T60_hit1"]
+
+
+def test_a_sweep_in_uneven_steps(tmp_path):
+    """Lines of a logarithmic sweep are kept as they are, through the campaign's file too; a conjugated one is refused as any other."""
+    lines = np.geomspace(400.0, 700.0, 400)
+    frf = rotor_frf(lines, noise=0.0005)
+    heads, found = columns("real", "(m/s)/N", frf.value)
+    file = table(tmp_path / "T20.csv", ["Frequency", *heads], [lines, *found])
+    back = imported(tmp_path, "", file)
+    np.testing.assert_allclose(back.frequency, lines, rtol=1e-11)
+    np.testing.assert_allclose(back.value[0], frf.value[0], rtol=1e-8)
+    heads, found = columns("real", "(m/s)/N", frf.value.conj())
+    table(file, ["Frequency", *heads], [lines, *found])
+    with pytest.raises(BadInput, match="is conjugated"):
+        bring([file], mapping=tmp_path / "mapping.toml", out=tmp_path / "d")
+    heads, found = columns("real", "(m/s)/N")
+    table(file, ["Frequency", *heads], [np.delete(c, 100) for c in (FREQUENCY, *found)])
+    with pytest.raises(BadInput, match=r"T20.csv.*from 499 to 501 Hz among steps of 1 Hz; no line may be missing"):
+        bring([file], mapping=tmp_path / "mapping.toml", out=tmp_path / "d")
+
+
+def test_low_frequencies_of_an_accelerometer_are_noise_and_no_wrong_sign(tmp_path):
+    """Noise of an accelerance, equal at all lines, exceeds every resonance of the receptance at its lowest ones."""
+    lines = np.arange(10.0, 701.0)
+    frf = rotor_frf(lines, "accelerance", noise=0.002)
+    heads, found = columns("real", "m/N", frf.value / (2j * np.pi * lines) ** 2)
+    file = table(tmp_path / "T20.csv", ["Frequency", *heads], [lines, *found])
+    assert imported(tmp_path, "", file).quantity == "receptance"
+
+
+def test_noise_of_a_magnitude_makes_no_modes(tmp_path):
+    """Two modes, noise of 2 % of the largest: peaks of the noise are no modes."""
+    from thermospindle.sim.importing.measured import Curve, End
+    from thermospindle.sim.importing.peaks import from_peaks
+
+    lines = np.arange(50.0, 2000.0)
+    size = np.abs(rotor_frf(lines, noise=0.02).value[:, 0])
+    modes, _ = from_peaks([Curve(tmp_path, "", End(k), End(1), lines, row) for k, row in enumerate(size, 1)], 0.0)
+    assert [m.frequency for m in modes] == [pytest.approx(480, abs=0.5), pytest.approx(600, abs=0.5)]
 
 
 def test_points_on_a_flexible_shaft_are_told_by_its_name(tmp_path):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from thermospindle.model.errors import BadInput
 from thermospindle.report.verbs.importing import bring
 from thermospindle.sim.campaign.campaign import read_campaign
 
@@ -133,3 +134,22 @@ def test_a_hit_a_row_and_no_hit(tmp_path):
     test = read_campaign(tmp_path / "c").tests[0]
     model = exact(test.frf.frequency, test.window_decay)[:, :1]
     assert np.abs(test.frf.value - model).max() < 1e-3 * np.abs(model).max()
+
+
+@pytest.mark.parametrize("order", ["hits, responses", "responses, hits"])
+def test_all_channels_in_one_array(tmp_path, order):
+    """As many hits as the force has, whichever axis they are; another number of them is said."""
+    random = np.random.default_rng(5)
+    force, answer = zip(*(hit(random) for _ in range(4)), strict=True)
+    motion = np.array(answer)[:, :, 0]
+    motion = motion if order == "hits, responses" else motion.swapaxes(0, 1)
+    np.savez(tmp_path / "hammer1.npz", fs=RATE, force=np.array(force), velocity=motion, resp_nodes=np.array([1, 2]))
+    told = MAPPING.replace('test = "T20"', 'test = "T20"\nreference = 1\ncolumns = { force = "force [N]", velocity = "velocity [m/s]" }', 1)
+    (tmp_path / "m.toml").write_text(told + "[records]\nband_Hz = [50.0, 1000.0]\n")
+    bring([tmp_path / "hammer1.npz"], mapping=tmp_path / "m.toml", out=tmp_path / "c")
+    test = read_campaign(tmp_path / "c").tests[0]
+    model = exact(test.frf.frequency, test.window_decay)[:, :1]
+    assert np.abs(test.frf.value - model).max() < 1e-3 * np.abs(model).max()
+    np.savez(tmp_path / "hammer1.npz", fs=RATE, force=np.array(force)[:3], velocity=motion, resp_nodes=np.array([1, 2]))
+    with pytest.raises(BadInput, match="its force force 3 of"):
+        bring([tmp_path / "hammer1.npz"], mapping=tmp_path / "m.toml", out=tmp_path / "d")
