@@ -39,7 +39,24 @@ def study(folder, text, *options):
 
 
 def files(folder):
-    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+    """All but the log, which holds when it was written."""
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file() and p.suffix != ".rrd"}
+
+
+def test_the_log_gives_back_the_numbers(tmp_path, capsys):
+    out, rows = study(tmp_path, TURNING + "draws = 3\n")
+    capsys.readouterr()
+    assert main(["inspect", str(out / "study.rrd"), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["kind"], told["cases"], told["rows"], told["errors"]) == ("monte-carlo", 3, 6, 0)
+    numbers = [name for name, value in rows[0].items() if isinstance(value, float | int) and not isinstance(value, bool)]
+    assert len(numbers) > 15
+    assert set(numbers) < set(told["columns"])
+    for name, column in told["columns"].items():
+        assert column == [r[name] for r in rows]
+    assert "/series/mode 1, Hz/20 C" in [e.replace("\\", "") for e in told["entities"]]
+    assert main(["inspect", str(out / "study.rrd")]) == 0
+    assert "monte-carlo of 3 cases: 6 rows" in capsys.readouterr().out
 
 
 def test_a_sweep_has_the_modes_of_every_condition(tmp_path, capsys):
@@ -93,6 +110,28 @@ def test_draws_scatter_as_the_tolerances_say(tmp_path, capsys):
     assert share == pytest.approx((ends[1] - ends[0]) / (2 * by.sd) * drawn, rel=0.03)  # Hz a standard deviation, by differences too
     assert (out / "spread.png").is_file()
     assert (out / "sensitivity.png").is_file()
+
+
+TURNING = DRAWN.replace("temperatures_C = [20, 60]", "temperatures_C = [20]\nspeeds_rpm = [0, 7200]\nrunout = true")
+
+
+def test_runout_of_spindles_as_they_are_built(tmp_path, capsys):
+    """With a grade every draw has imperfections of its own; without, those of the scene, which the tolerances hardly move."""
+    from thermospindle.sim.running.steady import steady_runout
+
+    spread = {}
+    for grade in ("", 'grade = "high precision"\n'):
+        (tmp_path / f"of {len(grade)}").mkdir()
+        out, rows = study(tmp_path / f"of {len(grade)}", TURNING + grade + "draws = 12\nseed = 2\n")
+        turning = json.loads(capsys.readouterr().out)["conditions"][1]
+        assert [r["rro_um.x"] is None for r in rows] == [True, False] * 12
+        own = steady_runout(operating_point(load(SCENE), Condition(20.0, 7200 * np.pi / 30)))
+        assert turning["rro_um"]["x"]["nominal"] == pytest.approx(1e6 * own["hub x"].repeatable)
+        assert turning["nrro_six_sigma_um"]["axial"]["nominal"] == pytest.approx(1e6 * own["hub axial"].six_sigma)
+        spread[grade] = turning["rro_um"]["x"]["spread"]["sd"] / turning["rro_um"]["x"]["spread"]["mean"]
+        assert "rro_um" not in json.loads((out / "summary.json").read_text(encoding="utf-8"))["conditions"][0]
+    few, own = spread.values()
+    assert 0 < few < 0.05 < own
 
 
 def test_sensitivities_are_those_of_a_linear_answer():
@@ -210,6 +249,8 @@ def test_two_runs_do_not_write_into_one_folder(tmp_path, capsys):
         ("kind = ", "not a TOML file"),
         (DRAWN, "draws: missing"),
         (DRAWN + "draws = 1\n", "draws = 1"),
+        (DRAWN + "draws = 5\nrunout = true\n", "speeds_rpm needs a speed"),
+        (DRAWN + 'draws = 5\ngrade = "precision"\n', "it needs runout = true"),
         (DRAWN + "draw = 5\n", "did you mean draws"),
         (DRAWN + "draws = 5\n[vary]\nspeed = [1]\n", "vary: is for kind = 'sweep'"),
         (DRAWN.replace("hdd_2003", "nowhere") + "draws = 5\n", "nowhere: no scene there"),

@@ -16,7 +16,7 @@ from matplotlib.patches import Rectangle
 
 from thermospindle.model.types import Array
 from thermospindle.report.figures.common import INK, PALE, STYLE, colour
-from thermospindle.sim.study.rows import Cases
+from thermospindle.sim.study.rows import OF_RUNOUT, Cases
 from thermospindle.sim.study.sensitivity import APART
 from thermospindle.sim.study.summary import at_conditions, frequencies, numbers
 
@@ -47,6 +47,8 @@ def sweep(of: Cases, table: pa.Table) -> dict[str, Figure]:
         lines.setdefault(told, []).append(i)
     x = numbers(table, along)
     panels = [(f"mode {n}, Hz", y) for n, y in frequencies(table).items()][: 2 * PANELS]
+    if of.study.runout:
+        panels += [(f"{key.split('_')[0].upper()} {probe}, um", numbers(table, f"{key}.{probe}")) for key in OF_RUNOUT for probe in ("x", "axial")]
     panels += [(f"preload {b.name}, N", numbers(table, f"preload_N.{b.name}")) for b in of.spindle.bearings]
     with rc_context(STYLE):
         figure, grid = _grid(len(panels))
@@ -103,19 +105,22 @@ def _spreads(of: Cases, table: pa.Table) -> Figure:
     parts = at_conditions(of, table)
     every = [here["temperature_C"] for here, _ in parts]
     modes = sorted({n for _, rows in parts for n in frequencies(rows)})[: 2 * PANELS]
-    titles = [f"mode {n}" for n in modes] + [f"preload {b.name}" for b in of.spindle.bearings]
+    columns = {f"preload {b.name}": f"preload_N.{b.name}" for b in of.spindle.bearings}
+    if of.study.runout:
+        columns |= {f"{'RRO' if key == 'rro_um' else 'NRRO 6 s.d.'} {probe}": f"{key}.{probe}" for key in OF_RUNOUT for probe in ("x", "y", "axial")}
+    titles = [f"mode {n}" for n in modes] + list(columns)
     figure, grid = _grid(len(titles))
     for k, title in enumerate(titles):
         axes = grid[k]
         for here, rows in parts:
-            values = frequencies(rows).get(modes[k]) if k < len(modes) else numbers(rows, f"preload_N.{title.removeprefix('preload ')}")
+            values = frequencies(rows).get(modes[k]) if k < len(modes) else numbers(rows, columns[title])
             known = values[np.isfinite(values)] if values is not None else np.array([])
             if len(known) > 1:
                 label = f"{here['temperature_C']:g} °C" + (f", {here['speed_rpm']:g} rpm" if here["speed_rpm"] else "")
                 axes.hist(known, bins="auto" if np.ptp(known) > 0 else 1, density=True, histtype="step", color=colour(here["temperature_C"], every), ls="--" if here["speed_rpm"] else "-", label=label)  # fmt: skip
         axes.set_title(title)
         axes.set_yticks([])
-        axes.set_xlabel("Hz" if k < len(modes) else "N")
+        axes.set_xlabel("Hz" if k < len(modes) else "um" if "RRO" in title else "N")
     handles, labels = grid[0].get_legend_handles_labels()
     if handles:
         figure.legend(handles, labels, loc="outside lower center", ncols=min(6, len(handles)))

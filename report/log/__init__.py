@@ -19,6 +19,7 @@ read              reads any of our logs back: numbers bit for bit as computed, a
 run               the Rerun log of a run: one `.rrd` with what was computed, and a blueprint that shows it at a glance
 runout            the Rerun log of a turning spindle: the model spins and its orbit grows on the timeline `time`, RRO
                   (repeatable runout) and NRRO (nonrepeatable) run beside them
+study/            the Rerun log of a study
 runout_blueprint  the blueprint stored in the log of a turning spindle: all of it in one window, playing
 ================  ======================================================================================================
 """

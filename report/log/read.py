@@ -1,6 +1,6 @@
 """Reads any of our Rerun logs back: what is in it as numbers, bit for bit as computed, as JSON, and in words.
 
-A log says by its property which kind it is: `run` (also comparison and ladder), `map` or `runout`. Numbers stand under `numbers/` as
+A log says by its property which kind it is: `run` (also comparison and ladder), `map`, `runout` or `study`. Numbers stand under `numbers/` as
 components with plain names; `Log.table` gives those of one entity, and a row a kind in `SHOW` says what they mean.
 """
 
@@ -26,8 +26,8 @@ from thermospindle.report.log.content import Peak
 from thermospindle.sim.identification.frf import Frf
 
 APPLICATION = "thermospindle"
-KINDS = ("run", "map", "runout")
-NEEDS = {"run": "/numbers/peaks", "map": "/numbers/modes", "runout": "/signals"}
+KINDS = ("run", "map", "runout", "study")
+NEEDS = {"run": "/numbers/peaks", "map": "/numbers/modes", "runout": "/signals", "study": "/numbers/rows"}
 
 
 @dataclass(frozen=True)
@@ -321,8 +321,25 @@ def _runout_words(log: Log) -> list[str]:
     return lines
 
 
+def _study_json(log: Log) -> dict[str, Any]:
+    """Columns of numbers as they stand in the results, null where a row has none."""
+    told = {key: log.about[key] for key in ("title", "kind", "cases", "rows", "errors")}
+    table = log.table("/numbers/rows")
+    return told | {"columns": {name: [v if v == v else None for v in values] for name, values in table.items()}}
+
+
+def _study_words(log: Log) -> list[str]:
+    about = log.about
+    lines = [f"{about['kind']} of {about['cases']} cases: {about['rows']} rows, {about['errors']} without a result"]
+    for name, values in log.table("/numbers/rows").items():
+        known = [v for v in values if v == v]
+        lines.append(f"{name}: {len(known)} of {len(values)} known" + (f", {min(known):.6g} to {max(known):.6g}" if known else ""))
+    return lines
+
+
 SHOW: dict[str, tuple[Callable[[Log], dict[str, Any]], Callable[[Log], list[str]]]] = {
     "run": (_run_json, _run_words),
     "map": (_map_json, _map_words),
     "runout": (_runout_json, _runout_words),
+    "study": (_study_json, _study_words),
 }

@@ -20,6 +20,7 @@ from thermospindle.model.scene.fields import read_file
 from thermospindle.model.scene.reading import content_hash, scene_path
 from thermospindle.report.figures import study as figures
 from thermospindle.report.folder import digest
+from thermospindle.report.log.study.log import write_study_log
 from thermospindle.report.text.grid import show_grid
 from thermospindle.report.verbs.answer import Answer, progress_bar, with_effects
 from thermospindle.sim.study.executors import Executor, on_cluster, on_this_machine
@@ -30,7 +31,7 @@ from thermospindle.sim.study.sensitivity import APART
 from thermospindle.sim.study.summary import summary
 from thermospindle.sim.study.variants import check
 
-SUMMARY = "summary.json"
+SUMMARY, LOG = "summary.json", "study.rrd"
 OUTLIERS, CONDITIONS = 20, 6  # shown
 
 
@@ -60,12 +61,13 @@ def study(file: Path, cluster: str | None = None, effect_files: Sequence[Path] =
         write_table(table, folder.path / RESULTS)
         write(folder.path / SUMMARY, json.dumps(values, indent=1))
         figures.write_figures(drawn, folder.path)
+        write_study_log(spindle, values, table, drawn, folder.path / LOG)
     values |= {"out": str(place), "parts": folder.count, "parts_found": there, "warnings": _warnings(values)}
 
     def show(console: Console) -> None:
         console.print(f"{asked.title}: {of.count} cases of {spindle.name}" + (f", {there} of {folder.count} parts found there" if there else ""))
         (_show_fleet if isinstance(of, Fleet) else _show)(console, values)
-        console.print(f"\n{place}: {RESULTS}, {SUMMARY}, {', '.join(f'{name}.png' for name in drawn)}", soft_wrap=True)
+        console.print(f"\n{place}: {RESULTS}, {SUMMARY}, {LOG}, {', '.join(f'{name}.png' for name in drawn)}", soft_wrap=True)
 
     return Answer(values, show)
 
@@ -121,6 +123,8 @@ def _show(console: Console, values: dict[str, Any]) -> None:
     for c in values["conditions"][:CONDITIONS]:
         rows = [_line(f"{m['mode']} {m['kind']}, Hz", m["nominal_Hz"], m) for m in c["modes"]]
         rows += [_line(f"preload {name}, N", p["nominal"], p) for name, p in c["preload_N"].items()]
+        for key, label in (("rro_um", "RRO"), ("nrro_six_sigma_um", "NRRO, 6 s.d.")):
+            rows += [_line(f"{label} {probe}, um", own["nominal"], own) for probe, own in c.get(key, {}).items()]
         lost = {name: share for name, share in c["in_contact"].items() if share is not None and share < 1}
         head = ["", "scene", *(["mean", "s.d.", "2.5 %", "97.5 %", "most by", "r2"] if values["kind"] == MONTE_CARLO else ["least", "most"])]
         show_grid(console, f"{c['temperature_C']:g} C, {c['speed_rpm']:g} rpm", head, rows, ("", "most by"))

@@ -11,6 +11,7 @@ run           the running spindle in time: MuJoCo under the forces of its imperf
               and in coast-down
 runout        runout of a turning spindle: what probes at points in space see, what of it repeats, which lines it holds
               and why
+steady        runout in the steady state from the lines alone, exactly and without a record
 waterfall     line spectra over speed: what a run-up passes through, steady at every speed, with the natural frequencies
               it crosses
 ============  ==========================================================================================================

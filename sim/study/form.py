@@ -51,6 +51,8 @@ class StudyForm(Table):
     speeds_rpm: list[Rpm] | None = Field(None, min_length=1, max_length=100_000)
     highest_Hz: Annotated[float, Field(gt=0, le=1e9)] | None = None
     chunk: Annotated[int, Field(ge=1, le=10_000)] | None = None
+    runout: bool = False
+    grade: Literal["high precision", "precision", "ordinary"] | None = None
     vary: dict[Name, Steps | Annotated[list[Any], Field(min_length=1, max_length=100_000)]] = Field(default_factory=dict)
     draws: Annotated[int, Field(ge=2, le=MOST)] | None = None
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
@@ -66,6 +68,10 @@ class StudyForm(Table):
         for key, kind in (("draws", MONTE_CARLO), ("campaigns", FLEET)):
             if self.kind == kind and not getattr(self, key):
                 raise ValueError(f"{key}: missing, and a {kind} study has no default for it")
+        if self.runout and not any(self.speeds_rpm or ()):
+            raise ValueError("runout = true: at rest there is none; speeds_rpm needs a speed")
+        if self.grade and not self.runout:
+            raise ValueError(f"grade = {self.grade!r}: imperfections show in the runout alone; it needs runout = true")
         for key in ("temperatures_C", "speeds_rpm", "campaigns"):
             values = getattr(self, key) or []
             if len(set(values)) < len(values):
@@ -82,6 +88,8 @@ ONLY = {
     "temperatures_C": (SWEEP, MONTE_CARLO),
     "speeds_rpm": (SWEEP, MONTE_CARLO),
     "highest_Hz": (SWEEP, MONTE_CARLO),
+    "runout": (SWEEP, MONTE_CARLO),
+    "grade": (MONTE_CARLO,),
 }
 """Keys that only some kinds of study have."""
 CHUNK = {SWEEP: 64, MONTE_CARLO: 64, FLEET: 1}
@@ -106,6 +114,8 @@ class Study:
     campaigns: tuple[Path, ...]
     work: str
     digest: str
+    runout: bool = False
+    grade: str | None = None  # of the imperfections that are drawn with each spindle; None: those of the scene
 
     def combinations(self) -> int:
         """Of the varied keys."""
@@ -135,6 +145,8 @@ def read_study(file: Path) -> Study:
         seed=form.seed,
         campaigns=_campaigns(file, form.campaigns),
         work=form.work,
+        runout=form.runout,
+        grade=form.grade,
         digest=hashlib.sha256(file.read_bytes()).hexdigest()[:16],
     )
     if (count := study.combinations() * len(study.temperatures or ()) * len(study.speeds)) > MOST:

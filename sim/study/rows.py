@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -12,22 +12,27 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from thermospindle.model.drawn import GRADES, drawn
 from thermospindle.model.errors import BadInput, NoEquilibrium, NotConverged, OutsideRange
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.modes import Mode
 from thermospindle.model.tolerance import toleranced
-from thermospindle.model.units import RPM
+from thermospindle.model.units import RPM, TO_UM
 from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.identification.pairing import follow
 from thermospindle.sim.operating import OperatingPoint, operating_point, unloads
+from thermospindle.sim.running.runout import AXIAL, X, Y
+from thermospindle.sim.running.steady import steady_runout
 from thermospindle.sim.study.form import MONTE_CARLO, Study
 from thermospindle.sim.study.variants import combination, variant
 
+IMPERFECT = 1  # of the seeds of a draw: imperfections, beside the deviations
 BEYOND = 1.5  # of the band, up to which partners of the scene's own modes are looked for
 NAMED = (BadInput, OutsideRange, NoEquilibrium, NotConverged)
 """What is a result of a case rather than the end of the study: the sentence stands in its row."""
 OF_ROW = {"preload_N": "preload", "contact_angle_deg": "contact_angle", "deformation_um": "deformation"}
 OF_BEARING = {"radial_stiffness_N_per_m": "radial_stiffness", "axial_stiffness_N_per_m": "axial_stiffness"}
+OF_RUNOUT = ("rro_um", "nrro_six_sigma_um")  # peak to valley, and six standard deviations
 UNITS = {"contact_angle_deg": np.degrees(1.0), "deformation_um": 1e6}
 MODES = {"frequency_Hz": pa.float64(), "damping_ratio": pa.float64(), "kind": pa.string(), "whirl": pa.string(), "mode": pa.int64()}
 
@@ -76,11 +81,18 @@ class Cases:
             return [self._empty(known, condition, error)]
         return [self._row(known, spindle, condition)[0]]
 
+    def _with_imperfections(self, case: int) -> Spindle:
+        """The scene's spindle; where the study names a grade, with imperfections of its own for every draw."""
+        if self.study.grade is None:
+            return self.spindle
+        own = int(np.random.default_rng([self.study.seed, case, IMPERFECT]).integers(2**62))
+        return replace(self.spindle, imperfections=drawn(self.spindle, own, GRADES[self.study.grade]))
+
     def _drawn(self, case: int) -> list[Row]:
         parameters = toleranced(self.spindle)
         off = draw(self.study.seed, case, [p.sd for p in parameters])
         known: Row = {"case": case, **{f"deviation.{p.name}": float(x) for p, x in zip(parameters, off, strict=True)}}
-        spindle = self.spindle
+        spindle = self._with_imperfections(case)
         try:
             for p, x in zip(parameters, off, strict=True):
                 spindle = p.apply(spindle, float(x))
@@ -104,6 +116,7 @@ class Cases:
             ]
             if not np.all(np.isfinite(values)):
                 raise NotConverged("a frequency, damping ratio or stiffness is no finite number")
+            seen = steady_runout(point) if self.study.runout and condition.speed else {}
         except NAMED as error:
             return self._empty(known, condition, error), None
         number = self._numbers(condition, point, modes)
@@ -113,6 +126,8 @@ class Cases:
         for bearing in point.state.all_bearings:
             told = {**OF_ROW, **OF_BEARING} if bearing.name in names else OF_BEARING
             row |= {f"{key}.{bearing.name}": float(getattr(bearing, name)) * UNITS.get(key, 1.0) for key, name in told.items()}
+        row |= {f"rro_um.{_plain(probe)}": TO_UM * r.repeatable for probe, r in seen.items()}
+        row |= {f"nrro_six_sigma_um.{_plain(probe)}": TO_UM * r.six_sigma for probe, r in seen.items()}
         row |= {f"in_contact.{b.name}": bool(b.in_contact) for b in point.state.bearings}
         row |= {"frequency_Hz": [modes[i].frequency for i in kept], "damping_ratio": [modes[i].damping_ratio for i in kept]}
         row |= {"kind": [modes[i].kind for i in kept], "whirl": [modes[i].whirl for i in kept], "mode": [number[i] for i in kept]}
@@ -145,6 +160,8 @@ class Cases:
                 fields[f"unloads_C.{b.name}"] = pa.float64()
         for name in (*(b.name for b in self.spindle.bearings), *(b.name for b in self.spindle.linear_bearings)):
             fields |= {f"{key}.{name}": pa.float64() for key in OF_BEARING}
+        if self.study.runout:
+            fields |= {f"{key}.{_plain(probe)}": pa.float64() for key in OF_RUNOUT for probe in (X, Y, AXIAL)}
         return pa.schema(fields | {name: pa.list_(kind) for name, kind in MODES.items()})
 
 
@@ -157,6 +174,11 @@ def cases(study: Study, raw: Mapping[str, Any], file: Path, spindle: Spindle, ca
             point = operating_point(spindle, condition := Condition(t, rpm * RPM))
             own[condition] = point, point.modes_below(study.highest or spindle.hammer.band[1])
     return Cases(study, raw, file, spindle, catalogue, own)
+
+
+def _plain(probe: str) -> str:
+    """A probe's name as part of a column's."""
+    return probe.removeprefix("hub ")
 
 
 def draw(seed: int, case: int, sd: Sequence[float]) -> Any:

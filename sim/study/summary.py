@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -10,8 +10,10 @@ import numpy as np
 import pyarrow as pa
 
 from thermospindle.model.types import Array
-from thermospindle.model.units import RPM
-from thermospindle.sim.study.rows import Cases
+from thermospindle.model.units import RPM, TO_UM
+from thermospindle.sim.operating import OperatingPoint
+from thermospindle.sim.running.steady import steady_runout
+from thermospindle.sim.study.rows import OF_RUNOUT, Cases
 from thermospindle.sim.study.sensitivity import sensitivity, spread
 
 Told = dict[str, Any]
@@ -72,6 +74,7 @@ def summary(of: Cases, table: pa.Table) -> Told:
                     b: {"nominal": point.state.bearing(b).preload, **told_of(numbers(rows, f"preload_N.{b}"))}
                     for b in bearings
                 },
+                **_runout(of, rows, point, told_of),
                 "in_contact": {b: _share(rows[f"in_contact.{b}"].to_pylist()) for b in bearings},
             }
         )
@@ -79,6 +82,21 @@ def summary(of: Cases, table: pa.Table) -> Told:
         once = table.filter(pa.array(np.diff(numbers(table, "case"), prepend=-1) != 0))
         told["unloads_C"] = {b: _spread(v := numbers(once, f"unloads_C.{b}")) | {"share": float(np.isfinite(v).mean())} for b in bearings}
     return told
+
+
+def _runout(of: Cases, rows: pa.Table, point: OperatingPoint, told_of: Callable[[Array], Told]) -> Told:
+    """By value and probe, where the study asks for it and the spindle turns; `nominal` is that of the scene's own imperfections."""
+    if not of.study.runout or not point.condition.speed:
+        return {}
+    seen = steady_runout(point)
+    nominal = {"rro_um": lambda r: r.repeatable, "nrro_six_sigma_um": lambda r: r.six_sigma}
+    return {
+        key: {
+            (probe := name.removeprefix("hub ")): {"nominal": TO_UM * nominal[key](r), **told_of(numbers(rows, f"{key}.{probe}"))}
+            for name, r in seen.items()
+        }
+        for key in OF_RUNOUT
+    }
 
 
 def _spread(values: Array) -> Told:
