@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from thermospindle.model.bearing.pair import BearingState
-from thermospindle.model.machine import Body, RingMotion, Spindle
+from thermospindle.model.machine import MOVES, Body, RingMotion, Spindle
 from thermospindle.model.rotor.chain import Element, RotorBase
 from thermospindle.model.tolerance import scaled_preload
 from thermospindle.model.types import Array
@@ -155,8 +155,8 @@ def _of_rings(spindle: Spindle) -> list[Mechanism]:
     found = [
         Mechanism("preload falls", "%", 1.0, 40.0, ("preload_loss",), "preload",
                   {"spindle": lambda s, a, _: scaled_preload(s, max(1 + a / 100, 0.02))}, sign=-1),
-        Mechanism("turning part warmer", "K", 0.3, 8.0, ("thermal_gradient", "soak_lag"), "rings", {"temperatures": _warmer(turning)}),
-        Mechanism("standing part warmer", "K", 0.3, 8.0, ("thermal_gradient", "soak_lag"), "rings", {"temperatures": _warmer(standing)}),
+        Mechanism("turning part warmer", "K", 0.3, 8.0, ("thermal_gradient", "soak_lag", "cooling_imbalance"), "rings", {"temperatures": _warmer(turning)}),
+        Mechanism("standing part warmer", "K", 0.3, 8.0, ("thermal_gradient", "soak_lag", "cooling_imbalance"), "rings", {"temperatures": _warmer(standing)}),
         Mechanism("outer rings grow", "um", 0.02, 0.8, ("clearance_opening", "ring_growth", "loose_inserts", "expansion_mismatch"),
                   "rings apart radially", {"motions": _moved(None, "outer_r")}, sign=1),
         Mechanism("inner rings shrink", "um", 0.02, 0.8, ("clearance_opening", "loose_inserts", "expansion_mismatch"),
@@ -166,7 +166,7 @@ def _of_rings(spindle: Spindle) -> list[Mechanism]:
                   {"motions": _moved(None, "inner_strain")}),
     ]  # fmt: skip
     if spindle.sets[0].spring is None:
-        found.append(Mechanism("rings move along the axis", "um", 0.02, 0.8, ("preload_loss", "expansion_mismatch"), "preload",
+        found.append(Mechanism("rings move along the axis", "um", 0.02, 0.8, ("preload_loss", "expansion_mismatch", "tandem_sharing"), "preload",
                                {"motions": _moved((first,), "outer_z")}))  # fmt: skip
     return found
 
@@ -198,9 +198,9 @@ def _moved(names: tuple[str, ...] | None, coordinate: str, factor: float = 1.0):
 def _of_bearings(spindle: Spindle) -> list[Mechanism]:
     last = spindle.bearings[-1].name
     return [
-        Mechanism("compliance in series with the bearings", "% of the bearing's", 0.5, 25.0, ("bond_softening",), "bearings",
+        Mechanism("compliance in series with the bearings", "% of the bearing's", 0.5, 25.0, ("bond_softening", "housing_flexibility"), "bearings",
                   {"bearings": _in_series(None)}, sign=1, laws="any"),
-        Mechanism(f"compliance in series with the {last} bearing", "% of the bearing's", 0.5, 25.0, ("bond_softening",), last,
+        Mechanism(f"compliance in series with the {last} bearing", "% of the bearing's", 0.5, 25.0, ("bond_softening", "seat_clearance"), last,
                   {"bearings": _in_series(last)}, sign=1),
         Mechanism("bearing damping", "% (ln)", 10.0, 150.0, ("grease_damping", "lubricant_film"), "bearings damping",
                   {"bearings": _each(None, lambda b, a: replace(b, damping=np.exp(a / 100) * b.damping))}),
@@ -272,8 +272,8 @@ RIGHT = {"mount": ("mount_compliance",), "plate": ("plate_prestress",), "flange"
 
 def _of_structure(spindle: Spindle) -> list[Mechanism]:
     found = []
-    turning = spindle.turning.name
-    for joint in spindle.structure.joints:
+    turning, heavier = hit(spindle), larger(spindle)
+    for joint in (j for j in spindle.structure.joints if j.role != "beam"):
         right = RIGHT.get(joint.role, ())
         softer = right if joint.role != "plate" else (*right, "support_anisotropy")
         found += [
@@ -295,9 +295,9 @@ def _of_structure(spindle: Spindle) -> list[Mechanism]:
         Mechanism(
             f"mass added to {turning}", "%", 0.5, 12.0, ("added_disk",), turning, {"chain": _heavier(turning)}, sign=1, laws="constant"
         ),
-        Mechanism("mass at a sensor", "g", 0.02, 2.0, ("sensor_mass",), standing, {"chain": _sensor}, sign=1, laws="constant"),
-        Mechanism(f"{turning} loses inertia", "%", 0.5, 8.0, (), turning, {"chain": _lighter(turning)}, sign=1),
-        Mechanism("a cable on the base", "g", 0.05, 3.0, (), every[0], {"chain": _cable}, sign=1),
+        Mechanism("mass at a sensor", "g", 0.02 * heavier**0.5, 2.0 * heavier**0.5, ("sensor_mass",), standing, {"chain": _sensor}, sign=1, laws="constant"),
+        Mechanism(f"{turning} loses inertia", "%", 0.5, 8.0, (), turning, {"chain": _lighter}, sign=1),
+        Mechanism("a cable on the base", "g", 0.05 * heavier, 3.0 * heavier, (), every[0], {"chain": _cable}, sign=1),
         Mechanism("a spring from rotor to ground", "% of a bearing's radial", 0.001, 0.1, (), every[0], {"chain": _tether}, sign=1),
     ]
     return found
@@ -338,33 +338,41 @@ def _with_body(chain: RotorBase, name: str, change: Callable[[Body], Body]) -> R
     return replace(chain, bodies=tuple(change(b) if b.name == name else b for b in chain.bodies))
 
 
+def hit(spindle: Spindle) -> str:
+    """The turning body that masses are put on: the hub, or of a flexible shaft the node that is hit first."""
+    return spindle.point(spindle.hammer.hammer_nodes[0]).body if spindle.structure.shafts else spindle.turning.name
+
+
+def larger(spindle: Spindle) -> float:
+    """Turning mass of a spindle with a flexible shaft over that of the small ones, whose hubs weigh some 26 g; 1 for these."""
+    return spindle.turning_mass / 0.026 if spindle.structure.shafts else 1.0
+
+
 def _heavier(name: str):
-    """A disk of some per cent of the body's mass, flat, at its centre and three quarters of its radius of gyration."""
+    """A disk of some per cent of the turning mass, flat, at the body's centre and three quarters of what turns' radius of gyration."""
 
     def chain(spindle: Spindle, amount: float, before: RotorBase) -> RotorBase:
+        turning, f = [b for b in before.bodies if b.turns], amount / 100
+        more, polar = f * sum(b.mass for b in turning), 0.75 * f * sum(b.inertia[2] for b in turning)
+
         def changed(b: Body) -> Body:
-            f = amount / 100
-            polar = 0.75 * b.inertia[2] * f
-            return replace(b, mass=b.mass * (1 + f), inertia=(b.inertia[0] + polar / 2, b.inertia[1] + polar / 2, b.inertia[2] + polar))
+            return replace(b, mass=b.mass + more, inertia=(b.inertia[0] + polar / 2, b.inertia[1] + polar / 2, b.inertia[2] + polar))
 
         return _with_body(before, name, changed)
 
     return chain
 
 
-def _lighter(name: str):
-    """Transverse inertia alone: what no name stands for."""
-
-    def chain(spindle: Spindle, amount: float, before: RotorBase) -> RotorBase:
-        f = 1 - amount / 100
-        return _with_body(before, name, lambda b: replace(b, inertia=(f * b.inertia[0], f * b.inertia[1], b.inertia[2])))
-
-    return chain
+def _lighter(spindle: Spindle, amount: float, chain: RotorBase) -> RotorBase:
+    """Transverse inertia alone of what turns: what no name stands for."""
+    f = 1 - amount / 100
+    lighter = (replace(b, inertia=(f * b.inertia[0], f * b.inertia[1], b.inertia[2])) if b.turns else b for b in chain.bodies)
+    return replace(chain, bodies=tuple(lighter))
 
 
 def _sensor(spindle: Spindle, amount: float, chain: RotorBase) -> RotorBase:
     """A mass (g) at the last point that is not on the turning body; what lies off the axis counts by its moments of inertia alone."""
-    point = [p for p in spindle.points if p.body != spindle.turning.name][-1]
+    point = [p for p in spindle.points if not spindle.structure.body(p.body).turns][-1]
     m = 1e-3 * amount
 
     def changed(b: Body) -> Body:
@@ -376,19 +384,24 @@ def _sensor(spindle: Spindle, amount: float, chain: RotorBase) -> RotorBase:
     return _with_body(chain, point.body, changed)
 
 
-def on_spring(chain: RotorBase, host: str, name: str, mass: float, frequency: float, damping_ratio: float) -> RotorBase:
-    """A mass (kg) on an axial spring on a body, at the body's height."""
+def on_spring(chain: RotorBase, host: str, name: str, mass: float, frequency: float, damping_ratio: float, move: str) -> RotorBase:
+    """A mass (kg) on a spring along one of `MOVES` on a body, at the body's height."""
     omega = 2 * np.pi * frequency
-    axial = np.diag([0.0, 0.0, 1.0, 0.0, 0.0])
-    body = Body(name, mass, (0.0, 0.0, 0.0), chain.body(host).z, ("z",), False, ())
-    spring = Element(name, name, host, name, body.z, mass * omega**2 * axial, 2 * damping_ratio * mass * omega * axial)
+    along = np.diag([float(move == m) for m in MOVES])
+    body = Body(name, mass, (0.0, 0.0, 0.0), chain.body(host).z, (move,), False, ())
+    spring = Element(name, name, host, name, body.z, mass * omega**2 * along, 2 * damping_ratio * mass * omega * along)
     return replace(chain, bodies=(*chain.bodies, body), elements=(*chain.elements, spring))
 
 
 def _cable(spindle: Spindle, amount: float, chain: RotorBase) -> RotorBase:
     """Something lossy of 1400 Hz that takes part more and more, by `amount` g, on the body that carries the standing rings or below."""
-    host = next(p.body for p in reversed(spindle.points) if p.body != spindle.turning.name)
-    return on_spring(chain, host, "cable", 1e-3 * amount, 1400.0, 0.08) if amount > 1e-9 else chain
+    host = next(p.body for p in reversed(spindle.points) if not spindle.structure.body(p.body).turns)
+    return on_spring(chain, host, "cable", 1e-3 * amount, 1400.0, 0.08, excited(spindle)) if amount > 1e-9 else chain
+
+
+def excited(spindle: Spindle) -> str:
+    """The move in which something light on the base is felt: along the axis, or across it where a machine-tool spindle is hit across."""
+    return "x" if spindle.structure.shafts else "z"
 
 
 def _tether(spindle: Spindle, amount: float, chain: RotorBase) -> RotorBase:
@@ -428,9 +441,9 @@ def _channel(index: int, unit: float):
 
 
 def _beside(spindle: Spindle, amount: float, positions: Array) -> Array:
-    """Hammer positions (references, 3): all moved outward along the axis across which they stand, toward or from it."""
+    """Hammer positions (references, 3): all moved outward along the axis across which they stand, toward or from it; those on it along it."""
     after = positions.copy()
     radial = positions.copy()
-    radial[:, 2] = 0.0
+    radial[:, 2] = np.hypot(radial[:, 0], radial[:, 1]) == 0.0
     after += 1e-3 * amount * radial / np.maximum(np.linalg.norm(radial, axis=1, keepdims=True), 1e-9)
     return after

@@ -6,7 +6,7 @@ from rich.console import Console
 
 from tests.blind.hidden import law, mechanisms
 from tests.blind.score import element_found, interval, most_probable, outcome, show, truth_probability
-from tests.blind.study import SCENES, draw
+from tests.blind.study import FURTHER, FURTHER_FROM, FURTHER_SHARE, SCENES, draw
 from tests.blind.world import Record, World, answer, campaign, visibility
 from tests.conftest import ROOT
 from thermospindle.model.machine import Condition
@@ -18,7 +18,7 @@ LINES = np.arange(400.0, 6000.0, 20.0)
 WARM = 50.0
 
 
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("scene", [*SCENES, FURTHER])
 @pytest.mark.parametrize(("temperature", "share"), [(20.0, 0.0), (55.0, 0.0), (60.0, 1.0)])
 def test_with_nothing_of_its_own_the_world_is_the_model(scene, temperature, share):
     """Another solver of the balance, matrices instead of MuJoCo, line by line instead of modes: the same FRF."""
@@ -28,7 +28,7 @@ def test_with_nothing_of_its_own_the_world_is_the_model(scene, temperature, shar
     assert np.abs(ours - theirs).max() < 1e-8 * np.abs(theirs).max()
 
 
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("scene", [*SCENES, FURTHER])
 def test_every_hidden_mechanism_changes_the_frf_and_none_at_size_zero(scene):
     spindle = load(ROOT / scene)
     condition = Condition(WARM, spindle.nominal_speed)
@@ -96,9 +96,17 @@ def test_a_seed_is_a_campaign(seed):
     assert one.tests[0].frf != other.tests[0].frf
 
 
+def test_a_quarter_of_later_seeds_is_a_machine_tool_spindle():
+    assert not any(draw(seed).scene == FURTHER for seed in (1, 30, 70))
+    later = [np.random.default_rng([seed, 71]).random() < FURTHER_SHARE for seed in range(FURTHER_FROM, FURTHER_FROM + 300)]
+    assert sum(later) >= 60
+    assert draw(FURTHER_FROM + later.index(True)).scene == FURTHER
+    assert draw(FURTHER_FROM + later.index(False)).scene in SCENES
+
+
 def test_what_is_hidden_has_right_answers_of_the_catalogue_or_none():
     names = {e.name for e in CATALOGUE}
-    for scene in SCENES:
+    for scene in (*SCENES, FURTHER):
         spindle = load(ROOT / scene)
         own = {e.name for e in usable(spindle, CATALOGUE)}
         every = mechanisms(spindle, sorted(names))

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from tests.blind.hidden import REFERENCE, Hidden, Place, on_spring
+from tests.blind.hidden import REFERENCE, Hidden, Place, excited, on_spring
 from thermospindle.model.bearing.ball_row import BallRow, centred_axial_force
 from thermospindle.model.bearing.pair import PairState, bearing_state, contact_status, reference_motion, row_at
 from thermospindle.model.machine import Condition, RingMotion, Spindle
@@ -29,7 +29,7 @@ from thermospindle.thermal.expansion import expand
 from thermospindle.thermal.influence import TOLERANCE
 
 STEPS = ("spindle", "temperatures", "motions", "bearings", "chain", "gain", "delay", "decay", "hammer")
-BAND = (400.0, 6000.0)  # Hz
+LARGE = 60  # degrees of freedom from which FRFs come from all poles instead of line by line
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class World:
     mesh: float = TOLERANCE  # of the ring motions: coarser or finer than the model's
     constant_kept: bool = False  # Hertz constants as at 20 C
     grooves_follow_faces: float = 0.0  # share in which a groove grows as its ring's face does, not by its own free strain
-    weak_mode: tuple[float, float, float] | None = None  # mass (kg), frequency (Hz), damping ratio: axial, on the lowest standing body
+    weak_mode: tuple[float, float, float] | None = None  # mass (kg), frequency (Hz), damping ratio: on the lowest standing body
     stiffness_error: float = 0.0  # of each mode, constant: rms of a random symmetric modal matrix
     damping_error: float = 0.0  # of the modal damping matrix, alike: not proportional
     seed: int = 0  # of the modal matrices
@@ -85,12 +85,30 @@ class Answer:
     decay: float
 
     def frf(self, frequency: Array, window: float = 0.0) -> ComplexArray:
-        """Mobility (n_resp, n_ref, n) at `frequency` (Hz), by the dynamic stiffness line by line; the window is in it."""
+        """Mobility (n_resp, n_ref, n) at `frequency` (Hz), by the dynamic stiffness line by line, of a flexible shaft by all its poles; the window
+        is in it."""
         s = 2j * np.pi * frequency + self.decay + window
+        if len(self.linear.mass) > LARGE:
+            p: Poles = poles(self.linear)
+            residue = (self.responses @ p.right)[:, None, :] * (p.left @ self.references.T).T[None] * p.value
+            return residue @ (1 / (s - p.value[:, None])) * self._channels(frequency)
+        return np.einsum("ri,fij,f->rjf", self.responses, self._solved(s, self.references.T), s) * self._channels(frequency)
+
+    def by_modes(self, frequency: Array, vectors: Array) -> tuple[ComplexArray, ComplexArray]:
+        """Derivatives (m, n_resp, n_ref, n) of the mobility by K + x v v^T and by C + x v v^T, for every column v of `vectors` (n, m)."""
+        s = 2j * np.pi * frequency + self.decay
+        u = self._solved(s, np.hstack([self.references.T, vectors]))
+        hammers = len(self.references)
+        there = np.einsum("ri,fim->mrf", self.responses, u[:, :, hammers:])
+        back = np.einsum("im,fij->mjf", vectors, u[:, :, :hammers])
+        moved = -s * there[:, :, None] * back[:, None] * self._channels(frequency)
+        return moved, s * moved
+
+    def _solved(self, s: ComplexArray, forces: Array) -> ComplexArray:
+        """Displacements (lines, n, k) under `forces` (n, k)."""
         m, c, k = self.linear.mass, self.linear.damping, self.linear.stiffness
         dynamic = s[:, None, None] ** 2 * m + s[:, None, None] * c + k
-        u = np.linalg.solve(dynamic, np.broadcast_to(self.references.T, (len(s), *self.references.T.shape)))
-        return np.einsum("ri,fij,f->rjf", self.responses, u, s) * self._channels(frequency)
+        return np.linalg.solve(dynamic, np.broadcast_to(forces, (len(s), *forces.shape)))
 
     def transformed(self, frequency: Array, record: Record) -> ComplexArray:
         """Mobility as a record of finite length shows it: every mode's e^(pole t) under the window, cut at the record's end (leakage)."""
@@ -127,7 +145,7 @@ def answer(spindle: Spindle, condition: Condition, world: World, hidden: Sequenc
     )
     chain = rotor_base(spindle, replace(state, bearings=changed("bearings", state.bearings)))
     if world.weak_mode is not None:
-        chain = on_spring(chain, lowest(spindle), "weak", *world.weak_mode)
+        chain = on_spring(chain, lowest(spindle), "weak", *world.weak_mode, excited(spindle))
     chain = changed("chain", chain)
     linear = matrices(chain)
     if world.stiffness_error or world.damping_error:
@@ -227,7 +245,7 @@ def perturbed(linear: Matrices, spindle: Spindle, world: World) -> Matrices:
         return np.tril(g) + np.tril(g, -1).T
 
     of_k, of_c = symmetric(), symmetric()
-    in_band = omega < 2 * np.pi * 2 * BAND[1]
+    in_band = omega < 2 * np.pi * 2 * spindle.hammer.band[1]
     of_k, of_c = (g * in_band[:, None] * in_band[None, :] for g in (of_k, of_c))
     more_k = world.stiffness_error * 2 * omega[:, None] * omega[None, :] * of_k  # a mode's frequency is wrong by half of that
     more_c = world.damping_error * loss[:, None] * loss[None, :] * of_c
@@ -329,7 +347,7 @@ def measured(at: Answer, spindle: Spindle, record: Record, random: np.random.Gen
     nodes, sd = tuple(p.node for p in spindle.points), None
     hammer = spindle.hammer
     if record.kind == "line":
-        frequency = np.arange(BAND[0], BAND[1] + 1, 2.5)
+        frequency = np.arange(hammer.band[0], hammer.band[1] + 1, 2.5)
         value = at.frf(frequency, record.decay)
         one, two = (random.standard_normal((2, *value.shape)) / np.sqrt(2) for _ in range(2))
         largest = np.abs(value).max(axis=(0, 2), keepdims=True)
@@ -339,7 +357,7 @@ def measured(at: Answer, spindle: Spindle, record: Record, random: np.random.Gen
         step = 1 / hammer.sample_rate
         samples = round(record.length * hammer.sample_rate)
         lines = np.fft.rfftfreq(samples, step)
-        use = (lines >= BAND[0]) & (lines <= BAND[1])
+        use = (lines >= hammer.band[0]) & (lines <= hammer.band[1])
         frequency, window = lines[use], np.exp(-record.decay * step * np.arange(samples))
         value = at.transformed(frequency, record)
         force = half_sine(frequency, np.pi * np.sqrt(hammer.hammer_mass / hammer.tip_stiffness))
@@ -367,7 +385,7 @@ def described(made: Made, spindle: Spindle) -> dict[str, Any]:
     """What a row of the study says of a world; `leakage` is its largest error of a line at 20 C and rest, in standard deviations of noise."""
     leakage = 0.0
     if made.record.kind != "line":
-        frequency, at = np.arange(*BAND, 10.0), answer(spindle, Condition(REFERENCE), World())
+        frequency, at = np.arange(*spindle.hammer.band, 10.0), answer(spindle, Condition(REFERENCE), World())
         exact = at.frf(frequency, made.record.decay)
         size = made.record.times * spindle.hammer.noise_of_largest * np.abs(exact).max(axis=(0, 2), keepdims=True)
         leakage = float((np.abs(at.transformed(frequency, made.record) - exact) / size).max())
@@ -380,8 +398,8 @@ def described(made: Made, spindle: Spindle) -> dict[str, Any]:
 def visibility(made: Made, spindle: Spindle, lines: int = 160) -> list[float]:
     """Of every hidden piece: its change of the FRFs in standard errors, after all that build tolerances, temperatures, gains and each mode's
     constant error can take of it. Linear, about the built spindle; sqrt(10) is worth 5 in ln evidence."""
-    frequency = np.linspace(*BAND, lines)
     hammer = spindle.hammer
+    frequency = np.linspace(*hammer.band, lines)
     plain = replace(made.world, stiffness_error=0.0, damping_error=0.0)
 
     def all_tests(s: Spindle, hidden: Sequence[Hidden] = (), warmer: float = 0.0) -> list[ComplexArray]:
@@ -430,18 +448,13 @@ def _modal_columns(made: Made, column, frequency: Array, plain: World, spindle: 
     root = np.sqrt(np.diag(reference.mass))
     square, vectors = np.linalg.eigh(reference.stiffness / root[:, None] / root[None, :])
     back = root[:, None] * vectors
+    seen = np.flatnonzero((square > 1.0) & (square < (2 * np.pi * 1.2 * spindle.hammer.band[1]) ** 2))
+    plainly = [at.frf(frequency) for at in answers]
+    moved = [at.by_modes(frequency, back[:, seen] * np.sqrt(square[seen])) for at in answers]
     found = []
-    for i in np.flatnonzero((square > 1.0) & (square < (2 * np.pi * 1.2 * BAND[1]) ** 2)):
-        outer = square[i] * np.outer(back[:, i], back[:, i])
-        for kind, size in (
-            ("stiffness", 2 * made.world.stiffness_error),
-            ("damping", made.world.damping_error * 0.02 / np.sqrt(square[i])),
-        ):
-            if not size:
-                continue
-            values = []
-            for at in answers:
-                linear = replace(at.linear, **{kind: getattr(at.linear, kind) + 0.01 * size * outer})
-                values.append(replace(at, linear=linear).frf(frequency))
-            found.append(column(values) * 100)
+    for j, i in enumerate(seen):
+        sizes = 2 * made.world.stiffness_error, made.world.damping_error * 0.02 / np.sqrt(square[i])
+        for kind, size in enumerate(sizes):
+            if size:
+                found.append(column([p + size * m[kind][j] for p, m in zip(plainly, moved, strict=True)]))
     return found
