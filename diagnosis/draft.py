@@ -21,7 +21,6 @@ from thermospindle.model.files.formats import DIAGNOSIS, migrated
 from thermospindle.model.types import Array
 
 REFERENCE = 20.0  # C at which laws are told
-KELVIN = 273.15
 LEAST = -0.999  # of what was: nothing falls further
 LARGEST = 1e9  # of any number that is read
 NEAR = 10.0  # criterion within which rivals are named in the file

@@ -10,7 +10,7 @@ DEGREE = np.pi / 180
 """rad."""
 MINUTE = 60.0
 """s."""
-MM, UM, NM = 1e-3, 1e-6, 1e-9
+MM, NM = 1e-3, 1e-9
 """m."""
 TO_MM, TO_UM, TO_NM = 1e3, 1e6, 1e9
 """A length in m, to show."""

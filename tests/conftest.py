@@ -6,8 +6,11 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does, 
 if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("LOKY_MAX_CPU_COUNT", "1")  # pytest's own workers take the cores: each does its work by itself
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
+import cloudpickle
 import pytest
 
 from thermospindle.diagnosis.verdict import Diagnosis, diagnose
@@ -21,6 +24,7 @@ from thermospindle.thermal.expansion import expand
 ROOT = Path(__file__).parents[1]
 SCENE = ROOT / "scenes" / "hdd_2003"
 DATA = ROOT / "tests" / "data"
+Made = TypeVar("Made")
 
 
 @pytest.fixture(scope="session")
@@ -41,6 +45,21 @@ def hot(spindle):
 
 
 @pytest.fixture(scope="session")
-def nothing_missing(spindle) -> Diagnosis:
-    """The diagnosis of another program's campaign with nothing hidden, beside two effects: made once for all tests."""
-    return diagnose(spindle, read_campaign(DATA / "foreign_none"), tuple(by_name(n) for n in ("soak_lag", "channel_delay")))
+def nothing_missing(spindle, tmp_path_factory) -> Diagnosis:
+    """The diagnosis of another program's campaign with nothing hidden, beside two effects."""
+    effects = tuple(by_name(n) for n in ("soak_lag", "channel_delay"))
+    return made_once(tmp_path_factory, "nothing_missing", lambda: diagnose(spindle, read_campaign(DATA / "foreign_none"), effects))
+
+
+def made_once(folders: pytest.TempPathFactory, name: str, make: Callable[[], Made]) -> Made:
+    """What one of pytest's workers has made already, or what `make` makes, left on disk for the others."""
+    if "PYTEST_XDIST_WORKER" not in os.environ:
+        return make()
+    file = folders.getbasetemp().parent / f"{name}.pickle"
+    if file.exists():
+        return cloudpickle.loads(file.read_bytes())
+    made = make()
+    own = file.with_suffix(f".{os.getpid()}")
+    own.write_bytes(cloudpickle.dumps(made))
+    own.replace(file)
+    return made

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import tomllib
 from pathlib import Path
@@ -19,9 +20,11 @@ SERVED = {"workbench"}  # goes on until it is stopped: tests/report/test_workben
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory) -> Path:
-    """A folder with a campaign of one virtual test, and one of one runout record."""
+    """A folder with a scene of short hammer tests, a campaign of one runout record, and files of the other kinds that are read."""
     folder = tmp_path_factory.mktemp("answers")
-    say("simulate", SCENE, "--temperatures", 20, "--out", folder / "modes")
+    (folder / "short").mkdir()
+    text = (SCENE / "spindle.toml").read_text(encoding="utf-8")
+    (folder / "short" / "spindle.toml").write_text(re.sub(r"record_length_s = .*", "record_length_s = 0.10", text), encoding="utf-8")
     say("simulate", SCENE, "--runout", "--temperatures", 20, "--speeds", 7200, "--seconds", 0.1, "--out", folder / "runout")
     (folder / "mapping.toml").write_text('spindle = "rig"\n[[tests]]\nid = "at_rest"\ntemperature_C = 20.0\nspeed_rpm = 0.0\n')
     (folder / "study.toml").write_text('title = "t"\nkind = "monte-carlo"\nscene = "hdd_2003"\ntemperatures_C = [20]\ndraws = 12\n')
@@ -45,8 +48,8 @@ QUICK: dict[str, tuple[list[object], list[str]]] = {
     "effects": (["effects"], ["effects"]),
     "effects of a scene": (["effects", "--scene", SCENE], ["effects", "effects, and with --scene"]),
     "an effect": (["effects", "unbalance"], ["effects, of one effect"]),
-    "impact": (["impact", SCENE, "--hits", 1], ["impact"]),
-    "simulate": (["simulate", SCENE, "--temperatures", 20, "--hits", 1, "--out", "OUT"], ["simulate"]),
+    "impact": (["impact", "MADE/short", "--hits", 1], ["impact"]),
+    "simulate": (["simulate", "MADE/short", "--temperatures", 20, "--hits", 1, "--out", "OUT"], ["simulate"]),
     "runout": (["runout", SCENE, "--path", "linear", "--seconds", 0.2], ["runout"]),
     "warmup": (["warmup", SCENE, "--speed", 3600, "--minutes", 2], ["warmup"]),
     "map": (["map", SCENE, "--temperatures", 20, 26, "--speeds", 3600, 7200], ["map"]),
@@ -86,14 +89,14 @@ def keys_of(capsys, *arguments: str) -> set[str]:
 @pytest.mark.parametrize(
     ("words", "log", "form"),
     [
-        (["run", SCENE, "--temperatures", 20, "--hits", 1], "run.rrd", "inspect"),
+        (["run", "MADE/short", "--temperatures", 20, "--hits", 1], "run.rrd", "inspect"),
         pytest.param(["map", SCENE, "--temperatures", 20, 26, "--speeds", 3600, 7200], "map.rrd", "inspect, of a resonance map", marks=pytest.mark.slow),
         pytest.param(["runout", SCENE, "--path", "linear", "--seconds", 0.2], "runout.rrd", "inspect, of runout", marks=pytest.mark.slow),
     ],
     ids=["run", "map", "runout"],
 )
-def test_inspect_answers_by_what_a_log_holds(words, log, form, tmp_path, capsys) -> None:
-    say(*words, "--out", tmp_path / "out")
+def test_inspect_answers_by_what_a_log_holds(words, log, form, made, tmp_path, capsys) -> None:
+    say(*(str(w).replace("MADE", str(made)) for w in words), "--out", tmp_path / "out")
     assert keys_of(capsys, "inspect", str(tmp_path / "out" / log)) == {"warnings", *ANSWERS[form]}
 
 

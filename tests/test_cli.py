@@ -76,10 +76,17 @@ def test_impact(capsys, short_scene):
         assert abs(mode["frequency_Hz"] - nearest.frequency) < 6 * mode["frequency_sd_Hz"] + 0.1
 
 
-def test_simulate_writes_a_campaign_that_reads(capsys, short_scene, tmp_path):
-    found = answer(capsys, "simulate", short_scene, "--temperatures", 20, 60, "--out", tmp_path / "c", "--json")
-    campaign = read_campaign(tmp_path / "c")
-    assert [t.id for t in campaign.tests] == found["tests"] == ["T20_n0", "T60_n0"]
+@pytest.fixture(scope="module")
+def simulated(short_scene, tmp_path_factory):
+    """The campaign of the short scene's own tests."""
+    folder = tmp_path_factory.mktemp("simulated") / "c"
+    assert main(["simulate", str(short_scene), "--temperatures", "20", "60", "--out", str(folder)]) == 0
+    return folder
+
+
+def test_simulate_writes_a_campaign_that_reads(capsys, simulated):
+    campaign = read_campaign(simulated)
+    assert [t.id for t in campaign.tests] == ["T20_n0", "T60_n0"]
     assert campaign.tests[1].frf.sd is not None
 
 
@@ -209,9 +216,8 @@ def test_diagnose(capsys, tmp_path):
     assert isinstance(found["where"], list)
 
 
-def test_people_see_a_comparison(capsys, short_scene, tmp_path):
-    campaign = tmp_path / "c"
-    answer(capsys, "simulate", short_scene, "--temperatures", 20, "--out", campaign, "--json")
+def test_people_see_a_comparison(capsys, short_scene, simulated):
+    campaign = simulated
     assert main(["compare", str(short_scene), str(campaign)]) == 0
     short = capsys.readouterr().out
     assert re.match(r"short (nearly )?agrees with the tests", short)

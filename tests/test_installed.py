@@ -146,10 +146,15 @@ def test_a_users_own_modules_of_the_same_names_break_nothing(installed, users, s
 
 
 @pytest.mark.slow
-def test_types_are_seen(wheel, users):
-    """mypy reads the types of an installed wheel, and so finds the one error of this file."""
+@pytest.mark.parametrize("way", ["wheel", "editable"])
+def test_types_are_seen(way, wheel, users, tmp_path_factory):
+    """mypy reads the types of an installed wheel, and of an editable install whose files are linked (`editable_mode=strict`), and so finds the one error of
+    this file."""
     environment = Environment(users / "venv")
-    environment.install(wheel)
+    if way == "wheel":
+        environment.install(wheel)
+    else:
+        environment.install("--config-settings", "editable_mode=strict", "--editable", copy_of_checkout(tmp_path_factory.mktemp("checkout"), links=False))
     (users / "typed.py").write_text(
         "from thermospindle.model.machine import Condition\n"
         "reveal_type(Condition(20.0).temperature)\n"

@@ -193,7 +193,7 @@ def test_verbs_write_their_folders(name, verb, scene, capsys, tmp_path):
     assert all(f.stat().st_size for f in files)
 
 
-OWN = [n if n in ("symmetric", "inner ring turning") else pytest.param(n, marks=pytest.mark.slow) for n in SCENES]
+OWN = [n if n == "inner ring turning" else pytest.param(n, marks=pytest.mark.slow) for n in SCENES]
 
 
 @pytest.mark.parametrize("name", OWN)

@@ -71,7 +71,6 @@ class TestComparison:
     modes: tuple[PairedMode, ...]
     missing: tuple[float, ...]
     extra: tuple[float, ...]
-    missing_residual: tuple[float, ...]  # of an error of `BELIEVABLE`
     correlation: Correlation | None
     residuals: Array  # (2m,) of measured [frequency, damping], whitened; a missing mode's in place of its frequency, 0 where there is none
     count: int  # of those there are
@@ -215,13 +214,12 @@ def _test(
             )
         )
     lost = np.flatnonzero(partner < 0)
-    lost_residual = BELIEVABLE / relative[lost]
     rows = np.flatnonzero(np.isfinite(relative) & (np.tile(partner, 2) >= 0))
     computed = np.concatenate([p.frequency, p.damping])[np.concatenate([partner, partner + len(p.frequency)])[rows]]
     error = np.log(computed / np.concatenate([o.frequency, o.damping])[rows])
     covariance = (o.covariance + np.diag(np.where(np.isfinite(relative), extra, 0.0)))[np.ix_(rows, rows)]
     residuals = np.zeros(2 * m)
-    residuals[rows], residuals[lost] = whitened(error, covariance), lost_residual
+    residuals[rows], residuals[lost] = whitened(error, covariance), BELIEVABLE / relative[lost]
     frf = o.test.frf
     low, high = spindle.hammer.band if frf is None else (frf.frequency[0], frf.frequency[-1])
     found = set(partner.tolist())
@@ -231,7 +229,6 @@ def _test(
         tuple(modes),
         tuple(o.frequency[lost].tolist()),
         tuple(float(f) for j, f in enumerate(p.frequency) if low <= f <= high and j not in found),
-        tuple(lost_residual.tolist()),
         None if shown is None else correlate(shown),
         residuals,
         len(rows) + len(lost),

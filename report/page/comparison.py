@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from thermospindle.model.rotor.modes import group_energy
-from thermospindle.report.figures import common as plots
-from thermospindle.report.figures.common import Peaks
+from thermospindle.report.figures import report as plots
+from thermospindle.report.figures.report import Peaks
 from thermospindle.sim.campaign.campaign import Campaign
 from thermospindle.sim.campaign.published import published
 from thermospindle.sim.identification.numbering import identified, nearest, numbered, rows_of, temperature_of

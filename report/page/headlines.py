@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from thermospindle.model.machine import Spindle
-from thermospindle.report.figures.common import Peaks
+from thermospindle.report.figures.report import Peaks
 from thermospindle.report.page.comparison import Table
 from thermospindle.sim.identification.numbering import temperature_of
 from thermospindle.sim.run import Run

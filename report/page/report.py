@@ -1,7 +1,7 @@
 """The report of a run: one HTML file that needs no network, measured beside computed.
 
 It is a list of sections, (title, HTML); other modules add theirs through `extra_sections`. Numbers are prepared here, drawn in
-`report.figures.common` and set in `report.html.j2`. The same run gives the same file;
+`report.figures.report` and set in `report.html.j2`. The same run gives the same file;
 the command line adds when and how it was made (`stamp`).
 """
 
@@ -24,8 +24,8 @@ from thermospindle.model.rotor.modes import frf, group_energy, point_rows
 from thermospindle.model.scene.reading import content_hash, load
 from thermospindle.model.units import RPM
 from thermospindle.model.whole import whole
-from thermospindle.report.figures import common as plots
-from thermospindle.report.figures.common import Curve
+from thermospindle.report.figures import report as plots
+from thermospindle.report.figures.report import Curve
 from thermospindle.report.page.comparison import SAME_TEMPERATURE, compared
 from thermospindle.report.page.headlines import calibration, headlines, misses
 from thermospindle.report.typeset import minus, signed, with_error

@@ -60,6 +60,7 @@ def itself(spindle, clean):
     return compare(spindle, *clean)
 
 
+@pytest.mark.slow
 def test_a_scene_beside_its_own_virtual_tests(spindle):
     """In MuJoCo's time domain; the floors hold more than the estimator errs, so the pull is below one but not nothing."""
     short = replace(spindle, hammer=replace(spindle.hammer, record_length=0.1, hits=2))
@@ -102,7 +103,7 @@ def test_symmetry_leaves_silent_channels_without_frac(itself):
     assert [k for k, v in itself.tests[0].frac.items() if v is None] == [(3, 2), (4, 1)]
 
 
-@pytest.mark.parametrize("quantity", ["receptance", "accelerance"])
+@pytest.mark.parametrize("quantity", ["receptance", pytest.param("accelerance", marks=pytest.mark.slow)])
 def test_frac_converts_the_quantity(spindle, quantity):
     found = compare(spindle, exact(spindle, (40.0,), quantity))
     assert min(v for v in found.tests[0].frac.values() if v is not None) > 0.999

@@ -121,7 +121,7 @@ def test_a_share_lies_between_the_forms(spindle, effect):
     assert min(preload[0], preload[2]) < preload[1] < max(preload[0], preload[2])
 
 
-@pytest.mark.parametrize("true", FORMS[::2], ids=lambda f: f.name)
+@pytest.mark.parametrize("true", [pytest.param(FORMS[0], id=FORMS[0].name), pytest.param(FORMS[2], id=FORMS[2].name, marks=pytest.mark.slow)])
 def test_the_form_that_made_the_data_leads(spindle, true):
     """With all tolerances free, either way round: the comparison has no favourite."""
     found = ladder(spindle, tables(spindle, true.applied), ())
@@ -361,13 +361,13 @@ def numbers(text):
     return re.findall(r"\w+", text)
 
 
-def test_picture_and_report_section_name_every_step(virtual, tmp_path):
-    title, html = section(virtual)
+def test_picture_and_report_section_name_every_step(lagging):
+    title, html = section(lagging)
     assert title.startswith("The ladder")
-    for r in virtual.steps:
+    for r in lagging.steps:
         assert f"<td class=left>{r.name}</td>" in html
     words = re.findall(r"<p>(.*?)</p>", html)
-    for s in sentences(virtual):
+    for s in sentences(lagging):
         assert numbers(s) == numbers(unescape(words.pop(0)))
     assert words == []
     assert html.count("<svg") == 1
@@ -400,5 +400,5 @@ def test_unknown_effect_is_refused_by_name(capsys):
     assert "rust" in capsys.readouterr().err
 
 
-def test_same_answer_without_out_folder(virtual):
-    assert json.loads(json.dumps(ladder_json(virtual)))["top"] == "+ ring_growth"
+def test_same_answer_without_out_folder(lagging):
+    assert json.loads(json.dumps(ladder_json(lagging)))["top"] == "+ constant_force_preload"

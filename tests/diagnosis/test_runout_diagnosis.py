@@ -105,10 +105,19 @@ def test_a_line_that_no_imperfection_has_is_unexplained(spindle) -> None:
     assert "150.0 Hz" in answer["reason"] or f"{d.unexplained[0].frequency:.1f} Hz" in answer["reason"]
 
 
-def test_with_one_speed_the_cage_and_the_balls_are_not_told_apart_for_certain(spindle) -> None:
+HEAVY_CAGE = {"cage_unbalance": {"amount": 6.0, "phase": 0.0, "bearing": 1}}
+
+
+@pytest.fixture(scope="module")
+def heavy_cage(spindle) -> tuple[Campaign, RunoutDiagnosis]:
+    """Tests at three speeds, and the diagnosis of the last alone."""
+    made = hidden(spindle, HEAVY_CAGE, 5)
+    return made, diagnose_runout(spindle, replace(made, tests=made.tests[2:]))
+
+
+def test_with_one_speed_the_cage_and_the_balls_are_not_told_apart_for_certain(spindle, heavy_cage) -> None:
     """Both whirl the hub at fc; only speed tells them apart, and the balls' size is the likelier: a cage so heavy is 30 of its standard deviations."""
-    made = hidden(spindle, {"cage_unbalance": {"amount": 6.0, "phase": 0.0, "bearing": 1}}, 5)
-    d = diagnose_runout(spindle, replace(made, tests=made.tests[2:]))
+    made, d = heavy_cage
     assert d.verdict == "ambiguous", d.reason
     assert set(d.effects) == {"ball_size", "cage_unbalance"}
     several = diagnose_runout(spindle, made)
@@ -272,19 +281,16 @@ def test_probes_of_the_hub_are_points_that_a_campaign_can_name(spindle) -> None:
 # ---------------------------------------------------------------- the next test
 
 
-def test_the_test_that_is_proposed_parts_look_alikes_and_decides_for_the_true_one(spindle) -> None:
+def test_the_test_that_is_proposed_parts_look_alikes_and_decides_for_the_true_one(spindle, heavy_cage) -> None:
     """A heavy cage and a large ball show one line at fc; at one speed its size could be either's."""
-    true = {"cage_unbalance": {"amount": 6.0, "phase": 0.0, "bearing": 1}}
-    made = hidden(spindle, true, 5)
-    one = replace(made, tests=made.tests[2:])
-    before = diagnose_runout(spindle, one)
+    made, before = heavy_cage
     assert before.verdict == "ambiguous"
     (test,) = runout_diagnosis_json(before, CATALOGUE)["next_test"]
     assert set(test["separates"]) == set(test["predicted"]) == {"ball_size", "cage_unbalance"}
     assert test["condition"]["speed_rpm"] != 7200
     assert test["odds"] > 1e3
-    proposed = hidden(spindle, true, 5, conditions=[CONDITIONS[2], before.next[0].plan.condition]).tests[1]
-    after = diagnose_runout(spindle, replace(made, tests=(*one.tests, proposed)))
+    proposed = hidden(spindle, HEAVY_CAGE, 5, conditions=[CONDITIONS[2], before.next[0].plan.condition]).tests[1]
+    after = diagnose_runout(spindle, replace(made, tests=(*made.tests[2:], proposed)))
     assert (after.verdict, after.effects) == ("identified", ("cage_unbalance",)), after.reason
     predicted = {name: rows[0] for name, rows in test["predicted"].items()}
     seen = min(look(spindle, proposed).seen, key=lambda s: abs(s.frequency - predicted["ball_size"]["frequency_Hz"]))

@@ -5,20 +5,24 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+from rich.console import Console
 
 from tests.made_campaign import other_campaign
 from thermospindle.model.rotor.modes import group_energy
 from thermospindle.model.scene.reading import content_hash
-from thermospindle.report.figures import common as plots
+from thermospindle.report.figures import common
+from thermospindle.report.figures import report as plots
 from thermospindle.report.page.comparison import compared
 from thermospindle.report.page.headlines import misses
 from thermospindle.report.page.report import background, html, stamp, write_report
+from thermospindle.report.text.run import show_run
 from thermospindle.sim.campaign.campaign import ModeRow
 from thermospindle.sim.run import Run
 
@@ -258,6 +262,18 @@ def test_changed_spindle_is_told(run: Run):
     assert "differs from its file" in said["Where the numbers come from"]
 
 
+def test_the_terminal_promises_what_there_is(run: Run):
+    """Measurements stand in a title only where there are some; why a mode has no peak is told by where the hammer strikes."""
+    said = []
+    for measured in (run.measured, ()):
+        out = StringIO()
+        show_run(Console(file=out, width=200), replace(run, measured=measured), Path("out"))
+        said.append(out.getvalue())
+    assert "and what was measured" in said[0]
+    assert "measured" not in said[1]
+    assert "-: no peak was found. The hammer strikes node" in said[1]
+
+
 # ---------------------------------------------------------------- pictures
 
 
@@ -273,21 +289,21 @@ def test_exaggeration_is_a_round_number_that_fits(run: Run):
 
 
 def test_temperature_colours_go_from_cold_to_hot():
-    assert plots.colour(20, (20, 60)) == "#2166ac"
-    assert plots.colour(60, (20, 60)) == "#c9371c"
-    assert plots.colour(20, (20,)) == "#2166ac"
+    assert common.colour(20, (20, 60)) == "#2166ac"
+    assert common.colour(60, (20, 60)) == "#c9371c"
+    assert common.colour(20, (20,)) == "#2166ac"
 
 
 def test_svg_for_a_page():
     """Ids are only those referred to, with the figure's own beginning; two figures of one page share none; text stays text."""
     drawn = []
     for key in ("a", "b"):
-        with rc_context(plots.STYLE):
+        with rc_context(common.STYLE):
             figure = Figure(figsize=(3, 2))
             axes = figure.subplots()
             axes.plot([0, 1], [0, 1], "o-", color="#c9371c", label="line")
             axes.legend()
-            drawn.append(plots.svg(figure, key, "a <figure>"))
+            drawn.append(common.svg(figure, key, "a <figure>"))
     ids = [set(re.findall(r' id="([^"]+)"', text)) for text in drawn]
     references = [set(re.findall(r'(?:url\(|href=")#([^")]+)', text)) for text in drawn]
     assert ids[0]
@@ -312,9 +328,9 @@ def test_a_level_curve_has_no_offset_axis():
 def test_residuals_have_one_scale():
     """Ticks are plain numbers; one standard error is pale on every page."""
     figure = Figure()
-    norm = plots.residual_norm(4.0)
+    norm = common.residual_norm(4.0)
     assert (norm.vmin, norm.vmax) == (-30.0, 30.0)
     assert abs(float(norm(1.0)) - 0.5) < 0.15
-    plots.residual_bar(figure, norm, figure.subplots())
+    common.residual_bar(figure, norm, figure.subplots())
     figure.canvas.draw()
     assert [t.get_text() for t in figure.axes[1].get_yticklabels()] == ["−10", "−3", "0", "3", "10"]

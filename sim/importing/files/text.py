@@ -24,7 +24,6 @@ class TextTable:
     heading: tuple[str, ...]
     unit: tuple[str, ...]
     values: np.ndarray
-    preamble: tuple[str, ...]  # lines above the headings
 
 
 def text_of(file: Path) -> str:
@@ -62,7 +61,7 @@ def read_table(file: Path) -> TextTable:
         values = np.array(rows, dtype)
     except (TypeError, ValueError):
         values = np.array(rows, complex)
-    return TextTable(file, heading, unit, values, tuple(above))
+    return TextTable(file, heading, unit, values)
 
 
 def _headings(line: str, separator: str | None) -> list[str]:

@@ -144,8 +144,11 @@ def test_matrix_model_is_the_data_sheets():
     assert frequency[:5] == pytest.approx([1002, 1545, 1795, 1821, 2010], abs=0.5)
 
 
-@pytest.mark.parametrize("rpm", [0, 7200])
-@pytest.mark.parametrize(("step", "relative"), [(1, 0.005), (3, 0.005), (1, 0.02)])
+CASES = [(r, s, e) for r in (0, 7200) for s, e in ((1, 0.005), (3, 0.005), (1, 0.02))]
+FIRST = [(0, 1, 0.02), (7200, 3, 0.005)]
+
+
+@pytest.mark.parametrize(("rpm", "step", "relative"), [pytest.param(*c, marks=[pytest.mark.slow] * (c not in FIRST)) for c in CASES])
 def test_reference_scene(rpm, step, relative):
     """All eight modes of the band and no other, the five of Table 2 within 0.5 Hz and 5 %, and all within their covariance (p = 1e-5)."""
     frequency, damping, shape = (x[:8] for x in eigen(*spindle(rpm * RPM), sensors()))
@@ -163,23 +166,24 @@ def test_reference_scene(rpm, step, relative):
     assert np.linalg.svd(pair_found.conj().T @ pair_known)[1].min() > 0.99
 
 
-def test_standard_errors_come_true():
-    """Twelve realisations in a narrower band (seven modes, one pair of them 2.4 Hz apart at 5 % damping): the squared errors in units of
-    the stated covariance are chi-square of 168 degrees of freedom, so errors stated 20 % wrong either way are caught."""
+@pytest.mark.parametrize(("seeds", "within"), [(4, 0.35), pytest.param(12, 0.2, marks=pytest.mark.slow)])
+def test_standard_errors_come_true(seeds, within):
+    """Realisations in a narrower band (seven modes, one pair of them 2.4 Hz apart at 5 % damping): the squared errors in units of the stated
+    covariance are chi-square of 14 degrees of freedom each, so that with twelve errors stated 20 % wrong either way are caught."""
     lines = np.arange(1150.0, 6001.0, 5.0)
     exact = reference(lines)
     frequency, damping, shape = (x[1:8] for x in eigen(*spindle(), sensors()))
     total, shapes = 0.0, []
-    for seed in range(12):
+    for seed in range(seeds):
         modes = extract(lines, *noisy(exact, seed))
         assert len(modes.frequency) == 7
         total += distance(modes, frequency, damping)
         largest = (np.arange(7), np.abs(modes.shape).argmax(1))
         error = np.abs(modes.shape - shape / shape[largest][:, None])
         shapes.append((error / np.where(modes.shape_sd > 0, modes.shape_sd, np.inf)) ** 2)
-    low, high = st.chi2.ppf([0.001, 0.999], 168)
+    low, high = st.chi2.ppf([0.001, 0.999], 14 * seeds)
     assert low < total < high
-    assert np.mean(shapes) * 7 / 6 == pytest.approx(1, abs=0.2)  # one of seven components is 1 by definition; some 1000 numbers
+    assert np.mean(shapes) * 7 / 6 == pytest.approx(1, abs=within)  # one of seven components is 1 by definition; some 90 numbers each
 
 
 @pytest.mark.parametrize("seeds", [range(2), pytest.param(range(2, 12), marks=pytest.mark.slow)], ids=["two", "ten"])

@@ -226,33 +226,33 @@ def test_sentence_without_a_crossing(spindle):
 # ------------------------------------------------------------------ log and command line
 
 
-def test_log_gives_the_map_back(found, tmp_path):
+def test_log_gives_the_map_back(met, tmp_path):
     """Grid and natural frequencies bit for bit, coincidences as told; a timeline for each axis, and a blueprint."""
-    write_map_log(found, tmp_path / "map.rrd")
+    write_map_log(met, tmp_path / "map.rrd")
     read = read_log(tmp_path / "map.rrd")
     assert read.kind == "map"
     temperatures, speeds, modes = read.grid
-    assert np.array_equal(temperatures, found.temperatures)
-    assert np.array_equal(speeds, found.speeds)
-    for m, track in enumerate(found.modes):
+    assert np.array_equal(temperatures, met.temperatures)
+    assert np.array_equal(speeds, met.speeds)
+    for m, track in enumerate(met.modes):
         assert np.array_equal(modes[:, m], track.frequency)
-    told = map_json(found)["coincidences"]
+    told = map_json(met)["coincidences"]
     assert read.rows("/numbers/coincidences") == told
     assert {"temperature, 0.01 C", "speed"} <= set(read.timelines)
     assert read.blueprint
     assert f"{len(told)} coincidences" in describe(read)
-    assert log_json(read)["modes_Hz"][0][0][0] == found.modes[0].frequency[0, 0]
+    assert log_json(read)["modes_Hz"][0][0][0] == met.modes[0].frequency[0, 0]
 
 
-def test_log_without_its_numbers_is_refused(found, tmp_path):
-    write_map_log(found, tmp_path / "map.rrd")
+def test_log_without_its_numbers_is_refused(met, tmp_path):
+    write_map_log(met, tmp_path / "map.rrd")
     whole = read_log(tmp_path / "map.rrd")
     for entity in ("/numbers/modes", "/numbers/speeds"):
         less = replace(whole, columns={k: v for k, v in whole.columns.items() if k != entity})
         with pytest.raises(BadInput, match=rf"map.rrd: is not a whole log of thermospindle: .*{entity}"):
             log_json(less)
     with pytest.raises(BadInput, match="folder"):
-        write_map_log(found, tmp_path / "none" / "map.rrd")
+        write_map_log(met, tmp_path / "none" / "map.rrd")
 
 
 def test_map_from_the_command_line(tmp_path, capsys):
