@@ -61,9 +61,13 @@ def copy_of_checkout(folder: Path, links: bool = True) -> Path:
     return folder
 
 
-def call(*arguments: object, cwd: Path) -> str:
+def tried(*arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
     environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "MYPYPATH")}
-    done = subprocess.run([*map(str, arguments)], cwd=cwd, env=environment, capture_output=True, text=True)
+    return subprocess.run([*map(str, arguments)], cwd=cwd, env=environment, capture_output=True, text=True)
+
+
+def call(*arguments: object, cwd: Path) -> str:
+    done = tried(*arguments, cwd=cwd)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
@@ -160,8 +164,7 @@ def test_types_are_seen(way, wheel, users, tmp_path_factory):
         "reveal_type(Condition(20.0).temperature)\n"
         "Condition('warm')\n"
     )  # fmt: skip
-    mypy = [sys.executable, "-m", "mypy", "--python-executable", environment.python, "typed.py"]
-    done = subprocess.run(mypy, cwd=users, capture_output=True, text=True)
+    done = tried(sys.executable, "-m", "mypy", "--python-executable", environment.python, "typed.py", cwd=users)
     errors = [line for line in done.stdout.splitlines() if ": error:" in line]
     assert 'Revealed type is "builtins.float"' in done.stdout or 'Revealed type is "float"' in done.stdout
     assert len(errors) == 1
