@@ -15,10 +15,10 @@ from thermospindle.diagnosis.inference.detectable import smallest, unseen_beside
 from thermospindle.diagnosis.inference.freeform import free_forms
 from thermospindle.diagnosis.inference.mechanism import Mechanism, variants
 from thermospindle.diagnosis.inference.model import CampaignModel, TestData, campaign_model, expected_noise
-from thermospindle.diagnosis.inference.next_test import NextTest, next_tests
 from thermospindle.diagnosis.inference.search import Hypothesis, Search, search
 from thermospindle.diagnosis.inference.verdict import Verdict, decide
 from thermospindle.diagnosis.misfit.patterns import Chosen, choose_for
+from thermospindle.diagnosis.prediction.next_test import NextTest, next_tests
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.parallel import in_parallel
 from thermospindle.model.types import Array

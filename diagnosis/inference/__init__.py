@@ -10,9 +10,9 @@ freeform   what would have to drift where nobody names a cause
 fit        tempered Gauss-Newton with priors
 evidence   Laplace evidence with everything of unknown size learned
 screening  what a mechanism promises beside a fitted model
+remainder  what an explanation leaves: how far residuals say the same, and the light resonance that would make them
 detectable  smallest sizes that would have shown
 search     fits, pairs: the evidence of every explanation
 verdict    posterior probabilities, and the answer with the least expected loss
-next_test  which test would decide between the explanations that survive
 =========  ========================================================================================================
 """

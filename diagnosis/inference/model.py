@@ -16,8 +16,8 @@ import numpy as np
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.mode_table import ModeData
 from thermospindle.diagnosis.inference import nuisance as kinds_of
-from thermospindle.diagnosis.inference.nuisance import Nuisance, ReferenceModes, nuisances, reference_modes
-from thermospindle.diagnosis.inference.response import Linear, Products, Response, mode_residual, partners, products, same_chain
+from thermospindle.diagnosis.inference.nuisance import Nuisance, ReferenceModes, Resonance, nuisances, reference_modes
+from thermospindle.diagnosis.inference.response import Light, Linear, Products, Response, mode_residual, partners, products, same_chain
 from thermospindle.model.errors import NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Condition, RingMotion, Spindle
 from thermospindle.model.rotor.chain import Matrices, matrices
@@ -53,6 +53,7 @@ class CampaignModel:
     parameters: tuple[Nuisance, ...]
     reference: ReferenceModes
     present: Applied
+    resonances: tuple[Resonance, ...] = ()  # whose parameters are the last
 
     def __getstate__(self) -> dict:
         """Without what was worked out: it is on its way to another process."""
@@ -200,7 +201,33 @@ class CampaignModel:
         assert isinstance(data, LineData)
         if frequency is not None:
             data = replace(data, frequency=frequency)
-        return Response(linear, data, self._gain(t, x), 0.0 if self._record is None else float(x[self._record]))
+        cut = 0.0 if self._record is None else float(x[self._record])
+        return Response(linear, data, self._gain(t, x), cut, [light for light, _ in self.lights(linear.matrices.dofs, x)])
+
+    def lights(self, dofs: Sequence[tuple[str, str]], x: Array) -> list[tuple[Light, Integers]]:
+        """The light resonances at nuisance values, over `dofs`, and the numbers of the parameters of each."""
+        found = []
+        first = len(self.parameters) - sum(len(r.shares) + 2 for r in self.resonances)
+        for r in self.resonances:
+            numbers = np.arange(first, first + len(r.shares) + 2)
+            first += len(numbers)
+            found.append((self._light(dofs, r.at(x[numbers] * np.array([self.parameters[i].sd for i in numbers]))), numbers))
+        return found
+
+    def _light(self, dofs: Sequence[tuple[str, str]], resonance: Resonance) -> Light:
+        columns = self.reference.over(dofs)[:, : len(resonance.shares)]
+        return Light(columns, np.array(resonance.shares), 2 * np.pi * resonance.frequency, resonance.damping)
+
+    def by_products_of_shares(self, t: int, x: Array, effects: Applied, resonance: Resonance) -> Array:
+        """Derivatives (k, N) of the residual of test `t` by the products of two shares each of a light resonance that is not there yet."""
+        linear = self.linear(t, x, effects)
+        light = self._light(linear.matrices.dofs, resonance)
+        moved = self._standing(t, x, effects, linear).by_products_of_shares(light, *np.triu_indices(len(resonance.shares)))
+        return np.array([self.whitened(t, m, 0.0) for m in moved])
+
+    def with_resonance(self, resonance: Resonance) -> CampaignModel:
+        """With one light resonance more, whose parameters follow all others."""
+        return replace(self, parameters=(*self.parameters, *resonance.nuisances), resonances=(*self.resonances, resonance))
 
     def _standing(self, t: int, x: Array, effects: Applied, linear: Linear) -> Response:
         """The response of test `t`; the last one is kept for those who ask more of the same place."""
@@ -245,7 +272,8 @@ class CampaignModel:
         own, channel = self._gains[t]
         pairs = self._discrepancies[t]
         record = [] if self._record is None else [self._record]
-        numbers = np.concatenate([rates.numbers[t], *[row[0] for row in pairs], own, np.array(record, int)])
+        lights = self.lights(linear.matrices.dofs, x)
+        numbers = np.concatenate([rates.numbers[t], *[row[0] for row in pairs], own, np.array(record, int), *[n for _, n in lights]])
         n_resp, n_ref, lines = response.value.shape
         weight = np.sqrt(2) / data.sd
         jacobian = np.zeros((len(numbers) + more, 2, n_resp, n_ref, lines))
@@ -269,8 +297,11 @@ class CampaignModel:
             if c < n_resp:
                 gain = response.value[c] * weight[c] * self.parameters[own[k]].sd
                 jacobian[at + k, 0, c], jacobian[at + k, 1, c] = gain.real, gain.imag
+        at += len(own)
         if record:
-            fill(at + len(own), response.cut_off[None])
+            at = fill(at, response.cut_off[None])
+        for light, of_light in lights:
+            at = fill(at, response.by_light(light) * np.array([self.parameters[i].sd for i in of_light])[:, None, None, None])
         return self.whitened(t, response.value, data.value), jacobian.reshape(len(jacobian), -1), numbers
 
     def column(self, t: int, x: Array, first: Applied, second: Applied, apart: float) -> Array:

@@ -7,6 +7,9 @@ Every nuisance parameter is counted in its own prior standard deviations, so tha
 K + sum_ij e_ij w_i w_j (M f_i)(M f_j)^T with mass-normalised modes f of the reference condition. It is the same at every condition: it moves
 frequencies and mixes shapes, never their changes, and it is smooth where modes coincide. A drifting discrepancy is a much smaller one of each
 mode in each test: what laws that hold only nearly leave. The size of each is learned from the data.
+
+A light resonance is one that the drawing lacks, of the table, a fixture or a cable: an oscillator on some point of the machine, wherever that is, and so
+given by how much of it each reference mode carries along. It is looked for where the data show the same misfit in every test.
 """
 
 from __future__ import annotations
@@ -24,12 +27,15 @@ from thermospindle.model.types import Array
 
 BUILD, TEMPERATURE, GAIN, DRIFT, EXPANSION = "build", "temperature", "gain", "gain drift", "thermal expansion"
 RECORD = "end of records"
+RESONANCE = "light resonance"
 STIFFNESS, DAMPING = "stiffness discrepancy", "damping discrepancy"
 STIFFNESS_DRIFT, DAMPING_DRIFT = "drifting stiffness discrepancy", "drifting damping discrepancy"
 STIFFNESS_SD = 1e-3  # relative error of a frequency at the reference width
 DAMPING_SD = 0.03  # relative error of a damping ratio at the reference width
 STIFFNESS_DRIFT_SD, DAMPING_DRIFT_SD = 1e-4, 0.01  # of one mode in one test, at the reference width
 DRIFT_SD = 1e-3  # of one channel's gain from test to test, at the reference width
+SHARE_SD = 0.03  # root of the mass that a mode carries along in a light resonance, over its own modal mass
+RESONANCE_SD = (0.02, 0.5)  # relative, of its frequency and of its damping ratio, about where it was seen
 RIGID = 1e-6  # of the highest frequency, below which a mode is a rigid body's: rounding leaves some 1e-8 of it, and a beam's highest is in MHz
 EXPANSION_SD = {"radial motion of the rings": 3e-3, "axial motion of the rings": 3e-3, "growth of the grooves": 0.03}
 """Relative errors of thermal motions, the same at all temperatures: two honest finite-element programs differ by a thousandth in the motions, and
@@ -69,6 +75,29 @@ class ReferenceModes:
         """M f over other dofs: zero for those that the reference has not."""
         place = {dof: i for i, dof in enumerate(self.dofs)}
         return np.array([self.weighted[place[dof]] if dof in place else np.zeros(len(self.omega)) for dof in dofs])
+
+
+@dataclass(frozen=True)
+class Resonance:
+    """A light resonance as it was seen, about which its parameters move: frequency in Hz, damping ratio, and the roots of the masses that the first
+    reference modes carry along in it, over their modal masses."""
+
+    frequency: float
+    damping: float
+    shares: tuple[float, ...]
+
+    @property
+    def nuisances(self) -> tuple[Nuisance, ...]:
+        """The share of each mode, its frequency and its damping."""
+        of = f"of the light resonance near {self.frequency:.0f} Hz"
+        shares = [Nuisance(RESONANCE, f"share in mode {i + 1} {of}", SHARE_SD) for i in range(len(self.shares))]
+        shape = zip((f"frequency {of}", f"damping {of}"), RESONANCE_SD, strict=True)
+        return (*shares, *(Nuisance(RESONANCE, name, sd) for name, sd in shape))
+
+    def at(self, values: Array) -> Resonance:
+        """At `values` (k + 2,) of its parameters, in their units."""
+        shares = tuple(float(a + v) for a, v in zip(self.shares, values[:-2], strict=True))
+        return Resonance(self.frequency * float(np.exp(values[-2])), self.damping * float(np.exp(values[-1])), shares)
 
 
 def reference_modes(linear: Matrices, seen: float, highest: float, most: int) -> ReferenceModes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -32,6 +33,25 @@ class Linear:
     layout: tuple
 
 
+@dataclass(frozen=True, eq=False)
+class Light:
+    """A light resonance: a mass of one on a spring on the generalised force b = `columns` (n, k) `shares` (k,), which adds s^2 m(s) b b^T to the dynamic
+    stiffness with m = (2 z w s + w^2) / (s^2 + 2 z w s + w^2) (Den Hartog, *Mechanical Vibrations*, 1956, 3.2)."""
+
+    columns: Array
+    shares: Array
+    omega: float
+    damping: float
+
+    def felt(self, s: ComplexArray) -> ComplexArray:
+        """What is felt of the mass, (3, L): s^2 m(s), and its derivatives by ln w and ln z."""
+        lossy = 2 * self.damping * self.omega * s
+        spring = lossy + self.omega**2
+        whole = s**2 + spring
+        moved = np.stack([lossy + 2 * self.omega**2, lossy]) * s**2 / whole**2
+        return np.asarray(s**2 * np.concatenate([[spring / whole], moved]), complex)
+
+
 class Response:
     """FRFs of one test's linear model at its lines, in the measured quantity.
 
@@ -39,7 +59,7 @@ class Response:
     its reduced model (`model.rotor.reduced`), which is off by 1e-5 of the largest response at most.
     """
 
-    def __init__(self, linear: Linear, data: LineData, gain: Array, cut: float = 0.0) -> None:
+    def __init__(self, linear: Linear, data: LineData, gain: Array, cut: float = 0.0, lights: Sequence[Light] = ()) -> None:
         chain, m = linear.chain, linear.matrices
         n_resp = data.value.shape[0]
         omega = 2 * np.pi * data.frequency
@@ -47,6 +67,7 @@ class Response:
         self.s: ComplexArray = np.asarray(1j * omega + (chain.decay + window), complex)
         rows, references = chain.response_rows[:n_resp], chain.reference_rows
         self._basis: Array | None = None
+        self._lights = lights
         self._matrices = m.mass, m.damping, m.stiffness
         if len(m.mass) > LARGE:
             small = reduced(m, np.concatenate([rows, references]), float(omega.max()))
@@ -70,7 +91,11 @@ class Response:
         """Dynamic stiffness (L, r, r)."""
         mass, damping, stiffness = self._matrices
         s = self.s[:, None, None]
-        return np.asarray(s**2 * mass + s * damping + stiffness, complex)
+        whole = np.asarray(s**2 * mass + s * damping + stiffness, complex)
+        for light in self._lights:
+            b = self.over(light.columns) @ light.shares
+            whole += light.felt(self.s)[0][:, None, None] * np.outer(b, b)
+        return whole
 
     @cached_property
     def left(self) -> ComplexArray:
@@ -98,6 +123,26 @@ class Response:
     def over(self, columns: Array) -> Array:
         """Columns (n, m) of generalised forces in the coordinates (r,) of `left` and `right`."""
         return columns if self._basis is None else self._basis.T @ columns
+
+    def by_light(self, light: Light) -> ComplexArray:
+        """Derivatives (k + 2, n_resp, n_ref, L) by the shares of a light resonance, its ln frequency and its ln damping."""
+        left, right = self._modal(light)
+        felt = -light.felt(self.s)
+        own_left, own_right = np.tensordot(light.shares, left, 1), np.tensordot(light.shares, right, 1)
+        shares = felt[0] * (left[:, :, None] * own_right[None, None] + own_left[None, :, None] * right[:, None])
+        whole = own_left[:, None] * own_right[None]
+        return np.concatenate([shares, (felt[1:, None, None] * whole)])
+
+    def by_products_of_shares(self, light: Light, rows: Integers, columns: Integers) -> ComplexArray:
+        """Derivatives (k, n_resp, n_ref, L) by products of two shares each, what they are."""
+        left, right = self._modal(light)
+        found = left[rows][:, :, None] * right[columns][:, None] + left[columns][:, :, None] * right[rows][:, None]
+        return -light.felt(self.s)[0] * np.where(rows == columns, 0.5, 1.0)[:, None, None, None] * found
+
+    def _modal(self, light: Light) -> tuple[ComplexArray, ComplexArray]:
+        """What responses read of a force on each of a light resonance's columns (k, n_resp, L), and how references move these (k, n_ref, L)."""
+        of = self.over(light.columns)
+        return (self.left @ of).transpose(2, 1, 0) * self.factor, (of.T @ self.right).transpose(1, 2, 0)
 
     def moved(self, by: Products) -> ComplexArray:
         """Derivatives (k, n_resp, n_ref, L) by the parameters of `by`."""

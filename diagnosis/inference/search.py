@@ -19,6 +19,7 @@ from thermospindle.diagnosis.inference.freeform import alike
 from thermospindle.diagnosis.inference.mechanism import Mechanism
 from thermospindle.diagnosis.inference.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.prior import DRIFTING, Learned, steady
+from thermospindle.diagnosis.inference.remainder import LOOKED, light_resonance, overlap
 from thermospindle.diagnosis.inference.screening import Screened, screen
 from thermospindle.model.parallel import in_parallel
 from thermospindle.model.types import Array
@@ -37,6 +38,7 @@ STRAIN = 1.02  # times the errors, from which the model without effects leaves a
 FINALISTS = {1: 3, 2: 2, 3: 1}  # explanations of one, two and three mechanisms that are fitted anew at the end, of the catalogue and free
 NEAR = 100.0  # ln evidence behind the best, so far
 REFITS = 2  # at most
+RESONANCES, CLEARED = 2, 0.1  # light resonances at most, and the share of what was left that one may leave
 LITTLE = 2.0  # ln evidence that a screened mechanism must promise
 
 
@@ -76,9 +78,48 @@ def search(
     model: CampaignModel, named: Sequence[Mechanism], free: Sequence[Mechanism], progress: Callable[[str], None] = lambda done: None,
     workers: int | None = None,
 ) -> Search:
-    first = fit(model)
-    none = settled(model, Hypothesis(first, evidence(model, first)))
+    """The evidence of every explanation. A light resonance becomes part of the model where it clears nearly all that is left without effects, or beside
+    the best single one."""
+    none = _without_effects(model)
+    wider = _with_resonance(model, none)
+    model, none = wider or (model, none)
     progress("fitted without effects")
+    tried = _singles(model, none, named, free, progress, workers)
+    wider = _with_resonance(model, max(tried.singles, key=lambda h: h.evidence.ln, default=none))
+    if wider is not None:
+        progress("a light resonance found")
+        model, none = wider[0], _without_effects(wider[0])
+        tried = _singles(model, none, named, free, progress, workers)
+    singles = tried.singles
+    pairs = _joined(model, none, singles, [*named, *free], tried.most, tried.expected, workers)
+    progress("pairs fitted")
+    finalists = _finalists([*singles, *pairs])
+    anew = dict(zip(map(id, finalists), in_parallel(partial(settled, model), finalists, workers), strict=True))
+    ranked = [replace(anew[id(h)], fit=replace(anew[id(h)].fit, mechanisms=h.mechanisms)) if id(h) in anew else h for h in [*singles, *pairs]]
+    progress("the best fitted anew")
+    hypotheses = tuple(sorted([none, *ranked], key=lambda h: -h.evidence.ln))
+    return Search(model, none, hypotheses, tried.screened, _alike(model, none.fit.nuisance, hypotheses))
+
+
+def _without_effects(model: CampaignModel) -> Hypothesis:
+    first = fit(model)
+    return settled(model, Hypothesis(first, evidence(model, first)))
+
+
+@dataclass(frozen=True, eq=False)
+class Singles:
+    """Mechanisms one at a time: those fitted, what screening said of all, what priors pairs are fitted with and the cost they should reach."""
+
+    singles: list[Hypothesis]
+    screened: tuple[Screened, ...]
+    most: float
+    expected: Learned
+
+
+def _singles(
+    model: CampaignModel, none: Hypothesis, named: Sequence[Mechanism], free: Sequence[Mechanism], progress: Callable[[str], None],
+    workers: int | None,
+) -> Singles:
     learned = none.evidence.learned
     strained = learned.errors > STRAIN or any(learned.sizes.get(kind, 0.0) > 0 for kind in DRIFTING)
     expected = steady(learned)
@@ -94,14 +135,38 @@ def search(
     most = fit(model, (), (none.evidence.mean, none.fit.point), none.fit.rates, TEMPERS[-1:], learned=expected).cost
     singles = _fitted_all(model, tasks, strained, about, most, expected, workers)
     progress("effects fitted")
-    pairs = _joined(model, none, singles, [*named, *free], most, expected, workers)
-    progress("pairs fitted")
-    finalists = _finalists([*singles, *pairs])
-    anew = dict(zip(map(id, finalists), in_parallel(partial(settled, model), finalists, workers), strict=True))
-    ranked = [replace(anew[id(h)], fit=replace(anew[id(h)].fit, mechanisms=h.mechanisms)) if id(h) in anew else h for h in [*singles, *pairs]]
-    progress("the best fitted anew")
-    hypotheses = tuple(sorted([none, *ranked], key=lambda h: -h.evidence.ln))
-    return Search(model, none, hypotheses, tuple(looked), _alike(model, none.fit.nuisance, hypotheses))
+    return Singles(singles, tuple(looked), most, expected)
+
+
+def _excess(h: Hypothesis) -> float:
+    """What is left beyond noise, in squares of the errors."""
+    return max(h.fit.chi2 / h.fit.count - 1.0, 0.0)
+
+
+def _with_resonance(model: CampaignModel, h: Hypothesis) -> tuple[CampaignModel, Hypothesis] | None:
+    """The model with the light resonance that an explanation leaves unexplained in every test, and the explanation fitted in it; None where it
+    leaves none, or it clears too little."""
+    if h.evidence.learned.errors <= STRAIN or len(model.resonances) == RESONANCES or overlap(model, h.fit).tests < LOOKED:
+        return None
+    seen = light_resonance(model.thinned, h.fit, h.evidence.learned)
+    if seen is None or seen[1] < PLENTY:
+        return None
+    resonance, n = seen[0], len(model.parameters)
+    wider, own = model.with_resonance(resonance), np.zeros(len(resonance.nuisances))
+    fitted = np.concatenate([h.fit.point[:n], own, h.fit.point[n:]])
+    afresh = np.concatenate([np.zeros(n), own, h.fit.point[n:]])
+    try:
+        tried = [fit(wider, h.mechanisms, at, tempers=tempers) for at, tempers in ((fitted, TEMPERS[EARLY:]), (afresh, TEMPERS))]
+        best = min(tried, key=lambda f: f.cost)
+        sd = np.array([q.sd for q in resonance.nuisances])
+        centred = model.with_resonance(resonance.at(sd * best.point[n : n + len(own)]))  # about which all explanations then start
+        there = np.concatenate([best.point[:n], own, best.point[n + len(own) :]])
+        again = fit(centred, h.mechanisms, there, best.rates, TEMPERS[-1:])
+    except FAILED:
+        return None
+    found = settled(centred, Hypothesis(again, evidence(centred, again)))
+    asked = found.evidence.ln > h.evidence.ln + PLENTY and _excess(found) < CLEARED * _excess(h)
+    return (centred, found) if asked else None
 
 
 def _alike(model: CampaignModel, x: Array, hypotheses: Sequence[Hypothesis]) -> dict[str, frozenset[str]]:

@@ -14,13 +14,11 @@ from math import comb
 
 import numpy as np
 
-from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.inference import nuisance as kinds_of
 from thermospindle.diagnosis.inference.evidence import left_out
-from thermospindle.diagnosis.inference.fit import Problem
 from thermospindle.diagnosis.inference.model import CampaignModel
+from thermospindle.diagnosis.inference.remainder import ALIKE, Overlap, overlap
 from thermospindle.diagnosis.inference.search import STRAIN, Hypothesis, Search
-from thermospindle.model.types import Array
 
 PRIOR = {"none": 0.5, "one": 0.33, "two": 0.08, "free": 0.05, "two free": 0.02, "one and free": 0.02, "three": 0.01}
 WRONG, FALSE_ALARM, MISSED, SET, HALF = 10.0, 20.0, 5.0, 1.0, 3.0
@@ -31,8 +29,6 @@ NUMERICS = (1e-4, 0.01)  # drift of frequencies and of damping that two honest p
 MOSTLY = 0.6  # of the ln evidence of an explanation with free drift in it, that what it names must reach alone to be the answer
 COARSE = 4.0  # chosen on blind campaigns 1 to 16, by log score; others judge it
 DEPARTS = 0.3  # of the size, from which a law does not hold
-LAGS, SMALL = 12, 0.05  # lines over which residuals are compared, and the correlation that chance makes
-ALIKE = 0.5  # correlation of what is left in one test with what is left in another, from which it is called constant
 SPREAD = 3.0  # temperatures within so many tolerances of each other are one condition
 
 Names = tuple[str, ...]
@@ -72,7 +68,7 @@ def decide(found: Search) -> Verdict:
     named_count = len({s.mechanism.name for s in found.screened if not s.mechanism.free and s.visibility > 0}) or 1
     free_count = len({s.mechanism.name for s in found.screened if s.mechanism.free and s.visibility > 0}) or 1
     base = found.base.evidence.ln
-    same = overlap(found.model, found.hypotheses[0])
+    same = overlap(found.model, found.hypotheses[0].fit)
     worth = same.inflation * coarsening(found.hypotheses[0])
     rows = [(h, _prior(h, named_count, free_count) + (_weighed(h, found.hypotheses) - base) / worth) for h in found.hypotheses]
     top = max(w for _, w in rows)
@@ -95,54 +91,8 @@ def decide(found: Search) -> Verdict:
     groups = conditions_of(found)
     before = left_out(found.model, found.base.fit, found.base.evidence, groups)
     after = left_out(found.model, accepted.fit, accepted.evidence, groups)
-    reason = _reason(found, word, effects, candidates, free, none, before, after) + _constant(found.hypotheses[0], same)
+    reason = _reason(found, word, effects, candidates, free, none, before, after) + _seen(found.model) + _constant(found.hypotheses[0], same)
     return Verdict(word, effects, reason, candidates, free, none, unknown, losses, before, after, accepted)
-
-
-@dataclass(frozen=True)
-class Overlap:
-    """How far residuals say the same: `lines`, 1 + 2 sum of their autocorrelation over neighbouring lines; `tests`, the mean correlation of one test's
-    with another's. `inflation` is by how much fewer numbers they are worth.
-
-    1, 0 and 1 for noise. What a model misses is smooth over lines, and what it misses everywhere (a resonance of the table) is there in every test:
-    ln evidence is divided by the inflation (Bartlett 1946; Bayley & Hammersley, *J. R. Statist. Soc. Suppl.* 8 (1946) 184).
-    """
-
-    lines: float
-    tests: float
-    inflation: float
-
-
-def overlap(model: CampaignModel, best: Hypothesis) -> Overlap:
-    """Of the residuals that an explanation leaves in FRF lines."""
-    problem = Problem(model, best.mechanisms)
-    left = [
-        (d.frequency, problem.residual(t, best.fit.point).reshape(-1, len(d.frequency)))
-        for t, d in enumerate(model.tests)
-        if isinstance(d, LineData) and d.count
-    ]
-    total, square = np.zeros(LAGS), sum(float(np.mean(r * r)) for _, r in left)
-    if square <= 0.0:
-        return Overlap(1.0, 0.0, 1.0)
-    for _, r in left:
-        total += [float(np.mean(r[:, k:] * r[:, :-k])) if r.shape[1] > k else 0.0 for k in range(1, LAGS + 1)]
-    correlation = total / square
-    seen = np.cumprod(correlation > SMALL).astype(bool)  # up to where it is lost in chance
-    lines, tests = float(1 + 2 * correlation[seen].sum()), between_tests(left)
-    return Overlap(lines, tests, lines * (1 + (len(left) - 1) * tests))
-
-
-def between_tests(left: Sequence[tuple[Array, Array]]) -> float:
-    """Mean correlation of residuals (channels, lines) at frequencies (lines,) of one test with those of another at its nearest lines; what chance makes counts as none."""
-    found = []
-    for a, (lines, r) in enumerate(left):
-        for b, (other_lines, other) in enumerate(left):
-            if a != b and len(r) == len(other):
-                there = other[:, np.abs(other_lines[None, :] - lines[:, None]).argmin(axis=1)].ravel()
-                size = float(np.linalg.norm(r) * np.linalg.norm(there))
-                correlation = float(r.ravel() @ there) / size if size else 0.0
-                found.append(correlation if correlation > SMALL else 0.0)
-    return float(np.mean(found)) if found else 0.0
 
 
 def coarsening(best: Hypothesis) -> float:
@@ -279,6 +229,13 @@ def conditions_of(found: Search) -> list[list[int]]:
         else:
             groups.append([int(t)])
     return groups
+
+
+def _seen(model: CampaignModel) -> str:
+    """The light resonances that the data show in every test."""
+    told = ", ".join(f"{r.frequency:.0f} Hz (damping ratio {r.damping:.2g})" for r in model.resonances)
+    one = "a light resonance" if len(model.resonances) == 1 else "light resonances"
+    return f" Taken into account: {one} at {told} that the drawing lacks and every test shows, of a table, a fixture or a cable." if told else ""
 
 
 def _constant(best: Hypothesis, same: Overlap) -> str:

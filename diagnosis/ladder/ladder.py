@@ -20,11 +20,11 @@ import numpy as np
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.observe import observe
 from thermospindle.diagnosis.inference.model import CampaignModel, TestData
-from thermospindle.diagnosis.inference.next_test import NextTest
 from thermospindle.diagnosis.inference.verdict import SPREAD, Candidate, Verdict
 from thermospindle.diagnosis.ladder.fitting import CONSTANT, FREE, Settled, predicted_squares, settled, unseen, without
 from thermospindle.diagnosis.ladder.forms import FORMS
 from thermospindle.diagnosis.ladder.step import MeasuredModes, Step, as_drawn, fitted, measured_modes
+from thermospindle.diagnosis.prediction.next_test import NextTest
 from thermospindle.diagnosis.verdict import Diagnosis, campaign_data, diagnose
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Spindle

@@ -2,6 +2,7 @@
 
 ===========  ===========================================================================================================
 modes        the modes that a model has at the condition of a test, as its measuring points show them
+next_test    which test would decide between the explanations that survive
 outcomes     what was predicted before a test was read, beside what it then showed: confirmed or refuted
 partners     which measured mode is which computed one: partners, numbers through all conditions, crossings, shapes of
              close modes

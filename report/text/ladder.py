@@ -8,9 +8,9 @@ from itertools import pairwise
 import numpy as np
 
 from thermospindle.diagnosis.inference import nuisance as kinds_of
-from thermospindle.diagnosis.inference.next_test import in_words
 from thermospindle.diagnosis.ladder.ladder import CLEAR, DISCREPANCY, TOLERANCES, Ladder
 from thermospindle.diagnosis.ladder.step import Step
+from thermospindle.diagnosis.prediction.next_test import in_words
 
 CERTAIN = 1000.0  # odds, beyond which models are not to be trusted so far
 STRETCHED = 2.0  # standard deviations from which a tolerance is named

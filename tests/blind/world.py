@@ -144,9 +144,9 @@ def answer(spindle: Spindle, condition: Condition, world: World, hidden: Sequenc
         spindle, condition, {b: _grooves(spindle, b, m, world.grooves_follow_faces) for b, m in motions.items()}, world.constant_kept
     )
     chain = rotor_base(spindle, replace(state, bearings=changed("bearings", state.bearings)))
+    chain = changed("chain", chain)
     if world.weak_mode is not None:
         chain = on_spring(chain, lowest(spindle), "weak", *world.weak_mode, excited(spindle))
-    chain = changed("chain", chain)
     linear = matrices(chain)
     if world.stiffness_error or world.damping_error:
         linear = perturbed(linear, drawing, world)
@@ -230,8 +230,9 @@ def _grooves(spindle: Spindle, name: str, motion: RingMotion, share: float) -> R
 
 
 def perturbed(linear: Matrices, spindle: Spindle, world: World) -> Matrices:
-    """K and C with a random symmetric matrix in the modes of the drawing at 20 C and rest, the same in every test."""
-    reference = answer(spindle, Condition(REFERENCE), replace(world, stiffness_error=0.0, damping_error=0.0)).linear
+    """K and C with a random symmetric matrix in the modes of the drawing at 20 C and rest, the same in every test. A weak mode is none of these: it
+    stays an oscillator on its body, which modal errors of the spindle do not couple to anything else."""
+    reference = answer(spindle, Condition(REFERENCE), replace(world, stiffness_error=0.0, damping_error=0.0, weak_mode=None)).linear
     root = np.sqrt(np.diag(reference.mass))
     square, vectors = np.linalg.eigh(reference.stiffness / root[:, None] / root[None, :])
     omega = np.sqrt(np.maximum(square, 0.0))
@@ -249,7 +250,7 @@ def perturbed(linear: Matrices, spindle: Spindle, world: World) -> Matrices:
     of_k, of_c = (g * in_band[:, None] * in_band[None, :] for g in (of_k, of_c))
     more_k = world.stiffness_error * 2 * omega[:, None] * omega[None, :] * of_k  # a mode's frequency is wrong by half of that
     more_c = world.damping_error * loss[:, None] * loss[None, :] * of_c
-    n = len(root)  # what is hidden may have added bodies, after these
+    n = len(root)  # what is hidden, and a weak mode, may have added bodies, after these
     stiffness, damping = linear.stiffness.copy(), linear.damping.copy()
     stiffness[:n, :n] += back @ more_k @ back.T
     damping[:n, :n] += back @ more_c @ back.T

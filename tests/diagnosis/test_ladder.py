@@ -13,12 +13,12 @@ from rerun.chunk import RrdReader
 from tests.conftest import SCENE
 from thermospindle.cli import main
 from thermospindle.diagnosis.inference.mechanism import variants
-from thermospindle.diagnosis.inference.next_test import ModePrediction, NextTest
 from thermospindle.diagnosis.inference.verdict import Candidate
 from thermospindle.diagnosis.ladder.fitting import FREE, predicted_squares, settled, unseen, without
 from thermospindle.diagnosis.ladder.forms import FORMS
 from thermospindle.diagnosis.ladder.ladder import CLEAR, DISCREPANCY, TOLERANCES, conditions, ladder, named_by
 from thermospindle.diagnosis.ladder.step import as_drawn
+from thermospindle.diagnosis.prediction.next_test import ModePrediction, NextTest
 from thermospindle.diagnosis.verdict import campaign_data
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Addition, Condition

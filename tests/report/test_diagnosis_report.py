@@ -16,9 +16,9 @@ from thermospindle.cli import main
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.mechanism import variants
-from thermospindle.diagnosis.inference.next_test import ModePrediction, NextTest
 from thermospindle.diagnosis.inference.search import Hypothesis
 from thermospindle.diagnosis.inference.verdict import Candidate
+from thermospindle.diagnosis.prediction.next_test import ModePrediction, NextTest
 from thermospindle.diagnosis.runout.verdict import diagnose_runout
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import content_hash, load

@@ -57,6 +57,7 @@ def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
             if p.kind in (kinds_of.BUILD, kinds_of.TEMPERATURE, kinds_of.GAIN)
         },
         "learned": _learned(accepted.evidence),
+        "light_resonances": [{"frequency_Hz": r.frequency, "damping_ratio": r.damping} for r in d.search.model.resonances],
         "noise": {data.test.id: getattr(data, "noise_from", "the table of modes") for data in d.search.model.tests},
     }
 

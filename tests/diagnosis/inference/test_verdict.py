@@ -13,6 +13,7 @@ from thermospindle.diagnosis.inference.fit import Fit
 from thermospindle.diagnosis.inference.mechanism import Mechanism
 from thermospindle.diagnosis.inference.nuisance import DAMPING, STIFFNESS
 from thermospindle.diagnosis.inference.prior import Learned
+from thermospindle.diagnosis.inference.remainder import between_tests
 from thermospindle.diagnosis.inference.screening import Screened
 from thermospindle.diagnosis.inference.search import Hypothesis, Search
 from thermospindle.diagnosis.inference.verdict import (
@@ -21,7 +22,6 @@ from thermospindle.diagnosis.inference.verdict import (
     MISSED,
     WRONG,
     Verdict,
-    between_tests,
     coarsening,
     conditions_of,
     decide,
@@ -54,7 +54,7 @@ def made(gains: dict[str | tuple[str, ...], float], catalogue: int = 30, forms: 
     """A search that found `gains` in ln evidence over the model without effects; so many mechanisms were screened."""
     spindle = SimpleNamespace(tolerances=SimpleNamespace(temperature=0.2))
     tests = tuple(SimpleNamespace(condition=c, count=50) for c in CONDITIONS)
-    model = SimpleNamespace(parameters=(), tests=tests, spindle=spindle)
+    model = SimpleNamespace(parameters=(), tests=tests, spindle=spindle, resonances=())
     none = hypothesis((), 0.0)
     others = [hypothesis((k,) if isinstance(k, str) else k, v) for k, v in gains.items()]
     screened = [Screened(mechanism(f"effect_{i}"), 0.0, np.zeros(2), 1.0) for i in range(catalogue)]

@@ -1,0 +1,121 @@
+"""What an explanation leaves of the data: how far its residuals say the same, and the light resonance that would make them.
+
+A resonance that the drawing lacks (of the table, a fixture, a cable) is there in every test. It is no effect that changes over conditions, and yet it
+spoils a fit by many standard errors, which tolerances are then strained to take. Where an explanation misses the data alike in all tests, the
+oscillator on the machine that would make that is looked for, and becomes part of the model where the data ask for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from thermospindle.diagnosis.data.lines import LineData
+from thermospindle.diagnosis.inference.fit import Fit, Problem
+from thermospindle.diagnosis.inference.model import CampaignModel
+from thermospindle.diagnosis.inference.nuisance import SHARE_SD, Resonance
+from thermospindle.diagnosis.inference.prior import Learned
+from thermospindle.diagnosis.inference.screening import Fitted, fitted
+from thermospindle.model.types import Array
+
+LAGS, SMALL = 12, 0.05  # lines over which residuals are compared, and the correlation that chance makes
+LOOKED = 0.2  # correlation from which a light resonance is looked for
+ALIKE = 0.5  # correlation of what is left in one test with what is left in another, from which it is called constant
+SPACING, DAMPING = 0.02, 0.02  # of neighbouring frequencies (ln) at which a light resonance is looked for, and its damping ratio there
+
+
+@dataclass(frozen=True)
+class Overlap:
+    """How far residuals say the same: `lines`, 1 + 2 sum of their autocorrelation over neighbouring lines; `tests`, the mean correlation of one test's
+    with another's. `inflation` is by how much fewer numbers they are worth.
+
+    1, 0 and 1 for noise. What a model misses is smooth over lines, and what it misses everywhere (a resonance of the table) is there in every test:
+    ln evidence is divided by the inflation (Bartlett 1946; Bayley & Hammersley, *J. R. Statist. Soc. Suppl.* 8 (1946) 184).
+    """
+
+    lines: float
+    tests: float
+    inflation: float
+
+
+def overlap(model: CampaignModel, fit: Fit) -> Overlap:
+    """Of the residuals that an explanation leaves in FRF lines."""
+    problem = Problem(model, fit.mechanisms)
+    left = [
+        (d.frequency, problem.residual(t, fit.point).reshape(-1, len(d.frequency)))
+        for t, d in enumerate(model.tests)
+        if isinstance(d, LineData) and d.count
+    ]
+    total, square = np.zeros(LAGS), sum(float(np.mean(r * r)) for _, r in left)
+    if square <= 0.0:
+        return Overlap(1.0, 0.0, 1.0)
+    for _, r in left:
+        total += [float(np.mean(r[:, k:] * r[:, :-k])) if r.shape[1] > k else 0.0 for k in range(1, LAGS + 1)]
+    correlation = total / square
+    seen = np.cumprod(correlation > SMALL).astype(bool)  # up to where it is lost in chance
+    lines, tests = float(1 + 2 * correlation[seen].sum()), between_tests(left)
+    return Overlap(lines, tests, lines * (1 + (len(left) - 1) * tests))
+
+
+def between_tests(left: Sequence[tuple[Array, Array]]) -> float:
+    """Mean correlation of residuals (channels, lines) at frequencies (lines,) of one test with those of another at its nearest lines; what chance
+    makes counts as none."""
+    found = []
+    for a, (lines, r) in enumerate(left):
+        for b, (other_lines, other) in enumerate(left):
+            if a != b and len(r) == len(other):
+                there = other[:, np.abs(other_lines[None, :] - lines[:, None]).argmin(axis=1)].ravel()
+                size = float(np.linalg.norm(r) * np.linalg.norm(there))
+                correlation = float(r.ravel() @ there) / size if size else 0.0
+                found.append(correlation if correlation > SMALL else 0.0)
+    return float(np.mean(found)) if found else 0.0
+
+
+def light_resonance(model: CampaignModel, about: Fit, learned: Learned) -> tuple[Resonance, float] | None:
+    """The light resonance that would explain most beside the model `about`, and the ln evidence that it promises; None where no test has FRF lines.
+
+    To first order the products of its shares count, a symmetric matrix; its shares are the first eigenvector's, those of modes beyond the band none.
+    """
+    lines = [d.frequency for d in model.tests if isinstance(d, LineData)]
+    if not lines:
+        return None
+    at, whole = fitted(model, about), Problem(model, about.mechanisms, learned).precision.copy()
+    gradient = whole @ about.point
+    for t in at:
+        whole[np.ix_(t.numbers, t.numbers)] += t.information
+        gradient[t.numbers] += t.gradient
+    inverse = np.asarray(np.linalg.inv(whole), float)
+    low, high = min(float(f.min()) for f in lines), max(float(f.max()) for f in lines)
+    grid = np.geomspace(low, high, int(np.log(high / low) / SPACING) + 1)
+    rows, seen = [], model.reference.seen
+    for frequency in grid:
+        products, gain = _promised(model, about, at, inverse, gradient, Resonance(float(frequency), DAMPING, (0.0,) * seen), learned.errors)
+        rows.append((gain, float(frequency), products))
+    gain, frequency, products = max(rows, key=lambda row: row[0])
+    matrix = np.zeros((seen, seen))
+    matrix[np.triu_indices(seen)] = products
+    size, vector = np.linalg.eigh(matrix + np.triu(matrix, 1).T)
+    shares = np.zeros(len(model.reference.omega))
+    shares[:seen] = np.sqrt(max(size[-1], 0.0)) * vector[:, -1]
+    return Resonance(frequency, DAMPING, tuple(shares.tolist())), gain - float(np.log(len(rows)))
+
+
+def _promised(
+    model: CampaignModel, about: Fit, at: Sequence[Fitted], inverse: Array, gradient: Array, resonance: Resonance, errors: float
+) -> tuple[Array, float]:
+    """The products of a light resonance's shares, and the ln evidence that they would gain."""
+    k, problem = len(np.triu_indices(len(resonance.shares))[0]), Problem(model, about.mechanisms)
+    x, effects = problem.parts(about.point)[0], problem.effects_of(about.point)
+    cross, square, slope = np.zeros((len(inverse), k)), np.zeros((k, k)), np.zeros(k)
+    for t, (data, of_test) in enumerate(zip(model.tests, at, strict=True)):
+        if isinstance(data, LineData):
+            column = SHARE_SD**2 * model.by_products_of_shares(t, x, effects[t], resonance)
+            cross[of_test.numbers] += of_test.derivatives @ column.T
+            square += column @ column.T
+            slope += column @ of_test.residual
+    information = (square - cross.T @ inverse @ cross) / errors**2 + np.eye(k)
+    left = (slope - cross.T @ inverse @ gradient) / errors**2
+    found = np.asarray(-np.linalg.solve(information, left), float)
+    return SHARE_SD**2 * found, float(-0.5 * left @ found - 0.5 * np.linalg.slogdet(information)[1])

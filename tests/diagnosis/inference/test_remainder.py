@@ -1,0 +1,92 @@
+"""A resonance that the drawing lacks: seen in every test, placed, and no reason to name an effect."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.blind.hidden import on_spring
+from tests.virtual_campaign import drawn, effect, model_of, virtual_campaign
+from thermospindle.diagnosis.inference.evidence import evidence
+from thermospindle.diagnosis.inference.fit import fit
+from thermospindle.diagnosis.inference.nuisance import RESONANCE, Resonance
+from thermospindle.diagnosis.inference.search import Hypothesis, _excess, _with_resonance, settled
+from thermospindle.diagnosis.verdict import diagnose
+from thermospindle.model.machine import Condition
+from thermospindle.sim.effects.effect import Effect, Parameter
+
+TESTS = (Condition(20.0), Condition(40.0), Condition(60.0))
+FREQUENCY = np.arange(400.0, 6000.1, 8.0)
+MASS, AT, RATIO = 0.008, 1754.0, 0.016  # kg on the base, a hundredth of it; Hz; damping ratio
+
+
+def table() -> Effect:
+    """An oscillator on the base, the same in every test."""
+    size = Parameter("mass", "kg", 0.0, MASS, MASS, (0.0, 1.0), "", "")
+
+    def chain(spindle, condition, values, chain):
+        return on_spring(chain, spindle.structure.bodies[0].name, "table", values["mass"], AT, RATIO)
+
+    return Effect("table", "", "", (size,), "", (), "", chain=chain)
+
+
+def campaign(spindle, *effects):
+    return virtual_campaign(spindle, TESTS, 5, [(table(), {"mass": MASS}), *effects], drawn(spindle, 3, 5), responses=(1, 3, 6), frequency=FREQUENCY)
+
+
+@pytest.fixture(scope="module")
+def model(spindle):
+    return model_of(spindle, campaign(spindle))
+
+
+def test_it_is_found_where_it_is(model):
+    """Without it a misfit of many standard errors that is the same in every test; with it noise, and its frequency to 1e-3."""
+    first = fit(model)
+    none = settled(model, Hypothesis(first, evidence(model, first)))
+    assert none.fit.chi2 / none.fit.count > 2
+    found = _with_resonance(model, none)
+    assert found is not None
+    wider, h = found
+    assert h.fit.chi2 / h.fit.count == pytest.approx(1.0, abs=0.15)
+    assert _excess(h) < 0.1 * _excess(none)
+    assert wider.resonances[0].frequency == pytest.approx(AT, rel=1e-3)
+    assert wider.resonances[0].damping == pytest.approx(RATIO, rel=0.1)
+    assert h.evidence.ln > none.evidence.ln + 100
+    assert _with_resonance(wider, h) is None
+
+
+def test_where_nothing_is_left_none_is_looked_for(spindle):
+    plain = model_of(spindle, virtual_campaign(spindle, TESTS, 5, (), drawn(spindle, 3, 5), responses=(1, 3, 6), frequency=FREQUENCY))
+    first = fit(plain)
+    assert _with_resonance(plain, Hypothesis(first, evidence(plain, first))) is None
+
+
+def test_derivatives_by_its_parameters(model):
+    """Against central differences, beside tolerances that are off."""
+    random = np.random.default_rng(2)
+    wider = model.with_resonance(Resonance(AT, RATIO, tuple(0.05 * random.standard_normal(len(model.reference.omega)))))
+    x = 0.1 * random.standard_normal(len(wider.parameters))
+    x[[i for i, q in enumerate(wider.parameters) if q.kind == "end of records"]] = 0.0
+    own = [i for i, q in enumerate(wider.parameters) if q.kind == RESONANCE]
+    assert len(own) == len(model.reference.omega) + 2
+    rates = wider.rates(x, [[]] * 3)
+    _, jacobian, numbers = wider.jacobian(1, x, [], rates)
+    for i in own:
+        up, down = x.copy(), x.copy()
+        up[i] += 1e-4
+        down[i] -= 1e-4
+        wanted = (wider.residual(1, up, []) - wider.residual(1, down, [])) / 2e-4
+        assert jacobian[list(numbers).index(i)] == pytest.approx(wanted, abs=1e-5 * np.abs(wanted).max())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("hidden", "word"), [((), "none"), ((("preload_loss", {"loss": 0.2, "thermal_share": 1.0}),), "identified")])
+def test_the_verdict_is_of_what_is_hidden_beside_it(spindle, hidden, word):
+    """The whole diagnosis: nothing is named for the table's sake, and what is hidden is found as without it."""
+    found = diagnose(spindle, replace(campaign(spindle, *[(effect(name), values) for name, values in hidden]), title="with a table"))
+    assert found.verdict.word == word
+    assert found.verdict.effects == tuple(name for name, _ in hidden)
+    assert [r.frequency for r in found.search.model.resonances] == pytest.approx([AT], rel=2e-3)
+    assert "Taken into account: a light resonance" in found.verdict.reason
