@@ -27,7 +27,7 @@ def table() -> Effect:
     size = Parameter("mass", "kg", 0.0, MASS, MASS, (0.0, 1.0), "", "")
 
     def chain(spindle, condition, values, chain):
-        return on_spring(chain, spindle.structure.bodies[0].name, "table", values["mass"], AT, RATIO)
+        return on_spring(chain, spindle.structure.bodies[0].name, "table", values["mass"], AT, RATIO, "z")
 
     return Effect("table", "", "", (size,), "", (), "", chain=chain)
 
