@@ -9,7 +9,7 @@ as likely as one, and something that is in no catalogue a seventh.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import comb
 
 import numpy as np
@@ -26,7 +26,8 @@ ENOUGH = 0.95  # posterior probability that a set holds the truth
 NEGLIGIBLE = 1e-3  # probability that adds nothing to a set
 LARGEST = 6  # names in a set, beyond which it says little
 NUMERICS = (1e-4, 0.01)  # drift of frequencies and of damping that two honest programs may differ by
-MOSTLY = 0.6  # of the ln evidence of an explanation with free drift in it, that what it names must reach alone to be the answer
+MOSTLY = 0.6  # of the ln evidence of an explanation with free drift in it, or of the misfit that changes, that what is named must reach to be the answer
+MUCH, LEFT = 0.5, "what is left"  # squares of the errors, from which what is left and changes tells of something else
 COARSE = 4.0  # chosen on blind campaigns 1 to 16, by log score; others judge it
 DEPARTS = 0.3  # of the size, from which a law does not hold
 SPREAD = 3.0  # temperatures within so many tolerances of each other are one condition
@@ -85,6 +86,11 @@ def decide(found: Search) -> Verdict:
         free = (*free, Candidate(found.base, ("every mode",), True, 0.0, none))
         free = tuple(sorted(free, key=lambda c: -c.probability))
         none = 0.0
+    kept = changing(found.base, overlap(found.model, found.base.fit)), changing(found.hypotheses[0], same)
+    if kept[1] > MUCH and kept[1] > (1 - MOSTLY) * kept[0]:  # what leaves most of what changes is no explanation
+        free = (Candidate(found.base, (LEFT,), True, 0.0, sum(c.probability for c in candidates)), *free)
+        free = tuple(sorted(free, key=lambda c: -c.probability))
+        candidates = tuple(replace(c, probability=0.0) for c in candidates)
     unknown = sum(c.probability for c in free)
     word, effects, losses = _least_loss(candidates, none, free, found.alike)
     accepted = _accepted(found, word, effects, candidates, free)
@@ -93,6 +99,11 @@ def decide(found: Search) -> Verdict:
     after = left_out(found.model, accepted.fit, accepted.evidence, groups)
     reason = _reason(found, word, effects, candidates, free, none, before, after) + _seen(found.model) + _constant(found.hypotheses[0], same)
     return Verdict(word, effects, reason, candidates, free, none, unknown, losses, before, after, accepted)
+
+
+def changing(h: Hypothesis, same: Overlap) -> float:
+    """Squares of the errors a number that an explanation leaves beyond noise, and not alike in all tests."""
+    return max(h.fit.chi2 / h.fit.count - 1.0, 0.0) * (1.0 - same.tests)
 
 
 def coarsening(best: Hypothesis) -> float:
@@ -259,7 +270,10 @@ def _reason(found: Search, word: str, effects: Names, candidates, free, none: fl
     lead = candidates[0] if candidates else None
     if word == "unexplained":
         place = "nothing tried explains them"
-        if free and free[0].hypothesis.mechanisms:
+        if free and free[0].names == (LEFT,):
+            left = found.hypotheses[0].fit
+            place = f"the best leaves {np.sqrt(left.chi2 / left.count):.1f} standard errors of {np.sqrt(chi2 / n):.1f}, and not the same in every test"
+        elif free and free[0].hypothesis.mechanisms:
             place = f"{' and '.join(free[0].names)} would have to drift ({free[0].delta_evidence:.0f} in ln evidence)"
         elif free:
             drift = found.base.evidence.learned.sizes[kinds_of.STIFFNESS_DRIFT]

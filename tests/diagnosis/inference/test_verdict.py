@@ -187,6 +187,18 @@ def test_a_free_form_that_leads_clearly_is_unexplained_though_an_effect_changes_
     assert decide(found).word == "unexplained"
 
 
+@pytest.mark.parametrize(("leaves", "word"), [(46.0, "unexplained"), (21.0, "unexplained"), (4.0, "identified"), (1.0, "identified")])
+def test_what_leaves_most_of_the_misfit_is_no_explanation(leaves, word):
+    """Of a misfit of fifty squares of the errors a number, whatever the lead in evidence."""
+    found = made({"a": 2300.0, "b": 100.0})
+    left = {(): 50.0, ("a",): leaves, ("b",): 49.0}
+    wrong = tuple(replace(h, fit=replace(h.fit, chi2=h.fit.count * left[h.names])) for h in found.hypotheses)
+    v = decide(replace(found, hypotheses=wrong, base=wrong[-1]))
+    assert v.word == word
+    assert total(v) == pytest.approx(1.0)
+    assert ("the best leaves" in v.reason) == (word == "unexplained")
+
+
 def test_the_order_of_hypotheses_does_not_matter():
     search = made({"a": 12.0, "b": 11.0, "~x": 9.0, ("a", "c"): 10.0})
     turned = replace(search, hypotheses=search.hypotheses[::-1])
