@@ -34,6 +34,9 @@ LACK_OF_FIT = 4.0  # standard deviations of a block's chi2, and of that of the n
 LINES_THAT_SCATTER = 50  # of an FRF at least, from whose neighbours its noise can be told
 RISES = (0, 2, 4)  # powers of frequency in which noise of largest is told: a hammer's force falls, and noise over it rises
 CHANGED = 1.5  # times the step before, from which lines are another piece
+FALLS = (2, 4)  # powers of 1/frequency in which the variance of an accelerometer's noise falls, as a velocity's and a displacement's
+USUAL, WIDE = (1e-3, 1e-6), (1e-12, 1e-14)  # of the mean square, that count as such: of noise that is much the same over the band, and of one that falls
+LOW = (0.1, 40)  # share of the band, and lines in it at least, where such noise shows
 ENOUGH = 200  # degrees of freedom from which the scatter within blocks tells the noise
 REPEATS, CAMPAIGN, SCATTER = "repeats", "the campaign", "scatter of neighbouring lines"
 KNOWN = (REPEATS, CAMPAIGN)
@@ -86,13 +89,16 @@ def line_data(test: Test, condition: Condition, stated: Noise | None, expected: 
     damped = test.window_decay * record_length(frf) if np.isfinite(record_length(frf)) else 0.0
     damped = damped if windowed(value, damped) else 0.0
     sd, noise_from = _noise(frf, value, use, stated, expected, damped)
+    falling = _falls(value, sd, damped, frequency)
+    if falling is not None:
+        sd = np.maximum(sd, _smooth_sd(value, scatter(value) / np.sqrt(neighbours(damped)), falling))
     least = SILENT * float(np.abs(value).max())  # where symmetry forbids an answer there is rounding alone
     sd = np.maximum(sd, least)
     known, blocks = sd if noise_from in KNOWN else None, _blocks(value, sd, damped, gaps)
-    seen = _within_blocks(value, blocks, damped)
+    seen = _within_blocks(value, blocks, damped, falling)
     if seen is None and len(frequency) > LINES_THAT_SCATTER:  # noise stated too small divides every block to single lines
-        blocks = _blocks(value, np.maximum(sd, _smooth_sd(value, scatter(value) / np.sqrt(neighbours(damped)))), damped, gaps)
-        seen = _within_blocks(value, blocks, damped)
+        blocks = _blocks(value, np.maximum(sd, _smooth_sd(value, scatter(value) / np.sqrt(neighbours(damped)), falling)), damped, gaps)
+        seen = _within_blocks(value, blocks, damped, falling)
     for _ in range(2):
         if seen is None:
             break
@@ -103,7 +109,7 @@ def line_data(test: Test, condition: Condition, stated: Noise | None, expected: 
         sd = sd_seen if known is None else np.maximum(known, sd_seen)
         noise_from = SCATTER if known is None else noise_from
         blocks = _blocks(value, sd, damped, gaps)
-        seen = _within_blocks(value, blocks, damped)
+        seen = _within_blocks(value, blocks, damped, falling)
     at, kept, error = _compressed(frequency, value, sd, blocks, damped)
     return LineData(test, condition, at, kept, error, frf.quantity, noise_from, len(frequency))
 
@@ -119,14 +125,28 @@ def _noise(frf: Frf, value: ComplexArray, use, stated: Noise | None, expected: N
     return _smooth_sd(value, seen / np.sqrt(neighbours(damped))), SCATTER
 
 
-def _smooth_sd(value: ComplexArray, sd: Array) -> Array:
-    """The noise of value and of largest that the standard errors `sd` of single lines follow, FRF by FRF; few hits scatter them."""
+def _falls(value: ComplexArray, sd: Array, damped: float, frequency: Array) -> Array | None:
+    """Shapes (shapes, n) over frequency of a noise that falls with it, where lines at the lowest `LOW`, measured by `sd`, scatter more than twice as much as the others: that
+    of an accelerometer does, whose motion was integrated to a velocity or a displacement; None where it does not."""
+    low = frequency <= LOW[0] * frequency[-1]
+    if low.sum() < LOW[1]:
+        return None
+    seen = scatter(value) / np.sqrt(neighbours(damped)) / sd
+    steep = np.median(seen[..., low]) > 2 * np.median(seen[..., ~low])
+    return np.array([(frequency[0] / frequency) ** power for power in FALLS]) if steep else None
+
+
+def _smooth_sd(value: ComplexArray, sd: Array, falling: Array | None = None) -> Array:
+    """The noise of value and of largest, and that of the shapes `falling` where given, that the standard errors `sd` of single lines follow, FRF by FRF;
+    few hits scatter them."""
     size = np.abs(value)
     largest = size.max(axis=(0, 2))
     smooth = np.empty_like(sd)
     for i, j in np.ndindex(*sd.shape[:2]):
-        columns = np.stack([size[i, j] ** 2, np.full(sd.shape[2], max(largest[j], 1e-300) ** 2)], axis=1)
-        smooth[i, j] = np.maximum(columns @ _gamma_fit(columns, sd[i, j] ** 2, np.ones(sd.shape[2])), 1e-14 * largest[j] ** 2)
+        of_largest = np.full(sd.shape[2], max(largest[j], 1e-300) ** 2)
+        columns = np.stack([size[i, j] ** 2, of_largest, *(() if falling is None else of_largest * falling)], axis=1)
+        share = _gamma_fit(columns, sd[i, j] ** 2, np.ones(sd.shape[2]), WIDE if falling is not None else USUAL)
+        smooth[i, j] = np.maximum(columns @ share, 1e-14 * largest[j] ** 2)
     return np.sqrt(smooth)
 
 
@@ -172,12 +192,12 @@ def _lacking(squares: Array, mean: float, variance: float) -> bool:
     return float(squares.sum()) > mean + LACK_OF_FIT * np.sqrt(variance)
 
 
-def _within_blocks(value: ComplexArray, blocks: list[tuple[int, int]], damped: float) -> Array | None:
+def _within_blocks(value: ComplexArray, blocks: list[tuple[int, int]], damped: float, falling: Array | None = None) -> Array | None:
     """Noise variances (n_resp, n_ref, n) from what the polynomials of all blocks leave, as shares of |H|^2 and of the largest |H|^2 to that
     hammer, reference by reference; None where too few degrees of freedom are left."""
     size = np.abs(value) ** 2
     n = size.shape[-1]
-    rising = [np.linspace(0, 1, n) ** power for power in RISES]
+    rising = [*(np.linspace(0, 1, n) ** power for power in RISES), *(() if falling is None else falling)]
     variance = np.empty(size.shape)
     for j in range(value.shape[1]):
         rows, seen, freedom, largest = [], [], [], float(size[:, j].max())
@@ -195,19 +215,22 @@ def _within_blocks(value: ComplexArray, blocks: list[tuple[int, int]], damped: f
         if sum(f.sum() for f in freedom) < ENOUGH:
             return None
         a, y, w = np.concatenate(rows), np.concatenate(seen), np.concatenate(freedom)
-        share = _gamma_fit(a, y, w)
+        share = _gamma_fit(a, y, w, WIDE if falling is not None else USUAL)
         floor_of = largest * np.sum([c * r for c, r in zip(share[1:], rising, strict=True)], axis=0)
         variance[:, j] = np.maximum(share[0] * size[:, j] + floor_of, 1e-14 * largest)
     return variance
 
 
-def _gamma_fit(columns: Array, seen: Array, freedom: Array) -> Array:
-    """Shares (c,) >= 0 with `seen` (n,) about columns (n, c) @ shares: squares have errors in proportion to themselves, weighted anew."""
-    mean = seen + 1e-3 * seen.mean()
+def _gamma_fit(columns: Array, seen: Array, freedom: Array, least: tuple[float, float] = USUAL) -> Array:
+    """Shares (c,) >= 0 with `seen` (n,) about columns (n, c) @ shares: squares have errors in proportion to themselves, weighted anew.
+
+    Weights are those of `least` of the mean at least, in the first step and later.
+    """
+    mean = seen + least[0] * seen.mean()
     for _ in range(6):
         weight = np.sqrt(freedom) / mean
         share, _ = nnls(columns * weight[:, None], seen * weight)
-        mean = np.maximum(columns @ share, 1e-6 * seen.mean())
+        mean = np.maximum(columns @ share, least[1] * seen.mean())
     return share
 
 

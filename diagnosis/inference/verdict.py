@@ -20,6 +20,7 @@ from thermospindle.diagnosis.inference.model import CampaignModel
 from thermospindle.diagnosis.inference.remainder import ALIKE, Overlap, overlap
 from thermospindle.diagnosis.inference.search import STRAIN, Hypothesis, Search
 
+GROSS = 25.0  # chi2 a number, five times the errors, from which nothing has explained the data whatever else explains them no better
 PRIOR = {"none": 0.5, "one": 0.33, "two": 0.08, "free": 0.05, "two free": 0.02, "one and free": 0.02, "three": 0.01}
 WRONG, FALSE_ALARM, MISSED, SET, HALF = 10.0, 20.0, 5.0, 1.0, 3.0
 ENOUGH = 0.95  # posterior probability that a set holds the truth
@@ -93,6 +94,8 @@ def decide(found: Search) -> Verdict:
         candidates = tuple(replace(c, probability=0.0) for c in candidates)
     unknown = sum(c.probability for c in free)
     word, effects, losses = _least_loss(candidates, none, free, found.alike)
+    if word == "none" and found.base.evidence.chi2 > GROSS * found.base.fit.count:
+        word = "unexplained"
     accepted = _accepted(found, word, effects, candidates, free)
     groups = conditions_of(found)
     before = left_out(found.model, found.base.fit, found.base.evidence, groups)
@@ -269,7 +272,7 @@ def _reason(found: Search, word: str, effects: Names, candidates, free, none: fl
         return f"Tolerances and measuring errors explain the data: chi2 is {chi2 / n:.2f} a number for {n} numbers{constant}{best}."
     lead = candidates[0] if candidates else None
     if word == "unexplained":
-        place = "nothing tried explains them"
+        place = "nothing tried explains them, nor do tolerances and measuring errors: units, points, and noise that the files do not tell come first"
         if free and free[0].names == (LEFT,):
             left = found.hypotheses[0].fit
             place = f"the best leaves {np.sqrt(left.chi2 / left.count):.1f} standard errors of {np.sqrt(chi2 / n):.1f}, and not the same in every test"
@@ -278,6 +281,8 @@ def _reason(found: Search, word: str, effects: Names, candidates, free, none: fl
         elif free:
             drift = found.base.evidence.learned.sizes[kinds_of.STIFFNESS_DRIFT]
             place = f"every mode drifts from test to test, by {drift:.1g} of its frequency, more than two honest programs differ by"
+        if not free:
+            return f"No effect of the catalogue explains the data: {place} (chi2 without effects: {chi2 / n:.2f} a number)."
         rival = f"; the best of the catalogue, {' + '.join(lead.names)}, reaches {lead.delta_evidence:.0f}" if lead else ""
         return f"No effect of the catalogue explains the data as well as free drift does: {place}{rival} (chi2 without effects: {chi2 / n:.2f} a number)."
     named = " + ".join(effects)
