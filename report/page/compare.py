@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from markupsafe import Markup
@@ -61,6 +61,7 @@ def write_comparison(
     turning: Sequence[RunoutBeside] = (),
     errors: Mapping[str, float | None] | None = None,
     campaign: str = "",
+    progress: Callable[[str], None] = lambda done: None,
 ) -> None:
     """`report.html`, a PNG and an SVG of every picture, and, where there are FRFs, `compare.rrd`, in a folder that exists.
 
@@ -71,10 +72,12 @@ def write_comparison(
     ids = {t.test.id for t in (c.tests if c else ())} | {t.test.id for t in turning}
     conditions = f"the conditions of {len(ids)} test{'s' if len(ids) > 1 else ''}" + f": {c.campaign if c else campaign}"
     (folder / "report.html").write_text(page(spindle, conditions, every, "Comparison"), encoding="utf-8")
+    progress("page written")
     with rc_context(STYLE):
         for name, one in ((figures(c) if c else {}) | drawn).items():
             for kind in ("svg", "png"):
                 one.savefig(folder / f"{name}.{kind}", dpi=150, facecolor="white", metadata={"Date": None} if kind == "svg" else None)
+            progress(f"picture {name} written")
     shown = [FrfsBeside(t.test, found.beside.measured, found.computed) for t in c.tests if (found := t.correlation) is not None] if c else []
     if c and shown:
         peaks = {t.test.id: [(m.number, m.kind, m.measured, m.sd, m.computed) for m in t.modes] for t in c.tests}

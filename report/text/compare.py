@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,8 @@ from thermospindle.diagnosis.compare.compare import Comparison, PairedMode, Test
 from thermospindle.diagnosis.compare.correlation import Band
 from thermospindle.model.units import RPM
 from thermospindle.report.text.grid import grid, show_grid
+
+FEW = 20  # modes of all tests, up to which each has a row of its own
 
 
 def comparison_json(c: Comparison) -> dict[str, Any]:
@@ -89,6 +92,36 @@ def show_comparison(console: Console, c: Comparison, verbose: bool = True) -> No
     """The verdict, the table of modes, what has no partner; with `verbose` also the correlation of FRFs, crossings, FRAC and COMAC by point."""
     console.print(verdict(c), style="bold", highlight=False, markup=False)
     console.print(f"Tests: {c.campaign}", highlight=False, markup=False)
+    if verbose or sum(len(t.modes) for t in c.tests) <= FEW:
+        _show_modes(console, c)
+    else:
+        _show_by_mode(console, c)
+    for t in c.tests:
+        for what, values in (("measured, not computed", t.missing), ("computed, not measured", t.extra)):
+            if values:
+                console.print(f"{t.test.id}: {what}: {', '.join(f'{f:.1f}' for f in values)} Hz", highlight=False)
+    if not verbose:
+        console.print("--verbose shows every mode of every test, the likeness of FRFs, COMAC and crossings of modes.", style="dim", highlight=False)
+        return
+    for line in c.crossings:
+        console.print(line, highlight=False)
+    if any(t.correlation for t in c.tests):
+        _show_frfs(console, c)
+    if c.comac:
+        references = sorted({reference for t in c.tests for _, reference in t.frac})
+        rows = []
+        for node, comac in c.comac.items():
+            cells = []
+            for r in references:
+                known = [v for t in c.tests if (v := t.frac.get((node, r))) is not None]
+                cells.append(f"{min(known):.3f}" if known else "-")
+            rows.append([str(node), "-" if comac is None else f"{comac:.4f}", *cells])
+        title = "COMAC, and smallest FRAC of all tests by hammer point"
+        show_grid(console, title, ("node", "COMAC", *(f"hammer {r}" for r in references)), rows)
+
+
+def _show_modes(console: Console, c: Comparison) -> None:
+    """A row for every mode of every test."""
     columns = (
         "test", "mode", "kind", "measured\nHz", "+-", "computed\nHz", "error\nHz", "error\n%", "error\ns.e.",
         "damping\n%", "computed\n%", "error\ns.e.", "MAC",
@@ -107,28 +140,31 @@ def show_comparison(console: Console, c: Comparison, verbose: bool = True) -> No
     show_grid(console, "Modes, computed - measured", columns, rows, ("test", "kind"), keys=3)
     if any(m.close and m.mac is not None for t in c.tests for m in t.modes):
         console.print("* close modes: share of the measured shape in the plane of the computed ones")
+
+
+def _show_by_mode(console: Console, c: Comparison) -> None:
+    """A row for every mode, over all tests that have it."""
+    by_number: dict[tuple[int, str], list[tuple[str, PairedMode]]] = {}
     for t in c.tests:
-        for what, values in (("measured, not computed", t.missing), ("computed, not measured", t.extra)):
-            if values:
-                console.print(f"{t.test.id}: {what}: {', '.join(f'{f:.1f}' for f in values)} Hz", highlight=False)
-    if not verbose:
-        console.print("--verbose adds the likeness of FRFs, COMAC and crossings of modes.", style="dim", highlight=False)
-        return
-    for line in c.crossings:
-        console.print(line, highlight=False)
-    if any(t.correlation for t in c.tests):
-        _show_frfs(console, c)
-    if c.comac:
-        references = sorted({reference for t in c.tests for _, reference in t.frac})
-        rows = []
-        for node, comac in c.comac.items():
-            cells = []
-            for r in references:
-                known = [v for t in c.tests if (v := t.frac.get((node, r))) is not None]
-                cells.append(f"{min(known):.3f}" if known else "-")
-            rows.append([str(node), "-" if comac is None else f"{comac:.4f}", *cells])
-        title = "COMAC, and smallest FRAC of all tests by hammer point"
-        show_grid(console, title, ("node", "COMAC", *(f"hammer {r}" for r in references)), rows)
+        for m in t.modes:
+            by_number.setdefault((m.number, m.kind), []).append((t.test.id, m))
+    rows = []
+    for (number, kind), found in sorted(by_number.items()):
+        modes = [m for _, m in found]
+        worst, m = max(found, key=lambda row: abs(row[1].residual))
+        damping = [d for o in modes if (d := o.damping_residual) is not None]
+        macs = [o.mac for o in modes if o.mac is not None]
+        low, high = min(o.measured for o in modes), max(o.measured for o in modes)
+        rows.append([
+            str(number), kind, str(len(modes)), f"{low:.1f}-{high:.1f}", f"{np.mean([o.error for o in modes]):+.2f}", f"{_rms([o.residual for o in modes]):.1f}",
+            f"{m.error:+.2f}", worst, f"{_rms(damping):.1f}" if damping else "", f"{min(macs):.3f}" if macs else "",
+        ])  # fmt: skip
+    columns = ("mode", "kind", "tests", "measured\nHz", "error, Hz\nmean", "s.e.\nrms", "error, Hz\nworst", "in test", "damping\ns.e. rms", "MAC\nleast")
+    show_grid(console, f"Modes of {len(c.tests)} tests, computed - measured", columns, rows, ("kind", "in test"), keys=2)
+
+
+def _rms(values: Sequence[float]) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def _show_frfs(console: Console, c: Comparison) -> None:

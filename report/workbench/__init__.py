@@ -2,13 +2,15 @@
 
 ============  ====================================================================================================
 state         what is set, undo and redo, the ladder of steps that were kept: frozen values and pure functions
-bench         what is computed at a setting: FRFs, errors by mode and test, modes, fits
+bench         what is computed at a setting: FRFs, errors by mode and test, modes, fits to these errors
+lines         the effects of a setting fitted to the FRF lines and weighed, as `spindle diagnose` does
 section       the section as polygons that move with their bodies
 explanations  explanations with their probabilities, from a diagnosis read or made here
 save          scene, report, and the script that does the same without the page
 plots         FRFs, the map of errors and the moving section as Bokeh figures
 words         what the page says in words and tables
 controls      a slider for every parameter and tolerance
+work          a task beside the page: its progress, its end, how it is stopped
 page          one tab: it shows a session and turns what a user does into actions on it
 server        the page served on the loopback interface, under a token
 ============  ====================================================================================================

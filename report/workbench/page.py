@@ -6,11 +6,9 @@ that takes longer than `SMOOTH` too, nothing until the slider is let go. The pag
 
 from __future__ import annotations
 
-import threading
 import time
-import traceback
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +18,7 @@ from markupsafe import escape
 
 from thermospindle.diagnosis.inference.model import FAILED
 from thermospindle.report.workbench import explanations as told
-from thermospindle.report.workbench import words
+from thermospindle.report.workbench import lines, words
 from thermospindle.report.workbench.bench import Bench, Errors, Shown, channels, curves, errors, fitted, modes_of
 from thermospindle.report.workbench.controls import LOOK, WIDE, Controls, labelled
 from thermospindle.report.workbench.explanations import Explanations
@@ -42,14 +40,11 @@ from thermospindle.report.workbench.state import (
     take_up,
     undo,
 )  # fmt: skip
+from thermospindle.report.workbench.work import Work
 
 SMOOTH = 0.15  # s, up to which something is computed while a slider is dragged
 AGAIN = 1.0  # s
 RECENT = 5  # times that something was computed, of which the shortest counts
-
-
-class Stopped(Exception):
-    """A user, or the end of the page, stopped work in the background."""
 
 
 class Page:
@@ -63,11 +58,10 @@ class Page:
         self.found = Errors((), None, None)
         self.costs: dict[str, deque[float]] = {"all": deque(maxlen=RECENT), "shown": deque(maxlen=RECENT)}
         self.moved = (0.0, "")  # when which slider was last let go
-        self.stop = threading.Event()
-        self.working = ""
         self.frf, self.map, self.section = FrfPlots(), ErrorMap(bench), MovingSection(pieces(bench.spindle))
         self.controls = Controls(bench, self.session.now, self.change)
         self._widgets()
+        self.work = Work(document, self.halt, self.say)
         self._wire()
         self.choose_test()
         self.show_numbers()
@@ -84,7 +78,8 @@ class Page:
         self.quantity = RadioButtonGroup(labels=["Frequency", "Damping ratio"], active=0, name="quantity", **look)
         self.undo, self.redo = (Button(label=t, name=t.lower(), disabled=True, width=80, **look) for t in ("Undo", "Redo"))
         self.left_out = CheckboxGroup(labels=[s.id for s in self.bench.shown], inline=True, name="left_out", **look)
-        self.fit = Button(label="Fit the ticked", name="fit", disabled=self.bench.campaign is None, **look, **WIDE)
+        self.fit = Button(label="Fit the ticked to the errors shown", name="fit", disabled=self.bench.campaign is None, **look, **WIDE)
+        self.weigh = Button(label="Fit all to the FRF lines, as diagnose does", name="weigh", disabled=self.bench.campaign is None, **look, **WIDE)
         self.keep = Button(label="Keep as a step", name="keep", **look, **WIDE)
         self.step = Select(title="Step", options=[], name="step", **look, **WIDE)
         self.take_up = Button(label="Take up again", name="take_up", disabled=True, **look, **WIDE)
@@ -102,7 +97,7 @@ class Page:
     def roots(self) -> dict[str, Any]:
         """What the template places, by name."""
         own = {k: getattr(self, k) for k in (
-            "test", "response", "hammer", "mode", "quantity", "undo", "redo", "left_out", "fit", "keep", "step", "take_up", "explanation", "take",
+            "test", "response", "hammer", "mode", "quantity", "undo", "redo", "left_out", "fit", "weigh", "keep", "step", "take_up", "explanation", "take",
             "diagnose", "name", "save", "halt", "short", "status", "ladder", "reasons", "numbers", "message",
         )}  # fmt: skip
         drawn = {"magnitude": self.frf.size, "phase": self.frf.phase, "map": self.map.figure, "section": self.section.figure, "play": self.section.play}
@@ -123,9 +118,10 @@ class Page:
         self.take_up.on_click(lambda: self.become(take_up(self.session, int(self.step.value))))
         self.take.on_click(self._take)
         self.fit.on_click(self._fit)
+        self.weigh.on_click(self._weigh)
         self.diagnose.on_click(self._diagnose)
         self.save.on_click(self._save)
-        self.halt.on_click(self.stop.set)
+        self.halt.on_click(self.work.stop.set)
 
     # ------------------------------------------------------------ actions
 
@@ -288,50 +284,31 @@ class Page:
 
     # ------------------------------------------------------------ work in the background
 
-    def work(self, name: str, task: Callable[[Callable[[str], None]], Any], done: Callable[[Any], None]) -> None:
-        """Run `task` beside the page; it is given what to tell its progress, and `done` what it found."""
-        if self.working:
-            self.say(f"{self.working} is still at work; stop it first.")
-            return
-        self.working, self.halt.visible = name, True
-        self.stop.clear()
-        self.say(f"{name} ...")
-
-        def progress(text: str) -> None:
-            if self.stop.is_set():
-                raise Stopped
-            self.document.add_next_tick_callback(lambda: self.say(f"{name}: {text}"))
-
-        def ended(found: Any, problem: str) -> None:
-            self.working, self.halt.visible = "", False
-            self.say(problem, bad=True) if problem else done(found)
-
-        def run() -> None:
-            found, problem = None, ""
-            try:
-                found = task(progress)
-            except Stopped:
-                problem = f"{name} was stopped."
-            except (*FAILED, OSError) as error:
-                problem = f"{name}: {error}"
-            except Exception as error:  # the page must not wait for ever; the terminal has the rest
-                traceback.print_exc()
-                problem = f"{name} failed: {type(error).__name__}: {error}"
-            self.document.add_next_tick_callback(lambda: ended(found, problem))
-
-        threading.Thread(target=run, name=name, daemon=True).start()
-
     def _fit(self) -> None:
         s = self.session.now
 
         def done(found: Any) -> None:
-            now = self.session.now
-            there = {t.name for t in self.bench.tolerances} | {key_of(e, p) for e, values in now.effects.items() for p in values}
-            self.become(do(self.session, set_named(now, {key: v for key, v in found.value.items() if key in there})))
+            self._fitted(found.value)
             said = [f"{key} {value:.4g} ± {found.sd[key]:.2g}" for key, value in found.value.items() if "." in key]
             self.say(f"Fitted in {found.steps} steps. {', '.join(said)}")
 
-        self.work("Fit", lambda progress: fitted(self.bench, s, progress), done)
+        self.work.begin("Fit", lambda progress: fitted(self.bench, s, progress), done)
+
+    def _fitted(self, values: Mapping[str, float]) -> None:
+        """Take in fitted values, of what is still there."""
+        now = self.session.now
+        there = {t.name for t in self.bench.tolerances} | {key_of(e, p) for e, own in now.effects.items() for p in own}
+        self.become(do(self.session, set_named(now, {key: v for key, v in values.items() if key in there})))
+
+    def _weigh(self) -> None:
+        s, at = self.session.now, iter(range(1, 10**6))
+        steps = lines.STEPS + len(self.bench.shown) - len(s.left_out)
+
+        def done(found: lines.Weighed) -> None:
+            self._fitted(found.value)
+            self.say(lines.said(found))
+
+        self.work.begin("Fit to the lines", lambda progress: lines.weighed(self.bench, s, lambda text: progress(f"{next(at)} of {steps}: {text}")), done)
 
     def _diagnose(self) -> None:
         s, steps, at = self.session.now, told.steps(self.bench, self.session.now), iter(range(1, 10**6))
@@ -341,7 +318,7 @@ class Page:
             self.show_rest()
             self.say(f"Diagnosis: {found.word}. {found.reason}")
 
-        self.work("Diagnosis", lambda progress: told.find(self.bench, s, lambda text: progress(f"{next(at)} of {steps}: {text}")), done)
+        self.work.begin("Diagnosis", lambda progress: told.find(self.bench, s, lambda text: progress(f"{next(at)} of {steps}: {text}")), done)
 
     def _save(self) -> None:
         name = self.name.value.strip()
@@ -349,7 +326,7 @@ class Page:
             self.say(f"{name!r} is no name of a folder; use letters, digits and - _", bad=True)
             return
         s, folder = self.session, self.out / name
-        self.work(
-            "Saving", lambda progress: save(self.bench, s.now, self.found, s.ladder, folder),
+        self.work.begin(
+            "Saving", lambda progress: save(self.bench, s.now, self.found, s.ladder, folder, progress),
             lambda written: self.say(f"Saved in {folder}: {', '.join(written)}"),
         )  # fmt: skip

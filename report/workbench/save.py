@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from pprint import pformat
 
@@ -18,7 +19,7 @@ from thermospindle.sim.effects.own import OwnEffect
 SOURCE = "set on the workbench"
 
 
-def save(bench: Bench, s: Setting, errors: Errors, ladder: tuple[Step, ...], out: Path) -> list[str]:
+def save(bench: Bench, s: Setting, errors: Errors, ladder: tuple[Step, ...], out: Path, progress: Callable[[str], None] = lambda done: None) -> list[str]:
     """Write `scene/`, `workbench.py` and, where there is a campaign, `report/` into the folder `out`, whole or not at all; what was written.
 
     `BadInput` where something stands there that spindle did not write, or nothing was changed.
@@ -33,10 +34,13 @@ def save(bench: Bench, s: Setting, errors: Errors, ladder: tuple[Step, ...], out
         catalogue = (*bench.effects, *(a.definition for a in bench.spindle.effects if a.definition))
         scene_with(bench.scene, s.effects, s.deviations, tests, SOURCE, folder / "scene", out / "scene", catalogue)
         (folder / "workbench.py").write_text(script(bench, s), encoding="utf-8")
+        progress("scene and script written, now computing the FRFs of the report")
         if bench.campaign:
             (folder / "report").mkdir()
             spindle = built(bench, s)
-            write_comparison(compare(spindle, bench.campaign, bench.observations), spindle, folder / "report")
+            found = compare(spindle, bench.campaign, bench.observations)
+            progress("FRFs computed, now drawing")
+            write_comparison(found, spindle, folder / "report", progress=progress)
             written.append("report")
         asked = {"verb": "workbench", "scene": bench.scene, "campaign": bench.campaign.folder if bench.campaign else None}
         steps = [{"step": r.name, "fitted": r.fitted, "left_out": r.left_out} for r in ladder]

@@ -79,7 +79,7 @@ def page_of(bench: Bench, out: Path, known: Explanations | None) -> Callable[[Do
         document.title = f"Workbench: {bench.spindle.title}"
         document.template = template
         document.template_variables.update(words(bench))
-        document.on_session_destroyed(lambda context: page.stop.set())
+        document.on_session_destroyed(lambda context: page.work.stop.set())
 
     return make
 

@@ -173,6 +173,22 @@ def test_people_read_likeness_by_test(found):
     assert "+1.00" in text
 
 
+def test_many_tests_are_a_row_a_mode(found):
+    """Three times the same tests: the mean error of a mode is that of one, its worst that of its worst test; --verbose shows every one."""
+    many = replace(found, tests=found.tests * 3)
+    console = Console(width=120, record=True, file=open("/dev/null", "w"))  # noqa: SIM115
+    show_comparison(console, many, verbose=False)
+    text = console.export_text()
+    every = [(m, t.test.id) for t in found.tests for m in t.modes if m.number == 1]
+    worst, test = max(every, key=lambda row: abs(row[0].residual))
+    (row,) = [line.split() for line in text.splitlines() if line.split()[:2] == ["1", worst.kind]]
+    assert row[2] == str(3 * len(every))
+    assert float(row[4]) == pytest.approx(np.mean([m.error for m, _ in every]), abs=0.006)
+    assert (row[6], row[7]) == (f"{worst.error:+.2f}", test)
+    show_comparison(console, many)
+    assert console.export_text().count(f"{worst.measured:.2f}") == 3
+
+
 def test_labels_and_pairs(found, campaign):
     assert [label(t, ", ") for t in found.tests] == ["20 °C", "60 °C, 7200 rpm"]
     assert shown_pairs(found.tests[0].correlation) == [(n, n) for n in campaign.tests[0].frf.reference_nodes]

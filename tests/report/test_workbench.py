@@ -1,6 +1,7 @@
 """The workbench without a browser: what it computes is what `compare` tells, its page does what a user asks, and it saves what can be run again."""
 
 import json
+import re
 import runpy
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bokeh.document import Document
+from bokeh.server.callbacks import PeriodicCallback
 
 from tests.conftest import DATA, ROOT, SCENE
 from thermospindle.diagnosis.add import scene_with
@@ -55,13 +57,15 @@ def changed(bench):
 def turn(page):
     """What the server's loop would do next."""
     for callback in list(page.document.session_callbacks):
+        if isinstance(callback, PeriodicCallback):
+            continue
         page.document.callbacks.remove_session_callback(callback)
         callback.callback()
 
 
 def finish(page, seconds=60):
     end = time.monotonic() + seconds
-    while page.working:
+    while page.work.name:
         assert time.monotonic() < end, page.message.text
         turn(page)
         time.sleep(0.01)
@@ -325,11 +329,11 @@ def test_work_can_be_stopped(page):
             time.sleep(0.001)
             progress(str(k))
 
-    page.work("Waiting", long, lambda found: None)
+    page.work.begin("Waiting", long, lambda found: None)
     assert page.halt.visible
-    page.work("Something else", long, lambda found: None)
+    page.work.begin("Something else", long, lambda found: None)
     assert "still at work" in page.message.text
-    page.stop.set()
+    page.work.stop.set()
     finish(page)
     assert "Waiting was stopped." in page.message.text
     assert not page.halt.visible
@@ -339,7 +343,7 @@ def test_work_that_goes_wrong_does_not_go_on_for_ever(page, capsys):
     def wrong(progress):
         raise AttributeError("a mistake of ours")
 
-    page.work("Work", wrong, lambda found: None)
+    page.work.begin("Work", wrong, lambda found: None)
     finish(page)
     assert "Work failed: AttributeError: a mistake of ours" in page.message.text
     assert "Traceback" in capsys.readouterr().err
@@ -379,6 +383,24 @@ def test_another_file_is_refused(bench, tmp_path, text):
     (tmp_path / "d.json").write_text(text)
     with pytest.raises(BadInput, match=r"--diagnosis .*d\.json: is not an answer"):
         told.read_explanations(tmp_path / "d.json", bench)
+
+
+@pytest.mark.slow
+def test_the_fit_to_the_lines_is_that_of_diagnose(tmp_path):
+    """The size, its error and the evidence of the effect on the bench are those of `diagnose`, asked about it alone."""
+    bench = benches.open_bench(SCENE, DATA / "foreign_bond")
+    bench = replace(bench, effects=(by_name("bond_softening"),))
+    page = Page(bench, Document(), tmp_path)
+    page.controls.add.value = "bond_softening"
+    page.weigh._trigger_event(click(page.weigh))
+    finish(page, 600)
+    assert page.message.text.startswith("<p>Fitted to the lines, as spindle diagnose does. bond_softening.hot_compliance 12.")
+    gain = float(re.search(r"ln evidence \+(\d+)", page.message.text)[1])
+    asked = told.find(bench, Setting(), lambda done: None)
+    assert asked.rows[0].delta_evidence == pytest.approx(gain, rel=0.02)
+    for name, value in asked.rows[0].values["bond_softening"].items():
+        assert page.session.now.effects["bond_softening"][name] == pytest.approx(value, rel=0.02)
+    assert page.found.fitted < 2
 
 
 @pytest.mark.slow
