@@ -39,6 +39,14 @@ def with_error(pair: tuple[float, float] | None, sign: bool = False, digits: int
     return Markup(minus(f"{value:{'+' if sign else ''}.{digits}f}") + f" <small>± {error:.{digits}f}</small>")
 
 
+def plain_error(value: float, error: float) -> str:
+    """A number with its standard error as the terminal has them, both to the error's second digit; the number alone where it has none."""
+    if not 0 < error < np.inf:
+        return f"{value:.4g}"
+    digits = int(np.clip(1 - np.floor(np.log10(error)), 0, 9))
+    return f"{round(value, digits) + 0.0:.{digits}f} +- {error:.{digits}f}"
+
+
 def table(
     head: Sequence[str], rows: Iterable[Sequence[str]], words: Collection[int] = (0,), caption: str = "", name: str = "", ruled: bool = False
 ) -> str:

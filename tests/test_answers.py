@@ -89,7 +89,7 @@ def keys_of(capsys, *arguments: str) -> set[str]:
 @pytest.mark.parametrize(
     ("words", "log", "form"),
     [
-        (["run", "MADE/short", "--temperatures", 20, "--hits", 1], "run.rrd", "inspect"),
+        pytest.param(["run", "MADE/short", "--temperatures", 20, "--hits", 1], "run.rrd", "inspect", marks=pytest.mark.slow),
         pytest.param(["map", SCENE, "--temperatures", 20, 26, "--speeds", 3600, 7200], "map.rrd", "inspect, of a resonance map", marks=pytest.mark.slow),
         pytest.param(["runout", SCENE, "--path", "linear", "--seconds", 0.2], "runout.rrd", "inspect, of runout", marks=pytest.mark.slow),
     ],

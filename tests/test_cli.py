@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import SCENE
+from tests.test_site import ANSWERS
 from thermospindle.cli import main
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
@@ -105,6 +106,7 @@ def test_run_and_inspect(capsys, short_scene, tmp_path):
     names = {p.name for p in out.iterdir()}
     assert {"report.html", "run.rrd", "table.csv", "modes.csv", "campaign", "spindle_20C.xml", "spindle_60C.xml", MARK} == names
     log = answer(capsys, "inspect", out / "run.rrd", "--json")
+    assert set(log) == {"warnings", *ANSWERS["inspect"]}
     campaign = read_campaign(out / "campaign")
     for test in campaign.tests:
         frf = log["frfs"][test.id]

@@ -13,6 +13,7 @@ from thermospindle.diagnosis.runout.next_test import NextRunout
 from thermospindle.diagnosis.runout.sources import SourceKey
 from thermospindle.diagnosis.runout.verdict import CLEAR, RunoutDiagnosis
 from thermospindle.model.units import RPM, TO_UM
+from thermospindle.report.typeset import plain_error
 from thermospindle.sim.effects.effect import Effect
 
 SHOWN = 12  # candidates
@@ -175,9 +176,7 @@ def show_runout_diagnosis(console: Console, answer: dict[str, Any]) -> None:
         console.print("\nBest explanations (ln evidence over the scene's own imperfections):")
         for c in answer["candidates"][:5]:
             values = ", ".join(
-                f"{k.split('.')[1]} {v['value']:.4g}"
-                + (f" +- {v['sd']:.2g}" if v["sd"] else "")
-                + (f" {v['unit']}" if v["unit"] != "1" else "")
+                f"{k.split('.')[1]} {plain_error(v['value'], v['sd'])}" + (f" {v['unit']}" if v["unit"] != "1" else "")
                 for k, v in c["parameters"].items()
             )
             console.print(

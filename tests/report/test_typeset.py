@@ -2,7 +2,7 @@
 
 import pytest
 
-from thermospindle.report.typeset import prose, signed
+from thermospindle.report.typeset import plain_error, prose, signed
 
 ROWS = [
     pytest.param("moves -27.0 +- 1.4 Hz", "moves −27.0 ± 1.4\u00a0Hz", id="signs and units"),
@@ -20,3 +20,18 @@ def test_prose(plain, told):
 def test_no_negative_zero():
     assert signed(-0.04) == signed(0.04) == signed(-0.0) == "+0.0"
     assert signed(-0.06) == "−0.1"
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "told"),
+    [
+        (-0.001385, 0.0075, "-0.0014 +- 0.0075"),
+        (0.02328, 45.2, "0 +- 45"),
+        (12.0934, 0.512, "12.09 +- 0.51"),
+        (1234.5, 1499.0, "1234 +- 1499"),
+        (-1e-4, 0.5, "0.00 +- 0.50"),
+        (0.123456, 0.0, "0.1235"),
+    ],
+)
+def test_a_number_has_the_digits_that_its_error_leaves(value, error, told):
+    assert plain_error(value, error) == told

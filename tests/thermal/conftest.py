@@ -11,13 +11,17 @@ from thermospindle.model.scene.reading import load
 SCENE = Path(__file__).parents[2] / "scenes" / "hdd_2003"
 
 
-@pytest.fixture(scope="session", autouse=True)
-def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """Nothing computed by other code is read, nothing is left behind."""
+@pytest.fixture(scope="session")
+def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("cache")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def own_cache(cache: Path) -> Iterator[Path]:
+    """Nothing computed by other code is read, nothing is left behind; tests elsewhere that come after these have the user's again."""
     with pytest.MonkeyPatch.context() as patch:
-        folder = tmp_path_factory.mktemp("cache")
-        patch.setenv("THERMOSPINDLE_CACHE", str(folder))
-        yield folder
+        patch.setenv("THERMOSPINDLE_CACHE", str(cache))
+        yield cache
 
 
 @pytest.fixture(scope="session")

@@ -64,8 +64,13 @@ def outcome(what: str):
             signal.signal(number, handler)
 
 
-@pytest.fixture(scope="session", autouse=True)
-def bounded(tmp_path_factory):
+@pytest.fixture(scope="session")
+def cache(tmp_path_factory):
+    return str(tmp_path_factory.mktemp("cache"))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def bounded(cache):
     """Nothing may ask for all memory there is; what is computed of random machines does not fill the user's cache."""
     import resource
 
@@ -73,7 +78,7 @@ def bounded(tmp_path_factory):
     if EXAMPLES:
         resource.setrlimit(resource.RLIMIT_AS, (BYTES, hard))
     kept = os.environ.get("THERMOSPINDLE_CACHE")
-    os.environ["THERMOSPINDLE_CACHE"] = str(tmp_path_factory.mktemp("cache"))
+    os.environ["THERMOSPINDLE_CACHE"] = cache
     yield
     os.environ.pop("THERMOSPINDLE_CACHE")
     if kept is not None:

@@ -11,6 +11,7 @@ from thermospindle.diagnosis.inference.verdict import DEPARTS, beyond_limits
 from thermospindle.diagnosis.verdict import Diagnosis, Drift
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
+from thermospindle.report.typeset import plain_error
 
 ALIKE = 0.9  # of the evidence of what the verdict names, from which a free drift does as well
 
@@ -158,7 +159,7 @@ def _show_little(console: Console, answer: dict[str, Any]) -> None:
 
 def _values(candidate: dict[str, Any]) -> str:
     """Fitted parameters with their errors and units."""
-    return ", ".join(f"{k.split('.', 1)[1]} {v['value']:.4g}{_error(v['sd'])}{_unit(v['unit'])}" for k, v in candidate["parameters"].items())
+    return ", ".join(f"{k.split('.', 1)[1]} {plain_error(v['value'], v['sd'])}{_unit(v['unit'])}" for k, v in candidate["parameters"].items())
 
 
 def _next(test: dict[str, Any]) -> str:
@@ -169,11 +170,6 @@ def _next(test: dict[str, Any]) -> str:
 
 def _percent(probability: float) -> str:
     return f"{probability:.1%}" if probability > 1e-3 else "less than 0.1 %"
-
-
-def _error(sd: float) -> str:
-    """What was chosen, not fitted, has none."""
-    return f" +- {sd:.2g}" if sd else ""
 
 
 def _unit(unit: str) -> str:
