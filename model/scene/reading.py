@@ -10,6 +10,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,7 @@ from thermospindle.model.scene.fields import read_file
 from thermospindle.model.shaft import SAME_HEIGHT
 from thermospindle.model.tolerance import deviated
 
+ROW_KINDS = ("ball_rows", "roller_rows")
 SCENES = Path(__file__).parents[2] / "scenes"
 """The shipped scenes: beside the packages, in a checkout as installed."""
 
@@ -66,7 +68,7 @@ def shipped() -> tuple[str, ...]:
 
 def build(raw: dict[str, Any], file: Path) -> Spindle:
     """The spindle of the parsed TOML `raw`; `file` serves messages only."""
-    raw = migrated(SCENE, raw, file)
+    raw = with_shipped_rows(migrated(SCENE, raw, file))
     try:
         form = scene_file.Scene.model_validate(raw)
     except ValidationError as error:
@@ -86,6 +88,24 @@ def build(raw: dict[str, Any], file: Path) -> Spindle:
     if own.seed is not None and own.grade is not None:
         spindle = replace(spindle, imperfections=drawn(spindle, own.seed, GRADES[own.grade]))
     return spindle
+
+
+@lru_cache(maxsize=1)
+def shipped_rows() -> dict[str, dict[str, Any]]:
+    """The bearings that come with the program (`scenes/bearings.toml`): tables of `ball_rows` and `roller_rows` by name."""
+    return read_file(SCENE, SCENES / "bearings.toml")
+
+
+def with_shipped_rows(raw: Mapping[str, Any]) -> dict[str, Any]:
+    """The tables of a scene with the shipped rows that its bearings name and that it does not describe itself."""
+    own = {kind: raw.get(kind, {}) for kind in ROW_KINDS}
+    bearings = raw.get("bearings")
+    if not isinstance(bearings, Mapping) or not all(isinstance(rows, Mapping) for rows in own.values()):
+        return dict(raw)  # what is wrong with it the form says
+    named = {b["row"] for b in bearings.values() if isinstance(b, Mapping) and isinstance(b.get("row"), str)}
+    named -= {name for rows in own.values() for name in rows}
+    found = {kind: {n: row for n, row in shipped_rows()[kind].items() if n in named} for kind in ROW_KINDS}
+    return {**raw, **{kind: {**own[kind], **rows} for kind, rows in found.items() if rows}}
 
 
 SAFE, SAFE_SHAFT = 1.35, 2.2
