@@ -3,7 +3,7 @@ PYTHON ?= python3
 SPINDLE = .venv/bin/spindle
 READY = .venv/ready
 
-.PHONY: demo test test-all lint bench blind torture docs clean
+.PHONY: demo test test-all lint bench blind torture faults release-check docs clean
 
 demo: $(READY)
 	$(SPINDLE) run scenes/hdd_2003 --out out/hdd_2003
@@ -33,6 +33,16 @@ torture: $(READY)
 docs: $(READY)
 	.venv/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[docs]'
 	.venv/bin/python -m sphinx -q -b html docs/site out/site
+
+# Every verb that writes killed with SIGKILL while it does, KILLS times in all; full disks, read-only folders, closed pipes and the like.
+KILLS ?= 100
+faults: $(READY)
+	FAULTS_KILLS=$(KILLS) .venv/bin/pytest tests/faults -m ''
+
+# Wheel and source package in clean environments: Python 3.11 to 3.13, newest and least dependencies; CHECK="--pythons 3.11 --tests tests/literature".
+release-check: $(READY)
+	.venv/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[release]'
+	.venv/bin/python -m tests.release_check $(CHECK)
 
 bench: $(READY)
 	.venv/bin/python -m tests.bench

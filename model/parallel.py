@@ -24,7 +24,10 @@ START = 2.0
 """s that the workers take to start and to import what they need: measured 1.6 to 3.1 s with two, 0.01 s once they run."""
 IDLE = 300.0
 """s after which a worker without work goes."""
-ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1"}  # the cores are taken by the workers; as the command line has it, so that sums round alike
+ENVIRONMENT = {
+    "OPENBLAS_NUM_THREADS": "1",  # the cores are taken by the workers; as the command line has it, so that sums round alike
+    "PYTHONSAFEPATH": "1",  # a worker is a `python -m`, which would import from the folder one happens to stand in
+}
 
 _last: tuple[int, float] = (0, 0.0)  # how many workers were last at work, until when
 _inside = False  # this process is a worker

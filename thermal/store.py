@@ -8,6 +8,8 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import stat
+import warnings
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -34,6 +36,27 @@ def folder() -> Path | None:
     if chosen is not None:
         return Path(chosen) if chosen else None
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "thermospindle"
+
+
+@cache
+def trusted(place: Path) -> bool:
+    """Whether nobody but this user (and root) could have put something into a folder: it and all above it are theirs, and none is open to others.
+
+    One that is not is passed over, with a warning: what lies there could be anybody's, however right it looks. Where there are no owners
+    (Windows) a folder is as safe as its place.
+    """
+    if not hasattr(os, "geteuid"):
+        return True
+    for folder in (place, *place.resolve().parents):
+        try:
+            info = folder.stat()
+        except OSError:
+            return True  # is not there: nothing is read, and what is made is this user's
+        shared = info.st_mode & stat.S_IWOTH or (info.st_mode & stat.S_IWGRP and info.st_gid not in (0, os.getegid()))
+        if info.st_uid not in (0, os.geteuid()) or (shared and not (folder != place and info.st_mode & stat.S_ISVTX)):
+            warnings.warn(f"{folder}: belongs to another user, or others may write there; nothing of {place} is used, and all is computed anew", stacklevel=2)
+            return False
+    return True
 
 
 def load(question: str) -> tuple[Response, Convergence] | None:
@@ -111,7 +134,7 @@ def _write(question: str, section: PartMesh, races: Sequence[Race], more: dict[s
         "races": [(race.ring, race.r, race.z) for race in races],
     }
     try:
-        file.parent.mkdir(parents=True, exist_ok=True)
+        file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         with whole(file) as part:
             mesh = {"p": section.mesh.p, "t": section.mesh.t, "region_of": section.region_of}
             kept: dict[str, Any] = {name: np.asarray(a) for name, a in {"notes": json.dumps(notes), **mesh, **arrays}.items()}
@@ -140,7 +163,9 @@ def _make_room(place: Path) -> None:
 
 def _file(question: str) -> Path | None:
     place = folder()
-    return place / f"influence-{hashlib.sha256((_code() + question).encode()).hexdigest()[:32]}.npz" if place else None
+    if place is None or not trusted(place):
+        return None
+    return place / f"influence-{hashlib.sha256((_code() + question).encode()).hexdigest()[:32]}.npz"
 
 
 @cache

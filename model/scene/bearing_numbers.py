@@ -60,10 +60,12 @@ class Numbers(Table):
 
 def _read(file: Path, bearing: str | None) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
     """The grid of a table; `BadInput` where it is none, or has gaps."""
+    if not file.is_file():  # a pipe would be waited for, a device has no end
+        raise BadInput(f"{file}: no such file")
     try:
         lines = [line for line in file.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
         rows = list(csv.DictReader(lines))
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise BadInput(f"{file}: cannot be read as a table of bearing stiffness: {error}") from None
     if rows and bearing is not None:
         rows = [row for row in rows if row.get("bearing") == bearing]
@@ -78,7 +80,7 @@ def _read(file: Path, bearing: str | None) -> tuple[tuple[float, ...], tuple[flo
             at = float(plain_number(row["temperature_C"])), float(plain_number(row["speed_rpm"])) * RPM
             radial, axial, tilt, coupling = (float(plain_number(row[c])) if c in known else 0.0 for c in COLUMNS)
         except (TypeError, ValueError):
-            raise BadInput(f"{file}: row {number}: {row}: every column must hold a number in digits 0 to 9") from None
+            raise BadInput(f"{file}: row {number}: every column must hold a number in digits 0 to 9") from None
         k = np.diag([radial, radial, axial, tilt, tilt])
         k[0, 4] = k[4, 0] = coupling
         k[1, 3] = k[3, 1] = -coupling

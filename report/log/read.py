@@ -166,7 +166,7 @@ def check_readable(path: Path) -> None:
     """Refuse (`BadInput`) a damaged log on which the library that reads it would abort the whole process, by letting it abort another."""
     if not Path(path).is_file():
         raise BadInput(f"{path}: no such file")
-    done = subprocess.run([sys.executable, "-c", TRIAL, str(path)], capture_output=True)
+    done = subprocess.run([sys.executable, "-P", "-c", TRIAL, str(path)], capture_output=True)
     if done.returncode:
         raise BadInput(f"{path}: is damaged; the library that reads Rerun logs breaks off on it")
 

@@ -8,11 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.io import savemat
 
 from tests.conftest import DATA, ROOT, SCENE
-from tests.torture.conftest import outcome
+from tests.torture.conftest import EXAMPLES, FEW, outcome
 from tests.torture.damage import damaged, damages
 from tests.torture.machines import FILES
 from thermospindle.cli import main
@@ -26,6 +27,7 @@ from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
 from thermospindle.sim.campaign.campaign import read_campaign
 from thermospindle.sim.importing.assemble import campaign_of, read
+from thermospindle.sim.importing.files.arrays import read_arrays
 from thermospindle.sim.importing.mapping import MappingForm, read_mapping
 from thermospindle.sim.study.form import read_study
 from thermospindle.sim.study.parts import opened
@@ -238,6 +240,100 @@ def test_tables_of_stiffness(folder, every):
     file.write_bytes(damaged(whole.read_bytes(), every))
     with outcome("table of stiffness"):
         read_table(file)
+
+
+# ---------------------------------------------------------------- what unpacks to more than there is room for
+
+
+def bomb(file, kind: str) -> None:
+    """Three megabytes of zeros in a few kilobytes."""
+    zeros = np.zeros(3 << 17)
+    match kind:
+        case "npz":
+            np.savez_compressed(file, frequency=zeros)
+        case "mat":
+            savemat(file, {"frequency": zeros}, do_compression=True)
+        case "mat of structures":
+            savemat(file, {"a": {"b": {"frequency": zeros}}}, do_compression=True)
+        case "hdf5":
+            h5py = pytest.importorskip("h5py")
+            with h5py.File(file, "w") as stored:
+                stored.create_dataset("frequency", shape=zeros.shape, dtype=float, chunks=(1 << 12,), compression="gzip")
+    assert file.stat().st_size < 30_000
+
+
+@pytest.mark.parametrize("kind", ["npz", "mat", "mat of structures", "hdf5"])
+def test_what_unpacks_to_too_much_is_refused(tmp_path, monkeypatch, kind):
+    file = tmp_path / ("lab.npz" if kind == "npz" else "lab.mat")
+    bomb(file, kind)
+    monkeypatch.setattr("thermospindle.sim.importing.files.arrays.LARGEST", 1 << 20)
+    with pytest.raises(BadInput, match=r"unpacks to \d+ MB or more; at most 1 MB are read"):
+        read_arrays(file)
+    monkeypatch.setattr("thermospindle.sim.importing.files.arrays.LARGEST", 4 << 20)
+    assert next(iter(read_arrays(file).values())).size == 3 << 17
+
+
+@cache
+def matlab(kind: str) -> bytes:
+    """A small .mat file of FRFs."""
+    from io import BytesIO
+
+    buffer = BytesIO()
+    arrays = {"frequency": np.arange(100.0, 200.0), "H_3_1": np.ones(100) * (1 + 1j)}
+    if kind == "hdf5":
+        h5py = pytest.importorskip("h5py")
+        with h5py.File(buffer, "w") as stored:
+            for name, value in arrays.items():
+                stored[name] = value
+    else:
+        savemat(buffer, arrays, do_compression=kind == "packed")
+    return buffer.getvalue()
+
+
+@given(st.sampled_from(["plain", "packed", "hdf5"]), damages)
+def test_matlab_files_of_others(folder, kind, every):
+    file = folder / "lab.mat"
+    file.write_bytes(damaged(matlab(kind), every))
+    with outcome(f".mat ({kind})"):
+        read([file], MappingForm(), None)
+
+
+@given(damages)
+def test_caches(folder, every):
+    """A kept answer that was damaged is computed again: never another number, never an error."""
+    from thermospindle.thermal import store
+
+    file = folder / "influence-0.npz"
+    before, arrays = os.environ["THERMOSPINDLE_CACHE"], {"a": np.arange(30.0), "notes": np.asarray(json.dumps({"question": "q"}))}
+    np.savez(file, digest=store._digest(arrays), **arrays)
+    file.write_bytes(damaged(file.read_bytes(), every))
+    place = store._file
+    store._file = lambda question: file
+    try:
+        with outcome("cache"):
+            found = store._read("q")
+            assert found is None or np.array_equal(found[1]["a"], arrays["a"])
+    finally:
+        store._file = place
+        os.environ["THERMOSPINDLE_CACHE"] = before
+
+
+@pytest.mark.slow
+@settings(max_examples=max(FEW, EXAMPLES // 100))
+@given(damages)
+def test_logs(folder, every):
+    """A process is started for each, since what reads them may abort."""
+    from thermospindle.report.log.read import check_readable, describe, read_log
+
+    whole = folder / "whole.rrd"
+    if not whole.exists():
+        assert main(["compare", str(SCENE), str(SCENE / "measured" / "jang_2003"), "--out", str(folder / "compared")]) == 0
+        shutil.copy(next((folder / "compared").rglob("*.rrd")), whole)
+    file = folder / "log.rrd"
+    file.write_bytes(damaged(whole.read_bytes(), every))
+    with outcome("log"):
+        check_readable(file)
+        describe(read_log(file))
 
 
 # ---------------------------------------------------------------- what is no ordinary file

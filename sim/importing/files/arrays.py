@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import struct
+import zipfile
+import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -11,6 +14,12 @@ import numpy as np
 from thermospindle.model.errors import BadInput
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
+
+
+LARGEST = 1 << 30
+"""Bytes that the arrays of one file may unpack to: a small file that unpacks to more than that is damaged, or was made to fill a memory."""
+STEP = 1 << 20
+COMPRESSED = 15  # type of an element of a .mat file in version 5
 
 
 def read_arrays(file: Path) -> dict[str, Any]:
@@ -26,18 +35,51 @@ def read_arrays(file: Path) -> dict[str, Any]:
 
 def _npz(file: Path) -> Iterator[tuple[str, Any]]:
     try:
+        with zipfile.ZipFile(file) as packed:
+            _refuse_larger(file, sum(member.file_size for member in packed.infolist()))
         with np.load(file, allow_pickle=False) as stored:
             for name in stored.files:
                 yield from _flat(name, stored[name])
+    except BadInput:
+        raise
     except Exception as error:  # zipfile and numpy raise whatever a damaged file leads them to
         raise BadInput(f"{file}: cannot be read as .npz: {error or type(error).__name__}; arrays of numbers and texts are allowed, no objects") from None
+
+
+def _refuse_larger(file: Path, count: int) -> None:
+    if count > LARGEST:
+        raise BadInput(f"{file}: unpacks to {count / 1e6:.0f} MB or more; at most {LARGEST / 1e6:.0f} MB are read from one file")
+
+
+def _unpacked(file: Path) -> int:
+    """Bytes that the elements of a .mat file in version 5 unpack to, counted until they are too many; of what is none its own size."""
+    total = file.stat().st_size
+    with file.open("rb") as stream:
+        head = stream.read(128)
+        order = {b"IM": "<", b"MI": ">"}.get(head[126:128])
+        while order is not None and len(tag := stream.read(8)) == 8:
+            kind, size = struct.unpack(f"{order}II", tag)
+            if kind != COMPRESSED:
+                stream.seek(size, 1)
+                continue
+            end, unpacking = stream.tell() + size, zlib.decompressobj()
+            while (rest := end - stream.tell()) > 0 and (packed := stream.read(min(STEP, rest))):
+                while packed and total <= LARGEST:
+                    total += len(unpacking.decompress(packed, STEP))
+                    packed = unpacking.unconsumed_tail
+                if total > LARGEST:
+                    return total
+    return total
 
 
 def _mat(file: Path) -> Iterator[tuple[str, Any]]:
     from scipy.io import loadmat
 
     try:
+        _refuse_larger(file, _unpacked(file))
         stored = loadmat(file, simplify_cells=True)
+    except BadInput:
+        raise
     except Exception as error:  # scipy's reader raises whatever a damaged file leads it to
         raise BadInput(f"{file}: cannot be read as .mat: {error}") from None
     for name, value in stored.items():
@@ -53,14 +95,19 @@ def _hdf5(file: Path) -> Iterator[tuple[str, Any]]:
             f"{file}: is a .mat of version 7.3 (HDF5), which needs h5py: pip install 'thermospindle[hdf5]', or save it with -v7"
         ) from None
     found: dict[str, Any] = {}
+    bytes_of: list[int] = []
 
     def visit(name: str, node: Any) -> None:
         if isinstance(node, h5py.Dataset) and not name.startswith("#"):
+            bytes_of.append(int(node.nbytes))
+            _refuse_larger(file, sum(bytes_of))
             found[name.replace("/", ".")] = _matlab(node)
 
     try:
         with h5py.File(file, "r") as stored:
             stored.visititems(visit)
+    except BadInput:
+        raise
     except Exception as error:  # as h5py does
         raise BadInput(f"{file}: cannot be read as HDF5: {error}") from None
     for name, value in found.items():
