@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.linalg import cho_factor, cho_solve
 from scipy.special import log_ndtr, logsumexp
 
 from thermospindle.diagnosis.inference import nuisance as kinds_of
@@ -79,13 +79,14 @@ def evidence(model: CampaignModel, fit: Fit, near: Learned | None = None) -> Evi
     kinds = {q.kind for q in model.parameters}
     grids = {kind: grid for kind, grid in GRIDS.items() if kind in kinds}
     own_grid = list(_mechanism_grid(fit))
-    priors = [mechanism_covariance(model, fit.mechanisms, own) for own in own_grid]
+    priors = np.array([mechanism_covariance(model, fit.mechanisms, own) for own in own_grid])
+    roots = np.asarray(np.linalg.cholesky(priors + 1e-12 * np.eye(priors.shape[-1])), float)
 
     def rated(s: float, sizes: Mapping[str, float]) -> tuple[float, int]:
         """ln evidence, the mean over widths and departures; and which of these is best."""
         scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
         inner = _marginal(scaled, nuisance_variances(model, sizes), p)
-        values = np.array([inner.with_prior(prior) for prior in priors]) - fit.count * np.log(s)
+        values = inner.with_priors(roots) - fit.count * np.log(s)
         return float(logsumexp(values) - np.log(len(values))), int(np.argmax(values))
 
     if near is not None:
@@ -161,15 +162,12 @@ class _Marginal:
     b: Array
     a: Array
 
-    def with_prior(self, prior: Array) -> float:
-        if not len(self.b):
-            return self.constant
-        root = np.linalg.cholesky(prior + 1e-12 * np.eye(len(prior)))
-        inner = root.T @ self.a @ root + np.eye(len(prior))
-        half = root.T @ self.b
-        factor = np.linalg.cholesky(inner)
-        solved = solve_triangular(factor, half, lower=True)
-        return self.constant + 0.5 * float(solved @ solved) - float(np.log(np.diag(factor)).sum())
+    def with_priors(self, roots: Array) -> Array:
+        """ln of the integral (g,) with each of the priors whose roots (g, m, m) are given."""
+        turned = roots.transpose(0, 2, 1)
+        factor = np.linalg.cholesky(turned @ self.a @ roots + np.eye(len(self.b)))
+        solved = np.linalg.solve(factor, (turned @ self.b)[..., None])[..., 0]
+        return np.asarray(self.constant + 0.5 * np.sum(solved**2, axis=1) - np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1), float)
 
 
 def _marginal(q: Quadratic, diagonal: Array, p: int) -> _Marginal:
