@@ -137,3 +137,10 @@ def test_a_section_without_ball_rows_is_refused(tmp_path: Path, capsys: pytest.C
     (tmp_path / "spindle.toml").write_text(text, encoding="utf-8")
     assert main(["modes", str(tmp_path)]) == 2
     assert "section: no bearing is a ball row" in capsys.readouterr().err
+
+
+def test_a_shaft_that_hangs_free_has_no_table_and_no_runout(capsys):
+    assert main(["table", FREE, "--temperatures", "20"]) == 0
+    assert "The scene has no bearings." in capsys.readouterr().out
+    assert main(["runout", FREE]) == 2
+    assert "free_shaft/spindle.toml: structure: nothing turns" in capsys.readouterr().err

@@ -154,6 +154,9 @@ def show_table(console: Console, table: StiffnessTable) -> None:
     columns = (
         "T\nC", "speed\nrpm", "bearing", "angle\ndeg", "deform.\num", "ball\nforce\nN", "ball k\nN/um", "preload\nN", "k_RR\nN/um", "k_AA\nN/um",
     )  # fmt: skip
+    if not table.values:
+        console.print("The scene has no bearings.")
+        return
     rows = []
     scale = (1, 1, 1, 1e-6, 1, 1e-6, 1e-6)
     digits = (2, 3, 3, 3, 2, 2, 3)

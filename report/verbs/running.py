@@ -56,6 +56,7 @@ def runout(
         spindle = with_imperfections(spindle, drawn(spindle, seed))
     with progress_bar(5) as progress:
         speed = spindle.nominal_speed if speed_rpm is None else speed_rpm * RPM
+        _ = spindle.turning  # refused where nothing turns
         point = operating_point(spindle, Condition(temperature_or_reference(temperature, spindle), speed))
         found = simulated_runout(point, seconds, element, path)
         progress("record analysed")
