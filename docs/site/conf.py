@@ -14,6 +14,7 @@ extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.viewcode"]
 myst_enable_extensions = ["colon_fence", "deflist"]
 myst_heading_anchors = 3
 default_role = "code"
+highlight_language = "none"  # commands and files; what is Python says so
 html_theme = "furo"
 html_title = "Thermospindle"
 exclude_patterns = ["_build"]

@@ -6,6 +6,7 @@ import json
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -205,6 +206,42 @@ def command_line() -> str:
     return "\n".join(lines)
 
 
+THEORY = {
+    "Expansion": ("thermal.elastic",),
+    "Ball and roller contact": ("model.bearing.hertz", "model.bearing.ball_row", "model.bearing.heavy_ball", "model.bearing.roller"),
+    "Equilibrium of the bearings": ("model.bearing.pair", "model.bearing.springs", "model.rotor.loaded"),
+    "Rotor and base": ("model.rotor.chain", "model.rotor.beam", "model.rotor.modes"),
+    "What excites a running spindle": ("model.bearing.kinematics", "sim.running.excitation"),
+    "The hammer test and its FRFs": ("sim.hammer.estimate", "sim.importing.records"),
+    "Poles of a measurement": ("sim.identification.poles", "sim.identification.modal", "sim.identification.running_lines"),
+    "Measured beside computed": ("diagnosis.compare.compare",),
+    "Lines, noise and evidence": ("diagnosis.data.lines", "diagnosis.data.window", "diagnosis.inference.evidence", "diagnosis.inference.search"),
+    "Warm-up": ("sim.warmup", "thermal.friction", "thermal.heat"),
+}
+"""Sections of the theory, and the modules whose docstrings tell them."""
+
+
+def theory() -> str:
+    """The equations as the modules tell them, so that no page says another thing than the program."""
+    lines = []
+    for title, modules in THEORY.items():
+        lines += [f"## {title}", ""]
+        for name in modules:
+            lines += [f"### `{name}`", "", "```{eval-rst}", _displayed(import_module(f"thermospindle.{name}").__doc__ or ""), "```", ""]
+    return "\n".join(lines)
+
+
+def _displayed(text: str) -> str:
+    """A docstring as reStructuredText whose indented lines are shown as they are, and in which no sign of mathematics is mark-up."""
+    blocks = []
+    for block in re.split(r"\n\s*\n", text.strip()):
+        if all(line.startswith("    ") for line in block.splitlines()):
+            blocks.append("::\n\n" + block)
+        else:
+            blocks.append(block.replace("**", r"\*\*").replace("|", r"\|"))
+    return "\n\n".join(blocks)
+
+
 def write_all(folder: Path) -> None:
     """Write every generated page into a folder of the site."""
     folder.mkdir(exist_ok=True)
@@ -221,6 +258,7 @@ def write_all(folder: Path) -> None:
     }  # fmt: skip
     for name, text in pages.items():
         (folder / f"{name}.md").write_text(text, encoding="utf-8")
+    (folder / "theory.inc").write_text(theory(), encoding="utf-8")
 
 
 if __name__ == "__main__":
