@@ -167,6 +167,20 @@ def test_uff_of_others(folder, source, every):
         read([file], MappingForm(), None)
 
 
+@pytest.mark.parametrize("length", ["0.", "1e400", "nan", "-1."])
+def test_units_of_a_file_are_numbers(tmp_path, length):
+    """Found by `make torture`: a factor of data set 164 that made all its FRFs infinite."""
+    text = (DATA / "uff_files_jl" / "dataset151_164_58_55.unv").read_text(encoding="latin-1")
+    lines = text.splitlines(keepends=True)
+    at = next(k for k, line in enumerate(lines) if line.split() == ["164"]) + 2
+    own = lines[at][:25]
+    changed = "".join([*lines[:at], f"{length:>25}", lines[at][len(own):], *lines[at + 1 :]])
+    assert changed != text
+    (tmp_path / "lab.unv").write_text(changed, encoding="latin-1")
+    with pytest.raises(BadInput, match="164"):
+        read([tmp_path / "lab.unv"], MappingForm(), None)
+
+
 @given(damages)
 def test_tables_of_others(folder, every):
     file = folder / "lab.csv"

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from thermospindle.model.errors import BadInput
+from thermospindle.model.scene.fields import LARGEST, SMALLEST
 from thermospindle.sim.campaign.uff import AXIS, FORCE, KINDS, STANDARD_ERROR, read_uff
 from thermospindle.sim.importing import units
 from thermospindle.sim.importing.files.labels import end
@@ -107,7 +108,7 @@ def _curve(
     unit = settings.unit or joined
     questions: list[Question] = []
     if not unit and not joined and typed and system is not None:
-        scale = float(system["force"]) / float(system["length"])
+        scale = _factor(file, system, "force") / _factor(file, system, "length")
         value = np.asarray(record["data"]) * scale
         return Curve(file, where, *ends, np.asarray(record["x"], float), value, settings.quantity or typed, RATIO[number]), []
     said = {"type": typed, "unit": (units.of_frf(joined) or ("",))[0], "label": units.named(word)}
@@ -119,6 +120,14 @@ def _curve(
         questions.append(Question(file.name, "quantity", f"which quantity its FRFs are: {words}"))
     quantity = settings.quantity or (heard.pop() if len(heard) == 1 else "")
     return Curve(file, where, *ends, np.asarray(record["x"], float), np.asarray(record["data"]), quantity, unit), questions
+
+
+def _factor(file: Path, system: Mapping[str, Any], of: str) -> float:
+    """To SI, of a set of units (164). BadInput for what is no factor."""
+    value = float(system[of])
+    if not SMALLEST <= value <= LARGEST:
+        raise BadInput(f"{file}: data set 164: the factor of {of} = {value:g}: must lie between {SMALLEST:g} and {LARGEST:g}")
+    return value
 
 
 def _motion(file: Path, where: str, record: Mapping[str, Any], ends: tuple[End, End]) -> Motion:
