@@ -87,9 +87,8 @@ def search(
     tried = _singles(model, none, named, free, progress, workers)
     wider = _with_resonance(model, max(tried.singles, key=lambda h: h.evidence.ln, default=none))
     if wider is not None:
-        progress("a light resonance found")
         model, none = wider[0], _without_effects(wider[0])
-        tried = _singles(model, none, named, free, progress, workers)
+        tried = _singles(model, none, named, free, lambda done: None, workers)  # steps that were counted already
     singles = tried.singles
     pairs = _joined(model, none, singles, [*named, *free], tried.most, tried.expected, workers)
     progress("pairs fitted")
