@@ -125,7 +125,7 @@ def _from_csv(file: Path, points: Sequence[Point]) -> RunoutRecord:
             raise BadInput(
                 f"{file}: line 1: {name!r}: allowed are <node>_um, _nm, _mm or _m" + (" and <node>_deg" if kind == "spectrum" else "")
             )
-        if not node.isdigit() or int(node) not in [p.node for p in points]:
+        if not node.isdecimal() or int(node) not in [p.node for p in points]:
             raise BadInput(f"{file}: line 1: {name!r}: node {node!r} is no point of the campaign; allowed are {[p.node for p in points]}")
         if int(node) in found[what]:
             raise BadInput(f"{file}: line 1: {name!r}: node {node} stands twice")

@@ -181,6 +181,13 @@ def test_units_of_a_file_are_numbers(tmp_path, length):
         read([tmp_path / "lab.unv"], MappingForm(), None)
 
 
+def test_a_superscript_is_no_number_of_a_channel(tmp_path):
+    """Found by `make torture`: "²" is a digit to Python, and no number."""
+    (tmp_path / "lab.csv").write_bytes("r ² ".encode() + TABLE)
+    with outcome("CSV to import"):
+        assert read([tmp_path / "lab.csv"], MappingForm(), None)
+
+
 @given(damages)
 def test_tables_of_others(folder, every):
     file = folder / "lab.csv"

@@ -84,7 +84,7 @@ def _role(text: str, unit: str) -> Role | None:
         return replace(told, part=part or "complex")
     if part and {*words} & {*FORCES} and {*words} & {*RESPONSES}:  # "Acceleration/Force magnitude"
         return replace(told, part=part)
-    number = next((int(w) for w in words if w.isdigit()), 0)
+    number = next((int(w) for w in words if w.isdecimal()), 0)
     for kind, known in (("force", FORCES), ("response", RESPONSES)):
         if any(w.rstrip("0123456789") in known for w in words):
             glued = next((re.sub(r"\D", "", w) for w in words if w.rstrip("0123456789") in known), "")
