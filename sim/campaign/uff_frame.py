@@ -28,7 +28,7 @@ def check_frame(path: Path, data: bytes) -> list[int]:
             raise BadInput(f"{where}: does not begin with a line '    -1'; something stands between the sets, or a byte is damaged")
         line = data[begin.end() :].split(b"\n", 1)[0]
         number = line[:6].strip()
-        if not number.isdecimal() or int(number) == 0:
+        if not number.isdigit() or int(number) == 0:
             raise BadInput(f"{where}: {line[:20].decode(errors='replace').strip()!r} is no number of a dataset; a byte is damaged")
         types.append(int(number))
         start = begin.end() + len(line) + 1
@@ -49,7 +49,7 @@ def check_frame(path: Path, data: bytes) -> list[int]:
 def _field(text: bytes, low: int, high: int) -> int:
     """A whole number of a header line; -1 where there is none."""
     digits = text[low:high].strip()
-    return int(digits) if digits.isdecimal() else -1
+    return int(digits) if digits.isdigit() else -1
 
 
 def _check_ordinate(where: str, data: bytes, start: int) -> None:
