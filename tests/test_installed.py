@@ -62,7 +62,7 @@ def copy_of_checkout(folder: Path, links: bool = True) -> Path:
 
 
 def tried(*arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
-    environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "MYPYPATH")}
+    environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTHONSAFEPATH", "MYPYPATH")}
     return subprocess.run([*map(str, arguments)], cwd=cwd, env=environment, capture_output=True, text=True)
 
 
