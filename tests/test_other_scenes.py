@@ -51,6 +51,7 @@ def test_every_verb_answers(scene: Path, verb: str, capsys: pytest.CaptureFixtur
     assert json.loads(capsys.readouterr().out)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", ["symmetric", *(pytest.param(n, marks=pytest.mark.slow) for n in NAMES[1:])], indirect=True)
 def test_identified_modes_are_the_models(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """As many as the model has in the band, members of coincident pairs too, each within five standard errors and 0.1 %."""

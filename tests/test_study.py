@@ -193,6 +193,7 @@ def test_a_fleet_shows_who_stands_apart(fleet, capsys):
     assert "begun with another campaigns" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_killed_and_gone_on_with_is_the_same_to_the_last_bit(tmp_path, capsys):
     file = tmp_path / "study.toml"
     file.write_text(DRAWN + "draws = 120\nchunk = 1\n", encoding="utf-8")

@@ -28,7 +28,7 @@ def test_with_nothing_of_its_own_the_world_is_the_model(scene, temperature, shar
     assert np.abs(ours - theirs).max() < 1e-8 * np.abs(theirs).max()
 
 
-@pytest.mark.parametrize("scene", [*SCENES, FURTHER])
+@pytest.mark.parametrize("scene", [*SCENES, pytest.param(FURTHER, marks=pytest.mark.slow)])
 def test_every_hidden_mechanism_changes_the_frf_and_none_at_size_zero(scene):
     spindle = load(ROOT / scene)
     condition = Condition(WARM, spindle.nominal_speed)

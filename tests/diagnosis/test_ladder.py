@@ -141,6 +141,7 @@ def test_a_temperature_left_out_is_not_in_the_fit_that_predicts_it(spindle):
     assert found[1][1] > 100 * 8
 
 
+@pytest.mark.slow
 def test_effects_of_the_scene_stand_on_every_step(spindle):
     """A scene that has the effect already: nothing is missing, and it cannot be added again."""
     values = {"hub_share": 0.2}

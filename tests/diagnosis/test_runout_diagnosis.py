@@ -77,7 +77,7 @@ def test_nothing_is_named_where_nothing_hides(spindle, own) -> None:
     assert all(e.delta_evidence < 12 for e in d.explanations)
 
 
-@pytest.mark.parametrize("ring", [0, 1], ids=["inner", "outer"])
+@pytest.mark.parametrize("ring", [pytest.param(0, id="inner"), pytest.param(1, id="outer", marks=pytest.mark.slow)])
 def test_waviness_of_the_other_ring_is_not_named(spindle, ring) -> None:
     """The outer ring turns: the same order is another line on either ring."""
     d = found(spindle, {"race_waviness": {"amplitude": 60.0, "multiple": 2, "offset": 0, "ring": ring, "bearing": 0}}, seed=6)
@@ -86,6 +86,7 @@ def test_waviness_of_the_other_ring_is_not_named(spindle, ring) -> None:
     assert rings == {ring}
 
 
+@pytest.mark.slow
 def test_two_effects_are_both_named(spindle) -> None:
     d = found(spindle, {n: HIDDEN[n] for n in ("race_waviness", "ball_size")}, seed=2)
     assert d.verdict == "two effects", d.reason

@@ -54,6 +54,7 @@ def test_what_is_no_format_is_refused(tmp_path, number):
         read("study", text_of("study", tmp_path, number), tmp_path)
 
 
+@pytest.mark.slow
 def test_what_is_written_says_its_format(tmp_path, capsys):
     for file in ROOT.glob("scenes/*/spindle.toml"):
         assert tomllib.loads(file.read_text(encoding="utf-8"))[KEY] == CURRENT["scene"]

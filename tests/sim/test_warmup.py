@@ -237,6 +237,7 @@ def test_warmups_that_are_refused(capsys):
     assert "300000 rpm" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_effects_act_but_for_those_that_prescribe_temperatures(spindle, warm):
     """The film loads the pair as at any operating point; a soak lag, which is a temperature told, is named and does nothing."""
     told = (Addition("soak_lag", {"hub_share": 0.2, "ball_share": 0.5, "nominal_soak": 3600.0}), Addition("lubricant_film", {"scale": 0.5}))

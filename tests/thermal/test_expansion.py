@@ -120,6 +120,7 @@ def test_wrong_region_temperatures_are_named(spindle):
         expand(spindle, {g.name if g.name != "magnet ring" else "magnets": 30.0 for g in spindle.regions})
 
 
+@pytest.mark.slow
 def test_temperature_dependent_laws(spindle):
     """Expansion: the strain is the integral of the law. Modulus: taken at the temperature, so a law that makes aluminium as soft
     at 60 C as another constant gives that constant's motions, within the reduced basis (`thermal.reduced`) at this tolerance of 1e-3. Outside its range a law refuses."""

@@ -250,6 +250,7 @@ def test_running_up_ends_steady_and_is_second_order_with_friction(spindle, refer
     assert ratio == pytest.approx([4, 4], abs=1.2)
 
 
+@pytest.mark.slow
 def test_mesh_of_the_influence_is_fine_enough_for_heat(spindle):
     """Every element divided in four changes no temperature rise by more than 1e-4."""
     drive = heat.running(spindle, 25.0, 7200 * RPM)

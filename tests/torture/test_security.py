@@ -42,6 +42,7 @@ print(len({pid for _, pid in in_parallel(work, range(6), 2)}))
 """
 
 
+@pytest.mark.slow
 def test_nothing_is_imported_from_the_folder_one_stands_in(trapped):
     """Nor by the processes that share the work, nor by the one that tries a log."""
     done = run(PARALLEL, trapped)

@@ -72,6 +72,7 @@ def test_derivatives_of_lines(scene, quantity, decay):
         assert worst[kind] < 5e-3, kind
 
 
+@pytest.mark.slow
 def test_derivatives_of_a_flexible_shaft():
     """Of its reduced model, at speed and warm, against differences of residuals that have a basis of their own on either side."""
     model, x = made(load(ROOT / "scenes" / "five_bearing"), frequency=np.arange(300.0, 4000.1, 50.0))

@@ -110,6 +110,7 @@ def test_double_hits_cost_no_accuracy(spindle, quick):
     assert error(test, exact_frf(test)) < 3e-3
 
 
+@pytest.mark.slow
 def test_standard_errors_come_true(spindle):
     """Noise added anew to one noiseless record: mean squared error over stated variance is one, FRF by FRF."""
     point = operating_point(spindle, Condition(20.0))

@@ -244,6 +244,7 @@ def test_log_gives_the_map_back(met, tmp_path):
     assert log_json(read)["modes_Hz"][0][0][0] == met.modes[0].frequency[0, 0]
 
 
+@pytest.mark.slow
 def test_log_without_its_numbers_is_refused(met, tmp_path):
     write_map_log(met, tmp_path / "map.rrd")
     whole = read_log(tmp_path / "map.rrd")
@@ -269,6 +270,7 @@ def test_map_from_the_command_line(tmp_path, capsys):
     assert "--speed 0" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_runout_grows_when_simulated(light, met):
     """MuJoCo's time domain at the nominal condition and at the crossing shows what the linear model says of the same record, and that grows as the
     map tells.

@@ -224,6 +224,7 @@ def passing(spindle, duration: float) -> tuple[float, float]:
     return float(envelope[inside].max()), float(max(steady))
 
 
+@pytest.mark.slow
 def test_a_slow_run_up_has_the_steady_amplitude_and_a_fast_one_less(spindle):
     """Passing a resonance: Lewis 1932, *Trans. ASME* 54: the faster, the lower the peak; slowly it is that of steady running."""
     slow, steady = passing(spindle, 0.6)
