@@ -81,7 +81,9 @@ def light_resonance(model: CampaignModel, about: Fit, learned: Learned) -> tuple
     lines = [d.frequency for d in model.tests if isinstance(d, LineData)]
     if not lines:
         return None
-    at, whole = fitted(model, about), Problem(model, about.mechanisms, learned).precision.copy()
+    problem = Problem(model, about.mechanisms, learned)
+    at, whole = fitted(model, about), problem.precision.copy()
+    x, effects = problem.parts(about.point)[0], problem.effects_of(about.point)
     gradient = whole @ about.point
     for t in at:
         whole[np.ix_(t.numbers, t.numbers)] += t.information
@@ -91,8 +93,12 @@ def light_resonance(model: CampaignModel, about: Fit, learned: Learned) -> tuple
     grid = np.geomspace(low, high, int(np.log(high / low) / SPACING) + 1)
     rows, seen = [], model.reference.seen
     for frequency in grid:
-        products, gain = _promised(model, about, at, inverse, gradient, Resonance(float(frequency), DAMPING, (0.0,) * seen), learned.errors)
-        rows.append((gain, float(frequency), products))
+        resonance = Resonance(float(frequency), DAMPING, (0.0,) * seen)
+        columns = [
+            SHARE_SD**2 * model.by_products_of_shares(t, x, effects[t], resonance) if isinstance(d, LineData) else None for t, d in enumerate(model.tests)
+        ]
+        products, gain = _promised(columns, at, inverse, gradient, learned.errors)
+        rows.append((gain, resonance.frequency, SHARE_SD**2 * products))
     gain, frequency, products = max(rows, key=lambda row: row[0])
     matrix = np.zeros((seen, seen))
     matrix[np.triu_indices(seen)] = products
@@ -102,20 +108,17 @@ def light_resonance(model: CampaignModel, about: Fit, learned: Learned) -> tuple
     return Resonance(frequency, DAMPING, tuple(shares.tolist())), gain - float(np.log(len(rows)))
 
 
-def _promised(
-    model: CampaignModel, about: Fit, at: Sequence[Fitted], inverse: Array, gradient: Array, resonance: Resonance, errors: float
-) -> tuple[Array, float]:
-    """The products of a light resonance's shares, and the ln evidence that they would gain."""
-    k, problem = len(np.triu_indices(len(resonance.shares))[0]), Problem(model, about.mechanisms)
-    x, effects = problem.parts(about.point)[0], problem.effects_of(about.point)
+def _promised(columns: Sequence[Array | None], at: Sequence[Fitted], inverse: Array, gradient: Array, errors: float) -> tuple[Array, float]:
+    """Parameters (k,) of prior width one whose derivatives (k, N) in every test are `columns`, None where it has none; and the ln evidence that
+    they would gain."""
+    k = next(len(c) for c in columns if c is not None)
     cross, square, slope = np.zeros((len(inverse), k)), np.zeros((k, k)), np.zeros(k)
-    for t, (data, of_test) in enumerate(zip(model.tests, at, strict=True)):
-        if isinstance(data, LineData):
-            column = SHARE_SD**2 * model.by_products_of_shares(t, x, effects[t], resonance)
+    for column, of_test in zip(columns, at, strict=True):
+        if column is not None:
             cross[of_test.numbers] += of_test.derivatives @ column.T
             square += column @ column.T
             slope += column @ of_test.residual
     information = (square - cross.T @ inverse @ cross) / errors**2 + np.eye(k)
     left = (slope - cross.T @ inverse @ gradient) / errors**2
     found = np.asarray(-np.linalg.solve(information, left), float)
-    return SHARE_SD**2 * found, float(-0.5 * left @ found - 0.5 * np.linalg.slogdet(information)[1])
+    return found, float(-0.5 * left @ found - 0.5 * np.linalg.slogdet(information)[1])

@@ -61,6 +61,11 @@ class Hypothesis:
     def free(self) -> bool:
         return any(m.free for m in self.mechanisms)
 
+    @property
+    def excess(self) -> float:
+        """What is left beyond noise, in squares of the errors a number."""
+        return max(self.fit.chi2 / self.fit.count - 1.0, 0.0)
+
 
 @dataclass(frozen=True, eq=False)
 class Search:
@@ -137,11 +142,6 @@ def _singles(
     return Singles(singles, tuple(looked), most, expected)
 
 
-def _excess(h: Hypothesis) -> float:
-    """What is left beyond noise, in squares of the errors."""
-    return max(h.fit.chi2 / h.fit.count - 1.0, 0.0)
-
-
 def _with_resonance(model: CampaignModel, h: Hypothesis) -> tuple[CampaignModel, Hypothesis] | None:
     """The model with the light resonance that an explanation leaves unexplained in every test, and the explanation fitted in it; None where it
     leaves none, or it clears too little."""
@@ -164,7 +164,7 @@ def _with_resonance(model: CampaignModel, h: Hypothesis) -> tuple[CampaignModel,
     except FAILED:
         return None
     found = settled(centred, Hypothesis(again, evidence(centred, again)))
-    asked = found.evidence.ln > h.evidence.ln + PLENTY and _excess(found) < CLEARED * _excess(h)
+    asked = found.evidence.ln > h.evidence.ln + PLENTY and found.excess < CLEARED * h.excess
     return (centred, found) if asked else None
 
 

@@ -106,7 +106,7 @@ def decide(found: Search) -> Verdict:
 
 def changing(h: Hypothesis, same: Overlap) -> float:
     """Squares of the errors a number that an explanation leaves beyond noise, and not alike in all tests."""
-    return max(h.fit.chi2 / h.fit.count - 1.0, 0.0) * (1.0 - same.tests)
+    return h.excess * (1.0 - same.tests)
 
 
 def coarsening(best: Hypothesis) -> float:

@@ -12,7 +12,7 @@ from tests.virtual_campaign import drawn, effect, model_of, virtual_campaign
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.nuisance import RESONANCE, Resonance
-from thermospindle.diagnosis.inference.search import Hypothesis, _excess, _with_resonance, settled
+from thermospindle.diagnosis.inference.search import Hypothesis, _with_resonance, settled
 from thermospindle.diagnosis.verdict import diagnose
 from thermospindle.model.machine import Condition
 from thermospindle.sim.effects.effect import Effect, Parameter
@@ -50,7 +50,7 @@ def test_it_is_found_where_it_is(model):
     assert found is not None
     wider, h = found
     assert h.fit.chi2 / h.fit.count == pytest.approx(1.0, abs=0.15)
-    assert _excess(h) < 0.1 * _excess(none)
+    assert h.excess < 0.1 * none.excess
     assert wider.resonances[0].frequency == pytest.approx(AT, rel=1e-3)
     assert wider.resonances[0].damping == pytest.approx(RATIO, rel=0.1)
     assert h.evidence.ln > none.evidence.ln + 100
