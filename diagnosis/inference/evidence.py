@@ -21,6 +21,7 @@ from scipy.special import log_ndtr, logsumexp
 
 from thermospindle.diagnosis.inference import nuisance as kinds_of
 from thermospindle.diagnosis.inference.fit import Fit
+from thermospindle.diagnosis.inference.mechanism import Mechanism, size_covariance
 from thermospindle.diagnosis.inference.model import CampaignModel
 from thermospindle.diagnosis.inference.prior import Learned, covariance, mechanism_covariance, nuisance_variances
 from thermospindle.model.types import Array
@@ -121,7 +122,7 @@ def evidence(model: CampaignModel, fit: Fit, near: Learned | None = None) -> Evi
         part = slice(at, at + tests)
         means.append(m.size.neutral + root @ mean[part])
         covariances.append(root @ spread[part, part] @ root.T)
-        truncation += _one_sided(m, means[-1], covariances[-1])
+        truncation += _one_sided(model, m, own[len(means) - 1], means[-1], covariances[-1])
         at += tests + len(m.shape)
     shape = (len(fit.mechanisms), tests)
     return Evidence(
@@ -130,16 +131,22 @@ def evidence(model: CampaignModel, fit: Fit, near: Learned | None = None) -> Evi
     )
 
 
-def _one_sided(mechanism, mean: Array, covariance: Array) -> float:
-    """ln of twice the posterior probability of the sign that limits allow: a size that may not be negative has half its prior."""
+def _one_sided(model: CampaignModel, mechanism: Mechanism, own: tuple[float, float], mean: Array, covariance: Array) -> float:
+    """ln of twice the posterior probability of the sign that limits allow: a size that may not be negative has half its prior.
+
+    The sign is that of the size a which all tests share, about which `own` (width, departure) lets them scatter: a_t = a (1 + r_t), of which the
+    posterior `mean` (n,) and `covariance` (n, n) are given (conditional mean of jointly Gaussian quantities: Rasmussen & Williams, *Gaussian
+    Processes*, 2006, Eq. A.6).
+    """
     low, high = mechanism.size.limits
     sign = 1.0 if low >= mechanism.size.neutral else -1.0 if high <= mechanism.size.neutral else 0.0
     if not sign:
         return 0.0
-    weight = np.linalg.lstsq(covariance + 1e-12 * np.trace(covariance) * np.eye(len(mean)), np.ones(len(mean)), rcond=None)[0]
-    weight = weight / weight.sum()
-    sd = float(np.sqrt(max(weight @ covariance @ weight, 1e-300)))
-    return float(np.log(2) + log_ndtr(sign * float(weight @ (mean - mechanism.size.neutral)) / sd))
+    width, departure = own
+    prior = size_covariance([d.condition for d in model.tests], 1.0, departure)
+    weight = np.linalg.solve(prior, np.ones(len(mean)))
+    variance = (width * mechanism.size.prior_sd) ** 2 * max(1.0 - float(weight.sum()), 0.0) + float(weight @ covariance @ weight)
+    return float(np.log(2) + log_ndtr(sign * float(weight @ (mean - mechanism.size.neutral)) / np.sqrt(max(variance, 1e-300))))
 
 
 def _error_scales(whole: Quadratic, count: int) -> Array:

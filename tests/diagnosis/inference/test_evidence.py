@@ -60,8 +60,12 @@ class Toy:
         return float(multivariate_normal(np.zeros(len(y)), covariance).logpdf(y) + len(y) / 2 * np.log(2 * np.pi))
 
 
-def toy(seed: int, stiffness: float, hidden: float | None = None, limits=(-50.0, 50.0), rows: int = 40, errors: float = 1.0) -> Toy:
-    """Data drawn with a discrepancy of the size `stiffness`, and, with a mechanism in the fit, a `hidden` size in every test."""
+def toy(
+    seed: int, stiffness: float, hidden: float | tuple[float, ...] | None = None, limits=(-50.0, 50.0), rows: int = 40, errors: float = 1.0,
+    confused: tuple[float, ...] = (0.0, 0.0, 0.0),
+) -> Toy:
+    """Data drawn with a discrepancy of the size `stiffness`, and, with a mechanism in the fit, a `hidden` size in every test, of which the first
+    tolerance cannot be told from `confused` times its change."""
     random = np.random.default_rng(seed)
     parameters = [Nuisance(BUILD, f"b{i}", 0.01) for i in range(3)] + [Nuisance(STIFFNESS, f"k{i}", STIFFNESS_SD, modes=(i, i)) for i in range(8)]
     parameters += [Nuisance(DAMPING, f"c{i}", DAMPING_SD, modes=(i, i)) for i in range(2)]
@@ -73,13 +77,16 @@ def toy(seed: int, stiffness: float, hidden: float | None = None, limits=(-50.0,
         roots = (np.linalg.cholesky(size_covariance(CONDITIONS, REFERENCE_WIDTH * size.prior_sd, REFERENCE_DEPARTURE)),)
     n = len(parameters)
     p = np.array([stiffness / STIFFNESS_SD if q.kind == STIFFNESS else 1.0 if q.kind in (BUILD, TEMPERATURE) else 0.0 for q in parameters])
-    p = np.concatenate([p * random.standard_normal(n), *([np.linalg.solve(r, np.full(3, hidden - 1.0)) for r in roots])])
+    p = np.concatenate([p * random.standard_normal(n), *([np.linalg.solve(r, np.full(3, np.array(hidden) - 1.0)) for r in roots])])
     own_of_test = np.array([q.test is None for q in parameters])
     jacobians, y = [], []
     for t in range(3):
         j = random.standard_normal((rows, n)) * np.where(own_of_test | np.array([q.test == t for q in parameters]), 1.0, 0.0)
         j[:, [q.kind == STIFFNESS for q in parameters]] *= 5  # the smallest size shows by about five standard errors
-        j = np.concatenate([j, *[2 * random.standard_normal((rows, 1)) * r[t][None, :] for r in roots]], axis=1)
+        by_size = 2 * random.standard_normal((rows, 1))
+        if any(confused):
+            j[:, :1] = confused[t] * by_size
+        j = np.concatenate([j, *[by_size * r[t][None, :] for r in roots]], axis=1)
         jacobians.append(j)
         y.append(j @ p + errors * random.standard_normal(rows))
     point = p + 0.3 * random.standard_normal(len(p))  # the quadratic is the same about any point
@@ -139,6 +146,16 @@ def test_a_size_of_one_sign_has_half_a_prior():
     wrong = toy(4, 0.0, hidden=0.4, limits=(1.0, 50.0))
     other = toy(4, 0.0, hidden=0.4)
     assert evidence(wrong.model, wrong.fit).ln - evidence(other.model, other.fit).ln < norm.logcdf(-5)
+
+
+def test_sizes_that_depart_from_their_law_keep_the_sign_that_all_have():
+    """Errors that all sizes share weigh them against each other: the mean of least variance of 1.8, 3.4 and 1.7 is then less than 1."""
+    sizes = {"hidden": (1.8, 3.4, 1.7), "confused": (0.3, 0.6, 0.3), "rows": 400}
+    free, bound = toy(6, 0.0, **sizes), toy(6, 0.0, **sizes, limits=(1.0, 50.0))
+    found = evidence(free.model, free.fit)
+    gls = np.linalg.solve(found.size_covariance[0], np.ones(3))
+    assert gls @ found.sizes[0] / gls.sum() < 1.0 < found.sizes[0].min()
+    assert 0 < evidence(bound.model, bound.fit).ln - found.ln < np.log(2) + 1e-9  # the sign is more probable than not
 
 
 @pytest.mark.parametrize("hidden", [None, 1.6])
