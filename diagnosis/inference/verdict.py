@@ -28,6 +28,7 @@ NEGLIGIBLE = 1e-3  # probability that adds nothing to a set
 LARGEST = 6  # names in a set, beyond which it says little
 NUMERICS = (1e-4, 0.01)  # drift of frequencies and of damping that two honest programs may differ by
 MOSTLY = 0.6  # of the ln evidence of an explanation with free drift in it, or of the misfit that changes, that what is named must reach to be the answer
+UNTOLD = "nothing tried"  # what explains data that are missed grossly
 MUCH, LEFT = 0.5, "what is left"  # squares of the errors, from which what is left and changes tells of something else
 COARSE = 4.0  # chosen on blind campaigns 1 to 16, by log score; others judge it
 DEPARTS = 0.3  # of the size, from which a law does not hold
@@ -82,26 +83,31 @@ def decide(found: Search) -> Verdict:
     candidates = tuple(c for c in every if not c.free)
     free = tuple(c for c in every if c.free)
     none = float(np.exp(next(w for h, w in rows if not h.mechanisms) - total))
-    adrift = _adrift(found.base)  # nothing named, and yet more drifts than two honest programs differ by: that is something
-    if adrift:
-        free = (*free, Candidate(found.base, ("every mode",), True, 0.0, none))
-        free = tuple(sorted(free, key=lambda c: -c.probability))
-        none = 0.0
-    kept = changing(found.base, overlap(found.model, found.base.fit)), changing(found.hypotheses[0], same)
-    if kept[1] > MUCH and kept[1] > (1 - MOSTLY) * kept[0]:  # what leaves most of what changes is no explanation
-        free = (Candidate(found.base, (LEFT,), True, 0.0, sum(c.probability for c in candidates)), *free)
-        free = tuple(sorted(free, key=lambda c: -c.probability))
-        candidates = tuple(replace(c, probability=0.0) for c in candidates)
+    candidates, free, none = _unheld(found, same, candidates, free, none)
     unknown = sum(c.probability for c in free)
     word, effects, losses = _least_loss(candidates, none, free, found.alike)
-    if word == "none" and found.base.evidence.chi2 > GROSS * found.base.fit.count:
-        word = "unexplained"
     accepted = _accepted(found, word, effects, candidates, free)
     groups = conditions_of(found)
     before = left_out(found.model, found.base.fit, found.base.evidence, groups)
     after = left_out(found.model, accepted.fit, accepted.evidence, groups)
     reason = _reason(found, word, effects, candidates, free, none, before, after) + _seen(found.model) + _constant(found.hypotheses[0], same)
     return Verdict(word, effects, reason, candidates, free, none, unknown, losses, before, after, accepted)
+
+
+def _unheld(
+    found: Search, same: Overlap, candidates: tuple[Candidate, ...], free: tuple[Candidate, ...], none: float
+) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...], float]:
+    """What is only the best of what was tried, with its probability moved to the unknown: nothing missing, where modes drift by more than two honest
+    programs differ by or the data are missed grossly; effects, where they leave most of what changes."""
+    gross = found.base.evidence.chi2 > GROSS * found.base.fit.count
+    if _adrift(found.base) or gross:
+        free = (*free, Candidate(found.base, (UNTOLD,) if gross else ("every mode",), True, 0.0, none))
+        none = 0.0
+    kept = changing(found.base, overlap(found.model, found.base.fit)), changing(found.hypotheses[0], same)
+    if kept[1] > MUCH and kept[1] > (1 - MOSTLY) * kept[0]:
+        free = (*free, Candidate(found.base, (LEFT,), True, 0.0, sum(c.probability for c in candidates)))
+        candidates = tuple(replace(c, probability=0.0) for c in candidates)
+    return candidates, tuple(sorted(free, key=lambda c: -c.probability)), none
 
 
 def changing(h: Hypothesis, same: Overlap) -> float:
@@ -278,10 +284,10 @@ def _reason(found: Search, word: str, effects: Names, candidates, free, none: fl
             place = f"the best leaves {np.sqrt(left.chi2 / left.count):.1f} standard errors of {np.sqrt(chi2 / n):.1f}, and not the same in every test"
         elif free and free[0].hypothesis.mechanisms:
             place = f"{' and '.join(free[0].names)} would have to drift ({free[0].delta_evidence:.0f} in ln evidence)"
-        elif free:
+        elif free and free[0].names != (UNTOLD,):
             drift = found.base.evidence.learned.sizes[kinds_of.STIFFNESS_DRIFT]
             place = f"every mode drifts from test to test, by {drift:.1g} of its frequency, more than two honest programs differ by"
-        if not free:
+        if not free or free[0].names == (UNTOLD,):
             return f"No effect of the catalogue explains the data: {place} (chi2 without effects: {chi2 / n:.2f} a number)."
         rival = f"; the best of the catalogue, {' + '.join(lead.names)}, reaches {lead.delta_evidence:.0f}" if lead else ""
         return f"No effect of the catalogue explains the data as well as free drift does: {place}{rival} (chi2 without effects: {chi2 / n:.2f} a number)."

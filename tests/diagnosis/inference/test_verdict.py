@@ -199,6 +199,18 @@ def test_what_leaves_most_of_the_misfit_is_no_explanation(leaves, word):
     assert ("the best leaves" in v.reason) == (word == "unexplained")
 
 
+@pytest.mark.parametrize(("chi2", "word"), [(30.0, "unexplained"), (3.0, "none")])
+def test_data_that_are_missed_grossly_are_not_nothing_missing(chi2, word):
+    """More than five times the errors, and nothing tried gains anything: no probability is left for *none*, and the sentence says where to look."""
+    found = made({"a": -3.0, "~x": -4.0})
+    none = found.base
+    grossly = replace(none, evidence=replace(none.evidence, chi2=chi2 * none.fit.count))
+    v = decide(replace(found, base=grossly, hypotheses=tuple(grossly if h is none else h for h in found.hypotheses)))
+    assert (v.word, v.probability_none == 0.0) == (word, word == "unexplained")
+    assert total(v) == pytest.approx(1.0)
+    assert ("units, points" in v.reason) == (word == "unexplained")
+
+
 def test_the_order_of_hypotheses_does_not_matter():
     search = made({"a": 12.0, "b": 11.0, "~x": 9.0, ("a", "c"): 10.0})
     turned = replace(search, hypotheses=search.hypotheses[::-1])
