@@ -74,10 +74,11 @@ def drawing(point: OperatingPoint) -> Figure:
     _centres_and_joints(axes, spindle, frame)
     _points(axes, spindle, frame)
     for group, edge, sign in ((labels[0], frame.top + 0.7 * step, 1), (labels[1], -frame.bottom, -1)):
-        for text, z, r, colour, place, level in group:
-            at = edge + sign * step * (level + 0.9)
-            line = {"arrowstyle": "-", "color": colour, "lw": 0.5, "alpha": 0.7, "shrinkA": 0, "shrinkB": 1}
-            axes.annotate(text, (z, r), (place, at), ha="center", va="center", fontsize=8, color=colour, arrowprops=line)
+        rows = [edge + sign * step * (level + 0.9) for *_, level in group]
+        words = [(place, at, _half(text, frame)) for (text, *_, place, _), at in zip(group, rows, strict=True)]
+        for (text, z, r, colour, place, _), at in zip(group, rows, strict=True):
+            axes.plot(*_leader((z, r), (place, at), words, 0.42 * step), color=colour, lw=0.5, alpha=0.7)
+            axes.text(place, at, text, ha="center", va="center", fontsize=8, color=colour)
     axes.axhline(0, color=INK, lw=0.7, ls=(0, (9, 3, 2, 3)))
     axes.set(xlim=frame.across, ylim=(floor, ceiling), xlabel="z, mm", yticks=[])
     axes.spines["left"].set_visible(False)
@@ -232,7 +233,7 @@ def _staggered(labels: Sequence[tuple[str, float, float, str]], frame: Frame) ->
     taken: list[tuple[float, float, float, int]] = []  # span, line, level
     (first, last), apart = frame.across, 0.05 * frame.per_inch
     for text, z, r, colour in sorted(labels, key=lambda entry: entry[1]):
-        half = (LETTER * len(text) / 2 + 0.06) * frame.per_inch
+        half = _half(text, frame)
         place = min(max(z, first + half), last - half)
         low, high = place - half, place + half
 
@@ -245,6 +246,26 @@ def _staggered(labels: Sequence[tuple[str, float, float, str]], frame: Frame) ->
         taken.append((low, high, place, level))
         found.append((text, z, r, colour, place, level))
     return found
+
+
+def _half(text: str, frame: Frame) -> float:
+    """Half the width of a label, mm of the machine."""
+    return (LETTER * len(text) / 2 + 0.06) * frame.per_inch
+
+
+def _leader(start: tuple[float, float], end: tuple[float, float], words: Sequence[tuple[float, float, float]], half: float) -> tuple[list[float], list[float]]:
+    """The line from what a label names to the label, with gaps where it would run through `words` (place, height, half width), `half` their half height."""
+    (z, r), (place, at) = start, end
+    gaps = []
+    for middle, height, wide in words:
+        share = (height - r) / (at - r)
+        if 0 < share <= 1 and abs(z + share * (place - z) - middle) < wide:
+            gaps.append(((height - half - r) / (at - r), (height + half - r) / (at - r)))
+    shares = [0.0]
+    for low, high in sorted((min(g), max(g)) for g in gaps):
+        shares += [low, float("nan"), high]
+    shares += [] if shares[-1] >= 1 else [1.0]
+    return [z + s * (place - z) for s in shares], [r + s * (at - r) for s in shares]
 
 
 def _legend(spindle: Spindle) -> list[Line2D | Patch]:

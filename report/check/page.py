@@ -11,7 +11,7 @@ from matplotlib import rc_context
 
 from thermospindle.report.check.drawing import drawing
 from thermospindle.report.check.words import grids, sentences
-from thermospindle.report.figures.common import STYLE, svg
+from thermospindle.report.figures.common import STYLE, save, svg
 from thermospindle.report.page.report import page
 from thermospindle.report.typeset import figure, minus, prose, table
 from thermospindle.sim.operating import OperatingPoint
@@ -41,9 +41,7 @@ def write_check(point: OperatingPoint, values: Mapping[str, Any], folder: Path) 
     ]
     where = f"{values['reference_temperature_C']:g} °C, at rest"
     (folder / "check.html").write_text(page(point.spindle, where, sections, "Check"), encoding="utf-8")
-    with rc_context(STYLE):
-        picture.savefig(folder / "section.svg", facecolor="white", metadata={"Date": None})
-        picture.savefig(folder / "section.png", dpi=130, facecolor="white")
+    save(picture, folder, "section", 130)
 
 
 def _words(rows: list[list[str]], k: int) -> bool:

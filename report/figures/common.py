@@ -9,11 +9,12 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
-from matplotlib import colormaps
+from matplotlib import colormaps, rc_context
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize, SymLogNorm, to_hex
@@ -25,7 +26,10 @@ from thermospindle.model.types import Array
 
 INK, PALE = "#1b1c1d", "#84898f"
 TEMPERATURES = LinearSegmentedColormap.from_list("cold to hot", ["#2166ac", "#8073ac", "#c9371c"])
-BEARINGS = (("#a0741a", "o", "-"), ("#7a3d8f", "^", "--"), ("#2e7d6b", "s", ":"), ("#555f6b", "D", "-."))
+BEARINGS = (
+    ("#a0741a", "o", "-"), ("#7a3d8f", "^", "--"), ("#2e7d6b", "s", ":"), ("#555f6b", "D", "-."), ("#b0457b", "v", (0, (7, 2))), ("#3b6ea5", "P", (0, (3, 1, 1, 1, 1, 1))),
+)  # fmt: skip
+"""Colour, marker and dashes of a spindle's bearings in their order."""
 STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "thermospindle",
@@ -69,6 +73,13 @@ def colour(temperature: float, every: Sequence[float]) -> str:
     """Colour of a temperature (C) among `every`: cold blue to hot red."""
     low, high = min(every), max(every)
     return to_hex(TEMPERATURES((temperature - low) / (high - low) if high > low else 0.0))
+
+
+def save(figure: Figure, folder: Path, name: str, dpi: float = 150) -> None:
+    """`name`.png and `name`.svg in a folder that exists: files of their own, on white; the same figure gives the same SVG."""
+    with rc_context(STYLE):
+        figure.savefig(folder / f"{name}.png", dpi=dpi, facecolor="white")
+        figure.savefig(folder / f"{name}.svg", dpi=dpi, facecolor="white", metadata={"Date": None})
 
 
 def svg(figure: Figure, key: str, description: str) -> str:

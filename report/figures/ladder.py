@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +17,18 @@ from thermospindle.diagnosis.ladder.ladder import Ladder
 from thermospindle.diagnosis.ladder.step import Step
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
-from thermospindle.report.figures.common import PALE, STYLE, broken, cells, logarithmic, residual_bar, residual_norm, signed_short, svg
+from thermospindle.report.figures.common import (
+    PALE,
+    STYLE,
+    broken,
+    cells,
+    logarithmic,
+    residual_bar,
+    residual_norm,
+    save,
+    signed_short,
+    svg,
+)
 
 ERROR, HELD_OUT = "#b3402a", "#2166ac"
 
@@ -130,10 +140,7 @@ def picture(found: Ladder) -> str:
         return svg(figure(found), "ladder", "Error at every step of the ladder, and residuals on the first and the last")
 
 
-def write(found: Ladder, path: Path) -> None:
-    """The figure as a file of its own, by its ending (.svg or .png), on white."""
-    with rc_context({**STYLE, "figure.facecolor": "white", "savefig.facecolor": "white"}):
-        buffer = io.BytesIO()
-        metadata = {"Date": None} if path.suffix == ".svg" else None
-        figure(found).savefig(buffer, format=path.suffix[1:], dpi=130, metadata=metadata)
-    path.write_bytes(buffer.getvalue())
+def write(found: Ladder, folder: Path) -> None:
+    """The figure as `ladder.png` and `ladder.svg`."""
+    with rc_context(STYLE):
+        save(figure(found), folder, "ladder", 130)

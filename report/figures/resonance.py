@@ -13,10 +13,11 @@ from matplotlib.lines import Line2D
 
 from thermospindle.model.bearing.kinematics import Line
 from thermospindle.model.units import RPM
-from thermospindle.report.figures.common import INK, PALE, STYLE, svg
+from thermospindle.report.figures.common import INK, PALE, STYLE, save, svg
 from thermospindle.report.figures.warmup import MODES, name_ends, spread
 from thermospindle.sim.resonance.found import Coincidence, LineTrack, ResonanceMap, Track, strongest
 from thermospindle.sim.resonance.point import key
+from thermospindle.sim.running.runout import looked_at
 
 WHIRL = {"forward": "#c9371c", "backward": "#2166ac", "none": "#1f8a70"}
 CAUSES = {
@@ -33,10 +34,10 @@ CURVES = 14  # drawn in the map
 
 
 def write_figures(found: ResonanceMap, folder: Path) -> None:
-    """`campbell.png`, `temperature.png`, `coincidences.png`, `nrro.png`."""
-    with rc_context({**STYLE, "savefig.facecolor": "white"}):
+    """`campbell`, `temperature`, `coincidences`, `nrro`, each as PNG and SVG."""
+    with rc_context(STYLE):
         for name, figure in figures(found).items():
-            figure.savefig(folder / f"{name}.png", dpi=150)
+            save(figure, folder, name)
 
 
 def figures_svg(found: ResonanceMap) -> dict[str, str]:
@@ -191,10 +192,10 @@ def runout(found: ResonanceMap) -> Figure:
             axes.plot(x, 1e9 * values[:, column], color=paint, label=name)
         for c in strongest(crossed)[:6]:
             axes.axvline(place(c), color=PALE, lw=0.8, ls=":")
-        axes.set(xlabel=label, ylabel="nonrepeatable runout (NRRO) of the hub, nm rms", xlim=(x[0], x[-1]))
+        axes.set(xlabel=label, ylabel=f"nonrepeatable runout (NRRO) of the {looked_at(found.spindle)}, nm rms", xlim=(x[0], x[-1]))
         axes.set_ylim(0, 1.25e9 * values.max() or 1.0)
         _name_tops(axes, [(place(c), f"{c.line.name}, {c.mode.number}", PALE) for c in strongest(crossed)[:6]])
-        axes.legend(loc="upper left" if axes is right else "lower left")
+        axes.legend(loc="best")
     return figure
 
 

@@ -17,7 +17,7 @@ from thermospindle.report.figures.common import INK, PALE, STYLE, colour
 from thermospindle.sim.posing import round_down
 from thermospindle.sim.running.lines import FoundLine
 from thermospindle.sim.running.revolutions import ErrorMotion, Revolutions, once_per_revolution
-from thermospindle.sim.running.runout import AXIAL, Runout, X, Y
+from thermospindle.sim.running.runout import AXIAL, Runout, X, Y, looked_at
 from thermospindle.sim.running.waterfall import LineSpectrum, on_grid
 
 REPEATS, BAND = "#c9371c", "#2166ac"
@@ -33,8 +33,8 @@ def motion_figure(runout: Runout) -> Figure:
         figure = Figure(figsize=(11.0, 4.3))
         whole = figure.add_gridspec(1, 3, width_ratios=(1.0, 1.05, 1.05))
         cut, values, names = runout.by_lines, runout.values(), [p.name for p in runout.signals.probes]
-        _orbit(figure.add_subplot(whole[0]), cut, names.index(X), names.index(Y))
-        for place, name, title in ((1, X, "Radial error motion (hub x)"), (2, AXIAL, "Axial error motion")):
+        _orbit(figure.add_subplot(whole[0]), cut, names.index(X), names.index(Y), place_of(runout))
+        for place, name, title in ((1, X, f"Radial error motion ({place_of(runout)} x)"), (2, AXIAL, "Axial error motion")):
             axes = figure.add_subplot(whole[place], projection="polar")
             assert isinstance(axes, PolarAxes)
             _polar(axes, cut, names.index(name), values[name], title, name != AXIAL)
@@ -43,14 +43,19 @@ def motion_figure(runout: Runout) -> Figure:
     return figure
 
 
-def _orbit(axes: Axes, cut: Revolutions, x: int, y: int) -> None:
+def place_of(runout: Runout) -> str:
+    """What the probes look at, in a word."""
+    return looked_at(runout.point.spindle)
+
+
+def _orbit(axes: Axes, cut: Revolutions, x: int, y: int, where: str) -> None:
     every = TO_NM * cut.value[[x, y]].reshape(2, -1)
     axes.plot(*every, color=BAND, lw=0.35, alpha=0.45, rasterized=True)
     mean = TO_NM * cut.repeatable[[x, y]]
     axes.plot(*np.concatenate([mean, mean[:, :1]], axis=1), color=REPEATS, lw=2.0)
     reach = 1.08 * float(np.abs(every - every.mean(axis=1, keepdims=True)).max() or 1.0)
     for axis, middle in zip(("x", "y"), every.mean(axis=1), strict=True):
-        axes.set(**{f"{axis}lim": (middle - reach, middle + reach), f"{axis}label": f"hub {axis}, nm"})
+        axes.set(**{f"{axis}lim": (middle - reach, middle + reach), f"{axis}label": f"{where} {axis}, nm"})
     axes.set_aspect("equal")
     axes.set_title(f"Orbit, {cut.count} revolutions")
 

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from thermospindle.model.types import Array
-from thermospindle.report.figures.common import INK, PALE, STYLE, colour
+from thermospindle.report.figures.common import INK, PALE, STYLE, colour, save
 from thermospindle.sim.study.rows import OF_RUNOUT, Cases
 from thermospindle.sim.study.sensitivity import APART
 from thermospindle.sim.study.summary import at_conditions, frequencies, numbers
@@ -27,10 +27,9 @@ KEYED = 12  # lines named below a figure
 
 
 def write_figures(figures: Mapping[str, Figure], folder: Path) -> None:
-    """A PNG of every figure, into a folder that exists."""
-    with rc_context({**STYLE, "savefig.facecolor": "white"}):
-        for name, figure in figures.items():
-            figure.savefig(folder / f"{name}.png", dpi=140)
+    """A PNG and an SVG of every figure, into a folder that exists."""
+    for name, figure in figures.items():
+        save(figure, folder, name, 140)
 
 
 def sweep(of: Cases, table: pa.Table) -> dict[str, Figure]:

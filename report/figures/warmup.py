@@ -12,16 +12,23 @@ from matplotlib.figure import Figure
 
 from thermospindle.model.types import Array
 from thermospindle.model.units import MINUTE
-from thermospindle.report.figures.common import BEARINGS, PALE, STYLE, svg
+from thermospindle.report.figures.common import BEARINGS, PALE, STYLE, save, svg
 from thermospindle.sim.warmup import Warmup
 
 PARTS = {"stationary": "#3b6ea5", "rotating": "#c2622d"}
 MODES = ("#1f8a70", "#7a3d8f", "#a0741a", "#3b6ea5", "#c9371c", "#555f6b", "#d18a0f", "#b0457b")
 
 
-def figure_png(warmup: Warmup, path: Path) -> None:
-    with rc_context({**STYLE, "savefig.facecolor": "white"}):
-        figure(warmup).savefig(path, dpi=150)
+def write_figure(warmup: Warmup, folder: Path) -> None:
+    """`warmup.png` and `warmup.svg`."""
+    with rc_context(STYLE):
+        save(figure(warmup), folder, "warmup")
+
+
+def power(warmup: Warmup) -> tuple[str, float]:
+    """The unit that friction is told in, and how many of it a watt is: a disk drive takes milliwatts, a machine tool watts."""
+    most = max(sum(m.friction.values()) for m in (*warmup.moments, warmup.steady))
+    return ("mW", 1e3) if most < 10 else ("W", 1.0)
 
 
 def figure_svg(warmup: Warmup) -> str:
@@ -51,8 +58,9 @@ def figure(warmup: Warmup) -> Figure:
     axes.legend(loc="lower right")
     preload = np.array([[m.preload[b] for b in bearings] for m in warmup.moments])
     if warmup.speed:
-        third = np.array([[1e3 * m.friction[b] for b in bearings] for m in warmup.moments])
-        about = ("Friction heat of each bearing", "friction heat, mW")
+        unit, scale = power(warmup)
+        third = np.array([[scale * m.friction[b] for b in bearings] for m in warmup.moments])
+        about = ("Friction heat of each bearing", f"friction heat, {unit}")
     else:
         third = np.degrees([[m.point.state.bearing(b).contact_angle for b in bearings] for m in warmup.moments])
         about = ("Contact angle", "contact angle, degrees")
@@ -61,7 +69,7 @@ def figure(warmup: Warmup) -> Figure:
         for k, series in enumerate(values.T[:1] if same else values.T):
             paint, _, dashes = BEARINGS[k % len(BEARINGS)]
             axes.plot(minutes, series, color=paint, ls=dashes, lw=1.5)
-        names = ["both bearings"] if same else bearings
+        names = ["both bearings" if len(bearings) == 2 else f"all {len(bearings)} bearings"] if same else bearings
         name_ends(axes, values[-1, : len(names)], names, [BEARINGS[k % len(BEARINGS)][0] for k in range(len(names))])
         axes.set(title=title, ylabel=label)
     axes = panels[1, 1]

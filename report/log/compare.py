@@ -133,7 +133,7 @@ def _blueprint(title: str, tests: Sequence[FrfsBeside]) -> rrb.Blueprint:
 def _view(t: FrfsBeside, pair: Pair) -> rrb.View:
     frf = t.measured
     value = np.array([v[frf.response_nodes.index(pair[0]), frf.reference_nodes.index(pair[1])] for v in (frf.value, t.computed)])
-    level = decibel(value[:, np.abs(value).min(axis=0) > 0]) if np.any(value) else np.zeros((1, 1))
+    level = decibel(value[value != 0]) if np.any(value) else np.zeros(1)  # one of the two may be nothing: by symmetry, or a channel that was off
     low, high = (float(v) for v in np.percentile(level, [0.5, 100]))
     ends = [rr.TimeRangeBoundary.absolute(seq=round(f)) for f in (frf.frequency[0], frf.frequency[-1])]
     speed = f", {t.test.speed / RPM:.0f} rpm" if t.test.speed else ""

@@ -9,7 +9,7 @@ import rerun.blueprint as rrb
 from thermospindle.model.units import TO_MM
 from thermospindle.report.log.pictures import DARK, view
 from thermospindle.sim.posing import reach
-from thermospindle.sim.running.runout import Runout
+from thermospindle.sim.running.runout import Runout, looked_at
 
 WATERFALL, POLAR = (6.6, 4.8), (4.2, 3.3)  # inches
 WORDS = {"RRO": "repeatable", "NRRO": "nonrepeatable"}
@@ -18,7 +18,7 @@ PLAYED = 3.0  # revolutions of the spindle that a second shows
 
 def blueprint(runout: Runout, factor: float, waterfall: bool) -> rrb.Blueprint:
     """`factor`: by which the model's displacements are enlarged; `waterfall`: whether there is one."""
-    cut, turning = runout.by_lines, abs(runout.turning)
+    cut, turning, where = runout.by_lines, abs(runout.turning), looked_at(runout.point.spindle)
     r = TO_MM * reach(runout.point.spindle)
     eye = rrb.EyeControls3D(position=(1.8 * r, -1.4 * r, 1.9 * r), look_target=(0.1 * r, -0.1 * r, 0.1 * r), eye_up=(0, 0, 1))
     title = f"Displacements × {factor:g}, {PLAYED:g} revolutions a second"
@@ -27,7 +27,7 @@ def blueprint(runout: Runout, factor: float, waterfall: bool) -> rrb.Blueprint:
     grown = rrb.VisibleTimeRange("time", start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.cursor_relative(seconds=0.0))
     orbit = rrb.Spatial2DView(
         origin="orbit",
-        name=f"Orbit of the hub, ±{span / 1.1:.0f} nm; repeatable part red",
+        name=f"Orbit of the {where}, ±{span / 1.1:.0f} nm; repeatable part red",
         visual_bounds=rrb.VisualBounds2D(x_range=(-span, span), y_range=(-span, span)),
         background=DARK,
         time_ranges=[grown],
@@ -37,9 +37,9 @@ def blueprint(runout: Runout, factor: float, waterfall: bool) -> rrb.Blueprint:
         for direction in ("radial", "axial")
         if waterfall
     ]
-    series = [_series(part, some, 4 / turning) for part, some in (("RRO", (0, 1, 2)), ("NRRO", (3, 4, 5)))]
+    series = [_series(part, some, 4 / turning, where) for part, some in (("RRO", (0, 1, 2)), ("NRRO", (3, 4, 5)))]
     middle = rrb.Vertical(*([rrb.Tabs(*charts)] if charts else []), *series, row_shares=[2.6, 1, 1] if charts else [1, 1])
-    polar = view("charts/polar", "Error motion of hub x", POLAR)
+    polar = view("charts/polar", f"Error motion of {where} x", POLAR)
     right = rrb.Vertical(polar, rrb.TextDocumentView(origin="summary", name="Summary"), row_shares=[1, 1.5])
     return rrb.Blueprint(
         rrb.Horizontal(rrb.Vertical(model, orbit), middle, right, column_shares=[1, 1.55, 1.0]),
@@ -51,12 +51,12 @@ def blueprint(runout: Runout, factor: float, waterfall: bool) -> rrb.Blueprint:
     )
 
 
-def _series(part: str, chosen: tuple[int, ...], seconds: float) -> rrb.View:
+def _series(part: str, chosen: tuple[int, ...], seconds: float, where: str) -> rrb.View:
     """RRO or NRRO of the three probes in a window of `seconds` about the cursor."""
     ends = [rr.TimeRangeBoundary.cursor_relative(seconds=t) for t in (-seconds / 2, seconds / 2)]
     return rrb.TimeSeriesView(
         origin="signals",
-        name=f"{part} ({WORDS[part]}), nm: hub x red, hub y blue, axial green",
+        name=f"{part} ({WORDS[part]}), nm: {where} x red, {where} y blue, axial green",
         overrides={"signals": rr.SeriesLines(visible_series=[i in chosen for i in range(6)])},
         axis_x=rrb.TimeAxis(view_range=rr.TimeRange(*ends)),
         plot_legend=rrb.PlotLegend(visible=False),

@@ -11,7 +11,7 @@ from matplotlib import rc_context
 from thermospindle.diagnosis.compare.compare import Comparison
 from thermospindle.diagnosis.runout.compare import RunoutBeside
 from thermospindle.model.machine import Spindle
-from thermospindle.report.figures.common import STYLE, svg
+from thermospindle.report.figures.common import STYLE, save, svg
 from thermospindle.report.figures.compare import figures, label
 from thermospindle.report.figures.runout_campaign import comparison_figures
 from thermospindle.report.log.compare import FrfsBeside, write_comparison_log
@@ -73,11 +73,9 @@ def write_comparison(
     conditions = f"the conditions of {len(ids)} test{'s' if len(ids) > 1 else ''}" + f": {c.campaign if c else campaign}"
     (folder / "report.html").write_text(page(spindle, conditions, every, "Comparison"), encoding="utf-8")
     progress("page written")
-    with rc_context(STYLE):
-        for name, one in ((figures(c) if c else {}) | drawn).items():
-            for kind in ("svg", "png"):
-                one.savefig(folder / f"{name}.{kind}", dpi=150, facecolor="white", metadata={"Date": None} if kind == "svg" else None)
-            progress(f"picture {name} written")
+    for name, one in ((figures(c) if c else {}) | drawn).items():
+        save(one, folder, name)
+        progress(f"picture {name} written")
     shown = [FrfsBeside(t.test, found.beside.measured, found.computed) for t in c.tests if (found := t.correlation) is not None] if c else []
     if c and shown:
         peaks = {t.test.id: [(m.number, m.kind, m.measured, m.sd, m.computed) for m in t.modes] for t in c.tests}

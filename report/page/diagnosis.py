@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from thermospindle.diagnosis.runout.verdict import RunoutDiagnosis
 from thermospindle.diagnosis.verdict import Diagnosis
 from thermospindle.model.machine import Spindle
-from thermospindle.report.figures.common import STYLE, svg
+from thermospindle.report.figures.common import STYLE, save, svg
 from thermospindle.report.figures.diagnosis import figures
 from thermospindle.report.figures.runout_campaign import diagnosis_figures
 from thermospindle.report.page import runout_diagnosis
@@ -62,11 +62,9 @@ def write_diagnosis(
     conditions = f"the conditions of {count} test{'s' if count > 1 else ''}: {answer['campaign']}"
     text = page(spindle, conditions, every, "Diagnosis")
     (folder / "report.html").write_text(text, encoding="utf-8")
-    with rc_context(STYLE):
-        for name, figure in (modal | runout).items():
-            figure.set_layout_engine("none")  # laid out for the page already
-            figure.savefig(folder / f"{name}.svg", facecolor="white", metadata={"Date": None})
-            figure.savefig(folder / f"{name}.png", dpi=130, facecolor="white")
+    for name, one in (modal | runout).items():
+        one.set_layout_engine("none")  # laid out for the page already
+        save(one, folder, name, 130)
 
 
 def _verdict(answer: dict[str, Any]) -> str:

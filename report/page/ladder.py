@@ -23,12 +23,12 @@ def section(found: Ladder) -> tuple[str, str]:
 
 
 def write_ladder(found: Ladder, folder: Path) -> None:
-    """`ladder.svg`, `ladder.rrd` and `report.html` into an existing folder."""
+    """`ladder.png` and `ladder.svg`, `ladder.rrd` and `report.html` into an existing folder."""
     from thermospindle.report.log.ladder import write_ladder_log
     from thermospindle.report.log.ladder_content import shown
     from thermospindle.report.page.report import page
 
-    ladder_plots.write(found, folder / "ladder.svg")
+    ladder_plots.write(found, folder)
     count = len(found.model.tests)
     conditions = f"the conditions of {count} test{'s' if count > 1 else ''}: {found.campaign.title}"
     (folder / "report.html").write_text(page(found.spindle, conditions, [section(found)], "Ladder"), encoding="utf-8")

@@ -15,7 +15,9 @@ from thermospindle.report.text.grid import show_grid
 from thermospindle.report.typeset import figure, prose, table, write_csv
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.resonance.found import Coincidence, ResonanceMap, strongest
+from thermospindle.sim.running.runout import looked_at
 
+SAID = 4  # crossings at the nominal speed told in words, of more than one more
 SHOWN = 18  # coincidences in the terminal and the report
 
 
@@ -120,6 +122,14 @@ def sentences(found: ResonanceMap) -> list[str]:
     return said
 
 
+def told(found: ResonanceMap) -> list[str]:
+    """What a reader is told of `sentences`: the first `SAID`, and how many more there are."""
+    every = sentences(found)
+    left = len(every) - SAID
+    many = f"So do {left} weaker lines between {found.temperatures[0]:g} and {found.temperatures[-1]:g} C; all are in coincidences.csv of --out, and in --json."
+    return every if left <= 1 else [*every[:SAID], many]
+
+
 def _line(c: Coincidence) -> str:
     order = f" of order {c.line.order}" if c.line.order else ""
     where = f" of the {c.line.bearing} bearing" if c.line.bearing else ""
@@ -132,7 +142,7 @@ def _mode(c: Coincidence) -> str:
 
 
 def show_map(console: Console, found: ResonanceMap) -> None:
-    for said in sentences(found):
+    for said in told(found):
         console.print(said, highlight=False)
     console.print()
     title = f"Coincidences from {found.temperatures[0]:g} to {found.temperatures[-1]:g} C, up to {found.speeds[-1] / RPM:g} rpm, strongest first"
@@ -144,7 +154,7 @@ def show_map(console: Console, found: ResonanceMap) -> None:
         else f"plausible imperfections (seed {found.drawn_from}; the scene names none)"
     )
     console.print(
-        f"{len(found.coincidences)} in all. Strength: amplitude of the mode at the hub under {whose}. "
+        f"{len(found.coincidences)} in all. Strength: amplitude of the mode at the {looked_at(found.spindle)} under {whose}. "
         f"Margin: of the line from the mode at {found.nominal.temperature:g} C, {found.nominal.speed / RPM:g} rpm.",
         highlight=False,
     )
@@ -188,7 +198,7 @@ def write_map(found: ResonanceMap, folder: Path) -> None:
 
 def map_section(found: ResonanceMap) -> tuple[str, str]:
     """Title and HTML of a report section."""
-    said = "".join(f"<p>{prose(s)}</p>" for s in sentences(found))
+    said = "".join(f"<p>{prose(s)}</p>" for s in told(found))
     head = ("line", "wave and order", "bearing", "mode", "°C", "rpm", "Hz", "strength, nm", "NRRO (nonrepeatable runout), nm rms", "margin, %")
     grid = table(head, [[prose(cell) for cell in _cells(c)] for c in strongest(found.coincidences)[:SHOWN]], range(4))
     drawings = figures_svg(found)

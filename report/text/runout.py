@@ -18,8 +18,8 @@ from rich.console import Console
 
 from thermospindle.model.machine import Spindle
 from thermospindle.model.units import RPM, TO_UM
-from thermospindle.report.figures.common import STYLE, svg
-from thermospindle.report.figures.runout import motion_figure, spectrum_figure
+from thermospindle.report.figures.common import STYLE, save, svg
+from thermospindle.report.figures.runout import motion_figure, place_of, spectrum_figure
 from thermospindle.report.log.runout import write_runout_log
 from thermospindle.report.text.grid import grid, show_grid
 from thermospindle.report.typeset import figure, table, write_csv
@@ -115,11 +115,12 @@ def line_json(line: FoundLine) -> dict[str, Any]:
 # ---------------------------------------------------------------- terminal
 
 
-def show_runout(console: Console, answer: dict[str, Any]) -> None:
+def show_runout(console: Console, answer: dict[str, Any], where: str) -> None:
+    """`where` names what the probes look at."""
     nominal = f" ({answer['speed_from']})" if answer["speed_from"] != "--speed" else ""
     title = f"Runout at {answer['temperature_C']:g} C, {answer['speed_rpm']:g} rpm{nominal}, {answer['revolutions']} revolutions, um"
     title += f" (bearings {answer['status']})"
-    quoted = grid(title, ("", "radial\n(hub x)", "axial"), words=("",))
+    quoted = grid(title, ("", f"radial\n({where} x)", "axial"), words=("",))
     for key, meaning in STATISTICS.items():
         quoted.add_row(meaning, *(f"{answer[key][d]:.4f}" for d in MAIN))
     console.print(quoted)
@@ -146,10 +147,8 @@ def write_runout(runout: Runout, spindle: Spindle, answer: dict[str, Any], folde
     names = [k for k in line_json(runout.lines[0]) if k != "causes"] if runout.lines else ["frequency_Hz"]
     write_csv(folder / "lines.csv", names, ([row[k] for k in names] for row in answer["lines"]))
     progress("tables written")
-    with rc_context(STYLE):
-        for name, drawn in (("motion", motion_figure(runout)), ("spectrum", spectrum_figure(runout))):
-            drawn.savefig(folder / f"{name}.png", dpi=130, facecolor="white")
-            drawn.savefig(folder / f"{name}.svg", dpi=130, facecolor="white", metadata={"Date": None})
+    for name, drawn in (("motion", motion_figure(runout)), ("spectrum", spectrum_figure(runout))):
+        save(drawn, folder, name, 130)
     progress("figures written")
     condition = runout.point.condition
     write_runout_log(runout, waterfall(spindle, condition.temperature, run_up(condition.speed)), folder / "runout.rrd")
@@ -184,6 +183,7 @@ def _table(path: Path, names: list[str], columns: list[Any]) -> None:
 
 def runout_section(runout: Runout, answer: dict[str, Any]) -> tuple[str, str]:
     """A section of the report: title and HTML."""
+    where = place_of(runout)
     quoted = [[escape(meaning), *(f"{1e3 * answer[key][d]:.2f}" for d in MAIN)] for key, meaning in STATISTICS.items()]
     lines = [
         [
@@ -195,8 +195,8 @@ def runout_section(runout: Runout, answer: dict[str, Any]) -> tuple[str, str]:
     text = (
         f"<p>{answer['revolutions']} revolutions at {answer['temperature_C']:g} °C and {answer['speed_rpm']:.6g} rpm, bearings {answer['status']}, "
         f"imperfections {answer['imperfections']}. The repeatable part is made of the lines at whole multiples of the turning frequency.</p>"
-        f"{table(('nm', 'radial (hub x)', 'axial'), quoted)}"
-        f"{_figure(motion_figure(runout), 'motion', 'Orbit of the hub, and its error motion over the angle of the turning part.')}"
+        f"{table(('nm', f'radial ({escape(where)} x)', 'axial'), quoted)}"
+        f"{_figure(motion_figure(runout), 'motion', f'Orbit of the {escape(where)}, and its error motion over the angle of the turning part.')}"
         f"{_figure(spectrum_figure(runout), 'spectrum', 'Amplitude over frequency; a mark is a line fitted at its known frequency.')}"
         f"{table(('Hz', 'orders', 'direction', 'nm', 'line', 'cause'), lines, (2, 4, 5))}"
     )

@@ -14,7 +14,7 @@ from thermospindle.model.bearing.roller import RollerState
 from thermospindle.model.machine import RollerBearing
 from thermospindle.model.types import Array
 from thermospindle.model.units import MINUTE, RPM
-from thermospindle.report.figures.warmup import figure_png, figure_svg
+from thermospindle.report.figures.warmup import figure_svg, power, write_figure
 from thermospindle.report.text.grid import show_grid
 from thermospindle.report.typeset import figure, minus, write_csv
 from thermospindle.sim.operating import provenance
@@ -105,11 +105,11 @@ def rows(warmup: Warmup) -> tuple[list[str], list[list[float]]]:
 
 
 def write_warmup(warmup: Warmup, folder: Path) -> None:
-    """`warmup.csv` (a comment line of provenance, a header with units, all steps) and `warmup.png`."""
+    """`warmup.csv` (a comment line of provenance, a header with units, all steps), `warmup.png` and `warmup.svg`."""
     header, body = rows(warmup)
     about = ", ".join(f"{k} {v}" for k, v in provenance(warmup.spindle).items())
     write_csv(folder / "warmup.csv", header, body, about)
-    figure_png(warmup, folder / "warmup.png")
+    write_figure(warmup, folder)
 
 
 def show_warmup(console: Console, warmup: Warmup) -> None:
@@ -119,7 +119,7 @@ def show_warmup(console: Console, warmup: Warmup) -> None:
     if lost:
         console.print(f"{lost[0].upper()}{lost[1:]}.\n", highlight=False)
     bearings = [b.name for b in warmup.spindle.bearings]
-    unit, scale = _power(warmup)
+    unit, scale = power(warmup)
     columns = ["time\nmin", *(f"{b}\nC" for b in bearings), "coolest\nC", "hottest\nC", f"{bearings[0]}\npreload\nN", f"friction\n{unit}"]
     columns += [f"f{k}\nHz" for k in range(1, len(warmup.modes) + 1)]
     rows = [
@@ -128,10 +128,10 @@ def show_warmup(console: Console, warmup: Warmup) -> None:
     show_grid(console, title, columns, [*rows, ["steady", *_cells(warmup.steady, bearings, warmup.steady_frequencies, scale)]])
     kinds = ", ".join(f"f{k} {m.kind}" for k, m in enumerate(warmup.modes, 1))
     console.print(f"Bearings, coolest and hottest region; {kinds}.")
-    total = energy(warmup)
+    total = _heat(warmup)
     console.print(
-        f"Slowest time constant {warmup.time_constant:.0f} s. Heat of the whole time: motor {total['motor']:.1f} J and bearings "
-        f"{total['friction']:.1f} J in, convection {total['convection']:.1f} J out, {total['stored']:.1f} J stored."
+        f"Slowest time constant {warmup.time_constant:.0f} s. Heat of the whole time: motor {total['motor']} and bearings "
+        f"{total['friction']} in, convection {total['convection']} out, {total['stored']} stored."
     )
     if warmup.left_out:
         console.print(f"Left out, since region temperatures are computed here: {', '.join(warmup.left_out)}.")
@@ -148,14 +148,15 @@ def lost_contact(warmup: Warmup) -> str:
     return ""
 
 
+def _heat(warmup: Warmup) -> dict[str, str]:
+    """Where the heat of the whole time came from and went, in joules or kilojoules."""
+    total = energy(warmup)
+    large = max(map(abs, total.values())) >= 1e4
+    return {name: f"{1e-3 * value:.1f} kJ" if large else f"{value:.1f} J" for name, value in total.items()}
+
+
 def _all_loaded(moment: Moment) -> bool:
     return all(b.in_contact for b in moment.point.state.bearings)
-
-
-def _power(warmup: Warmup) -> tuple[str, float]:
-    """The unit that friction is told in, and how many of it a watt is: a disk drive takes milliwatts, a machine tool watts."""
-    most = max(sum(m.friction.values()) for m in (*warmup.moments, warmup.steady))
-    return ("mW", 1e3) if most < 10 else ("W", 1.0)
 
 
 def _cells(moment: Moment, bearings: Sequence[str], frequency: Array, scale: float) -> list[str]:
@@ -177,20 +178,20 @@ def _shown(times: Array) -> list[int]:
 
 def warmup_section(warmup: Warmup) -> tuple[str, str]:
     """Title and HTML of a report section."""
-    last, total = warmup.steady, energy(warmup)
+    last, total = warmup.steady, _heat(warmup)
     bearings = ", ".join(f"{b} {t:.1f}" for b, t in last.bearing_temperatures.items())
     first = warmup.spindle.bearings[0].name
     shifts = ", ".join(
         f"mode {k} ({escape(m.kind)}) {b - a:+.1f}"
         for k, (m, a, b) in enumerate(zip(warmup.modes, warmup.frequencies[0], warmup.steady_frequencies, strict=True), 1)
     )
-    unit, scale = _power(warmup)
+    unit, scale = power(warmup)
     about = (
         f"<p>From {warmup.start:g} °C in air of {warmup.air:g} °C at {warmup.speed / RPM:.0f} rpm. The slowest time constant is "
         f"{warmup.time_constant:.0f} s. In the steady state the bearings are at {escape(bearings)} °C, the preload of {escape(first)} is "
         f"{last.preload[first]:.2f} N (at the start {warmup.moments[0].preload[first]:.2f} N) and bearing friction "
         f"{scale * sum(last.friction.values()):.0f} {unit}; natural frequencies move by {shifts} Hz.</p>"
-        f"<p>Heat: motor {total['motor']:.1f} J, bearings {total['friction']:.1f} J in; convection {total['convection']:.1f} J out; "
-        f"stored {total['stored']:.1f} J.</p>"
+        f"<p>Heat: motor {total['motor']}, bearings {total['friction']} in; convection {total['convection']} out; "
+        f"stored {total['stored']}.</p>"
     )
     return "Warm-up", minus(about) + figure(figure_svg(warmup))

@@ -28,8 +28,8 @@ from thermospindle.report.verbs.answer import (
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.resonance.found import ResonanceMap
 from thermospindle.sim.resonance.map import resonance_map, stages
+from thermospindle.sim.running.runout import looked_at, with_imperfections
 from thermospindle.sim.running.runout import runout as simulated_runout
-from thermospindle.sim.running.runout import with_imperfections
 from thermospindle.sim.warmup import STAGES, warm_up
 
 STEPS_OF_TEMPERATURE, STEPS_OF_SPEED = 21, 41  # of a resonance map
@@ -71,7 +71,7 @@ def runout(
         def write(folder: Path, answer: dict[str, Any]) -> None:
             write_runout(found, spindle, answer, folder, progress)
 
-        return answered(values, lambda console: show_runout(console, values), out, asked, write, doubts)
+        return answered(values, lambda console: show_runout(console, values, looked_at(spindle)), out, asked, write, doubts)
 
 
 def warmup(

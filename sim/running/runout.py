@@ -141,6 +141,16 @@ def hub_probes(spindle: Spindle) -> tuple[Probe, Probe, Probe]:
     )
 
 
+def looked_at(spindle: Spindle) -> str:
+    """What the first two probes look at, in a word: the turning body, or the measuring point of a flexible shaft."""
+    probe = hub_probes(spindle)[0]
+    shaft = next((s for s in spindle.structure.shafts if s.turns), None)
+    if shaft is None:
+        return probe.body
+    here = (p.name for p in spindle.points if p.body in shaft.bodies and abs(p.direction[2]) < 0.5 and p.position[2] == probe.position[2])
+    return next(here, f"end of {shaft.name}")
+
+
 def _on_shaft(spindle: Spindle, shaft: Shaft, lowest: bool = True) -> tuple[str, float, float]:
     """Body, radius (m) and height (m) at which a probe looks at a shaft: its first measuring point across the axis, or the end farthest from it."""
     across = [p for p in spindle.points if p.body in shaft.bodies and abs(p.direction[2]) < 0.5]

@@ -320,7 +320,7 @@ def test_json_of_the_command(capsys, tmp_path):
     assert answer["rungs"][-1]["effects"] == ["expansion_mismatch"]
     assert set(answer["rungs"][0]) >= {"name", "effects", "error", "held_out", "rms_Hz", "rms_percent", "evidence"}
     assert answer["rungs"][-1]["parameters"]["expansion_mismatch.hub_expansion"]["unit"] == "1"
-    assert {f.name for f in out.iterdir()} >= {"ladder.json", "ladder.svg", "ladder.rrd", "report.html"}
+    assert {f.name for f in out.iterdir()} >= {"ladder.json", "ladder.png", "ladder.svg", "ladder.rrd", "report.html"}
     assert json.loads((out / "ladder.json").read_text()) == answer
 
 

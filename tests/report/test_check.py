@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +56,23 @@ def test_the_set_of_five_bearings_is_understood(capsys: pytest.CaptureFixture[st
         b = found["bearings"][name]
         reach = b["pitch_diameter_mm"] / 2 * np.tan(np.radians(b["contact_angle_deg"]))
         assert b["load_lines_meet_axis_at_mm"] == pytest.approx(b["z_mm"] + sense * reach, abs=1e-5)
+
+
+def test_no_leader_runs_through_a_name() -> None:
+    """Of every scene: each piece of a leader stays out of the boxes in which the names stand."""
+    for scene in SCENES.values():
+        [axes] = drawing(operating_point(load(scene), Condition(20.0))).axes
+        figure = axes.figure
+        figure.canvas.draw()
+        boxes = [t.get_window_extent().padded(-1.0) for t in axes.texts if t.get_text()]
+        leaders = [line for line in axes.lines if line.get_linewidth() == 0.5]
+        assert len(leaders) == len(boxes) > 0
+        for line in leaders:
+            drawn = axes.transData.transform(line.get_xydata())
+            for a, b in pairwise(drawn):
+                if np.isfinite([a, b]).all():
+                    on_it = a + np.linspace(0, 1, 400)[:, None] * (b - a)
+                    assert not any(box.contains(*p) for box in boxes for p in on_it), scene
 
 
 def test_a_load_line_passes_the_ball_and_ends_on_the_axis() -> None:

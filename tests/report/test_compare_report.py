@@ -16,6 +16,7 @@ from thermospindle.diagnosis.data.observe import observe
 from thermospindle.model.machine import Condition
 from thermospindle.report.figures.common import STYLE, svg
 from thermospindle.report.figures.compare import figures, label, shown_pairs
+from thermospindle.report.log.compare import FrfsBeside, write_comparison_log
 from thermospindle.report.log.read import read_log
 from thermospindle.report.page.compare import sections, write_comparison
 from thermospindle.report.text.compare import show_comparison
@@ -145,6 +146,19 @@ def test_the_log_reads_back(found, folder, campaign):
     assert contents.timelines == ("frequency",)
     level = "/frf/T20/hammer\\ 1\\,\\ response\\ 1/level"
     assert {f"{level}/measured", f"{level}/computed", f"{level}/modes_measured"} <= set(contents.entities)
+
+
+def test_what_symmetry_forbids_has_a_view_in_the_log_too(spindle, campaign, tmp_path):
+    """Computed as nothing at all where noise alone was measured, measured as nothing, and neither: every curve is there, on an axis of its own."""
+    test = campaign.tests[0]
+    computed, measured = test.frf.value.copy(), test.frf.value.copy()
+    computed[3, 0], measured[4, 0], computed[5, 1], measured[5, 1] = 0.0, 0.0, 0.0, 0.0
+    frf = replace(test.frf, value=measured)
+    write_comparison_log(spindle, "crossed", [FrfsBeside(test, frf, computed)], {}, tmp_path / "compare.rrd")
+    contents = read_log(tmp_path / "compare.rrd")
+    assert np.array_equal(contents.frfs[f"{test.id} computed"].value, computed)
+    assert contents.frfs[test.id] == frf
+    assert contents.blueprint
 
 
 def test_a_table_of_modes_has_no_frfs_to_show(spindle, tmp_path):

@@ -13,6 +13,8 @@ from thermospindle.model.bearing.pair import solve
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Addition, Condition, Friction, Law
 from thermospindle.model.units import RPM
+from thermospindle.report.figures.warmup import figure
+from thermospindle.report.text import warmup as text
 from thermospindle.report.text.warmup import rows, warmup_json, warmup_section
 from thermospindle.sim import warmup as module
 from thermospindle.sim.operating import operating_point
@@ -216,6 +218,18 @@ def test_answer_as_json_and_rows(warm):
     assert "161 s" in html
 
 
+def test_units_go_with_the_size_of_the_machine(warm, monkeypatch):
+    """A disk drive is told in milliwatts and joules, a machine tool in watts and kilojoules, in words and figure alike."""
+    assert [axes.get_ylabel() for axes in figure(warm).axes][2] == "friction heat, mW"
+    assert f"bearings {energy(warm)['friction']:.1f} J in" in warmup_section(warm)[1]
+    hot = replace(warm, moments=tuple(replace(m, friction={b: 1e4 * q for b, q in m.friction.items()}) for m in warm.moments))
+    axes = figure(hot).axes[2]
+    assert axes.get_ylabel() == "friction heat, W"
+    assert axes.lines[0].get_ydata() == pytest.approx([m.friction[warm.spindle.bearings[0].name] for m in hot.moments])
+    monkeypatch.setattr(text, "energy", lambda warmup: {"motor": 0.0, "friction": 2544024.0, "convection": 2139693.0, "stored": 404331.0})
+    assert "bearings 2544.0 kJ in; convection 2139.7 kJ out; stored 404.3 kJ" in warmup_section(warm)[1]
+
+
 def test_soak_from_the_command_line(tmp_path, capsys):
     scene, out = str(SCENE), tmp_path / "out"
     assert main(["warmup", scene, "--minutes", "0.5", "--json", "--out", str(out), "--soak", "60"]) == 0
@@ -223,7 +237,7 @@ def test_soak_from_the_command_line(tmp_path, capsys):
     assert answer["time_s"][-1] == pytest.approx(30.0)
     assert (answer["speed_rpm"], answer["air_C"]) == (0.0, 60.0)
     assert answer["steady"]["preload_N"] == pytest.approx(8.002, abs=0.01)
-    assert {p.name for p in out.iterdir()} >= {"warmup.csv", "warmup.png"}
+    assert {p.name for p in out.iterdir()} >= {"warmup.csv", "warmup.png", "warmup.svg"}
     with (out / "warmup.csv").open() as file:
         assert file.readline().startswith("# scene hdd_2003")
         table = list(csv.DictReader(file))

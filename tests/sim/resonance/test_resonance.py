@@ -17,7 +17,7 @@ from thermospindle.model.rotor.modes import modes
 from thermospindle.model.units import RPM
 from thermospindle.report.log.map import write_map_log
 from thermospindle.report.log.read import describe, log_json, read_log
-from thermospindle.report.text.resonance import map_json, map_section, sentences
+from thermospindle.report.text.resonance import SAID, map_json, map_section, sentences, told
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.resonance.found import strongest
 from thermospindle.sim.resonance.map import resonance_map
@@ -223,6 +223,17 @@ def test_sentence_without_a_crossing(spindle):
     assert "crosses no line between 20 and 22 C; nearest is 20 (fo-fc)" in sentences(near)[0]
 
 
+def test_many_crossings_are_told_by_the_strongest_and_a_number(met):
+    """A machine tool crosses a score of lines at its speed: in words come the first, the answer has all."""
+    [crossed] = [c for c in met.coincidences if c.at_nominal_speed][:1]
+    many = replace(met, coincidences=(crossed,) * (SAID + 3))
+    assert len(sentences(many)) == SAID + 3
+    assert told(many)[:-1] == sentences(many)[:SAID]
+    assert told(many)[-1].startswith("So do 3 weaker lines between 20 and")
+    few = replace(met, coincidences=(crossed,) * (SAID + 1))
+    assert told(few) == sentences(few)
+
+
 # ------------------------------------------------------------------ log and command line
 
 
@@ -263,7 +274,7 @@ def test_map_from_the_command_line(tmp_path, capsys):
     answer = json.loads(capsys.readouterr().out)
     assert answer["grid"]["speed_rpm"] == pytest.approx([5000.0, 7200.0, 8000.0])
     assert any(c["line"] == "30 fc" and c["mode"] == 5 for c in answer["coincidences"])
-    assert {p.name for p in out.iterdir()} >= {"coincidences.csv", "modes.csv", "campbell.png", "temperature.png", "map.rrd"}
+    assert {p.name for p in out.iterdir()} >= {"coincidences.csv", "modes.csv", "campbell.png", "campbell.svg", "temperature.png", "map.rrd"}
     assert main(["inspect", str(out / "map.rrd"), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["coincidences"] == answer["coincidences"]
     assert main(["map", scene, "--speed", "0"]) == 2

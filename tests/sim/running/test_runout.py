@@ -18,6 +18,7 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.chain import motion_rows
+from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
 from thermospindle.report.figures.runout import motion_figure, spectrum_figure, spread
 from thermospindle.report.text.runout import runout_json, runout_section, write_runout
@@ -26,7 +27,19 @@ from thermospindle.sim.running import runout as running
 from thermospindle.sim.running.lines import find_lines, fit
 from thermospindle.sim.running.revolutions import error_motion, leakage, revolutions, turning_frequency
 from thermospindle.sim.running.run import run_spindle
-from thermospindle.sim.running.runout import AXIAL, X, Y, all_probes, hub_probes, linear, measured, runout, whole_turns, with_imperfections
+from thermospindle.sim.running.runout import (
+    AXIAL,
+    X,
+    Y,
+    all_probes,
+    hub_probes,
+    linear,
+    looked_at,
+    measured,
+    runout,
+    whole_turns,
+    with_imperfections,
+)
 
 RATE, TURNING = 20000.0, 120.0
 SCENE = Path(__file__).parents[3] / "scenes" / "hdd_2003"
@@ -195,6 +208,14 @@ def test_probes_see_the_hub_at_their_places(spindle):
     assert axial.row(chain) @ tilt == 0  # on the axis
     four = next(p for p in all_probes(spindle) if p.name == "4 hub_side90")
     assert four.row(chain) == pytest.approx(motion_rows(chain, "hub", (0.0, 12.5e-3, 15e-3))[1])
+
+
+@pytest.mark.parametrize(
+    ("scene", "points", "word"), [("hdd_2003", None, "hub"), ("five_bearing", None, "nose"), ("mk7702", None, "nose"), ("mk7702", 0, "end of spindle")]
+)
+def test_what_they_look_at_has_a_name_of_the_machine(scene, points, word):
+    own = load(scene)
+    assert looked_at(own if points is None else replace(own, points=own.points[:points])) == word
 
 
 # ---------------------------------------------------------------- whole records
