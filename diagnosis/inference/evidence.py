@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache, lru_cache
 from itertools import product
 
 import numpy as np
@@ -23,7 +24,8 @@ from thermospindle.diagnosis.inference import nuisance as kinds_of
 from thermospindle.diagnosis.inference.fit import Fit
 from thermospindle.diagnosis.inference.mechanism import Mechanism, size_covariance
 from thermospindle.diagnosis.inference.model import CampaignModel
-from thermospindle.diagnosis.inference.prior import Learned, covariance, mechanism_covariance, nuisance_variances
+from thermospindle.diagnosis.inference.prior import Learned, covariance, nuisance_variances, whitened_covariance
+from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
 
 GRIDS = {
@@ -79,15 +81,15 @@ def evidence(model: CampaignModel, fit: Fit, near: Learned | None = None) -> Evi
     p = len(fit.nuisance)
     kinds = {q.kind for q in model.parameters}
     grids = {kind: grid for kind, grid in GRIDS.items() if kind in kinds}
-    own_grid = list(_mechanism_grid(fit))
-    priors = np.array([mechanism_covariance(model, fit.mechanisms, own) for own in own_grid])
-    roots = np.asarray(np.linalg.cholesky(priors + 1e-12 * np.eye(priors.shape[-1])), float)
+    own_grids = [_own_grid(m.free) for m in fit.mechanisms]  # (width, departure) of every mechanism
+    conditions = tuple(d.condition for d in model.tests)
+    roots = [_roots(conditions, m.free, len(m.shape)) for m in fit.mechanisms]
 
     def rated(s: float, sizes: Mapping[str, float]) -> tuple[float, int]:
-        """ln evidence, the mean over widths and departures; and which of these is best."""
+        """ln evidence, the mean over widths and departures of all mechanisms; and which of these is best."""
         scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
         inner = _marginal(scaled, nuisance_variances(model, sizes), p)
-        values = inner.with_priors(roots) - fit.count * np.log(s)
+        values = inner.integrated(roots) - fit.count * np.log(s)
         return float(logsumexp(values) - np.log(len(values))), int(np.argmax(values))
 
     if near is not None:
@@ -112,7 +114,7 @@ def evidence(model: CampaignModel, fit: Fit, near: Learned | None = None) -> Evi
                         total, own_best, s = value, best, scale
             if total - before < 0.01:
                 break
-    own = own_grid[own_best]
+    own = [grid[k] for grid, k in zip(own_grids, np.unravel_index(own_best, [len(grid) for grid in own_grids]), strict=True)] if own_grids else []
     scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
     learned = Learned(sizes, s, tuple(w for w, _ in own), tuple(d for _, d in own))
     mean, spread = _posterior(scaled, covariance(model, fit.mechanisms, learned))
@@ -156,9 +158,19 @@ def _error_scales(whole: Quadratic, count: int) -> Array:
     return np.array([1.0]) if centre < 1.02 else np.unique(np.concatenate([[1.0], np.maximum(centre * np.array([0.95, 1.0, 1.05, 1.2]), 1.0)]))
 
 
-def _mechanism_grid(fit: Fit):
-    """(width, departure) of every mechanism."""
-    return product(*[list(product(FREE_WIDTHS if m.free else WIDTHS, DEPARTURES)) for m in fit.mechanisms])
+@cache
+def _own_grid(free: bool) -> tuple[tuple[float, float], ...]:
+    """(width, departure) that one mechanism may have."""
+    return tuple(product(FREE_WIDTHS if free else WIDTHS, DEPARTURES))
+
+
+@lru_cache(maxsize=64)
+def _roots(conditions: tuple[Condition, ...], free: bool, shapes: int) -> Array:
+    """Roots (g, m, m) of the prior covariance of one mechanism's [z, u] at every (width, departure) of its grid."""
+    m = len(conditions) + shapes
+    found = np.tile(np.eye(m), (len(_own_grid(free)), 1, 1))
+    found[:, : len(conditions), : len(conditions)] = [whitened_covariance(conditions, *own) for own in _own_grid(free)]
+    return np.asarray(np.linalg.cholesky(found + 1e-12 * np.eye(m)), float)
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,12 +181,22 @@ class _Marginal:
     b: Array
     a: Array
 
-    def with_priors(self, roots: Array) -> Array:
-        """ln of the integral (g,) with each of the priors whose roots (g, m, m) are given."""
-        turned = roots.transpose(0, 2, 1)
-        factor = np.linalg.cholesky(turned @ self.a @ roots + np.eye(len(self.b)))
-        solved = np.linalg.solve(factor, (turned @ self.b)[..., None])[..., 0]
-        return np.asarray(self.constant + 0.5 * np.sum(solved**2, axis=1) - np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1), float)
+    def integrated(self, roots: Sequence[Array]) -> Array:
+        """ln of the integral (g_1 g_2 ...,) over the priors of all mechanisms, each with every one of its `roots` (g_k, m_k, m_k): one mechanism
+        after the other, by Schur complements."""
+        constant, b, a = np.array([self.constant]), self.b[None], self.a[None]
+        for root in roots:
+            m, turned = root.shape[-1], root.transpose(0, 2, 1)
+            factor = np.linalg.cholesky(turned @ a[:, None, :m, :m] @ root + np.eye(m))  # (G, g, m, m)
+            rest = turned @ np.concatenate([b[:, :m, None], a[:, :m, m:]], axis=2)[:, None]
+            solved = np.linalg.solve(factor, rest)
+            of_b, of_a = solved[..., 0], solved[..., 1:]
+            logs = np.log(np.diagonal(factor, axis1=-2, axis2=-1)).sum(axis=-1)
+            constant = (constant[:, None] + 0.5 * np.sum(of_b**2, axis=-1) - logs).reshape(-1)
+            left = of_a.swapaxes(-1, -2)
+            b = (b[:, None, m:] - (left @ of_b[..., None])[..., 0]).reshape(len(constant), -1)
+            a = (a[:, None, m:, m:] - left @ of_a).reshape(len(constant), *(b.shape[-1],) * 2)
+        return np.asarray(constant, float)
 
 
 def _marginal(q: Quadratic, diagonal: Array, p: int) -> _Marginal:

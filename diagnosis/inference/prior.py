@@ -71,13 +71,13 @@ def mechanism_covariance(model: CampaignModel, mechanisms: Sequence[Mechanism], 
     tests = len(model.tests)
     prior, at = np.eye(sum(tests + len(m.shape) for m in mechanisms)), 0
     for m, (width, departure) in zip(mechanisms, own, strict=True):
-        prior[at : at + tests, at : at + tests] = _whitened(tuple(d.condition for d in model.tests), width, departure)
+        prior[at : at + tests, at : at + tests] = whitened_covariance(tuple(d.condition for d in model.tests), width, departure)
         at += tests + len(m.shape)
     return prior
 
 
 @lru_cache(maxsize=256)
-def _whitened(conditions: tuple[Condition, ...], width: float, departure: float) -> Array:
+def whitened_covariance(conditions: tuple[Condition, ...], width: float, departure: float) -> Array:
     """Covariance (tests, tests) of z = root^-1 (sizes - neutral): the same for every mechanism, as widths are counted in its own standard deviation."""
     root = np.linalg.cholesky(size_covariance(conditions, REFERENCE_WIDTH, REFERENCE_DEPARTURE))
     half = solve_triangular(root, size_covariance(conditions, width, departure), lower=True)
