@@ -263,7 +263,7 @@ class CampaignModel:
 
     def jacobian(self, t: int, x: Array, effects: Applied, rates: Rates, more: int = 0) -> tuple[Array, Array, Integers]:
         """Residuals (N,) of test `t`, their derivatives (k + more, N) by k nuisance parameters, and the numbers (k,) of these; rows `more` are
-        left zero for whoever has further parameters. What records leave out is small: the derivatives leave out how it moves."""
+        left zero for whoever has further parameters."""
         data, linear = self.tests[t], self.linear(t, x, effects)
         if isinstance(data, ModeData):
             r, found, numbers = self._mode_jacobian(t, data, linear, rates)
@@ -285,14 +285,9 @@ class CampaignModel:
 
         at = fill(0, response.moved(rates.products[t]))
         w = response.over(self.reference.over(linear.matrices.dofs))
-        left = np.ascontiguousarray((response.left @ w).transpose(2, 1, 0)) * response.factor  # (m, n_resp, L)
-        right = np.ascontiguousarray((w.T @ response.right).transpose(1, 2, 0))  # (m, n_ref, L)
-        for (_, i, j, whole), s in zip(pairs, (np.ones(1), response.s), strict=True):
-            size = -whole * np.where(i == j, 0.5, 1.0)
-            there = right * s
-            both = left[i][:, :, None] * (size[:, None, None] * there[j])[:, None]
-            both += left[j][:, :, None] * (size[:, None, None] * there[i])[:, None]
-            at = fill(at, both)
+        for power, (_, i, j, whole) in enumerate(pairs):
+            size = whole * np.where(i == j, 0.5, 1.0)
+            at = fill(at, response.moved_together(w, power, i, j) * size[:, None, None, None])
         for k, c in enumerate(channel):
             if c < n_resp:
                 gain = response.value[c] * weight[c] * self.parameters[own[k]].sd

@@ -11,7 +11,7 @@ import numpy as np
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.mode_table import ModeData
 from thermospindle.model.rotor.chain import Matrices
-from thermospindle.model.rotor.modes import LARGE, kinds, oscillating, poles, poles_below
+from thermospindle.model.rotor.modes import LARGE, Poles, kinds, oscillating, poles, poles_below
 from thermospindle.model.rotor.reduced import reduced
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.campaign.beside import POWER
@@ -21,6 +21,7 @@ from thermospindle.sim.identification.pairing import ModeSet
 
 SILENT = 1e-6  # of a mode's answer, left at the end of a record
 REACH = 2.5  # times the highest measured frequency, up to which modes of the model may be those of a table
+CLOSE = 1e-5  # times 1 / T, below which two poles' difference is their derivative
 EXACT = 1e-11  # of the largest singular value of a change: products that are left out
 
 
@@ -83,7 +84,7 @@ class Response:
         )  # (n_resp, L)
         receptance = rows @ self.right  # (L, n_resp, n_ref)
         self.value: ComplexArray = receptance.transpose(1, 2, 0) * self.factor[:, None, :]
-        self._of = linear, data
+        self._of, self._cut = (linear, data), cut
         if cut:
             self.value = self.value + cut * self.cut_off
 
@@ -104,21 +105,23 @@ class Response:
 
     @cached_property
     def cut_off(self) -> ComplexArray:
-        """What a record of finite length T leaves out, (n_resp, n_ref, L): of a velocity's mode p A e^(p t) the part after T,
-        -p A e^((p - w) T) / (s - p) with w what windows add. At the lines 1/T apart of a discrete Fourier transform e^(-i omega T) is one, so
-        that the part is smooth over lines (Brandt, *Noise and Vibration Analysis*, 2011, 10.3)."""
+        """What records of finite length leave out, (n_resp, n_ref, L)."""
+        return np.zeros_like(self.value) if self._end is None else self._end.value
+
+    @cached_property
+    def _end(self) -> RecordEnd | None:
+        """The end of records, where some mode still answers there."""
         linear, data = self._of
         if not np.isfinite(data.duration):
-            return np.zeros_like(self.value)
-        mass, damping, stiffness = self._matrices
-        p = poles(Matrices(mass, damping, stiffness, ()))
-        chain = linear.chain
-        window = chain.decay + data.test.window_decay
-        decayed = np.exp(np.minimum((p.value.real - window) * data.duration, 0.0)) * np.exp(1j * p.value.imag * data.duration)
-        seen = np.abs(decayed) > SILENT
-        residue = (self._rows @ p.right[:, seen])[:, None, :] * (p.left[seen] @ self._references).T[None]
-        away = (p.value[seen] * decayed[seen])[:, None] / (self.s[None, :] - p.value[seen, None])
-        return -(residue @ away) * (self.factor / self.s)[:, None, :]
+            return None
+        p = poles(Matrices(*self._matrices, ()))
+        window = linear.chain.decay + data.test.window_decay
+        grown = np.minimum((p.value.real - window) * data.duration, 0.0)
+        at_end = np.exp(grown + 1j * p.value.imag * data.duration)
+        seen = np.flatnonzero(np.abs(at_end) > SILENT)
+        away = self.s[None, :] - p.value[seen, None]
+        read = (self._rows @ (p.right * p.value)[:, seen]).T[:, :, None] * (self.factor / self.s) / away[:, None, :]
+        return RecordEnd(data.duration, p, p.left @ self._references, at_end, seen, away, read) if len(seen) else None
 
     def over(self, columns: Array) -> Array:
         """Columns (n, m) of generalised forces in the coordinates (r,) of `left` and `right`."""
@@ -146,15 +149,91 @@ class Response:
 
     def moved(self, by: Products) -> ComplexArray:
         """Derivatives (k, n_resp, n_ref, L) by the parameters of `by`."""
-        _, responses, _ = self.left.shape
-        lines, _, references = self.right.shape
-        found: ComplexArray = np.zeros((by.count, responses, references, lines), complex)
+        n_resp, n_ref, lines = self.value.shape
+        found: ComplexArray = np.zeros((by.count, n_resp, n_ref, lines), complex)
         if len(by.of):
-            left = np.ascontiguousarray((self.left @ self.over(by.left)).transpose(2, 1, 0))  # (r, n_resp, L)
-            right = np.ascontiguousarray((self.over(by.right).T @ self.right).transpose(1, 2, 0))  # (r, n_ref, L)
-            right *= -(self.s[None, :] ** by.power[:, None])[:, None, :]
-            found[by.of] = np.add.reduceat(left[:, :, None] * right[:, None], by.first, axis=0) * self.factor[:, None, :]
+            left, right = self.over(by.left), self.over(by.right)
+            products = self.read(left)[:, :, None] * self.driven(right, by.power)[:, None]
+            found[by.of] = np.add.reduceat(products, by.first, axis=0)
+            if self._cut and self._end is not None:
+                found[by.of] += self._cut * self._end.moved(np.add.reduceat(self._end.kicked(left, right, by.power), by.first, axis=0))
         return found
+
+    def moved_together(self, columns: Array, power: int, i: Integers, j: Integers) -> ComplexArray:
+        """Derivatives (k, n_resp, n_ref, L) by factors of s^`power` (u_i u_j^T + u_j u_i^T) in the dynamic stiffness, u the `columns` (r, m)."""
+        left, right = self.read(columns), self.driven(columns, np.full(columns.shape[1], power))
+        found = left[i][:, :, None] * right[j][:, None]
+        found += left[j][:, :, None] * right[i][:, None]
+        if self._cut and self._end is not None:
+            powers = np.full(len(i), power)
+            kicked = [self._end.kicked(columns[:, a], columns[:, b], powers) for a, b in ((i, j), (j, i))]
+            found += self._cut * self._end.moved(kicked[0] + kicked[1])
+        return found
+
+    def read(self, columns: Array) -> ComplexArray:
+        """What responses read of a force on `columns` (r, m), in the measured quantity: (m, n_resp, L)."""
+        return np.asarray(np.ascontiguousarray((self.left @ columns).transpose(2, 1, 0)) * self.factor)
+
+    def driven(self, columns: Array, power: Integers) -> ComplexArray:
+        """The force (m, n_ref, L) that appears on one vector where s^`power` times it and `columns` (r, m) is added to the dynamic stiffness, less what
+        of it comes after the records' end."""
+        found = np.ascontiguousarray((columns.T @ self.right).transpose(1, 2, 0))
+        found *= -(self.s[None, :] ** power[:, None])[:, None, :]
+        return found + self._cut * self._end.tail(columns, power) if self._cut and self._end is not None else found
+
+
+@dataclass(frozen=True, eq=False)
+class RecordEnd:
+    """The end of records of finite length T: of a velocity's mode p A e^(p t) they leave out the part after T, -p A e^((p - w) T) / (s - p) with w what
+    windows add. At the lines 1/T apart of a discrete Fourier transform e^(-i omega T) is one, so that the part is smooth over lines (Brandt, *Noise and
+    Vibration Analysis*, 2011, 10.3).
+
+    With the state matrix A = V diag(p) V^-1 it is -C (s - A)^-1 e^((A - w) T) B. Its derivatives need that of the exponential, whose elements
+    in V are those of V^-1 dA V times the divided differences of e^(p T) (Higham, *Functions of Matrices*, 2008, Theorem 3.11); a change
+    s^q u v^T of the dynamic stiffness has (V^-1 dA V)_ij = -(l_i u) p_j^q (v r_j), l and r the left and right vectors.
+
+    Poles p with `force` (n, n_ref) of the references on them and `at_end` (n,) e^((p - w) T); of those `seen` at the end `away` (k, L), s - p, and
+    `read` (k, n_resp, L), what responses read of their velocity.
+    """
+
+    duration: float
+    poles: Poles
+    force: ComplexArray
+    at_end: ComplexArray
+    seen: Integers
+    away: ComplexArray
+    read: ComplexArray
+
+    @property
+    def value(self) -> ComplexArray:
+        """(n_resp, n_ref, L)."""
+        return -self.moved((self.at_end[:, None] * self.force)[None, self.seen])[0]
+
+    def moved(self, amplitude: ComplexArray) -> ComplexArray:
+        """Sums (m, n_resp, n_ref, L) of the seen poles with `amplitude` (m, k, n_ref) each."""
+        m, k, n_ref = amplitude.shape
+        n_resp, lines = self.read.shape[1:]
+        found = amplitude.transpose(0, 2, 1).reshape(m * n_ref, k) @ self.read.reshape(k, n_resp * lines)
+        return np.asarray(found.reshape(m, n_ref, n_resp, lines).transpose(0, 2, 1, 3))
+
+    def tail(self, columns: Array, power: Integers) -> ComplexArray:
+        """The answer (m, n_ref, L) after the records' end, read as s^`power` `columns` (r, m)."""
+        p = self.poles.value[self.seen]
+        shape = (columns.T @ self.poles.right[:, self.seen]) * p ** power[:, None]
+        amplitude = shape[:, None, :] * (self.at_end[:, None] * self.force)[self.seen].T
+        return np.asarray(amplitude @ (1 / self.away))
+
+    def kicked(self, left: Array, right: Array, power: Integers) -> ComplexArray:
+        """How the amplitudes (m, k, n_ref) of the seen poles at the records' end change with s^`power` `left` `right`^T (r, m) in the dynamic stiffness."""
+        p, e, t = self.poles.value, self.at_end, self.duration
+        apart = p[self.seen, None] - p[None, :]
+        close = np.abs(apart) * t < CLOSE
+        between = np.where(close, t * (e[self.seen, None] + e[None, :]) / 2, (e[self.seen, None] - e[None, :]) / np.where(close, 1.0, apart))
+        shape = right.T @ self.poles.right
+        driven = (shape * p ** power[:, None])[:, :, None] * self.force  # (m, n, n_ref)
+        mass = np.where(power == 2, 1.0, 0.0)[:, None] * ((shape * p) @ self.force)  # a force's first velocity, which the mass sets
+        own = left.T @ self.poles.left[self.seen].T
+        return np.asarray(own[:, :, None] * (between @ driven + e[self.seen, None] * mass[:, None, :]))
 
 
 @dataclass(frozen=True, eq=False)
