@@ -8,7 +8,7 @@ Methods*, 1990). Steps are damped as Levenberg and Marquardt do; a step to where
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,8 +21,11 @@ from thermospindle.model.types import Array, Integers
 TEMPERS = (3e-4, 3e-3, 0.03, 0.3, 1.0)
 LONGEST = 3.0  # prior standard deviations in one step
 MOST_STEPS = (30, 40)  # while errors are taken too large, and at the end
-MOST_REFUSED = 6  # steps one after the other, each shorter
-ENOUGH = 0.1  # of the cost, from which a fit goes on
+LEAST_DAMPING, RAISED_DAMPING = 1e-4, 1e-3  # of a parameter's own curvature, at first and after a step that was refused
+MOST_GROWTH = 2.0**6  # of the damping, one refusal after the other
+ENOUGH, ENOUGH_EARLY = 0.3, 0.02  # of the cost, from which a fit goes on; a share of it while errors are taken too large
+TRUSTED, POOR = 0.6, 0.25  # of the gain promised: from there derivatives stay in use, and below it a step is corrected
+CORRECTIONS = 2
 SIZE_STEP = 0.02  # of a size's or shape parameter's prior standard deviation, for differences
 
 
@@ -162,6 +165,10 @@ class Problem:
         """Residuals of every test; None where no spindle can be built."""
         return built(lambda t: self.residual(t, p), self.tests)
 
+    def at(self, p: Array, temper: float) -> Point:
+        residuals = self.residuals(p)
+        return Point(p, residuals, self.cost(p, temper, residuals) if residuals is not None else np.inf)
+
     def cost(self, p: Array, temper: float, residuals: Sequence[Array] | None = None) -> float:
         """chi2 with errors 1 / `temper` times the data's, and priors; infinite where no spindle can be built."""
         if residuals is None:
@@ -190,6 +197,11 @@ class Linearisation:
             information[np.ix_(numbers, numbers)] = jacobian @ jacobian.T
             self.by_test.append(information)
         self.information: Array = np.sum(self.by_test, axis=0)
+
+    def slope(self, problem: Problem, at: Point, temper: float) -> Array:
+        """Half the gradient (n,) of the cost at a point near."""
+        assert at.residuals is not None
+        return np.asarray(temper**2 * np.sum(self.gradients(at.residuals), axis=0) + problem.precision @ at.p)
 
     def gradients(self, residuals: Sequence[Array]) -> list[Array]:
         found = []
@@ -224,41 +236,69 @@ def fit(
     return _finished(*done)
 
 
-def _settled(problem: Problem, p: Array, rates: Rates, temper: float) -> tuple[Array, Linearisation, list[Array]]:
-    """Levenberg-Marquardt steps at one temper until the cost stands still. Derivatives are taken anew only where a step does not do what it
-    promises, and at the end of the last temper."""
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Parameters (n,), the residuals of every test there (None where no spindle can be built) and their cost."""
+
+    p: Array
+    residuals: Sequence[Array] | None
+    cost: float
+
+
+def _settled(problem: Problem, p: Array, rates: Rates, temper: float) -> tuple[Array, Linearisation, Sequence[Array]]:
+    """Levenberg-Marquardt steps at one temper until the cost stands still, damped as in Madsen, Nielsen & Tingleff, *Methods for Non-Linear Least
+    Squares Problems*, 2004, algorithm 3.16. Derivatives are taken anew only where a step does not do what it promises, and at the end of the last
+    temper."""
     last = temper == 1.0
     lines = problem.linearisation(p, rates)
-    residuals, current, damping, refused = lines.residuals, True, 1e-4, 0
-    cost = problem.cost(p, temper, residuals)
+    here = Point(p, lines.residuals, problem.cost(p, temper, lines.residuals))
+    current, damping, growth = True, LEAST_DAMPING, 2.0
     for _ in range(MOST_STEPS[last]):
-        gradient = temper**2 * np.sum(lines.gradients(residuals), axis=0) + problem.precision @ p
-        normal = temper**2 * lines.information + problem.precision
+        gradient, normal = lines.slope(problem, here, temper), temper**2 * lines.information + problem.precision
         move = -np.linalg.solve(normal + damping * np.diag(np.diag(normal)), gradient)
         move *= min(1.0, LONGEST / max(float((np.abs(move) * problem.reach).max()), 1e-300))
         promised = -2 * float(gradient @ move) - float(move @ normal @ move)
-        enough = ENOUGH if last else max(1.0, 0.02 * cost)
         if promised < ENOUGH and current:
             break
-        there = problem.residuals(p + move)
-        gained = -np.inf if there is None else cost - problem.cost(p + move, temper, there)
-        if gained > 0 and there is not None:
-            p, residuals, cost, damping, refused = p + move, there, cost - gained, damping * (0.1 if gained > 0.6 * promised else 1.0), 0
-            if gained < enough and (current or not last):
+        there = problem.at(here.p + move, temper)
+        corrected = False
+        if current and there.residuals is not None and here.cost - there.cost < POOR * promised:
+            stiff = normal + max(damping, RAISED_DAMPING) * np.diag(np.diag(normal))
+            best = _corrected(problem, lines, stiff, temper, there)
+            there, corrected = best, best is not there
+        gained = here.cost - there.cost
+        if gained > 0:
+            here, growth = there, 2.0
+            damping *= max(1 / 3, 1 - (2 * min(gained / promised, 1.0) - 1) ** 3)
+            if gained < (ENOUGH if last else max(1.0, ENOUGH_EARLY * here.cost)) and (current or not last):
                 break
         elif current:
-            damping, refused = max(10 * damping, 1e-3), refused + 1
-            if refused == MOST_REFUSED:
+            damping, growth = max(2.5 * growth * damping, RAISED_DAMPING), 2 * growth
+            if growth > MOST_GROWTH:
                 break
-        if gained < 0.6 * promised and (gained > 0 or not current):
-            lines, current = problem.linearisation(p, rates), True
-            residuals = lines.residuals
+        if (corrected and gained > 0) or (gained < TRUSTED * promised and (gained > 0 or not current)):
+            lines, current = problem.linearisation(here.p, rates), True
+            here = replace(here, residuals=lines.residuals)
         elif gained > 0:
             current = False
     if last and not current:
-        lines = problem.linearisation(p, rates)
-        residuals = lines.residuals
-    return p, lines, residuals
+        lines = problem.linearisation(here.p, rates)
+        here = replace(here, residuals=lines.residuals)
+    assert here.residuals is not None
+    return here.p, lines, here.residuals
+
+
+def _corrected(problem: Problem, lines: Linearisation, normal: Array, temper: float, there: Point) -> Point:
+    """The best of a few steps on from a point with the derivatives of the one before: peaks narrower than they move bend every valley, and a step along
+    it is back on its floor after them."""
+    best = there
+    for _ in range(CORRECTIONS):
+        there = problem.at(there.p - np.linalg.solve(normal, lines.slope(problem, there, temper)), temper)
+        if there.residuals is None:
+            break
+        if there.cost < best.cost:
+            best = there
+    return best
 
 
 def _finished(problem: Problem, p: Array, rates: Rates, temper: float, lines: Linearisation, residuals: Sequence[Array]) -> Fit:

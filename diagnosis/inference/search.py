@@ -39,6 +39,7 @@ FINALISTS = {1: 3, 2: 2, 3: 1}  # explanations of one, two and three mechanisms 
 NEAR = 100.0  # ln evidence behind the best, so far
 REFITS = 2  # at most
 RESONANCES, CLEARED = 2, 0.1  # light resonances at most, and the share of what was left that one may leave
+CENTRED = 2  # times that a light resonance's parameters are counted anew from where they were fitted
 LITTLE = 2.0  # ln evidence that a screened mechanism must promise
 
 
@@ -157,15 +158,17 @@ def _with_resonance(model: CampaignModel, h: Hypothesis) -> tuple[CampaignModel,
     try:
         tried = [fit(wider, h.mechanisms, at, tempers=tempers) for at, tempers in ((fitted, TEMPERS[EARLY:]), (afresh, TEMPERS))]
         best = min(tried, key=lambda f: f.cost)
-        sd = np.array([q.sd for q in resonance.nuisances])
-        centred = model.with_resonance(resonance.at(sd * best.point[n : n + len(own)]))  # about which all explanations then start
-        there = np.concatenate([best.point[:n], own, best.point[n + len(own) :]])
-        again = fit(centred, h.mechanisms, there, best.rates, TEMPERS[-1:])
+        sd, learned = np.array([q.sd for q in resonance.nuisances]), None
+        for _ in range(CENTRED):  # so that all explanations start about it as it is
+            resonance = resonance.at(sd * best.point[n : n + len(own)])
+            wider, there = model.with_resonance(resonance), np.concatenate([best.point[:n], own, best.point[n + len(own) :]])
+            again = fit(wider, h.mechanisms, there, best.rates, TEMPERS[-1:], learned)
+            found = settled(wider, Hypothesis(again, evidence(wider, again)))
+            best, learned = found.fit, found.evidence.learned
     except FAILED:
         return None
-    found = settled(centred, Hypothesis(again, evidence(centred, again)))
     asked = found.evidence.ln > h.evidence.ln + PLENTY and found.excess < CLEARED * h.excess
-    return (centred, found) if asked else None
+    return (wider, found) if asked else None
 
 
 def _alike(model: CampaignModel, x: Array, hypotheses: Sequence[Hypothesis]) -> dict[str, frozenset[str]]:
