@@ -11,10 +11,10 @@ import numpy as np
 from thermospindle.diagnosis.data.lines import line_data
 from thermospindle.diagnosis.data.mode_table import mode_data
 from thermospindle.diagnosis.data.observe import condition_of
+from thermospindle.diagnosis.forward.mechanism import Mechanism, variants
+from thermospindle.diagnosis.forward.model import CampaignModel, TestData, campaign_model, expected_noise
 from thermospindle.diagnosis.inference.detectable import smallest, unseen_beside
 from thermospindle.diagnosis.inference.freeform import free_forms
-from thermospindle.diagnosis.inference.mechanism import Mechanism, variants
-from thermospindle.diagnosis.inference.model import CampaignModel, TestData, campaign_model, expected_noise
 from thermospindle.diagnosis.inference.search import Hypothesis, Search, search
 from thermospindle.diagnosis.inference.verdict import Verdict, decide
 from thermospindle.diagnosis.misfit.patterns import Chosen, choose_for

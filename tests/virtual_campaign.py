@@ -10,8 +10,8 @@ import numpy as np
 from thermospindle.diagnosis.data.lines import line_data
 from thermospindle.diagnosis.data.mode_table import mode_data
 from thermospindle.diagnosis.data.observe import condition_of
-from thermospindle.diagnosis.inference import nuisance
-from thermospindle.diagnosis.inference.model import CampaignModel, campaign_model, expected_noise
+from thermospindle.diagnosis.forward import nuisance
+from thermospindle.diagnosis.forward.model import CampaignModel, campaign_model, expected_noise
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.tolerance import toleranced
 from thermospindle.model.types import Array, ComplexArray

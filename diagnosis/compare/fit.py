@@ -16,7 +16,7 @@ from scipy.optimize import least_squares
 
 from thermospindle.diagnosis.compare.compare import compare
 from thermospindle.diagnosis.data.observe import Observation
-from thermospindle.diagnosis.inference.model import FAILED
+from thermospindle.diagnosis.forward.model import FAILED
 from thermospindle.model.machine import Spindle
 from thermospindle.model.types import Array
 from thermospindle.sim.campaign.campaign import Campaign

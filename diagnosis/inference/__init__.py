@@ -1,18 +1,14 @@
 """Inference from the FRF lines (or mode tables) of a campaign: what the model lacks, by evidence.
 
-=========  ========================================================================================================
-nuisance   build tolerances, measuring errors, and the model's own constant discrepancy
-model      residuals of every test in standard errors, with exact derivatives
-response   FRFs at the lines of a test, with what their derivatives need; the residual of a table of modes
-prior      priors at reference widths, or at those learned
-mechanism  what an effect changes, and its law as a prior over conditions
-freeform   what would have to drift where nobody names a cause
-fit        tempered Gauss-Newton with priors
-evidence   Laplace evidence with everything of unknown size learned
-screening  what a mechanism promises beside a fitted model
-remainder  what an explanation leaves: how far residuals say the same, and the light resonance that would make them
+==========  =======================================================================================================
+prior       priors at reference widths, or at those learned
+freeform    what would have to drift where nobody names a cause
+fit         tempered Levenberg-Marquardt with priors
+evidence    Laplace evidence with everything of unknown size learned
+screening   what a mechanism promises beside a fitted model
+remainder   what an explanation leaves: how far residuals say the same, and the light resonance that would make them
 detectable  smallest sizes that would have shown
-search     fits, pairs: the evidence of every explanation
-verdict    posterior probabilities, and the answer with the least expected loss
-=========  ========================================================================================================
+search      fits, pairs: the evidence of every explanation
+verdict     posterior probabilities, and the answer with the least expected loss
+==========  =======================================================================================================
 """

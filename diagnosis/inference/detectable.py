@@ -12,9 +12,9 @@ from functools import partial
 
 import numpy as np
 
+from thermospindle.diagnosis.forward.mechanism import Mechanism
+from thermospindle.diagnosis.forward.model import Applied, CampaignModel
 from thermospindle.diagnosis.inference.fit import Fit, built
-from thermospindle.diagnosis.inference.mechanism import Mechanism
-from thermospindle.diagnosis.inference.model import Applied, CampaignModel
 from thermospindle.diagnosis.inference.screening import Fitted, Screened, fitted, screen
 from thermospindle.diagnosis.inference.search import Hypothesis, Search
 from thermospindle.model.parallel import in_parallel

@@ -20,10 +20,10 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.special import log_ndtr, logsumexp
 
-from thermospindle.diagnosis.inference import nuisance as kinds_of
+from thermospindle.diagnosis.forward import nuisance as kinds_of
+from thermospindle.diagnosis.forward.mechanism import Mechanism, size_covariance
+from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.fit import Fit
-from thermospindle.diagnosis.inference.mechanism import Mechanism, size_covariance
-from thermospindle.diagnosis.inference.model import CampaignModel
 from thermospindle.diagnosis.inference.prior import Learned, covariance, nuisance_variances, whitened_covariance
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array

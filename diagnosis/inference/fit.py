@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from thermospindle.diagnosis.inference import nuisance as kinds_of
-from thermospindle.diagnosis.inference.mechanism import Mechanism
-from thermospindle.diagnosis.inference.model import FAILED, Applied, CampaignModel, Rates
+from thermospindle.diagnosis.forward import nuisance as kinds_of
+from thermospindle.diagnosis.forward.linear import Rates
+from thermospindle.diagnosis.forward.mechanism import Mechanism
+from thermospindle.diagnosis.forward.model import FAILED, Applied, CampaignModel
 from thermospindle.diagnosis.inference.prior import Learned, precision, roots_of
 from thermospindle.model.types import Array, Integers
 

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from thermospindle.diagnosis.forward.mechanism import Mechanism
+from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.fit import Problem
-from thermospindle.diagnosis.inference.mechanism import Mechanism
-from thermospindle.diagnosis.inference.model import CampaignModel
 from thermospindle.model.bearing.pair import PairState
 from thermospindle.model.machine import MOVES, Condition, RingMotion, Spindle
 from thermospindle.model.rotor.chain import RotorBase

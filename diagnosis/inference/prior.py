@@ -9,9 +9,9 @@ from functools import lru_cache
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from thermospindle.diagnosis.inference import nuisance as kinds_of
-from thermospindle.diagnosis.inference.mechanism import REFERENCE_DEPARTURE, REFERENCE_WIDTH, Mechanism, size_covariance
-from thermospindle.diagnosis.inference.model import CampaignModel
+from thermospindle.diagnosis.forward import nuisance as kinds_of
+from thermospindle.diagnosis.forward.mechanism import REFERENCE_DEPARTURE, REFERENCE_WIDTH, Mechanism, size_covariance
+from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
 

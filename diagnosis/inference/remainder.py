@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
+from thermospindle.diagnosis.forward.model import CampaignModel
+from thermospindle.diagnosis.forward.nuisance import SHARE_SD, Resonance
 from thermospindle.diagnosis.inference.fit import Fit, Problem
-from thermospindle.diagnosis.inference.model import CampaignModel
-from thermospindle.diagnosis.inference.nuisance import SHARE_SD, Resonance
 from thermospindle.diagnosis.inference.prior import Learned
 from thermospindle.diagnosis.inference.screening import Fitted, fitted
 from thermospindle.model.types import Array

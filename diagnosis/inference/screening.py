@@ -8,10 +8,10 @@ from functools import partial
 
 import numpy as np
 
+from thermospindle.diagnosis.forward.mechanism import Mechanism
+from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import Fit, Problem
-from thermospindle.diagnosis.inference.mechanism import Mechanism
-from thermospindle.diagnosis.inference.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.prior import Learned
 from thermospindle.model.parallel import in_parallel
 from thermospindle.model.types import Array, Integers

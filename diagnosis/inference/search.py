@@ -13,11 +13,11 @@ from functools import partial
 
 import numpy as np
 
+from thermospindle.diagnosis.forward.mechanism import Mechanism
+from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.evidence import Evidence, evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, Problem, fit
 from thermospindle.diagnosis.inference.freeform import alike
-from thermospindle.diagnosis.inference.mechanism import Mechanism
-from thermospindle.diagnosis.inference.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.prior import DRIFTING, Learned, steady
 from thermospindle.diagnosis.inference.remainder import LOOKED, light_resonance, overlap
 from thermospindle.diagnosis.inference.screening import Screened, screen

@@ -14,9 +14,9 @@ from math import comb
 
 import numpy as np
 
-from thermospindle.diagnosis.inference import nuisance as kinds_of
+from thermospindle.diagnosis.forward import nuisance as kinds_of
+from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.evidence import left_out
-from thermospindle.diagnosis.inference.model import CampaignModel
 from thermospindle.diagnosis.inference.remainder import ALIKE, Overlap, overlap
 from thermospindle.diagnosis.inference.search import STRAIN, Hypothesis, Search
 

@@ -14,11 +14,11 @@ from itertools import product
 import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
-from thermospindle.diagnosis.inference import nuisance as kinds_of
+from thermospindle.diagnosis.forward import nuisance as kinds_of
+from thermospindle.diagnosis.forward.mechanism import Mechanism, variants
+from thermospindle.diagnosis.forward.model import FAILED, CampaignModel, TestData
 from thermospindle.diagnosis.inference.evidence import GRIDS, Evidence, evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, Problem, fit
-from thermospindle.diagnosis.inference.mechanism import Mechanism, variants
-from thermospindle.diagnosis.inference.model import FAILED, CampaignModel, TestData
 from thermospindle.diagnosis.inference.prior import Learned, as_stated, precision
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.types import Array

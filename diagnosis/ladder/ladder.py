@@ -19,7 +19,7 @@ import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.observe import observe
-from thermospindle.diagnosis.inference.model import CampaignModel, TestData
+from thermospindle.diagnosis.forward.model import CampaignModel, TestData
 from thermospindle.diagnosis.inference.verdict import SPREAD, Candidate, Verdict
 from thermospindle.diagnosis.ladder.fitting import CONSTANT, FREE, Settled, predicted_squares, settled, unseen, without
 from thermospindle.diagnosis.ladder.forms import FORMS

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from thermospindle.diagnosis.data.observe import Observation
-from thermospindle.diagnosis.inference.model import Applied
+from thermospindle.diagnosis.forward.model import Applied
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import Matrices, matrices
 from thermospindle.model.rotor.modes import kinds, oscillating, poles

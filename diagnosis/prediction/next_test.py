@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from thermospindle.diagnosis.inference.mechanism import size_covariance
-from thermospindle.diagnosis.inference.model import FAILED
+from thermospindle.diagnosis.forward.mechanism import size_covariance
+from thermospindle.diagnosis.forward.model import FAILED
 from thermospindle.diagnosis.inference.search import Hypothesis, Search
 from thermospindle.diagnosis.inference.verdict import Candidate, Verdict, beyond_limits
 from thermospindle.model.machine import Condition, Spindle

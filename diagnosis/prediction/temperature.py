@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from thermospindle.diagnosis.data.observe import Observation
-from thermospindle.diagnosis.inference.model import Applied
+from thermospindle.diagnosis.forward.model import Applied
 from thermospindle.diagnosis.prediction.modes import Predicted, predict
 from thermospindle.model.machine import Spindle
 from thermospindle.model.types import Array

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from thermospindle.diagnosis.inference import nuisance as kinds_of
+from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.ladder.ladder import CLEAR, DISCREPANCY, TOLERANCES, Ladder
 from thermospindle.diagnosis.ladder.step import Step
 from thermospindle.diagnosis.prediction.next_test import in_words

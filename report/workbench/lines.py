@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from itertools import product
 
 from thermospindle.diagnosis.compare.before_after import without
-from thermospindle.diagnosis.inference import nuisance as kinds_of
+from thermospindle.diagnosis.forward import nuisance as kinds_of
+from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import Problem, fit
-from thermospindle.diagnosis.inference.mechanism import variants
 from thermospindle.diagnosis.inference.search import Hypothesis, settled
 from thermospindle.diagnosis.inference.verdict import Candidate
 from thermospindle.diagnosis.verdict import campaign_data

@@ -16,7 +16,7 @@ from bokeh.document import Document
 from bokeh.models import Button, CheckboxGroup, Div, RadioButtonGroup, Select, TextInput
 from markupsafe import escape
 
-from thermospindle.diagnosis.inference.model import FAILED
+from thermospindle.diagnosis.forward.model import FAILED
 from thermospindle.report.workbench import explanations as told
 from thermospindle.report.workbench import lines, words
 from thermospindle.report.workbench.bench import Bench, Errors, Shown, channels, curves, errors, fitted, modes_of

@@ -11,7 +11,7 @@ from typing import Any
 from bokeh.document import Document
 from bokeh.models import Button
 
-from thermospindle.diagnosis.inference.model import FAILED
+from thermospindle.diagnosis.forward.model import FAILED
 
 TICK = 1000  # ms between looks at the clock
 

@@ -26,9 +26,9 @@ import numpy as np
 from tests.blind.hidden import Hidden, Mechanism, mechanisms
 from tests.blind.world import Made, Plan, World, campaign, described, plans, visibility
 from thermospindle.diagnosis.draft import draft
+from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.inference.evidence import evidence, left_out
 from thermospindle.diagnosis.inference.fit import TEMPERS, Problem, fit
-from thermospindle.diagnosis.inference.mechanism import variants
 from thermospindle.diagnosis.inference.prior import steady
 from thermospindle.diagnosis.inference.search import Hypothesis, settled
 from thermospindle.diagnosis.inference.verdict import conditions_of

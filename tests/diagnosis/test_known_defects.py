@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.diagnosis.test_ladder import tables
-from thermospindle.diagnosis.inference.nuisance import GAIN, TEMPERATURE
+from thermospindle.diagnosis.forward.nuisance import GAIN, TEMPERATURE
 from thermospindle.diagnosis.ladder.ladder import conditions
 from thermospindle.diagnosis.verdict import campaign_data
 from thermospindle.model.machine import Law

@@ -12,7 +12,7 @@ from rerun.chunk import RrdReader
 
 from tests.conftest import SCENE
 from thermospindle.cli import main
-from thermospindle.diagnosis.inference.mechanism import variants
+from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.inference.verdict import Candidate
 from thermospindle.diagnosis.ladder.fitting import FREE, predicted_squares, settled, unseen, without
 from thermospindle.diagnosis.ladder.forms import FORMS

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import ROOT
-from thermospindle.diagnosis.inference import nuisance as kinds_of
+from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.verdict import diagnose
 from thermospindle.model.scene.reading import load
 from thermospindle.report.text.diagnosis.answer import diagnosis_json

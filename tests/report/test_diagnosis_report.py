@@ -13,9 +13,9 @@ from rich.console import Console
 
 from tests.conftest import SCENE
 from thermospindle.cli import main
+from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
-from thermospindle.diagnosis.inference.mechanism import variants
 from thermospindle.diagnosis.inference.search import Hypothesis
 from thermospindle.diagnosis.inference.verdict import Candidate
 from thermospindle.diagnosis.prediction.next_test import ModePrediction, NextTest

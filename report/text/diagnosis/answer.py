@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from thermospindle.diagnosis.inference import nuisance as kinds_of
+from thermospindle.diagnosis.forward import nuisance as kinds_of
+from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.inference.evidence import Evidence
-from thermospindle.diagnosis.inference.mechanism import Mechanism
 from thermospindle.diagnosis.inference.verdict import Candidate
 from thermospindle.diagnosis.verdict import Diagnosis, Drift
 from thermospindle.model.types import Array

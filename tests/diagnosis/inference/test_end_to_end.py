@@ -7,9 +7,9 @@ import pytest
 
 from tests.conftest import ROOT
 from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, virtual_campaign
+from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
-from thermospindle.diagnosis.inference.mechanism import variants
 from thermospindle.diagnosis.inference.prior import steady
 from thermospindle.diagnosis.inference.screening import screen
 from thermospindle.diagnosis.inference.search import _fit_one

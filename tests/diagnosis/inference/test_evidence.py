@@ -9,14 +9,8 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal, norm
 
-from thermospindle.diagnosis.inference.evidence import (
-    Learned,
-    evidence,
-    left_out,
-)  # fmt: skip
-from thermospindle.diagnosis.inference.fit import Fit
-from thermospindle.diagnosis.inference.mechanism import REFERENCE_DEPARTURE, REFERENCE_WIDTH, Mechanism, size_covariance
-from thermospindle.diagnosis.inference.nuisance import (
+from thermospindle.diagnosis.forward.mechanism import REFERENCE_DEPARTURE, REFERENCE_WIDTH, Mechanism, size_covariance
+from thermospindle.diagnosis.forward.nuisance import (
     BUILD,
     DAMPING,
     DAMPING_SD,
@@ -27,6 +21,12 @@ from thermospindle.diagnosis.inference.nuisance import (
     TEMPERATURE,
     Nuisance,
 )
+from thermospindle.diagnosis.inference.evidence import (
+    Learned,
+    evidence,
+    left_out,
+)  # fmt: skip
+from thermospindle.diagnosis.inference.fit import Fit
 from thermospindle.model.machine import Condition
 from thermospindle.sim.effects.effect import Effect, Parameter
 

@@ -8,11 +8,11 @@ from scipy import stats
 
 from tests.conftest import ROOT
 from tests.virtual_campaign import drawn, effect, model_of, truth, virtual_campaign
+from thermospindle.diagnosis.forward.mechanism import variants
+from thermospindle.diagnosis.forward.model import CampaignModel
+from thermospindle.diagnosis.forward.nuisance import BUILD, DRIFT, GAIN, STIFFNESS, TEMPERATURE
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import Problem, fit
-from thermospindle.diagnosis.inference.mechanism import variants
-from thermospindle.diagnosis.inference.model import CampaignModel
-from thermospindle.diagnosis.inference.nuisance import BUILD, DRIFT, GAIN, STIFFNESS, TEMPERATURE
 from thermospindle.diagnosis.inference.search import scan
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.scene.reading import load

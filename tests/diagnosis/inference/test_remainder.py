@@ -9,9 +9,9 @@ import pytest
 
 from tests.blind.hidden import on_spring
 from tests.virtual_campaign import drawn, effect, model_of, virtual_campaign
+from thermospindle.diagnosis.forward.nuisance import RESONANCE, Resonance
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
-from thermospindle.diagnosis.inference.nuisance import RESONANCE, Resonance
 from thermospindle.diagnosis.inference.search import Hypothesis, _with_resonance, settled
 from thermospindle.diagnosis.verdict import diagnose
 from thermospindle.model.machine import Condition

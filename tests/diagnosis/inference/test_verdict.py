@@ -8,10 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from thermospindle.diagnosis.forward.mechanism import Mechanism
+from thermospindle.diagnosis.forward.nuisance import DAMPING, STIFFNESS
 from thermospindle.diagnosis.inference.evidence import Evidence
 from thermospindle.diagnosis.inference.fit import Fit
-from thermospindle.diagnosis.inference.mechanism import Mechanism
-from thermospindle.diagnosis.inference.nuisance import DAMPING, STIFFNESS
 from thermospindle.diagnosis.inference.prior import Learned
 from thermospindle.diagnosis.inference.remainder import between_tests
 from thermospindle.diagnosis.inference.screening import Screened

@@ -15,9 +15,11 @@ import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.mode_table import ModeData
-from thermospindle.diagnosis.inference import nuisance as kinds_of
-from thermospindle.diagnosis.inference.nuisance import Nuisance, ReferenceModes, Resonance, nuisances, reference_modes
-from thermospindle.diagnosis.inference.response import Light, Linear, Products, Response, mode_residual, partners, products, same_chain
+from thermospindle.diagnosis.forward import nuisance as kinds_of
+from thermospindle.diagnosis.forward.linear import Linear, Rates, products, same_chain
+from thermospindle.diagnosis.forward.nuisance import Nuisance, ReferenceModes, Resonance, nuisances, reference_modes
+from thermospindle.diagnosis.forward.response import Light, Response
+from thermospindle.diagnosis.forward.table import mode_jacobian, mode_residual
 from thermospindle.model.errors import NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Condition, RingMotion, Spindle
 from thermospindle.model.rotor.chain import Matrices, matrices
@@ -266,8 +268,9 @@ class CampaignModel:
         left zero for whoever has further parameters."""
         data, linear = self.tests[t], self.linear(t, x, effects)
         if isinstance(data, ModeData):
-            r, found, numbers = self._mode_jacobian(t, data, linear, rates)
-            return r, np.concatenate([found.T, np.zeros((more, len(r)))]), numbers
+            r, found = mode_jacobian(data, linear, [(rates.mass[t], rates.damping[t], rates.stiffness[t]), *self._by_discrepancies(t, linear)])
+            numbers = np.concatenate([rates.numbers[t], *[row[0] for row in self._discrepancies[t]]])
+            return r, np.concatenate([found, np.zeros((more, len(r)))]), numbers
         response = self._standing(t, x, effects, linear)
         own, channel = self._gains[t]
         pairs = self._discrepancies[t]
@@ -298,6 +301,16 @@ class CampaignModel:
         for light, of_light in lights:
             at = fill(at, response.by_light(light) * np.array([self.parameters[i].sd for i in of_light])[:, None, None, None])
         return self.whitened(t, response.value, data.value), jacobian.reshape(len(jacobian), -1), numbers
+
+    def _by_discrepancies(self, t: int, linear: Linear) -> list[tuple[Array, Array, Array]]:
+        """Derivatives (k, n, n) of M, C and K of test `t` by the discrepancies of stiffness, and by those of damping."""
+        w, found = self.reference.over(linear.matrices.dofs).T, []
+        for of_damping, (_, i, j, whole) in enumerate(self._discrepancies[t]):
+            size = whole * np.where(i == j, 0.5, 1.0)
+            outer = size[:, None, None] * (w[i][:, :, None] * w[j][:, None, :] + w[j][:, :, None] * w[i][:, None, :])
+            zero = np.zeros_like(outer)
+            found.append((zero, outer, zero) if of_damping else (zero, zero, outer))
+        return found
 
     def column(self, t: int, x: Array, first: Applied, second: Applied, apart: float) -> Array:
         """(residual at `second` - residual at `first`) / apart, (N,): the derivative by what differs between two lists of effects.
@@ -355,41 +368,6 @@ class CampaignModel:
         """Which build tolerances leave the bearings alone."""
         ends = [p.apply(self.spindle, 0.01) for p in self.build]
         return [end.bearings is self.spindle.bearings and end.sets is self.spindle.sets for end in ends]
-
-    def _mode_jacobian(self, t: int, data: ModeData, linear: Linear, rates: Rates) -> tuple[Array, Array, Integers]:
-        """By first-order perturbation of the poles, -left (p^2 dM + p dC + dK) right (Lancaster 1964, AIAA J. 2, 1659)."""
-        found, partner, p = partners(data, linear)
-        pole, right, left = p.value[found][partner], p.right[:, found][:, partner], p.left[found][partner]
-        stacks = [(rates.mass[t], rates.damping[t], rates.stiffness[t])]
-        numbers = [rates.numbers[t]]
-        w = self.reference.over(linear.matrices.dofs)
-        for of_damping, (number, i, j, whole) in enumerate(self._discrepancies[t]):
-            size = whole * np.where(i == j, 0.5, 1.0)
-            outer = size[:, None, None] * (w.T[i][:, :, None] * w.T[j][:, None, :] + w.T[j][:, :, None] * w.T[i][:, None, :])
-            zero = np.zeros_like(outer)
-            stacks.append((zero, outer, zero) if of_damping else (zero, zero, outer))
-            numbers.append(number)
-        m, c, k = (np.concatenate([s[i] for s in stacks]) for i in range(3))
-        moved = -sum(power * np.einsum("mi,kij,jm->mk", left, d, right) for power, d in ((pole[:, None] ** 2, m), (pole[:, None], c), (1.0, k)))
-        by_frequency = (moved * pole.conj()[:, None]).real / np.abs(pole[:, None]) ** 2
-        by_damping = moved.real / pole.real[:, None] - by_frequency
-        known = np.isfinite(data.damping_sd)
-        jacobian = np.concatenate([by_frequency / data.frequency_sd[:, None], by_damping[known] / data.damping_sd[known, None]])
-        return mode_residual(data, linear), jacobian, np.concatenate(numbers)
-
-
-@dataclass(frozen=True, eq=False)
-class Rates:
-    """Derivatives (k, n, n) of mass, damping and stiffness of every test by the nuisance parameters `numbers` (k,)."""
-
-    numbers: tuple[Integers, ...]
-    mass: tuple[Array, ...]
-    damping: tuple[Array, ...]
-    stiffness: tuple[Array, ...]
-
-    @cached_property
-    def products(self) -> list[Products]:
-        return [products(*of_test) for of_test in zip(self.mass, self.damping, self.stiffness, strict=True)]
 
 
 def replace_measuring(point: OperatingPoint, effects: Applied) -> OperatingPoint:

@@ -1,4 +1,4 @@
-"""What one test's linear model says of its data: FRFs at its lines, with what their derivatives need, or the residual of its table of modes."""
+"""What one test's linear model says of FRFs at its lines, with what their derivatives need."""
 
 from __future__ import annotations
 
@@ -9,29 +9,15 @@ from functools import cached_property
 import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
-from thermospindle.diagnosis.data.mode_table import ModeData
+from thermospindle.diagnosis.forward.linear import Linear, Products
+from thermospindle.diagnosis.forward.record import RecordEnd
 from thermospindle.model.rotor.chain import Matrices
-from thermospindle.model.rotor.modes import LARGE, Poles, kinds, oscillating, poles, poles_below
+from thermospindle.model.rotor.modes import LARGE, poles
 from thermospindle.model.rotor.reduced import reduced
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.campaign.beside import POWER
-from thermospindle.sim.effects.effect import Measurement
-from thermospindle.sim.identification import pairing
-from thermospindle.sim.identification.pairing import ModeSet
 
 SILENT = 1e-6  # of a mode's answer, left at the end of a record
-REACH = 2.5  # times the highest measured frequency, up to which modes of the model may be those of a table
-CLOSE = 1e-5  # times 1 / T, below which two poles' difference is their derivative
-EXACT = 1e-11  # of the largest singular value of a change: products that are left out
-
-
-@dataclass(frozen=True, eq=False)
-class Linear:
-    """One test's linear model: matrices with dofs, and its measuring chain (None for a table of modes)."""
-
-    matrices: Matrices
-    chain: Measurement
-    layout: tuple
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,125 +166,3 @@ class Response:
         found = np.ascontiguousarray((columns.T @ self.right).transpose(1, 2, 0))
         found *= -(self.s[None, :] ** power[:, None])[:, None, :]
         return found + self._cut * self._end.tail(columns, power) if self._cut and self._end is not None else found
-
-
-@dataclass(frozen=True, eq=False)
-class RecordEnd:
-    """The end of records of finite length T: of a velocity's mode p A e^(p t) they leave out the part after T, -p A e^((p - w) T) / (s - p) with w what
-    windows add. At the lines 1/T apart of a discrete Fourier transform e^(-i omega T) is one, so that the part is smooth over lines (Brandt, *Noise and
-    Vibration Analysis*, 2011, 10.3).
-
-    With the state matrix A = V diag(p) V^-1 it is -C (s - A)^-1 e^((A - w) T) B. Its derivatives need that of the exponential, whose elements
-    in V are those of V^-1 dA V times the divided differences of e^(p T) (Higham, *Functions of Matrices*, 2008, Theorem 3.11); a change
-    s^q u v^T of the dynamic stiffness has (V^-1 dA V)_ij = -(l_i u) p_j^q (v r_j), l and r the left and right vectors.
-
-    Poles p with `force` (n, n_ref) of the references on them and `at_end` (n,) e^((p - w) T); of those `seen` at the end `away` (k, L), s - p, and
-    `read` (k, n_resp, L), what responses read of their velocity.
-    """
-
-    duration: float
-    poles: Poles
-    force: ComplexArray
-    at_end: ComplexArray
-    seen: Integers
-    away: ComplexArray
-    read: ComplexArray
-
-    @property
-    def value(self) -> ComplexArray:
-        """(n_resp, n_ref, L)."""
-        return -self.moved((self.at_end[:, None] * self.force)[None, self.seen])[0]
-
-    def moved(self, amplitude: ComplexArray) -> ComplexArray:
-        """Sums (m, n_resp, n_ref, L) of the seen poles with `amplitude` (m, k, n_ref) each."""
-        m, k, n_ref = amplitude.shape
-        n_resp, lines = self.read.shape[1:]
-        found = amplitude.transpose(0, 2, 1).reshape(m * n_ref, k) @ self.read.reshape(k, n_resp * lines)
-        return np.asarray(found.reshape(m, n_ref, n_resp, lines).transpose(0, 2, 1, 3))
-
-    def tail(self, columns: Array, power: Integers) -> ComplexArray:
-        """The answer (m, n_ref, L) after the records' end, read as s^`power` `columns` (r, m)."""
-        p = self.poles.value[self.seen]
-        shape = (columns.T @ self.poles.right[:, self.seen]) * p ** power[:, None]
-        amplitude = shape[:, None, :] * (self.at_end[:, None] * self.force)[self.seen].T
-        return np.asarray(amplitude @ (1 / self.away))
-
-    def kicked(self, left: Array, right: Array, power: Integers) -> ComplexArray:
-        """How the amplitudes (m, k, n_ref) of the seen poles at the records' end change with s^`power` `left` `right`^T (r, m) in the dynamic stiffness."""
-        p, e, t = self.poles.value, self.at_end, self.duration
-        apart = p[self.seen, None] - p[None, :]
-        close = np.abs(apart) * t < CLOSE
-        between = np.where(close, t * (e[self.seen, None] + e[None, :]) / 2, (e[self.seen, None] - e[None, :]) / np.where(close, 1.0, apart))
-        shape = right.T @ self.poles.right
-        driven = (shape * p ** power[:, None])[:, :, None] * self.force  # (m, n, n_ref)
-        mass = np.where(power == 2, 1.0, 0.0)[:, None] * ((shape * p) @ self.force)  # a force's first velocity, which the mass sets
-        own = left.T @ self.poles.left[self.seen].T
-        return np.asarray(own[:, :, None] * (between @ driven + e[self.seen, None] * mass[:, None, :]))
-
-
-@dataclass(frozen=True, eq=False)
-class Products:
-    """Changes of M, C and K by k parameters as sums of few products of two vectors, for an element moves few degrees of freedom: the change of
-    the dynamic stiffness by parameter `of`[i] is the sum over its rows r of s^`power`[r] `left`[:, r] `right`[:, r]^T, of which `first`[i] is the first."""
-
-    count: int
-    of: Integers
-    first: Integers
-    power: Integers
-    left: Array
-    right: Array
-
-
-def products(mass: Array, damping: Array, stiffness: Array) -> Products:
-    """The products of dM, dC, dK (k, n, n), to `EXACT` of the largest of each."""
-    of, first, left, right = [], [], [], []
-    power: list[int] = []
-    for k in range(len(mass)):
-        start = len(power)
-        for exponent, change in ((2, mass[k]), (1, damping[k]), (0, stiffness[k])):
-            if change.any():
-                u, size, v = np.linalg.svd(change)
-                kept = np.flatnonzero(size > EXACT * size[0])
-                power += [exponent] * len(kept)
-                left.append(u[:, kept] * size[kept])
-                right.append(v[kept].T)
-        if len(power) > start:
-            of.append(k)
-            first.append(start)
-    n = mass.shape[1]
-    none = [np.zeros((n, 0))]
-    return Products(
-        len(mass), np.array(of, int), np.array(first, int), np.array(power, int), np.concatenate(left or none, axis=1), np.concatenate(right or none, axis=1)
-    )
-
-
-def same_chain(a: Measurement, b: Measurement) -> bool:
-    return a is b or (
-        a.decay == b.decay
-        and all(np.array_equal(getattr(a, k), getattr(b, k)) for k in ("response_rows", "reference_rows", "gain", "delay"))
-    )
-
-
-def partners(data: ModeData, linear: Linear):
-    """Poles of the model in order of frequency, and which of them is which measured mode: of its kind, near in ln frequency."""
-    p = poles(linear.matrices)
-    found = oscillating(p, REACH * float(data.frequency.max()))
-    return found, _partners(data, linear, p.value[found], p.right[:, found]), p
-
-
-def _partners(data: ModeData, linear: Linear, pole: ComplexArray, shape: ComplexArray) -> Integers:
-    computed = ModeSet(np.abs(pole) / (2 * np.pi), kind=kinds(linear.matrices, shape))
-    partner = pairing.partners(ModeSet(data.frequency, kind=data.kind), computed, pairing.OF_A_TABLE)
-    if np.any(partner < 0):
-        raise ValueError("the model has fewer modes than the table")
-    return partner
-
-
-def mode_residual(data: ModeData, linear: Linear) -> Array:
-    every, shape = poles_below(linear.matrices, REACH * float(data.frequency.max()))
-    pole = every[_partners(data, linear, every, shape)] - linear.chain.decay
-    frequency, damping = np.abs(pole) / (2 * np.pi), -pole.real / np.abs(pole)
-    known = np.isfinite(data.damping_sd)
-    by_frequency = np.log(frequency / data.frequency) / data.frequency_sd
-    by_damping = np.log(np.maximum(damping[known], 1e-9) / data.damping[known]) / data.damping_sd[known]
-    return np.concatenate([by_frequency, by_damping])

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tests.virtual_campaign import mode_campaign, model_of, virtual_campaign
+from thermospindle.diagnosis.forward.mechanism import Mechanism, likeness, size_covariance, variants
+from thermospindle.diagnosis.forward.nuisance import RECORD
 from thermospindle.diagnosis.inference.fit import Problem
 from thermospindle.diagnosis.inference.freeform import alike, free_forms
-from thermospindle.diagnosis.inference.mechanism import Mechanism, likeness, size_covariance, variants
-from thermospindle.diagnosis.inference.nuisance import RECORD
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
 from thermospindle.sim.effects import usable

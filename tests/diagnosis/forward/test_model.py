@@ -9,8 +9,9 @@ import pytest
 
 from tests.conftest import ROOT
 from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, truth, virtual_campaign
-from thermospindle.diagnosis.inference.nuisance import BUILD, DAMPING, DRIFT, EXPANSION, GAIN, RECORD, STIFFNESS, TEMPERATURE
-from thermospindle.diagnosis.inference.response import Response, products
+from thermospindle.diagnosis.forward.linear import products
+from thermospindle.diagnosis.forward.nuisance import BUILD, DAMPING, DRIFT, EXPANSION, GAIN, RECORD, STIFFNESS, TEMPERATURE
+from thermospindle.diagnosis.forward.response import Response
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.modes import poles
 from thermospindle.model.scene.reading import load
