@@ -13,6 +13,7 @@ campaign/        campaigns of tests, measured or virtual
 importing/       a laboratory's own files as a campaign
 running/         the running spindle: excitation, its run, runout and its lines
 resonance/       natural frequencies against bearing and unbalance lines
+side_by_side     MuJoCo models stepped side by side on all cores
 study/           sweeps, Monte Carlo, and whatever is many computations of one scene
 warmup           from cold start to steady state
 ===============  =================================================================================================

@@ -10,9 +10,9 @@ from rich.console import Console
 
 from thermospindle.diagnosis.runout.compare import LineBeside, PartBeside, RunoutBeside, rms_residual
 from thermospindle.model.units import RPM, TO_UM
-from thermospindle.report.text.grid import grid
+from thermospindle.report.text.grid import grid, show_grid
 
-SHOWN = 12  # lines of a test
+SHOWN = 12  # lines of a table
 WORDS = ("test", "line", "cause")
 
 
@@ -63,27 +63,46 @@ def _part_json(p: PartBeside) -> dict[str, Any]:
     return {"node": p.node, "measured_rms_um": TO_UM * p.measured_rms, "computed_rms_um": TO_UM * p.computed_rms} | valley
 
 
-def show_runout_comparison(console: Console, found: Sequence[RunoutBeside]) -> None:
-    """One table of lines a test, strongest first, one of RRO and NRRO."""
+def show_runout_comparison(console: Console, found: Sequence[RunoutBeside], verbose: bool = False) -> None:
+    """Of the `SHOWN` strongest lines of every test those farthest from their likely size, RRO and NRRO; with `verbose` these lines by test."""
+    every = sorted(((t.test.id, g) for t in found for g in t.lines[:SHOWN]), key=lambda row: -abs(row[1].residual))
     console.print(f"Runout: rms residual of all lines {rms_residual(found) or np.nan:.3g} standard errors", highlight=False)
+    rows = [[test, str(g.node), g.causes[0].name, cause_words(g), *_sizes(g)] for test, g in every[:SHOWN]]
+    title = "Strong lines farthest from their likely size, nm zero to peak"
+    show_grid(console, title, ("test", "node", "line", "cause", "measured", "computed", "error\ns.d."), rows, WORDS)
+    for t in found if verbose else ():
+        columns = ("Hz", "node", "line", "cause", "measured", "computed", "error\ns.d.", "orders", "measured\n+-", "computed\n+-")
+        lines = [
+            [f"{g.frequency:.2f}", str(g.node), g.causes[0].name, cause_words(g), *_sizes(g), f"{g.order:.3f}", _nm(g.measured_sd), _nm(g.scatter)]
+            for g in t.lines[:SHOWN]
+        ]
+        show_grid(console, f"{t.test.id}: lines, nm zero to peak", columns, lines, WORDS, keys=4)
+    for t in found:
+        for s in t.unexplained:
+            console.print(f"{t.test.id}: unexplained line at {s.frequency:.1f} Hz, {1e9 * s.amplitude:.3g} nm at node {s.node}", highlight=False)
     parts = grid("Runout parts, rms, nm", ("test", "node", "RRO", "computed", "NRRO", "computed"), WORDS)
     for t in found:
-        columns = ("Hz", "orders", "node", "line", "cause", "measured", "+-", "computed", "+- ", "error\ns.d.")
-        lines = grid(f"{t.test.id}: lines, nm zero to peak", columns, WORDS)
-        for g in t.lines[:SHOWN]:
-            cause = f"{g.causes[0].bearing} {g.causes[0].cause}".strip() + (f" {g.causes[0].order}" if g.causes[0].order else "")
-            sizes = (*(f"{1e9 * v:.2f}" for v in (g.measured, g.measured_sd, g.computed, g.scatter)), f"{g.residual:+.1f}")
-            lines.add_row(f"{g.frequency:.2f}", f"{g.order:.3f}", str(g.node), g.causes[0].name, cause, *sizes)
-        console.print(lines)
-        for s in t.unexplained:
-            console.print(
-                f"{t.test.id}: unexplained line at {s.frequency:.1f} Hz, {1e9 * s.amplitude:.3g} nm at node {s.node}", highlight=False
-            )
         for r, n in zip(t.rro, t.nrro, strict=True):
-            cells = (f"{1e9 * v:.2f}" for v in (r.measured_rms, r.computed_rms, n.measured_rms, n.computed_rms))
+            cells = (_nm(v) for v in (r.measured_rms, r.computed_rms, n.measured_rms, n.computed_rms))
             parts.add_row(t.test.id if r is t.rro[0] else "", str(r.node), *cells)
         parts.add_section()
     console.print(parts)
+    if not verbose:
+        console.print("--verbose shows the strongest lines of every test.", highlight=False)
+
+
+def cause_words(g: LineBeside) -> str:
+    """What makes a line, in so few words that a table holds them: the bearing, and the ring or the balls with the order of the wave."""
+    first = g.causes[0]
+    return f"{first.bearing} {first.cause.replace('waviness', str(first.order)) if first.order else first.cause}".strip()
+
+
+def _sizes(g: LineBeside) -> tuple[str, str, str]:
+    return _nm(g.measured), _nm(g.computed), f"{g.residual:+.1f}"
+
+
+def _nm(value: float) -> str:
+    return f"{1e9 * value:.2f}"
 
 
 def show_errors(console: Console, errors: dict[str, float | None]) -> None:

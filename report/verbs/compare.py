@@ -36,7 +36,7 @@ def compare(
     spindle, whole = with_effects(scene, effect_files)[0], read_campaign(campaign)
     earlier = with_effects(before, effect_files)[0] if before else None
     unseen = held_out(spindle, whole, held_out_tests)
-    turning = _of_runout(spindle, earlier, whole, unseen)
+    turning = _of_runout(spindle, earlier, whole, unseen, verbose)
     tests = modal_tests(whole)
     if turning and not tests.tests:
         values = {"spindle": spindle.name, "campaign": whole.title, **turning[0]}
@@ -64,7 +64,7 @@ def compare(
 
 
 def _of_runout(
-    spindle: Spindle, before: Spindle | None, campaign: Campaign, unseen: Sequence[str]
+    spindle: Spindle, before: Spindle | None, campaign: Campaign, unseen: Sequence[str], verbose: bool
 ) -> tuple[dict[str, Any], Callable[[Console], None], list[RunoutBeside], dict[str, float | None] | None] | None:
     """The runout tests of a campaign beside the scene, None where it has none: JSON, how it is told, and what the page needs; with `before` the errors of
     both scenes."""
@@ -79,7 +79,7 @@ def _of_runout(
         values |= {"error": before_after, "held_out": list(unseen)}
 
     def show(console: Console) -> None:
-        show_runout_comparison(console, found)
+        show_runout_comparison(console, found, verbose)
         if before_after:
             show_errors(console, before_after)
 

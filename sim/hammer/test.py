@@ -1,6 +1,6 @@
 """The virtual impact-hammer test: MuJoCo in time, acquisition as a laboratory does it, and FRFs with standard errors.
 
-Every hit is a full time simulation (RK4); all hits run side by side in C (`mujoco.rollout`), no Python between steps. Forces are
+Every hit is a full time simulation (RK4); all hits run side by side in C (`sim.side_by_side`), no Python between steps. Forces are
 controls held over a step: the force channel is that of the held force, so no half step of delay is left in the FRF. What is left of the hold
 are its images about the rate of integration, folded back where the velocity is read once a step: for a mass, whose velocity falls as 1/f,
 a part (pi f step)^2 / 3 of the FRF, 0.3 % at 6 kHz and 5 us.
@@ -18,7 +18,6 @@ from typing import TypeVar
 
 import mujoco
 import numpy as np
-from mujoco.rollout import Rollout
 from scipy.signal import resample_poly
 
 from thermospindle.model.errors import BadInput
@@ -31,6 +30,7 @@ from thermospindle.sim.hammer.estimate import Estimate, Windows, estimate
 from thermospindle.sim.hammer.pulse import Hit, check_band, draw_hits, force, pulse_duration
 from thermospindle.sim.hammer.reduced import MARGIN, PIECES, simulate_reduced, with_long_step
 from thermospindle.sim.operating import OperatingPoint
+from thermospindle.sim.side_by_side import SideBySide
 
 T = TypeVar("T")
 
@@ -166,15 +166,13 @@ def simulate(
     state = np.repeat(np.array([loaded_state(model) for model in models]), references * repeats, axis=0)
     actuators = [models[0].actuator(f"hammer{node}").id for node in test.hammer_nodes]
     velocity = np.empty((len(many), models[0].nsensordata, steps))
-    threads = min(cores(), len(many))
     edges = np.linspace(0, steps, PIECES + 1).astype(int)
-    with Rollout(nthread=threads) as pool:
-        data = [mujoco.MjData(models[0]) for _ in range(threads)]
+    with SideBySide(many) as pool:
         for k, (first, after) in enumerate(pairwise(edges.tolist()), 1):
             control = np.zeros((count, references, repeats, after - first, models[0].nu))
             for r, actuator in enumerate(actuators):
                 control[:, r, :, :, actuator] = held[:, r, :, first:after]
-            states, sensors = pool.rollout(many, data, state, control.reshape(len(many), after - first, -1))
+            states, sensors = pool.step(state, control.reshape(len(many), after - first, -1))
             state = np.ascontiguousarray(states[:, -1])
             velocity[:, :, first:after] = sensors.transpose(0, 2, 1)
             progress(f"{len(many)} hits, {k * 100 // PIECES} % of the records simulated")

@@ -1,7 +1,7 @@
 """The running spindle in time: MuJoCo under the forces of its imperfections, at constant speed, in run-up and in coast-down.
 
 Unbalance is an off-axis mass centre and a tilted inertia of the turning body; waviness, ball sizes and the cage act as generalised
-forces known in advance, which `mujoco.rollout` takes step by step in C (Runge-Kutta 4), several spindles side by side on all cores.
+forces known in advance, which MuJoCo takes step by step in C (Runge-Kutta 4), several spindles side by side on all cores.
 A force is held over a step: it is taken at the middle of the step and made larger by what holding takes off, (1 - (omega h)^2 / 24), so
 that nothing of the step is left in the response. The motor holds the speed: the spin hinge carries a flywheel's armature, which
 adds no gyroscopic moment, and a known torque for a speed that changes.
@@ -21,18 +21,17 @@ from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
-from mujoco.rollout import Rollout
 from numpy.typing import NDArray
 from scipy.signal import firwin, upfirdn
 
 from thermospindle.model.errors import BadInput
-from thermospindle.model.parallel import cores
 from thermospindle.model.rotor.chain import turning_at
 from thermospindle.model.rotor.mjcf import joint_names, spin_dofs
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.hammer.test import check_step
 from thermospindle.sim.operating import OperatingPoint
 from thermospindle.sim.running.excitation import Excitation, Harmonics, at_speed, chain_response, excitation
+from thermospindle.sim.side_by_side import SideBySide
 
 FILTER_REACH = 24  # samples on either side that the anti-alias filter sees
 PIECE = 0.05  # s, simulated at a time
@@ -107,19 +106,15 @@ def run_spindle(
     taps = firwin(2 * FILTER_REACH * every + 1, 0.85 / every, window=("kaiser", 8.6))
     per_piece = max(1, round(PIECE * sample_rate))
     needed = settled + samples + 2 * FILTER_REACH
-    threads = min(cores(), len(runs))
     state = np.array([run.start for run in runs])
     nv = runs[0].model.nv
     tail = np.zeros((len(runs), 2 * FILTER_REACH * every, nv))
     filtered, turned = [], []
-    with Rollout(nthread=threads) as pool:
-        data = [mujoco.MjData(runs[0].model) for _ in range(threads)]
+    with SideBySide([run.model for run in runs]) as pool:
         for first in range(0, needed, per_piece):
             count = min(per_piece, needed - first)
             forces = np.array([run.forces(first * every, count * every) for run in runs])
-            moved, _ = pool.rollout(
-                [run.model for run in runs], data, state, forces, control_spec=int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
-            )
+            moved, _ = pool.step(state, forces, mujoco.mjtState.mjSTATE_QFRC_APPLIED)
             state = moved[:, -1]
             position = np.concatenate([tail, moved[:, :, 1 : 1 + nv]], axis=1)
             tail = position[:, -tail.shape[1] :]

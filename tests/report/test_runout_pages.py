@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from thermospindle.diagnosis.compare.compare import compare
 from thermospindle.diagnosis.runout.compare import compare_runout
@@ -18,6 +20,7 @@ from thermospindle.model.units import RPM
 from thermospindle.report.figures.runout_campaign import explanations, lines_figure, moved_figure, pulls_figure, strongest_probe
 from thermospindle.report.page.compare import write_comparison
 from thermospindle.report.page.diagnosis import write_diagnosis
+from thermospindle.report.text.runout_compare import SHOWN, cause_words, show_runout_comparison
 from thermospindle.report.text.runout_diagnosis import runout_diagnosis_json
 from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Test
 from thermospindle.sim.campaign.simulated import runout_campaign
@@ -85,6 +88,21 @@ def test_a_comparison_of_runout_alone_has_its_page(spindle, campaign, beside, tm
     assert {p.name for p in tmp_path.iterdir()} == {"report.html"} | {
         f"runout_{n}.{k}" for n in ("lines", "pulls") for k in ("svg", "png")
     }
+
+
+@pytest.mark.parametrize("verbose", [False, True])
+def test_people_read_the_worst_line_first_in_80_columns(beside, verbose):
+    console = Console(width=80, file=io.StringIO())
+    show_runout_comparison(console, beside, verbose)
+    said = console.file.getvalue().splitlines()
+    assert max(map(len, said)) <= 80
+    assert said[0].startswith("Runout: rms residual of all lines")
+    worst = max(beside[0].lines[:SHOWN], key=lambda g: abs(g.residual))
+    first = next(line for line in said if line.startswith("T20_n7200"))
+    assert first.split()[-3:] == [f"{1e9 * worst.measured:.2f}", f"{1e9 * worst.computed:.2f}", f"{worst.residual:+.1f}"]
+    assert cause_words(worst) in first, "in one row, whole"
+    assert any(line.startswith("T20_n7200: lines") for line in said) is verbose
+    assert ("--verbose shows the strongest lines of every test." in said) is not verbose
 
 
 def test_a_comparison_of_both_has_both(spindle, beside, tmp_path):
