@@ -39,6 +39,8 @@ def free_forms(spindle: Spindle) -> list[Mechanism]:
     parts: list[tuple[str, tuple[str, ...], list[tuple[str, tuple[int, ...]]]]] = [(j.name, (j.name,), _groups(j.stiffness)) for j in joints]
     parts += [(s.name, s.elements, OF_BEAMS) for s in shafts]  # a shaft is one piece: its elements drift together
     for name, elements, groups in parts:
+        if len(groups) > 1:
+            found.append(_form(f"{name} stiffness", "%", STIFFNESS_WIDTH, chain=_scaled(elements, range(5), damping_too=True)))
         for label, moves in groups:
             found.append(_form(f"{name} {label} stiffness", "%", STIFFNESS_WIDTH, chain=_scaled(elements, moves, damping_too=True)))
         found.append(_form(f"{name} damping", "%", DAMPING_WIDTH, chain=_scaled(elements, range(0), damping_too=True, damping_only=True)))

@@ -30,6 +30,7 @@ NUMERICS = (1e-4, 0.01)  # drift of frequencies and of damping that two honest p
 MOSTLY = 0.6  # of the ln evidence of an explanation with free drift in it, or of the misfit that changes, that what is named must reach to be the answer
 UNTOLD = "nothing tried"  # what explains data that are missed grossly
 MUCH, LEFT = 0.5, "what is left"  # squares of the errors, from which what is left and changes tells of something else
+SURE = 5.0  # standard deviations of chi2 by chance, beyond which something is left
 COARSE = 4.0  # chosen on blind campaigns 1 to 16, by log score; others judge it
 DEPARTS = 0.3  # of the size, from which a law does not hold
 SPREAD = 3.0  # temperatures within so many tolerances of each other are one condition
@@ -98,12 +99,16 @@ def _unheld(
     found: Search, same: Overlap, candidates: tuple[Candidate, ...], free: tuple[Candidate, ...], none: float
 ) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...], float]:
     """What is only the best of what was tried, with its probability moved to the unknown: nothing missing, where modes drift by more than two honest
-    programs differ by or the data are missed grossly; effects, where they leave most of what changes."""
+    programs differ by, the data are missed grossly, or much is left that is not alike in all tests; effects, where they leave most of what changes."""
+    alike = overlap(found.model, found.base.fit)
+    kept = changing(found.base, alike), changing(found.hypotheses[0], same)
     gross = found.base.evidence.chi2 > GROSS * found.base.fit.count
-    if _adrift(found.base) or gross:
-        free = (*free, Candidate(found.base, (UNTOLD,) if gross else ("every mode",), True, 0.0, none))
+    by_chance = SURE * np.sqrt(2 / found.base.fit.count)  # standard deviations of chi2 a number
+    changes = len(found.model.tests) > 1 and alike.tests < ALIKE and kept[0] > max(MUCH, by_chance)
+    if _adrift(found.base) or gross or changes:
+        name = UNTOLD if gross else LEFT if changes else "every mode"
+        free = (*free, Candidate(found.base, (name,), True, 0.0, none))
         none = 0.0
-    kept = changing(found.base, overlap(found.model, found.base.fit)), changing(found.hypotheses[0], same)
     if kept[1] > MUCH and kept[1] > (1 - MOSTLY) * kept[0]:
         free = (*free, Candidate(found.base, (LEFT,), True, 0.0, sum(c.probability for c in candidates)))
         candidates = tuple(replace(c, probability=0.0) for c in candidates)
@@ -281,7 +286,8 @@ def _reason(found: Search, word: str, effects: Names, candidates, free, none: fl
         place = "nothing tried explains them, nor do tolerances and measuring errors: units, points, and noise that the files do not tell come first"
         if free and free[0].names == (LEFT,):
             left = found.hypotheses[0].fit
-            place = f"the best leaves {np.sqrt(left.chi2 / left.count):.1f} standard errors of {np.sqrt(chi2 / n):.1f}, and not the same in every test"
+            of = f" of {np.sqrt(chi2 / n):.1f}" if left.mechanisms else ""
+            place = f"the best leaves {np.sqrt(left.chi2 / left.count):.1f} standard errors{of}, and not the same in every test"
         elif free and free[0].hypothesis.mechanisms:
             place = f"{' and '.join(free[0].names)} would have to drift ({free[0].delta_evidence:.0f} in ln evidence)"
         elif free and free[0].names != (UNTOLD,):

@@ -96,6 +96,18 @@ def test_a_free_form_is_alike_to_effects_that_change_the_same(spindle, model, fo
     assert {m.name for m in named if alike(model, np.zeros(len(model.parameters)), free, m)} == names
 
 
+def test_an_element_that_drifts_whole_is_the_sum_of_its_directions(spindle, model):
+    found = {m.name: m for m in free_forms(spindle)}
+    x = np.zeros(len(model.parameters))
+
+    def column(name):
+        m = found[name]
+        return Problem(model, (m,)).by_size(1, x, [(m.effect, m.values(0.0, []))], 0)
+
+    parts = sum(column(f"flange {direction} stiffness") for direction in ("axial", "lateral", "tilt"))
+    assert column("flange stiffness") == pytest.approx(parts, abs=1e-3 * np.abs(parts).max())
+
+
 @pytest.mark.parametrize("name", ["preload_loss", "lubricant_film", "thermal_gradient"])
 def test_beyond_its_limits_a_size_goes_straight_on(spindle, model, name):
     """Continuous at the limit, and three equal steps beyond it change the residuals equally, along the slope inside."""

@@ -211,6 +211,17 @@ def test_data_that_are_missed_grossly_are_not_nothing_missing(chi2, word):
     assert ("units, points" in v.reason) == (word == "unexplained")
 
 
+@pytest.mark.parametrize(("leaves", "tests", "word"), [(5.0, 2, "unexplained"), (5.0, 1, "none"), (1.6, 2, "none"), (1.0, 2, "none")])
+def test_what_changes_beyond_noise_is_not_nothing_missing(leaves, tests, word):
+    """And not the same in every test: in one test alone it may be constant, and a little of it may be chance."""
+    found = made({"a": -3.0, "~x": -4.0})
+    model = SimpleNamespace(**vars(found.model) | {"tests": found.model.tests[:tests]})
+    wrong = tuple(replace(h, fit=replace(h.fit, chi2=leaves * h.fit.count)) for h in found.hypotheses)
+    v = decide(replace(found, model=model, hypotheses=wrong, base=next(h for h in wrong if not h.mechanisms)))
+    assert (v.word, v.probability_none == 0.0) == (word, word == "unexplained")
+    assert ("the best leaves" in v.reason) == (word == "unexplained")
+
+
 def test_the_order_of_hypotheses_does_not_matter():
     search = made({"a": 12.0, "b": 11.0, "~x": 9.0, ("a", "c"): 10.0})
     turned = replace(search, hypotheses=search.hypotheses[::-1])
