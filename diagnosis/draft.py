@@ -106,7 +106,8 @@ def _starts(law: Law, temperature: Array) -> list[Array]:
     if "middle" not in names:
         return [start]
     every = np.unique(temperature)
-    return [np.where(np.array(names) == "middle", m, start) for m in (every[1:] + every[:-1]) / 2] or [start]
+    middles = np.clip((every[1:] + every[:-1]) / 2, *law.shape[names.index("middle")][3])
+    return [np.where(np.array(names) == "middle", m, start) for m in middles] or [start]
 
 
 def _errors(law: Law, values: Array, offset: bool, temperature: Array, share: Array, sd: Array) -> Array:

@@ -20,12 +20,15 @@ from importlib import import_module
 from importlib.metadata import version
 from math import inf, isfinite
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from thermospindle.model.errors import BadInput, NoEquilibrium, NotConverged, OutsideRange, Unanswered, instead
 from thermospindle.model.rotor.elements import ELEMENTS, HAMMER
 from thermospindle.model.shaft import THEORIES
 from thermospindle.report.folder import COMMAND
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 HOTTEST, FASTEST = 1e4, 1e8  # C and rpm, up to which numbers are computed with; what no bearing bears only warns
 NEWTONS, SECONDS, MINUTES, NANOMETRES = 1e6, 100.0, 1e5, 1e6  # of a hammer, a record, a warm-up and a probe's noise
@@ -77,13 +80,22 @@ def _run(arguments: list[str]) -> int:
     if as_json:
         print(json.dumps(answer.values))
     else:
-        from rich.console import Console
-
-        answer.show(Console(markup=False))  # names of scenes and files may look like markup
+        answer.show(_terminal())
     if sys.stdout is not None:  # closed by the caller
         sys.stdout.flush()
     answer.then()
     return 0
+
+
+def _terminal() -> Console:
+    """Where results are shown; names of scenes and files may look like markup. Rich's own ends the program with 1 where a pipe is closed."""
+    from rich.console import Console
+
+    class Terminal(Console):
+        def on_broken_pipe(self) -> None:
+            raise BrokenPipeError
+
+    return Terminal(markup=False)
 
 
 def _refused(why: str) -> int:

@@ -121,6 +121,7 @@ LIMITS = Limits()
 FLOOR = 1e-3  # of the largest FRF of a test: its noise where no standard error is told, five times the 0.02 % of a good vibrometer
 FINER = 4  # lines for one of a sweep with uneven steps, where the direction of time is looked at
 ENOUGH = 16  # lines, from which their scatter tells noise
+HUGE = 1e100  # in any unit; squares of what is larger overflow
 SILENT = 0.02  # of the strongest answer to a hammer; below it symmetry forbids an answer, and noise alone has no coherence
 
 
@@ -129,6 +130,8 @@ def check_frf(where: str | Path, frf: Frf, speed: float, limits: Limits = LIMITS
 
     `where` is the file for the message, `speed` in rad/s.
     """
+    if (largest := max(np.abs(frf.value.real).max(), np.abs(frf.value.imag).max())) > HUGE:
+        raise BadInput(f"{where}: a value of {largest:g}: none beyond {HUGE:g} is a measurement")
     quiet = bridged(frf, out_of(frf, speed).out)  # the running speed's own lines answer no hammer
     for i, response in enumerate(frf.response_nodes):
         if not frf.value[i].any():

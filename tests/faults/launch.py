@@ -49,7 +49,11 @@ def save(scene: str, campaign: str, out: str) -> int:
 
     bench = benches.open_bench(Path(scene), read_campaign(Path(campaign)))
     s = set_deviation(Setting(), "hub mass", 0.004)
-    saved(bench, s, benches.errors(bench, s), (), Path(out))
+    try:
+        saved(bench, s, benches.errors(bench, s), (), Path(out))
+    except OSError as error:  # the workbench shows it (report/workbench/work.py)
+        print(f"spindle: {error}", file=sys.stderr)
+        return 2
     return 0
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import re
 from dataclasses import dataclass
 
@@ -56,6 +57,20 @@ _one = st.one_of(
     st.builds(Damage, st.sampled_from(["take out", "twice"]), _where, st.just(b""), st.floats(0, 0.2)),
 )
 damages = st.lists(_one, min_size=1, max_size=4)
+
+
+def drawn(rng: random.Random) -> Damage:
+    """One of the same kinds, for the fuzzer, that draws by itself."""
+    match rng.choice(("number", "number", "put in", "bytes", "small", "piece")):
+        case "number":
+            return Damage("number", rng.random(), rng.choice(VALUES))
+        case "put in":
+            return Damage("put in", rng.random(), rng.choice(BITS))
+        case "bytes":
+            return Damage("put in", rng.random(), rng.randbytes(rng.randint(1, 7)))
+        case "small":
+            return Damage(rng.choice(("cut", "flip", "line")), rng.random())
+    return Damage(rng.choice(("take out", "twice")), rng.random(), b"", 0.2 * rng.random())
 
 
 def damaged(data: bytes, every: list[Damage]) -> bytes:

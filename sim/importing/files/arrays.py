@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import struct
+import subprocess
+import sys
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -28,9 +32,45 @@ def read_arrays(file: Path) -> dict[str, Any]:
         begin = stream.read(520)
     if begin.startswith(b"PK"):
         return dict(_npz(file))
-    if begin.startswith(HDF5) or begin[512:].startswith(HDF5):
-        return dict(_hdf5(file))
-    return dict(_mat(file))
+    return _apart(file)
+
+
+APART = "import sys; from thermospindle.sim.importing.files.arrays import hand_over; sys.exit(hand_over(*sys.argv[1:]))"
+REFUSED = 3  # exit code of a process that has said why
+
+
+def _apart(file: Path) -> dict[str, Any]:
+    """What another process reads of a `.mat` file: the compiled readers of SciPy and HDF5 break off the process that they are in on some damaged files."""
+    with TemporaryDirectory() as place:
+        found = Path(place) / "arrays.npz"
+        done = subprocess.run([sys.executable, "-P", "-c", APART, str(file), str(found), str(LARGEST)], capture_output=True, text=True, errors="replace")
+        if done.returncode == REFUSED:
+            raise BadInput(done.stderr.strip())
+        if done.returncode or not found.is_file():
+            raise BadInput(f"{file}: is damaged; the library that reads .mat files breaks off on it")
+        with np.load(found, allow_pickle=False) as stored:
+            names = json.loads(str(stored["names"]))
+            return {name: _told(stored[f"arr_{k}"]) for k, name in enumerate(names)}
+
+
+def _told(value: np.ndarray) -> Any:
+    return value if value.dtype.kind != "U" else value.tolist()
+
+
+def hand_over(file: str, found: str, largest: str) -> int:
+    """The other process: reads a `.mat` file and writes its arrays and texts to the file `found`; an exit code."""
+    global LARGEST
+    LARGEST = int(largest)
+    try:
+        with Path(file).open("rb") as stream:
+            begin = stream.read(520)
+        arrays = dict((_hdf5 if begin.startswith(HDF5) or begin[512:].startswith(HDF5) else _mat)(Path(file)))
+    except BadInput as error:
+        print(error, file=sys.stderr)
+        return REFUSED
+    with open(found, "wb") as stream:
+        np.savez(stream, *(np.asarray(value) for value in arrays.values()), names=np.asarray(json.dumps(list(arrays))))
+    return 0
 
 
 def _npz(file: Path) -> Iterator[tuple[str, Any]]:
