@@ -1,8 +1,9 @@
-"""Fitting nuisance parameters and the sizes of mechanisms to a campaign: Gauss-Newton with priors, tempered.
+"""Fitting nuisance parameters and the sizes of mechanisms to a campaign: Levenberg-Marquardt with priors, tempered.
 
 Peaks that do not overlap do not pull at each other: with the data's own errors a fit stalls. Errors are therefore first taken thousands of
 times too large, so that priors rule and all peaks move together, then less and less (a homotopy: Allgower & Georg, *Numerical Continuation
-Methods*, 1990). Steps are damped as Levenberg and Marquardt do; a step to where no spindle can be built is taken shorter.
+Methods*, 1990). What moves a peak by its width bends every valley of the cost: a step along one is corrected with the derivatives at hand before
+it is judged. A step to where no spindle can be built is taken shorter.
 """
 
 from __future__ import annotations

@@ -30,8 +30,9 @@ from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.inference.evidence import evidence, left_out
 from thermospindle.diagnosis.inference.fit import TEMPERS, Problem, fit
 from thermospindle.diagnosis.inference.prior import steady
+from thermospindle.diagnosis.inference.remainder import overlap
 from thermospindle.diagnosis.inference.search import Hypothesis, settled
-from thermospindle.diagnosis.inference.verdict import conditions_of
+from thermospindle.diagnosis.inference.verdict import coarsening, conditions_of
 from thermospindle.diagnosis.verdict import Diagnosis, diagnose
 from thermospindle.model.machine import Spindle
 from thermospindle.model.scene.reading import load
@@ -124,12 +125,29 @@ def judge(seed: int, without: Sequence[str] = ()) -> dict[str, Any]:
         "probability": told["probability"],
         "candidates": [{k: c[k] for k in ("effects", "probability", "delta_evidence", "chi2_per_number")} for c in told["candidates"]],
         "drifts": [[p["element"], p["delta_evidence"]] for p in told["where"]],
+        "weighed": weighed(found),
         "rms": [told["error"]["before"], told["error"]["after"]],
         "held_out": [told["error"]["held_out_before"], told["error"]["held_out_after"]],
         "learned": told["learned"],
         "noise": sorted(set(told["noise"].values())),
         "seconds": seconds,
         "drafted": drafted(found, told) if told["verdict"] == "unexplained" and told["where"] else None,
+    }
+
+
+def weighed(found: Diagnosis) -> dict[str, Any]:
+    """What a verdict is made of, for whoever asks what another weighing would have said: of every explanation its names, how many of them are free, ln
+    evidence over the model without effects and the largest departure from a law; the inflation of the evidence, and whether it is coarsened."""
+    search, base = found.search, found.search.base.evidence.ln
+    best = search.hypotheses[0]
+    return {
+        "explanations": [
+            [list(h.names), sum(m.free for m in h.mechanisms), round(h.evidence.ln - base, 2), max(h.evidence.learned.departures, default=0.0)]
+            for h in search.hypotheses
+        ],
+        "inflation": overlap(search.model, best.fit).inflation,
+        "coarse": coarsening(best),
+        "screened": [len({s.mechanism.name for s in search.screened if s.mechanism.free == free and s.visibility > 0}) for free in (False, True)],
     }
 
 
