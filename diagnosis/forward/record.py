@@ -1,4 +1,12 @@
-"""What records that end before the answer has died away leave out of FRFs, and how that moves."""
+"""What records that end before the answer has died away leave out of FRFs, and how that moves.
+
+Of a velocity's mode p A e^(p t) a record of T seconds leaves out the part after T, -p A e^((p - w) T) / (s - p) with w what windows add. At the lines
+1/T apart of a discrete Fourier transform e^(-i omega T) is one, so that the part is smooth over lines (Brandt, *Noise and Vibration Analysis*, 2011, 10.3).
+
+With the state matrix A = V diag(p) V^-1 it is -C (s - A)^-1 e^((A - w) T) B. Its derivatives need that of the exponential, whose elements in V are
+those of V^-1 dA V times the divided differences of e^(p T) (Higham, *Functions of Matrices*, 2008, Theorem 3.11). A change s^q u v^T of the dynamic
+stiffness has (V^-1 dA V)_ij = -(l_i u) p_j^q (v r_j), l and r the left and right vectors; one of the mass changes B, too.
+"""
 
 from __future__ import annotations
 
@@ -14,17 +22,8 @@ CLOSE = 1e-5  # times 1 / T, below which two poles' difference is their derivati
 
 @dataclass(frozen=True, eq=False)
 class RecordEnd:
-    """The end of records of finite length T: of a velocity's mode p A e^(p t) they leave out the part after T, -p A e^((p - w) T) / (s - p) with w what
-    windows add. At the lines 1/T apart of a discrete Fourier transform e^(-i omega T) is one, so that the part is smooth over lines (Brandt, *Noise and
-    Vibration Analysis*, 2011, 10.3).
-
-    With the state matrix A = V diag(p) V^-1 it is -C (s - A)^-1 e^((A - w) T) B. Its derivatives need that of the exponential, whose elements
-    in V are those of V^-1 dA V times the divided differences of e^(p T) (Higham, *Functions of Matrices*, 2008, Theorem 3.11); a change
-    s^q u v^T of the dynamic stiffness has (V^-1 dA V)_ij = -(l_i u) p_j^q (v r_j), l and r the left and right vectors.
-
-    Poles p with `force` (n, n_ref) of the references on them and `at_end` (n,) e^((p - w) T); of those `seen` at the end `away` (k, L), s - p, and
-    `read` (k, n_resp, L), what responses read of their velocity.
-    """
+    """The end of records of `duration` seconds: `poles` p, with `force` (n, n_ref) of the references on them and `at_end` (n,) e^((p - w) T); of those
+    `seen` at the end `away` (k, L), s - p, and `read` (k, n_resp, L), what responses read of their velocity."""
 
     duration: float
     poles: Poles

@@ -215,7 +215,7 @@ THEORY = {
     "The hammer test and its FRFs": ("sim.hammer.estimate", "sim.importing.records"),
     "Poles of a measurement": ("sim.identification.poles", "sim.identification.modal", "sim.identification.running_lines"),
     "Measured beside computed": ("diagnosis.compare.compare",),
-    "Lines, noise and evidence": ("diagnosis.data.lines", "diagnosis.data.window", "diagnosis.inference.evidence", "diagnosis.inference.search"),
+    "Lines, noise and evidence": ("diagnosis.data.lines", "diagnosis.data.window", "diagnosis.forward.record", "diagnosis.inference.evidence", "diagnosis.inference.search"),
     "Warm-up": ("sim.warmup", "thermal.friction", "thermal.heat"),
 }
 """Sections of the theory, and the modules whose docstrings tell them."""
