@@ -198,15 +198,12 @@ def _least_loss(
         return sum(c.probability * (HALF if any(own & alike.get(n, frozenset()) for n in c.names) else at_worst) for c in unknown)
 
     def named_loss(own: set[str]) -> float:
-        """Of naming one effect, or two: half right where one of two is named, or one beside something unknown."""
+        """Of naming one effect, or two: half right where one of two is named, or one beside something unknown; wrong with any name that is not true."""
         loss = FALSE_ALARM * none + missed(own, WRONG)
-        for c in candidates:
-            hit = own & set(c.names)
-            loss += c.probability * (0.0 if own == set(c.names) else HALF if hit else WRONG)
-        for c in beside:
+        for c in (*candidates, *beside):
             of_it = set(named_part(c))
-            whole = SET / 2 if own == of_it and _mostly_named(c, alone) else HALF
-            loss += c.probability * (whole if own & of_it else WRONG)
+            whole = 0.0 if not c.free else SET / 2 if _mostly_named(c, alone) else HALF
+            loss += c.probability * (whole if own == of_it else HALF if own < of_it else WRONG)
         return loss
 
     for names in dict.fromkeys([c.names for c in candidates[:8]] + [named_part(c) for c in beside[:3]]):
@@ -302,7 +299,8 @@ def _reason(found: Search, word: str, effects: Names, candidates, free, none: fl
     if word == "ambiguous":
         rows = [c for c in candidates if set(c.names) <= set(effects)]
         share = sum(c.probability for c in rows)
-        return f"One of {', '.join(effects)} explains the data (together {share:.0%} probable); no one of them is probable enough to be named{checked}."
+        several = ", or several of them together," if any(len(c.names) > 1 and c.probability > NEGLIGIBLE for c in rows) else ""
+        return f"One of {', '.join(effects)}{several} explains the data (together {share:.0%} probable); no one of them is probable enough to be named{checked}."
     disagreement = ", which does not confirm it" if after > 0.9 * before else ""
     told = [c for c in (*candidates, *free) if set(named_part(c)) == set(effects)]
     chosen = max(told, key=lambda c: c.probability)

@@ -211,6 +211,14 @@ def test_data_that_are_missed_grossly_are_not_nothing_missing(chi2, word):
     assert ("units, points" in v.reason) == (word == "unexplained")
 
 
+@pytest.mark.parametrize(("pair", "word"), [(26.0, "ambiguous"), (34.0, "two effects")])
+def test_a_second_name_must_be_as_sure_as_a_first(pair, word):
+    """Four to one for two effects over one of them: the second would be a wrong name once in five, and both are told as a set."""
+    v = decide(made({("a", "b"): pair, "a": 20.5}))
+    assert (v.word, set(v.effects)) == (word, {"a", "b"})
+    assert (v.candidates[0].probability < 0.9) == (word == "ambiguous")
+
+
 @pytest.mark.parametrize(("leaves", "tests", "word"), [(5.0, 2, "unexplained"), (5.0, 1, "none"), (1.6, 2, "none"), (1.0, 2, "none")])
 def test_what_changes_beyond_noise_is_not_nothing_missing(leaves, tests, word):
     """And not the same in every test: in one test alone it may be constant, and a little of it may be chance."""
