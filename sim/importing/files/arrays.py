@@ -9,6 +9,7 @@ import sys
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
+from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -32,7 +33,15 @@ def read_arrays(file: Path) -> dict[str, Any]:
         begin = stream.read(520)
     if begin.startswith(b"PK"):
         return dict(_npz(file))
+    if _is_hdf5(begin) and find_spec("h5py") is None:
+        raise BadInput(
+            f"{file}: is a .mat of version 7.3 (HDF5), which needs h5py: pip install 'thermospindle[hdf5]', or save it with -v7"
+        )
     return _apart(file)
+
+
+def _is_hdf5(begin: bytes) -> bool:
+    return begin.startswith(HDF5) or begin[512:].startswith(HDF5)
 
 
 APART = "import sys; from thermospindle.sim.importing.files.arrays import hand_over; sys.exit(hand_over(*sys.argv[1:]))"
@@ -64,7 +73,7 @@ def hand_over(file: str, found: str, largest: str) -> int:
     try:
         with Path(file).open("rb") as stream:
             begin = stream.read(520)
-        arrays = dict((_hdf5 if begin.startswith(HDF5) or begin[512:].startswith(HDF5) else _mat)(Path(file)))
+        arrays = dict((_hdf5 if _is_hdf5(begin) else _mat)(Path(file)))
     except BadInput as error:
         print(error, file=sys.stderr)
         return REFUSED
@@ -128,12 +137,8 @@ def _mat(file: Path) -> Iterator[tuple[str, Any]]:
 
 
 def _hdf5(file: Path) -> Iterator[tuple[str, Any]]:
-    try:
-        import h5py
-    except ImportError:
-        raise BadInput(
-            f"{file}: is a .mat of version 7.3 (HDF5), which needs h5py: pip install 'thermospindle[hdf5]', or save it with -v7"
-        ) from None
+    import h5py
+
     found: dict[str, Any] = {}
     bytes_of: list[int] = []
 
