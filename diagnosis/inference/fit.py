@@ -25,7 +25,8 @@ LONGEST = 3.0  # prior standard deviations in one step
 MOST_STEPS = (30, 40)  # while errors are taken too large, and at the end
 LEAST_DAMPING, RAISED_DAMPING = 1e-4, 1e-3  # of a parameter's own curvature, at first and after a step that was refused
 MOST_GROWTH = 2.0**6  # of the damping, one refusal after the other
-ENOUGH, ENOUGH_EARLY = 0.3, 0.02  # of the cost, from which a fit goes on; a share of it while errors are taken too large
+ENOUGH = 0.3  # of the cost, from which a fit goes on
+ENOUGH_FAR, ENOUGH_EARLY = 2e-3, 0.02  # share of what is left beyond noise, and of all the cost while errors are taken too large, likewise
 TRUSTED, POOR = 0.6, 0.25  # of the gain promised: from there derivatives stay in use, and below it a step is corrected
 CORRECTIONS = 2
 SIZE_STEP = 0.02  # of a size's or shape parameter's prior standard deviation, for differences
@@ -251,7 +252,7 @@ def _settled(problem: Problem, p: Array, rates: Rates, temper: float) -> tuple[A
     """Levenberg-Marquardt steps at one temper until the cost stands still, damped as in Madsen, Nielsen & Tingleff, *Methods for Non-Linear Least
     Squares Problems*, 2004, algorithm 3.16. Derivatives are taken anew only where a step does not do what it promises, and at the end of the last
     temper."""
-    last = temper == 1.0
+    last, count = temper == 1.0, sum(d.count for d in problem.model.tests)
     lines = problem.linearisation(p, rates)
     here = Point(p, lines.residuals, problem.cost(p, temper, lines.residuals))
     current, damping, growth = True, LEAST_DAMPING, 2.0
@@ -272,7 +273,8 @@ def _settled(problem: Problem, p: Array, rates: Rates, temper: float) -> tuple[A
         if gained > 0:
             here, growth = there, 2.0
             damping *= max(1 / 3, 1 - (2 * min(gained / promised, 1.0) - 1) ** 3)
-            if gained < (ENOUGH if last else max(1.0, ENOUGH_EARLY * here.cost)) and (current or not last):
+            enough = max(ENOUGH, ENOUGH_FAR * (here.cost - count)) if last else max(1.0, ENOUGH_EARLY * here.cost)
+            if gained < enough and (current or not last):
                 break
         elif current:
             damping, growth = max(2.5 * growth * damping, RAISED_DAMPING), 2 * growth
