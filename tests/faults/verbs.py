@@ -103,7 +103,7 @@ def launched(folder: Path, line: list[str], cache: Path, kill_at: int = 0, **mor
     count = folder.parent / "acts"
     count.unlink(missing_ok=True)
     command = [sys.executable, "-m", "tests.faults.launch", str(folder), str(kill_at), str(count), *line]
-    return subprocess.run(command, env=surroundings(cache), cwd=folder, capture_output=True, text=True, timeout=900, **more)
+    return subprocess.run(command, env=surroundings(cache), cwd=folder, capture_output=True, text=True, timeout=3600, **more)
 
 
 def acts(folder: Path) -> int:
