@@ -3,7 +3,7 @@ PYTHON ?= python3
 SPINDLE = .venv/bin/spindle
 READY = .venv/ready
 
-.PHONY: demo test test-all lint bench blind torture faults release-check docs clean
+.PHONY: demo test test-all lint bench growth blind torture fuzz faults release-check docs clean
 
 demo: $(READY)
 	$(SPINDLE) run scenes/hdd_2003 --out out/hdd_2003
@@ -29,6 +29,12 @@ EXAMPLES ?= 1000
 torture: $(READY)
 	TORTURE_EXAMPLES=$(EXAMPLES) .venv/bin/pytest tests/torture -m ''
 
+# Every reader of files under atheris, SECONDS each; what is found stands in out/fuzz. For one: .venv/bin/python -m tests.fuzz uff --seconds 600
+SECONDS ?= 60
+fuzz: $(READY)
+	.venv/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[fuzz]'
+	.venv/bin/python -m tests.fuzz --seconds $(SECONDS)
+
 # The documentation as one static site in out/site; its own libraries come with it.
 docs: $(READY)
 	.venv/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[docs]'
@@ -46,6 +52,10 @@ release-check: $(READY)
 
 bench: $(READY)
 	.venv/bin/python -m tests.bench
+
+# How costs grow with the work; `--picture docs/growth.png` draws them.
+growth: $(READY)
+	.venv/bin/python -m tests.bench_growth $(GROWTH)
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11) and 'Thermospindle needs Python 3.11 or newer')"
