@@ -88,7 +88,7 @@ def evidence(model: CampaignModel, fit: Fit, near: Learned | None = None) -> Evi
     def rated(s: float, sizes: Mapping[str, float]) -> tuple[float, int]:
         """ln evidence, the mean over widths and departures of all mechanisms; and which of these is best."""
         scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
-        inner = _marginal(scaled, nuisance_variances(model, sizes), p)
+        inner = _marginal(scaled, nuisance_variances(model, sizes, fit.moved), p)
         values = inner.integrated(roots) - fit.count * np.log(s)
         return float(logsumexp(values) - np.log(len(values))), int(np.argmax(values))
 
@@ -117,7 +117,7 @@ def evidence(model: CampaignModel, fit: Fit, near: Learned | None = None) -> Evi
     own = [grid[k] for grid, k in zip(own_grids, np.unravel_index(own_best, [len(grid) for grid in own_grids]), strict=True)] if own_grids else []
     scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
     learned = Learned(sizes, s, tuple(w for w, _ in own), tuple(d for _, d in own))
-    mean, spread = _posterior(scaled, covariance(model, fit.mechanisms, learned))
+    mean, spread = _posterior(scaled, covariance(model, fit.mechanisms, learned, fit.moved))
     at, means, covariances, truncation = p, [], [], 0.0
     tests = len(model.tests)
     for m, root in zip(fit.mechanisms, fit.roots, strict=True):
@@ -239,7 +239,7 @@ def _posterior(q: Quadratic, prior: Array) -> tuple[Array, Array]:
 def left_out(model: CampaignModel, fit: Fit, found: Evidence, groups: Sequence[Sequence[int]]) -> float:
     """Root mean square residual, in standard errors of the data, of groups of tests predicted from all others, with what was learned from all."""
     learned = found.learned
-    prior = covariance(model, fit.mechanisms, learned)
+    prior = covariance(model, fit.mechanisms, learned, fit.moved)
     by_test = [quadratic(*b, fit.point) for b in fit.by_test]
     total, count = 0.0, 0
     for group in groups:

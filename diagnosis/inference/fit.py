@@ -9,7 +9,7 @@ it is judged. A step to where no spindle can be built is taken shorter.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.linear import Rates
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import FAILED, Applied, CampaignModel
-from thermospindle.diagnosis.inference.prior import Learned, precision, roots_of
+from thermospindle.diagnosis.inference.prior import UNMOVED, Learned, precision, roots_of
 from thermospindle.model.types import Array, Integers
 
 TEMPERS = (3e-4, 3e-3, 0.03, 0.3, 1.0)
@@ -53,6 +53,7 @@ class Fit:
     count: int
     rates: Rates
     temper: float
+    moved: Array = field(default_factory=lambda: UNMOVED)  # (tests, 2, modes), of frequency and damping of every mode, by the mechanisms and relative
     cost: float = np.nan  # chi2, its errors 1 / temper times the data's, and priors: those that it was fitted with
 
     @property
@@ -168,6 +169,10 @@ class Problem:
         """Residuals of every test; None where no spindle can be built."""
         return built(lambda t: self.residual(t, p), self.tests)
 
+    def within_reach(self, move: Array) -> Array:
+        """A step (n,), shortened to `LONGEST`."""
+        return move * min(1.0, LONGEST / max(float((np.abs(move) * self.reach).max()), 1e-300))
+
     def at(self, p: Array, temper: float) -> Point:
         residuals = self.residuals(p)
         return Point(p, residuals, self.cost(p, temper, residuals) if residuals is not None else np.inf)
@@ -258,8 +263,7 @@ def _settled(problem: Problem, p: Array, rates: Rates, temper: float) -> tuple[A
     current, damping, growth = True, LEAST_DAMPING, 2.0
     for _ in range(MOST_STEPS[last]):
         gradient, normal = lines.slope(problem, here, temper), temper**2 * lines.information + problem.precision
-        move = -np.linalg.solve(normal + damping * np.diag(np.diag(normal)), gradient)
-        move *= min(1.0, LONGEST / max(float((np.abs(move) * problem.reach).max()), 1e-300))
+        move = problem.within_reach(-np.linalg.solve(normal + damping * np.diag(np.diag(normal)), gradient))
         promised = -2 * float(gradient @ move) - float(move @ normal @ move)
         if promised < ENOUGH and current:
             break
@@ -297,7 +301,7 @@ def _corrected(problem: Problem, lines: Linearisation, normal: Array, temper: fl
     it is back on its floor after them."""
     best = there
     for _ in range(CORRECTIONS):
-        there = problem.at(there.p - np.linalg.solve(normal, lines.slope(problem, there, temper)), temper)
+        there = problem.at(there.p + problem.within_reach(-np.linalg.solve(normal, lines.slope(problem, there, temper))), temper)
         if there.residuals is None:
             break
         if there.cost < best.cost:
@@ -322,5 +326,21 @@ def _finished(problem: Problem, p: Array, rates: Rates, temper: float, lines: Li
         sum(d.count for d in problem.model.tests),
         rates,
         temper,
+        _moved(problem, p) if temper == 1.0 and problem.mechanisms else UNMOVED,
         problem.cost(p, temper, residuals),
     )
+
+
+def _moved(problem: Problem, p: Array) -> Array:
+    """Relative changes (tests, 2, modes) that the mechanisms make in the frequency and the damping of the reference modes, to first order."""
+    model, x = problem.model, problem.parts(p)[0]
+    omega, damping = model.reference.omega[: model.reference.seen], model.reference.damping[: model.reference.seen]
+    found = np.zeros((problem.tests, 2, len(omega)))
+    for t, effects in enumerate(problem.effects_of(p)):
+        plain, acting = model.linear(t, x, []).matrices, model.linear(t, x, effects).matrices
+        if not effects or acting.dofs != plain.dofs:
+            continue
+        shape = np.linalg.solve(plain.mass, model.reference.over(plain.dofs)[:, : len(omega)])
+        k, m, c = (np.einsum("ni,nj,ji->i", shape, getattr(acting, w) - getattr(plain, w), shape) for w in ("stiffness", "mass", "damping"))
+        found[t] = (k - omega**2 * m) / (2 * omega**2), c / (2 * damping * omega)
+    return found

@@ -23,6 +23,9 @@ REFERENCE = {
     kinds_of.DRIFT: kinds_of.DRIFT_SD,
 }
 """Widths in which nuisances of unknown size are counted."""
+ACTION = 3.0  # times the relative error of frequencies, which what the model says of an effect may be wrong by
+UNMOVED = np.zeros((0, 2, 0))
+"""Of a model without effects, and of fits, which need no more than a place to start from."""
 NOTHING = 1e-4  # of a reference width: what stands for a size of zero where a prior must be inverted
 
 
@@ -61,9 +64,19 @@ def roots_of(model: CampaignModel, mechanisms: Sequence[Mechanism]) -> tuple[Arr
     )
 
 
-def nuisance_variances(model: CampaignModel, sizes: Mapping[str, float]) -> Array:
-    """Prior variances (P,) of the nuisance parameters in units of their reference widths."""
-    return np.array([(sizes[p.kind] / REFERENCE[p.kind]) ** 2 if p.kind in sizes else 1.0 for p in model.parameters])
+def nuisance_variances(model: CampaignModel, sizes: Mapping[str, float], moved: Array) -> Array:
+    """Prior variances (P,) of the nuisance parameters in units of their reference widths.
+
+    A model whose frequencies are constantly wrong is wrong, too, in what an effect does: of the relative changes of frequency and damping that the
+    mechanisms make of every mode in every test, `moved` (tests, 2, modes), a share may drift: `ACTION` times the relative error of the frequencies.
+    """
+    found = np.array([(sizes[p.kind] / REFERENCE[p.kind]) ** 2 if p.kind in sizes else 1.0 for p in model.parameters])
+    share = ACTION * sizes.get(kinds_of.STIFFNESS, 0.0)
+    if share and moved.any():
+        for i, q in enumerate(model.parameters):
+            if q.kind in DRIFTING:
+                found[i] += (share * moved[q.test, DRIFTING.index(q.kind), q.modes[0]] / REFERENCE[q.kind]) ** 2
+    return found
 
 
 def mechanism_covariance(model: CampaignModel, mechanisms: Sequence[Mechanism], own: Sequence[tuple[float, float]]) -> Array:
@@ -84,9 +97,9 @@ def whitened_covariance(conditions: tuple[Condition, ...], width: float, departu
     return np.asarray(solve_triangular(root, half.T, lower=True))
 
 
-def covariance(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned) -> Array:
-    """Prior covariance (n, n) of all parameters at learned sizes; singular where a size is zero."""
-    diagonal = nuisance_variances(model, learned.sizes)
+def covariance(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned, moved: Array) -> Array:
+    """Prior covariance (n, n) of all parameters at learned sizes, the mechanisms having `moved` the modes; singular where a size is zero."""
+    diagonal = nuisance_variances(model, learned.sizes, moved)
     n = len(diagonal)
     own = mechanism_covariance(model, mechanisms, list(zip(learned.widths, learned.departures, strict=True)))
     prior = np.zeros((n + len(own), n + len(own)))
@@ -100,7 +113,7 @@ def precision(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Le
     n = len(model.parameters)
     if learned is None:
         return np.eye(n + sum(len(model.tests) + len(m.shape) for m in mechanisms))
-    found = covariance(model, mechanisms, learned)
+    found = covariance(model, mechanisms, learned, UNMOVED)
     found[:n, :n] = np.diag(1 / np.maximum(np.diag(found)[:n], NOTHING**2))
     if len(found) > n:
         own = found[n:, n:]
