@@ -13,10 +13,14 @@ from thermospindle.diagnosis.forward.mechanism import REFERENCE_DEPARTURE, REFER
 from thermospindle.diagnosis.forward.nuisance import (
     BUILD,
     DAMPING,
+    DAMPING_DRIFT,
+    DAMPING_DRIFT_SD,
     DAMPING_SD,
     DRIFT,
     DRIFT_SD,
     STIFFNESS,
+    STIFFNESS_DRIFT,
+    STIFFNESS_DRIFT_SD,
     STIFFNESS_SD,
     TEMPERATURE,
     Nuisance,
@@ -27,6 +31,7 @@ from thermospindle.diagnosis.inference.evidence import (
     left_out,
 )  # fmt: skip
 from thermospindle.diagnosis.inference.fit import Fit
+from thermospindle.diagnosis.inference.prior import ACTION, nuisance_variances
 from thermospindle.model.machine import Condition
 from thermospindle.sim.effects.effect import Effect, Parameter
 
@@ -129,6 +134,24 @@ def test_the_size_of_the_discrepancy_is_learned(size):
     right = [evidence(made.model, made.fit).learned for made in (toy(seed, size) for seed in range(20))]
     assert sum(learned.sizes[STIFFNESS] == size for learned in right) >= 18
     assert sum(learned.sizes[DAMPING] == 0.0 and learned.sizes[DRIFT] == 0.0 for learned in right) >= 14
+
+
+def test_a_model_that_is_wrong_may_be_wrong_in_what_an_effect_does():
+    """In proportion: nothing for a model that is right, or a mode that does not move; `ACTION` times the frequencies' error of what moves."""
+    parameters = [Nuisance(BUILD, "b", 0.01)] + [
+        Nuisance(kind, kind, sd, test=t, modes=(i, i))
+        for kind, sd in ((STIFFNESS_DRIFT, STIFFNESS_DRIFT_SD), (DAMPING_DRIFT, DAMPING_DRIFT_SD)) for t in (0, 1) for i in (0, 1)
+    ]  # fmt: skip
+    model = SimpleNamespace(parameters=parameters)
+    moved = np.zeros((2, 2, 2))
+    moved[1, 0, 1], moved[1, 1, 0] = 0.02, -0.3  # frequency of the second mode and damping of the first, in the second test
+    right = {STIFFNESS: 0.0, STIFFNESS_DRIFT: 0.0, DAMPING_DRIFT: DAMPING_DRIFT_SD}
+    plain = nuisance_variances(model, right, moved)
+    assert plain.tolist() == [1, 0, 0, 0, 0, 1, 1, 1, 1]
+    found = nuisance_variances(model, right | {STIFFNESS: 0.01}, moved) - plain
+    assert found[4] == pytest.approx((ACTION * 0.01 * 0.02 / STIFFNESS_DRIFT_SD) ** 2)
+    assert found[7] == pytest.approx((ACTION * 0.01 * 0.3 / DAMPING_DRIFT_SD) ** 2)
+    assert np.count_nonzero(found) == 2
 
 
 def test_errors_larger_than_stated_are_learned():
