@@ -61,6 +61,7 @@ class Bench:
     observations: tuple[Observation, ...] = ()
     effect_files: tuple[Path, ...] = ()
     left_out: tuple[str, ...] = ()  # tests that are left out at the beginning
+    of_runout: tuple[str, ...] = ()  # tests of the campaign that have runout alone, which the bench does not show
     modes: dict[str, list[Mode]] = field(default_factory=dict)  # of the scene as it was opened, where there are no tests
 
     def effect(self, name: str) -> Effect:
@@ -137,7 +138,8 @@ def open_bench(
     unseen = held_out(spindle, tests, left_out)
     observed = observe(tests, spindle, progress)
     shown = tuple(Shown(t.id, condition_of(t), t) for t in tests.tests)
-    return replace(bench, campaign=tests, observations=tuple(observed), shown=shown, left_out=unseen)
+    of_runout = tuple(t.id for t in every.tests if t not in tests.tests)
+    return replace(bench, campaign=tests, observations=tuple(observed), shown=shown, left_out=unseen, of_runout=of_runout)
 
 
 def _conditions(spindle: Spindle) -> list[Shown]:

@@ -229,7 +229,7 @@ class Page:
     def show_status(self, s: Setting) -> None:
         drag = "all tests" if self.cost("all") < SMOOTH else "the shown test" if self.cost("shown") < SMOOTH else "nothing until you let go"
         self.short.text = words.short(self.bench, self.found)
-        self.status.text = words.status(self.bench, s, self.found) + words.timing(self.cost("all"), drag) + words.remarks(self.found)
+        self.status.text = words.status(self.bench, s, self.found) + words.aside(self.bench) + words.timing(self.cost("all"), drag) + words.remarks(self.found)
 
     def choose_test(self) -> None:
         """Another test: its channels, its modes, its FRF."""

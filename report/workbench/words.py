@@ -11,6 +11,7 @@ from thermospindle.report.text.compare import AGREES, ALMOST
 from thermospindle.report.workbench.bench import Bench, Errors, Shown
 from thermospindle.report.workbench.state import Session, Setting
 
+NAMED = 4  # tests told by name
 NOTHING = 5e-4  # percent, up to which a mode has not changed
 
 
@@ -47,6 +48,22 @@ def status(bench: Bench, s: Setting, found: Errors) -> str:
     if furthest:
         said.append(Markup("furthest off: mode {} in {}, {:+.3g} standard errors").format(furthest.mode, furthest.test, furthest.frequency))
     return str(Markup("<p>{}.</p>").format(Markup("; ").join(said)))
+
+
+def not_shown(bench: Bench) -> str:
+    """Which tests of the campaign the bench cannot show, and what does, as plain text; empty where there are none."""
+    if not bench.of_runout:
+        return ""
+    several = len(bench.of_runout) > 1
+    names = ", ".join(bench.of_runout[:NAMED]) + (f" and {len(bench.of_runout) - NAMED} more" if len(bench.of_runout) > NAMED else "")
+    tests = f"Tests {names} are" if several else f"Test {names} is"
+    return f"{tests} of runout, and not on the bench: spindle compare and spindle diagnose show runout, with --out on pages of its own."
+
+
+def aside(bench: Bench) -> str:
+    """The same on the page."""
+    said = not_shown(bench)
+    return str(Markup("<p>{}</p>").format(said)) if said else ""
 
 
 def timing(seconds: float, drag: str) -> str:

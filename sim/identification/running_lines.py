@@ -3,6 +3,7 @@
 At whole multiples of the turning frequency a line or two stick out of FRFs that are smooth there otherwise. What is smooth is told from the lines on either
 side, as a polynomial and as a ratio of polynomials with one denominator for all FRFs, which follows a resonance (the local rational method: Geerardyn,
 Lataire, Schoukens & Pintelon, *IEEE Trans. Instrum. Meas.* 63 (2014) 1203). A line sticks out if it is beyond the scatter of its neighbours about both.
+At the very ends of a band there are none on one side: where multiples stick out elsewhere, those there are left out unseen.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ from thermospindle.model.types import Array, ComplexArray
 SIDE = 9  # neighbours on either side from which a line is told
 OUT = 2  # lines on either side of one that its own spike may reach
 FEWEST = 10  # neighbours
+ONE_SIDE = 3  # of them on the side that has fewer
+END = OUT + ONE_SIDE  # lines at either end of the band, which cannot be told from their neighbours
 DEGREE, POLES = 3, 2  # of numerators and the common denominator
 CHANCE = 1e-6  # of a spike in a test without any
 LEAST = 1e-8  # of the mean square of the neighbours: scatter that is believed
@@ -47,8 +50,9 @@ def running_lines(frequency: Array, value: ComplexArray, speed: float) -> Runnin
     none = RunningLines(out, (), ())
     if turning == 0.0 or len(frequency) <= 2 * FEWEST:
         return none
-    multiples = np.arange(1, int(frequency[-1] / turning) + 1)
-    multiples = multiples[multiples * turning >= max(frequency[0], frequency[1] - frequency[0])]
+    low, high = frequency[1] - frequency[0], frequency[-1] - frequency[-2]
+    multiples = np.arange(1, int((frequency[-1] + high / 2) / turning) + 1)
+    multiples = multiples[multiples * turning >= max(frequency[0] - low / 2, low)]
     step = np.interp(multiples * turning, (frequency[1:] + frequency[:-1]) / 2, np.diff(frequency))  # that of the lines there: sweeps have uneven ones
     reach = np.maximum(1.5 * step, DRIFT * multiples * turning)
     suspect = np.zeros(len(frequency), bool)
@@ -56,13 +60,17 @@ def running_lines(frequency: Array, value: ComplexArray, speed: float) -> Runnin
         suspect |= np.abs(frequency - f) <= r
     limit = CHANCE / max(int(suspect.sum()) * value.shape[0] * value.shape[1], 1)
     found: list[tuple[int, float]] = []
+    untold = np.zeros(len(frequency), bool)
     for k, r in zip(multiples.tolist(), reach, strict=True):
         own = [int(j) for j in np.flatnonzero(np.abs(frequency - k * turning) <= r) if frequency[j] > 0]
+        untold[[j for j in own if min(j, len(frequency) - 1 - j) < END]] = True
         unlikely = {j: _chance(value, j, suspect) for j in own}
         if unlikely and min(unlikely.values()) < limit:
             top = min(unlikely, key=lambda j: unlikely[j])
             found.append((k, float(frequency[top])))
             out[[j for j in own if unlikely[j] < limit or abs(j - top) < OUT]] = True
+    if found:
+        out |= untold
     return RunningLines(out, tuple(k for k, _ in found), tuple(f for _, f in found))
 
 
@@ -70,7 +78,7 @@ def _chance(value: ComplexArray, j: int, suspect: NDArray[np.bool_]) -> float:
     """Probability of the line `j` being so far off by the scatter of its neighbours, in the FRF where it is farthest off."""
     near = np.arange(max(0, j - SIDE - OUT), min(value.shape[-1], j + SIDE + OUT + 1))
     near = near[(np.abs(near - j) > OUT) & ~suspect[near]]
-    if len(near) < FEWEST or (near < j).sum() < 3 or (near > j).sum() < 3:
+    if len(near) < FEWEST or (near < j).sum() < ONE_SIDE or (near > j).sum() < ONE_SIDE:
         return 1.0
     x = (near - j) / (SIDE + OUT)
     here = value[:, :, near].reshape(-1, len(near))

@@ -18,14 +18,18 @@ from tests.conftest import DATA, ROOT, SCENE
 from thermospindle.diagnosis.add import scene_with
 from thermospindle.diagnosis.compare.compare import compare
 from thermospindle.model.errors import BadInput
+from thermospindle.model.machine import Condition
+from thermospindle.model.units import RPM
 from thermospindle.report.workbench import bench as benches
 from thermospindle.report.workbench import explanations as told
 from thermospindle.report.workbench import page as pages
-from thermospindle.report.workbench import state
+from thermospindle.report.workbench import state, words
 from thermospindle.report.workbench.page import Page
 from thermospindle.report.workbench.save import save, script
 from thermospindle.report.workbench.section import LARGEST, moving, pieces
 from thermospindle.report.workbench.state import Setting
+from thermospindle.sim.campaign.campaign import read_campaign
+from thermospindle.sim.campaign.simulated import runout_campaign
 from thermospindle.sim.effects import by_name
 from thermospindle.sim.operating import operating_point
 
@@ -101,6 +105,21 @@ def test_without_tests_the_model_stands_beside_itself(alone):
     assert cell.frequency == pytest.approx(100 * (after / before - 1))
     assert cell.frequency < -0.2
     assert benches.curves(alone, s, alone.shown[0], 3, 1).measured is None
+
+
+def test_runout_tests_are_said_not_to_be_on_the_bench(spindle, tmp_path):
+    """Beside tests of modes: named on the page with what shows them; alone they are refused in a sentence."""
+    modal = read_campaign(SCENE / "measured" / "jang_2003")
+    turned = runout_campaign(spindle, [Condition(20.0, rpm * RPM) for rpm in (3600, 7200)], 0.3, path="linear")
+    mixed = benches.open_bench(SCENE, replace(modal, points=turned.points, tests=(*modal.tests, *turned.tests)))
+    assert mixed.of_runout == ("T20_n3600", "T20_n7200")
+    assert [s.id for s in mixed.shown] == [t.id for t in modal.tests]
+    said = "Tests T20_n3600, T20_n7200 are of runout, and not on the bench: spindle compare and spindle diagnose show runout"
+    assert said in Page(mixed, Document(), tmp_path).status.text
+    assert words.not_shown(replace(mixed, of_runout=tuple("abcdef"))).startswith("Tests a, b, c, d and 2 more are of runout")
+    assert words.not_shown(benches.open_bench(SCENE, modal)) == ""
+    with pytest.raises(BadInput, match="holds runout tests alone; the workbench needs tests of modes"):
+        benches.open_bench(SCENE, turned)
 
 
 def test_effects_of_runout_alone_are_not_offered(bench):

@@ -99,3 +99,18 @@ def test_compare_warns_and_names_them(spindle, tmp_path, capsys):
     assert "campaign.toml: tests.t1: a line of the running speed stands in the FRFs, at 71" in warning
     assert "(6x)" in warning
     assert answer["rms_pull"] < 2.0
+
+
+def test_multiples_on_the_ends_of_the_band_go_with_the_others(spindle):
+    """On the first and last lines nothing on one side tells a spike; they are left out where others are seen, and stay where none is."""
+    frf, turning = measured(spindle, 3), SPEED / (2 * np.pi)
+    first, last = np.searchsorted(LINES, 4 * turning - 0.1), np.searchsorted(LINES, 20 * turning + 0.1)
+    cut = Frf(LINES[first:last], frf.value[:, :, first:last], frf.response_nodes, frf.reference_nodes, "mobility")
+    assert not out_of(cut, SPEED).out.any()
+    value = cut.value.copy()
+    ends = [0, len(cut.frequency) - 1]
+    value[:, :, [*ends, int(np.argmin(np.abs(cut.frequency - 6 * turning)))]] += 0.3 * np.abs(value).max()
+    found = out_of(replace(cut, value=value), SPEED)
+    assert found.multiples == (6,)
+    assert found.out[ends].all()
+    assert found.out.sum() < 20
