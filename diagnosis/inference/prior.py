@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -48,6 +48,11 @@ def steady(learned: Learned, mechanisms: Sequence[Mechanism] = ()) -> Learned:
     drift does not take what the mechanisms should explain."""
     sizes = {kind: max(REFERENCE[kind], learned.sizes[kind]) if kind not in DRIFTING else REFERENCE[kind] for kind in learned.sizes}
     return as_stated(sizes, mechanisms)
+
+
+def undrifted(learned: Learned) -> Learned:
+    """What was learned, but for modes that drift."""
+    return replace(learned, sizes={kind: 0.0 if kind in DRIFTING else size for kind, size in learned.sizes.items()})
 
 
 def as_stated(sizes: Mapping[str, float], mechanisms: Sequence[Mechanism] = ()) -> Learned:

@@ -2,7 +2,7 @@
 
 Screening is linear: what each mechanism would do to every line in every test, beside all that nuisances can do, gives the evidence that it
 would have. Where tolerances leave a misfit, it is done while errors are still taken 30 times too large, before tolerances are dragged off
-to fit what they cannot. What falls behind there is not fitted further (successive halving: Jamieson & Talwalkar, AISTATS 2016).
+to fit what they cannot; where modes that drift explain it, also as if none did. What falls behind there is not fitted further (successive halving: Jamieson & Talwalkar, AISTATS 2016).
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import chain, zip_longest
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.evidence import Evidence, evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, Problem, fit
 from thermospindle.diagnosis.inference.freeform import alike
-from thermospindle.diagnosis.inference.prior import DRIFTING, Learned, steady
+from thermospindle.diagnosis.inference.prior import DRIFTING, Learned, steady, undrifted
 from thermospindle.diagnosis.inference.remainder import LOOKED, light_resonance, overlap
 from thermospindle.diagnosis.inference.screening import Screened, screen
 from thermospindle.model.parallel import in_parallel
@@ -133,8 +134,11 @@ def _singles(
     else:
         about, temper = none.fit, 1.0
     looked = screen(model if temper == 1.0 else model.thinned, about, temper, learned, [*named, *free], workers)
+    rankings = [looked]
+    if strained and learned.errors <= STRAIN:  # drift alone explains what is missing: what would, were there none
+        rankings.append(screen(model, none.fit, 1.0, undrifted(learned), [*named, *free], workers))
     progress("effects screened")
-    chosen = _chosen(looked, strained)
+    chosen = _chosen(rankings, strained)
     # tolerances strained to stand in for an effect must give way with it; while errors are enlarged they are not strained yet
     tasks = [_task((), about, s, -np.inf if strained else none.evidence.ln + s.gain, far=not strained) for s in chosen]
     most = fit(model, (), (none.evidence.mean, none.fit.point), none.fit.rates, TEMPERS[-1:], learned=expected).cost
@@ -220,17 +224,21 @@ def _finalists(found: Sequence[Hypothesis]) -> list[Hypothesis]:
     return chosen
 
 
-def _chosen(looked: Sequence[Screened], strained: bool) -> list[Screened]:
-    """The most promising mechanisms, one variant of each effect, of the catalogue and of the free forms. Where nothing is strained what
-    screening promises is nearly what a fit will hold, and only what is near the best is followed."""
+def _chosen(rankings: Sequence[Sequence[Screened]], strained: bool) -> list[Screened]:
+    """The most promising mechanisms, one variant of each effect, of the catalogue and of the free forms, from all rankings by turns. Where nothing is
+    strained what screening promises is nearly what a fit will hold, and only what is near the best is followed."""
     found: list[Screened] = []
     for free, most in ((False, NAMED), (True, FREE)):
-        best: dict[str, Screened] = {}
-        for s in sorted((s for s in looked if s.mechanism.free == free and np.isfinite(s.gain)), key=lambda s: -s.gain):
-            best.setdefault(s.mechanism.name, s)
-        ranked = list(best.values())[:most]
-        least = -LITTLE if strained or not ranked else max(-LITTLE, ranked[0].gain - CLOSE)
-        found += [s for s in ranked if s.gain > least or s is ranked[0]]
+        promising = []
+        for looked in rankings:
+            ranked = sorted((s for s in looked if s.mechanism.free == free and np.isfinite(s.gain)), key=lambda s: -s.gain)
+            least = -LITTLE if strained or not ranked else max(-LITTLE, ranked[0].gain - CLOSE)
+            promising.append([s for s in ranked if s.gain > least or s is ranked[0]])
+        chosen: dict[str, Screened] = {}
+        for s in filter(None, chain.from_iterable(zip_longest(*promising))):
+            if len(chosen) < most:
+                chosen.setdefault(s.mechanism.name, s)
+        found += chosen.values()
     return found
 
 
@@ -313,7 +321,7 @@ def _beside(model, leads: Sequence[Hypothesis], mechanisms: Sequence[Mechanism],
         asked = ENOUGH if lead.evidence.learned.errors > 1.0 else PLENTY
         drifts = all(m.free for m in lead.mechanisms)
         others = [m for m in mechanisms if m.name not in lead.names and not (drifts and not m.free) and not (m.free and lead.free and not drifts)]
-        looked = screen(model, lead.fit, 1.0, lead.evidence.learned, others, workers)
+        looked = screen(model, lead.fit, 1.0, undrifted(lead.evidence.learned), others, workers)
         for free in (False, True):
             best: dict[str, Screened] = {}
             for s in sorted(looked, key=lambda s: -s.gain):
