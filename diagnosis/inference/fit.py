@@ -263,7 +263,7 @@ def _settled(problem: Problem, p: Array, rates: Rates, temper: float) -> tuple[A
     current, damping, growth = True, LEAST_DAMPING, 2.0
     for _ in range(MOST_STEPS[last]):
         gradient, normal = lines.slope(problem, here, temper), temper**2 * lines.information + problem.precision
-        move = problem.within_reach(-np.linalg.solve(normal + damping * np.diag(np.diag(normal)), gradient))
+        move = problem.within_reach(-_solved(normal + damping * np.diag(np.diag(normal)), gradient))
         promised = -2 * float(gradient @ move) - float(move @ normal @ move)
         if promised < ENOUGH and current:
             break
@@ -296,12 +296,16 @@ def _settled(problem: Problem, p: Array, rates: Rates, temper: float) -> tuple[A
     return here.p, lines, here.residuals
 
 
+def _solved(matrix: Array, right: Array) -> Array:
+    return np.asarray(np.linalg.solve(matrix, right), float)
+
+
 def _corrected(problem: Problem, lines: Linearisation, normal: Array, temper: float, there: Point) -> Point:
     """The best of a few steps on from a point with the derivatives of the one before: peaks narrower than they move bend every valley, and a step along
     it is back on its floor after them."""
     best = there
     for _ in range(CORRECTIONS):
-        there = problem.at(there.p + problem.within_reach(-np.linalg.solve(normal, lines.slope(problem, there, temper))), temper)
+        there = problem.at(there.p + problem.within_reach(-_solved(normal, lines.slope(problem, there, temper))), temper)
         if there.residuals is None:
             break
         if there.cost < best.cost:

@@ -2,7 +2,8 @@
 
 Screening is linear: what each mechanism would do to every line in every test, beside all that nuisances can do, gives the evidence that it
 would have. Where tolerances leave a misfit, it is done while errors are still taken 30 times too large, before tolerances are dragged off
-to fit what they cannot; where modes that drift explain it, also as if none did. What falls behind there is not fitted further (successive halving: Jamieson & Talwalkar, AISTATS 2016).
+to fit what they cannot; where modes that drift explain it, also as if none did. What falls behind there is not fitted further (successive
+halving: Jamieson & Talwalkar, AISTATS 2016).
 """
 
 from __future__ import annotations
