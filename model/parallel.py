@@ -7,7 +7,9 @@ travel too, and a script needs no `if __name__ == "__main__"`. The workers stay 
 
 from __future__ import annotations
 
+import os
 import signal
+import threading
 import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator
@@ -72,7 +74,7 @@ def _sent(function: Callable[[Item], Result], items: list[Item], workers: int) -
     global _last
     workers = _last[0] if _running(workers) else workers  # a pool that is larger is not made smaller
     warnings.filterwarnings("ignore", "A worker was restarted", UserWarning)  # which loses nothing, and is no news to whoever waits
-    pool = get_reusable_executor(workers, timeout=IDLE, initializer=_begin, env=ENVIRONMENT)
+    pool = get_reusable_executor(workers, timeout=IDLE, initializer=_begin, initargs=(os.getpid(),), env=ENVIRONMENT)
     try:
         yield from pool.map(partial(_call, cloudpickle.dumps(function)), items)
     except KeyboardInterrupt:
@@ -96,9 +98,18 @@ def alone() -> None:
     _inside = True
 
 
-def _begin() -> None:
+def _begin(parent: int) -> None:
     alone()
+    threading.Thread(target=_leave_with, args=(parent,), daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process that started this one says when to stop
+
+
+def _leave_with(parent: int) -> None:
+    """Ends this worker when the process that started it is gone, killed for instance: one that has a large result to hand over would wait for ever, since
+    it holds the other end of the pipe itself."""
+    while os.getppid() == parent:
+        time.sleep(1.0)
+    os._exit(1)
 
 
 @lru_cache(maxsize=2)

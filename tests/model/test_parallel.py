@@ -139,3 +139,44 @@ def test_nothing_else_makes_processes():
     files = [f for p in ("model", "thermal", "sim", "diagnosis", "report") for f in (ROOT / p).rglob("*.py")]
     found = [f for f in files if any(word in f.read_text(encoding="utf-8") for word in words)]
     assert found == [ROOT / "model" / "parallel.py"]
+
+
+KILLED = """
+import os, time
+from pathlib import Path
+from thermospindle.model import parallel
+parallel.START = 0.0
+def work(k):
+    Path(f"{os.getpid()}.pid").touch()
+    time.sleep(2)
+    return bytes(10_000_000)  # more than a pipe holds
+parallel.in_parallel(work, range(8), 2, done=lambda result: time.sleep(600))
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows keeps the number of a parent that is gone")
+def test_workers_end_with_the_process_that_was_killed(tmp_path):
+    """Found by `make faults`: a worker with a large result in hand waited for ever, since nobody read the pipe and it held its other end itself."""
+    running = subprocess.Popen([sys.executable, "-c", KILLED], cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)})
+    until = time.monotonic() + 120
+    while len(list(tmp_path.glob("*.pid"))) < 2 and time.monotonic() < until:
+        time.sleep(0.2)
+    workers = [int(file.stem) for file in tmp_path.glob("*.pid")]
+    running.kill()
+    running.wait()
+    assert len(workers) == 2
+    assert running.pid not in workers
+    until = time.monotonic() + 30
+    while (left := [pid for pid in workers if _runs(pid)]) and time.monotonic() < until:
+        time.sleep(0.2)
+    for pid in left:
+        os.kill(pid, 9)
+    assert not left
+
+
+def _runs(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
