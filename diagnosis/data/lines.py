@@ -41,6 +41,7 @@ ENOUGH = 200  # degrees of freedom from which the scatter within blocks tells th
 REPEATS, CAMPAIGN, SCATTER = "repeats", "the campaign", "scatter of neighbouring lines"
 KNOWN = (REPEATS, CAMPAIGN)
 SILENT = 1e-7  # of the largest value of a test: the least noise that is believed
+FALLEN = 0.6  # of the noise seen before, below which it is not believed to be less
 CONFIRMED = 1.1  # of a known noise, up to which the scatter of neighbouring lines does not contradict it
 
 
@@ -99,10 +100,12 @@ def line_data(test: Test, condition: Condition, stated: Noise | None, expected: 
     if seen is None and len(frequency) > LINES_THAT_SCATTER:  # noise stated too small divides every block to single lines
         blocks = _blocks(value, np.maximum(sd, _smooth_sd(value, scatter(value) / np.sqrt(neighbours(damped)), falling)), damped, gaps)
         seen = _within_blocks(value, blocks, damped, falling)
-    for _ in range(2):
+    for again in (False, True):
         if seen is None:
             break
         sd_seen = np.maximum(np.sqrt(seen), least)
+        if again:  # the polynomials of short blocks leave little to tell noise by
+            sd_seen = np.where(sd_seen < FALLEN * sd, sd, sd_seen)
         if known is not None and np.sqrt(np.mean(sd_seen**2 / known**2)) < CONFIRMED:
             sd, blocks = known, _blocks(value, known, damped, gaps)
             break

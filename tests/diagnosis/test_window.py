@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.blind.study import draw
 from tests.diagnosis.inference.test_lines import modal_frf
 from thermospindle.diagnosis.data.lines import line_data
 from thermospindle.diagnosis.data.window import correlation, left_by, neighbours, windowed
+from thermospindle.diagnosis.inference.fit import fit
+from thermospindle.diagnosis.verdict import campaign_data
 from thermospindle.model.machine import Condition
 from thermospindle.sim.campaign.campaign import Noise, Test
 from thermospindle.sim.identification.frf import Frf
@@ -68,3 +71,13 @@ def test_errors_of_compressed_lines_come_true(hidden):
         left = (data.value - modal_frf(data.frequency)) / data.sd
         total, count = total + float(np.sum(np.abs(left) ** 2)), count + left.size
     assert total / count == pytest.approx(1.0, abs=0.1)
+
+
+def test_noise_is_seen_where_few_lines_tell_it():
+    """Blind campaign 165, with nothing hidden: in one test blocks of few lines told a hundredth of the noise that low frequencies have, and it was missed by
+    six standard errors."""
+    drawn = draw(165)
+    model = campaign_data(drawn.spindle, drawn.made().campaign)
+    left = [np.sqrt(chi2 / data.count) for (chi2, _, _), data in zip(fit(model).by_test, model.tests, strict=True)]
+    assert max(left) < 1.2
+    assert min(left) > 0.6
