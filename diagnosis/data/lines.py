@@ -41,7 +41,7 @@ ENOUGH = 200  # degrees of freedom from which the scatter within blocks tells th
 REPEATS, CAMPAIGN, SCATTER = "repeats", "the campaign", "scatter of neighbouring lines"
 KNOWN = (REPEATS, CAMPAIGN)
 SILENT = 1e-7  # of the largest value of a test: the least noise that is believed
-FALLEN = 0.6  # of the noise seen before, below which it is not believed to be less
+TRUSTED = 9.0  # times less than a block showed: the least noise by which it is weighed
 CONFIRMED = 1.1  # of a known noise, up to which the scatter of neighbouring lines does not contradict it
 
 
@@ -100,12 +100,10 @@ def line_data(test: Test, condition: Condition, stated: Noise | None, expected: 
     if seen is None and len(frequency) > LINES_THAT_SCATTER:  # noise stated too small divides every block to single lines
         blocks = _blocks(value, np.maximum(sd, _smooth_sd(value, scatter(value) / np.sqrt(neighbours(damped)), falling)), damped, gaps)
         seen = _within_blocks(value, blocks, damped, falling)
-    for again in (False, True):
+    for _ in range(2):
         if seen is None:
             break
         sd_seen = np.maximum(np.sqrt(seen), least)
-        if again:  # the polynomials of short blocks leave little to tell noise by
-            sd_seen = np.where(sd_seen < FALLEN * sd, sd, sd_seen)
         if known is not None and np.sqrt(np.mean(sd_seen**2 / known**2)) < CONFIRMED:
             sd, blocks = known, _blocks(value, known, damped, gaps)
             break
@@ -227,13 +225,14 @@ def _within_blocks(value: ComplexArray, blocks: list[tuple[int, int]], damped: f
 def _gamma_fit(columns: Array, seen: Array, freedom: Array, least: tuple[float, float] = USUAL) -> Array:
     """Shares (c,) >= 0 with `seen` (n,) about columns (n, c) @ shares: squares have errors in proportion to themselves, weighted anew.
 
-    Weights are those of `least` of the mean at least, in the first step and later.
+    Weights are those of `least` of the mean at least, in the first step and later, and of `TRUSTED` times less than was seen: a step that leaves a
+    block next to nothing would make it rule the following one.
     """
     mean = seen + least[0] * seen.mean()
     for _ in range(6):
         weight = np.sqrt(freedom) / mean
         share, _ = nnls(columns * weight[:, None], seen * weight)
-        mean = np.maximum(columns @ share, least[1] * seen.mean())
+        mean = np.maximum(columns @ share, np.maximum(least[1] * seen.mean(), seen / TRUSTED))
     return share
 
 

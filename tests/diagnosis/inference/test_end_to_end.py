@@ -12,7 +12,7 @@ from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.prior import steady
 from thermospindle.diagnosis.inference.screening import screen
-from thermospindle.diagnosis.inference.search import _fit_one
+from thermospindle.diagnosis.inference.search import Task, _fit_one
 from thermospindle.diagnosis.verdict import Diagnosis, diagnose
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
@@ -47,7 +47,7 @@ def test_a_fit_that_stalls_from_where_screening_points_starts_again():
     screened = screen(model, base, 1.0, none.learned, [m], 1)[0]
     expected = steady(none.learned)
     most = fit(model, (), none.mean, learned=expected).cost
-    found = _fit_one(model, base.rates, (1.0,), most, expected, ((m,), screened.start, -np.inf))
+    found = _fit_one(model, base.rates, (1.0,), most, expected, False, Task((m,), (screened.start,), -np.inf))
     assert found is not None
     assert found.fit.chi2 / found.fit.count == pytest.approx(1.0, abs=0.1)
     assert found.evidence.ln - none.ln > 8
