@@ -109,6 +109,11 @@ class Response:
         read = (self._rows @ (p.right * p.value)[:, seen]).T[:, :, None] * (self.factor / self.s) / away[:, None, :]
         return RecordEnd(data.duration, p, p.left @ self._references, at_end, seen, away, read) if len(seen) else None
 
+    @property
+    def _late(self) -> RecordEnd | None:
+        """The end of records, where a share of it is taken away."""
+        return self._end if self._cut else None
+
     def over(self, columns: Array) -> Array:
         """Columns (n, m) of generalised forces in the coordinates (r,) of `left` and `right`."""
         return columns if self._basis is None else self._basis.T @ columns
@@ -141,8 +146,8 @@ class Response:
             left, right = self.over(by.left), self.over(by.right)
             products = self.read(left)[:, :, None] * self.driven(right, by.power)[:, None]
             found[by.of] = np.add.reduceat(products, by.first, axis=0)
-            if self._cut and self._end is not None:
-                found[by.of] += self._cut * self._end.moved(np.add.reduceat(self._end.kicked(left, right, by.power), by.first, axis=0))
+            if (end := self._late) is not None:
+                found[by.of] += self._cut * end.moved(np.add.reduceat(end.kicked(left, right, by.power), by.first, axis=0))
         return found
 
     def moved_together(self, columns: Array, power: int, i: Integers, j: Integers) -> ComplexArray:
@@ -150,10 +155,10 @@ class Response:
         left, right = self.read(columns), self.driven(columns, np.full(columns.shape[1], power))
         found = left[i][:, :, None] * right[j][:, None]
         found += left[j][:, :, None] * right[i][:, None]
-        if self._cut and self._end is not None:
+        if (end := self._late) is not None:
             powers = np.full(len(i), power)
-            kicked = [self._end.kicked(columns[:, a], columns[:, b], powers) for a, b in ((i, j), (j, i))]
-            found += self._cut * self._end.moved(kicked[0] + kicked[1])
+            kicked = [end.kicked(columns[:, a], columns[:, b], powers) for a, b in ((i, j), (j, i))]
+            found += self._cut * end.moved(kicked[0] + kicked[1])
         return found
 
     def read(self, columns: Array) -> ComplexArray:
@@ -165,4 +170,4 @@ class Response:
         of it comes after the records' end."""
         found = np.ascontiguousarray((columns.T @ self.right).transpose(1, 2, 0))
         found *= -(self.s[None, :] ** power[:, None])[:, None, :]
-        return found + self._cut * self._end.tail(columns, power) if self._cut and self._end is not None else found
+        return found if (end := self._late) is None else found + self._cut * end.tail(columns, power)

@@ -120,11 +120,11 @@ def evidence(model: CampaignModel, fit: Fit, near: Learned | None = None) -> Evi
     mean, spread = _posterior(scaled, covariance(model, fit.mechanisms, learned, fit.moved))
     at, means, covariances, truncation = p, [], [], 0.0
     tests = len(model.tests)
-    for m, root in zip(fit.mechanisms, fit.roots, strict=True):
+    for m, root, width_departure in zip(fit.mechanisms, fit.roots, own, strict=True):
         part = slice(at, at + tests)
         means.append(m.size.neutral + root @ mean[part])
         covariances.append(root @ spread[part, part] @ root.T)
-        truncation += _one_sided(model, m, own[len(means) - 1], means[-1], covariances[-1])
+        truncation += _one_sided(model, m, width_departure, means[-1], covariances[-1])
         at += tests + len(m.shape)
     shape = (len(fit.mechanisms), tests)
     return Evidence(

@@ -31,7 +31,7 @@ MOSTLY = 0.6  # of the ln evidence of an explanation with free drift in it, or o
 UNTOLD = "nothing tried"  # what explains data that are missed grossly
 MUCH, LEFT = 0.5, "what is left"  # squares of the errors, from which what is left and changes tells of something else
 SURE = 5.0  # standard deviations of chi2 by chance, beyond which something is left
-COARSE = 4.0  # chosen on blind campaigns 1 to 16, by log score; others judge it
+COARSE = 4.0  # chosen on blind campaigns 1 to 16, by judgement; others judge it
 DEPARTS = 0.3  # of the size, from which a law does not hold
 SPREAD = 3.0  # temperatures within so many tolerances of each other are one condition
 
