@@ -36,7 +36,7 @@ RISES = (0, 2, 4)  # powers of frequency in which noise of largest is told: a ha
 CHANGED = 1.5  # times the step before, from which lines are another piece
 FALLS = (2, 4)  # powers of 1/frequency in which the variance of an accelerometer's noise falls, as a velocity's and a displacement's
 USUAL, WIDE = (1e-3, 1e-6), (1e-12, 1e-14)  # of the mean square, that count as such: of noise that is much the same over the band, and of one that falls
-LOW = (0.1, 40)  # share of the band, and lines in it at least, where such noise shows
+LOW = (0.1, 40)  # share of the band from its first line, and lines in it at least, where such noise shows
 ENOUGH = 200  # degrees of freedom from which the scatter within blocks tells the noise
 REPEATS, CAMPAIGN, SCATTER = "repeats", "the campaign", "scatter of neighbouring lines"
 KNOWN = (REPEATS, CAMPAIGN)
@@ -129,7 +129,7 @@ def _noise(frf: Frf, value: ComplexArray, use, stated: Noise | None, expected: N
 def _falls(value: ComplexArray, sd: Array, damped: float, frequency: Array) -> Array | None:
     """Shapes (shapes, n) over frequency of a noise that falls with it, where lines at the lowest `LOW`, measured by `sd`, scatter more than twice as much as the others: that
     of an accelerometer does, whose motion was integrated to a velocity or a displacement; None where it does not."""
-    low = frequency <= LOW[0] * frequency[-1]
+    low = frequency <= (1 - LOW[0]) * frequency[0] + LOW[0] * frequency[-1]
     if low.sum() < LOW[1]:
         return None
     seen = scatter(value) / np.sqrt(neighbours(damped)) / sd

@@ -269,7 +269,11 @@ def _leader(start: tuple[float, float], end: tuple[float, float], words: Sequenc
 
 
 def _legend(spindle: Spindle) -> list[Line2D | Patch]:
-    handles: list[Line2D | Patch] = [Patch(fc=TURNING, ec=INK, lw=0.5, label="turns"), Patch(fc=STANDING, ec=INK, lw=0.5, label="stands")]
+    """What is in the picture, and nothing else."""
+    structure = spindle.structure
+    handles: list[Line2D | Patch] = [Patch(fc=TURNING, ec=INK, lw=0.5, label="turns")]
+    if any(g.part != "rotating" for g in spindle.regions) or any(not s.turns for s in structure.shafts):
+        handles.append(Patch(fc=STANDING, ec=INK, lw=0.5, label="stands"))
     if spindle.bearings or spindle.roller_bearings:
         handles.append(Line2D([], [], color=LOAD, lw=0.9, ls=(0, (5, 2)), label="load line"))
     if spindle.linear_bearings:
@@ -280,7 +284,8 @@ def _legend(spindle: Spindle) -> list[Line2D | Patch]:
         handles.append(Line2D([], [], color=INK, marker="o", mfc="none", ls="none", ms=6, label="along y"))
     if spindle.structure.shafts:
         handles.append(Line2D([], [], color=INK, marker="|", ls="none", ms=7, label="beam node"))
-    handles.append(Line2D([], [], color=INK, marker="o", ls="none", ms=6, label="centre of mass"))
-    if spindle.structure.joints:
+    if any(structure.carrier(b.name) == b.name for b in structure.bodies):
+        handles.append(Line2D([], [], color=INK, marker="o", ls="none", ms=6, label="centre of mass"))
+    if any(not any(j.name in s.elements for s in structure.shafts) for j in structure.joints):
         handles.append(Line2D([], [], color=JOINT, marker="D", mfc="white", ls="none", ms=5, label="joint"))
     return handles

@@ -144,6 +144,8 @@ def _mode(c: Coincidence) -> str:
 def show_map(console: Console, found: ResonanceMap) -> None:
     for said in told(found):
         console.print(said, highlight=False)
+    if not found.coincidences:
+        return
     console.print()
     title = f"Coincidences from {found.temperatures[0]:g} to {found.temperatures[-1]:g} C, up to {found.speeds[-1] / RPM:g} rpm, strongest first"
     columns = ("line", "wave", "bearing", "mode", "T\nC", "speed\nrpm", "f\nHz", "strong\nnm", "NRRO\nnm rms", "margin\n%")

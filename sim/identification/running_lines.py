@@ -21,7 +21,8 @@ OUT = 2  # lines on either side of one that its own spike may reach
 FEWEST = 10  # neighbours
 ONE_SIDE = 3  # of them on the side that has fewer
 END = OUT + ONE_SIDE  # lines at either end of the band, which cannot be told from their neighbours
-DEGREE, POLES = 3, 2  # of numerators and the common denominator
+DEGREE, POLES = 3, 3  # of numerators and the common denominator
+AGAIN = 2  # times that the denominator is found
 CHANCE = 1e-6  # of a spike in a test without any
 LEAST = 1e-8  # of the mean square of the neighbours: scatter that is believed
 DRIFT = 2e-3  # relative, by which the speed may differ from the one told
@@ -64,7 +65,7 @@ def running_lines(frequency: Array, value: ComplexArray, speed: float) -> Runnin
     for k, r in zip(multiples.tolist(), reach, strict=True):
         own = [int(j) for j in np.flatnonzero(np.abs(frequency - k * turning) <= r) if frequency[j] > 0]
         untold[[j for j in own if min(j, len(frequency) - 1 - j) < END]] = True
-        unlikely = {j: _chance(value, j, suspect) for j in own}
+        unlikely = {j: _chance(value, j, suspect, limit) for j in own}
         if unlikely and min(unlikely.values()) < limit:
             top = min(unlikely, key=lambda j: unlikely[j])
             found.append((k, float(frequency[top])))
@@ -74,8 +75,9 @@ def running_lines(frequency: Array, value: ComplexArray, speed: float) -> Runnin
     return RunningLines(out, tuple(k for k, _ in found), tuple(f for _, f in found))
 
 
-def _chance(value: ComplexArray, j: int, suspect: NDArray[np.bool_]) -> float:
-    """Probability of the line `j` being so far off by the scatter of its neighbours, in the FRF where it is farthest off."""
+def _chance(value: ComplexArray, j: int, suspect: NDArray[np.bool_], limit: float) -> float:
+    """Probability of the line `j` being so far off by the scatter of its neighbours, in the FRF where it is farthest off; some other
+    one at or above `limit` where polynomials alone tell it."""
     near = np.arange(max(0, j - SIDE - OUT), min(value.shape[-1], j + SIDE + OUT + 1))
     near = near[(np.abs(near - j) > OUT) & ~suspect[near]]
     if len(near) < FEWEST or (near < j).sum() < ONE_SIDE or (near > j).sum() < ONE_SIDE:
@@ -87,26 +89,35 @@ def _chance(value: ComplexArray, j: int, suspect: NDArray[np.bool_]) -> float:
     here, at = here[used] / size[used, None], value[:, :, j].reshape(-1)[used] / size[used]
     if not len(at):
         return 1.0
+    of_polynomials = float(np.min(_tail(here, at, x, 0)))
+    return of_polynomials if of_polynomials >= limit else max(of_polynomials, float(np.min(_tail(here, at, x, POLES))))
+
+
+def _tail(here: ComplexArray, at: ComplexArray, x: Array, poles: int) -> Array:
+    """By FRF (rows of `here`) the probability (F distribution) of `at`, the value at x = 0, by what `here` leaves of polynomials over one denominator
+    1 + d_1 x + ... of all FRFs.
+
+    Numerators and denominator by linear least squares, weighted anew with the denominator found (Sanathanan & Koerner 1963): the errors of both count.
+    """
     powers = np.vander(x, DEGREE + 1, increasing=True)
-    return float(max(np.min(_tail(here, at, powers, np.zeros(0, complex), x)), np.min(_tail(here, at, powers, _denominator(here, powers, x), x))))
-
-
-def _denominator(here: ComplexArray, powers: Array, x: Array) -> ComplexArray:
-    """d (POLES,) of 1 + d_1 x + d_2 x^2, by least squares over all FRFs (rows of `here`) with the numerators' polynomials projected out."""
-    q = np.linalg.qr(powers)[0]
-    left = np.array([here * x**p for p in range(POLES + 1)])
-    left = left - (left @ q) @ q.T
-    columns = left[1:].reshape(POLES, -1).T
-    return np.asarray(np.linalg.lstsq(columns, -left[0].ravel(), rcond=1e-10)[0])
-
-
-def _tail(here: ComplexArray, at: ComplexArray, powers: Array, d: ComplexArray, x: Array) -> Array:
-    """By FRF the probability (F distribution) of `at`, the value at x = 0, by what `here` leaves of its fit."""
-    below = 1 + sum((c * x ** (p + 1) for p, c in enumerate(d)), np.zeros(len(x), complex))
-    numerator = np.linalg.lstsq(powers, (here * below).T, rcond=None)[0]
+    below, d, of_d = np.ones(len(x), complex), np.zeros(0, complex), np.zeros((0, 0), complex)
+    for _ in range(AGAIN if poles else 0):
+        weighted = here / np.abs(below)
+        q = np.linalg.qr(powers / np.abs(below)[:, None])[0]
+        left = np.array([weighted * x**p for p in range(poles + 1)])
+        left = left - (left @ q) @ q.T  # numerators projected out
+        solved = np.linalg.pinv(left[1:].reshape(poles, -1).T, rcond=1e-10)
+        d, of_d = -solved @ left[0].ravel(), solved @ solved.conj().T
+        below = 1 + sum(c * x ** (p + 1) for p, c in enumerate(d))
+    weight = 1 / np.abs(below)
+    from_lines = np.linalg.pinv(powers * weight[:, None]) * weight  # (DEGREE + 1, lines), of numerators
+    numerator = from_lines @ (here * below).T
     left = here - (powers @ numerator).T / below
-    freedom = len(x) - powers.shape[1] - len(d) / len(here)
-    variance = (np.abs(left) ** 2).sum(axis=1) / freedom
-    leverage = float(np.linalg.inv(powers.T @ powers)[0, 0])
-    off = np.abs(at - numerator[0]) ** 2 / (1 + leverage)
-    return np.asarray(fisher.sf(off / np.maximum(variance, LEAST), 2, 2 * freedom))
+    freedom = len(x) - powers.shape[1] - poles / len(here)
+    even = (np.abs(left) ** 2).sum(axis=1) / freedom
+    of_value = np.median(np.abs(left / np.where(here == left, 1.0, here - left)) ** 2, axis=1) / np.log(2) * np.abs(numerator[0]) ** 2  # noise in proportion to the value
+    variance = np.maximum(np.maximum(even, of_value), LEAST)
+    moved = np.array([(here * x ** (p + 1)) @ from_lines[0] for p in range(poles)]).reshape(poles, len(here))  # the value at 0, by d
+    by_d = np.einsum("pr,pq,qr->r", moved.conj(), of_d, moved).real * variance.mean()
+    expected = variance * (1 + float((from_lines[0] ** 2).sum())) + by_d
+    return np.asarray(fisher.sf(np.abs(at - numerator[0]) ** 2 / expected, 2, 2 * freedom))

@@ -58,6 +58,16 @@ def test_the_set_of_five_bearings_is_understood(capsys: pytest.CaptureFixture[st
         assert b["load_lines_meet_axis_at_mm"] == pytest.approx(b["z_mm"] + sense * reach, abs=1e-5)
 
 
+def test_the_key_names_what_is_in_the_picture() -> None:
+    """A shaft on bearings given by numbers has nothing that stands, no rigid body and no joint; a machine in its housing has them."""
+    words = {}
+    for name in ("mk7702", "five_bearing"):
+        [key] = drawing(operating_point(load(SCENES[name]), Condition(20.0))).legends
+        words[name] = {t.get_text() for t in key.get_texts()}
+    assert words["five_bearing"] - words["mk7702"] == {"stands", "load line", "centre of mass", "joint"}
+    assert words["mk7702"] - words["five_bearing"] == {"bearing by numbers"}
+
+
 def test_no_leader_runs_through_a_name() -> None:
     """Of every scene: each piece of a leader stays out of the boxes in which the names stand."""
     for scene in SCENES.values():

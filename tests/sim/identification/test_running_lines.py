@@ -15,6 +15,7 @@ from thermospindle.diagnosis.data.observe import condition_of, observe
 from thermospindle.model.machine import Condition
 from thermospindle.sim.campaign.campaign import Campaign, Noise, Test, write_campaign
 from thermospindle.sim.identification.frf import Frf, out_of, without
+from thermospindle.sim.identification.modal import noise_model
 from thermospindle.sim.operating import operating_point
 
 LINES = np.arange(400.0, 3000.0, 2.0)
@@ -60,6 +61,24 @@ def test_resonances_without_noise_are_no_spikes(spindle):
             value = operating_point(spindle, Condition(20.0, SPEED)).frf(LINES)
             found = out_of(Frf(LINES, value, tuple(p.node for p in spindle.points), spindle.hammer.hammer_nodes, "mobility"), speed)
             assert found.multiples == (), mode.frequency
+
+
+@pytest.mark.parametrize("noise", [Noise(0.0, 0.0), Noise(5e-4, 5e-5), NOISE], ids=["none", "little", "usual"])
+@pytest.mark.parametrize("step", [4.0, 8.0])
+def test_resonances_of_few_lines_are_no_spikes_and_spikes_on_them_are_seen(spindle, step, noise):
+    """Lines so far apart that the sharpest peak has three within its half power, with a multiple on each of the modes in turn."""
+    lines, random = np.arange(400.0, 6000.0, step), np.random.default_rng(0)
+    for mode in operating_point(spindle, Condition(60.0, SPEED)).modes_below(2900.0):
+        if mode.frequency > 450.0:
+            speed = 2 * np.pi * mode.frequency / 13
+            exact = operating_point(spindle, Condition(60.0, speed)).frf(lines)
+            sd = noise_model(exact, noise.of_value, noise.of_largest) / np.sqrt(2)
+            error = random.standard_normal((2, *exact.shape))
+            frf = Frf(lines, exact + sd * (error[0] + 1j * error[1]), tuple(p.node for p in spindle.points), spindle.hammer.hammer_nodes, "mobility")
+            assert out_of(frf, speed).multiples == (), mode.frequency
+            value = frf.value.copy()
+            value[:, :, int(np.argmin(np.abs(lines - mode.frequency)))] += 0.03 * np.abs(value).max()
+            assert 13 in out_of(replace(frf, value=value), speed).multiples, mode.frequency
 
 
 def test_spikes_are_found_and_named_and_nothing_else_is_left_out(spindle):
