@@ -3,8 +3,7 @@
 Where a modulus follows the temperature, the influence at any temperatures comes from a reduced basis (`thermal.reduced`), made once for a
 section and its laws.
 
-It is kept in the process, and on disk in `THERMOSPINDLE_CACHE` (a folder; empty for none), by default
-`$XDG_CACHE_HOME/thermospindle`, under a hash of all it depends on, this package's code included; the oldest go when there is too much of it.
+It is kept in the process, and on disk (`model.files.kept`) under a hash of all it depends on, this package's code included.
 """
 
 from __future__ import annotations

@@ -14,8 +14,9 @@ from thermospindle.model.parallel import in_parallel
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.campaign.campaign import Campaign, Noise, Test
 from thermospindle.sim.identification.frf import out_of, without
-from thermospindle.sim.identification.modal import extract, noise_model
+from thermospindle.sim.identification.modal import noise_model
 from thermospindle.sim.identification.pairing import REPEATED, ModeSet, pairs
+from thermospindle.sim.identification.remembered import extracted
 
 FREQUENCY_FLOOR = 3e-5  # relative: finite elements and bearing equilibrium of the model itself
 DAMPING_FLOOR = 3e-3  # relative
@@ -116,7 +117,7 @@ def _from_frf(test: Test, noise: Noise) -> Observation:
     sd = frf.sd
     if sd is None or not np.all(np.isfinite(sd)):  # a single hit has no scatter
         sd = noise_model(frf.value, noise.of_value, noise.of_largest)
-    found = extract(frf.frequency, frf.value, sd, kind=frf.quantity, window_decay=test.window_decay)
+    found = extracted(frf.frequency, frf.value, sd, frf.quantity, test.window_decay)
     scale = np.concatenate([found.frequency, found.damping])
     covariance = found.covariance / np.outer(scale, scale)
     largest = np.argmax(np.abs(found.shape), axis=1)

@@ -1,7 +1,8 @@
-"""What all files that people write or read back have in common.
+"""What all files that are written or read back have in common.
 
 =======  ==========================================================================
 cells    names and numbers as cells of a CSV file
 formats  the format that a file is written in, and how an older one becomes today's
+kept     results kept on disk between runs, the user's own alone
 =======  ==========================================================================
 """

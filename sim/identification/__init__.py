@@ -8,6 +8,7 @@ numbering      the modes of a run numbered at its first step and followed, measu
 pairing        which mode of one set is which of another: one cost, one assignment, and a policy for each use
 poles          poles of a matrix of frequency response functions by maximum likelihood, and where to start looking for
                them
+remembered     modes of FRFs that were extracted before, kept on disk
 running_lines  lines of the running speed in measured FRFs: on a turning spindle the motion of unbalance and races
                stands beside the answer to the hammer
 shift          the shift of a natural frequency from one condition to another, with its standard error

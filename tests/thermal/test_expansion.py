@@ -216,7 +216,7 @@ class TestCache:
         calls = self.count(monkeypatch)
         influence(spindle, tolerance=2e-2)
         influence_module._kept.cache_clear()
-        monkeypatch.setattr("thermospindle.thermal.store.np.load", broken)
+        monkeypatch.setattr("thermospindle.model.files.kept.np.load", broken)
         influence(spindle, tolerance=2e-2)
         assert len(calls) == 4
 

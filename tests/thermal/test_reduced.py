@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from thermospindle.model.files import kept
 from thermospindle.model.machine import Law
 from thermospindle.thermal import influence as module
-from thermospindle.thermal import store
 from thermospindle.thermal.elastic import Solid
 from thermospindle.thermal.expansion import expand
 from thermospindle.thermal.influence import elasticity, gains, influence
@@ -48,11 +48,11 @@ def test_against_whole_solutions(softening, part, apart):
 def test_a_new_temperature_solves_nothing(softening, monkeypatch):
     """No finite elements, nothing on disk: temperature by temperature for nothing."""
     expand(softening, 60.0, ROUGH)
-    before = set(store.folder().iterdir())
+    before = set(kept.folder().iterdir())
     monkeypatch.setattr(Solid, "_solve", property(lambda self: pytest.fail("a whole solution")))
     motions = [expand(softening, t, ROUGH)["upper"].outer_z for t in np.linspace(21.0, 59.0, 20)]
     assert np.all(np.diff(motions) > 0)
-    assert set(store.folder().iterdir()) == before
+    assert set(kept.folder().iterdir()) == before
 
 
 def test_kept_on_disk(softening, monkeypatch):
@@ -64,12 +64,12 @@ def test_kept_on_disk(softening, monkeypatch):
 
 def test_the_cache_ends(tmp_path, monkeypatch):
     """The files that were not asked for longest go first."""
-    monkeypatch.setattr(store, "MOST_BYTES", 2500)
+    monkeypatch.setattr(kept, "MOST_BYTES", 2500)
     for k in range(4):
         file = tmp_path / f"influence-{k}.npz"
         file.write_bytes(b"x" * 1000)
         os.utime(file, (k, k))
     os.utime(tmp_path / "influence-0.npz", (9, 9))  # read just now
     (tmp_path / "other.txt").write_bytes(b"x" * 9000)
-    store._make_room(tmp_path)
+    kept._make_room(tmp_path)
     assert sorted(f.name for f in tmp_path.iterdir()) == ["influence-0.npz", "influence-3.npz", "other.txt"]

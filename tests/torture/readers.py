@@ -214,15 +214,15 @@ def study_key() -> bytes:
 
 def _cache(file: Path) -> None:
     """A kept answer that was damaged is computed again: never another number, never an error."""
-    from thermospindle.thermal import store
+    from thermospindle.model.files import kept as files
 
-    place = store._file
-    store._file = lambda question: file
+    place = files._file
+    files._file = lambda kind, question, code: file
     try:
-        found = store._read("q")
+        found = files.read("influence", "q", "")
         assert found is None or np.array_equal(found[1]["a"], KEPT["a"])
     finally:
-        store._file = place
+        files._file = place
 
 
 KEPT = {"a": np.arange(30.0), "notes": np.asarray(json.dumps({"question": "q"}))}
@@ -230,10 +230,10 @@ KEPT = {"a": np.arange(30.0), "notes": np.asarray(json.dumps({"question": "q"}))
 
 @cache
 def kept() -> bytes:
-    from thermospindle.thermal import store
+    from thermospindle.model.files import kept as files
 
     buffer = BytesIO()
-    np.savez(buffer, digest=store._digest(KEPT), **KEPT)
+    np.savez(buffer, digest=files.digest(KEPT), **KEPT)
     return buffer.getvalue()
 
 

@@ -11,8 +11,8 @@ import pytest
 from tests.conftest import ROOT, SCENE
 from thermospindle.cli import main
 from thermospindle.model.errors import BadInput
+from thermospindle.model.files import kept as files
 from thermospindle.model.scene.reading import load
-from thermospindle.thermal import store
 
 TRAPS = ("numpy", "scipy", "loky", "cloudpickle", "mujoco", "rerun", "matplotlib", "json", "thermospindle", "sitecustomize", "usercustomize", "effect", "conftest")
 
@@ -70,9 +70,9 @@ class TestCache:
 
     @pytest.fixture(autouse=True)
     def forget(self):
-        store.trusted.cache_clear()
+        files.trusted.cache_clear()
         yield
-        store.trusted.cache_clear()
+        files.trusted.cache_clear()
 
     @pytest.fixture
     def place(self, tmp_path, monkeypatch):
@@ -84,14 +84,14 @@ class TestCache:
         place.mkdir(mode=0o700)
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            assert store.trusted(place)
+            assert files.trusted(place)
 
     @pytest.mark.parametrize("mode", [0o777, 0o1777, 0o702])
     def test_one_that_others_may_write_is_not(self, place, mode):
         place.mkdir()
         place.chmod(mode)
         with pytest.warns(UserWarning, match="others may write there"):
-            assert not store.trusted(place)
+            assert not files.trusted(place)
 
     def test_one_of_another_user_is_not(self, place, monkeypatch):
         place.mkdir(mode=0o755)
@@ -100,13 +100,13 @@ class TestCache:
         else:
             monkeypatch.setattr(os, "geteuid", lambda: 12345)
         with pytest.warns(UserWarning, match="belongs to another user"):
-            assert not store.trusted(place)
+            assert not files.trusted(place)
 
     def test_nor_one_in_a_folder_that_another_could_exchange(self, place, tmp_path):
         place.mkdir(mode=0o700)
         tmp_path.chmod(0o777)
         with pytest.warns(UserWarning, match="others may write there"):
-            assert not store.trusted(place)
+            assert not files.trusted(place)
         tmp_path.chmod(0o700)
 
     def test_what_is_planted_is_not_read_and_the_answer_is_the_same(self, place, spindle):
@@ -120,7 +120,7 @@ class TestCache:
         for file in place.glob("*.npz"):
             file.write_bytes(b"planted")
         place.chmod(0o777)
-        store.trusted.cache_clear()
+        files.trusted.cache_clear()
         influence.forget()
         with pytest.warns(UserWarning, match="computed anew"):
             assert expand(spindle, 55.0) == own
@@ -146,7 +146,7 @@ def test_no_data_is_unpickled():
         if words:
             found[file.relative_to(ROOT).as_posix()] = sorted(set(words))
     assert set(found) <= {"model/parallel.py", "sim/effects/rules.py", "diagnosis/draft.py"}, found  # an effect already loaded; laws written in the program
-    for file in ("thermal/store.py", "sim/importing/files/arrays.py"):
+    for file in ("model/files/kept.py", "sim/importing/files/arrays.py"):
         path = ROOT / file
         if path.exists():
             assert "np.load(" not in path.read_text(encoding="utf-8") or "allow_pickle=False" in path.read_text(encoding="utf-8")
