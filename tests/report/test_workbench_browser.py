@@ -15,7 +15,7 @@ import pytest
 from tornado.httpclient import HTTPClientError, HTTPRequest
 from tornado.websocket import websocket_connect
 
-from tests.conftest import ROOT, SCENE
+from tests.conftest import DATA, ROOT, SCENE
 from tests.report.browser import Browser, installed, until
 from tests.test_site import ANSWERS
 from thermospindle.cli import main
@@ -287,6 +287,35 @@ def test_saving_from_the_page(tab, served):
     tab.click(BUTTON.format("Save scene"))
     tab.wait(f"{tab.model('message')}.text.includes('Saved in')", 60)
     assert (Path(served["out"]) / "mine" / "scene" / "spindle.toml").is_file()
+
+
+@needs_a_browser
+@pytest.mark.slow
+def test_the_fit_to_the_lines_runs_to_its_end(chromium, tmp_path):
+    """On FRFs of another program with a bond that softens (12.5 nm/N): added, fitted by the button, with its gain told, and undone in one step."""
+    process, told = started(tmp_path, SCENE, DATA / "foreign_bond")
+    chromium.size(1400, 1000)
+    chromium.errors.clear()
+    try:
+        chromium.open(told["address"])
+        chromium.wait("document.body?.dataset.ready === 'yes'", 60)
+        choose(chromium, "add", "bond_softening")
+        value = f"{chromium.model('bond_softening.hot_compliance')}.value"
+        chromium.wait(f"!!{chromium.model('bond_softening.hot_compliance')}", 60)
+        before = chromium.run(value)
+        chromium.click(BUTTON.format("Fit all to the FRF lines"))
+        chromium.wait(f"{chromium.model('message')}.text.includes('Fitted to the lines')", 1800)
+        said = chromium.run(f"{chromium.model('message')}.text")
+        assert float(re.search(r"ln evidence \+(\d+)", said)[1]) > 100
+        assert chromium.run(value) == pytest.approx(12.5, abs=1.0)
+        assert chromium.run(value) != before
+        chromium.click(BUTTON.format("Undo"))
+        chromium.wait(f"{value} === {before}", 60)
+        assert chromium.errors == []
+    finally:
+        process.send_signal(signal.SIGTERM)
+        process.communicate(timeout=60)
+    chromium.open("about:blank")
 
 
 @needs_a_browser
