@@ -32,10 +32,13 @@ def pixels(figure: Figure) -> Pixels:
         figure.patch.set_facecolor("white")
         canvas = FigureCanvasAgg(figure)
         canvas.draw()
-    light = np.asarray(canvas.buffer_rgba())[..., :3].astype(int)
-    # in HSL, lightness l = (max + min) / 2 becomes 1 - l when every channel moves by 1 - 2 l
-    turned = light + 255 - light.max(axis=2, keepdims=True) - light.min(axis=2, keepdims=True)
-    return np.asarray(np.array(DARK) + turned * (1 - np.array(DARK) / 255), np.uint8)
+    light = np.asarray(canvas.buffer_rgba())[..., :3]
+    # in HSL, lightness l = (max + min) / 2 becomes 1 - l when every channel moves by 1 - 2 l: by 255 - max - min, and none leaves its byte
+    red, green, blue = (light[..., k] for k in range(3))
+    largest, smallest = (which(which(red, green), blue) for which in (np.maximum, np.minimum))
+    turned = light + (255 - largest - smallest)[..., None]  # of bytes, modulo 256
+    ground, steps = np.array(DARK), np.arange(256)[:, None]
+    return np.asarray(ground + steps * (1 - ground / 255), np.uint8)[turned, range(3)]
 
 
 def for_dark(colour: Sequence[int] | NDArray[np.uint8]) -> tuple[float, float, float]:

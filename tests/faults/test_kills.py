@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from tests.faults.conftest import COUNTS, KILLS, SEED
-from tests.faults.verbs import VERBS, Verb, acts, fresh, launched, marked, prepare, surroundings, tree, work_folders
+from tests.faults.verbs import QUICKEST, VERBS, Verb, acts, fresh, launched, marked, prepare, surroundings, tree, work_folders
 
 SHARE = sum(v.weight for v in VERBS)
 
@@ -87,7 +87,7 @@ def test_killed_at_any_moment(verb, tmp_path, cache):
 
 def test_killed_at_three_moments(tmp_path, cache):
     """The quick guard in every run of the tests."""
-    count = survives(VERBS[0], 3, tmp_path, cache)
+    count = survives(QUICKEST, 3, tmp_path, cache)
     assert sum(count.values()) == 3
 
 

@@ -10,17 +10,16 @@ from contextlib import contextmanager
 
 import pytest
 
-from tests.faults.verbs import VERBS, Verb, launched, marked, prepare, surroundings, tree, work_folders
+from tests.faults.verbs import QUICKEST, VERBS, Verb, launched, marked, prepare, surroundings, tree, work_folders
 
 LEAST = 300  # bytes that a file may have: less than what any verb writes
 QUICK = ("new", "modes", "add", "import")
-BY_NAME = {v.name: v for v in VERBS}
 
 
 def params(names=None):
     """Every verb, the quick ones in every run of the tests."""
     every = [v for v in VERBS if names is None or v.name in names]
-    return [pytest.param(v, id=v.name.replace(" ", "_"), marks=() if v.name == "new" else pytest.mark.slow) for v in every]
+    return [pytest.param(v, id=v.name.replace(" ", "_"), marks=() if v is QUICKEST else pytest.mark.slow) for v in every]
 
 
 def said(done: subprocess.CompletedProcess) -> str:
@@ -157,7 +156,7 @@ def test_a_damaged_cache(damage, tmp_path):
 def test_no_terminal_and_closed_pipes(closed, tmp_path, cache):
     """A result that has a folder stands there whole, whoever listens to what is printed."""
     place = prepare(tmp_path / "here")
-    line = " ".join(f"'{part}'" for part in [sys.executable, "-m", "thermospindle", *BY_NAME["modes"].line(place)])
+    line = " ".join(f"'{part}'" for part in [sys.executable, "-m", "thermospindle", *QUICKEST.line(place)])
     done = subprocess.run(["bash", "-c", f"set -o pipefail; {line} {closed}"], env=surroundings(cache), cwd=place, capture_output=True, text=True)
     assert "Traceback" not in done.stderr
     assert done.returncode in (0, 2), done.stderr

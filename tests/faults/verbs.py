@@ -90,6 +90,8 @@ VERBS = (
     Verb("ladder", ("ladder", S, J, "--effects", "bond_softening", *OUT), weight=0.25),
     Verb("report", ("report", S, "--temperatures", "20", "--hits", "2", *OUT), weight=0.25),
 )
+QUICKEST = next(v for v in VERBS if v.name == "add")
+"""A third of what others take to start, and it replaces an older result: the one of every run of the tests."""
 
 
 def surroundings(cache: Path, **more: str) -> dict[str, str]:

@@ -109,7 +109,7 @@ def test_modulus_softening_of_everything_alike_scales_all_frequencies(spindle):
     assert hot / cold == pytest.approx(np.sqrt(1 - 22 * 12e-6 * 40), abs=1.1 * (size - 1))
 
 
-@pytest.mark.parametrize("temperature", [35.0, 60.0])
+@pytest.mark.parametrize("temperature", [pytest.param(35.0, marks=pytest.mark.slow), 60.0])
 def test_modulus_softening_of_rings_against_finite_elements(spindle, temperature):
     """Ring motions of a section whose moduli all fall: 0.2 nm, two thirds of the finite elements' own tolerance; they change by 8 nm."""
     material = {n: replace(modulus_softening.softened(m, 20.0, 1.0), name=n) for n, m in spindle.materials.items()}
@@ -120,6 +120,17 @@ def test_modulus_softening_of_rings_against_finite_elements(spindle, temperature
         for end in ("inner_r", "inner_z", "outer_r", "outer_z"):
             assert getattr(found[name], end) == pytest.approx(getattr(exact[name], end), abs=2e-10)
     assert abs(exact["upper"].outer_r - before["upper"].outer_r) > 1e-9
+
+
+def test_modulus_softening_of_rings_grows_as_the_square_of_the_temperature(spindle):
+    """Strain times softening, each in proportion to what it is warmer: at 35 C (15 / 40)^2 of what it is at 60 C."""
+    effect, change = modulus_softening.EFFECT, {}
+    for temperature in (35.0, 60.0):
+        before = expand(spindle, temperature)
+        found = effect.motions(spindle, Condition(temperature), effect.typical(), before)
+        change[temperature] = [getattr(found[name], end) - getattr(before[name], end) for name in before for end in ("inner_r", "inner_z", "outer_r", "outer_z")]
+    assert max(np.abs(change[60.0])) > 1e-9
+    assert change[35.0] == pytest.approx(np.array(change[60.0]) * (15 / 40) ** 2, rel=1e-4, abs=1e-13)
 
 
 # ---------------------------------------------------------------- joints
