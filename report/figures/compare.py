@@ -131,6 +131,11 @@ def decibel(value: np.ndarray) -> Array:
     return np.asarray(20 * np.log10(np.maximum(np.abs(value), 1e-15)), float)
 
 
+def _share(value: float) -> str:
+    """Of one, in two digits and little room."""
+    return f"{value:.2f}".removeprefix("0") if value < 0.995 else "1"
+
+
 @rc_context(STYLE)
 def by_band(c: Comparison) -> Figure:
     """CSAC, CSF and the shift by FDAC, test by band."""
@@ -147,12 +152,13 @@ def by_band(c: Comparison) -> Figure:
     panels = figure.subplots(1, 3, sharey=True)
     far = max(1.0, float(np.nanmax(np.abs(values["shift"]), initial=0.0)))
     looks: list[tuple[str, Normalize, str, Callable[[float], str]]] = [
-        ("Shape: mean CSAC", Normalize(0, 1), "YlGnBu", lambda v: f"{v:.2f}"),
-        ("Amplitude: mean CSF", Normalize(0, 1), "YlGnBu", lambda v: f"{v:.2f}"),
-        ("Shift of the model, %, by FDAC", Normalize(-far, far), "RdBu_r", lambda v: f"{v:+.1f}"),
+        ("Shape: mean CSAC", Normalize(0, 1), "YlGnBu", _share),
+        ("Amplitude: mean CSF", Normalize(0, 1), "YlGnBu", _share),
+        ("Shift of the model, %, by FDAC", Normalize(-far, far), "RdBu_r", lambda v: "0" if abs(v) < 0.05 else f"{v:+.1f}"),
     ]
+    size = min(6.5, 72 / max(len(edges), 1))  # numbers stand side by side
     for axes, grid, (title, norm, colours, text) in zip(panels, values.values(), looks, strict=True):
-        picture = cells(axes, grid, norm, colours, text, 6.5)
+        picture = cells(axes, grid, norm, colours, text, size)
         axes.set_title(title)
         axes.set_xticks(range(len(edges)), [f"{a:.0f}–{b:.0f}" for a, b in edges], fontsize=7, rotation=90)
         axes.set_xlabel("band, Hz")

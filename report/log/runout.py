@@ -161,10 +161,10 @@ def summary(runout: Runout) -> str:
     for name, m in values.items():
         row = (m.repeatable, m.nonrepeatable, m.six_sigma, m.synchronous_error, m.asynchronous_error)
         lines.append(f"| {name} | " + " | ".join(f"{TO_NM * v:.1f}" for v in row) + " |")
-    lines += ["", "Strongest lines:", "", "| Hz | order | | nm | line | cause |", "|---|---|---|---|---|---|"]
+    lines += ["", "Strongest lines:", "", "| Hz | | nm | line | cause |", "|---|---|---|---|---|"]
     for g in runout.lines[:16]:
         cause = f"{g.causes[0].bearing} {g.causes[0].cause}".strip() if g.causes else "unexplained"
         name = g.causes[0].name if g.causes else ""
-        lines.append(f"| {g.frequency:.2f} | {g.order:.3f} | {g.direction} | {TO_NM * g.amplitude:.1f} | {name} | {cause} |")
+        lines.append(f"| {g.frequency:.1f} | {g.direction} | {TO_NM * g.amplitude:.1f} | {name} | {cause} |")
     lines += ["", "Made from:", "", *(f"- {name}: {text}" for name, text in provenance(runout.point.spindle).items())]
     return "\n".join(lines) + "\n"

@@ -74,7 +74,7 @@ class Controls:
         self.ticks: dict[str, Checkbox] = {}
         self.numbers: dict[str, tuple[NumericInput, float]] = {}  # and what a value is multiplied with to be shown there
         self.rows: dict[str, Column] = {}
-        options = [("", "choose an effect ..."), *((e.name, f"{e.name}: {e.title}") for e in bench.effects)]
+        options = [("", "choose an effect (by keys: arrows, then Enter) ..."), *((e.name, f"{e.name}: {e.title}") for e in bench.effects)]
         self.add = Select(title="Add an effect", value="", options=options, stylesheets=[LOOK], name="add", **WIDE)
         self.effects = Column(**WIDE)
         self.tolerances = Column(*(self._tolerance(t.name, t.sd, s) for t in bench.tolerances), visible=False, **WIDE)

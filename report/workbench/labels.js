@@ -7,6 +7,8 @@ function label(root, above) {
     if (own) name(inside, "input, select, button, .noUi-handle", own)
     if (own || above) name(inside, ".bk-events", own || above)
     name(inside, ".bk-tool-overflow", "more tools")
+    const list = inside.querySelector("select[name=add]")
+    if (list && !list.dataset.patient) patient(list)
     label(inside, own || above)
   }
 }
@@ -17,6 +19,38 @@ function name(inside, which, said) {
   }
 }
 setInterval(() => label(document, ""), 500)
+
+// On a closed list an arrow key chooses at once on most systems: what does something when it is chosen waits for Enter, so that one can look at all of it.
+function patient(list) {
+  list.dataset.patient = "yes"
+  let key = "", waiting = false
+  list.addEventListener("pointerdown", () => { key = "" })
+  list.addEventListener("blur", () => { if (waiting) list.selectedIndex = 0; waiting = false })
+  list.addEventListener("keydown", event => {
+    key = event.key
+    if (key !== "Enter" || !waiting) return
+    event.preventDefault()
+    waiting = false
+    list.dispatchEvent(new Event("change"))
+  })
+  list.getRootNode().addEventListener("change", event => {
+    if (event.target !== list || !event.isTrusted || key === "" || key === "Enter" || key === " ") return
+    event.stopImmediatePropagation()
+    waiting = true
+  }, true)
+}
+
+// Ctrl+Z undoes, Ctrl+Y and Ctrl+Shift+Z do it again, but where text is being typed.
+addEventListener("keydown", event => {
+  const typed = event.composedPath()[0]
+  if (!(event.ctrlKey || event.metaKey) || event.altKey || (typed.tagName === "INPUT" && ["text", "number"].includes(typed.type))) return
+  const key = event.key.toLowerCase()
+  const wanted = key === "y" || (key === "z" && event.shiftKey) ? "redo" : key === "z" ? "undo" : null
+  const model = wanted && window.Bokeh?.documents?.[0]?.get_model_by_name(wanted)
+  if (!model) return
+  event.preventDefault()
+  window.Bokeh.index.get(model)?.el.shadowRoot.querySelector("button")?.click()
+})
 
 // Colours of the pictures follow the page's: drawn again when light turns to dark. A mode moves at once, unless that is not wanted.
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {

@@ -33,6 +33,7 @@ MEASURED, COMPUTED = "#d2691e", "#2f86d6"  # three to one and more on white and 
 FITTED, LEFT_OUT, CONDITIONS = "fitted", "left out", "conditions"
 INK, PAPER = "#1b1c1d", "#ffffff"
 PERCENT = 5.0  # of change, the strongest colour where there are no errors
+LEFT = 66  # px of both pictures of an FRF, so that their frequencies stand under each other
 TOOLS = "xbox_zoom,reset"
 FOCUS = ":focus-visible { outline: 3px solid var(--focus) !important; outline-offset: -3px; }"
 Points = list[list[float]]
@@ -60,6 +61,7 @@ class FrfPlots:
             made.line("f", key, source=self.measured, color=MEASURED, width=4, alpha=0.65)
             made.line("f", key, source=self.computed, color=COMPUTED, width=1.8)
             made.xaxis.axis_label = "frequency, Hz"
+            made.min_border_left = LEFT
         self.size.vspan(x="f", source=self.peaks, line_color=MEASURED, line_dash="dotted", line_alpha=0.8)
         self.phase.yaxis.axis_label = "phase, deg"
         self.phase.yaxis.ticker = FixedTicker(ticks=[-180, -90, 0, 90, 180])

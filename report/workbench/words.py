@@ -24,11 +24,16 @@ def of_test(shown: Shown) -> str:
     return f"{t.id}: {c.temperature:g} °C, {speed}" + (f", {t.level:g} N" if t.level else "")
 
 
+def signed(value: float) -> str:
+    """With its sign, three digits, a true minus."""
+    return f"{value:+.3g}".replace("-", "−")
+
+
 def short(bench: Bench, found: Errors) -> str:
     """The same in few words, for where the rest is out of sight."""
     if bench.campaign is None:
         furthest = max(found.cells, key=lambda c: abs(c.frequency), default=None)
-        return str(Markup("<p>{}: <b>{:+.3g} %</b></p>").format(furthest.mode, furthest.frequency)) if furthest and abs(furthest.frequency) > NOTHING else "<p>no change</p>"
+        return str(Markup("<p>{}: <b>{} %</b></p>").format(furthest.mode, signed(furthest.frequency))) if furthest and abs(furthest.frequency) > NOTHING else "<p>no change</p>"
     said = [f"{which} <b>{value:.3g}</b>" for which, value in (("fitted", found.fitted), ("left out", found.left_out)) if value is not None]
     return f"<p>{', '.join(said)} s.e.</p>"
 
@@ -39,14 +44,14 @@ def status(bench: Bench, s: Setting, found: Errors) -> str:
     if bench.campaign is None:
         if furthest is None or abs(furthest.frequency) < NOTHING:
             return "<p>No natural frequency has changed from the scene as it was opened.</p>"
-        return str(Markup("<p>Changed most: mode {} at {}, <b>{:+.3g} %</b>, {}.</p>").format(furthest.mode, furthest.test, furthest.frequency, furthest.says))
+        return str(Markup("<p>Changed most: mode {} at {}, <b>{} %</b>, {}.</p>").format(furthest.mode, furthest.test, signed(furthest.frequency), furthest.says))
     said = []
     for value, count, which in ((found.fitted, len(bench.shown) - len(s.left_out), "fitted"), (found.left_out, len(s.left_out), "left-out")):
         if value is not None:
             good = "agrees" if value < AGREES else "nearly agrees" if value < ALMOST else "does not agree"
             said.append(Markup("<b>{:.3g}</b> standard errors over {} {} test{} ({})").format(value, count, which, "s" * (count > 1), good))
     if furthest:
-        said.append(Markup("furthest off: mode {} in {}, {:+.3g} standard errors").format(furthest.mode, furthest.test, furthest.frequency))
+        said.append(Markup("furthest off: mode {} in {}, {} standard errors").format(furthest.mode, furthest.test, signed(furthest.frequency)))
     return str(Markup("<p>{}.</p>").format(Markup("; ").join(said)))
 
 

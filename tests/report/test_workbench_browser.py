@@ -269,6 +269,38 @@ def contrast(a, b):
 
 
 @needs_a_browser
+def test_the_keyboard_alone_looks_through_the_effects_adds_one_and_undoes_it(tab):
+    """Arrows on the closed list only choose; Enter adds. Ctrl+Z and Ctrl+Y walk, but not while a number is typed."""
+    added = "Bokeh.documents[0].get_model_by_name('effects').children.length"
+    deepest = "(() => { let e = document.activeElement; while (e?.shadowRoot?.activeElement) e = e.shadowRoot.activeElement; return e })()"
+    tab.wait("find(e => e.name === 'add')?.dataset.patient === 'yes'")
+    tab.run("find(e => e.name === 'add').focus() ?? true")
+    for _ in range(3):
+        tab.key("ArrowDown", 40)
+    assert tab.run("find(e => e.name === 'add').selectedIndex") == 3
+    wanted = tab.run("find(e => e.name === 'add').selectedOptions[0].text").split(":")[0]
+    assert tab.run(added) == 0
+    tab.key("Enter", 13, "\r")
+    tab.wait(f"{added} === 1")
+    first = f"find(e => e.getAttribute?.('aria-label') === 'remove {wanted}')"
+    tab.wait(f"!!{first}")
+    tab.key("z", 90, modifiers=2)
+    tab.wait(f"{added} === 0")
+    tab.key("y", 89, modifiers=2)
+    tab.wait(f"{added} === 1")
+    tab.run("find(e => e.type === 'text' && e.name !== 'name').focus() ?? true")
+    assert tab.run(f"{deepest}.tagName") == "INPUT"
+    tab.key("z", 90, modifiers=2)
+    tab.run("find(e => e.name === 'add').focus() ?? true")
+    tab.key("ArrowDown", 40)
+    tab.run("find(e => e.name === 'add').blur() ?? true")
+    tab.wait("find(e => e.name === 'add').selectedIndex === 0")
+    assert tab.run(added) == 1
+    tab.key("z", 90, modifiers=2)
+    tab.wait(f"{added} === 0")
+
+
+@needs_a_browser
 def test_the_section_moves_when_it_is_asked_to(tab):
     corner = f"{tab.model('section')}.renderers[1].data_source.data.z[0][0]"
     first = tab.run(corner)
