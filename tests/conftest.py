@@ -14,12 +14,14 @@ from typing import TypeVar
 import cloudpickle
 import pytest
 
+from tests.small_run import small_run
 from thermospindle.diagnosis.verdict import Diagnosis, diagnose
 from thermospindle.model.bearing.pair import reference_motion, solve
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.scene.reading import load
 from thermospindle.sim.campaign.campaign import read_campaign
 from thermospindle.sim.effects import by_name
+from thermospindle.sim.run import Run, measured_campaigns
 from thermospindle.thermal.expansion import expand
 
 ROOT = Path(__file__).parents[1]
@@ -29,7 +31,7 @@ Made = TypeVar("Made")
 
 
 def pytest_collection_finish() -> None:
-    """What is there by now (libraries, thousands of tests) stays to the end: looking through it again for what may go took a sixth of all tests' time."""
+    """What is there by now (libraries, thousands of tests) stays to the end and is not looked through again and again for what may go."""
     gc.collect()
     gc.freeze()
     gc.set_threshold(50_000, 20, 20)
@@ -50,6 +52,12 @@ def cold(spindle):
 def hot(spindle):
     """Both bearings at 60 C, at rest."""
     return solve(spindle, Condition(60.0), expand(spindle, 60.0))
+
+
+@pytest.fixture(scope="session")
+def run(spindle) -> Run:
+    """Two short tests and the scene's own measurement."""
+    return small_run(spindle, (20.0, 60.0), measured_campaigns(spindle))
 
 
 @pytest.fixture(scope="session")
