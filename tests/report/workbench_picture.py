@@ -30,7 +30,7 @@ def main() -> None:
             tab.wait(f"!!{tab.model('bond_softening.width')}")
             tab.run(f"{tab.model('left_out')}.active = [6]")
             tab.run(f"{tab.model('keep')}.trigger_event(new (Bokeh.require('core/bokeh_events').ButtonClick)()) ?? true")
-            tab.click("find(e => e.tagName === 'BUTTON' && e.textContent === 'Fit the ticked')")
+            tab.click("find(e => e.tagName === 'BUTTON' && e.textContent.startsWith('Fit the ticked'))")
             tab.wait(f"{tab.model('message')}.text.includes('Fitted in')", 90)
             tab.click("find(e => e.tagName === 'BUTTON' && e.textContent === 'Keep as a step')")
             tab.run(f"{tab.model('mode')}.value = '2'")
