@@ -3,7 +3,7 @@ PYTHON ?= python3
 SPINDLE = .venv/bin/spindle
 READY = .venv/ready
 
-.PHONY: demo test test-all lint bench blind torture fuzz faults release-check docs clean
+.PHONY: demo test test-all lint bench growth blind torture fuzz faults release-check docs clean
 
 demo: $(READY)
 	$(SPINDLE) run scenes/hdd_2003 --out out/hdd_2003
@@ -52,6 +52,10 @@ release-check: $(READY)
 
 bench: $(READY)
 	.venv/bin/python -m tests.bench
+
+# Cost against the size of the work, drawn; ROSS_PYTHON and EMA_PYTHON may name Pythons that have ROSS and sdypy-EMA.
+growth: $(READY)
+	.venv/bin/python -m tests.bench_growth --picture docs/growth.png
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11) and 'Thermospindle needs Python 3.11 or newer')"

@@ -21,6 +21,7 @@ HOW = {
     "map.png": "spindle map hdd_2003 --speed 7200 --out out; rerun out/map.rrd --screenshot-to docs/map.png --window-size 1400x900",
     "diagnosis.png": "spindle diagnose hdd_2003 tests/data/foreign_bond --out out; out/explanations.png",
     "workbench.png": "python -m tests.report.workbench_picture",
+    "growth.png": "ROSS_PYTHON=... EMA_PYTHON=... make growth",
     "cluster.png": "python -m tests.bench_study --picture docs/cluster.png",
     "blind.txt": "python -m tests.blind.study --seeds A B; python -m tests.blind.score",
 }
