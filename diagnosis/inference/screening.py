@@ -19,6 +19,7 @@ from thermospindle.sim.effects.effect import HOOKS
 
 SEEN = tuple(hook for hook in HOOKS if hook != "imperfections")
 """What of an effect a hammer test can see: imperfections show in the runout alone."""
+TURN = 2.0  # prior standard deviations, by which each shape parameter is moved in turn
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,10 @@ def screen(
     sizes = Learned(learned.sizes, learned.errors if temper == 1.0 else 1.0, (), ())
     nothing = evidence(model, about, sizes).ln
     found = in_parallel(partial(_screened, model, about, sizes, nothing), list(mechanisms), workers)
-    return [replace(s, mechanism=m) for s, m in zip(found, mechanisms, strict=True)]
+    found = [replace(s, mechanism=m) for s, m in zip(found, mechanisms, strict=True)]
+    best = {s.mechanism.name: s for s in sorted(found, key=lambda s: s.gain) if s.visibility > 0 and s.mechanism.shape}
+    turned = in_parallel(partial(_turned, model, about, sizes, nothing), list(best.values()), workers)
+    return found + [replace(s, mechanism=best[s.mechanism.name].mechanism) for s in turned]
 
 
 def fitted(model: CampaignModel, about: Fit) -> list[Fitted]:
@@ -67,12 +71,33 @@ def fitted(model: CampaignModel, about: Fit) -> list[Fitted]:
 
 
 def _screened(model: CampaignModel, about: Fit, sizes: Learned, nothing: float, mechanism: Mechanism) -> Screened:
-    """The quadratic of the fitted model, with the mechanism's sizes beside its parameters."""
     problem = Problem(model, [*about.mechanisms, mechanism])
-    first = len(about.point)
+    if any(getattr(mechanism.effect, hook) for hook in SEEN):
+        return _promised(problem, about, sizes, nothing, np.zeros(len(mechanism.shape)))
+    return Screened(mechanism, -np.inf, np.concatenate([about.point, np.zeros(problem.length - len(about.point))]), 0.0)
+
+
+def _turned(model: CampaignModel, about: Fit, sizes: Learned, nothing: float, drawn: Screened) -> Screened:
+    """The best that a mechanism promises with its shape parameters moved in turn: a disk that would do nothing where it is drawn may do everything a
+    little lower."""
+    mechanism = drawn.mechanism
+    problem, shape, best = Problem(model, [*about.mechanisms, mechanism]), np.zeros(len(mechanism.shape)), drawn
+    for k, q in enumerate(mechanism.shape):
+        ends = np.clip(q.neutral + TURN * q.prior_sd * np.array([-1.0, 1.0]), *q.limits)
+        for turn in (ends - q.neutral) / q.prior_sd:
+            if turn:
+                tried = _promised(problem, about, sizes, nothing, np.where(np.arange(len(shape)) == k, turn, shape))
+                best = tried if tried.gain > best.gain else best
+        shape = best.start[problem.length - len(shape) :]
+    return replace(best, visibility=drawn.visibility)
+
+
+def _promised(problem: Problem, about: Fit, sizes: Learned, nothing: float, shape: Array) -> Screened:
+    """The quadratic of the fitted model, with the sizes of the last mechanism beside its parameters; its `shape` parameters stay where they are, in prior
+    standard deviations from neutral."""
+    model, mechanism, first = problem.model, problem.mechanisms[-1], len(about.point)
     p = np.concatenate([about.point, np.zeros(problem.length - first)])
-    if not any(getattr(mechanism.effect, hook) for hook in SEEN):
-        return Screened(mechanism, -np.inf, p, 0.0)
+    p[problem.length - len(shape) :] = shape
     x, own_sizes, shapes = problem.parts(p)
     by_test, seen = [], []
     for t, at in enumerate(fitted(model, about)):
@@ -102,7 +127,9 @@ def _screened(model: CampaignModel, about: Fit, sizes: Learned, nothing: float, 
     if visibility == 0.0:
         return Screened(mechanism, -np.inf, p, 0.0)
     found = evidence(model, whole, sizes)
-    return Screened(mechanism, found.ln - nothing, found.mean, visibility)
+    start = found.mean
+    start[problem.length - len(shape) :] = shape
+    return Screened(mechanism, found.ln - nothing - float(shape @ shape) / 2, start, visibility)
 
 
 def _visibility(seen: Sequence[tuple[Array, float, Integers]], information: Array, mechanism: Mechanism) -> float:
