@@ -24,13 +24,13 @@ from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import Mechanism, size_covariance
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.fit import Fit
-from thermospindle.diagnosis.inference.prior import Learned, covariance, nuisance_variances, whitened_covariance
+from thermospindle.diagnosis.inference.prior import Learned, covariance, misjudged, nuisance_variances, whitened_covariance
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
 
 GRIDS = {
-    kinds_of.STIFFNESS: (0.0, 1e-4, 1e-3, 1e-2),  # relative error of a frequency
-    kinds_of.DAMPING: (0.0, 0.03, 0.1),
+    kinds_of.STIFFNESS: (0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2),  # relative error of a frequency
+    kinds_of.DAMPING: (0.0, 0.01, 0.03, 0.1),
     kinds_of.STIFFNESS_DRIFT: (0.0, 3e-5, 1e-4, 3e-4, 1e-3),
     kinds_of.DAMPING_DRIFT: (0.0, 0.01, 0.03),
     kinds_of.DRIFT: (0.0, 3e-4, 1e-3, 3e-3, 1e-2),
@@ -88,7 +88,7 @@ def evidence(model: CampaignModel, fit: Fit, near: Learned | None = None) -> Evi
     def rated(s: float, sizes: Mapping[str, float]) -> tuple[float, int]:
         """ln evidence, the mean over widths and departures of all mechanisms; and which of these is best."""
         scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
-        inner = _marginal(scaled, nuisance_variances(model, sizes, fit.moved), p)
+        inner = _marginal(scaled, nuisance_variances(model, sizes), misjudged(model, sizes, fit.moved))
         values = inner.integrated(roots) - fit.count * np.log(s)
         return float(logsumexp(values) - np.log(len(values))), int(np.argmax(values))
 
@@ -199,16 +199,22 @@ class _Marginal:
         return np.asarray(constant, float)
 
 
-def _marginal(q: Quadratic, diagonal: Array, p: int) -> _Marginal:
-    root = np.sqrt(diagonal)
-    inner = root[:, None] * q.a[:p, :p] * root[None, :] + np.eye(p)
-    factor, lower = cho_factor(inner, lower=True)
-    b1 = root * q.b[:p]
-    cross = root[:, None] * q.a[:p, p:]
+def _marginal(q: Quadratic, diagonal: Array, beside: Array) -> _Marginal:
+    """Without the first parameters, whose prior covariance is diag(`diagonal`) + `beside` `beside`^T = R R^T: what is left of the quadratic."""
+    p, scale = len(diagonal), np.sqrt(diagonal)[:, None]
+
+    def turned(m: Array) -> Array:
+        """R^T m."""
+        return np.concatenate([scale * m, beside.T @ m]) if beside.size else np.asarray(scale * m)
+
+    inner = turned(turned(q.a[:p, :p]).T)
+    factor, lower = cho_factor(inner + np.eye(len(inner)), lower=True)
+    b1 = turned(q.b[:p, None])[:, 0]
     solved_b = cho_solve((factor, lower), b1)
     constant = -0.5 * q.constant + 0.5 * float(b1 @ solved_b) - float(np.log(np.diag(factor)).sum())
     if q.a.shape[0] == p:
         return _Marginal(constant, np.zeros(0), np.zeros((0, 0)))
+    cross = turned(q.a[:p, p:])
     solved = cho_solve((factor, lower), cross)
     return _Marginal(constant, q.b[p:] - solved.T @ b1, q.a[p:, p:] - cross.T @ solved)
 

@@ -69,19 +69,26 @@ def roots_of(model: CampaignModel, mechanisms: Sequence[Mechanism]) -> tuple[Arr
     )
 
 
-def nuisance_variances(model: CampaignModel, sizes: Mapping[str, float], moved: Array) -> Array:
-    """Prior variances (P,) of the nuisance parameters in units of their reference widths.
+def nuisance_variances(model: CampaignModel, sizes: Mapping[str, float]) -> Array:
+    """Prior variances (P,) of the nuisance parameters in units of their reference widths."""
+    return np.array([(sizes[p.kind] / REFERENCE[p.kind]) ** 2 if p.kind in sizes else 1.0 for p in model.parameters])
 
-    A model whose frequencies are constantly wrong is wrong, too, in what an effect does: of the relative changes of frequency and damping that the
-    mechanisms make of every mode in every test, `moved` (tests, 2, modes), a share may drift: `ACTION` times the relative error of the frequencies.
+
+def misjudged(model: CampaignModel, sizes: Mapping[str, float], moved: Array) -> Array:
+    """Root (P, k) of the prior covariance that an effect misjudged adds to the drift of modes.
+
+    A model whose frequencies are constantly wrong is wrong, too, in what an effect does: of the relative changes of frequency and of damping that the
+    mechanisms make of a mode, `moved` (tests, 2, modes), a share is wrong, the same in all tests: `ACTION` times the relative error of the frequencies.
     """
-    found = np.array([(sizes[p.kind] / REFERENCE[p.kind]) ** 2 if p.kind in sizes else 1.0 for p in model.parameters])
     share = ACTION * sizes.get(kinds_of.STIFFNESS, 0.0)
+    found = np.zeros((len(model.parameters), 2, moved.shape[2]))
     if share and moved.any():
         for i, q in enumerate(model.parameters):
             if q.kind in DRIFTING:
-                found[i] += (share * moved[q.test, DRIFTING.index(q.kind), q.modes[0]] / REFERENCE[q.kind]) ** 2
-    return found
+                which, mode = DRIFTING.index(q.kind), q.modes[0]
+                found[i, which, mode] = share * moved[q.test, which, mode] / REFERENCE[q.kind]
+    columns = found.reshape(len(found), -1)
+    return columns[:, columns.any(axis=0)]
 
 
 def mechanism_covariance(model: CampaignModel, mechanisms: Sequence[Mechanism], own: Sequence[tuple[float, float]]) -> Array:
@@ -104,11 +111,11 @@ def whitened_covariance(conditions: tuple[Condition, ...], width: float, departu
 
 def covariance(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned, moved: Array) -> Array:
     """Prior covariance (n, n) of all parameters at learned sizes, the mechanisms having `moved` the modes; singular where a size is zero."""
-    diagonal = nuisance_variances(model, learned.sizes, moved)
+    diagonal, action = nuisance_variances(model, learned.sizes), misjudged(model, learned.sizes, moved)
     n = len(diagonal)
     own = mechanism_covariance(model, mechanisms, list(zip(learned.widths, learned.departures, strict=True)))
     prior = np.zeros((n + len(own), n + len(own)))
-    prior[:n, :n] = np.diag(diagonal)
+    prior[:n, :n] = np.diag(diagonal) + action @ action.T
     prior[n:, n:] = own
     return prior
 

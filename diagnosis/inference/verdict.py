@@ -27,6 +27,7 @@ ENOUGH = 0.95  # posterior probability that a set holds the truth
 NEGLIGIBLE = 1e-3  # probability that adds nothing to a set
 LARGEST = 6  # names in a set, beyond which it says little
 NUMERICS = (1e-4, 0.01)  # drift of frequencies and of damping that two honest programs may differ by
+OWN_LAW = 0.5  # prior odds of a law that no formula has over the one assumed, for a mechanism of the catalogue
 MOSTLY = 0.6  # of the ln evidence of an explanation with free drift in it, or of the misfit that changes, that what is named must reach to be the answer
 UNTOLD = "nothing tried"  # what explains data that are missed grossly
 MUCH, LEFT = 0.5, "what is left"  # squares of the errors, from which what is left and changes tells of something else
@@ -75,6 +76,7 @@ def decide(found: Search) -> Verdict:
     same = overlap(found.model, found.hypotheses[0].fit)
     worth = same.inflation * coarsening(found.hypotheses[0])
     rows = [(h, _prior(h, named_count, free_count) + (_weighed(h, found.hypotheses) - base) / worth) for h in found.hypotheses]
+    rows = [(h, _with_own_law(h, w, rows, found.alike, named_count, free_count)) for h, w in rows]
     top = max(w for _, w in rows)
     total = np.log(sum(np.exp(w - top) for _, w in rows)) + top
     every = [
@@ -139,6 +141,21 @@ def _weighed(h: Hypothesis, every: Sequence[Hypothesis]) -> float:
     if max(lead.evidence.learned.departures, default=0.0) < DEPARTS or h.evidence.ln < lead.evidence.ln:
         return h.evidence.ln
     return lead.evidence.ln + (h.evidence.ln - lead.evidence.ln) / COARSE
+
+
+def _with_own_law(
+    h: Hypothesis, weight: float, rows: Sequence[tuple[Hypothesis, float]], alike: Mapping[str, frozenset[str]], named: int, free: int
+) -> float:
+    """ln weight of an effect whatever its law: with the one assumed, and with a law of its own, which is the free form that changes the same; that is
+    less probable by `OWN_LAW`. Of a free form that gains much more than the effect does, the effect is not the cause."""
+    if len(h.mechanisms) != 1 or h.free:
+        return weight
+    base = next(o.evidence.ln for o, _ in rows if not o.mechanisms)
+    for o, of_free in rows:
+        same = len(o.mechanisms) == 1 and o.free and h.names[0] in alike.get(o.names[0], frozenset())
+        if same and h.evidence.ln - base > MOSTLY * (o.evidence.ln - base):
+            weight = float(np.logaddexp(weight, np.log(OWN_LAW) + _prior(h, named, free) + of_free - _prior(o, named, free)))
+    return weight
 
 
 def _adrift(h: Hypothesis) -> bool:

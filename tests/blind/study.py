@@ -94,22 +94,22 @@ def draw(seed: int) -> Drawn:
 def judge(seed: int, without: Sequence[str] = ()) -> dict[str, Any]:
     """Make and diagnose one campaign; an exception of the diagnosis is an outcome too, the verdict `error`."""
     drawn = draw(seed)
+    made = drawn.made(without)
     row: dict[str, Any] = {
         "seed": seed,
         "without": list(without),
         "kind": drawn.kind,
         "scene": drawn.scene,
         "tests": [[p.temperature, round(p.speed * 30 / np.pi)] for p in drawn.tests],
-        "hidden": [h.mechanism for h in drawn.hidden],
-        "sizes": [h.size for h in drawn.hidden],
-        "units": [h.unit for h in drawn.hidden],
-        "laws": [h.law.kind for h in drawn.hidden],
-        "amounts": [[h.amount(p.place(drawn.spindle)) for p in drawn.tests] for h in drawn.hidden],
-        "truth": [list(h.names) for h in drawn.hidden],
-        "elements": [h.element for h in drawn.hidden],
+        "hidden": [h.mechanism for h in made.hidden],
+        "sizes": [h.size for h in made.hidden],
+        "units": [h.unit for h in made.hidden],
+        "laws": [h.law.kind for h in made.hidden],
+        "amounts": [[h.amount(p.place(drawn.spindle)) for p in drawn.tests] for h in made.hidden],
+        "truth": [list(h.names) for h in made.hidden],
+        "elements": [h.element for h in made.hidden],
     }
-    made = drawn.made(without)
-    row |= described(made, drawn.spindle) | {"visibility": visibility(made, drawn.spindle) if drawn.hidden else []}
+    row |= described(made, drawn.spindle) | {"visibility": visibility(made, drawn.spindle) if made.hidden else []}
     start = time.perf_counter()
     try:
         found = diagnose(drawn.spindle, made.campaign)

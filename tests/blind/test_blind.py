@@ -7,7 +7,7 @@ from rich.console import Console
 from tests.blind.hidden import law, mechanisms
 from tests.blind.score import element_found, interval, most_probable, outcome, show, truth_probability
 from tests.blind.study import FURTHER, FURTHER_FROM, FURTHER_SHARE, SCENES, draw
-from tests.blind.world import Record, World, answer, campaign, visibility
+from tests.blind.world import Record, World, answer, campaign, in_contact, visibility
 from tests.conftest import ROOT
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
@@ -55,6 +55,16 @@ def test_every_difference_of_the_world_changes_the_frf():
     ]
     for world in differences:
         assert np.abs(answer(spindle, Condition(WARM), world).frf(LINES) - base).max() > 1e-5 * np.abs(base).max(), world
+
+
+def test_what_is_hidden_leaves_every_bearing_in_contact():
+    """Balls that would lose all preload shrink half as much, or a quarter; what leaves some is as it was drawn."""
+    drawn = draw(171)
+    balls = next(h for h in drawn.hidden if h.mechanism == "balls grow")
+    less = in_contact(drawn.spindle, drawn.tests, World(), [balls])[0]
+    assert less.size / balls.size in (0.5, 0.25)
+    assert in_contact(drawn.spindle, drawn.tests, World(), [less])[0] is less
+    assert drawn.made().hidden[0].size == less.size
 
 
 def test_a_long_record_leaks_nothing_and_a_short_one_does():

@@ -25,13 +25,9 @@ from thermospindle.diagnosis.forward.nuisance import (
     TEMPERATURE,
     Nuisance,
 )
-from thermospindle.diagnosis.inference.evidence import (
-    Learned,
-    evidence,
-    left_out,
-)  # fmt: skip
+from thermospindle.diagnosis.inference.evidence import (Learned, Quadratic, _marginal, evidence, left_out)  # fmt: skip
 from thermospindle.diagnosis.inference.fit import Fit
-from thermospindle.diagnosis.inference.prior import ACTION, nuisance_variances
+from thermospindle.diagnosis.inference.prior import ACTION, misjudged, nuisance_variances
 from thermospindle.model.machine import Condition
 from thermospindle.sim.effects.effect import Effect, Parameter
 
@@ -146,12 +142,23 @@ def test_a_model_that_is_wrong_may_be_wrong_in_what_an_effect_does():
     moved = np.zeros((2, 2, 2))
     moved[1, 0, 1], moved[1, 1, 0] = 0.02, -0.3  # frequency of the second mode and damping of the first, in the second test
     right = {STIFFNESS: 0.0, STIFFNESS_DRIFT: 0.0, DAMPING_DRIFT: DAMPING_DRIFT_SD}
-    plain = nuisance_variances(model, right, moved)
-    assert plain.tolist() == [1, 0, 0, 0, 0, 1, 1, 1, 1]
-    found = nuisance_variances(model, right | {STIFFNESS: 0.01}, moved) - plain
-    assert found[4] == pytest.approx((ACTION * 0.01 * 0.02 / STIFFNESS_DRIFT_SD) ** 2)
-    assert found[7] == pytest.approx((ACTION * 0.01 * 0.3 / DAMPING_DRIFT_SD) ** 2)
+    assert nuisance_variances(model, right).tolist() == [1, 0, 0, 0, 0, 1, 1, 1, 1]
+    assert misjudged(model, right, moved).shape == (9, 0)
+    found = misjudged(model, right | {STIFFNESS: 0.01}, moved)
+    assert found[4] == pytest.approx([ACTION * 0.01 * 0.02 / STIFFNESS_DRIFT_SD, 0])
+    assert found[7] == pytest.approx([0, -ACTION * 0.01 * 0.3 / DAMPING_DRIFT_SD])
     assert np.count_nonzero(found) == 2
+
+
+def test_what_is_wrong_in_an_effect_is_alike_in_all_tests():
+    """The evidence with drift in proportion to what an effect moves is that of one parameter more for every mode, in closed form."""
+    random = np.random.default_rng(5)
+    jacobian, y = random.standard_normal((60, 5)), random.standard_normal(60)
+    beside, diagonal = random.standard_normal((5, 2)), np.array([1.0, 0.0, 0.3, 0.0, 2.0])
+    left = _marginal(Quadratic(float(y @ y), jacobian.T @ y, jacobian.T @ jacobian), diagonal, beside)
+    prior = np.diag(diagonal) + beside @ beside.T
+    whole = multivariate_normal(np.zeros(60), np.eye(60) + jacobian @ prior @ jacobian.T)
+    assert left.constant == pytest.approx(whole.logpdf(y) + 30 * np.log(2 * np.pi), rel=1e-9)
 
 
 def test_errors_larger_than_stated_are_learned():
