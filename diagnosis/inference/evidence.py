@@ -24,7 +24,7 @@ from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import Mechanism, size_covariance
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.fit import Fit
-from thermospindle.diagnosis.inference.prior import Learned, covariance, misjudged, nuisance_variances, whitened_covariance
+from thermospindle.diagnosis.inference.prior import Learned, Root, nuisance_root, root, whitened_covariance
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
 
@@ -88,7 +88,7 @@ def evidence(model: CampaignModel, fit: Fit, near: Learned | None = None) -> Evi
     def rated(s: float, sizes: Mapping[str, float]) -> tuple[float, int]:
         """ln evidence, the mean over widths and departures of all mechanisms; and which of these is best."""
         scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
-        inner = _marginal(scaled, nuisance_variances(model, sizes), misjudged(model, sizes, fit.moved))
+        inner = _marginal(scaled, nuisance_root(model, sizes, fit.moved))
         values = inner.integrated(roots) - fit.count * np.log(s)
         return float(logsumexp(values) - np.log(len(values))), int(np.argmax(values))
 
@@ -117,13 +117,13 @@ def evidence(model: CampaignModel, fit: Fit, near: Learned | None = None) -> Evi
     own = [grid[k] for grid, k in zip(own_grids, np.unravel_index(own_best, [len(grid) for grid in own_grids]), strict=True)] if own_grids else []
     scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
     learned = Learned(sizes, s, tuple(w for w, _ in own), tuple(d for _, d in own))
-    mean, spread = _posterior(scaled, covariance(model, fit.mechanisms, learned, fit.moved))
+    mean, spread = _posterior(scaled, root(model, fit.mechanisms, learned, fit.moved))
     at, means, covariances, truncation = p, [], [], 0.0
     tests = len(model.tests)
-    for m, root, width_departure in zip(fit.mechanisms, fit.roots, own, strict=True):
+    for m, own_root, width_departure in zip(fit.mechanisms, fit.roots, own, strict=True):
         part = slice(at, at + tests)
-        means.append(m.size.neutral + root @ mean[part])
-        covariances.append(root @ spread[part, part] @ root.T)
+        means.append(m.size.neutral + own_root @ mean[part])
+        covariances.append(own_root @ spread[part, part] @ own_root.T)
         truncation += _one_sided(model, m, width_departure, means[-1], covariances[-1])
         at += tests + len(m.shape)
     shape = (len(fit.mechanisms), tests)
@@ -199,53 +199,33 @@ class _Marginal:
         return np.asarray(constant, float)
 
 
-def _marginal(q: Quadratic, diagonal: Array, beside: Array) -> _Marginal:
-    """Without the first parameters, whose prior covariance is diag(`diagonal`) + `beside` `beside`^T = R R^T: what is left of the quadratic."""
-    p, scale = len(diagonal), np.sqrt(diagonal)[:, None]
-
-    def turned(m: Array) -> Array:
-        """R^T m."""
-        return np.concatenate([scale * m, beside.T @ m]) if beside.size else np.asarray(scale * m)
-
-    inner = turned(turned(q.a[:p, :p]).T)
-    factor, lower = cho_factor(inner + np.eye(len(inner)), lower=True)
-    b1 = turned(q.b[:p, None])[:, 0]
+def _marginal(q: Quadratic, prior: Root) -> _Marginal:
+    """What is left of the quadratic without the first parameters, which have that prior."""
+    p, k = prior.beside.shape
+    inner = prior.within(q.a[:p, :p])
+    factor, lower = cho_factor(inner + np.eye(p + k), lower=True)
+    b1 = prior.turned(q.b[:p, None])[:, 0]
     solved_b = cho_solve((factor, lower), b1)
     constant = -0.5 * q.constant + 0.5 * float(b1 @ solved_b) - float(np.log(np.diag(factor)).sum())
     if q.a.shape[0] == p:
         return _Marginal(constant, np.zeros(0), np.zeros((0, 0)))
-    cross = turned(q.a[:p, p:])
+    cross = prior.turned(q.a[:p, p:])
     solved = cho_solve((factor, lower), cross)
     return _Marginal(constant, q.b[p:] - solved.T @ b1, q.a[p:, p:] - cross.T @ solved)
 
 
-def _posterior(q: Quadratic, prior: Array) -> tuple[Array, Array]:
-    """Mean and covariance under N(0, prior), which may be singular; most of the prior is a diagonal, and so is its root."""
-    n = len(prior)
-    diagonal = np.diag(prior)
-    beside = np.flatnonzero((prior - np.diag(diagonal)).any(axis=1))
-    alone = int(beside[0]) if len(beside) else n  # the first parameters, each independent of all others
-    scale = np.sqrt(diagonal[:alone] + 1e-14)
-    root = np.asarray(np.linalg.cholesky(prior[alone:, alone:] + 1e-14 * np.eye(n - alone)), float)
-
-    def between(matrix: Array, left: Array) -> Array:
-        """R^T matrix R with R = diag(scale) beside `left`."""
-        found = matrix.copy()
-        found[:alone] *= scale[:, None]
-        found[:, :alone] *= scale
-        found[alone:] = left.T @ found[alone:]
-        found[:, alone:] = found[:, alone:] @ left
-        return found
-
-    inner = np.asarray(np.linalg.inv(np.asarray(between(q.a, root) + np.eye(n), float)), float)
-    covariance = between(inner, np.asarray(root.T, float))
+def _posterior(q: Quadratic, prior: Root) -> tuple[Array, Array]:
+    """Mean (n,) and covariance (n, n)."""
+    inner = prior.within(q.a)
+    inverse = np.asarray(np.linalg.inv(inner + np.eye(len(inner))))
+    covariance = prior.times(prior.times(inverse).T)
     return covariance @ q.b, covariance
 
 
 def left_out(model: CampaignModel, fit: Fit, found: Evidence, groups: Sequence[Sequence[int]]) -> float:
     """Root mean square residual, in standard errors of the data, of groups of tests predicted from all others, with what was learned from all."""
     learned = found.learned
-    prior = covariance(model, fit.mechanisms, learned, fit.moved)
+    prior = root(model, fit.mechanisms, learned, fit.moved)
     by_test = [quadratic(*b, fit.point) for b in fit.by_test]
     total, count = 0.0, 0
     for group in groups:

@@ -134,13 +134,14 @@ def _preloaded(spindle: Spindle, condition: Condition, values: Values) -> Spindl
     return scaled_preload(spindle, _factor(values))
 
 
-def alike(model: CampaignModel, x: Array, free: Mechanism, named: Mechanism) -> bool:
+def alike(model: CampaignModel, x: Array, free: Mechanism, named: Mechanism, shape: Sequence[float] | None = None) -> bool:
     """Whether a free form changes what an effect of the catalogue changes, whatever the law: whether in every test the two move all lines in the same
-    direction, to `ALIKE` of their squares. `x` (P,) are the nuisances where that is asked."""
+    direction, to `ALIKE` of their squares. `x` (P,) are the nuisances where that is asked, and `shape` the effect's (neutral unless given)."""
     apart = whole = 0.0
     columns = []
     for m in (free, named):
-        at = [(m.effect, m.values(m.size.neutral, [q.neutral for q in m.shape]))]
+        values = shape if m is named and shape is not None else [q.neutral for q in m.shape]
+        at = [(m.effect, m.values(m.size.neutral, values))]
         columns.append([Problem(model, (m,)).by_size(t, x, at, 0) for t in range(len(model.tests))])
     for of_free, of_named in zip(*columns, strict=True):
         square, other = float(of_named @ of_named), float(of_free @ of_free)

@@ -25,7 +25,7 @@ REFERENCE = {
 """Widths in which nuisances of unknown size are counted."""
 ACTION = 3.0  # times the relative error of frequencies, which what the model says of an effect may be wrong by
 UNMOVED = np.zeros((0, 2, 0))
-"""Of a model without effects, and of fits, which need no more than a place to start from."""
+"""Of a model without effects, and of fits that are no more than a place to start from."""
 NOTHING = 1e-4  # of a reference width: what stands for a size of zero where a prior must be inverted
 
 
@@ -87,7 +87,7 @@ def misjudged(model: CampaignModel, sizes: Mapping[str, float], moved: Array) ->
             if q.kind in DRIFTING:
                 which, mode = DRIFTING.index(q.kind), q.modes[0]
                 found[i, which, mode] = share * moved[q.test, which, mode] / REFERENCE[q.kind]
-    columns = found.reshape(len(found), -1)
+    columns = found.reshape(len(found), 2 * moved.shape[2])
     return columns[:, columns.any(axis=0)]
 
 
@@ -109,25 +109,48 @@ def whitened_covariance(conditions: tuple[Condition, ...], width: float, departu
     return np.asarray(solve_triangular(root, half.T, lower=True))
 
 
-def covariance(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned, moved: Array) -> Array:
-    """Prior covariance (n, n) of all parameters at learned sizes, the mechanisms having `moved` the modes; singular where a size is zero."""
-    diagonal, action = nuisance_variances(model, learned.sizes), misjudged(model, learned.sizes, moved)
-    n = len(diagonal)
+@dataclass(frozen=True, eq=False)
+class Root:
+    """R (n, r) of a prior covariance R R^T: the nuisances' diag(`scale`) (P,) and `beside` (P, k), and `own` (m, m) of the mechanisms."""
+
+    scale: Array
+    beside: Array
+    own: Array
+
+    def turned(self, matrix: Array) -> Array:
+        """R^T `matrix`, (n, c) to (r, c)."""
+        p = len(self.scale)
+        return np.concatenate([self.scale[:, None] * matrix[:p], self.beside.T @ matrix[:p], self.own.T @ matrix[p:]])
+
+    def times(self, matrix: Array) -> Array:
+        """R `matrix`, (r, c) to (n, c)."""
+        p, k = self.beside.shape
+        return np.concatenate([self.scale[:, None] * matrix[:p] + self.beside @ matrix[p : p + k], self.own @ matrix[p + k :]])
+
+    def within(self, matrix: Array) -> Array:
+        """R^T `matrix` R of a symmetric one, (n, n) to (r, r)."""
+        return self.turned(self.turned(matrix).T)
+
+
+def nuisance_root(model: CampaignModel, sizes: Mapping[str, float], moved: Array) -> Root:
+    """Of the nuisances alone, the mechanisms having `moved` the modes."""
+    return Root(np.sqrt(nuisance_variances(model, sizes)), misjudged(model, sizes, moved), np.zeros((0, 0)))
+
+
+def root(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned, moved: Array) -> Root:
+    """Of all parameters at learned sizes, the mechanisms having `moved` the modes; singular where a size is zero."""
     own = mechanism_covariance(model, mechanisms, list(zip(learned.widths, learned.departures, strict=True)))
-    prior = np.zeros((n + len(own), n + len(own)))
-    prior[:n, :n] = np.diag(diagonal) + action @ action.T
-    prior[n:, n:] = own
-    return prior
+    return replace(nuisance_root(model, learned.sizes, moved), own=np.linalg.cholesky(own + 1e-14 * np.eye(len(own))))
 
 
 def precision(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned | None) -> Array:
-    """The inverse of `covariance`, with next to nothing for sizes of zero; the identity, the reference widths, without `learned`."""
+    """The inverse of the prior covariance, what is misjudged left out and with next to nothing for sizes of zero; the identity, the reference widths,
+    without `learned`."""
     n = len(model.parameters)
     if learned is None:
         return np.eye(n + sum(len(model.tests) + len(m.shape) for m in mechanisms))
-    found = covariance(model, mechanisms, learned, UNMOVED)
-    found[:n, :n] = np.diag(1 / np.maximum(np.diag(found)[:n], NOTHING**2))
-    if len(found) > n:
-        own = found[n:, n:]
-        found[n:, n:] = np.linalg.inv(own + NOTHING**2 * np.eye(len(own)))
+    own = mechanism_covariance(model, mechanisms, list(zip(learned.widths, learned.departures, strict=True)))
+    found = np.zeros((n + len(own), n + len(own)))
+    found[:n, :n] = np.diag(1 / np.maximum(nuisance_variances(model, learned.sizes), NOTHING**2))
+    found[n:, n:] = np.linalg.inv(own + NOTHING**2 * np.eye(len(own)))
     return found

@@ -456,19 +456,25 @@ def visibility(made: Made, spindle: Spindle, lines: int = 160) -> list[float]:
 
 
 def _modal_columns(made: Made, column, frequency: Array, plain: World, spindle: Spindle) -> list[Array]:
-    """Every mode's constant stiffness and damping error, one at a time."""
+    """Every mode's constant stiffness and damping error, and what couples every two of them, one at a time."""
     answers = [answer(made.built, Condition(p.temperature, p.speed), plain) for p in made.plans]
     reference = answer(made.built, Condition(REFERENCE), plain).linear
     root = np.sqrt(np.diag(reference.mass))
     square, vectors = np.linalg.eigh(reference.stiffness / root[:, None] / root[None, :])
     back = root[:, None] * vectors
     seen = np.flatnonzero((square > 1.0) & (square < (2 * np.pi * 1.2 * spindle.hammer.band[1]) ** 2))
+    v = back[:, seen] * np.sqrt(square[seen])
+    one, two = np.triu_indices(len(seen), 1)
     plainly = [at.frf(frequency) for at in answers]
-    moved = [at.by_modes(frequency, back[:, seen] * np.sqrt(square[seen])) for at in answers]
+    moved = []
+    for at in answers:
+        by_one = at.by_modes(frequency, v)
+        by_sum = at.by_modes(frequency, v[:, one] + v[:, two])  # (v + w)(v + w)^T less v v^T and w w^T couples the two
+        moved.append([np.concatenate([of_one, of_sum - of_one[one] - of_one[two]]) for of_one, of_sum in zip(by_one, by_sum, strict=True)])
+    omega = np.sqrt(np.concatenate([square[seen], np.sqrt(square[seen][one] * square[seen][two])]))
     found = []
-    for j, i in enumerate(seen):
-        sizes = 2 * made.world.stiffness_error, made.world.damping_error * 0.02 / np.sqrt(square[i])
-        for kind, size in enumerate(sizes):
+    for j, w in enumerate(omega):
+        for kind, size in enumerate((2 * made.world.stiffness_error, made.world.damping_error * 0.02 / w)):
             if size:
                 found.append(column([p + size * m[kind][j] for p, m in zip(plainly, moved, strict=True)]))
     return found

@@ -74,10 +74,10 @@ EFFECT = Effect(
             "mm",
             neutral=0.0,
             typical=0.0,
-            prior_sd=3.0,
+            prior_sd=6.0,
             limits=(-50.0, 50.0),
             meaning="height of the disk above the upper face of the turning body, or before the end of a flexible shaft that is hammered",
-            source="on top unless somebody looks",
+            source="on top, or within a turning part some 20 mm tall",
         ),
     ),
     sees=(

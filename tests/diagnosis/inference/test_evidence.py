@@ -27,7 +27,7 @@ from thermospindle.diagnosis.forward.nuisance import (
 )
 from thermospindle.diagnosis.inference.evidence import (Learned, Quadratic, _marginal, evidence, left_out)  # fmt: skip
 from thermospindle.diagnosis.inference.fit import Fit
-from thermospindle.diagnosis.inference.prior import ACTION, misjudged, nuisance_variances
+from thermospindle.diagnosis.inference.prior import ACTION, Root, misjudged, nuisance_variances
 from thermospindle.model.machine import Condition
 from thermospindle.sim.effects.effect import Effect, Parameter
 
@@ -155,7 +155,7 @@ def test_what_is_wrong_in_an_effect_is_alike_in_all_tests():
     random = np.random.default_rng(5)
     jacobian, y = random.standard_normal((60, 5)), random.standard_normal(60)
     beside, diagonal = random.standard_normal((5, 2)), np.array([1.0, 0.0, 0.3, 0.0, 2.0])
-    left = _marginal(Quadratic(float(y @ y), jacobian.T @ y, jacobian.T @ jacobian), diagonal, beside)
+    left = _marginal(Quadratic(float(y @ y), jacobian.T @ y, jacobian.T @ jacobian), Root(np.sqrt(diagonal), beside, np.zeros((0, 0))))
     prior = np.diag(diagonal) + beside @ beside.T
     whole = multivariate_normal(np.zeros(60), np.eye(60) + jacobian @ prior @ jacobian.T)
     assert left.constant == pytest.approx(whole.logpdf(y) + 30 * np.log(2 * np.pi), rel=1e-9)
