@@ -64,13 +64,15 @@ class Fit:
 class Problem:
     """A campaign and the mechanisms that act in it, as a least-squares problem over p = [x, z_1, u_1, z_2, u_2, ...].
 
-    Priors have their reference widths, or those `learned`.
+    Priors have their reference widths, or those `learned` where the mechanisms `moved` the modes.
     """
 
-    def __init__(self, model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned | None = None) -> None:
+    def __init__(
+        self, model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned | None = None, moved: Array = UNMOVED
+    ) -> None:
         self.model, self.mechanisms = model, tuple(mechanisms)
         self.roots = roots_of(model, self.mechanisms)
-        self.precision = precision(model, self.mechanisms, learned) * (1.0 if learned is None else learned.errors**2)
+        self.precision = precision(model, self.mechanisms, learned, moved) * (1.0 if learned is None else learned.errors**2)
         self.tests = len(model.tests)
         self.nuisances = len(model.parameters)
         self.length = self.nuisances + sum(self.tests + len(m.shape) for m in self.mechanisms)
@@ -222,14 +224,14 @@ class Linearisation:
 
 def fit(
     model: CampaignModel, mechanisms: Sequence[Mechanism] = (), start: Array | Sequence[Array] | None = None, rates: Rates | None = None,
-    tempers: Sequence[float] = TEMPERS, learned: Learned | None = None,
+    tempers: Sequence[float] = TEMPERS, learned: Learned | None = None, moved: Array = UNMOVED,
 ) -> Fit:
-    """The fit with the reference widths of all priors, or those `learned`; of several starts from the one of least cost. While errors are taken
+    """The fit with the reference widths of all priors, or those `learned` where the mechanisms `moved` the modes; of several starts from the one of least cost. While errors are taken
     too large, the thinned model serves.
 
     Raises what the model raises where even the start cannot be built.
     """
-    problem = Problem(model, mechanisms, learned)
+    problem = Problem(model, mechanisms, learned, moved)
     if start is None:
         p = np.zeros(problem.length)
     elif isinstance(start, np.ndarray):
@@ -237,7 +239,7 @@ def fit(
     else:
         p = min(start, key=lambda at: problem.cost(at, tempers[0])).copy()
     for temper in tempers:
-        problem = Problem(model if temper == 1.0 else model.thinned, mechanisms, learned)
+        problem = Problem(model if temper == 1.0 else model.thinned, mechanisms, learned, moved)
         rates = problem.model.rates(problem.parts(p)[0], problem.effects_of(p), rates)
         p, lines, residuals = _settled(problem, p, rates, temper)
         done = problem, p, rates, temper, lines, residuals

@@ -143,14 +143,16 @@ def root(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned
     return replace(nuisance_root(model, learned.sizes, moved), own=np.linalg.cholesky(own + 1e-14 * np.eye(len(own))))
 
 
-def precision(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned | None) -> Array:
-    """The inverse of the prior covariance, what is misjudged left out and with next to nothing for sizes of zero; the identity, the reference widths,
-    without `learned`."""
+def precision(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned | None, moved: Array = UNMOVED) -> Array:
+    """The inverse (n, n) of the prior covariance, with next to nothing for sizes of zero; the identity, the reference widths, without `learned`."""
     n = len(model.parameters)
     if learned is None:
         return np.eye(n + sum(len(model.tests) + len(m.shape) for m in mechanisms))
     own = mechanism_covariance(model, mechanisms, list(zip(learned.widths, learned.departures, strict=True)))
     found = np.zeros((n + len(own), n + len(own)))
-    found[:n, :n] = np.diag(1 / np.maximum(nuisance_variances(model, learned.sizes), NOTHING**2))
+    alone = 1 / np.maximum(nuisance_variances(model, learned.sizes), NOTHING**2)
+    beside = alone[:, None] * misjudged(model, learned.sizes, moved)
+    inner = np.eye(beside.shape[1]) + beside.T @ (beside / alone[:, None])  # Woodbury's identity
+    found[:n, :n] = np.diag(alone) - beside @ np.linalg.solve(inner, beside.T)
     found[n:, n:] = np.linalg.inv(own + NOTHING**2 * np.eye(len(own)))
     return found

@@ -8,7 +8,7 @@ halving: Jamieson & Talwalkar, AISTATS 2016).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain, zip_longest
@@ -143,7 +143,8 @@ def _singles(
     # tolerances strained to stand in for an effect must give way with it; while errors are enlarged they are not strained yet
     tasks = [_task((), about, s, -np.inf if strained else none.evidence.ln + s.gain, far=not strained) for s in chosen]
     most = fit(model, (), (none.evidence.mean, none.fit.point), none.fit.rates, TEMPERS[-1:], learned=expected).cost
-    singles = _fitted_all(model, tasks, strained, about, most, expected, workers)
+    first = {max((s for s in looked if s.mechanism.free == free), key=lambda s: s.gain).mechanism.name for looked in rankings for free in (False, True)}
+    singles = _fitted_all(model, tasks, first, strained, about, most, expected, workers)
     progress("effects fitted")
     return Singles(singles, tuple(looked), most, expected)
 
@@ -207,7 +208,7 @@ def settled(model: CampaignModel, h: Hypothesis) -> Hypothesis:
     It starts from its own answer, or from the fit where the model is no quadratic as far as that."""
     for _ in range(REFITS):
         try:
-            found = fit(model, h.mechanisms, (h.evidence.mean, h.fit.point), h.fit.rates, TEMPERS[-1:], learned=h.evidence.learned)
+            found = fit(model, h.mechanisms, (h.evidence.mean, h.fit.point), h.fit.rates, TEMPERS[-1:], h.evidence.learned, h.fit.moved)
         except FAILED:
             return h
         before, h = h.evidence, Hypothesis(found, evidence(model, found))
@@ -245,8 +246,9 @@ def _chosen(rankings: Sequence[Sequence[Screened]], strained: bool) -> list[Scre
     return found
 
 
-def _fitted_all(model, tasks, strained: bool, about: Fit, most: float, expected: Learned, workers) -> list[Hypothesis]:
-    """All tasks fitted; where much is missing in steps of temper, after which what fell behind is left."""
+def _fitted_all(model, tasks, first: Collection[str], strained: bool, about: Fit, most: float, expected: Learned, workers) -> list[Hypothesis]:
+    """All tasks fitted; where much is missing in steps of temper, after which what fell behind is left, but for those that promised most at `first`: the
+    first of two causes that shows while errors are enlarged need not be the one that tells more."""
     if not tasks:
         return []
     if not strained:
@@ -257,7 +259,7 @@ def _fitted_all(model, tasks, strained: bool, about: Fit, most: float, expected:
         early = False
         best = max(h.evidence.ln for h in found)
         keep = {id(h) for kind in (False, True) for h in sorted((h for h in found if h.free == kind), key=lambda h: -h.evidence.ln)[:2]}
-        kept = [h for h in found if id(h) in keep or h.evidence.ln > best - BEHIND]
+        kept = [h for h in found if id(h) in keep or h.names[0] in first or h.evidence.ln > best - BEHIND]
         if temper == TEMPERS[-1]:
             return found
         alive = [Task(h.mechanisms, (h.fit.point,), -np.inf) for h in kept]

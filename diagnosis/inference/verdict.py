@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import permutations
 from math import comb
 
 import numpy as np
@@ -146,16 +147,22 @@ def _weighed(h: Hypothesis, every: Sequence[Hypothesis]) -> float:
 def _with_own_law(
     h: Hypothesis, weight: float, rows: Sequence[tuple[Hypothesis, float]], alike: Mapping[str, frozenset[str]], named: int, free: int
 ) -> float:
-    """ln weight of an effect whatever its law: with the one assumed, and with a law of its own, which is the free form that changes the same; that is
-    less probable by `OWN_LAW`. Of a free form that gains much more than the effect does, the effect is not the cause."""
-    if len(h.mechanisms) != 1 or h.free:
+    """ln weight of effects whatever their laws: with those assumed and, less probable by `OWN_LAW` each, with laws of their own, which are the free forms
+    that change the same. Where free forms gain much more than the effects do, the effects are not the cause."""
+    if h.free or not h.mechanisms:
         return weight
     base = next(o.evidence.ln for o, _ in rows if not o.mechanisms)
     for o, of_free in rows:
-        same = len(o.mechanisms) == 1 and o.free and h.names[0] in alike.get(o.names[0], frozenset())
-        if same and h.evidence.ln - base > MOSTLY * (o.evidence.ln - base):
-            weight = float(np.logaddexp(weight, np.log(OWN_LAW) + _prior(h, named, free) + of_free - _prior(o, named, free)))
+        if o.free and h.evidence.ln - base > MOSTLY * (o.evidence.ln - base) and _same_changes(h.names, o, alike):
+            own = sum(m.free for m in o.mechanisms) * np.log(OWN_LAW)
+            weight = float(np.logaddexp(weight, own + _prior(h, named, free) + of_free - _prior(o, named, free)))
     return weight
+
+
+def _same_changes(names: Names, o: Hypothesis, alike: Mapping[str, frozenset[str]]) -> bool:
+    """Whether each of the effects is a mechanism of `o` of its own, or the law of one that is free there."""
+    means = [alike.get(m.name, frozenset()) if m.free else {m.name} for m in o.mechanisms]
+    return len(names) == len(means) and any(all(n in of for n, of in zip(row, means, strict=True)) for row in permutations(names))
 
 
 def _adrift(h: Hypothesis) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -27,7 +27,7 @@ from thermospindle.diagnosis.forward.nuisance import (
 )
 from thermospindle.diagnosis.inference.evidence import (Learned, Quadratic, _marginal, evidence, left_out)  # fmt: skip
 from thermospindle.diagnosis.inference.fit import Fit
-from thermospindle.diagnosis.inference.prior import ACTION, Root, misjudged, nuisance_variances
+from thermospindle.diagnosis.inference.prior import ACTION, Root, misjudged, nuisance_variances, precision, root
 from thermospindle.model.machine import Condition
 from thermospindle.sim.effects.effect import Effect, Parameter
 
@@ -159,6 +159,24 @@ def test_what_is_wrong_in_an_effect_is_alike_in_all_tests():
     prior = np.diag(diagonal) + beside @ beside.T
     whole = multivariate_normal(np.zeros(60), np.eye(60) + jacobian @ prior @ jacobian.T)
     assert left.constant == pytest.approx(whole.logpdf(y) + 30 * np.log(2 * np.pi), rel=1e-9)
+
+
+def test_a_fit_and_the_evidence_have_one_prior():
+    """The precision of a fit is the inverse of the covariance whose root the evidence has, what is misjudged included."""
+    made = toy(3, 1e-3)
+    learned = evidence(made.model, made.fit).learned
+    sizes = dict.fromkeys(learned.sizes, 1e-3)
+    learned = replace(learned, sizes=sizes, departures=(0.3,) * len(learned.departures))
+    parameters = tuple(Nuisance(STIFFNESS_DRIFT, "drift", STIFFNESS_DRIFT_SD, test=t, modes=(0, 0)) for t in range(len(made.model.tests)))
+    model = SimpleNamespace(parameters=parameters, tests=made.model.tests)
+    moved = np.full((len(parameters), 2, 1), 0.1)
+    moved[0] = -0.2
+    found = root(model, made.fit.mechanisms, learned, moved)
+    n = len(found.scale) + len(found.own)
+    covariance = found.times(found.turned(np.eye(n)))
+    assert np.abs(found.beside).max() > 0.1
+    assert precision(model, made.fit.mechanisms, learned, moved) @ covariance == pytest.approx(np.eye(n), abs=1e-5)
+    assert found.within(np.eye(n)) == pytest.approx(found.turned(found.times(np.eye(len(found.within(np.eye(n)))))))
 
 
 def test_errors_larger_than_stated_are_learned():

@@ -179,6 +179,8 @@ OWN_LAWS = {
     "another's": ({"a": 60.0, "~x": 66.0}, {"b"}, "unexplained", set()),
     "no effect's": ({"a": 60.0, "~x": 66.0}, set(), "unexplained", set()),
     "of an effect that gains little of it": ({"a": 6.0, "~x": 66.0}, {"a"}, "unexplained", set()),
+    "one of two": ({"a": 40.0, "~x": 50.0, ("a", "b"): 60.0, ("~x", "b"): 80.0}, {"a"}, "ambiguous", {"a", "b"}),
+    "neither of two": ({"a": 40.0, "~x": 50.0, ("a", "b"): 60.0, ("~x", "~y"): 80.0}, {"a"}, "unexplained", set()),
 }
 
 
