@@ -3,7 +3,8 @@
 Loss of an answer, in units of a set that holds the truth: a wrong name costs ten times as much and a false alarm twenty times; to say
 "nothing" of a spindle that lacks something five times, as much as a set without the truth in it does beyond its own cost. Prior odds are even
 between nothing missing and something missing; within the catalogue every effect is as likely as another, two at once a quarter
-as likely as one, and something that is in no catalogue a seventh.
+as likely as one, and something that is in no catalogue a seventh. A mechanism of the catalogue may have a law of its own, half as likely as the
+one assumed.
 """
 
 from __future__ import annotations
