@@ -24,7 +24,7 @@ from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import Mechanism, size_covariance
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.fit import Fit
-from thermospindle.diagnosis.inference.prior import Learned, Root, nuisance_root, root, whitened_covariance
+from thermospindle.diagnosis.inference.prior import Learned, Root, nuisance_root, whitened_covariance, whole_root
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
 
@@ -72,9 +72,9 @@ def quadratic(chi2: float, gradient: Array, information: Array, point: Array) ->
     return Quadratic(float(chi2 - 2 * gradient @ point + point @ information @ point), b, information)
 
 
-def evidence(model: CampaignModel, fit: Fit, near: Learned | None = None) -> Evidence:
+def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = ()) -> Evidence:
     """The evidence of a fit at its own temper (its errors are 1 / temper times the data's); with `near` the sizes of discrepancies, drift and
-    errors are taken from there, which is quick."""
+    errors are taken from the best of these, which is quick."""
     whole = quadratic(fit.chi2, fit.gradient, fit.information, fit.point)
     t2 = fit.temper**2
     whole = Quadratic(t2 * whole.constant, t2 * whole.b, t2 * whole.a)
@@ -92,9 +92,8 @@ def evidence(model: CampaignModel, fit: Fit, near: Learned | None = None) -> Evi
         values = inner.integrated(roots) - fit.count * np.log(s)
         return float(logsumexp(values) - np.log(len(values))), int(np.argmax(values))
 
-    if near is not None:
-        s, sizes = near.errors, dict(near.sizes)
-        total, own_best = rated(s, sizes)
+    if near:
+        (total, own_best), s, sizes = max(((rated(n.errors, n.sizes), n.errors, dict(n.sizes)) for n in near), key=lambda row: row[0][0])
     else:
         scales = [1.0] if fit.temper < 1.0 else [float(s) for s in _error_scales(whole, fit.count)]
         s, sizes = scales[len(scales) // 2], {kind: 0.0 for kind in grids}
@@ -117,13 +116,13 @@ def evidence(model: CampaignModel, fit: Fit, near: Learned | None = None) -> Evi
     own = [grid[k] for grid, k in zip(own_grids, np.unravel_index(own_best, [len(grid) for grid in own_grids]), strict=True)] if own_grids else []
     scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
     learned = Learned(sizes, s, tuple(w for w, _ in own), tuple(d for _, d in own))
-    mean, spread = _posterior(scaled, root(model, fit.mechanisms, learned, fit.moved))
+    mean, spread = _posterior(scaled, whole_root(model, fit.mechanisms, learned, fit.moved))
     at, means, covariances, truncation = p, [], [], 0.0
     tests = len(model.tests)
-    for m, own_root, width_departure in zip(fit.mechanisms, fit.roots, own, strict=True):
+    for m, root, width_departure in zip(fit.mechanisms, fit.roots, own, strict=True):
         part = slice(at, at + tests)
-        means.append(m.size.neutral + own_root @ mean[part])
-        covariances.append(own_root @ spread[part, part] @ own_root.T)
+        means.append(m.size.neutral + root @ mean[part])
+        covariances.append(root @ spread[part, part] @ root.T)
         truncation += _one_sided(model, m, width_departure, means[-1], covariances[-1])
         at += tests + len(m.shape)
     shape = (len(fit.mechanisms), tests)
@@ -225,7 +224,7 @@ def _posterior(q: Quadratic, prior: Root) -> tuple[Array, Array]:
 def left_out(model: CampaignModel, fit: Fit, found: Evidence, groups: Sequence[Sequence[int]]) -> float:
     """Root mean square residual, in standard errors of the data, of groups of tests predicted from all others, with what was learned from all."""
     learned = found.learned
-    prior = root(model, fit.mechanisms, learned, fit.moved)
+    prior = whole_root(model, fit.mechanisms, learned, fit.moved)
     by_test = [quadratic(*b, fit.point) for b in fit.by_test]
     total, count = 0.0, 0
     for group in groups:

@@ -137,7 +137,7 @@ def nuisance_root(model: CampaignModel, sizes: Mapping[str, float], moved: Array
     return Root(np.sqrt(nuisance_variances(model, sizes)), misjudged(model, sizes, moved), np.zeros((0, 0)))
 
 
-def root(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned, moved: Array) -> Root:
+def whole_root(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned, moved: Array) -> Root:
     """Of all parameters at learned sizes, the mechanisms having `moved` the modes; singular where a size is zero."""
     own = mechanism_covariance(model, mechanisms, list(zip(learned.widths, learned.departures, strict=True)))
     return replace(nuisance_root(model, learned.sizes, moved), own=np.linalg.cholesky(own + 1e-14 * np.eye(len(own))))

@@ -51,7 +51,7 @@ def screen(
     """Every one of `mechanisms` beside the model `about`, its errors 1 / `temper` times the data's and sizes of discrepancies as `learned`."""
     about = replace(about, temper=temper)
     sizes = Learned(learned.sizes, learned.errors if temper == 1.0 else 1.0, (), ())
-    nothing = evidence(model, about, sizes).ln
+    nothing = evidence(model, about, [sizes]).ln
     found = in_parallel(partial(_screened, model, about, sizes, nothing), list(mechanisms), workers)
     found = [replace(s, mechanism=m) for s, m in zip(found, mechanisms, strict=True)]
     best = {s.mechanism.name: s for s in sorted(found, key=lambda s: s.gain) if s.visibility > 0 and s.mechanism.shape}
@@ -128,7 +128,7 @@ def _promised(problem: Problem, about: Fit, sizes: Learned, nothing: float, shap
     visibility = _visibility(seen, whole.information[:first, :first], mechanism)
     if visibility == 0.0:
         return Screened(mechanism, -np.inf, p, 0.0)
-    found = max((evidence(model, whole, s) for s in (sizes, *smaller(sizes))), key=lambda e: e.ln)
+    found = evidence(model, whole, [sizes, *smaller(sizes)])
     start = found.mean
     start[problem.length - len(shape) :] = shape
     return Screened(mechanism, found.ln - nothing - float(shape @ shape) / 2, start, visibility)

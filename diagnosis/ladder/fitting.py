@@ -166,9 +166,9 @@ def _at_learned(model: CampaignModel, first: Fit) -> Settled:
     """
     kinds = [kind for kind in GRIDS if any(p.kind == kind for p in model.parameters)]
     tried = [as_stated(dict(zip(kinds, row, strict=True)), first.mechanisms) for row in product(*(GRIDS[kind] for kind in kinds))]
-    learned = max(tried, key=lambda sizes: evidence(model, first, sizes).ln)
+    learned = max(tried, key=lambda sizes: evidence(model, first, [sizes]).ln)
     found = fit(model, first.mechanisms, first.point, tempers=TEMPERS[-2:], learned=learned)
-    return Settled(model, found, evidence(model, found, learned), first, learned)
+    return Settled(model, found, evidence(model, found, [learned]), first, learned)
 
 
 # ---------------------------------------------------------------- what was left out

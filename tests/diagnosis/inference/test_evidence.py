@@ -25,9 +25,9 @@ from thermospindle.diagnosis.forward.nuisance import (
     TEMPERATURE,
     Nuisance,
 )
-from thermospindle.diagnosis.inference.evidence import (Learned, Quadratic, _marginal, evidence, left_out)  # fmt: skip
+from thermospindle.diagnosis.inference.evidence import Learned, Quadratic, _marginal, evidence, left_out  # fmt: skip
 from thermospindle.diagnosis.inference.fit import Fit
-from thermospindle.diagnosis.inference.prior import ACTION, Root, misjudged, nuisance_variances, precision, root
+from thermospindle.diagnosis.inference.prior import ACTION, Root, misjudged, nuisance_variances, precision, whole_root
 from thermospindle.model.machine import Condition
 from thermospindle.sim.effects.effect import Effect, Parameter
 
@@ -104,7 +104,7 @@ def toy(
 @pytest.mark.parametrize("sizes", [(0.0, 0.0, 0.0), (1e-3, 0.03, 1e-3), (1e-2, 0.1, 0.0)])
 def test_one_choice_of_priors_is_the_gaussian_integral(sizes, errors):
     made = toy(1, 1e-3)
-    found = evidence(made.model, made.fit, Learned(dict(zip((STIFFNESS, DAMPING, DRIFT), sizes, strict=True)), errors, (), ()))
+    found = evidence(made.model, made.fit, [Learned(dict(zip((STIFFNESS, DAMPING, DRIFT), sizes, strict=True)), errors, (), ())])
     assert found.ln == pytest.approx(made.ln(made.prior(*sizes), errors), abs=1e-6)
 
 
@@ -171,7 +171,7 @@ def test_a_fit_and_the_evidence_have_one_prior():
     model = SimpleNamespace(parameters=parameters, tests=made.model.tests)
     moved = np.full((len(parameters), 2, 1), 0.1)
     moved[0] = -0.2
-    found = root(model, made.fit.mechanisms, learned, moved)
+    found = whole_root(model, made.fit.mechanisms, learned, moved)
     n = len(found.scale) + len(found.own)
     covariance = found.times(found.turned(np.eye(n)))
     assert np.abs(found.beside).max() > 0.1
