@@ -140,7 +140,7 @@ def nuisance_root(model: CampaignModel, sizes: Mapping[str, float], moved: Array
 def whole_root(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned, moved: Array) -> Root:
     """Of all parameters at learned sizes, the mechanisms having `moved` the modes; singular where a size is zero."""
     own = mechanism_covariance(model, mechanisms, list(zip(learned.widths, learned.departures, strict=True)))
-    return replace(nuisance_root(model, learned.sizes, moved), own=np.linalg.cholesky(own + 1e-14 * np.eye(len(own))))
+    return replace(nuisance_root(model, learned.sizes, moved), own=np.asarray(np.linalg.cholesky(own + 1e-14 * np.eye(len(own))), float))
 
 
 def precision(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned | None, moved: Array = UNMOVED) -> Array:
