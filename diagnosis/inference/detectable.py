@@ -47,7 +47,7 @@ def unseen_beside(found: Search, accepted: Hypothesis) -> tuple[str, ...]:
     alike = {name for m in accepted.mechanisms for name in m.effect.resembles} - set(accepted.names)
     alone = [s.mechanism for s in found.screened if s.mechanism.name in alike and not s.mechanism.free and s.visibility > SHOWS]
     seen: dict[str, float] = {}
-    for s in screen(found.model, accepted.fit, 1.0, accepted.evidence.learned, alone):
+    for s in screen(found.model, accepted.fit, 1.0, accepted.evidence.learned, alone, turned=False):
         seen[s.mechanism.name] = max(s.visibility, seen.get(s.mechanism.name, 0.0))
     return tuple(name for name, standard_errors in seen.items() if standard_errors < HIDES)
 

@@ -17,7 +17,7 @@ from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.linear import Rates
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import FAILED, Applied, CampaignModel
-from thermospindle.diagnosis.inference.prior import UNMOVED, Learned, precision, roots_of
+from thermospindle.diagnosis.inference.prior import UNMOVED, Learned, precision, roots_of, variances
 from thermospindle.model.types import Array, Integers
 
 TEMPERS = (3e-4, 3e-3, 0.03, 0.3, 1.0)
@@ -53,7 +53,7 @@ class Fit:
     count: int
     rates: Rates
     temper: float
-    moved: Array = field(default_factory=lambda: UNMOVED)  # (tests, 2, modes), of frequency and damping of every mode, by the mechanisms and relative
+    moved: Array = field(default_factory=lambda: UNMOVED)  # (mechanisms, tests, 2, modes), of frequency and damping of every mode, relative
     cost: float = np.nan  # chi2, its errors 1 / temper times the data's, and priors: those that it was fitted with
 
     @property
@@ -64,7 +64,7 @@ class Fit:
 class Problem:
     """A campaign and the mechanisms that act in it, as a least-squares problem over p = [x, z_1, u_1, z_2, u_2, ...].
 
-    Priors have their reference widths, or those `learned` where the mechanisms `moved` the modes.
+    Priors have their reference widths, or those `learned`, with what may be misjudged of mechanisms that `moved` the modes.
     """
 
     def __init__(
@@ -72,7 +72,9 @@ class Problem:
     ) -> None:
         self.model, self.mechanisms = model, tuple(mechanisms)
         self.roots = roots_of(model, self.mechanisms)
-        self.precision = precision(model, self.mechanisms, learned, moved) * (1.0 if learned is None else learned.errors**2)
+        scale = 1.0 if learned is None else learned.errors**2
+        self.precision = scale * precision(model, self.mechanisms, learned, moved)
+        self.least_stiff = scale / variances(model, self.mechanisms, learned, moved)  # of each parameter, all others free
         self.tests = len(model.tests)
         self.nuisances = len(model.parameters)
         self.length = self.nuisances + sum(self.tests + len(m.shape) for m in self.mechanisms)
@@ -226,8 +228,8 @@ def fit(
     model: CampaignModel, mechanisms: Sequence[Mechanism] = (), start: Array | Sequence[Array] | None = None, rates: Rates | None = None,
     tempers: Sequence[float] = TEMPERS, learned: Learned | None = None, moved: Array = UNMOVED,
 ) -> Fit:
-    """The fit with the reference widths of all priors, or those `learned` where the mechanisms `moved` the modes; of several starts from the one of least cost. While errors are taken
-    too large, the thinned model serves.
+    """The fit with the reference widths of all priors, or those `learned`, with what may be misjudged of mechanisms that `moved` the modes; of several
+    starts from the one of least cost. While errors are taken too large, the thinned model serves.
 
     Raises what the model raises where even the start cannot be built.
     """
@@ -265,14 +267,15 @@ def _settled(problem: Problem, p: Array, rates: Rates, temper: float) -> tuple[A
     current, damping, growth = True, LEAST_DAMPING, 2.0
     for _ in range(MOST_STEPS[last]):
         gradient, normal = lines.slope(problem, here, temper), temper**2 * lines.information + problem.precision
-        move = problem.within_reach(-_solved(normal + damping * np.diag(np.diag(normal)), gradient))
+        damped = np.diag(temper**2 * np.diag(lines.information) + problem.least_stiff)  # not what is stiff only with all others held
+        move = problem.within_reach(-_solved(normal + damping * damped, gradient))
         promised = -2 * float(gradient @ move) - float(move @ normal @ move)
         if promised < ENOUGH and current:
             break
         there = problem.at(here.p + move, temper)
         corrected = False
         if current and there.residuals is not None and here.cost - there.cost < POOR * promised:
-            stiff = normal + max(damping, RAISED_DAMPING) * np.diag(np.diag(normal))
+            stiff = normal + max(damping, RAISED_DAMPING) * damped
             best = _corrected(problem, lines, stiff, temper, there)
             there, corrected = best, best is not there
         gained = here.cost - there.cost
@@ -338,15 +341,20 @@ def _finished(problem: Problem, p: Array, rates: Rates, temper: float, lines: Li
 
 
 def _moved(problem: Problem, p: Array) -> Array:
-    """Relative changes (tests, 2, modes) that the mechanisms make in the frequency and the damping of the reference modes, to first order."""
-    model, x = problem.model, problem.parts(p)[0]
+    """Relative changes (mechanisms, tests, 2, modes) that each mechanism makes in the frequency and the damping of the reference modes, to first order."""
+    model, (x, sizes, shapes) = problem.model, problem.parts(p)
     omega, damping = model.reference.omega[: model.reference.seen], model.reference.damping[: model.reference.seen]
-    found = np.zeros((problem.tests, 2, len(omega)))
-    for t, effects in enumerate(problem.effects_of(p)):
-        plain, acting = model.linear(t, x, []).matrices, model.linear(t, x, effects).matrices
-        if not effects or acting.dofs != plain.dofs:
-            continue
+    found = np.zeros((len(problem.mechanisms), problem.tests, 2, len(omega)))
+    for t in range(problem.tests):
+        plain = model.linear(t, x, []).matrices
         shape = np.linalg.solve(plain.mass, model.reference.over(plain.dofs)[:, : len(omega)])
-        k, m, c = (np.einsum("ni,nj,ji->i", shape, getattr(acting, w) - getattr(plain, w), shape) for w in ("stiffness", "mass", "damping"))
-        found[t] = (k - omega**2 * m) / (2 * omega**2), c / (2 * damping * omega)
+        for k, (mechanism, (effect, values)) in enumerate(zip(problem.mechanisms, problem.applied(t, sizes, shapes)[0], strict=True)):
+            if values[mechanism.size.name] == mechanism.size.neutral:
+                continue
+            acting = model.linear(t, x, [(effect, values)]).matrices
+            if acting.dofs == plain.dofs:
+                of_k, of_m, of_c = (
+                    np.einsum("ni,nj,ji->i", shape, getattr(acting, w) - getattr(plain, w), shape) for w in ("stiffness", "mass", "damping")
+                )
+                found[k, t] = (of_k - omega**2 * of_m) / (2 * omega**2), of_c / (2 * damping * omega)
     return found

@@ -24,8 +24,8 @@ REFERENCE = {
 }
 """Widths in which nuisances of unknown size are counted."""
 ACTION = 3.0  # times the relative error of frequencies, which what the model says of an effect may be wrong by
-UNMOVED = np.zeros((0, 2, 0))
-"""Of a model without effects, and of fits that are no more than a place to start from."""
+UNMOVED = np.zeros((0, 0, 2, 0))
+"""Of a model without effects, and of fits with errors enlarged, which are a place to start from."""
 NOTHING = 1e-4  # of a reference width: what stands for a size of zero where a prior must be inverted
 
 
@@ -77,17 +77,18 @@ def nuisance_variances(model: CampaignModel, sizes: Mapping[str, float]) -> Arra
 def misjudged(model: CampaignModel, sizes: Mapping[str, float], moved: Array) -> Array:
     """Root (P, k) of the prior covariance that an effect misjudged adds to the drift of modes.
 
-    A model whose frequencies are constantly wrong is wrong, too, in what an effect does: of the relative changes of frequency and of damping that the
-    mechanisms make of a mode, `moved` (tests, 2, modes), a share is wrong, the same in all tests: `ACTION` times the relative error of the frequencies.
+    A model whose frequencies are constantly wrong is wrong, too, in what an effect does: of the relative change of frequency and of damping that each
+    mechanism makes of a mode, `moved` (mechanisms, tests, 2, modes), a share is wrong, the same in all tests: `ACTION` times the relative error of the
+    frequencies.
     """
     share = ACTION * sizes.get(kinds_of.STIFFNESS, 0.0)
-    found = np.zeros((len(model.parameters), 2, moved.shape[2]))
+    found = np.zeros((len(model.parameters), len(moved), *moved.shape[2:]))
     if share and moved.any():
         for i, q in enumerate(model.parameters):
             if q.kind in DRIFTING:
                 which, mode = DRIFTING.index(q.kind), q.modes[0]
-                found[i, which, mode] = share * moved[q.test, which, mode] / REFERENCE[q.kind]
-    columns = found.reshape(len(found), 2 * moved.shape[2])
+                found[i, :, which, mode] = share * moved[:, q.test, which, mode] / REFERENCE[q.kind]
+    columns = found.reshape(len(found), int(np.prod(found.shape[1:])))
     return columns[:, columns.any(axis=0)]
 
 
@@ -152,7 +153,16 @@ def precision(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Le
     found = np.zeros((n + len(own), n + len(own)))
     alone = 1 / np.maximum(nuisance_variances(model, learned.sizes), NOTHING**2)
     beside = alone[:, None] * misjudged(model, learned.sizes, moved)
-    inner = np.eye(beside.shape[1]) + beside.T @ (beside / alone[:, None])  # Woodbury's identity
+    inner = np.eye(beside.shape[1]) + beside.T @ (beside / alone[:, None])  # Woodbury's identity (Golub & Van Loan, 2.1.4)
     found[:n, :n] = np.diag(alone) - beside @ np.linalg.solve(inner, beside.T)
     found[n:, n:] = np.linalg.inv(own + NOTHING**2 * np.eye(len(own)))
     return found
+
+
+def variances(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned | None, moved: Array = UNMOVED) -> Array:
+    """The diagonal (n,) of the covariance of which `precision` is the inverse."""
+    if learned is None:
+        return np.ones(len(model.parameters) + sum(len(model.tests) + len(m.shape) for m in mechanisms))
+    own = mechanism_covariance(model, mechanisms, list(zip(learned.widths, learned.departures, strict=True)))
+    alone = np.maximum(nuisance_variances(model, learned.sizes), NOTHING**2)
+    return np.concatenate([alone + np.sum(misjudged(model, learned.sizes, moved) ** 2, axis=1), np.diag(own) + NOTHING**2])

@@ -81,7 +81,7 @@ def light_resonance(model: CampaignModel, about: Fit, learned: Learned) -> tuple
     lines = [d.frequency for d in model.tests if isinstance(d, LineData)]
     if not lines:
         return None
-    problem = Problem(model, about.mechanisms, learned)
+    problem = Problem(model, about.mechanisms, learned, about.moved)
     at, whole = fitted(model, about), problem.precision.copy()
     x, effects = problem.parts(about.point)[0], problem.effects_of(about.point)
     gradient = whole @ about.point

@@ -46,17 +46,18 @@ class Fitted:
 
 
 def screen(
-    model: CampaignModel, about: Fit, temper: float, learned: Learned, mechanisms: Sequence[Mechanism], workers: int | None = None
+    model: CampaignModel, about: Fit, temper: float, learned: Learned, mechanisms: Sequence[Mechanism], workers: int | None = None, turned: bool = True
 ) -> list[Screened]:
-    """Every one of `mechanisms` beside the model `about`, its errors 1 / `temper` times the data's and sizes of discrepancies as `learned`."""
+    """Every one of `mechanisms` beside the model `about`, its errors 1 / `temper` times the data's and sizes of discrepancies as `learned`, or smaller;
+    and the best of each name once more with its shape `turned`."""
     about = replace(about, temper=temper)
     sizes = Learned(learned.sizes, learned.errors if temper == 1.0 else 1.0, (), ())
-    nothing = evidence(model, about, [sizes]).ln
+    nothing = evidence(model, about, [sizes, *smaller(sizes)]).ln
     found = in_parallel(partial(_screened, model, about, sizes, nothing), list(mechanisms), workers)
     found = [replace(s, mechanism=m) for s, m in zip(found, mechanisms, strict=True)]
-    best = {s.mechanism.name: s for s in sorted(found, key=lambda s: s.gain) if s.visibility > 0 and s.mechanism.shape}
-    turned = in_parallel(partial(_turned, model, about, sizes, nothing), list(best.values()), workers)
-    return found + [replace(s, mechanism=best[s.mechanism.name].mechanism) for s in turned]
+    best = {s.mechanism.name: s for s in sorted(found, key=lambda s: s.gain) if turned and s.visibility > 0 and s.mechanism.shape}
+    others = in_parallel(partial(_turned, model, about, sizes, nothing), list(best.values()), workers)
+    return found + [replace(s, mechanism=best[s.mechanism.name].mechanism) for s in others]
 
 
 def fitted(model: CampaignModel, about: Fit) -> list[Fitted]:
@@ -80,8 +81,7 @@ def _screened(model: CampaignModel, about: Fit, sizes: Learned, nothing: float, 
 
 
 def _turned(model: CampaignModel, about: Fit, sizes: Learned, nothing: float, drawn: Screened) -> Screened:
-    """The best that a mechanism promises with its shape parameters moved in turn: a disk that would do nothing where it is drawn may do everything a
-    little lower."""
+    """The best that a mechanism promises with its shape parameters moved in turn: what a disk on the hub would not do, one within the hub may."""
     mechanism = drawn.mechanism
     problem, shape, best = Problem(model, [*about.mechanisms, mechanism]), np.zeros(len(mechanism.shape)), drawn
     for k, q in enumerate(mechanism.shape):

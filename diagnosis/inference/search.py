@@ -141,9 +141,9 @@ def _singles(
     progress("effects screened")
     chosen = _chosen(rankings, strained)
     # tolerances strained to stand in for an effect must give way with it; while errors are enlarged they are not strained yet
-    tasks = [_task((), about, s, -np.inf if strained else none.evidence.ln + s.gain, far=not strained) for s in chosen]
+    tasks = [_task((), about, s, -np.inf if strained else none.evidence.ln + s.gain - OCCAM, far=not strained) for s in chosen]
     most = fit(model, (), (none.evidence.mean, none.fit.point), none.fit.rates, TEMPERS[-1:], learned=expected).cost
-    first = {max((s for s in looked if s.mechanism.free == free), key=lambda s: s.gain).mechanism.name for looked in rankings for free in (False, True)}
+    first = {next((s.mechanism.name for s in sorted(looked, key=lambda s: -s.gain) if s.mechanism.free == free), "") for looked in rankings for free in (False, True)}
     singles = _fitted_all(model, tasks, first, strained, about, most, expected, workers)
     progress("effects fitted")
     return Singles(singles, tuple(looked), most, expected)
@@ -168,7 +168,7 @@ def _with_resonance(model: CampaignModel, h: Hypothesis) -> tuple[CampaignModel,
         for _ in range(CENTRED):  # so that all explanations start about it as it is
             resonance = resonance.at(sd * best.point[n : n + len(own)])
             wider, there = model.with_resonance(resonance), np.concatenate([best.point[:n], own, best.point[n + len(own) :]])
-            again = fit(wider, h.mechanisms, there, best.rates, TEMPERS[-1:], learned)
+            again = fit(wider, h.mechanisms, there, best.rates, TEMPERS[-1:], learned, best.moved)
             found = settled(wider, Hypothesis(again, evidence(wider, again)))
             best, learned = found.fit, found.evidence.learned
     except FAILED:

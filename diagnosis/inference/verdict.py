@@ -43,13 +43,15 @@ Names = tuple[str, ...]
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """An explanation of the catalogue, or a free form: ln evidence over the model without effects and posterior probability."""
+    """An explanation of the catalogue, or a free form: ln evidence over the model without effects and posterior probability. `own_laws` is the free
+    explanation that changes the same, where the effects are likelier with laws of their own than with those assumed."""
 
     hypothesis: Hypothesis
     names: Names
     free: bool
     delta_evidence: float
     probability: float
+    own_laws: Hypothesis | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,11 +80,13 @@ def decide(found: Search) -> Verdict:
     same = overlap(found.model, found.hypotheses[0].fit)
     worth = same.inflation * coarsening(found.hypotheses[0])
     rows = [(h, _prior(h, named_count, free_count) + (_weighed(h, found.hypotheses) - base) / worth) for h in found.hypotheses]
-    rows = [(h, _with_own_law(h, w, rows, found.alike, named_count, free_count)) for h, w in rows]
+    own_laws = [_own_laws(h, rows, found.alike, named_count, free_count) for h, _ in rows]
+    freed = {id(h): own for (h, w), (own, of_own) in zip(rows, own_laws, strict=True) if of_own > w}
+    rows = [(h, float(np.logaddexp(w, of_own))) for (h, w), (_, of_own) in zip(rows, own_laws, strict=True)]
     top = max(w for _, w in rows)
     total = np.log(sum(np.exp(w - top) for _, w in rows)) + top
     every = [
-        Candidate(h, tuple(h.names), h.free, h.evidence.ln - base, float(np.exp(w - total))) for h, w in rows if h.mechanisms
+        Candidate(h, tuple(h.names), h.free, h.evidence.ln - base, float(np.exp(w - total)), freed.get(id(h))) for h, w in rows if h.mechanisms
     ]
     every.sort(key=lambda c: (-c.probability, -c.delta_evidence))
     candidates = tuple(c for c in every if not c.free)
@@ -145,19 +149,21 @@ def _weighed(h: Hypothesis, every: Sequence[Hypothesis]) -> float:
     return lead.evidence.ln + (h.evidence.ln - lead.evidence.ln) / COARSE
 
 
-def _with_own_law(
-    h: Hypothesis, weight: float, rows: Sequence[tuple[Hypothesis, float]], alike: Mapping[str, frozenset[str]], named: int, free: int
-) -> float:
-    """ln weight of effects whatever their laws: with those assumed and, less probable by `OWN_LAW` each, with laws of their own, which are the free forms
-    that change the same. Where free forms gain much more than the effects do, the effects are not the cause."""
-    if h.free or not h.mechanisms:
-        return weight
+def _own_laws(
+    h: Hypothesis, rows: Sequence[tuple[Hypothesis, float]], alike: Mapping[str, frozenset[str]], named: int, free: int
+) -> tuple[Hypothesis | None, float]:
+    """Effects with laws of their own: the likeliest explanation whose free forms change the same as they do, and its ln weight, less probable by
+    `OWN_LAW` for each. None where that gains so much more than the effects do that they are not the cause, or where they would need a size that they
+    cannot have."""
     base = next(o.evidence.ln for o, _ in rows if not o.mechanisms)
+    found: tuple[Hypothesis | None, float] = (None, -np.inf)
+    if h.free or not h.mechanisms or beyond_limits(h):
+        return found
     for o, of_free in rows:
         if o.free and h.evidence.ln - base > MOSTLY * (o.evidence.ln - base) and _same_changes(h.names, o, alike):
-            own = sum(m.free for m in o.mechanisms) * np.log(OWN_LAW)
-            weight = float(np.logaddexp(weight, own + _prior(h, named, free) + of_free - _prior(o, named, free)))
-    return weight
+            odds = sum(m.free for m in o.mechanisms) * np.log(OWN_LAW)
+            found = max(found, (o, float(odds + _prior(h, named, free) + of_free - _prior(o, named, free))), key=lambda row: row[1])
+    return found
 
 
 def _same_changes(names: Names, o: Hypothesis, alike: Mapping[str, frozenset[str]]) -> bool:
@@ -336,4 +342,6 @@ def _reason(found: Search, word: str, effects: Names, candidates, free, none: fl
     word_of = "is the explanation" if len(effects) == 1 else "are both needed" if len(effects) == 2 else "are all needed"
     drifting = [m.name for m in chosen.hypothesis.mechanisms if m.free]
     beside = f"; beside {'it' if len(effects) == 1 else 'them'} {' and '.join(drifting)} drifts a little" if drifting else ""
-    return f"{named} {word_of}: {chosen.delta_evidence:.0f} in ln evidence over the model without effects, {odds}{beside}{instead}{checked}{disagreement}."
+    own = chosen.own_laws
+    law = f", and {own.evidence.ln - found.base.evidence.ln:.0f} with a law of the data's own ({' and '.join(own.names)} drift)" if own else ""
+    return f"{named} {word_of}: {chosen.delta_evidence:.0f} in ln evidence over the model without effects{law}, {odds}{beside}{instead}{checked}{disagreement}."

@@ -73,7 +73,7 @@ class Settled:
 
     @cached_property
     def _precision(self) -> Array:
-        return precision(self.model, self.mechanisms, self.learned)
+        return precision(self.model, self.mechanisms, self.learned, self.fit.moved)
 
     @cached_property
     def posterior(self) -> tuple[Array, Array]:
@@ -166,8 +166,8 @@ def _at_learned(model: CampaignModel, first: Fit) -> Settled:
     """
     kinds = [kind for kind in GRIDS if any(p.kind == kind for p in model.parameters)]
     tried = [as_stated(dict(zip(kinds, row, strict=True)), first.mechanisms) for row in product(*(GRIDS[kind] for kind in kinds))]
-    learned = max(tried, key=lambda sizes: evidence(model, first, [sizes]).ln)
-    found = fit(model, first.mechanisms, first.point, tempers=TEMPERS[-2:], learned=learned)
+    learned = as_stated(evidence(model, first, tried).learned.sizes, first.mechanisms)
+    found = fit(model, first.mechanisms, first.point, tempers=TEMPERS[-2:], learned=learned, moved=first.moved)
     return Settled(model, found, evidence(model, found, [learned]), first, learned)
 
 

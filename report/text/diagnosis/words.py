@@ -60,7 +60,7 @@ def law_words(d: Diagnosis) -> list[str]:
     v, found = d.verdict, []
     lead = next((c for c in v.candidates if c.hypothesis is v.accepted), None)
     for m, departure in zip(lead.hypothesis.mechanisms, v.accepted.evidence.learned.departures, strict=True) if lead else ():
-        if departure >= DEPARTS:
+        if departure >= DEPARTS or (lead and lead.own_laws and m.name not in lead.own_laws.names):
             same = [p for p in d.drifts if p.pattern and lead and p.gain > ALIKE * lead.delta_evidence]
             instead = f"; {_drift_words(same[0])}, does as well without any law" if same else ""
             found.append(f"The data do not have the law that {m.name} assumes{instead}.")

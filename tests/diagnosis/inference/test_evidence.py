@@ -27,7 +27,7 @@ from thermospindle.diagnosis.forward.nuisance import (
 )
 from thermospindle.diagnosis.inference.evidence import Learned, Quadratic, _marginal, evidence, left_out  # fmt: skip
 from thermospindle.diagnosis.inference.fit import Fit
-from thermospindle.diagnosis.inference.prior import ACTION, Root, misjudged, nuisance_variances, precision, whole_root
+from thermospindle.diagnosis.inference.prior import ACTION, Root, misjudged, nuisance_variances, precision, variances, whole_root
 from thermospindle.model.machine import Condition
 from thermospindle.sim.effects.effect import Effect, Parameter
 
@@ -124,7 +124,7 @@ def test_mean_and_covariance_are_the_posterior():
     assert np.all(np.abs(found.sizes[0] - 1.6) < 5 * np.sqrt(np.diag(found.size_covariance[0])))
 
 
-@pytest.mark.parametrize("size", [0.0, 1e-4, 1e-3, 1e-2])
+@pytest.mark.parametrize("size", [0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2])
 def test_the_size_of_the_discrepancy_is_learned(size):
     """Of twenty campaigns at least eighteen learn the size that they were drawn with; drift and damping, of which there is none, none."""
     right = [evidence(made.model, made.fit).learned for made in (toy(seed, size) for seed in range(20))]
@@ -139,15 +139,18 @@ def test_a_model_that_is_wrong_may_be_wrong_in_what_an_effect_does():
         for kind, sd in ((STIFFNESS_DRIFT, STIFFNESS_DRIFT_SD), (DAMPING_DRIFT, DAMPING_DRIFT_SD)) for t in (0, 1) for i in (0, 1)
     ]  # fmt: skip
     model = SimpleNamespace(parameters=parameters)
-    moved = np.zeros((2, 2, 2))
-    moved[1, 0, 1], moved[1, 1, 0] = 0.02, -0.3  # frequency of the second mode and damping of the first, in the second test
+    moved = np.zeros((1, 2, 2, 2))
+    moved[0, 0, 0, 1], moved[0, 1, 0, 1], moved[0, 1, 1, 0] = 0.01, 0.02, -0.3  # frequency of the second mode in both tests, damping of the first in one
     right = {STIFFNESS: 0.0, STIFFNESS_DRIFT: 0.0, DAMPING_DRIFT: DAMPING_DRIFT_SD}
     assert nuisance_variances(model, right).tolist() == [1, 0, 0, 0, 0, 1, 1, 1, 1]
     assert misjudged(model, right, moved).shape == (9, 0)
     found = misjudged(model, right | {STIFFNESS: 0.01}, moved)
-    assert found[4] == pytest.approx([ACTION * 0.01 * 0.02 / STIFFNESS_DRIFT_SD, 0])
+    one_number = ACTION * 0.01 / STIFFNESS_DRIFT_SD * np.array([0.01, 0.02])
+    assert found[[2, 4], 0] == pytest.approx(one_number)  # of one mode in all tests
     assert found[7] == pytest.approx([0, -ACTION * 0.01 * 0.3 / DAMPING_DRIFT_SD])
-    assert np.count_nonzero(found) == 2
+    assert np.count_nonzero(found) == 3
+    opposed = misjudged(model, right | {STIFFNESS: 0.01}, np.concatenate([moved, -moved]))
+    assert opposed @ opposed.T == pytest.approx(2 * found @ found.T)  # two mechanisms may be misjudged though together they move nothing
 
 
 def test_what_is_wrong_in_an_effect_is_alike_in_all_tests():
@@ -163,16 +166,21 @@ def test_what_is_wrong_in_an_effect_is_alike_in_all_tests():
 
 def test_a_fit_and_the_evidence_have_one_prior():
     """The precision of a fit is the inverse of the covariance whose root the evidence has, what is misjudged included."""
-    made = toy(3, 1e-3)
+    made = toy(3, 1e-3, hidden=1.6)
     learned = evidence(made.model, made.fit).learned
-    sizes = dict.fromkeys(learned.sizes, 1e-3)
-    learned = replace(learned, sizes=sizes, departures=(0.3,) * len(learned.departures))
-    parameters = tuple(Nuisance(STIFFNESS_DRIFT, "drift", STIFFNESS_DRIFT_SD, test=t, modes=(0, 0)) for t in range(len(made.model.tests)))
+    sizes = dict.fromkeys((*learned.sizes, STIFFNESS_DRIFT, DAMPING_DRIFT), 1e-3)
+    learned = replace(learned, sizes=sizes, departures=(0.3,))
+    tests = range(len(made.model.tests))
+    parameters = tuple(
+        Nuisance(kind, "drift", sd, test=t, modes=(i, i))
+        for kind, sd in ((STIFFNESS_DRIFT, STIFFNESS_DRIFT_SD), (DAMPING_DRIFT, DAMPING_DRIFT_SD)) for t in tests for i in (0, 1)
+    )  # fmt: skip
     model = SimpleNamespace(parameters=parameters, tests=made.model.tests)
-    moved = np.full((len(parameters), 2, 1), 0.1)
-    moved[0] = -0.2
+    moved = np.random.default_rng(8).normal(0, 0.2, (1, len(tests), 2, 2))
     found = whole_root(model, made.fit.mechanisms, learned, moved)
     n = len(found.scale) + len(found.own)
+    assert (found.beside.shape[1], len(found.own)) == (4, len(tests) + len(made.fit.mechanisms[0].shape))
+    assert variances(model, made.fit.mechanisms, learned, moved) == pytest.approx(np.diag(found.times(found.turned(np.eye(n)))), abs=1e-7)
     covariance = found.times(found.turned(np.eye(n)))
     assert np.abs(found.beside).max() > 0.1
     assert precision(model, made.fit.mechanisms, learned, moved) @ covariance == pytest.approx(np.eye(n), abs=1e-5)

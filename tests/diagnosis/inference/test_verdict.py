@@ -190,7 +190,18 @@ def test_a_free_form_of_an_effects_own_change_is_that_effect_with_a_law_of_its_o
     gains, own, word, effects = OWN_LAWS[case]
     v = decide(replace(made(gains), alike={"~x": frozenset(own)}))
     assert (v.word, set(v.effects)) == (word, effects)
+    assert (v.candidates[0].own_laws is not None) == (word in ("identified", "ambiguous"))
+    assert ("law of the data's own (~x drift)" in v.reason) == (word == "identified")
     assert total(v) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_a_size_that_cannot_be_is_no_law_of_its_own():
+    found = replace(made({"a": 60.0, "~x": 66.0}), alike={"~x": frozenset({"a"})})
+    negative = tuple(
+        replace(h, evidence=replace(h.evidence, sizes=np.array([[3.0, -10.0]]), size_covariance=1e-4 * np.eye(2)[None])) if h.names == ("a",) else h
+        for h in found.hypotheses
+    )
+    assert decide(replace(found, hypotheses=negative)).word == "unexplained"
 
 
 def test_odds_of_a_law_of_its_own():
