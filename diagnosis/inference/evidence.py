@@ -81,9 +81,9 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = ()) -> Ev
     p = len(fit.nuisance)
     kinds = {q.kind for q in model.parameters}
     grids = {kind: grid for kind, grid in GRIDS.items() if kind in kinds}
-    own_grids = [_own_grid(m.free) for m in fit.mechanisms]  # (width, departure) of every mechanism
+    own_grids = [_own_grid(m.free, m.effect.lasting) for m in fit.mechanisms]  # (width, departure) of every mechanism
     conditions = tuple(d.condition for d in model.tests)
-    roots = [_roots(conditions, m.free, len(m.shape)) for m in fit.mechanisms]
+    roots = [_roots(conditions, grid, len(m.shape)) for m, grid in zip(fit.mechanisms, own_grids, strict=True)]
 
     def rated(s: float, sizes: Mapping[str, float]) -> tuple[float, int]:
         """ln evidence, the mean over widths and departures of all mechanisms; and which of these is best."""
@@ -158,17 +158,17 @@ def _error_scales(whole: Quadratic, count: int) -> Array:
 
 
 @cache
-def _own_grid(free: bool) -> tuple[tuple[float, float], ...]:
+def _own_grid(free: bool, lasting: bool) -> tuple[tuple[float, float], ...]:
     """(width, departure) that one mechanism may have."""
-    return tuple(product(FREE_WIDTHS if free else WIDTHS, DEPARTURES))
+    return tuple(product(FREE_WIDTHS if free else WIDTHS, DEPARTURES[:1] if lasting else DEPARTURES))
 
 
 @lru_cache(maxsize=64)
-def _roots(conditions: tuple[Condition, ...], free: bool, shapes: int) -> Array:
+def _roots(conditions: tuple[Condition, ...], grid: tuple[tuple[float, float], ...], shapes: int) -> Array:
     """Roots (g, m, m) of the prior covariance of one mechanism's [z, u] at every (width, departure) of its grid."""
     m = len(conditions) + shapes
-    found = np.tile(np.eye(m), (len(_own_grid(free)), 1, 1))
-    found[:, : len(conditions), : len(conditions)] = [whitened_covariance(conditions, *own) for own in _own_grid(free)]
+    found = np.tile(np.eye(m), (len(grid), 1, 1))
+    found[:, : len(conditions), : len(conditions)] = [whitened_covariance(conditions, *own) for own in grid]
     return np.asarray(np.linalg.cholesky(found + 1e-12 * np.eye(m)), float)
 
 

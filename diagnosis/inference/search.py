@@ -178,11 +178,11 @@ def _with_resonance(model: CampaignModel, h: Hypothesis) -> tuple[CampaignModel,
 
 
 def _alike(model: CampaignModel, x: Array, hypotheses: Sequence[Hypothesis]) -> dict[str, frozenset[str]]:
-    """Of every free form in a hypothesis the effects in others that change the same, with the shapes that they were fitted."""
+    """Of every free form in a hypothesis the effects in others that change the same, with the shapes that they were fitted, and could by another law."""
     fitted = [(m, shape) for h in reversed(hypotheses) for m, shape in zip(h.mechanisms, h.fit.shapes, strict=True)]  # the best one's last
     every = {m.name: (m, shape) for m, shape in fitted}
     free, named = ([row for row in every.values() if row[0].free == kind] for kind in (True, False))
-    return {f.name: frozenset(m.name for m, shape in named if alike(model, x, f, m, shape)) for f, _ in free}
+    return {f.name: frozenset(m.name for m, shape in named if not m.effect.lasting and alike(model, x, f, m, shape)) for f, _ in free}
 
 
 @dataclass(frozen=True, eq=False)

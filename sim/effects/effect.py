@@ -184,6 +184,7 @@ class Effect:
     idle: Question | None = None
     outside: Question | None = None
     sized: Sizes | None = None
+    lasting: bool = False  # its size is the same in every test, as a mass is: no law that data may depart from
 
     def neutral(self) -> dict[str, float]:
         return {p.name: p.neutral for p in self.parameters}

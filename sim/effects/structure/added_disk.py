@@ -89,4 +89,5 @@ EFFECT = Effect(
     spindle=spindle,
     sized=sized,
     acts_on=(TURNING,),
+    lasting=True,
 )

@@ -42,4 +42,5 @@ EFFECT = Effect(
     spindle=spindle,
     acts_on=(SHAFT,),
     idle=idle,
+    lasting=True,
 )

@@ -101,4 +101,5 @@ EFFECT = Effect(
     ),
     spindle=spindle,
     sized=sized,
+    lasting=True,
 )
