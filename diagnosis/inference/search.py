@@ -15,6 +15,7 @@ from itertools import chain, zip_longest
 
 import numpy as np
 
+from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.evidence import Evidence, evidence
@@ -41,7 +42,9 @@ FINALISTS = {1: 3, 2: 2, 3: 1}  # explanations of one, two and three mechanisms 
 NEAR = 100.0  # ln evidence behind the best, so far
 REFITS = 2  # at most
 RESONANCES, CLEARED = 2, 0.1  # light resonances at most, and the share of what was left that one may leave
+RESONANT = 0.2  # damping ratio up to which it is a resonance
 CENTRED = 2  # times that a light resonance's parameters are counted anew from where they were fitted
+HIDING = 1e-3  # relative error of frequencies, from which constant discrepancies may hide an effect that is the same in every test
 LITTLE = 2.0  # ln evidence that a screened mechanism must promise
 
 
@@ -86,17 +89,21 @@ def search(
     model: CampaignModel, named: Sequence[Mechanism], free: Sequence[Mechanism], progress: Callable[[str], None] = lambda done: None,
     workers: int | None = None,
 ) -> Search:
-    """The evidence of every explanation. A light resonance becomes part of the model where it clears nearly all that is left without effects, or beside
-    the best single one."""
+    """The evidence of every explanation. A light resonance becomes part of the model where the data show it without effects, or beside the best single
+    one."""
     none = _without_effects(model)
     wider = _with_resonance(model, none)
     model, none = wider or (model, none)
     progress("fitted without effects")
     tried = _singles(model, none, named, free, progress, workers)
-    wider = _with_resonance(model, max(tried.singles, key=lambda h: h.evidence.ln, default=none))
+    best = max(tried.singles, key=lambda h: h.evidence.ln, default=none)
+    wider = _with_resonance(model, best) if best.mechanisms else None
     if wider is not None:
-        model, none = wider[0], _without_effects(wider[0])
-        tried = _singles(model, none, named, free, lambda done: None, workers)  # steps that were counted already
+        first, model, none = model, wider[0], _without_effects(wider[0])
+        if best.evidence.learned.errors > STRAIN:  # nothing was explained without it
+            tried = _singles(model, none, named, free, lambda done: None, workers)  # steps that were counted already
+        else:
+            tried = _carried_over(model, none, tried, len(first.parameters), workers)
     singles = tried.singles
     pairs = _joined(model, none, singles, [*named, *free], tried.most, tried.expected, workers)
     progress("pairs fitted")
@@ -142,17 +149,61 @@ def _singles(
     chosen = _chosen(rankings, strained)
     # tolerances strained to stand in for an effect must give way with it; while errors are enlarged they are not strained yet
     tasks = [_task((), about, s, -np.inf if strained else none.evidence.ln + s.gain - OCCAM, far=not strained) for s in chosen]
-    most = fit(model, (), (none.evidence.mean, none.fit.point), none.fit.rates, TEMPERS[-1:], learned=expected).cost
+    most = _cost(model, none, expected)
     first = {next((s.mechanism.name for s in sorted(looked, key=lambda s: -s.gain) if s.mechanism.free == free), "") for looked in rankings for free in (False, True)}
     singles = _fitted_all(model, tasks, first, strained, about, most, expected, workers)
+    if not strained:
+        singles = _better([*singles, *_lasting(model, none, named, most, expected, workers)])
     progress("effects fitted")
     return Singles(singles, tuple(looked), most, expected)
 
 
+def _cost(model: CampaignModel, none: Hypothesis, expected: Learned) -> float:
+    """The cost without effects of priors as `expected`, which no mechanism should exceed."""
+    return fit(model, (), (none.evidence.mean, none.fit.point), none.fit.rates, TEMPERS[-1:], learned=expected).cost
+
+
+def _carried_over(model: CampaignModel, none: Hypothesis, tried: Singles, before: int, workers: int | None) -> Singles:
+    """Single mechanisms fitted on in a model with a light resonance more; `before` is the number of parameters that the model had."""
+    expected, own = steady(none.evidence.learned), np.zeros(len(model.parameters) - before)
+    starts = [np.concatenate([h.fit.point[:before], own, h.fit.point[before:]]) for h in tried.singles]
+    tasks = [Task(h.mechanisms, (at,), -np.inf) for h, at in zip(tried.singles, starts, strict=True)]
+    most = _cost(model, none, expected)
+    return Singles(_fits(model, tasks, TEMPERS[-1:], none.fit, most, expected, workers), tried.screened, most, expected)
+
+
+def _lasting(
+    model: CampaignModel, lead: Hypothesis, mechanisms: Sequence[Mechanism], most: float, expected: Learned, workers
+) -> list[Hypothesis]:
+    """Effects that are the same in every test beside an explanation, from a scan of sizes with all else as drawn: constant discrepancies of the model
+    stand in for them, and beside those screening sees nothing. Followed to the end is what gains something while errors are still enlarged."""
+    if lead.evidence.learned.sizes.get(kinds_of.STIFFNESS, 0.0) < HIDING:
+        return []
+    n = len(model.parameters)
+    own = np.concatenate([np.zeros(n), lead.fit.point[n:]])
+    drawn = {m.name: m for m in reversed(mechanisms) if m.effect.lasting and m.name not in lead.names}
+    tasks = [
+        Task((*lead.mechanisms, m), tuple(np.concatenate([own, at[n:]]) for at in scan(model, (m,))[1:]), -np.inf) for m in drawn.values()
+    ]
+    if not tasks:
+        return []
+    about = fit(model, lead.mechanisms, (own, lead.fit.point), tempers=TEMPERS[:-1], learned=steady(expected, lead.mechanisms))
+    least = evidence(model, about).ln + LITTLE
+    gaining = [h for h in _fits(model, tasks, TEMPERS[:-1], about, most, expected, workers) if h.evidence.ln > least]
+    tasks = [Task(h.mechanisms, (h.fit.point,), -np.inf) for h in gaining]
+    return _fits(model, tasks, TEMPERS[-1:], lead.fit, most, expected, workers)
+
+
+def _better(found: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Of those with the same mechanisms the one with more evidence."""
+    return list({frozenset(h.names): h for h in sorted(found, key=lambda h: h.evidence.ln)}.values())
+
+
 def _with_resonance(model: CampaignModel, h: Hypothesis) -> tuple[CampaignModel, Hypothesis] | None:
     """The model with the light resonance that an explanation leaves unexplained in every test, and the explanation fitted in it; None where it
-    leaves none, or it clears too little."""
-    if h.evidence.learned.errors <= STRAIN or len(model.resonances) == RESONANCES or overlap(model, h.fit).tests < LOOKED:
+    leaves none, or it clears too little. Where discrepancies stand in for it, no misfit is left, and its evidence alone tells."""
+    hidden = h.evidence.learned.errors <= STRAIN
+    if len(model.resonances) == RESONANCES or (not hidden and overlap(model, h.fit).tests < LOOKED):
         return None
     seen = light_resonance(model.thinned, h.fit, h.evidence.learned)
     if seen is None or seen[1] < PLENTY:
@@ -165,6 +216,8 @@ def _with_resonance(model: CampaignModel, h: Hypothesis) -> tuple[CampaignModel,
         tried = [fit(wider, h.mechanisms, at, tempers=tempers) for at, tempers in ((fitted, TEMPERS[EARLY:]), (afresh, TEMPERS))]
         best = min(tried, key=lambda f: f.cost)
         sd, learned = np.array([q.sd for q in resonance.nuisances]), None
+        if evidence(wider, best).ln < h.evidence.ln or resonance.at(sd * best.point[n : n + len(own)]).damping > RESONANT:
+            return None  # smooth over the band, it would stand in for something else
         for _ in range(CENTRED):  # so that all explanations start about it as it is
             resonance = resonance.at(sd * best.point[n : n + len(own)])
             wider, there = model.with_resonance(resonance), np.concatenate([best.point[:n], own, best.point[n + len(own) :]])
@@ -173,7 +226,7 @@ def _with_resonance(model: CampaignModel, h: Hypothesis) -> tuple[CampaignModel,
             best, learned = found.fit, found.evidence.learned
     except FAILED:
         return None
-    asked = found.evidence.ln > h.evidence.ln + PLENTY and found.excess < CLEARED * h.excess
+    asked = found.evidence.ln > h.evidence.ln + PLENTY and (hidden or found.excess < CLEARED * h.excess)
     return (wider, found) if asked else None
 
 
@@ -312,6 +365,8 @@ def _joined(
     if leads and (leads[0] is not gains[0] or leads[0].evidence.learned.errors > 1.0):
         leads += [h for h in gains if h.free][:1]  # two things that drift: where one of the catalogue does not do
     pairs = _beside(model, leads, mechanisms, most, expected, workers)
+    if leads and not leads[0].free:
+        pairs = _better([*pairs, *_lasting(model, leads[0], [m for m in mechanisms if not m.free], most, expected, workers)])
     best = max([*singles, *pairs], key=lambda h: h.evidence.ln, default=none)
     if len(best.mechanisms) < 2:
         return pairs

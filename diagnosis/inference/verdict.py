@@ -143,10 +143,12 @@ def _weighed(h: Hypothesis, every: Sequence[Hypothesis]) -> float:
     """ln evidence, of which what one mechanism more gains counts a `COARSE`-th where the best explanation without it departs from its law: what is wrong
     in a law looks like a little of something else, and an effect whose law is not quite its own is not quite its own in what it does either."""
     parts = [o for o in every if o.mechanisms and set(o.names) < set(h.names)]
-    lead = max(parts, key=lambda o: o.evidence.ln, default=h)
-    if max(lead.evidence.learned.departures, default=0.0) < DEPARTS or h.evidence.ln < lead.evidence.ln:
+    if not parts:
         return h.evidence.ln
-    return lead.evidence.ln + (h.evidence.ln - lead.evidence.ln) / COARSE
+    lead = max(parts, key=lambda o: o.evidence.ln)
+    gain = h.evidence.ln - lead.evidence.ln
+    departs = gain > 0 and max(lead.evidence.learned.departures, default=0.0) >= DEPARTS
+    return _weighed(lead, every) + (gain / COARSE if departs else gain)
 
 
 def _own_laws(
