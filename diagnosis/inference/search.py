@@ -42,9 +42,12 @@ FINALISTS = {1: 3, 2: 2, 3: 1}  # explanations of one, two and three mechanisms 
 NEAR = 100.0  # ln evidence behind the best, so far
 REFITS = 2  # at most
 RESONANCES, CLEARED = 2, 0.1  # light resonances at most, and the share of what was left that one may leave
+CHANCE = 3.0  # standard deviations of chi2 by chance, of which nothing is said to be left
+SLIGHT = 0.5  # squares of the errors, of which it cannot be told whether they are alike in all tests
 RESONANT = 0.2  # damping ratio up to which it is a resonance
 CENTRED = 2  # times that a light resonance's parameters are counted anew from where they were fitted
 HIDING = 1e-3  # relative error of frequencies, from which constant discrepancies may hide an effect that is the same in every test
+STRAINED = 4.0  # standard deviations of a build tolerance, from which likewise
 LITTLE = 2.0  # ln evidence that a screened mechanism must promise
 
 
@@ -176,10 +179,12 @@ def _lasting(
     model: CampaignModel, lead: Hypothesis, mechanisms: Sequence[Mechanism], most: float, expected: Learned, workers
 ) -> list[Hypothesis]:
     """Effects that are the same in every test beside an explanation, from a scan of sizes with all else as drawn: constant discrepancies of the model
-    stand in for them, and beside those screening sees nothing. Followed to the end is what gains something while errors are still enlarged."""
-    if lead.evidence.learned.sizes.get(kinds_of.STIFFNESS, 0.0) < HIDING:
-        return []
+    or strained tolerances stand in for them, and beside those screening sees nothing. Followed to the end is what gains something while errors are
+    still enlarged."""
     n = len(model.parameters)
+    off = max((abs(float(v)) for q, v in zip(model.parameters, lead.evidence.mean, strict=False) if q.kind == kinds_of.BUILD), default=0.0)
+    if lead.evidence.learned.sizes.get(kinds_of.STIFFNESS, 0.0) < HIDING and off < STRAINED:
+        return []
     own = np.concatenate([np.zeros(n), lead.fit.point[n:]])
     drawn = {m.name: m for m in reversed(mechanisms) if m.effect.lasting and m.name not in lead.names}
     tasks = [
@@ -203,7 +208,7 @@ def _with_resonance(model: CampaignModel, h: Hypothesis) -> tuple[CampaignModel,
     """The model with the light resonance that an explanation leaves unexplained in every test, and the explanation fitted in it; None where it
     leaves none, or it clears too little. Where discrepancies stand in for it, no misfit is left, and its evidence alone tells."""
     hidden = h.evidence.learned.errors <= STRAIN
-    if len(model.resonances) == RESONANCES or (not hidden and overlap(model, h.fit).tests < LOOKED):
+    if len(model.resonances) == RESONANCES or (h.excess > SLIGHT and overlap(model, h.fit).tests < LOOKED):
         return None
     seen = light_resonance(model.thinned, h.fit, h.evidence.learned)
     if seen is None or seen[1] < PLENTY:
@@ -226,7 +231,8 @@ def _with_resonance(model: CampaignModel, h: Hypothesis) -> tuple[CampaignModel,
             best, learned = found.fit, found.evidence.learned
     except FAILED:
         return None
-    asked = found.evidence.ln > h.evidence.ln + PLENTY and (hidden or found.excess < CLEARED * h.excess)
+    clear = max(CLEARED * h.excess, CHANCE * np.sqrt(2 / h.fit.count))
+    asked = found.evidence.ln > h.evidence.ln + PLENTY and (hidden or found.excess < clear)
     return (wider, found) if asked else None
 
 

@@ -22,12 +22,12 @@ FREQUENCY = np.arange(400.0, 6000.1, 8.0)
 MASS, AT, RATIO = 0.008, 1754.0, 0.016  # kg on the base, a hundredth of it; Hz; damping ratio
 
 
-def table() -> Effect:
+def table(at: float = AT) -> Effect:
     """An oscillator on the base, the same in every test."""
     size = Parameter("mass", "kg", 0.0, MASS, MASS, (0.0, 1.0), "", "")
 
     def chain(spindle, condition, values, chain):
-        return on_spring(chain, spindle.structure.bodies[0].name, "table", values["mass"], AT, RATIO, "z")
+        return on_spring(chain, spindle.structure.bodies[0].name, "table", values["mass"], at, RATIO, "z")
 
     return Effect("table", "", "", (size,), "", (), "", chain=chain)
 
@@ -57,7 +57,26 @@ def test_it_is_found_where_it_is(model):
     assert _with_resonance(wider, h) is None
 
 
-def test_where_nothing_is_left_none_is_looked_for(spindle):
+@pytest.mark.parametrize("share", [50, 30])
+def test_a_small_one_that_is_hidden_is_found_by_its_evidence(spindle, share):
+    """A few ten thousandths of the base's mass beside its first mode: tolerances and the modes' constant errors take most of the misfit."""
+    small, at = MASS / share, 966.0
+    made = virtual_campaign(
+        spindle, TESTS, 5, [(table(at), {"mass": small})], drawn(spindle, 3, 5), responses=(1, 3, 6), frequency=FREQUENCY
+    )  # fmt: skip
+    model = model_of(spindle, made)
+    first = fit(model)
+    none = settled(model, Hypothesis(first, evidence(model, first)))
+    assert none.evidence.learned.errors < 1.1
+    found = _with_resonance(model, none)
+    assert found is not None
+    wider, h = found
+    assert wider.resonances[0].frequency == pytest.approx(at, rel=5e-3)
+    assert h.evidence.ln > none.evidence.ln + 12
+    assert h.evidence.learned.errors == 1.0
+
+
+def test_where_nothing_is_left_none_is_found(spindle):
     plain = model_of(spindle, virtual_campaign(spindle, TESTS, 5, (), drawn(spindle, 3, 5), responses=(1, 3, 6), frequency=FREQUENCY))
     first = fit(plain)
     assert _with_resonance(plain, Hypothesis(first, evidence(plain, first))) is None
