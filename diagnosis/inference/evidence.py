@@ -186,7 +186,7 @@ class _Marginal:
         constant, b, a = np.array([self.constant]), self.b[None], self.a[None]
         for root in roots:
             m, turned = root.shape[-1], root.transpose(0, 2, 1)
-            factor = np.linalg.cholesky(turned @ a[:, None, :m, :m] @ root + np.eye(m))  # (G, g, m, m)
+            factor = _factor(turned @ a[:, None, :m, :m] @ root)  # (G, g, m, m)
             rest = turned @ np.concatenate([b[:, :m, None], a[:, :m, m:]], axis=2)[:, None]
             solved = np.linalg.solve(factor, rest)
             of_b, of_a = solved[..., 0], solved[..., 1:]
@@ -196,6 +196,17 @@ class _Marginal:
             b = (b[:, None, m:] - (left @ of_b[..., None])[..., 0]).reshape(len(constant), -1)
             a = (a[:, None, m:, m:] - left @ of_a).reshape(len(constant), *(b.shape[-1],) * 2)
         return np.asarray(constant, float)
+
+
+def _factor(information: Array) -> Array:
+    """Cholesky factors (..., m, m) of 1 + `information`, of which rounding may have made what is nothing less than nothing: where nuisances do all that a
+    mechanism does, their difference is of the rounding of either."""
+    one = np.eye(information.shape[-1])
+    try:
+        return np.asarray(np.linalg.cholesky(information + one))
+    except np.linalg.LinAlgError:
+        value, vector = np.linalg.eigh((information + information.swapaxes(-1, -2)) / 2)
+        return np.asarray(np.linalg.cholesky((vector * np.maximum(value, 0.0)[..., None, :]) @ vector.swapaxes(-1, -2) + one))
 
 
 def _marginal(q: Quadratic, prior: Root) -> _Marginal:

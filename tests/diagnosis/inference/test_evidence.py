@@ -187,6 +187,17 @@ def test_a_fit_and_the_evidence_have_one_prior():
     assert found.within(np.eye(n)) == pytest.approx(found.turned(found.times(np.eye(len(found.within(np.eye(n)))))))
 
 
+def test_rounding_does_not_end_an_evidence():
+    """A mechanism that does what a tolerance does, each worth 1e16 in information: what is left of it is rounding, and says nothing."""
+    column = np.random.default_rng(1).standard_normal(50) * 1e8
+    jacobian = np.stack([column, column, 0.5 * column])
+    information = jacobian @ jacobian.T
+    information[1:, 1:] -= 1e3 * np.eye(2)  # as rounding may have it
+    left = _marginal(Quadratic(0.0, np.zeros(3), information), Root(np.ones(1), np.zeros((1, 0)), np.zeros((0, 0))))
+    root = np.array([np.eye(2), 3 * np.eye(2)])
+    assert np.isfinite(left.integrated([root])).all()
+
+
 def test_errors_larger_than_stated_are_learned():
     for seed in range(5):
         made = toy(seed, 0.0, rows=200, errors=1.5)
