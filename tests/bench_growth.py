@@ -28,7 +28,7 @@ from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
-from tests.bench_beams import FULL, OF_ROWS, condition, for_ross, meshed, rowed
+from tests.bench_beams import FULL, OF_ROWS, best, condition, for_ross, meshed, rowed
 from tests.bench_study import small_study
 from tests.conftest import DATA, SCENE
 from thermospindle.diagnosis.verdict import diagnose
@@ -57,14 +57,8 @@ class Curve:
 
 
 def least(work: Callable[[], object], repeat: int = 2) -> float:
-    """Least processor time (s) after one to warm up."""
-    work()
-    found = []
-    for _ in range(repeat):
-        start = time.process_time()
-        work()
-        found.append(time.process_time() - start)
-    return min(found)
+    """Least processor time (s) after one call to warm up."""
+    return best(work, repeat, time.process_time)
 
 
 def of_beams(folder: Path) -> Curve:
