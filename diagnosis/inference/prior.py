@@ -146,16 +146,16 @@ def whole_root(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: L
 
 def precision(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned | None, moved: Array = UNMOVED) -> Array:
     """The inverse (n, n) of the prior covariance, with next to nothing for sizes of zero; the identity, the reference widths, without `learned`."""
-    n = len(model.parameters)
     if learned is None:
-        return np.eye(n + sum(len(model.tests) + len(m.shape) for m in mechanisms))
-    own = mechanism_covariance(model, mechanisms, list(zip(learned.widths, learned.departures, strict=True)))
+        return np.eye(len(variances(model, mechanisms, None)))
+    own_variances, misjudging, own = _floored(model, mechanisms, learned, moved)
+    n = len(own_variances)
     found = np.zeros((n + len(own), n + len(own)))
-    alone = 1 / np.maximum(nuisance_variances(model, learned.sizes), NOTHING**2)
-    beside = alone[:, None] * misjudged(model, learned.sizes, moved)
+    alone = 1 / own_variances
+    beside = alone[:, None] * misjudging
     inner = np.eye(beside.shape[1]) + beside.T @ (beside / alone[:, None])  # Woodbury's identity (Golub & Van Loan, 2.1.4)
     found[:n, :n] = np.diag(alone) - beside @ np.linalg.solve(inner, beside.T)
-    found[n:, n:] = np.linalg.inv(own + NOTHING**2 * np.eye(len(own)))
+    found[n:, n:] = np.linalg.inv(own)
     return found
 
 
@@ -163,6 +163,13 @@ def variances(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Le
     """The diagonal (n,) of the covariance of which `precision` is the inverse."""
     if learned is None:
         return np.ones(len(model.parameters) + sum(len(model.tests) + len(m.shape) for m in mechanisms))
+    own_variances, misjudging, own = _floored(model, mechanisms, learned, moved)
+    return np.concatenate([own_variances + np.sum(misjudging**2, axis=1), np.diag(own)])
+
+
+def _floored(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned, moved: Array) -> tuple[Array, Array, Array]:
+    """The parts of a prior covariance that can be inverted: variances (P,) of nuisances, the root (P, k) of what is misjudged, and the covariance (m, m) of
+    the mechanisms."""
     own = mechanism_covariance(model, mechanisms, list(zip(learned.widths, learned.departures, strict=True)))
     alone = np.maximum(nuisance_variances(model, learned.sizes), NOTHING**2)
-    return np.concatenate([alone + np.sum(misjudged(model, learned.sizes, moved) ** 2, axis=1), np.diag(own) + NOTHING**2])
+    return alone, misjudged(model, learned.sizes, moved), own + NOTHING**2 * np.eye(len(own))
