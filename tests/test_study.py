@@ -225,6 +225,12 @@ def test_a_folder_is_gone_on_with_only_by_its_own_study(tmp_path, capsys):
         assert re.search(r"out: was begun with another study \(.*\); name a new folder to begin anew\n", capsys.readouterr().err)
     assert files(out) == before
     (tmp_path / "study.toml").write_text(DRAWN + "draws = 3\n", encoding="utf-8")
+    key = json.loads((out / "study.json").read_text(encoding="utf-8"))
+    for name, said in (("study", "was begun with another study (None, now"), ("chunk", "is not what spindle wrote")):
+        (out / "study.json").write_text(json.dumps({k: v for k, v in key.items() if k != name}), encoding="utf-8")
+        assert main(["study", str(tmp_path / "study.toml"), "--out", str(out)]) == 2, "a key that lost a line is no key"
+        assert said in capsys.readouterr().err
+    (out / "study.json").write_text(json.dumps(key), encoding="utf-8")
     next((out / "parts").iterdir()).write_bytes(b"PAR1 no more")
     assert main(["study", str(tmp_path / "study.toml"), "--out", str(out)]) == 2
     assert "cannot be read" in capsys.readouterr().err

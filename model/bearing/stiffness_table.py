@@ -31,6 +31,7 @@ COLUMNS = {
     "coupling_stiffness_N_per_rad": lambda b: b.coupling_stiffness,
 }
 """Property of a bearing state behind every column."""
+GAPS = "{}: the table has gaps; every bearing needs a row for each temperature and speed, and one only"
 MISSING = -1e308  # in a grid that is being read; NaN is what a bearing given by numbers does not have
 
 
@@ -112,15 +113,21 @@ def read_table(path: Path) -> StiffnessTable:
         temperature = np.unique([float(r["temperature_C"]) for r in rows])
         rpm = np.unique([float(r["speed_rpm"]) for r in rows])
         values: dict[str, dict[str, Array]] = {}
+        if len(rows) != len(temperature) * len(rpm) * len({row["bearing"] for row in rows}):
+            raise BadInput(GAPS.format(path))  # before grids are made of it: of a damaged file they could be of any size
         for row in rows:
             where = np.searchsorted(temperature, float(row["temperature_C"])), np.searchsorted(rpm, float(row["speed_rpm"]))
             for column in COLUMNS:
                 grid = values.setdefault(name_of(row["bearing"]), {}).setdefault(column, np.full((len(temperature), len(rpm)), MISSING))
                 grid[where] = float(row[column])
-    except (OSError, UnicodeDecodeError, RecursionError, IndexError, KeyError, ValueError, TypeError) as error:
+    except BadInput:
+        raise
+    except (OSError, RecursionError, IndexError, KeyError, ValueError, TypeError, AttributeError, csv.Error) as error:
         raise BadInput(f"{path}: not a stiffness table as spindle writes it: {type(error).__name__} {error}") from None
     if not values or any((grid == MISSING).any() for columns in values.values() for grid in columns.values()):
-        raise BadInput(f"{path}: the table has gaps; every bearing needs a row for each temperature and speed")
+        raise BadInput(GAPS.format(path))
     if not (np.isfinite(temperature).all() and np.isfinite(rpm).all()) or any(np.isinf(g).any() for columns in values.values() for g in columns.values()):
         raise BadInput(f"{path}: holds an infinite number; only finite ones are allowed")
+    if not (isinstance(provenance, dict) and isinstance(unloads, dict) and all(v is None or isinstance(v, int | float) for v in unloads.values())):
+        raise BadInput(f"{path}: its first two lines say what it was made from, and where each bearing unloads: names and values; they are damaged")
     return StiffnessTable(temperature, rpm * RPM, values, unloads, provenance)

@@ -79,13 +79,15 @@ def _read(file: Path, bearing: str | None) -> tuple[tuple[float, ...], tuple[flo
         try:
             at = float(plain_number(row["temperature_C"])), float(plain_number(row["speed_rpm"])) * RPM
             radial, axial, tilt, coupling = (float(plain_number(row[c])) if c in known else 0.0 for c in COLUMNS)
-        except (TypeError, ValueError):
+        except (TypeError, AttributeError, ValueError):  # a row that ends before its time has None
             raise BadInput(f"{file}: row {number}: every column must hold a number in digits 0 to 9") from None
         k = np.diag([radial, radial, axial, tilt, tilt])
         k[0, 4] = k[4, 0] = coupling
         k[1, 3] = k[3, 1] = -coupling
         if at in values:
             raise BadInput(f"{file}: row {number}: {at[0]:g} C and {at[1] / RPM:g} rpm stand twice{'' if bearing else '; which bearing? say bearing = ...'}")
+        if not np.isfinite(at).all():
+            raise BadInput(f"{file}: row {number}: temperature_C and speed_rpm must be finite")
         if not np.isfinite(k).all() or np.linalg.eigvalsh(k).min() < -1e-9 * np.abs(k).max():
             raise BadInput(f"{file}: row {number}: is no stiffness of a bearing; it must be finite and push nothing away")
         values[at] = k

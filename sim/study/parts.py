@@ -86,9 +86,10 @@ def opened(path: Path, key: Mapping[str, Any], cases: int, chunk: int, schema: p
             if any(p for p in path.iterdir() if not p.name.startswith(f".{KEY}.")):  # what a killed run left of the file
                 raise BadInput(f"--out {path}: holds something that is no study of spindle; name a new or empty folder")
             write(file, json.dumps(told, indent=1))
-        for name, value in _begun(file).items():
-            if told.get(name) != value:
-                raise BadInput(f"--out {path}: was begun with another {_short(name)} ({_short(value)}, now {_short(told.get(name))}); name a new folder to begin anew")
+        begun = _begun(file)
+        for name in {**begun, **told}:
+            if begun.get(name) != told.get(name):
+                raise BadInput(f"--out {path}: was begun with another {_short(name)} ({_short(begun.get(name))}, now {_short(told.get(name))}); name a new folder to begin anew")
         (path / PARTS).mkdir(exist_ok=True)
         yield Folder(path, cases, chunk, schema)
 
@@ -98,7 +99,7 @@ def _begun(file: Path) -> dict[str, Any]:
         found = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise BadInput(f"{file}: cannot be read ({error}); name a new folder to begin anew") from None
-    if not isinstance(found, dict) or set(found) < {"cases", "chunk", "versions"}:
+    if not isinstance(found, dict) or not {"cases", "chunk", "versions"} <= set(found):
         raise BadInput(f"{file}: is not what spindle wrote; name a new folder to begin anew")
     return found
 

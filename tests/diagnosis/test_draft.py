@@ -123,7 +123,7 @@ def test_drafts_of_what_is_not_there_are_refused(slipping, tmp_path):
 
 def test_temperatures_beyond_a_law_are_drafted_too(tmp_path):
     """Found by `make torture`: the middle between 50 and 600 C lies outside the limits of the sigmoid's, from where no fit may start."""
-    from tests.torture.readers import diagnosis
+    from tests.torture.wholes import diagnosis
 
     raw = json.loads(diagnosis())
     raw["where"][0]["change"][-1]["temperature_C"] = 600.0

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tests.conftest import ROOT, SCENE
-from tests.torture.readers import MAPPING, TABLE, diagnosis
+from tests.torture.wholes import MAPPING, TABLE, diagnosis
 from thermospindle.report.folder import MARK, digest
 
 JANG = SCENE / "measured" / "jang_2003"

@@ -7,6 +7,6 @@ corpus/      inputs that each reach something no smaller one of their folder doe
 test_corpus  every input of the corpus again, in the tests that need no atheris
 ===========  ===========================================================================================================
 
-Readers, and whole files to begin with, are those of `tests/torture/readers.py`. A finding is what ends in anything but a result or a named error,
+Readers, and whole files to begin with, are those of `tests/torture` (`readers.py`, `wholes.py`). A finding is what ends in anything but a result or a named error,
 takes more than 30 s, or more than 4 GB.
 """

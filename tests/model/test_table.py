@@ -58,6 +58,36 @@ def test_other_files_are_refused(tmp_path, text):
         read_table(path)
 
 
+def test_an_endless_cell_is_refused(tmp_path):
+    """Longer than what Python's reader of CSV takes."""
+    path = tmp_path / "table.csv"
+    path.write_text("# provenance: {}\n# unloads_C: {}\nbearing,temperature_C\nupper," + "1" * 200_000)
+    with pytest.raises(BadInput, match="not a stiffness table"):
+        read_table(path)
+
+
+def test_no_grid_is_made_of_rows_that_do_not_fill_it(table, tmp_path):
+    """A row at each of 30,000 temperatures, each with another speed: a grid of them takes 70 GB."""
+    path = tmp_path / "table.csv"
+    write_table(table, path)
+    lines = path.read_text().splitlines()
+    name, _, _, rest = lines[3].split(",", 3)
+    path.write_text("\n".join([*lines[:3], *(f"{name},{k},{k},{rest}" for k in range(30_000))]))
+    with pytest.raises(BadInput, match="gaps"):
+        read_table(path)
+
+
+@pytest.mark.parametrize(("line", "text"), [(0, "# provenance: 3"), (1, '# unloads_C: ["upper"]'), (1, '# unloads_C: {"upper": "60"}')])
+def test_what_a_table_says_of_itself_is_checked(table, tmp_path, line, text):
+    path = tmp_path / "table.csv"
+    write_table(table, path)
+    lines = path.read_text().splitlines()
+    lines[line] = text
+    path.write_text("\n".join(lines))
+    with pytest.raises(BadInput, match="first two lines"):
+        read_table(path)
+
+
 def test_gaps_are_refused(table, tmp_path):
     path = tmp_path / "table.csv"
     write_table(table, path)

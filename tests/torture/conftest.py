@@ -9,12 +9,13 @@ from contextlib import contextmanager
 import pytest
 from hypothesis import HealthCheck, Phase, settings
 
+from tests.torture.apart import SECONDS, Hangs
 from thermospindle.model.errors import BadInput, NoEquilibrium, NotConverged, OutsideRange
 
 if os.name == "nt":  # alarms, pipes and limits of memory are not there
     collect_ignore_glob = ["test_*.py"]
 EXAMPLES = int(os.environ.get("TORTURE_EXAMPLES", "0"))
-FEW, SECONDS, WAIT, BYTES = 6, 30, 300, 8 << 30
+FEW, WAIT, BYTES = 6, 300, 8 << 30
 NAMED = (BadInput, NoEquilibrium, NotConverged, OutsideRange)
 COUNTS: dict[str, Counter] = {}
 
@@ -29,10 +30,6 @@ settings.register_profile(
     suppress_health_check=list(HealthCheck),
 )
 settings.load_profile("torture")
-
-
-class Hangs(Exception):
-    """More than `SECONDS` of the processor's time for one example, or more than `WAIT` s on a clock."""
 
 
 @contextmanager

@@ -7,14 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.io import savemat
 
 from tests.conftest import DATA, ROOT, SCENE
-from tests.torture.conftest import EXAMPLES, FEW, outcome
+from tests.torture.apart import tried_apart
+from tests.torture.conftest import NAMED, outcome
 from tests.torture.damage import Damage, damaged, damages
-from tests.torture.readers import MAPPING, READERS, STUDIES, TABLE, diagnosis
+from tests.torture.readers import READERS
+from tests.torture.wholes import MAPPING, STUDIES, TABLE, diagnosis, stiffness
 from thermospindle.cli import main
 from thermospindle.diagnosis.add import read_answer
 from thermospindle.diagnosis.draft import draft
@@ -26,6 +28,8 @@ from thermospindle.sim.importing.mapping import MappingForm, read_mapping
 ANY = [pytest.param(name, marks=pytest.mark.slow) if name == "log" else name for name in READERS]
 LONG, HEAD = 300_000, 100_000
 """Bytes from which a file is damaged in its first part alone, where its headers are, and of that part."""
+APART = ("mat", "log")
+"""What is read by another process first, since reading it may end one."""
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +40,7 @@ def folder(tmp_path_factory):
 @pytest.mark.parametrize("name", ANY)
 def test_a_whole_file_is_read(folder, name):
     """So a refusal below is one of the damage."""
-    READERS[name](folder / name, READERS[name].whole()[0])
+    read_it(folder / name, name, READERS[name].whole()[0])
 
 
 def test_what_is_read_is_what_was_meant(folder):
@@ -59,13 +63,19 @@ def test_nothing_of_a_diagnosis_becomes_code(tmp_path, key):
         draft(tmp_path / "d.json", "own", None)
 
 
+def read_it(place: Path, name: str, data: bytes) -> None:
+    if name in APART:
+        tried_apart(lambda: READERS[name](place, data), NAMED)
+    else:
+        READERS[name](place, data)
+
+
 def tried(folder: Path, name: str, which: int, every: list[Damage]) -> None:
-    reader = READERS[name]
-    whole = reader.whole()
+    whole = READERS[name].whole()
     data = whole[which % len(whole)]
     head = HEAD if len(data) > LONG else len(data)
     with outcome(name):
-        reader(folder / name, damaged(data[:head], every) + data[head:])
+        read_it(folder / name, name, damaged(data[:head], every) + data[head:])
 
 
 @pytest.mark.parametrize("name", [n for n in READERS if n != "log"])
@@ -75,7 +85,6 @@ def test_a_damaged_file_is_read_or_refused(folder, name, which, every):
 
 
 @pytest.mark.slow
-@settings(max_examples=max(FEW, EXAMPLES // 20))
 @given(damages)
 def test_so_is_a_log(folder, every):
     tried(folder, "log", 0, every)
@@ -120,6 +129,35 @@ def test_values_that_overflow_are_refused(folder):
     lines[20] = b",".join([lines[20].split(b",")[0], b"-1e308", b"-1e308", b"0.9"])
     with pytest.raises(BadInput, match=r"a value of 1e\+308: none beyond 1e\+100 is a measurement"):
         READERS["csv"](folder / "overflow", b"\n".join(lines))
+
+
+@pytest.mark.parametrize(("change", "said"), [(lambda row: row.rsplit(b",", 6)[0], "must hold a number"), (lambda row: row.replace(b",20.0,", b",1e400,"), "must be finite")])
+def test_a_row_of_a_bearing_table_is_whole(folder, change, said):
+    """A row that ends before its time ended in a traceback, a temperature beyond all numbers was taken where it stood alone."""
+    head, *rows = stiffness().splitlines()[2:]
+    row = next(r for r in rows if r.startswith(b"upper,20.0,"))
+    READERS["bearing-table"](folder / "rows", head + b"\n" + row)
+    with pytest.raises(BadInput, match=rf"row 2: .*{said}"):
+        READERS["bearing-table"](folder / "rows", head + b"\n" + change(row))
+
+
+def test_a_fork_tells_what_became_of_it():
+    """What raises, what ends its process, what calls another interpreter."""
+    import subprocess
+    import sys
+
+    with pytest.raises(BadInput, match="so it is"):
+        tried_apart(lambda: (_ for _ in ()).throw(BadInput("so it is")), NAMED)
+    with pytest.raises(AssertionError, match="ZeroDivisionError"):
+        tried_apart(lambda: 1 // 0, NAMED)
+    with pytest.raises(AssertionError, match="signal 6"):
+        tried_apart(os.abort, NAMED)
+
+    def asks() -> None:
+        assert subprocess.run([sys.executable, "-P", "-c", "import os; os.abort()"]).returncode == -6
+        assert subprocess.run([sys.executable, "-P", "-c", "import sys; print('no', file=sys.stderr); sys.exit(3)"]).stderr == "no\n"
+
+    tried_apart(asks, NAMED)
 
 
 # ---------------------------------------------------------------- what unpacks to more than there is room for

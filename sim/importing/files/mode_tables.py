@@ -7,6 +7,8 @@ import re
 from pathlib import Path
 
 from thermospindle.model.errors import BadInput
+from thermospindle.model.files.cells import plain_number
+from thermospindle.model.scene.fields import LARGEST
 from thermospindle.sim.importing.files.text import COMMENT, text_of
 from thermospindle.sim.importing.measured import Content, ModeLine
 
@@ -40,7 +42,10 @@ def from_modes(file: Path) -> Content:
     assert found is not None
     named, separator, first = found
     modes = []
-    rows = csv.reader(text_of(file).splitlines(), delimiter=separator)
+    try:
+        rows = list(csv.reader(text_of(file).splitlines(), delimiter=separator))
+    except csv.Error as error:
+        raise BadInput(f"{file}: cannot be read as a table of modes: {error}") from None
     for number, cells in enumerate(rows):
         if number <= first or not any(c.strip() for c in cells) or cells[0].lstrip().startswith("#"):
             continue
@@ -49,8 +54,8 @@ def from_modes(file: Path) -> Content:
             raise BadInput(f"{where}: has {len(cells)} cells, the headings are {len(named)}")
         told = {name: cell.strip() for name, cell in zip(named, cells, strict=False) if name and cell.strip()}
         frequency = _number(where, told, "frequency", separator)
-        if frequency is None or not frequency > 0:
-            raise BadInput(f"{where}: frequency = {told.get('frequency', '')!r}: a positive number in Hz is needed")
+        if frequency is None:
+            raise BadInput(f"{where}: frequency = '': a positive number in Hz is needed")
         damping = _number(where, told, "damping", separator)
         if (percent := _number(where, told, "percent", separator)) is not None:
             damping = percent / 100
@@ -67,6 +72,9 @@ def _number(where: str, told: dict[str, str], key: str, separator: str) -> float
     if key not in told:
         return None
     try:
-        return float(told[key].replace(",", ".") if separator != "," else told[key])
+        value = float(plain_number(told[key].replace(",", ".") if separator != "," else told[key]))
     except ValueError:
         raise BadInput(f"{where}: {key} = {told[key]!r}: is no number") from None
+    if not 0 < value <= LARGEST:
+        raise BadInput(f"{where}: {key} = {told[key]!r}: a positive number{' in Hz' * (key in ('frequency', 'sd'))} is needed")
+    return value

@@ -29,11 +29,15 @@ def test_published_of_the_scene():
         ("mode,frequency_20C_Hz\n1,1002\n", "columns"),
         ("mode,kind,frequency_20C_Hz\n1,axial,fast\n", "'fast'"),
         ("mode,kind,frequency_20C_Hz\n1,axial\n", "no number"),
+        ("mode,kind,frequency_20C_Hz\n1,axial,inf\n", "a frequency of inf Hz"),
+        ("mode,kind,frequency_2.0.1C_Hz\n1,axial,1002\n", "columns"),
+        ("mode,kind,frequency_20C_Hz\n1,axial," + 200_000 * "1", "cannot be read"),
+        ("mode,kind,frequency_20C_Hz\n1,\udcff,1002\n", "cannot be read"),
     ],
 )
 def test_bad_published_table_is_refused_by_name(content: str, says: str, tmp_path: Path):
     path = tmp_path / "bad.csv"
-    path.write_text(content)
+    path.write_bytes(content.encode(errors="surrogateescape"))
     with pytest.raises(BadInput, match=says) as error:
         read_published(path)
     assert str(path) in str(error.value)

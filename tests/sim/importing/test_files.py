@@ -293,6 +293,10 @@ def test_modes_picked_by_hand(tmp_path):
         ("f;H(1,1) real\n1;2\n2\n3;4;5\n4;5\n", "numbers"),
         ("f,H(1,1) real\n1,2\n2,3\n3,4\nend of data\n", "line 5: 'end of data' stands below the numbers"),
         ("frequency,mode\n1000,1\nabc,2\n", "line 3: frequency = 'abc': is no number"),
+        ("frequency,mode\n1_000,1\n", "line 2: frequency = '1_000': is no number"),
+        ("frequency,mode\n1000,1\ninf,2\n", "line 3: frequency = 'inf': a positive number in Hz is needed"),
+        *((f"frequency,mode,sd\n1000,1,{sd}\n", f"line 2: sd = '{sd}': a positive number in Hz is needed") for sd in ("0", "-1", "nan", "1e400")),
+        ("frequency,mode,kind\n1000,1," + 200_000 * "a", "cannot be read as a table of modes"),
     ],
 )
 def test_damaged_text_is_one_sentence(tmp_path, text, said):
