@@ -92,8 +92,10 @@ def keys_of(capsys, *arguments: str) -> set[str]:
         pytest.param(["run", "MADE/short", "--temperatures", 20, "--hits", 1], "run.rrd", "inspect", marks=pytest.mark.slow),
         pytest.param(["map", SCENE, "--temperatures", 20, 26, "--speeds", 3600, 7200], "map.rrd", "inspect, of a resonance map", marks=pytest.mark.slow),
         pytest.param(["runout", SCENE, "--path", "linear", "--seconds", 0.2], "runout.rrd", "inspect, of runout", marks=pytest.mark.slow),
+        pytest.param(["impact", "MADE/short", "--hits", 1], "impact.rrd", "inspect", marks=pytest.mark.slow),
+        (["warmup", SCENE, "--speed", 3600, "--minutes", 1], "warmup.rrd", "inspect, of a warm-up"),
     ],
-    ids=["run", "map", "runout"],
+    ids=["run", "map", "runout", "impact", "warm-up"],
 )
 def test_inspect_answers_by_what_a_log_holds(words, log, form, made, tmp_path, capsys) -> None:
     say(*(str(w).replace("MADE", str(made)) for w in words), "--out", tmp_path / "out")

@@ -5,6 +5,8 @@ from __future__ import annotations
 import rerun as rr
 import rerun.blueprint as rrb
 
+from thermospindle.model.machine import Spindle
+from thermospindle.model.rotor.shaft_look import extent
 from thermospindle.model.units import TO_MM
 from thermospindle.report.log.content import Pair, Shown
 from thermospindle.report.log.pictures import DARK, view
@@ -28,20 +30,22 @@ def blueprint(shown: Shown, quantities: list[tuple[str, str]], factor: float) ->
     cold, hot = min(shown.temperatures), max(shown.temperatures)
     sides = f"{cold:g} °C left, {hot:g} °C right" if hot > cold else f"{cold:g} °C"
     section = f"Section, {sides}, moved × {factor:g}"
-    left = rrb.Vertical(rrb.Grid(*_model_views(shown), grid_columns=2), _section_view(shown, "compared", section), row_shares=[2.6, 1])
-    middle = rrb.Vertical(view("charts/key", None, CHARTS["key"]), rrb.Tabs(*(_frf_views(shown, pair) for pair in shown.pairs)), row_shares=[1, 12])
+    left = rrb.Vertical(rrb.Grid(*model_views(shown), grid_columns=2), _section_view(shown, "compared", section), row_shares=[2.6, 1])
+    middle = frfs_below_key(shown)
     right = rrb.Vertical(
         view("charts/bearings", f"Bearings: {_sides(shown)}", CHARTS["bearings"]),
         view("charts/records", "First hits of the hammers", CHARTS["records"]),
         rrb.TextDocumentView(origin="summary", name="Summary"),
         row_shares=[3.9, 2.1, 2.9],
     )
+    overview = rrb.Horizontal(left, middle, right, column_shares=[1.15, 1.45, 1], name="Overview")
+    return sweeping(shown, overview, _time_tab(shown), _temperature_tab(shown, quantities, factor))
+
+
+def sweeping(shown: Shown, *tabs: rrb.Container) -> rrb.Blueprint:
+    """The tabs in a window of their own, the cursor of `frequency` sweeping through the band."""
     return rrb.Blueprint(
-        rrb.Tabs(
-            rrb.Horizontal(left, middle, right, column_shares=[1.15, 1.45, 1], name="Overview"),
-            _time_tab(shown),
-            _temperature_tab(shown, quantities, factor),
-        ),
+        rrb.Tabs(*tabs),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),
         rrb.TimePanel(state="collapsed", timeline="frequency", fps=CYCLE * shown.step, play_state="playing", loop_mode="all"),
@@ -50,15 +54,21 @@ def blueprint(shown: Shown, quantities: list[tuple[str, str]], factor: float) ->
     )
 
 
+def frfs_below_key(shown: Shown) -> rrb.Container:
+    """The key of colours and marks, and below it the FRFs that have views of their own, a tab each."""
+    return rrb.Vertical(view("charts/key", None, CHARTS["key"]), rrb.Tabs(*(frf_views(shown, pair) for pair in shown.pairs)), row_shares=[1, 12])
+
+
 def _sides(shown: Shown) -> str:
     return ", ".join(f"{b.name} {colour}" for b, colour in zip(shown.run.spindle.bearings, ("blue", "orange"), strict=False))
 
 
-def _model_views(shown: Shown) -> list[rrb.View]:
+def model_views(shown: Shown) -> list[rrb.View]:
+    """The first mode shapes, and the answer to a swept force."""
     views = [(f"{i} {m.kind} {m.frequency:.0f} Hz", f"mode_{i}") for i, m in enumerate(shown.modes[:5], 1)]
     views.append((f"Sweep at {shown.pairs[0][1]}", "sweep"))
-    r = TO_MM * reach(shown.run.spindle)
-    eye = rrb.EyeControls3D(position=(1.8 * r, -1.4 * r, 1.35 * r), look_target=(0, 0, -0.08 * r), eye_up=(0, 0, 1))
+    _, r, z = framed(shown.run.spindle)
+    eye = rrb.EyeControls3D(position=(1.8 * r, -1.4 * r, z + 1.35 * r), look_target=(0, 0, z - 0.08 * r), eye_up=(0, 0, 1))
     return [
         rrb.Spatial3DView(origin=at("model", entity), name=name, eye_controls=eye, line_grid=False, background=DARK)
         for name, entity in views
@@ -66,24 +76,34 @@ def _model_views(shown: Shown) -> list[rrb.View]:
 
 
 def _section_view(shown: Shown, which: str, name: str) -> rrb.View:
-    r = TO_MM * reach(shown.run.spindle)
-    x, away = (0.0, 1.3 * r) if which == "compared" else (0.5 * r, 2.2 * r)  # one half in a tall view
-    eye = rrb.EyeControls3D(position=(x, -away, 0.3 * r), look_target=(x, 0, 0.3 * r), eye_up=(0, 0, 1))
+    long, r, z = framed(shown.run.spindle)
+    x, away = (0.0, 1.3) if which == "compared" else (0.5, 2.2)  # one half in a tall view
+    x, away, z = (x * r, away * r, 0.3 * r) if not long else (x * TO_MM * reach(shown.run.spindle), 2.2 * r, z)
+    eye = rrb.EyeControls3D(position=(x, -away, z), look_target=(x, 0, z), eye_up=(0, 0, 1))
     return rrb.Spatial3DView(origin=at("section", which), name=name, eye_controls=eye, line_grid=False, background=DARK)
 
 
-def _frf_views(shown: Shown, pair: Pair) -> rrb.Container:
+def framed(spindle: Spindle) -> tuple[bool, float, float]:
+    """Whether a spindle is longer than wide; what a view must reach, its radius or half its length, and the height of what it looks at, in mm."""
+    radius, low, high = (TO_MM * v for v in extent(spindle))
+    half = (high - low) / 2
+    return (True, half, low + half) if half > radius else (False, radius, 0.0)
+
+
+def frf_views(shown: Shown, pair: Pair) -> rrb.Container:
+    """Level, phase and coherence of one FRF below each other."""
     origin, label = at(*pair_path(pair)), f"H({pair[0]},{pair[1]})"
     return rrb.Vertical(
-        _plot(shown, f"{origin}/level", f"{label} level, dB re 1 (m/s)/N, over frequency (#1000 is 1000 Hz)", shown.level),
-        _plot(shown, f"{origin}/phase", "phase, deg", (-185.0, 185.0)),
-        _plot(shown, f"{origin}/coherence", "coherence", (0.0, 1.03)),
+        plot(shown, f"{origin}/level", f"{label} level, dB re 1 (m/s)/N, over frequency (#1000 is 1000 Hz)", shown.level),
+        plot(shown, f"{origin}/phase", "phase, deg", (-185.0, 185.0)),
+        plot(shown, f"{origin}/coherence", "coherence", (0.0, 1.03)),
         row_shares=[2.6, 1, 1],
         name=label + (" driving point" if pair[0] == pair[1] else ""),
     )
 
 
-def _plot(shown: Shown, origin: str, name: str, limits: tuple[float, float]) -> rrb.View:
+def plot(shown: Shown, origin: str, name: str, limits: tuple[float, float]) -> rrb.View:
+    """Series over the band, between `limits`."""
     ends = [rr.TimeRangeBoundary.absolute(seq=f) for f in shown.band]
     return rrb.TimeSeriesView(
         origin=origin,

@@ -22,6 +22,7 @@ from thermospindle.thermal.expansion import expand
 
 Pair = tuple[int, int]  # response node, hammer node
 FRAMES = 900  # about, of the sweep through the band
+NOTHING = 60  # dB: an FRF so far below the largest is noise, its response vanishes by symmetry; it does not set the limits of plots
 
 
 @dataclass(frozen=True)
@@ -165,6 +166,7 @@ def shown(run: Run) -> Shown:
     pairs = _pairs(frf_of(tests[0]))
     low, high = run.spindle.hammer.band
     level = np.array([decibel(one(frf_of(t).value, frf_of(t), pair)) for t in tests for pair in pairs])
+    level = level[level.max(axis=1) > level.max() - NOTHING]
     return Shown(
         run,
         tests,

@@ -1,7 +1,7 @@
-"""Reads any of our Rerun logs back: what is in it as numbers, bit for bit as computed, as JSON, and in words.
+"""Reads any of our Rerun logs back: what is in it as numbers, bit for bit as computed.
 
-A log says by its property which kind it is: `run` (also comparison and ladder), `map`, `runout` or `study`. Numbers stand under `numbers/` as
-components with plain names; `Log.table` gives those of one entity, and a row a kind in `SHOW` says what they mean.
+A log says by its property which kind it is: `run` (also impact test, comparison and ladder), `map`, `runout`, `warmup` or `study`. Numbers stand
+under `numbers/` as components with plain names; `Log.table` gives those of one entity, and `report.log.told` says what they mean.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -21,13 +21,21 @@ from rerun.chunk import RrdReader
 
 from thermospindle.model.errors import BadInput
 from thermospindle.model.types import Array
-from thermospindle.model.units import RPM, TO_NM
 from thermospindle.report.log.content import Peak
 from thermospindle.sim.identification.frf import Frf
 
 APPLICATION = "thermospindle"
-KINDS = ("run", "map", "runout", "study")
-NEEDS = {"run": "/numbers/peaks", "map": "/numbers/modes", "runout": "/signals", "study": "/numbers/rows"}
+KINDS = ("run", "map", "runout", "warmup", "study")
+NEEDS = {"run": "/numbers/peaks", "map": "/numbers/modes", "runout": "/signals", "warmup": "/numbers/warmup", "study": "/numbers/rows"}
+
+
+@dataclass(frozen=True, eq=False)
+class HammerRecords:
+    """What was sampled of all hits on one hammer point: time (n,) s, force (hits, n) N, velocity (hits, responses, n) m/s."""
+
+    time: Array
+    force: Array
+    velocity: Array
 
 
 @dataclass(frozen=True)
@@ -114,6 +122,21 @@ class Log:
         coherence, sd = (lines(name) if name in self.columns[entity] else None for name in ("coherence", "standard_error"))
         return Frf(frequency[rising], value, responses, references, about["quantity"][0], coherence, sd)
 
+    @cached_property
+    def records(self) -> dict[int, HammerRecords]:
+        """Every hit of an impact test, by hammer node; empty where a log has none."""
+        found: dict[int, HammerRecords] = {}
+        for about in self.rows("/numbers/records"):
+            node, hits = about["hammer"], range(1, about["hits"] + 1)
+            force, velocity = ([self._scalars(f"/records/hammer\\ {node}/hit\\ {k}/{what}") for k in hits] for what in ("force", "velocity"))
+            time = np.arange(force[0].size) / about["sample_rate_Hz"]
+            found[node] = HammerRecords(time, np.array(force), np.array([v.reshape(time.size, -1).T for v in velocity]))
+        return found
+
+    def _scalars(self, entity: str) -> Array:
+        [name] = [name for name in self.columns[entity] if name.endswith("scalars")]
+        return np.asarray(self.array(entity, name))
+
     # ------------------------------------------------------------ maps
 
     @cached_property
@@ -129,8 +152,7 @@ class Log:
     @cached_property
     def signals(self) -> Array:
         """RRO of the hub's probes x, y and axial, then their NRRO (6, n) in nm."""
-        [values] = [name for name in self.columns["/signals"] if name.endswith("scalars")]
-        return np.asarray(self.array("/signals", values).reshape(-1, 6).T)
+        return self._scalars("/signals").reshape(-1, 6).T
 
     @cached_property
     def quoted(self) -> dict[str, dict[str, float]]:
@@ -204,142 +226,3 @@ def read_log(path: Path) -> Log:
     log = Log(path, ours[0].application_id, ours[0].recording_id, bool(blueprints), columns, dict(sorted(rows.items())), every)
     assert log.kind in KINDS
     return log
-
-
-# ---------------------------------------------------------------- as JSON and in words
-
-
-def log_json(log: Log) -> dict[str, Any]:
-    """What a log holds, with its numbers as nested lists."""
-    return {"scene": log.scene, "entities": list(log.entities), **SHOW[log.kind][0](log)}
-
-
-def describe(log: Log) -> str:
-    """What a log holds, for the terminal."""
-    lines = [
-        f"{log.path}: {log.about['title']}",
-        f"  scene {log.scene}, recording {log.recording}, {'with' if log.blueprint else 'without'} a blueprint",
-        f"  timelines: {', '.join(log.timelines)}",
-    ]
-    return "\n".join([*lines, *(f"  {line}" for line in SHOW[log.kind][1](log))])
-
-
-def _run_json(log: Log) -> dict[str, Any]:
-    """FRFs as [response][reference][line]."""
-    frfs = {
-        test: {
-            "frequency_Hz": frf.frequency.tolist(),
-            "response_nodes": list(frf.response_nodes),
-            "reference_nodes": list(frf.reference_nodes),
-            "quantity": frf.quantity,
-            "real": frf.value.real.tolist(),
-            "imag": frf.value.imag.tolist(),
-        }
-        for test, frf in log.frfs.items()
-    }
-    return {"temperatures_C": list(log.temperatures), "frfs": frfs}
-
-
-def _run_words(log: Log) -> list[str]:
-    lines = [f"temperatures: {', '.join(f'{t:g}' for t in log.temperatures)} C"]
-    groups: dict[str, list[int]] = {}
-    for entity, rows in log.entities.items():
-        groups.setdefault(entity.split("/")[1], []).append(rows)
-    lines += [f"{name}: {len(rows)} entities, {sum(rows)} rows" for name, rows in groups.items() if name != "__properties"]
-    for test, frf in log.frfs.items():
-        nodes = [" ".join(map(str, side)) for side in (frf.response_nodes, frf.reference_nodes)]
-        first, second, last = frf.frequency[[0, 1, -1]]
-        lines.append(
-            f"FRFs of {test}: {frf.quantity}, responses {nodes[0]}, references {nodes[1]}, "
-            f"{len(frf.frequency)} lines from {first:g} to {last:g} Hz every {second - first:.4g} Hz"
-        )
-    for source, test in dict.fromkeys((p.source, p.test) for p in log.peaks):
-        own = [p.frequency for p in log.peaks if (p.source, p.test) == (source, test)]
-        lines.append(f"peaks {source}, {test}: {', '.join(f'{f:.1f}' for f in own)} Hz")
-    return lines
-
-
-def _map_json(log: Log) -> dict[str, Any]:
-    temperatures, speeds, modes = log.grid
-    return {
-        "grid": {"temperature_C": temperatures.tolist(), "speed_rpm": (speeds / RPM).tolist()},
-        "modes_Hz": [[[float(f) if np.isfinite(f) else None for f in row] for row in m] for m in modes],
-        "coincidences": log.rows("/numbers/coincidences"),
-    }
-
-
-def _map_words(log: Log) -> list[str]:
-    (count, modes, speeds), coincidences = log.grid[2].shape, log.rows("/numbers/coincidences")
-    return [
-        f"resonance map: {modes} modes at {count} temperatures x {speeds} speeds, {len(coincidences)} coincidences",
-        *(
-            f"{c['line']} with mode {c['mode']} at {c['temperature_C']:.1f} C, {c['speed_rpm']:.0f} rpm, {c['frequency_Hz']:.1f} Hz"
-            for c in coincidences[:10]
-        ),
-    ]
-
-
-def _runout_json(log: Log) -> dict[str, Any]:
-    """The record as lists in nm."""
-    return {
-        "temperature_C": log.about["temperature_C"],
-        "speed_rpm": log.about["speed_rad_per_s"] / RPM,
-        "revolutions": log.about["revolutions"],
-        "quoted_m": log.quoted,
-        "lines": log.rows("/numbers/lines"),
-        "repeatable_nm": log.signals[:3].tolist(),
-        "nonrepeatable_nm": log.signals[3:].tolist(),
-        "waterfall": [
-            {
-                "speed_rpm": s["speed_rad_per_s"] / RPM,
-                "frequency_Hz": s["frequency"].tolist(),
-                "radial_m": s["radial"].tolist(),
-                "axial_m": s["axial"].tolist(),
-            }
-            for s in log.waterfall
-        ],
-    }
-
-
-def _runout_words(log: Log) -> list[str]:
-    about = log.about
-    lines = [
-        f"turning at {about['speed_rad_per_s'] / RPM:.6g} rpm, {about['temperature_C']:g} C, {about['revolutions']} revolutions, "
-        f"{log.signals.shape[1]} samples of 3 probes"
-    ]
-    for probe, own in log.quoted.items():
-        lines.append(
-            f"{probe}: RRO (repeatable runout) {TO_NM * own['repeatable']:.1f} nm, "
-            f"NRRO (nonrepeatable) {TO_NM * own['nonrepeatable']:.1f} nm peak to valley"
-        )
-    for g in log.rows("/numbers/lines")[:10]:
-        cause = f"{g['name']} {g['bearing']} {g['cause']}".replace("  ", " ").strip()
-        lines.append(f"line {g['frequency']:.2f} Hz, {g['direction']}, {TO_NM * g['amplitude']:.2f} nm: {cause}")
-    if log.waterfall:
-        rpm = [s["speed_rad_per_s"] / RPM for s in log.waterfall]
-        lines.append(f"waterfall of {len(rpm)} speeds from {rpm[0]:.0f} to {rpm[-1]:.0f} rpm")
-    return lines
-
-
-def _study_json(log: Log) -> dict[str, Any]:
-    """Columns of numbers as they stand in the results, null where a row has none."""
-    told = {key: log.about[key] for key in ("title", "kind", "cases", "rows", "errors")}
-    table = log.table("/numbers/rows")
-    return told | {"columns": {name: [v if v == v else None for v in values] for name, values in table.items()}}
-
-
-def _study_words(log: Log) -> list[str]:
-    about = log.about
-    lines = [f"{about['kind']} of {about['cases']} cases: {about['rows']} rows, {about['errors']} without a result"]
-    for name, values in log.table("/numbers/rows").items():
-        known = [v for v in values if v == v]
-        lines.append(f"{name}: {len(known)} of {len(values)} known" + (f", {min(known):.6g} to {max(known):.6g}" if known else ""))
-    return lines
-
-
-SHOW: dict[str, tuple[Callable[[Log], dict[str, Any]], Callable[[Log], list[str]]]] = {
-    "run": (_run_json, _run_words),
-    "map": (_map_json, _map_words),
-    "runout": (_runout_json, _runout_words),
-    "study": (_study_json, _study_words),
-}

@@ -20,7 +20,7 @@ from thermospindle.model.machine import Spindle
 from thermospindle.model.units import RPM, TO_UM
 from thermospindle.report.figures.common import STYLE, save, svg
 from thermospindle.report.figures.runout import motion_figure, place_of, spectrum_figure
-from thermospindle.report.log.runout import write_runout_log
+from thermospindle.report.log.turning.runout import write_runout_log
 from thermospindle.report.text.grid import grid, show_grid
 from thermospindle.report.typeset import figure, table, write_csv
 from thermospindle.sim.operating import provenance

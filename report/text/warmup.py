@@ -128,7 +128,7 @@ def show_warmup(console: Console, warmup: Warmup) -> None:
     show_grid(console, title, columns, [*rows, ["steady", *_cells(warmup.steady, bearings, warmup.steady_frequencies, scale)]])
     kinds = ", ".join(f"f{k} {m.kind}" for k, m in enumerate(warmup.modes, 1))
     console.print(f"Bearings, coolest and hottest region; {kinds}.")
-    total = _heat(warmup)
+    total = heat_sums(warmup)
     console.print(
         f"Slowest time constant {warmup.time_constant:.0f} s. Heat of the whole time: motor {total['motor']} and bearings "
         f"{total['friction']} in, convection {total['convection']} out, {total['stored']} stored."
@@ -148,7 +148,7 @@ def lost_contact(warmup: Warmup) -> str:
     return ""
 
 
-def _heat(warmup: Warmup) -> dict[str, str]:
+def heat_sums(warmup: Warmup) -> dict[str, str]:
     """Where the heat of the whole time came from and went, in joules or kilojoules."""
     total = energy(warmup)
     large = max(map(abs, total.values())) >= 1e4
@@ -178,7 +178,7 @@ def _shown(times: Array) -> list[int]:
 
 def warmup_section(warmup: Warmup) -> tuple[str, str]:
     """Title and HTML of a report section."""
-    last, total = warmup.steady, _heat(warmup)
+    last, total = warmup.steady, heat_sums(warmup)
     bearings = ", ".join(f"{b} {t:.1f}" for b, t in last.bearing_temperatures.items())
     first = warmup.spindle.bearings[0].name
     shifts = ", ".join(

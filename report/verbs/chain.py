@@ -15,6 +15,7 @@ from thermospindle.model.rotor.elements import ELEMENTS
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import NM, RPM
 from thermospindle.report.folder import mark, whole_folder
+from thermospindle.report.log.impact import write_impact_log
 from thermospindle.report.text import run as text
 from thermospindle.report.verbs.answer import (
     Answer,
@@ -69,7 +70,7 @@ def impact(
     effect_files: Sequence[Path] = (),
     out: Path | None = None,
 ) -> Answer:
-    """A virtual impact-hammer test and the modes it shows; a folder holds it as a campaign."""
+    """A virtual impact-hammer test and the modes it shows; a folder holds it as a campaign and a Rerun log of every hit, the FRFs and the peaks."""
     asked = dict(locals())
     spindle = with_hammer(with_effects(scene, effect_files)[0], hits, level)
     result = _virtual_tests(spindle, [temperature_or_reference(temperature, spindle)], speed_rpm, element, seed)
@@ -78,7 +79,7 @@ def impact(
         lambda console: text.show_impact(console, result.steps[0]),
         out,
         {"verb": "impact"} | asked,
-        lambda folder, _: text.write_campaign_of(result, folder / "campaign"),
+        lambda folder, _: _write_impact(result, folder),
         _doubts(result),
     )
 
@@ -165,6 +166,11 @@ def report(
 def _virtual_tests(spindle: Spindle, temperatures: Sequence[float], speed_rpm: float, element: str, seed: int) -> Run:
     with progress_bar(2 * len(temperatures) + stages(spindle.hammer, len(temperatures))) as progress:
         return whole_chain(spindle, temperatures, speed_rpm * RPM, element, seed, progress)
+
+
+def _write_impact(result: Run, folder: Path) -> None:
+    text.write_campaign_of(result, folder / "campaign")
+    write_impact_log(result, folder / "impact.rrd")
 
 
 def _doubts(result: Run) -> list[str]:

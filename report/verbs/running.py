@@ -13,7 +13,8 @@ from thermospindle.model.drawn import drawn
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import MINUTE, RPM
-from thermospindle.report.log.map import write_map_log
+from thermospindle.report.log.turning.map import write_map_log
+from thermospindle.report.log.turning.warmup import write_warmup_log
 from thermospindle.report.text.resonance import map_json, show_map, write_map
 from thermospindle.report.text.runout import runout_json, show_runout, write_runout
 from thermospindle.report.text.warmup import lost_contact, show_warmup, warmup_json, write_warmup
@@ -30,7 +31,7 @@ from thermospindle.sim.resonance.found import ResonanceMap
 from thermospindle.sim.resonance.map import resonance_map, stages
 from thermospindle.sim.running.runout import looked_at, with_imperfections
 from thermospindle.sim.running.runout import runout as simulated_runout
-from thermospindle.sim.warmup import STAGES, warm_up
+from thermospindle.sim.warmup import STAGES, Warmup, warm_up
 
 STEPS_OF_TEMPERATURE, STEPS_OF_SPEED = 21, 41  # of a resonance map
 
@@ -83,7 +84,7 @@ def warmup(
     effect_files: Sequence[Path] = (),
     out: Path | None = None,
 ) -> Answer:
-    """From a uniform `temperature` (C) at a speed, the scene's nominal one or 0 for a `soak` in air of another temperature; a folder holds CSV and figure."""
+    """From a uniform `temperature` (C) at a speed, the scene's nominal one or 0 for a `soak` in air of another temperature; a folder holds CSV, figure and a Rerun log."""
     asked = dict(locals()) | {"verb": "warmup"}
     if minutes is not None and minutes <= 0:
         raise BadInput(f"--minutes {minutes:g}: a warm-up lasts longer than nothing; name a positive number")
@@ -100,7 +101,7 @@ def warmup(
         lambda console: show_warmup(console, found),
         out,
         asked,
-        lambda folder, _: write_warmup(found, folder),
+        lambda folder, _: _write_warmup(found, folder),
         [*([lost] if lost else []), *doubts],
     )
 
@@ -135,6 +136,11 @@ def resonances(
         lambda folder, _: _write_map(found, folder),
         sense.of_conditions(spindle, conditions),
     )
+
+
+def _write_warmup(found: Warmup, folder: Path) -> None:
+    write_warmup(found, folder)
+    write_warmup_log(found, folder / "warmup.rrd")
 
 
 def _write_map(found: ResonanceMap, folder: Path) -> None:

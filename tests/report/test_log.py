@@ -22,8 +22,9 @@ from thermospindle.report.figures import run as figures
 from thermospindle.report.log import content as log_content
 from thermospindle.report.log import pictures
 from thermospindle.report.log import run as log
-from thermospindle.report.log.read import describe, read_log
+from thermospindle.report.log.read import read_log
 from thermospindle.report.log.run import write_log
+from thermospindle.report.log.told import describe
 from thermospindle.sim import posing
 from thermospindle.sim.hammer.test import impact_tests
 from thermospindle.sim.operating import operating_point

@@ -19,8 +19,9 @@ from thermospindle.model.imperfections import Imperfections
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import TO_MM
 from thermospindle.report.figures.runout import RANGE, polar_figure, waterfall_figure
-from thermospindle.report.log.read import describe, read_log
-from thermospindle.report.log.runout import log_signals, orbit_pieces, write_runout_log
+from thermospindle.report.log.read import read_log
+from thermospindle.report.log.told import describe
+from thermospindle.report.log.turning.runout import log_signals, orbit_pieces, write_runout_log
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.posing import cage_turns, frame_indices, turning_poses
 from thermospindle.sim.running.runout import X, Y, runout, with_imperfections
@@ -212,7 +213,7 @@ def test_a_file_cut_short_is_refused(share, file, tmp_path):
 def test_nothing_is_left_half_written(record, tmp_path, monkeypatch):
     with pytest.raises(BadInput, match="its folder does not exist"):
         write_runout_log(record, [], tmp_path / "absent" / "runout.rrd")
-    monkeypatch.setattr("thermospindle.report.log.runout.summary", lambda runout: 1 / 0)
+    monkeypatch.setattr("thermospindle.report.log.turning.runout.summary", lambda runout: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         write_runout_log(record, [], tmp_path / "runout.rrd")
     assert list(tmp_path.iterdir()) == []

@@ -41,7 +41,8 @@ from thermospindle.model.bearing.stiffness_table import read_table
 from thermospindle.model.errors import BadInput
 from thermospindle.model.scene.bearing_numbers import Numbers
 from thermospindle.model.scene.reading import load
-from thermospindle.report.log.read import check_readable, describe, read_log
+from thermospindle.report.log.read import check_readable, read_log
+from thermospindle.report.log.told import describe
 from thermospindle.sim.campaign.campaign import read_campaign, write_campaign
 from thermospindle.sim.campaign.published import read_published
 from thermospindle.sim.importing.assemble import campaign_of, read

@@ -15,8 +15,9 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Body, Condition
 from thermospindle.model.rotor.modes import modes
 from thermospindle.model.units import RPM
-from thermospindle.report.log.map import write_map_log
-from thermospindle.report.log.read import describe, log_json, read_log
+from thermospindle.report.log.read import read_log
+from thermospindle.report.log.told import describe, log_json
+from thermospindle.report.log.turning.map import write_map_log
 from thermospindle.report.text.resonance import SAID, map_json, map_section, sentences, told
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.resonance.found import strongest

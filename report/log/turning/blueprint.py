@@ -6,9 +6,8 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from thermospindle.model.units import TO_MM
+from thermospindle.report.log.blueprint import framed
 from thermospindle.report.log.pictures import DARK, view
-from thermospindle.sim.posing import reach
 from thermospindle.sim.running.runout import Runout, looked_at
 
 WATERFALL, POLAR = (6.6, 4.8), (4.2, 3.3)  # inches
@@ -19,8 +18,8 @@ PLAYED = 3.0  # revolutions of the spindle that a second shows
 def blueprint(runout: Runout, factor: float, waterfall: bool) -> rrb.Blueprint:
     """`factor`: by which the model's displacements are enlarged; `waterfall`: whether there is one."""
     cut, turning, where = runout.by_lines, abs(runout.turning), looked_at(runout.point.spindle)
-    r = TO_MM * reach(runout.point.spindle)
-    eye = rrb.EyeControls3D(position=(1.8 * r, -1.4 * r, 1.9 * r), look_target=(0.1 * r, -0.1 * r, 0.1 * r), eye_up=(0, 0, 1))
+    _, r, z = framed(runout.point.spindle)
+    eye = rrb.EyeControls3D(position=(1.8 * r, -1.4 * r, z + 1.9 * r), look_target=(0.1 * r, -0.1 * r, z + 0.1 * r), eye_up=(0, 0, 1))
     title = f"Displacements × {factor:g}, {PLAYED:g} revolutions a second"
     model = rrb.Spatial3DView(origin="model", name=title, eye_controls=eye, line_grid=False, background=DARK)
     span = 1.1e9 * float(np.abs(cut.value[:2] - cut.value[:2].mean(axis=(1, 2), keepdims=True)).max()) or 1.0

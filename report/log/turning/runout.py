@@ -21,7 +21,7 @@ from thermospindle.report.figures.runout import polar_figure, waterfall_figure
 from thermospindle.report.log.blueprint import at
 from thermospindle.report.log.columns import any_values, log_mesh, number_column, whole_log
 from thermospindle.report.log.pictures import log_figure
-from thermospindle.report.log.runout_blueprint import POLAR, WATERFALL, blueprint
+from thermospindle.report.log.turning.blueprint import POLAR, WATERFALL, blueprint
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.posing import body_meshes, cage_turns, frame_indices, turning_poses
 from thermospindle.sim.running.runout import AXIAL, Runout, X, Y

@@ -1,0 +1,123 @@
+"""The Rerun log of a warm-up: its numbers are those of `warmup.csv`, and the section has the colours of its temperatures."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rerun.chunk import RrdReader
+
+import thermospindle as ts
+from thermospindle.model.errors import BadInput
+from thermospindle.model.machine import Spindle
+from thermospindle.model.units import RPM
+from thermospindle.report.log import told
+from thermospindle.report.log.drawing import HEAT
+from thermospindle.report.log.turning import warmup as log
+from thermospindle.report.text.warmup import rows, warmup_json
+from thermospindle.sim.warmup import Warmup, warm_up
+
+
+@pytest.fixture(scope="module")
+def warm(spindle: Spindle) -> Warmup:
+    return warm_up(spindle, 7200 * RPM, 20.0, duration=200.0)
+
+
+@pytest.fixture(scope="module")
+def file(warm: Warmup, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("log") / "warmup.rrd"
+    log.write_warmup_log(warm, path)
+    return path
+
+
+def test_numbers_come_back_bit_for_bit(warm: Warmup, file: Path) -> None:
+    contents = ts.read_log(file)
+    assert (contents.kind, contents.scene, contents.timelines, contents.blueprint) == ("warmup", "hdd_2003", ("time",), True)
+    header, body = rows(warm)
+    table = contents.table("/numbers/warmup")
+    assert set(table) == set(header)
+    for name, column in zip(header, np.array(body).T, strict=True):
+        np.testing.assert_array_equal(table[name], column, err_msg=name)
+
+
+def test_what_is_drawn_is_what_was_computed(warm: Warmup, file: Path) -> None:
+    answer, drawn = warmup_json(warm), log.series(warm)
+    assert drawn["Preload, N"]["lower"][0].tolist() == answer["preload_N"]
+    assert drawn["Bearings, °C"]["upper"][0].tolist() == answer["bearings"]["upper"]["temperature_C"]
+    assert sum(drawn["Friction heat, mW"][b][0] for b in ("lower", "upper")) == pytest.approx(1e3 * np.array(answer["friction_W"]), rel=1e-12)
+    shift = np.array(answer["frequencies_Hz"], float)[:, 0] - answer["frequencies_Hz"][0][0]
+    name = f"1 axial {answer['frequencies_Hz'][0][0]:.0f} Hz"
+    assert drawn["Natural frequencies, Hz of change since the start"][name][0].tolist() == shift.tolist()
+    contents = ts.read_log(file)
+    assert contents.entities["/series/Preload\\,\\ N/lower"] == len(warm.times) + 1  # the series and its look
+
+
+def test_the_section_has_the_colours_of_its_temperatures(warm: Warmup, file: Path) -> None:
+    """Red where and when the section is hottest, blue all over at the start."""
+    colours: dict[str, np.ndarray] = {}
+    for chunk in RrdReader(file).stream():
+        batch = chunk.to_record_batch()
+        for name in batch.schema.names:
+            if chunk.entity_path.startswith("/section/") and name.endswith("vertex_colors"):
+                packed = np.array(batch.column(name).to_pylist(), np.uint32)
+                colours[chunk.entity_path] = (packed[..., None] >> np.array([24, 16, 8])) & 255
+    assert set(colours) == {f"/section/{part}/{side}" for part in ("stationary", "rotating") for side in ("left", "right")}
+    model = warm.history.model
+    for part, span in model.spans.items():
+        mesh = model.sections[part].mesh
+        own = colours[f"/section/{part}/right"]
+        assert own.shape == (len(warm.times), mesh.p.shape[1], 3)
+        assert np.abs(own[0] - HEAT[0]).max() <= 1
+        corners = warm.history.nodal[:, span][:, : mesh.p.shape[1]]
+        k, node = np.unravel_index(np.argmax(corners), corners.shape)
+        nearly = (corners[k, node] - warm.history.nodal.min()) / np.ptp(warm.history.nodal)
+        wanted = [np.interp(nearly, np.linspace(0, 1, len(HEAT)), channel) for channel in HEAT.T]
+        assert own[k, node] == pytest.approx(np.array(wanted), abs=1.0)
+
+
+def test_corners_come_first_among_nodal_values(warm: Warmup) -> None:
+    """On what the colours rest: the heat model's nodes begin with the mesh's corners."""
+    from skfem import Basis
+
+    from thermospindle.thermal.mesh import element
+
+    for section in warm.history.model.sections.values():
+        corners = section.mesh.p.shape[1]
+        assert Basis(section.mesh, element(section.mesh)).doflocs[:, :corners] == pytest.approx(section.mesh.p)
+
+
+def test_json_and_words(warm: Warmup, file: Path) -> None:
+    contents = ts.read_log(file)
+    answer = json.loads(json.dumps(told.log_json(contents)))
+    assert answer["speed_rpm"] == pytest.approx(7200)
+    assert answer["columns"]["preload of lower bearing_N"] == [m.preload["lower"] for m in warm.moments]
+    words = told.describe(contents)
+    first, last = warm.moments[0], warm.moments[-1]
+    assert "warm-up from 20 C in air of 20 C at 7200 rpm" in words
+    assert f"preload of lower bearing_N: {first.preload['lower']:.6g} to {last.preload['lower']:.6g}" in words
+
+
+def test_the_summary_says_start_end_and_steady(warm: Warmup) -> None:
+    text = log.summary(warm)
+    first, last = warm.moments[0], warm.moments[-1]
+    values = " | ".join(f"{m.preload['lower']:.2f}" for m in (first, last, warm.steady))
+    assert f"| lower preload, N | {values} |" in text
+    assert f"Slowest time constant {warm.time_constant:.0f} s." in text
+
+
+def test_a_lost_mode_is_null(warm: Warmup, tmp_path: Path) -> None:
+    from dataclasses import replace
+
+    frequencies = warm.frequencies.copy()
+    frequencies[-1, 0] = np.nan
+    log.write_warmup_log(replace(warm, frequencies=frequencies), tmp_path / "lost.rrd")
+    column = told.log_json(ts.read_log(tmp_path / "lost.rrd"))["columns"]["mode 1 axial_Hz"]
+    assert column[-1] is None
+    assert None not in column[:-1]
+
+
+def test_an_absent_folder(warm: Warmup, tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match=r"absent/warmup\.rrd: its folder does not exist"):
+        log.write_warmup_log(warm, tmp_path / "absent" / "warmup.rrd")
