@@ -2,6 +2,7 @@
 
     python -m tests.faults.launch FOLDER N COUNT VERB ...      N = 0: never; how many acts there were is written to the file COUNT
 
+With N = -1 it lives, and copies the folder to COUNT.copies/K before its K-th act: what a SIGKILL there would leave, for every K of one run.
 An act is what the interpreter's audit hooks tell: a file opened to be written, a folder made, something renamed or removed. `save` is no verb of
 the command line but the workbench's: SCENE CAMPAIGN OUT.
 """
@@ -9,6 +10,7 @@ the command line but the workbench's: SCENE CAMPAIGN OUT.
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import sys
 from pathlib import Path
@@ -17,8 +19,8 @@ WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC
 ACTS = {"os.rename", "os.mkdir", "os.remove", "os.rmdir", "os.truncate"}
 
 
-def watch(folder: str, last: int) -> list[int]:
-    """Counts from now on, in a list of one; this process is killed before act number `last` happens."""
+def watch(folder: str, last: int, copies: Path | None = None) -> list[int]:
+    """Counts from now on, in a list of one; this process is killed before act number `last` happens, or the folder copied before every one."""
     count = [0]
     me = os.getpid()
 
@@ -33,6 +35,8 @@ def watch(folder: str, last: int) -> list[int]:
             return
         if isinstance(path, str | bytes | os.PathLike) and os.fsdecode(path).startswith(folder) and os.getpid() == me:
             count[0] += 1
+            if copies is not None:
+                shutil.copytree(folder, copies / str(count[0]))
             if count[0] == last:
                 os.kill(me, signal.SIGKILL)
 
@@ -65,7 +69,7 @@ def main() -> int:
         from thermospindle.cli import main as spindle
 
         run = lambda: spindle(command)  # noqa: E731
-    count = watch(folder, int(last))
+    count = watch(folder, int(last), Path(f"{told}.copies") if last == "-1" else None)
     try:
         code = run()
     finally:
