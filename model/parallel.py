@@ -14,7 +14,10 @@ import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from functools import lru_cache, partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
+from uuid import uuid4
 
 import cloudpickle
 from loky import cpu_count, get_reusable_executor
@@ -49,7 +52,7 @@ def in_parallel(
     """`[function(item) for item in items]`, by so many processes (as many as there are cores where none are named).
 
     `done` is called here with every result, in order. The function must neither rely on nor change what is outside it: then the results
-    are the same to the last bit. It is sent to each worker once, and what it holds lives there as long as it is used, so large
+    are the same to the last bit. Each worker reads it once, and what it holds lives there as long as it is used, so large
     things belong into it (`functools.partial`) and small ones into the items. Whatever it raises is raised here.
 
     Workers that do not run yet are started only after as much work has been done here as starting them costs: so little work never
@@ -75,11 +78,14 @@ def _sent(function: Callable[[Item], Result], items: list[Item], workers: int) -
     workers = _last[0] if _running(workers) else workers  # a pool that is larger is not made smaller
     warnings.filterwarnings("ignore", "A worker was restarted", UserWarning)  # which loses nothing, and is no news to whoever waits
     pool = get_reusable_executor(workers, timeout=IDLE, initializer=_begin, initargs=(os.getpid(),), env=ENVIRONMENT)
-    try:
-        yield from pool.map(partial(_call, cloudpickle.dumps(function)), items)
-    except KeyboardInterrupt:
-        pool.shutdown(kill_workers=True)
-        raise
+    with TemporaryDirectory(prefix="thermospindle-") as folder:  # a pool sends with every item what it is to call
+        sent = Path(folder) / uuid4().hex
+        sent.write_bytes(cloudpickle.dumps(function))
+        try:
+            yield from pool.map(partial(_call, sent), items)
+        except KeyboardInterrupt:
+            pool.shutdown(kill_workers=True)
+            raise
     _last = workers, time.monotonic()
 
 
@@ -113,9 +119,9 @@ def _leave_with(parent: int) -> None:
 
 
 @lru_cache(maxsize=2)
-def _function(pickled: bytes) -> Callable[[Any], Any]:
-    return cloudpickle.loads(pickled)
+def _function(sent: Path) -> Callable[[Any], Any]:
+    return cloudpickle.loads(sent.read_bytes())
 
 
-def _call(pickled: bytes, item: Any) -> Any:
-    return _function(pickled)(item)
+def _call(sent: Path, item: Any) -> Any:
+    return _function(sent)(item)

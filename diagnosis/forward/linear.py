@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -24,22 +25,8 @@ class Linear:
 
 
 @dataclass(frozen=True, eq=False)
-class Rates:
-    """Derivatives (k, n, n) of mass, damping and stiffness of every test by the nuisance parameters `numbers` (k,)."""
-
-    numbers: tuple[Integers, ...]
-    mass: tuple[Array, ...]
-    damping: tuple[Array, ...]
-    stiffness: tuple[Array, ...]
-
-    @cached_property
-    def products(self) -> list[Products]:
-        return [products(*of_test) for of_test in zip(self.mass, self.damping, self.stiffness, strict=True)]
-
-
-@dataclass(frozen=True, eq=False)
 class Products:
-    """Changes of M, C and K by k parameters as sums of few products of two vectors, for an element moves few degrees of freedom: the change of
+    """Changes of M, C and K by `count` parameters as sums of few products of two vectors, for an element moves few degrees of freedom: the change of
     the dynamic stiffness by parameter `of`[i] is the sum over its rows r of s^`power`[r] `left`[:, r] `right`[:, r]^T, of which `first`[i] is the first."""
 
     count: int
@@ -51,26 +38,55 @@ class Products:
 
 
 def products(mass: Array, damping: Array, stiffness: Array) -> Products:
-    """The products of dM, dC, dK (k, n, n), to `EXACT` of the largest of each."""
-    of, first, left, right = [], [], [], []
+    """The products of one parameter's dM, dC, dK (n, n), to `EXACT` of the largest of each."""
+    n = len(mass)
     power: list[int] = []
-    for k in range(len(mass)):
-        start = len(power)
-        for exponent, change in ((2, mass[k]), (1, damping[k]), (0, stiffness[k])):
-            if change.any():
-                u, size, v = np.linalg.svd(change)
-                kept = np.flatnonzero(size > EXACT * size[0])
-                power += [exponent] * len(kept)
-                left.append(u[:, kept] * size[kept])
-                right.append(v[kept].T)
-        if len(power) > start:
-            of.append(k)
-            first.append(start)
-    n = mass.shape[1]
-    none = [np.zeros((n, 0))]
+    left, right = [np.zeros((n, 0))], [np.zeros((n, 0))]
+    for exponent, change in ((2, mass), (1, damping), (0, stiffness)):
+        rows, columns = np.flatnonzero(change.any(axis=1)), np.flatnonzero(change.any(axis=0))
+        if len(rows):
+            u, size, v = np.linalg.svd(change[np.ix_(rows, columns)], full_matrices=False)
+            kept = np.flatnonzero(size > EXACT * size[0])
+            power += [exponent] * len(kept)
+            left.append(np.zeros((n, len(kept))))
+            right.append(np.zeros((n, len(kept))))
+            left[-1][rows], right[-1][columns] = u[:, kept] * size[kept], v[kept].T
+    moves = np.zeros(min(len(power), 1), int)
+    return Products(1, moves, moves, np.array(power, int), np.concatenate(left, axis=1), np.concatenate(right, axis=1))
+
+
+def pairs(vectors: Array, power: int, i: Integers, j: Integers, size: Array) -> Products:
+    """Products of k parameters, of each `size` s^`power` (u_i u_j^T + u_j u_i^T), u the columns of `vectors` (n, m)."""
+    every, k = np.arange(len(i)), len(i)
+    both = np.stack([i, j], axis=1)
+    return Products(k, every, 2 * every, np.full(2 * k, power), vectors[:, both.ravel()] * np.repeat(size, 2), vectors[:, both[:, ::-1].ravel()])
+
+
+def together(every: Sequence[Products]) -> Products:
+    """All parameters of several, one after the other."""
+    counts, rows = np.cumsum([0, *(p.count for p in every)]), np.cumsum([0, *(len(p.power) for p in every)])
     return Products(
-        len(mass), np.array(of, int), np.array(first, int), np.array(power, int), np.concatenate(left or none, axis=1), np.concatenate(right or none, axis=1)
-    )
+        int(counts[-1]), np.concatenate([p.of + n for p, n in zip(every, counts, strict=False)]),
+        np.concatenate([p.first + n for p, n in zip(every, rows, strict=False)]), np.concatenate([p.power for p in every]),
+        np.concatenate([p.left for p in every], axis=1), np.concatenate([p.right for p in every], axis=1),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Rates:
+    """Derivatives of mass, damping and stiffness of every test by the nuisance parameters `numbers` (k,), each by itself."""
+
+    numbers: tuple[Integers, ...]
+    each: tuple[tuple[Products, ...], ...]
+
+    @cached_property
+    def products(self) -> list[Products]:
+        """Of every test those by all its parameters."""
+        return [together(of_test) for of_test in self.each]
+
+    def __getstate__(self) -> dict:
+        """Without what was worked out: it is on its way to another process."""
+        return {"numbers": self.numbers, "each": self.each}
 
 
 def same_chain(a: Measurement, b: Measurement) -> bool:

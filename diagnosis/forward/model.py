@@ -16,7 +16,7 @@ import numpy as np
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.mode_table import ModeData
 from thermospindle.diagnosis.forward import nuisance as kinds_of
-from thermospindle.diagnosis.forward.linear import Linear, Rates, products, same_chain
+from thermospindle.diagnosis.forward.linear import Linear, Products, Rates, pairs, products, same_chain, together
 from thermospindle.diagnosis.forward.nuisance import Nuisance, ReferenceModes, Resonance, nuisances, reference_modes
 from thermospindle.diagnosis.forward.response import Light, Response
 from thermospindle.diagnosis.forward.table import mode_jacobian, mode_residual
@@ -268,7 +268,7 @@ class CampaignModel:
         left zero for whoever has further parameters."""
         data, linear = self.tests[t], self.linear(t, x, effects)
         if isinstance(data, ModeData):
-            r, found = mode_jacobian(data, linear, [(rates.mass[t], rates.damping[t], rates.stiffness[t]), *self._by_discrepancies(t, linear)])
+            r, found = mode_jacobian(data, linear, together([rates.products[t], *self._by_discrepancies(t, linear)]))
             numbers = np.concatenate([rates.numbers[t], *[row[0] for row in self._discrepancies[t]]])
             return r, np.concatenate([found, np.zeros((more, len(r)))]), numbers
         response = self._standing(t, x, effects, linear)
@@ -302,15 +302,10 @@ class CampaignModel:
             at = fill(at, response.by_light(light) * np.array([self.parameters[i].sd for i in of_light])[:, None, None, None])
         return self.whitened(t, response.value, data.value), jacobian.reshape(len(jacobian), -1), numbers
 
-    def _by_discrepancies(self, t: int, linear: Linear) -> list[tuple[Array, Array, Array]]:
-        """Derivatives (k, n, n) of M, C and K of test `t` by the discrepancies of stiffness, and by those of damping."""
-        w, found = self.reference.over(linear.matrices.dofs).T, []
-        for of_damping, (_, i, j, whole) in enumerate(self._discrepancies[t]):
-            size = whole * np.where(i == j, 0.5, 1.0)
-            outer = size[:, None, None] * (w[i][:, :, None] * w[j][:, None, :] + w[j][:, :, None] * w[i][:, None, :])
-            zero = np.zeros_like(outer)
-            found.append((zero, outer, zero) if of_damping else (zero, zero, outer))
-        return found
+    def _by_discrepancies(self, t: int, linear: Linear) -> list[Products]:
+        """What discrepancies of stiffness change in test `t`, and those of damping."""
+        w = self.reference.over(linear.matrices.dofs)
+        return [pairs(w, power, i, j, size * np.where(i == j, 0.5, 1.0)) for power, (_, i, j, size) in enumerate(self._discrepancies[t])]
 
     def column(self, t: int, x: Array, first: Applied, second: Applied, apart: float) -> Array:
         """(residual at `second` - residual at `first`) / apart, (N,): the derivative by what differs between two lists of effects.
@@ -324,7 +319,7 @@ class CampaignModel:
             return (mode_residual(data, moved) - mode_residual(data, at)) / apart
         response = self._standing(t, x, first, at)
         if same:
-            difference = [(getattr(moved.matrices, k) - getattr(at.matrices, k))[None] / apart for k in ("mass", "damping", "stiffness")]
+            difference = [(getattr(moved.matrices, k) - getattr(at.matrices, k)) / apart for k in ("mass", "damping", "stiffness")]
             return self.whitened(t, response.moved(products(*difference))[0], 0.0)
         return self.whitened(t, (self._response(t, x, moved).value - response.value) / apart, 0.0)
 
@@ -332,16 +327,16 @@ class CampaignModel:
 
     def rates(self, x: Array, effects_of: Sequence[Applied], old: Rates | None = None) -> Rates:
         """dM, dC, dK by build tolerances, ring expansion and temperature, for every test; what structure alone moves is kept from `old`."""
-        numbers, mass, damping, stiffness = [], [], [], []
+        numbers, each = [], []
         for t, effects in enumerate(effects_of):
             base = self.operating(t, x, effects)
             at = matrices(base.chain)
             own = [*range(len(self.build)), *self._expansion, self._temperature[t]]
-            kept = old if old is not None and old.stiffness[t].shape[-1] == len(at.stiffness) else None
-            found: list[tuple[Array, Array, Array]] = []
+            kept = old.each[t] if old is not None and len(old.each[t][0].left) == len(at.stiffness) else ()
+            found = []
             for k, i in enumerate(own):
                 if kept and k < len(self.build) and self._structural[k]:
-                    found.append((kept.mass[t][k], kept.damping[t][k], kept.stiffness[t][k]))
+                    found.append(kept[k])
                     continue
                 step = x.copy()
                 step[i] += STEP
@@ -354,14 +349,10 @@ class CampaignModel:
                     apart = -STEP
                 if moved.dofs != at.dofs:
                     moved = at
-                changes = moved.mass - at.mass, moved.damping - at.damping, moved.stiffness - at.stiffness
-                found.append((changes[0] / apart, changes[1] / apart, changes[2] / apart))
-            by_mass, by_damping, by_stiffness = (np.array(v) for v in zip(*found, strict=True))
+                found.append(products(*((getattr(moved, w) - getattr(at, w)) / apart for w in ("mass", "damping", "stiffness"))))
             numbers.append(np.array(own))
-            mass.append(by_mass)
-            damping.append(by_damping)
-            stiffness.append(by_stiffness)
-        return Rates(tuple(numbers), tuple(mass), tuple(damping), tuple(stiffness))
+            each.append(tuple(found))
+        return Rates(tuple(numbers), tuple(each))
 
     @cached_property
     def _structural(self) -> list[bool]:

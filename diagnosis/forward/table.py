@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from thermospindle.diagnosis.data.mode_table import ModeData
-from thermospindle.diagnosis.forward.linear import Linear
+from thermospindle.diagnosis.forward.linear import Linear, Products
 from thermospindle.model.rotor.modes import kinds, oscillating, poles, poles_below
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.identification import pairing
@@ -41,13 +39,13 @@ def mode_residual(data: ModeData, linear: Linear) -> Array:
     return np.concatenate([by_frequency, by_damping])
 
 
-def mode_jacobian(data: ModeData, linear: Linear, rates: Sequence[tuple[Array, Array, Array]]) -> tuple[Array, Array]:
-    """Residual (N,) of a table of modes and its derivatives (k, N) by what changes M, C and K at `rates`, stacks of (k_i, n, n) each: first-order
-    perturbation of the poles, -left (p^2 dM + p dC + dK) right (Lancaster 1964, AIAA J. 2, 1659)."""
+def mode_jacobian(data: ModeData, linear: Linear, by: Products) -> tuple[Array, Array]:
+    """Residual (N,) of a table of modes and its derivatives (k, N) by the parameters that change M, C and K as `by` says: first-order perturbation of
+    the poles, -left (p^2 dM + p dC + dK) right (Lancaster 1964, AIAA J. 2, 1659)."""
     found, partner, p = partners(data, linear)
     pole, right, left = p.value[found][partner], p.right[:, found][:, partner], p.left[found][partner]
-    m, c, k = (np.concatenate([of[i] for of in rates]) for i in range(3))
-    moved = -sum(power * np.einsum("mi,kij,jm->mk", left, d, right) for power, d in ((pole[:, None] ** 2, m), (pole[:, None], c), (1.0, k)))
+    moved = np.zeros((len(pole), by.count), complex)
+    moved[:, by.of] = -np.add.reduceat(pole[:, None] ** by.power * (left @ by.left) * (right.T @ by.right), by.first, axis=1)
     by_frequency = (moved * pole.conj()[:, None]).real / np.abs(pole[:, None]) ** 2
     by_damping = moved.real / pole.real[:, None] - by_frequency
     known = np.isfinite(data.damping_sd)

@@ -6,6 +6,7 @@ import sys
 import time
 from functools import partial
 
+import cloudpickle
 import numpy as np
 import pytest
 
@@ -64,6 +65,23 @@ def test_closures_travel_and_what_they_hold_stays_in_the_worker(at_once):
     for worker in {pid for pid, _ in found}:
         counts = [n for pid, n in found if pid == worker]
         assert counts == list(range(1, len(counts) + 1))  # sent once to each worker, not with every item
+
+
+def test_what_the_function_holds_does_not_travel_with_every_item(at_once, monkeypatch):
+    """A pool sends with every item what it is to call: of ten million bytes that a function holds next to nothing."""
+    sent = []
+
+    class Pool:
+        def map(self, function, items):
+            sent.extend(len(cloudpickle.dumps((function, item))) for item in items)
+            return map(function, items)
+
+    monkeypatch.setattr(parallel, "get_reusable_executor", lambda *_, **__: Pool())
+    monkeypatch.setattr(parallel, "_last", (0, 0.0))
+    held = np.arange(1_250_000.0)
+    assert in_parallel(lambda i: held[i], range(5), 2) == [0.0, 1.0, 2.0, 3.0, 4.0]
+    assert len(sent) == 5
+    assert max(sent) < 1000
 
 
 def test_little_work_is_done_here():

@@ -9,7 +9,7 @@ import pytest
 
 from tests.conftest import ROOT
 from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, truth, virtual_campaign
-from thermospindle.diagnosis.forward.linear import products
+from thermospindle.diagnosis.forward.linear import products, together
 from thermospindle.diagnosis.forward.nuisance import BUILD, DAMPING, DRIFT, EXPANSION, GAIN, RECORD, STIFFNESS, TEMPERATURE
 from thermospindle.diagnosis.forward.response import Response
 from thermospindle.model.machine import Condition
@@ -113,7 +113,7 @@ def test_derivatives_of_records_that_end_early(scene):
     for which in ("mass", "damping", "stiffness"):
         own = getattr(m, which)
         change = own * np.outer(*[random.uniform(0.5, 1.0, n)] * 2)  # of every element, and symmetrical
-        rates = [(change if k == which else np.zeros((n, n)))[None] for k in ("mass", "damping", "stiffness")]
+        rates = [change if k == which else np.zeros((n, n)) for k in ("mass", "damping", "stiffness")]
 
         def at(share, by):
             return Response(replace(linear, matrices=replace(m, **{which: own + by * change})), data, gain, share)  # noqa: B023
@@ -125,11 +125,12 @@ def test_derivatives_of_records_that_end_early(scene):
         i, j = np.array([0, 1]), np.array([0, 3])
         vectors = random.standard_normal((n, 4))
         by_pair = [np.outer(vectors[:, a], vectors[:, b]) + np.outer(vectors[:, b], vectors[:, a]) for a, b in zip(i, j, strict=True)]
-        zero = np.zeros((2, n, n))
+        zero = np.zeros((n, n))
         power = {"mass": 2, "damping": 1, "stiffness": 0}[which]
-        together = at(1.0, 0.0).moved_together(vectors, power, i, j)
-        apart = at(1.0, 0.0).moved(products(*[np.array(by_pair) if k == which else zero for k in ("mass", "damping", "stiffness")]))
-        assert np.abs(together - apart).max() < 1e-9 * np.abs(apart).max()
+        at_once = at(1.0, 0.0).moved_together(vectors, power, i, j)
+        by_each = [products(*[pair if k == which else zero for k in ("mass", "damping", "stiffness")]) for pair in by_pair]
+        apart = at(1.0, 0.0).moved(together(by_each))
+        assert np.abs(at_once - apart).max() < 1e-9 * np.abs(apart).max()
 
 
 def test_parameters_of_other_tests_do_not_move_a_test(scene):
