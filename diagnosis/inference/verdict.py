@@ -293,6 +293,12 @@ def _seen(model: CampaignModel) -> str:
     return f" Taken into account: {one} at {told} that the drawing lacks and every test shows, of a table, a fixture or a cable." if told else ""
 
 
+def _by_another_law(drifting: Names, alike: Mapping[str, frozenset[str]]) -> str:
+    """The effects that change what drifts, where their own laws do not do."""
+    same = sorted(set().union(*(alike.get(name, ()) for name in drifting)))
+    return f", which {' and '.join(same)} would do with a law of its own" if same else ""
+
+
 def _constant(best: Hypothesis, same: Overlap) -> str:
     """What is left where the best explanation still misses the data and misses them alike in all tests."""
     if best.evidence.learned.errors <= STRAIN or same.tests < ALIKE:
@@ -320,6 +326,7 @@ def _reason(found: Search, word: str, effects: Names, candidates, free, none: fl
             place = f"the best leaves {np.sqrt(left.chi2 / left.count):.1f} standard errors{of}, and not the same in every test"
         elif free and free[0].hypothesis.mechanisms:
             place = f"{' and '.join(free[0].names)} would have to drift ({free[0].delta_evidence:.0f} in ln evidence)"
+            place += _by_another_law(free[0].names, found.alike)
         elif free and free[0].names != (UNTOLD,):
             drift = found.base.evidence.learned.sizes[kinds_of.STIFFNESS_DRIFT]
             place = f"every mode drifts from test to test, by {drift:.1g} of its frequency, more than two honest programs differ by"
