@@ -211,9 +211,9 @@ def _factor(information: Array) -> Array:
 
 def _marginal(q: Quadratic, prior: Root) -> _Marginal:
     """What is left of the quadratic without the first parameters, which have that prior."""
-    p, k = prior.beside.shape
+    p = len(prior.scale)
     inner = prior.within(q.a[:p, :p])
-    factor, lower = cho_factor(inner + np.eye(p + k), lower=True)
+    factor, lower = cho_factor(inner + np.eye(len(inner)), lower=True)
     b1 = prior.turned(q.b[:p, None])[:, 0]
     solved_b = cho_solve((factor, lower), b1)
     constant = -0.5 * q.constant + 0.5 * float(b1 @ solved_b) - float(np.log(np.diag(factor)).sum())

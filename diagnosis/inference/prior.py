@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -13,7 +13,7 @@ from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import REFERENCE_DEPARTURE, REFERENCE_WIDTH, Mechanism, size_covariance
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.model.machine import Condition
-from thermospindle.model.types import Array
+from thermospindle.model.types import Array, Integers
 
 REFERENCE = {
     kinds_of.STIFFNESS: kinds_of.STIFFNESS_SD,
@@ -118,15 +118,22 @@ class Root:
     beside: Array
     own: Array
 
+    @cached_property
+    def wide(self) -> Integers:
+        """The nuisances that have a width of their own; r counts these alone."""
+        return np.flatnonzero(self.scale)
+
     def turned(self, matrix: Array) -> Array:
         """R^T `matrix`, (n, c) to (r, c)."""
-        p = len(self.scale)
-        return np.concatenate([self.scale[:, None] * matrix[:p], self.beside.T @ matrix[:p], self.own.T @ matrix[p:]])
+        p, wide = len(self.scale), self.wide
+        return np.concatenate([self.scale[wide, None] * matrix[wide], self.beside.T @ matrix[:p], self.own.T @ matrix[p:]])
 
     def times(self, matrix: Array) -> Array:
         """R `matrix`, (r, c) to (n, c)."""
-        p, k = self.beside.shape
-        return np.concatenate([self.scale[:, None] * matrix[:p] + self.beside @ matrix[p : p + k], self.own @ matrix[p + k :]])
+        w, k = len(self.wide), self.beside.shape[1]
+        nuisances = self.beside @ matrix[w : w + k]
+        nuisances[self.wide] += self.scale[self.wide, None] * matrix[:w]
+        return np.concatenate([nuisances, self.own @ matrix[w + k :]])
 
     def within(self, matrix: Array) -> Array:
         """R^T `matrix` R of a symmetric one, (n, n) to (r, r)."""
