@@ -273,24 +273,24 @@ class CampaignModel:
             return r, np.concatenate([found, np.zeros((more, len(r)))]), numbers
         response = self._standing(t, x, effects, linear)
         own, channel = self._gains[t]
-        pairs = self._discrepancies[t]
+        discrepancies = self._discrepancies[t]
         record = [] if self._record is None else [self._record]
         lights = self.lights(linear.matrices.dofs, x)
-        numbers = np.concatenate([rates.numbers[t], *[row[0] for row in pairs], own, np.array(record, int), *[n for _, n in lights]])
+        numbers = np.concatenate([rates.numbers[t], *[row[0] for row in discrepancies], own, np.array(record, int), *[n for _, n in lights]])
         n_resp, n_ref, lines = response.value.shape
         weight = np.sqrt(2) / data.sd
         jacobian = np.zeros((len(numbers) + more, 2, n_resp, n_ref, lines))
 
         def fill(first: int, moved: ComplexArray) -> int:
-            moved = moved * weight
-            jacobian[first : first + len(moved), 0], jacobian[first : first + len(moved), 1] = moved.real, moved.imag
+            rows = jacobian[first : first + len(moved)]
+            np.multiply(moved.real, weight, out=rows[:, 0])
+            np.multiply(moved.imag, weight, out=rows[:, 1])
             return first + len(moved)
 
         at = fill(0, response.moved(rates.products[t]))
         w = response.over(self.reference.over(linear.matrices.dofs))
-        for power, (_, i, j, whole) in enumerate(pairs):
-            size = whole * np.where(i == j, 0.5, 1.0)
-            at = fill(at, response.moved_together(w, power, i, j) * size[:, None, None, None])
+        for power, (_, i, j, size) in enumerate(discrepancies):
+            at = fill(at, response.moved_together(w, power, i, j, size * np.where(i == j, 0.5, 1.0)))
         for k, c in enumerate(channel):
             if c < n_resp:
                 gain = response.value[c] * weight[c] * self.parameters[own[k]].sd

@@ -85,9 +85,15 @@ class Response:
         return whole
 
     @cached_property
-    def left(self) -> ComplexArray:
-        """What every response reads of a force on the degrees of freedom, (L, n_resp, r)."""
-        return np.asarray(np.linalg.solve(self._dynamic().transpose(0, 2, 1), self._rows.T).transpose(0, 2, 1), complex)
+    def _read(self) -> ComplexArray:
+        """What responses read of a force on each degree of freedom, in the measured quantity, (r, n_resp, L)."""
+        left = np.linalg.solve(self._dynamic().transpose(0, 2, 1), self._rows.T)
+        return np.asarray(np.ascontiguousarray(left.transpose(1, 2, 0)) * self.factor, complex)
+
+    @cached_property
+    def _driven(self) -> ComplexArray:
+        """How references move each degree of freedom, (r, n_ref, L)."""
+        return np.ascontiguousarray(self.right.transpose(1, 2, 0))
 
     @cached_property
     def cut_off(self) -> ComplexArray:
@@ -115,7 +121,7 @@ class Response:
         return self._end if self._cut else None
 
     def over(self, columns: Array) -> Array:
-        """Columns (n, m) of generalised forces in the coordinates (r,) of `left` and `right`."""
+        """Columns (n, m) of generalised forces in the coordinates (r,) of the model that answers."""
         return columns if self._basis is None else self._basis.T @ columns
 
     def by_light(self, light: Light) -> ComplexArray:
@@ -136,7 +142,7 @@ class Response:
     def _modal(self, light: Light) -> tuple[ComplexArray, ComplexArray]:
         """What responses read of a force on each of a light resonance's columns (k, n_resp, L), and how references move these (k, n_ref, L)."""
         of = self.over(light.columns)
-        return (self.left @ of).transpose(2, 1, 0) * self.factor, (of.T @ self.right).transpose(1, 2, 0)
+        return _over(of, self._read), _over(of, self._driven)
 
     def moved(self, by: Products) -> ComplexArray:
         """Derivatives (k, n_resp, n_ref, L) by the parameters of `by`."""
@@ -144,30 +150,37 @@ class Response:
         found: ComplexArray = np.zeros((by.count, n_resp, n_ref, lines), complex)
         if len(by.of):
             left, right = self.over(by.left), self.over(by.right)
-            products = self.read(left)[:, :, None] * self.driven(right, by.power)[:, None]
-            found[by.of] = np.add.reduceat(products, by.first, axis=0)
+            read, driven = self.read(left), self.driven(right, by.power)
+            for k, rows in zip(by.of, map(slice, by.first, [*by.first[1:], len(by.power)]), strict=True):
+                np.einsum("kil,kjl->ijl", read[rows], driven[rows], out=found[k])
             if (end := self._late) is not None:
                 found[by.of] += self._cut * end.moved(np.add.reduceat(end.kicked(left, right, by.power), by.first, axis=0))
         return found
 
-    def moved_together(self, columns: Array, power: int, i: Integers, j: Integers) -> ComplexArray:
-        """Derivatives (k, n_resp, n_ref, L) by factors of s^`power` (u_i u_j^T + u_j u_i^T) in the dynamic stiffness, u the `columns` (r, m)."""
+    def moved_together(self, columns: Array, power: int, i: Integers, j: Integers, size: Array) -> ComplexArray:
+        """Derivatives (k, n_resp, n_ref, L) by factors of `size` (k,) s^`power` (u_i u_j^T + u_j u_i^T) in the dynamic stiffness, u the `columns` (r, m)."""
         left, right = self.read(columns), self.driven(columns, np.full(columns.shape[1], power))
-        found = left[i][:, :, None] * right[j][:, None]
-        found += left[j][:, :, None] * right[i][:, None]
+        found = (size[:, None, None] * left[i])[:, :, None] * right[j][:, None]
+        found += (size[:, None, None] * left[j])[:, :, None] * right[i][:, None]
         if (end := self._late) is not None:
             powers = np.full(len(i), power)
-            kicked = [end.kicked(columns[:, a], columns[:, b], powers) for a, b in ((i, j), (j, i))]
+            kicked = [end.kicked(columns[:, a] * size, columns[:, b], powers) for a, b in ((i, j), (j, i))]
             found += self._cut * end.moved(kicked[0] + kicked[1])
         return found
 
     def read(self, columns: Array) -> ComplexArray:
         """What responses read of a force on `columns` (r, m), in the measured quantity: (m, n_resp, L)."""
-        return np.asarray(np.ascontiguousarray((self.left @ columns).transpose(2, 1, 0)) * self.factor)
+        return _over(columns, self._read)
 
     def driven(self, columns: Array, power: Integers) -> ComplexArray:
         """The force (m, n_ref, L) that appears on one vector where s^`power` times it and `columns` (r, m) is added to the dynamic stiffness, less what
         of it comes after the records' end."""
-        found = np.ascontiguousarray((columns.T @ self.right).transpose(1, 2, 0))
+        found = _over(columns, self._driven)
         found *= -(self.s[None, :] ** power[:, None])[:, None, :]
         return found if (end := self._late) is None else found + self._cut * end.tail(columns, power)
+
+
+def _over(columns: Array, each: ComplexArray) -> ComplexArray:
+    """Of what belongs to each degree of freedom (r, n, L) what belongs to `columns` (r, m), (m, n, L): one real product."""
+    r, n, lines = each.shape
+    return np.asarray((columns.T @ each.reshape(r, n * lines).view(float)).view(complex).reshape(-1, n, lines))
