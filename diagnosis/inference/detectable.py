@@ -14,8 +14,8 @@ import numpy as np
 
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import Applied, CampaignModel
-from thermospindle.diagnosis.inference.fit import Fit, built
-from thermospindle.diagnosis.inference.screening import Fitted, Screened, fitted, screen
+from thermospindle.diagnosis.inference.fit import Fit, Linearisation, built
+from thermospindle.diagnosis.inference.screening import Screened, linearised, screen
 from thermospindle.diagnosis.inference.search import Hypothesis, Search
 from thermospindle.model.parallel import in_parallel
 from thermospindle.model.types import Array
@@ -82,22 +82,18 @@ def visibility(model: CampaignModel, about: Fit, m: Mechanism, size: float) -> f
     The spindle `about` with the effect is taken for measured, without noise. Steps of Gauss and Newton with the derivatives of `about` (the chord method:
     Ortega & Rheinboldt, *Iterative Solution of Nonlinear Equations*, 1970, 7.1) move everything else until they gain little.
     """
-    base, shape = fitted(model, about), [q.neutral for q in m.shape]
+    base, shape = linearised(model, about), [q.neutral for q in m.shape]
     moved = _moved(model, about.nuisance, [(m.effect, m.values(size, shape))], base)
     if moved is None:
         return np.inf
-    normal = np.eye(len(about.point))
-    for at in base:
-        normal[np.ix_(at.numbers, at.numbers)] += at.information
+    normal = np.eye(len(about.point)) + base.information
     step, residual, best = np.zeros(len(normal)), [-r for r in moved], np.inf
     for _ in range(STEPS):
         cost = sum(float(r @ r) for r in residual) + float(step @ step)
         if cost > (1 - NEAR) * best:
             break
-        best, gradient = cost, step.copy()
-        for at, r in zip(base, residual, strict=True):
-            gradient[at.numbers] += at.derivatives @ r
-        step = step - np.linalg.solve(normal, gradient)
+        best = cost
+        step = step - np.linalg.solve(normal, step + np.sum(base.gradients(residual), axis=0))
         there = _moved(model, about.nuisance + step, [], base)
         if there is None:
             break
@@ -105,6 +101,6 @@ def visibility(model: CampaignModel, about: Fit, m: Mechanism, size: float) -> f
     return float(np.sqrt(min(best, sum(float(r @ r) for r in residual) + float(step @ step))))
 
 
-def _moved(model: CampaignModel, x: Array, effects: Applied, base: Sequence[Fitted]) -> list[Array] | None:
+def _moved(model: CampaignModel, x: Array, effects: Applied, base: Linearisation) -> list[Array] | None:
     """How far all residuals move from those of `base`; None where no spindle can be built."""
-    return built(lambda t: model.residual(t, x, effects) - base[t].residual, len(base))
+    return built(lambda t: model.residual(t, x, effects) - base.residuals[t], len(base.residuals))

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -209,6 +210,15 @@ class Linearisation:
             information[np.ix_(numbers, numbers)] = jacobian @ jacobian.T
             self.by_test.append(information)
         self.information: Array = np.sum(self.by_test, axis=0)
+
+    @cached_property
+    def chi2(self) -> float:
+        return sum(float(r @ r) for r in self.residuals)
+
+    @cached_property
+    def gradient(self) -> Array:
+        """J^T r (n,) of all tests at the point itself."""
+        return np.asarray(np.sum(self.gradients(self.residuals), axis=0))
 
     def slope(self, problem: Problem, at: Point, temper: float) -> Array:
         """Half the gradient (n,) of the cost at a point near."""

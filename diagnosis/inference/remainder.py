@@ -15,9 +15,9 @@ import numpy as np
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.forward.nuisance import SHARE_SD, Resonance
-from thermospindle.diagnosis.inference.fit import Fit, Problem
+from thermospindle.diagnosis.inference.fit import Fit, Linearisation, Problem
 from thermospindle.diagnosis.inference.prior import Learned
-from thermospindle.diagnosis.inference.screening import Fitted, fitted
+from thermospindle.diagnosis.inference.screening import linearised
 from thermospindle.model.types import Array
 
 LAGS, SMALL = 12, 0.05  # lines over which residuals are compared, and the correlation that chance makes
@@ -82,13 +82,10 @@ def light_resonance(model: CampaignModel, about: Fit, learned: Learned) -> tuple
     if not lines:
         return None
     problem = Problem(model, about.mechanisms, learned, about.moved)
-    at, whole = fitted(model, about), problem.precision.copy()
+    at = linearised(model, about)
     x, effects = problem.parts(about.point)[0], problem.effects_of(about.point)
-    gradient = whole @ about.point
-    for t in at:
-        whole[np.ix_(t.numbers, t.numbers)] += t.information
-        gradient[t.numbers] += t.gradient
-    inverse = np.asarray(np.linalg.inv(whole), float)
+    gradient = problem.precision @ about.point + at.gradient
+    inverse = np.asarray(np.linalg.inv(problem.precision + at.information), float)
     low, high = min(float(f.min()) for f in lines), max(float(f.max()) for f in lines)
     grid = np.geomspace(low, high, int(np.log(high / low) / SPACING) + 1)
     rows, seen = [], model.reference.seen
@@ -108,16 +105,16 @@ def light_resonance(model: CampaignModel, about: Fit, learned: Learned) -> tuple
     return Resonance(frequency, DAMPING, tuple(shares.tolist())), gain - float(np.log(len(rows)))
 
 
-def _promised(columns: Sequence[Array | None], at: Sequence[Fitted], inverse: Array, gradient: Array, errors: float) -> tuple[Array, float]:
+def _promised(columns: Sequence[Array | None], at: Linearisation, inverse: Array, gradient: Array, errors: float) -> tuple[Array, float]:
     """Parameters (k,) of prior width one whose derivatives (k, N) in every test are `columns`, None where it has none; and the ln evidence that
     they would gain."""
     k = next(len(c) for c in columns if c is not None)
     cross, square, slope = np.zeros((len(inverse), k)), np.zeros((k, k)), np.zeros(k)
-    for column, of_test in zip(columns, at, strict=True):
+    for column, (residual, derivatives, numbers) in zip(columns, at.rows, strict=True):
         if column is not None:
-            cross[of_test.numbers] += of_test.derivatives @ column.T
+            cross[numbers] += derivatives @ column.T
             square += column @ column.T
-            slope += column @ of_test.residual
+            slope += column @ residual
     information = (square - cross.T @ inverse @ cross) / errors**2 + np.eye(k)
     left = (slope - cross.T @ inverse @ gradient) / errors**2
     found = np.asarray(-np.linalg.solve(information, left), float)

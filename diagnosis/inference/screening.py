@@ -12,10 +12,10 @@ from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.evidence import GRIDS, evidence
-from thermospindle.diagnosis.inference.fit import Fit, Problem
+from thermospindle.diagnosis.inference.fit import Fit, Linearisation, Problem
 from thermospindle.diagnosis.inference.prior import Learned
 from thermospindle.model.parallel import in_parallel
-from thermospindle.model.types import Array, Integers
+from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import HOOKS
 
 SEEN = tuple(hook for hook in HOOKS if hook != "imperfections")
@@ -34,17 +34,6 @@ class Screened:
     visibility: float  # standard errors by which its typical size shows, beside what nuisances can do
 
 
-@dataclass(frozen=True, eq=False)
-class Fitted:
-    """One test of a fitted model: residual (N,), derivatives (k, N) by the parameters `numbers` (k,), and their products."""
-
-    residual: Array
-    derivatives: Array
-    numbers: Integers
-    gradient: Array
-    information: Array
-
-
 def screen(
     model: CampaignModel, about: Fit, temper: float, learned: Learned, mechanisms: Sequence[Mechanism], workers: int | None = None, turned: bool = True
 ) -> list[Screened]:
@@ -60,16 +49,12 @@ def screen(
     return found + [replace(s, mechanism=best[s.mechanism.name].mechanism) for s in others]
 
 
-def fitted(model: CampaignModel, about: Fit) -> list[Fitted]:
-    """All tests of the model `about`; the last one asked for is kept with the model."""
+def linearised(model: CampaignModel, about: Fit) -> Linearisation:
+    """The model `about`, taken anew at its own lines; the last one asked for is kept with the model."""
     key = (about.point.tobytes(), len(about.mechanisms))
     if key not in model.kept:
         model.kept.clear()
-        problem, found = Problem(model, about.mechanisms), []
-        for t in range(problem.tests):
-            r, jacobian, numbers = problem.linearised(t, about.point, about.rates)
-            found.append(Fitted(r, jacobian, numbers, jacobian @ r, jacobian @ jacobian.T))
-        model.kept[key] = found
+        model.kept[key] = Problem(model, about.mechanisms).linearisation(about.point, about.rates)
     return model.kept[key]
 
 
@@ -101,31 +86,29 @@ def _promised(problem: Problem, about: Fit, sizes: Learned, nothing: float, shap
     p = np.concatenate([about.point, np.zeros(problem.length - first)])
     p[problem.length - len(shape) :] = shape
     x, own_sizes, shapes = problem.parts(p)
-    by_test, seen = [], []
-    for t, at in enumerate(fitted(model, about)):
+    at = linearised(model, about)
+    gradient, information = np.zeros(problem.length), np.zeros((problem.length, problem.length))
+    gradient[:first], information[:first, :first] = at.gradient, at.information
+    typical, square = np.zeros(first), 0.0  # of one size in all tests
+    for t, (residual, derivatives, numbers) in enumerate(at.rows):
         effects, _ = problem.applied(t, own_sizes, shapes)
         try:
             column = problem.by_size(t, x, effects, len(about.mechanisms))
         except FAILED:
-            column = np.zeros(len(at.residual))
-        weights = problem.roots[-1][t, : t + 1]
-        own = first + np.arange(t + 1)
-        cross, square = at.derivatives @ column, float(column @ column)
-        gradient, information = np.zeros(problem.length), np.zeros((problem.length, problem.length))
-        gradient[at.numbers] = at.gradient
-        gradient[own] = weights * (column @ at.residual)
-        information[np.ix_(at.numbers, at.numbers)] = at.information
-        information[np.ix_(at.numbers, own)] = np.outer(cross, weights)
-        information[np.ix_(own, at.numbers)] = np.outer(weights, cross)
-        information[np.ix_(own, own)] = np.outer(weights, weights) * square
-        by_test.append((float(at.residual @ at.residual), gradient, information))
-        seen.append((cross, square, at.numbers))
+            column = np.zeros(len(residual))
+        weights, own = problem.roots[-1][t, : t + 1], slice(first, first + t + 1)
+        cross, of_test = derivatives @ column, float(column @ column)
+        gradient[own] += weights * float(column @ residual)
+        information[numbers, own] += np.outer(cross, weights)
+        information[own, own] += np.outer(weights, weights) * of_test
+        typical[numbers] += cross
+        square += of_test
+    information[first:, :first] = information[:first, first:].T
     whole = replace(
         about, mechanisms=problem.mechanisms, point=p, sizes=own_sizes, shapes=tuple(tuple(float(v) for v in s) for s in shapes),
-        roots=problem.roots, chi2=sum(b[0] for b in by_test), gradient=np.sum([b[1] for b in by_test], axis=0),
-        information=np.sum([b[2] for b in by_test], axis=0), by_test=tuple(by_test),
+        roots=problem.roots, chi2=at.chi2, gradient=gradient, information=information, by_test=(),
     )  # fmt: skip
-    visibility = _visibility(seen, whole.information[:first, :first], mechanism)
+    visibility = _visibility(typical, square, at.information, mechanism)
     if visibility == 0.0:
         return Screened(mechanism, -np.inf, p, 0.0)
     found = evidence(model, whole, [sizes, *smaller(sizes)])
@@ -141,11 +124,8 @@ def smaller(learned: Learned) -> list[Learned]:
     return [replace(learned, sizes={**learned.sizes, kinds_of.STIFFNESS: size}) for size in below[-SMALLER:]]
 
 
-def _visibility(seen: Sequence[tuple[Array, float, Integers]], information: Array, mechanism: Mechanism) -> float:
-    """Standard errors of the typical size, the same in all tests, after all else is fitted anew."""
-    n = len(information)
-    cross = np.zeros(n)
-    for of_test, _, numbers in seen:
-        cross[numbers] += of_test
-    left = sum(square for _, square, _ in seen) - float(cross @ np.linalg.solve(information + np.eye(n), cross))
+def _visibility(cross: Array, square: float, information: Array, mechanism: Mechanism) -> float:
+    """Standard errors of the typical size, the same in all tests, after all else is fitted anew: of its column c `square` is c c, and `cross` (n,) that
+    with the columns of all else, which have `information` (n, n)."""
+    left = square - float(cross @ np.linalg.solve(information + np.eye(len(cross)), cross))
     return float(abs(mechanism.size.typical - mechanism.size.neutral) * np.sqrt(max(left, 0.0)))

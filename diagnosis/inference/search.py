@@ -95,12 +95,12 @@ def search(
     """The evidence of every explanation. A light resonance becomes part of the model where the data show it without effects, or beside the best single
     one."""
     none = _without_effects(model)
-    wider = _with_resonance(model, none)
+    wider = _with_resonance(model, none, workers)
     model, none = wider or (model, none)
     progress("fitted without effects")
     tried = _singles(model, none, named, free, progress, workers)
     best = max(tried.singles, key=lambda h: h.evidence.ln, default=none)
-    wider = _with_resonance(model, best) if best.mechanisms else None
+    wider = _with_resonance(model, best, workers) if best.mechanisms else None
     if wider is not None:
         first, model, none = model, wider[0], _without_effects(wider[0])
         if best.evidence.learned.errors > STRAIN:  # nothing was explained without it
@@ -204,7 +204,7 @@ def _better(found: Sequence[Hypothesis]) -> list[Hypothesis]:
     return list({frozenset(h.names): h for h in sorted(found, key=lambda h: h.evidence.ln)}.values())
 
 
-def _with_resonance(model: CampaignModel, h: Hypothesis) -> tuple[CampaignModel, Hypothesis] | None:
+def _with_resonance(model: CampaignModel, h: Hypothesis, workers: int | None = None) -> tuple[CampaignModel, Hypothesis] | None:
     """The model with the light resonance that an explanation leaves unexplained in every test, and the explanation fitted in it; None where it
     leaves none, or it clears too little. Where discrepancies stand in for it, no misfit is left, and its evidence alone tells."""
     hidden = h.evidence.learned.errors <= STRAIN
@@ -218,8 +218,8 @@ def _with_resonance(model: CampaignModel, h: Hypothesis) -> tuple[CampaignModel,
     fitted = np.concatenate([h.fit.point[:n], own, h.fit.point[n:]])
     afresh = np.concatenate([np.zeros(n), own, h.fit.point[n:]])
     try:
-        tried = [fit(wider, h.mechanisms, at, tempers=tempers) for at, tempers in ((fitted, TEMPERS[EARLY:]), (afresh, TEMPERS))]
-        best = min(tried, key=lambda f: f.cost)
+        tried = in_parallel(partial(_from, wider, h.mechanisms), ((fitted, TEMPERS[EARLY:]), (afresh, TEMPERS)), workers)
+        best = replace(min(tried, key=lambda f: f.cost), mechanisms=h.mechanisms)
         sd, learned = np.array([q.sd for q in resonance.nuisances]), None
         if evidence(wider, best).ln < h.evidence.ln or resonance.at(sd * best.point[n : n + len(own)]).damping > RESONANT:
             return None  # smooth over the band, it would stand in for something else
@@ -234,6 +234,11 @@ def _with_resonance(model: CampaignModel, h: Hypothesis) -> tuple[CampaignModel,
     clear = max(CLEARED * h.excess, CHANCE * np.sqrt(2 / h.fit.count))
     asked = found.evidence.ln > h.evidence.ln + PLENTY and (hidden or found.excess < clear)
     return (wider, found) if asked else None
+
+
+def _from(model: CampaignModel, mechanisms: Sequence[Mechanism], start: tuple[Array, Sequence[float]]) -> Fit:
+    at, tempers = start
+    return fit(model, mechanisms, at, tempers=tempers)
 
 
 def _alike(model: CampaignModel, x: Array, hypotheses: Sequence[Hypothesis]) -> dict[str, frozenset[str]]:
