@@ -79,7 +79,7 @@ def diagnose(
     drifts = tuple(_drift(found, c.hypothesis, c.delta_evidence) for c in verdict.free if len(c.hypothesis.mechanisms) == 1 and c.delta_evidence > 0)
     tests = tuple(next_tests(found, verdict)) if verdict.word != "none" else ()
     progress("next tests weighed")
-    seen = smallest(model, found.base.fit, found.screened)
+    seen = smallest(found.model, found.base.fit, found.screened)
     progress("smallest sizes found")
     return Diagnosis(spindle, campaign, found, verdict, drifts, tests, seen, unseen_beside(found, verdict.accepted))
 

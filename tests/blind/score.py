@@ -1,8 +1,8 @@
 """`python -m tests.blind.score FILE ...`: what a diagnosis is worth where the truth is known, printed and written to docs/blind.txt.
 
 Shares have Clopper and Pearson's 95 % interval (*Biometrika* 26 (1934) 404). The log score is the mean of ln of the probability that was stated
-for the truth, no less than ln 0.001 each (Good, *J. R. Statist. Soc. B* 14 (1952) 107). A hidden piece counts as visible where its change of the
-FRFs is at least twice sqrt(10) standard errors, after what tolerances could take of it: sqrt(10) is 5 in ln evidence.
+for the truth, no less than ln 0.001 each (Good, *J. R. Statist. Soc. B* 14 (1952) 107). A hidden piece whose change of the FRFs is less than sqrt(10)
+standard errors, 5 in ln evidence, after what tolerances could take of it, need not be found, and may be; from twice that on it counts as visible.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import argparse
 import io
 from collections import Counter
 from collections.abc import Callable, Sequence
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 
@@ -24,31 +24,38 @@ from tests.blind.study import KINDS, RESULTS, ROOT, read
 
 Row = dict[str, Any]
 OUTCOMES = ("right", "in the set", "half", "unexplained", "missed", "wrong", "false alarm", "error")
-VISIBLE = 2 * np.sqrt(10.0)
+SHOWS = np.sqrt(10.0)
+VISIBLE = 2 * SHOWS
 LEAST = 1e-3
 BINS = (0.0, 0.2, 0.5, 0.8, 0.95, 0.99, 1.0)
 DOCS = ROOT / "docs" / "blind.txt"
 
 
+def needed(row: Row) -> list[bool]:
+    """Of every hidden piece whether it shows, and must be in a true answer."""
+    return [v >= SHOWS for v in row["visibility"]]
+
+
 def outcome(row: Row) -> str:
-    """right: nothing said of nothing, all names of what is hidden, or `unexplained` of what is in no catalogue; half: one of two, and no
-    other; unexplained: of what a name stands for; wrong: any name that is none of the truth's, or a set without all of it."""
+    """right: nothing said where nothing shows, no name but those of what is hidden and all of what shows, or `unexplained` of what is in no catalogue;
+    half: one of two, and no other; unexplained: of what a name stands for; wrong: any name that is none of the truth's, or a set without all of it."""
     verdict, named = row["verdict"], set(row["effects"])
     if verdict == "error":
         return "error"
-    if row["kind"] == "nothing":
-        return "right" if verdict == "none" else "false alarm"
     if verdict == "none":
-        return "missed"
+        return "missed" if any(needed(row)) else "right"
+    if row["kind"] == "nothing":
+        return "false alarm"
     if row["kind"] == "outside":
         return "right" if verdict == "unexplained" else "wrong"
     if verdict == "unexplained":
         return "unexplained"
     there = [bool(named & set(names)) for names in row["truth"]]
+    whole = any(there) and all(t or not n for t, n in zip(there, needed(row), strict=True))
     if verdict == "ambiguous":
-        return "in the set" if all(there) else "half" if any(there) else "wrong"
+        return "in the set" if whole else "half" if any(there) else "wrong"
     if named <= {n for names in row["truth"] for n in names}:
-        return "right" if all(there) else "half"
+        return "right" if whole else "half"
     return "wrong"
 
 
@@ -65,23 +72,27 @@ def element_found(row: Row) -> bool:
 
 
 def truth_probability(row: Row) -> float:
-    """What was stated for the truth: nothing, something unknown, or candidates whose names are all right and all of the truth's."""
-    if row["kind"] == "nothing":
-        return float(row["probability"]["none"])
-    if row["kind"] == "outside":
-        return float(row["probability"]["unknown"])
-    return float(sum(c["probability"] for c in row["candidates"] if true_names(row, c["effects"])))
+    """What was stated for the truth: nothing, something unknown, or candidates whose names are all right and all of what shows."""
+    return float(sum(p for p, true in _answers(row) if true))
 
 
 def true_names(row: Row, names: Sequence[str]) -> bool:
-    return len(names) == len(row["truth"]) and all(set(names) & set(t) for t in row["truth"])
+    """Whether every name is one of a hidden piece's, each of another, and no piece that shows is without one."""
+    pieces = [[k for k, truth in enumerate(row["truth"]) if name in truth] for name in names]
+    return any(
+        len(set(chosen)) == len(names) and all(k in chosen for k, shows in enumerate(needed(row)) if shows) for chosen in product(*pieces)
+    )
+
+
+def _answers(row: Row) -> list[tuple[float, bool]]:
+    """The stated probability of nothing, of something unknown and of every candidate, and whether it is true."""
+    found = [(row["probability"]["none"], not any(needed(row))), (row["probability"]["unknown"], row["kind"] == "outside")]
+    return found + [(c["probability"], row["kind"] in ("one", "two") and true_names(row, c["effects"])) for c in row["candidates"]]
 
 
 def most_probable(row: Row) -> tuple[float, bool]:
     """The most probable answer's stated probability, and whether it is true."""
-    answers = [(row["probability"]["none"], row["kind"] == "nothing"), (row["probability"]["unknown"], row["kind"] == "outside")]
-    answers += [(c["probability"], row["kind"] in ("one", "two") and true_names(row, c["effects"])) for c in row["candidates"]]
-    return max(answers, key=lambda a: a[0])
+    return max(_answers(row), key=lambda a: a[0])
 
 
 def interval(k: int, n: int) -> tuple[float, float]:

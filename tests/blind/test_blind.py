@@ -146,6 +146,10 @@ def row(kind, verdict, effects=(), truth=(), none=0.0, unknown=0.0, candidates=(
     }  # fmt: skip
 
 
+def unseen(row, *visibility):
+    return row | {"visibility": list(visibility)}
+
+
 SCORED = [
     (row("nothing", "none", none=0.97), "right", 0.97),
     (row("nothing", "identified", ["a"], none=0.01, candidates=[(["a"], 0.99)]), "false alarm", 0.01),
@@ -160,6 +164,11 @@ SCORED = [
     (row("outside", "unexplained", [], [[]], unknown=0.8, drifts=[("plate damping", 9.0)], elements=["plate damping"]), "right", 0.8),
     (row("outside", "identified", ["a"], [[]], candidates=[(["a"], 0.9)], elements=["plate"]), "wrong", 0.0),
     (row("one", "error", [], [["a"]]), "error", 0.0),
+    (unseen(row("one", "none", [], [["a"]], none=0.9, candidates=[(["a"], 0.05), (["c"], 0.05)]), 2.0), "right", 0.95),
+    (unseen(row("one", "identified", ["c"], [["a"]], candidates=[(["c"], 1.0)]), 2.0), "wrong", 0.0),
+    (unseen(row("two", "identified", ["a"], [["a"], ["c"]], candidates=[(["a"], 0.7), (["a", "c"], 0.1), (["c"], 0.2)]), 90.0, 2.0), "right", 0.8),
+    (unseen(row("two", "identified", ["c"], [["a"], ["c"]], candidates=[(["c"], 0.9)]), 90.0, 2.0), "half", 0.0),
+    (row("two", "identified", ["a"], [["a"], ["a", "c"]], candidates=[(["a"], 0.9)]), "right", 0.0),
 ]
 
 
@@ -175,9 +184,9 @@ def test_the_table_of_scores():
     with console.capture() as captured:
         show(console, rows)
     text = captured.get()
-    assert "13 campaigns, seeds 0 to 12" in text
+    assert "18 campaigns, seeds 0 to 17" in text
     assert "false alarm, nothing hidden: 1 of 2" in text
-    assert text.count("\n- ") == 8
+    assert text.count("\n- ") == 10
     assert element_found(SCORED[10][0])
     assert not element_found(SCORED[11][0])
     assert most_probable(SCORED[0][0]) == (0.97, True)
