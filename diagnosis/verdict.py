@@ -15,7 +15,8 @@ from thermospindle.diagnosis.forward.mechanism import Mechanism, variants
 from thermospindle.diagnosis.forward.model import CampaignModel, TestData, campaign_model, expected_noise
 from thermospindle.diagnosis.inference.detectable import smallest, unseen_beside
 from thermospindle.diagnosis.inference.freeform import free_forms
-from thermospindle.diagnosis.inference.search import Hypothesis, Search, search
+from thermospindle.diagnosis.inference.hypothesis import Hypothesis
+from thermospindle.diagnosis.inference.search import Search, search
 from thermospindle.diagnosis.inference.verdict import Verdict, decide
 from thermospindle.diagnosis.misfit.patterns import Chosen, choose_for
 from thermospindle.diagnosis.prediction.next_test import NextTest, next_tests

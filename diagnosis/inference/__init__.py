@@ -7,6 +7,8 @@ fit         tempered Levenberg-Marquardt with priors
 evidence    Laplace evidence with everything of unknown size learned
 screening   what a mechanism promises beside a fitted model
 remainder   what an explanation leaves: how far residuals say the same, and the light resonance that would make them
+hypothesis  mechanisms that act together, fitted, with their evidence
+resonance   the model with a light resonance more
 detectable  smallest sizes that would have shown
 search      fits, pairs: the evidence of every explanation
 verdict     posterior probabilities, and the answer with the least expected loss

@@ -17,63 +17,29 @@ import numpy as np
 
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import Mechanism
-from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
-from thermospindle.diagnosis.inference.evidence import Evidence, evidence
-from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, Problem, fit
+from thermospindle.diagnosis.forward.model import CampaignModel
+from thermospindle.diagnosis.inference.evidence import evidence
+from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit
 from thermospindle.diagnosis.inference.freeform import alike
+from thermospindle.diagnosis.inference.hypothesis import EARLY, LITTLE, PLENTY, STRAIN, Hypothesis, Task, fitted, scan, settled
 from thermospindle.diagnosis.inference.prior import DRIFTING, Learned, steady, undrifted
-from thermospindle.diagnosis.inference.remainder import LOOKED, light_resonance, overlap
+from thermospindle.diagnosis.inference.resonance import with_more, with_resonance
 from thermospindle.diagnosis.inference.screening import Screened, screen
 from thermospindle.model.parallel import in_parallel
 from thermospindle.model.types import Array
 
-EARLY = 2  # number in TEMPERS at which large effects are told from each other
 BEHIND = 12.0  # tempered ln evidence behind the best from which a mechanism is not followed
 NAMED, FREE = 14, 4  # mechanisms fitted at most, of the catalogue and free forms
 LEADS, CLOSE = 2, 60.0  # single mechanisms of the catalogue to which a second is joined: so many, so near the best in ln evidence
 SECONDS = 2  # of each kind, joined to each of them
 PAIRS = 6  # fitted at most
-ENOUGH, PLENTY = 5.0, 12.0  # ln evidence that a second mechanism must promise: beside one that leaves a misfit, and one that leaves none
+ENOUGH = 5.0  # ln evidence that a second mechanism must promise beside one that leaves a misfit
 OCCAM = 20.0  # ln evidence that a second mechanism of no size may cost at most: less tells of a fit that stalled
 STALLED = 0.1  # of the enlarged errors, which the model without effects must reach if fits are to start from it alone
-SCAN = (-10.0, -6.0, -3.0, -1.5, 1.5, 3.0, 6.0, 10.0)  # prior standard deviations of a size
-STRAIN = 1.02  # times the errors, from which the model without effects leaves a misfit
 FINALISTS = {1: 3, 2: 2, 3: 1}  # explanations of one, two and three mechanisms that are fitted anew at the end, of the catalogue and free
 NEAR = 100.0  # ln evidence behind the best, so far
-REFITS = 2  # at most
-RESONANCES, CLEARED = 2, 0.1  # light resonances at most, and the share of what was left that one may leave
-CHANCE = 3.0  # standard deviations of chi2 by chance, of which nothing is said to be left
-SLIGHT = 0.5  # squares of the errors, of which it cannot be told whether they are alike in all tests
-RESONANT = 0.2  # damping ratio up to which it is a resonance
-CENTRED = 2  # times that a light resonance's parameters are counted anew from where they were fitted
 HIDING = 1e-3  # relative error of frequencies, from which constant discrepancies may hide an effect that is the same in every test
 STRAINED = 4.0  # standard deviations of a build tolerance, from which likewise
-LITTLE = 2.0  # ln evidence that a screened mechanism must promise
-
-
-@dataclass(frozen=True, eq=False)
-class Hypothesis:
-    """Mechanisms that act together (none, one, several), fitted, with their evidence."""
-
-    fit: Fit
-    evidence: Evidence
-
-    @property
-    def mechanisms(self) -> tuple[Mechanism, ...]:
-        return self.fit.mechanisms
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return tuple(m.name for m in self.mechanisms)
-
-    @property
-    def free(self) -> bool:
-        return any(m.free for m in self.mechanisms)
-
-    @property
-    def excess(self) -> float:
-        """What is left beyond noise, in squares of the errors a number."""
-        return max(self.fit.chi2 / self.fit.count - 1.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,12 +61,12 @@ def search(
     """The evidence of every explanation. A light resonance becomes part of the model where the data show it without effects, or beside the best single
     one."""
     none = _without_effects(model)
-    wider = _with_resonance(model, none, workers)
+    wider = with_resonance(model, none, workers)
     model, none = wider or (model, none)
     progress("fitted without effects")
     tried = _singles(model, none, named, free, progress, workers)
     best = max(tried.singles, key=lambda h: h.evidence.ln, default=none)
-    wider = _with_resonance(model, best, workers) if best.mechanisms else None
+    wider = with_resonance(model, best, workers) if best.mechanisms else None
     if wider is not None:
         first, model, none = model, wider[0], _without_effects(wider[0])
         if best.evidence.learned.errors > STRAIN:  # nothing was explained without it
@@ -168,11 +134,11 @@ def _cost(model: CampaignModel, none: Hypothesis, expected: Learned) -> float:
 
 def _carried_over(model: CampaignModel, none: Hypothesis, tried: Singles, before: int, workers: int | None) -> Singles:
     """Single mechanisms fitted on in a model with a light resonance more; `before` is the number of parameters that the model had."""
-    expected, own = steady(none.evidence.learned), np.zeros(len(model.parameters) - before)
-    starts = [np.concatenate([h.fit.point[:before], own, h.fit.point[before:]]) for h in tried.singles]
+    expected = steady(none.evidence.learned)
+    starts = [with_more(h.fit.point, before, len(model.parameters) - before) for h in tried.singles]
     tasks = [Task(h.mechanisms, (at,), -np.inf) for h, at in zip(tried.singles, starts, strict=True)]
     most = _cost(model, none, expected)
-    return Singles(_fits(model, tasks, TEMPERS[-1:], none.fit, most, expected, workers), tried.screened, most, expected)
+    return Singles(fitted(model, tasks, TEMPERS[-1:], none.fit, most, expected, workers), tried.screened, most, expected)
 
 
 def _lasting(
@@ -194,51 +160,14 @@ def _lasting(
         return []
     about = fit(model, lead.mechanisms, (own, lead.fit.point), tempers=TEMPERS[:-1], learned=steady(expected, lead.mechanisms))
     least = evidence(model, about).ln + LITTLE
-    gaining = [h for h in _fits(model, tasks, TEMPERS[:-1], about, most, expected, workers) if h.evidence.ln > least]
+    gaining = [h for h in fitted(model, tasks, TEMPERS[:-1], about, most, expected, workers) if h.evidence.ln > least]
     tasks = [Task(h.mechanisms, (h.fit.point,), -np.inf) for h in gaining]
-    return _fits(model, tasks, TEMPERS[-1:], lead.fit, most, expected, workers)
+    return fitted(model, tasks, TEMPERS[-1:], lead.fit, most, expected, workers)
 
 
 def _better(found: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Of those with the same mechanisms the one with more evidence."""
     return list({frozenset(h.names): h for h in sorted(found, key=lambda h: h.evidence.ln)}.values())
-
-
-def _with_resonance(model: CampaignModel, h: Hypothesis, workers: int | None = None) -> tuple[CampaignModel, Hypothesis] | None:
-    """The model with the light resonance that an explanation leaves unexplained in every test, and the explanation fitted in it; None where it
-    leaves none, or it clears too little. Where discrepancies stand in for it, no misfit is left, and its evidence alone tells."""
-    hidden = h.evidence.learned.errors <= STRAIN
-    if len(model.resonances) == RESONANCES or (h.excess > SLIGHT and overlap(model, h.fit).tests < LOOKED):
-        return None
-    seen = light_resonance(model.thinned, h.fit, h.evidence.learned)
-    if seen is None or seen[1] < PLENTY:
-        return None
-    resonance, n = seen[0], len(model.parameters)
-    wider, own = model.with_resonance(resonance), np.zeros(len(resonance.nuisances))
-    fitted = np.concatenate([h.fit.point[:n], own, h.fit.point[n:]])
-    afresh = np.concatenate([np.zeros(n), own, h.fit.point[n:]])
-    try:
-        tried = in_parallel(partial(_from, wider, h.mechanisms), ((fitted, TEMPERS[EARLY:]), (afresh, TEMPERS)), workers)
-        best = replace(min(tried, key=lambda f: f.cost), mechanisms=h.mechanisms)
-        sd, learned = np.array([q.sd for q in resonance.nuisances]), None
-        if evidence(wider, best).ln < h.evidence.ln or resonance.at(sd * best.point[n : n + len(own)]).damping > RESONANT:
-            return None  # smooth over the band, it would stand in for something else
-        for _ in range(CENTRED):  # so that all explanations start about it as it is
-            resonance = resonance.at(sd * best.point[n : n + len(own)])
-            wider, there = model.with_resonance(resonance), np.concatenate([best.point[:n], own, best.point[n + len(own) :]])
-            again = fit(wider, h.mechanisms, there, best.rates, TEMPERS[-1:], learned, best.moved)
-            found = settled(wider, Hypothesis(again, evidence(wider, again)))
-            best, learned = found.fit, found.evidence.learned
-    except FAILED:
-        return None
-    clear = max(CLEARED * h.excess, CHANCE * np.sqrt(2 / h.fit.count))
-    asked = found.evidence.ln > h.evidence.ln + PLENTY and (hidden or found.excess < clear)
-    return (wider, found) if asked else None
-
-
-def _from(model: CampaignModel, mechanisms: Sequence[Mechanism], start: tuple[Array, Sequence[float]]) -> Fit:
-    at, tempers = start
-    return fit(model, mechanisms, at, tempers=tempers)
 
 
 def _alike(model: CampaignModel, x: Array, hypotheses: Sequence[Hypothesis]) -> dict[str, frozenset[str]]:
@@ -249,36 +178,12 @@ def _alike(model: CampaignModel, x: Array, hypotheses: Sequence[Hypothesis]) -> 
     return {f.name: frozenset(m.name for m, shape in named if not m.effect.lasting and alike(model, x, f, m, shape)) for f, _ in free}
 
 
-@dataclass(frozen=True, eq=False)
-class Task:
-    """Mechanisms to be fitted: from the best of some starts; `hoped` is the ln evidence that they should reach."""
-
-    mechanisms: tuple[Mechanism, ...]
-    starts: tuple[Array, ...]
-    hoped: float
-
-
 def _task(lead: tuple[Mechanism, ...], about: Fit, s: Screened, hoped: float, far: bool) -> Task:
     """A screened mechanism beside those of the fit `about`: from there with its size, and with `far` from where screening says it leads or from
     there without it."""
     own = s.start[len(about.point) :]
     starts = (s.start, np.concatenate([about.point, 0 * own])) if far else (np.concatenate([about.point, own]),)
     return Task((*lead, s.mechanism), starts, hoped)
-
-
-def settled(model: CampaignModel, h: Hypothesis) -> Hypothesis:
-    """Fitted anew with priors as wide as was learned, until that moves nothing: the quadratic then stands where the answer is.
-
-    It starts from its own answer, or from the fit where the model is no quadratic as far as that."""
-    for _ in range(REFITS):
-        try:
-            found = fit(model, h.mechanisms, (h.evidence.mean, h.fit.point), h.fit.rates, TEMPERS[-1:], h.evidence.learned, h.fit.moved)
-        except FAILED:
-            return h
-        before, h = h.evidence, Hypothesis(found, evidence(model, found))
-        if h.evidence.learned == before.learned and abs(h.evidence.ln - before.ln) < LITTLE:
-            break
-    return h
 
 
 def _finalists(found: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -316,10 +221,10 @@ def _fitted_all(model, tasks, first: Collection[str], strained: bool, about: Fit
     if not tasks:
         return []
     if not strained:
-        return _fits(model, tasks, TEMPERS[-1:], about, most, expected, workers)
+        return fitted(model, tasks, TEMPERS[-1:], about, most, expected, workers)
     alive, early = list(tasks), about.temper * np.sqrt(about.chi2 / about.count) > STALLED
     for temper in TEMPERS[EARLY:]:
-        found = _fits(model, alive, (temper,), about, most, expected, workers, afresh=early)
+        found = fitted(model, alive, (temper,), about, most, expected, workers, afresh=early)
         early = False
         best = max(h.evidence.ln for h in found)
         keep = {id(h) for kind in (False, True) for h in sorted((h for h in found if h.free == kind), key=lambda h: -h.evidence.ln)[:2]}
@@ -328,42 +233,6 @@ def _fitted_all(model, tasks, first: Collection[str], strained: bool, about: Fit
             return found
         alive = [Task(h.mechanisms, (h.fit.point,), -np.inf) for h in kept]
     return []
-
-
-def _fits(model, tasks, tempers, about: Fit, most: float, expected: Learned, workers, afresh: bool = False) -> list[Hypothesis]:
-    found = in_parallel(partial(_fit_one, model, about.rates, tuple(tempers), most, expected, afresh), tasks, workers)
-    return [
-        Hypothesis(replace(h.fit, mechanisms=task.mechanisms), h.evidence) for h, task in zip(found, tasks, strict=True) if h is not None
-    ]
-
-
-def _fit_one(model: CampaignModel, rates, tempers, most: float, expected: Learned, afresh: bool, task: Task) -> Hypothesis | None:
-    """A fit; with `afresh` also from the best of a `scan` through all tempers before, the better of both. Once more with errors enlarged where it did not
-    reach `most`, the cost of a model that it contains, or the evidence that screening `hoped` for: then it had stalled."""
-    mechanisms = task.mechanisms
-    prior = steady(expected, mechanisms)
-    try:
-        found = fit(model, mechanisms, task.starts, rates, tempers, learned=prior)
-        if afresh:
-            before = TEMPERS[: TEMPERS.index(tempers[0])]
-            found = min(found, fit(model, mechanisms, scan(model, mechanisms), rates, (*before, *tempers), learned=prior), key=lambda f: f.cost)
-        reached = Hypothesis(found, evidence(model, found))
-        if found.temper == 1.0 and (found.cost > most + LITTLE or reached.evidence.ln < task.hoped - LITTLE):
-            loose = np.concatenate([np.zeros(len(model.parameters)), task.starts[0][len(model.parameters) :]])
-            again = fit(model, mechanisms, loose, rates, TEMPERS[1:], learned=prior)
-            if again.cost < found.cost:
-                reached = Hypothesis(again, evidence(model, again))
-        return reached
-    except FAILED:
-        return None
-
-
-def scan(model: CampaignModel, mechanisms: Sequence[Mechanism]) -> tuple[Array, ...]:
-    """Starts with no tolerance off its drawing and one mechanism of a size, the same in all tests: what moves peaks by many of their widths has no
-    slope to follow from where it does not act."""
-    problem = Problem(model, mechanisms)
-    scanned = [(k, m.size.neutral + s * m.size.prior_sd, m.size.limits) for k, m in enumerate(mechanisms) for s in SCAN]
-    return problem.start({}), *(problem.start({k: size}) for k, size, (low, high) in scanned if low <= size <= high)
 
 
 def _joined(
@@ -407,4 +276,4 @@ def _beside(model, leads: Sequence[Hypothesis], mechanisms: Sequence[Mechanism],
     if not chosen:
         return []
     tempers = TEMPERS[-1:] if leads[0].evidence.learned.errors == 1.0 else TEMPERS[-2:]
-    return _fits(model, chosen, tempers, leads[0].fit, most, expected, workers)
+    return fitted(model, chosen, tempers, leads[0].fit, most, expected, workers)

@@ -19,8 +19,9 @@ import numpy as np
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.evidence import left_out
+from thermospindle.diagnosis.inference.hypothesis import STRAIN, Hypothesis
 from thermospindle.diagnosis.inference.remainder import ALIKE, Overlap, overlap
-from thermospindle.diagnosis.inference.search import STRAIN, Hypothesis, Search
+from thermospindle.diagnosis.inference.search import Search
 
 GROSS = 25.0  # chi2 a number, five times the errors, from which nothing has explained the data whatever else explains them no better
 PRIOR = {"none": 0.5, "one": 0.33, "two": 0.08, "free": 0.05, "two free": 0.02, "one and free": 0.02, "three": 0.01}

@@ -13,7 +13,8 @@ import numpy as np
 
 from thermospindle.diagnosis.forward.mechanism import size_covariance
 from thermospindle.diagnosis.forward.model import FAILED
-from thermospindle.diagnosis.inference.search import Hypothesis, Search
+from thermospindle.diagnosis.inference.hypothesis import Hypothesis
+from thermospindle.diagnosis.inference.search import Search
 from thermospindle.diagnosis.inference.verdict import Candidate, Verdict, beyond_limits
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.modes import modes

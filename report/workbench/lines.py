@@ -11,7 +11,7 @@ from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import Problem, fit
-from thermospindle.diagnosis.inference.search import Hypothesis, settled
+from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
 from thermospindle.diagnosis.inference.verdict import Candidate
 from thermospindle.diagnosis.verdict import campaign_data
 from thermospindle.model.errors import BadInput, NoEquilibrium

@@ -16,7 +16,7 @@ from thermospindle.cli import main
 from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
-from thermospindle.diagnosis.inference.search import Hypothesis
+from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.verdict import Candidate
 from thermospindle.diagnosis.prediction.next_test import ModePrediction, NextTest
 from thermospindle.diagnosis.runout.verdict import diagnose_runout

@@ -12,7 +12,8 @@ from tests.virtual_campaign import drawn, effect, model_of, virtual_campaign
 from thermospindle.diagnosis.forward.nuisance import RESONANCE, Resonance
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
-from thermospindle.diagnosis.inference.search import Hypothesis, _with_resonance, settled
+from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
+from thermospindle.diagnosis.inference.resonance import with_resonance
 from thermospindle.diagnosis.verdict import diagnose
 from thermospindle.model.machine import Condition
 from thermospindle.sim.effects.effect import Effect, Parameter
@@ -46,7 +47,7 @@ def test_it_is_found_where_it_is(model):
     first = fit(model)
     none = settled(model, Hypothesis(first, evidence(model, first)))
     assert none.fit.chi2 / none.fit.count > 2
-    found = _with_resonance(model, none)
+    found = with_resonance(model, none)
     assert found is not None
     wider, h = found
     assert h.fit.chi2 / h.fit.count == pytest.approx(1.0, abs=0.15)
@@ -54,7 +55,7 @@ def test_it_is_found_where_it_is(model):
     assert wider.resonances[0].frequency == pytest.approx(AT, rel=1e-3)
     assert wider.resonances[0].damping == pytest.approx(RATIO, rel=0.1)
     assert h.evidence.ln > none.evidence.ln + 100
-    assert _with_resonance(wider, h) is None
+    assert with_resonance(wider, h) is None
 
 
 @pytest.mark.parametrize("share", [50, 30])
@@ -68,7 +69,7 @@ def test_a_small_one_that_is_hidden_is_found_by_its_evidence(spindle, share):
     first = fit(model)
     none = settled(model, Hypothesis(first, evidence(model, first)))
     assert none.evidence.learned.errors < 1.1
-    found = _with_resonance(model, none)
+    found = with_resonance(model, none)
     assert found is not None
     wider, h = found
     assert wider.resonances[0].frequency == pytest.approx(at, rel=5e-3)
@@ -79,7 +80,7 @@ def test_a_small_one_that_is_hidden_is_found_by_its_evidence(spindle, share):
 def test_where_nothing_is_left_none_is_found(spindle):
     plain = model_of(spindle, virtual_campaign(spindle, TESTS, 5, (), drawn(spindle, 3, 5), responses=(1, 3, 6), frequency=FREQUENCY))
     first = fit(plain)
-    assert _with_resonance(plain, Hypothesis(first, evidence(plain, first))) is None
+    assert with_resonance(plain, Hypothesis(first, evidence(plain, first))) is None
 
 
 def test_derivatives_by_its_parameters(model):

@@ -10,8 +10,9 @@ from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.forward.nuisance import STIFFNESS
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
+from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
 from thermospindle.diagnosis.inference.prior import steady
-from thermospindle.diagnosis.inference.search import HIDING, Hypothesis, _cost, _lasting, settled
+from thermospindle.diagnosis.inference.search import HIDING, _cost, _lasting
 from thermospindle.model.machine import Condition
 
 TESTS = (Condition(20.0), Condition(40.0), Condition(60.0))

@@ -12,10 +12,11 @@ from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.nuisance import DAMPING, STIFFNESS
 from thermospindle.diagnosis.inference.evidence import Evidence
 from thermospindle.diagnosis.inference.fit import Fit
+from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.prior import Learned
 from thermospindle.diagnosis.inference.remainder import between_tests
 from thermospindle.diagnosis.inference.screening import Screened
-from thermospindle.diagnosis.inference.search import Hypothesis, Search
+from thermospindle.diagnosis.inference.search import Search
 from thermospindle.diagnosis.inference.verdict import (
     COARSE,
     FALSE_ALARM,

@@ -1,0 +1,109 @@
+"""Explanations: mechanisms that act together, fitted to a campaign, with their evidence; many of them side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from thermospindle.diagnosis.forward.mechanism import Mechanism
+from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
+from thermospindle.diagnosis.inference.evidence import Evidence, evidence
+from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, Problem, fit
+from thermospindle.diagnosis.inference.prior import Learned, steady
+from thermospindle.model.parallel import in_parallel
+from thermospindle.model.types import Array
+
+EARLY = 2  # number in TEMPERS at which large effects are told from each other
+SCAN = (-10.0, -6.0, -3.0, -1.5, 1.5, 3.0, 6.0, 10.0)  # prior standard deviations of a size
+STRAIN = 1.02  # times the errors, from which the model without effects leaves a misfit
+REFITS = 2  # at most
+PLENTY = 12.0  # ln evidence that anything more must promise where no misfit is left
+LITTLE = 2.0  # ln evidence that a screened mechanism must promise
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """Mechanisms that act together (none, one, several), fitted, with their evidence."""
+
+    fit: Fit
+    evidence: Evidence
+
+    @property
+    def mechanisms(self) -> tuple[Mechanism, ...]:
+        return self.fit.mechanisms
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(m.name for m in self.mechanisms)
+
+    @property
+    def free(self) -> bool:
+        return any(m.free for m in self.mechanisms)
+
+    @property
+    def excess(self) -> float:
+        """What is left beyond noise, in squares of the errors a number."""
+        return max(self.fit.chi2 / self.fit.count - 1.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """Mechanisms to be fitted: from the best of some starts; `hoped` is the ln evidence that they should reach."""
+
+    mechanisms: tuple[Mechanism, ...]
+    starts: tuple[Array, ...]
+    hoped: float
+
+
+def fitted(model, tasks, tempers, about: Fit, most: float, expected: Learned, workers, afresh: bool = False) -> list[Hypothesis]:
+    found = in_parallel(partial(_fit_one, model, about.rates, tuple(tempers), most, expected, afresh), tasks, workers)
+    return [
+        Hypothesis(replace(h.fit, mechanisms=task.mechanisms), h.evidence) for h, task in zip(found, tasks, strict=True) if h is not None
+    ]
+
+
+def _fit_one(model: CampaignModel, rates, tempers, most: float, expected: Learned, afresh: bool, task: Task) -> Hypothesis | None:
+    """A fit; with `afresh` also from the best of a `scan` through all tempers before, the better of both. Once more with errors enlarged where it did not
+    reach `most`, the cost of a model that it contains, or the evidence that screening `hoped` for: then it had stalled."""
+    mechanisms = task.mechanisms
+    prior = steady(expected, mechanisms)
+    try:
+        found = fit(model, mechanisms, task.starts, rates, tempers, learned=prior)
+        if afresh:
+            before = TEMPERS[: TEMPERS.index(tempers[0])]
+            found = min(found, fit(model, mechanisms, scan(model, mechanisms), rates, (*before, *tempers), learned=prior), key=lambda f: f.cost)
+        reached = Hypothesis(found, evidence(model, found))
+        if found.temper == 1.0 and (found.cost > most + LITTLE or reached.evidence.ln < task.hoped - LITTLE):
+            loose = np.concatenate([np.zeros(len(model.parameters)), task.starts[0][len(model.parameters) :]])
+            again = fit(model, mechanisms, loose, rates, TEMPERS[1:], learned=prior)
+            if again.cost < found.cost:
+                reached = Hypothesis(again, evidence(model, again))
+        return reached
+    except FAILED:
+        return None
+
+
+def scan(model: CampaignModel, mechanisms: Sequence[Mechanism]) -> tuple[Array, ...]:
+    """Starts with no tolerance off its drawing and one mechanism of a size, the same in all tests: what moves peaks by many of their widths has no
+    slope to follow from where it does not act."""
+    problem = Problem(model, mechanisms)
+    scanned = [(k, m.size.neutral + s * m.size.prior_sd, m.size.limits) for k, m in enumerate(mechanisms) for s in SCAN]
+    return problem.start({}), *(problem.start({k: size}) for k, size, (low, high) in scanned if low <= size <= high)
+
+
+def settled(model: CampaignModel, h: Hypothesis) -> Hypothesis:
+    """Fitted anew with priors as wide as was learned, until that moves nothing: the quadratic then stands where the answer is.
+
+    It starts from its own answer, or from the fit where the model is no quadratic as far as that."""
+    for _ in range(REFITS):
+        try:
+            found = fit(model, h.mechanisms, (h.evidence.mean, h.fit.point), h.fit.rates, TEMPERS[-1:], h.evidence.learned, h.fit.moved)
+        except FAILED:
+            return h
+        before, h = h.evidence, Hypothesis(found, evidence(model, found))
+        if h.evidence.learned == before.learned and abs(h.evidence.ln - before.ln) < LITTLE:
+            break
+    return h

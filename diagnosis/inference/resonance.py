@@ -1,0 +1,66 @@
+"""The model with a light resonance more, where the data of every test ask for one: of a table, a fixture or a cable that the drawing lacks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from thermospindle.diagnosis.forward.mechanism import Mechanism
+from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
+from thermospindle.diagnosis.inference.evidence import evidence
+from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit
+from thermospindle.diagnosis.inference.hypothesis import EARLY, PLENTY, STRAIN, Hypothesis, settled
+from thermospindle.diagnosis.inference.remainder import LOOKED, light_resonance, overlap
+from thermospindle.model.parallel import in_parallel
+from thermospindle.model.types import Array
+
+RESONANCES, CLEARED = 2, 0.1  # light resonances at most, and the share of what was left that one may leave
+CHANCE = 3.0  # standard deviations of chi2 by chance, of which nothing is said to be left
+SLIGHT = 0.5  # squares of the errors, of which it cannot be told whether they are alike in all tests
+RESONANT = 0.2  # damping ratio up to which it is a resonance
+CENTRED = 2  # times that a light resonance's parameters are counted anew from where they were fitted
+
+
+def with_resonance(model: CampaignModel, h: Hypothesis, workers: int | None = None) -> tuple[CampaignModel, Hypothesis] | None:
+    """The model with the light resonance that an explanation leaves unexplained in every test, and the explanation fitted in it; None where it
+    leaves none, or it clears too little. Where discrepancies stand in for it, no misfit is left, and its evidence alone tells."""
+    hidden = h.evidence.learned.errors <= STRAIN
+    if len(model.resonances) == RESONANCES or (h.excess > SLIGHT and overlap(model, h.fit).tests < LOOKED):
+        return None
+    seen = light_resonance(model.thinned, h.fit, h.evidence.learned)
+    if seen is None or seen[1] < PLENTY:
+        return None
+    resonance, n = seen[0], len(model.parameters)
+    wider, more = model.with_resonance(resonance), len(resonance.nuisances)
+    fitted = with_more(h.fit.point, n, more)
+    afresh = np.concatenate([np.zeros(n + more), h.fit.point[n:]])
+    try:
+        tried = in_parallel(partial(_from, wider, h.mechanisms), ((fitted, TEMPERS[EARLY:]), (afresh, TEMPERS)), workers)
+        best = replace(min(tried, key=lambda f: f.cost), mechanisms=h.mechanisms)
+        sd, learned = np.array([q.sd for q in resonance.nuisances]), None
+        if evidence(wider, best).ln < h.evidence.ln or resonance.at(sd * best.point[n : n + more]).damping > RESONANT:
+            return None  # smooth over the band, it would stand in for something else
+        for _ in range(CENTRED):  # so that all explanations start about it as it is
+            resonance = resonance.at(sd * best.point[n : n + more])
+            wider, there = model.with_resonance(resonance), np.concatenate([best.point[:n], np.zeros(more), best.point[n + more :]])
+            again = fit(wider, h.mechanisms, there, best.rates, TEMPERS[-1:], learned, best.moved)
+            found = settled(wider, Hypothesis(again, evidence(wider, again)))
+            best, learned = found.fit, found.evidence.learned
+    except FAILED:
+        return None
+    clear = max(CLEARED * h.excess, CHANCE * np.sqrt(2 / h.fit.count))
+    asked = found.evidence.ln > h.evidence.ln + PLENTY and (hidden or found.excess < clear)
+    return (wider, found) if asked else None
+
+
+def _from(model: CampaignModel, mechanisms: Sequence[Mechanism], start: tuple[Array, Sequence[float]]) -> Fit:
+    at, tempers = start
+    return fit(model, mechanisms, at, tempers=tempers)
+
+
+def with_more(point: Array, before: int, more: int) -> Array:
+    """A parameter vector with so many nuisances more, at none, after those that were there `before`."""
+    return np.insert(point, before, np.zeros(more))
