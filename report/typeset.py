@@ -13,6 +13,11 @@ from markupsafe import Markup, escape
 
 from thermospindle.model.files.cells import cells
 
+LINEAR, SMALLEST = 3.0, 30.0
+"""Standard errors: up to the first the colours of residuals are linear, and they span at least the second."""
+UNITS = {"receptance": "m/N", "mobility": "(m/s)/N", "accelerance": "(m/s²)/N"}
+"""Of FRFs, by their quantity."""
+
 
 def minus(text: str) -> str:
     """A true minus before digits, and units kept on the line of their number."""
@@ -37,6 +42,19 @@ def with_error(pair: tuple[float, float] | None, sign: bool = False, digits: int
         return Markup(minus(f"{value:{'+' if sign else ''}.{digits}f}"))
     digits = int(np.clip(-np.floor(np.log10(error / 2)), 0, 5))
     return Markup(minus(f"{value:{'+' if sign else ''}.{digits}f}") + f" <small>± {error:.{digits}f}</small>")
+
+
+def signed_short(value: float) -> str:
+    """A signed number in few characters, with a true minus: one digit after the point below ten, powers of ten from 10,000."""
+    if abs(value) < 0.05:
+        return "0.0"
+    text = f"{value:+.1f}" if abs(value) < 9.95 else f"{value:+.0f}" if abs(value) < 9999.5 else f"{value:+.0e}".replace("e+0", "e")
+    return text.replace("-", "−")
+
+
+def power(watts: float) -> tuple[str, float]:
+    """The unit for powers up to so many `watts`, and how many of it a watt is: a disk drive's friction takes milliwatts, a machine tool's watts."""
+    return ("mW", 1e3) if watts < 10 else ("W", 1.0)
 
 
 def plain_error(value: float, error: float) -> str:

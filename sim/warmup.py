@@ -185,3 +185,8 @@ def energy(warmup: Warmup) -> dict[str, float]:
     model, nodal = warmup.history.model, warmup.history.nodal
     sums = {name: float(sum(getattr(h, name) for h in warmup.history.heat)) for name in ("motor", "friction", "convection")}
     return sums | {"stored": float(model.lumped_capacity @ (nodal[-1] - nodal[0]))}
+
+
+def most_friction(warmup: Warmup) -> float:
+    """The largest friction heat (W) of all bearings together, at any time or in the end."""
+    return max(sum(m.friction.values()) for m in (*warmup.moments, warmup.steady))

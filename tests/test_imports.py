@@ -69,6 +69,16 @@ def test_the_walk_sees_files():
     assert "numpy" in imported(ROOT / "model" / "bearing" / "hertz.py")
 
 
+@pytest.mark.parametrize("verb", ["chain", "compare", "diagnose", "ladder", "running", "starting", "states", "workbench"])
+def test_verbs_open_without_what_only_draws(verb: str) -> None:
+    """Each of these takes half a second and more to load, and is needed where a folder is written."""
+    program = f"import sys, thermospindle.report.verbs.{verb}; print(*sorted(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=ROOT, check=True)
+    loaded = set(done.stdout.split())
+    assert f"thermospindle.report.verbs.{verb}" in loaded
+    assert not loaded & {"matplotlib", "rerun", "scipy.stats", "scipy.signal"}
+
+
 def test_the_catalogue_is_told_without_the_libraries_that_compute():
     """Half a second is what a verb may take that simulates nothing: these alone take longer."""
     program = "import sys; from thermospindle.cli import main; main(['effects', '--json']); print(*sorted(sys.modules), file=sys.stderr)"

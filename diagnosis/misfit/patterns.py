@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from itertools import pairwise, product
 
 import numpy as np
-from scipy.stats import f as f_distribution
+from scipy.special import fdtrc
 
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
@@ -141,7 +141,7 @@ def f_test(small: tuple[float, int], large: tuple[float, int], count: int, floor
     if more < 1 or free < 1:
         return 0.0, 1.0
     f = max(0.0, small[0] - large[0]) / more / max(large[0] / free, floor)
-    return float(f), float(f_distribution.sf(f, more, free))
+    return float(f), float(fdtrc(more, free, f))
 
 
 def choose_for(conditions: Sequence[Condition], values: Array, covariance: Array, floor: float = 1.0) -> Chosen:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2 as chi_squared
+from scipy.special import chdtrc
 
 from thermospindle.diagnosis.data.observe import Observation
 from thermospindle.model.errors import BadInput
@@ -88,6 +88,6 @@ def _outcome(o: Observation, name: str, predicted: np.ndarray) -> Outcome:
     off = np.log(np.concatenate([o.frequency[seen] / frequency, o.damping[seen] / damping]))
     known = np.hypot(np.concatenate([error[:m][seen], error[m:][seen]]), np.concatenate([sd / frequency, damping_sd / damping]))
     residual = (off / known)[np.isfinite(known)]
-    chance = float(chi_squared.sf(float(residual @ residual), len(residual)))
+    chance = float(chdtrc(len(residual), float(residual @ residual)))
     verdict = "refuted" if chance < REFUTED else "doubtful" if chance < DOUBTFUL else "confirmed"
     return Outcome(o.test.id, name, float(np.sqrt(np.mean(residual**2))), len(seen), verdict)

@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2 as chi_squared
+from scipy.special import chdtrc, chdtri
 
 from thermospindle.diagnosis.runout.explanation import Explanation, Variant, variants
 from thermospindle.diagnosis.runout.fit import Family, FamilyFit, families, fit_family, merged
@@ -99,7 +99,7 @@ def _fitted(chosen: Sequence[Variant], parts: Sequence[Family], base: Sequence[F
     before_evidence, before_chi2 = sum(base[i].evidence for i in own), sum(base[i].chi2 for i in own)
     total = sum(f.chi2 for f in base)
     amplitude = np.concatenate([base[i].amplitude for i in own])
-    if worth and 2 * float(np.sum(np.abs(amplitude[b[0] != 0]) ** 2)) < WORTH and before_chi2 < chi_squared.isf(0.01, family.count):
+    if worth and 2 * float(np.sum(np.abs(amplitude[b[0] != 0]) ** 2)) < WORTH and before_chi2 < chdtri(family.count, 0.01):
         size = np.linalg.norm(b[0][b[0] != 0] / family.likely[b[0] != 0]) * chosen[0].prior
         return Explanation(
             tuple(chosen), np.zeros(1), np.full(1, chosen[0].prior / np.hypot(1, size)), -float(np.log(np.hypot(1, size))), total
@@ -176,7 +176,7 @@ def _information(f: Family, b: np.ndarray) -> float:
 
 
 def _rejected(chi2: float, count: int) -> bool:
-    return bool(chi_squared.sf(chi2 / SLACK, count) < MISFIT)
+    return bool(count > 0 and chdtrc(count, chi2 / SLACK) < MISFIT)
 
 
 def _verdict(

@@ -23,6 +23,7 @@ from matplotlib.image import AxesImage
 from matplotlib.ticker import LogLocator, NullLocator
 
 from thermospindle.model.types import Array
+from thermospindle.report.typeset import LINEAR, SMALLEST
 
 INK, PALE = "#1b1c1d", "#84898f"
 TEMPERATURES = LinearSegmentedColormap.from_list("cold to hot", ["#2166ac", "#8073ac", "#c9371c"])
@@ -64,7 +65,6 @@ STYLE: dict[Any, Any] = {
 
 SVG = "{http://www.w3.org/2000/svg}"
 REFERENCE = re.compile(r"#([a-zA-Z][\w.-]*)(?=\)|$)")  # of url(#id) and #id; also a colour, which is no element's id
-LINEAR, SMALLEST = 3.0, 30.0  # standard errors
 ElementTree.register_namespace("", SVG[1:-1])
 ElementTree.register_namespace("xlink", "http://www.w3.org/1999/xlink")
 
@@ -136,14 +136,6 @@ def residual_bar(part: Any, norm: SymLogNorm, axes: Any, **look: Any) -> None:
 
 
 # ---------------------------------------------------------------- maps of cells
-
-
-def signed_short(value: float) -> str:
-    """A signed number in few characters, with a true minus: one digit after the point below ten, powers of ten from 10,000."""
-    if abs(value) < 0.05:
-        return "0.0"
-    text = f"{value:+.1f}" if abs(value) < 9.95 else f"{value:+.0f}" if abs(value) < 9999.5 else f"{value:+.0e}".replace("e+0", "e")
-    return text.replace("-", "−")
 
 
 def cells(axes: Axes, grid: Array, norm: Normalize, colours: str, text: Callable[[float], str], size: float = 7.5) -> AxesImage:

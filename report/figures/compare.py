@@ -15,10 +15,10 @@ from thermospindle.diagnosis.compare.compare import Comparison, PairedMode, Test
 from thermospindle.diagnosis.compare.correlation import Correlation, Pair
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
-from thermospindle.report.figures.common import INK, PALE, STYLE, cells, colour, residual_bar, residual_norm, signed_short
+from thermospindle.report.figures.common import INK, PALE, STYLE, cells, colour, residual_bar, residual_norm
+from thermospindle.report.typeset import UNITS, signed_short
 
 FDAC_LINES = 260  # about, of an FDAC map
-UNITS = {"receptance": "m/N", "mobility": "(m/s)/N", "accelerance": "(m/s²)/N"}
 
 
 def figures(c: Comparison) -> dict[str, Figure]:

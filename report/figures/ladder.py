@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +11,7 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from thermospindle.diagnosis.data.observe import Observation
 from thermospindle.diagnosis.ladder.ladder import Ladder
-from thermospindle.diagnosis.ladder.step import Step
-from thermospindle.model.types import Array
-from thermospindle.model.units import RPM
 from thermospindle.report.figures.common import (
     PALE,
     STYLE,
@@ -26,47 +21,12 @@ from thermospindle.report.figures.common import (
     residual_bar,
     residual_norm,
     save,
-    signed_short,
     svg,
 )
+from thermospindle.report.text.ladder_table import ResidualMap, residual_map
+from thermospindle.report.typeset import signed_short
 
 ERROR, HELD_OUT = "#b3402a", "#2166ac"
-
-
-@dataclass(frozen=True, eq=False)
-class ResidualMap:
-    """(computed - measured) / standard error by mode (row) and test (column), NaN where not measured; `damping` None without any."""
-
-    modes: list[str]
-    tests: list[str]
-    frequency: Array
-    damping: Array | None
-
-
-def residual_map(found: Ladder, step: Step) -> ResidualMap:
-    """The residuals of a step in all numbered modes, tests in order of speed and temperature."""
-    measured, tests = found.measured, found.measured.observations
-    order = sorted(range(len(tests)), key=lambda t: _place(tests[t]))
-    column = {t: k for k, t in enumerate(order)}
-    row = {number: k for k, number in enumerate(measured.kinds)}
-    frequency, damping = np.full((2, len(row), len(order)), np.nan)
-    rows = zip(measured.number, measured.test, *step.residual(measured), strict=True)
-    for number, t, of_frequency, of_damping in rows:
-        if number:
-            frequency[row[int(number)], column[int(t)]], damping[row[int(number)], column[int(t)]] = of_frequency, of_damping
-    known = damping if np.isfinite(damping).any() else None
-    return ResidualMap([f"{n} {kind}" for n, kind in measured.kinds.items()], _tests([tests[t] for t in order]), frequency, known)
-
-
-def _place(o: Observation) -> tuple[float, float, str]:
-    return abs(o.condition.speed), o.condition.temperature, o.test.id
-
-
-def _tests(observations: list[Observation]) -> list[str]:
-    """Temperature, and speed where there are several; the id of the test where that says too little."""
-    speeds = {o.condition.speed for o in observations}
-    labels = [f"{o.condition.temperature:g} °C" + (f", {o.condition.speed / RPM:.0f} rpm" if len(speeds) > 1 else "") for o in observations]
-    return labels if len(set(labels)) == len(labels) else [o.test.id for o in observations]
 
 
 def figure(found: Ladder) -> Figure:

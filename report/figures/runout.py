@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from matplotlib.projections.polar import PolarAxes
 
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM, TO_NM
-from thermospindle.report.figures.common import INK, PALE, STYLE, colour
+from thermospindle.report.figures.common import INK, PALE, STYLE, colour, save, svg
 from thermospindle.sim.posing import round_down
 from thermospindle.sim.running.lines import FoundLine
 from thermospindle.sim.running.revolutions import ErrorMotion, Revolutions, once_per_revolution
@@ -32,9 +33,10 @@ def motion_figure(runout: Runout) -> Figure:
     with rc_context(STYLE):
         figure = Figure(figsize=(11.0, 4.3))
         whole = figure.add_gridspec(1, 3, width_ratios=(1.0, 1.05, 1.05))
+        where = looked_at(runout.point.spindle)
         cut, values, names = runout.by_lines, runout.values(), [p.name for p in runout.signals.probes]
-        _orbit(figure.add_subplot(whole[0]), cut, names.index(X), names.index(Y), place_of(runout))
-        for place, name, title in ((1, X, f"Radial error motion ({place_of(runout)} x)"), (2, AXIAL, "Axial error motion")):
+        _orbit(figure.add_subplot(whole[0]), cut, names.index(X), names.index(Y), where)
+        for place, name, title in ((1, X, f"Radial error motion ({where} x)"), (2, AXIAL, "Axial error motion")):
             axes = figure.add_subplot(whole[place], projection="polar")
             assert isinstance(axes, PolarAxes)
             _polar(axes, cut, names.index(name), values[name], title, name != AXIAL)
@@ -43,9 +45,20 @@ def motion_figure(runout: Runout) -> Figure:
     return figure
 
 
-def place_of(runout: Runout) -> str:
-    """What the probes look at, in a word."""
-    return looked_at(runout.point.spindle)
+def motion_svg(runout: Runout, description: str) -> str:
+    with rc_context(STYLE):
+        return svg(motion_figure(runout), "runout-motion", description)
+
+
+def spectrum_svg(runout: Runout, description: str) -> str:
+    with rc_context(STYLE):
+        return svg(spectrum_figure(runout), "runout-spectrum", description)
+
+
+def write_figures(runout: Runout, folder: Path) -> None:
+    """Motion and spectrum, as SVG and PNG."""
+    for name, drawn in (("motion", motion_figure(runout)), ("spectrum", spectrum_figure(runout))):
+        save(drawn, folder, name, 130)
 
 
 def _orbit(axes: Axes, cut: Revolutions, x: int, y: int, where: str) -> None:

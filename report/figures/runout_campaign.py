@@ -15,9 +15,10 @@ from thermospindle.diagnosis.runout.explanation import Explanation
 from thermospindle.diagnosis.runout.moved import MovedLine, leading, moved_lines
 from thermospindle.diagnosis.runout.verdict import RunoutDiagnosis
 from thermospindle.model.units import RPM, TO_NM
-from thermospindle.report.figures.common import INK, PALE, STYLE, cells, residual_bar, residual_norm, signed_short
+from thermospindle.report.figures.common import INK, PALE, STYLE, cells, residual_bar, residual_norm
 from thermospindle.report.figures.diagnosis import NAMED, OTHER, evidence_bars
 from thermospindle.report.figures.runout import BAND, REPEATS, spread
+from thermospindle.report.typeset import signed_short
 
 PANELS = 6  # tests whose lines are drawn, those that agree least
 LABELS = 9  # lines of a test with names

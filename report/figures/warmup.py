@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 from thermospindle.model.types import Array
 from thermospindle.model.units import MINUTE
 from thermospindle.report.figures.common import BEARINGS, PALE, STYLE, save, svg
-from thermospindle.sim.warmup import Warmup
+from thermospindle.report.typeset import power
+from thermospindle.sim.warmup import Warmup, most_friction
 
 PARTS = {"stationary": "#3b6ea5", "rotating": "#c2622d"}
 MODES = ("#1f8a70", "#7a3d8f", "#a0741a", "#3b6ea5", "#c9371c", "#555f6b", "#d18a0f", "#b0457b")
@@ -23,12 +24,6 @@ def write_figure(warmup: Warmup, folder: Path) -> None:
     """`warmup.png` and `warmup.svg`."""
     with rc_context(STYLE):
         save(figure(warmup), folder, "warmup")
-
-
-def power(warmup: Warmup) -> tuple[str, float]:
-    """The unit that friction is told in, and how many of it a watt is: a disk drive takes milliwatts, a machine tool watts."""
-    most = max(sum(m.friction.values()) for m in (*warmup.moments, warmup.steady))
-    return ("mW", 1e3) if most < 10 else ("W", 1.0)
 
 
 def figure_svg(warmup: Warmup) -> str:
@@ -58,7 +53,7 @@ def figure(warmup: Warmup) -> Figure:
     axes.legend(loc="lower right")
     preload = np.array([[m.preload[b] for b in bearings] for m in warmup.moments])
     if warmup.speed:
-        unit, scale = power(warmup)
+        unit, scale = power(most_friction(warmup))
         third = np.array([[scale * m.friction[b] for b in bearings] for m in warmup.moments])
         about = ("Friction heat of each bearing", f"friction heat, {unit}")
     else:

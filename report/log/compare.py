@@ -22,13 +22,13 @@ from thermospindle.report.log.blueprint import at
 from thermospindle.report.log.columns import any_values, curve_look, log_curve, log_frf_numbers, log_peak_numbers, over_frequency, whole_log
 from thermospindle.report.log.content import Pair, Peak, decibel
 from thermospindle.report.log.drawing import heat
+from thermospindle.report.typeset import UNITS
 from thermospindle.sim.campaign.campaign import Test
 from thermospindle.sim.identification.frf import Frf
 from thermospindle.sim.operating import provenance
 
 COMPUTED = (170, 172, 178)
 SHOWN = 4  # tests and FRFs a test in the overview: the coldest, the hottest and some between
-UNITS = {"receptance": "m/N", "mobility": "(m/s)/N", "accelerance": "(m/s2)/N"}
 
 PairedPeak = tuple[int, str, float, float, float]
 """Number and kind of a mode, its measured frequency with standard error, and the computed one, Hz."""

@@ -10,7 +10,6 @@ from rich.console import Console
 
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
-from thermospindle.report.figures.resonance import figures_svg, write_figures
 from thermospindle.report.text.grid import show_grid
 from thermospindle.report.typeset import figure, prose, table, write_csv
 from thermospindle.sim.operating import provenance
@@ -195,6 +194,8 @@ def write_map(found: ResonanceMap, folder: Path) -> None:
         for j, s in enumerate(found.speeds)
     ]
     write_csv(folder / "modes.csv", ["temperature_C", "speed_rpm", *(f"mode {m.number} {m.kind}_Hz" for m in found.modes)], grid, about)
+    from thermospindle.report.figures.resonance import write_figures  # matplotlib takes its time to load
+
     write_figures(found, folder)
 
 
@@ -203,6 +204,8 @@ def map_section(found: ResonanceMap) -> tuple[str, str]:
     said = "".join(f"<p>{prose(s)}</p>" for s in told(found))
     head = ("line", "wave and order", "bearing", "mode", "°C", "rpm", "Hz", "strength, nm", "NRRO (nonrepeatable runout), nm rms", "margin, %")
     grid = table(head, [[prose(cell) for cell in _cells(c)] for c in strongest(found.coincidences)[:SHOWN]], range(4))
+    from thermospindle.report.figures.resonance import figures_svg
+
     drawings = figures_svg(found)
     captions = {
         "campbell": "Campbell diagram: natural frequencies and lines over speed.",

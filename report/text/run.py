@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Console
@@ -14,15 +14,15 @@ from thermospindle.model.bearing.stiffness_table import StiffnessTable, write_ta
 from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.modes import Mode, group_energy
 from thermospindle.model.units import RPM
-from thermospindle.report.log.read import Log
-from thermospindle.report.log.run import write_log
-from thermospindle.report.page.report import write_report
 from thermospindle.report.text.grid import show_grid
 from thermospindle.report.typeset import write_csv
 from thermospindle.sim.campaign.campaign import Campaign, write_campaign
 from thermospindle.sim.identification.numbering import identified, measured_rows, numbered
 from thermospindle.sim.operating import OperatingPoint, provenance, stiffness_table
 from thermospindle.sim.run import Run, Step, as_campaign
+
+if TYPE_CHECKING:
+    from thermospindle.report.log.read import Log
 
 JSON_COLUMNS = (
     "contact_angle_deg",
@@ -121,6 +121,9 @@ def _write_modes_csv(points: list[OperatingPoint], path: Path) -> None:
 
 def write_run(run: Run, folder: Path, progress: Callable[[str], None]) -> None:
     """Everything a run leaves behind: tables, model, campaign, report, Rerun log."""
+    from thermospindle.report.log.run import write_log  # matplotlib and rerun take their time to load
+    from thermospindle.report.page.report import write_report
+
     temperatures = [s.point.condition.temperature for s in run.steps]
     write_table(stiffness_table(run.spindle, temperatures, [run.steps[0].point.condition.speed]), folder / "table.csv")
     points = [s.point for s in run.steps]

@@ -14,11 +14,10 @@ from thermospindle.model.bearing.roller import RollerState
 from thermospindle.model.machine import RollerBearing
 from thermospindle.model.types import Array
 from thermospindle.model.units import MINUTE, RPM
-from thermospindle.report.figures.warmup import figure_svg, power, write_figure
 from thermospindle.report.text.grid import show_grid
-from thermospindle.report.typeset import figure, minus, write_csv
+from thermospindle.report.typeset import figure, minus, power, write_csv
 from thermospindle.sim.operating import provenance
-from thermospindle.sim.warmup import Moment, Warmup, energy
+from thermospindle.sim.warmup import Moment, Warmup, energy, most_friction
 
 LINES = 16  # of the terminal table
 
@@ -109,6 +108,8 @@ def write_warmup(warmup: Warmup, folder: Path) -> None:
     header, body = rows(warmup)
     about = ", ".join(f"{k} {v}" for k, v in provenance(warmup.spindle).items())
     write_csv(folder / "warmup.csv", header, body, about)
+    from thermospindle.report.figures.warmup import write_figure  # matplotlib takes its time to load
+
     write_figure(warmup, folder)
 
 
@@ -119,7 +120,7 @@ def show_warmup(console: Console, warmup: Warmup) -> None:
     if lost:
         console.print(f"{lost[0].upper()}{lost[1:]}.\n", highlight=False)
     bearings = [b.name for b in warmup.spindle.bearings]
-    unit, scale = power(warmup)
+    unit, scale = power(most_friction(warmup))
     columns = ["time\nmin", *(f"{b}\nC" for b in bearings), "coolest\nC", "hottest\nC", f"{bearings[0]}\npreload\nN", f"friction\n{unit}"]
     columns += [f"f{k}\nHz" for k in range(1, len(warmup.modes) + 1)]
     rows = [
@@ -178,6 +179,8 @@ def _shown(times: Array) -> list[int]:
 
 def warmup_section(warmup: Warmup) -> tuple[str, str]:
     """Title and HTML of a report section."""
+    from thermospindle.report.figures.warmup import figure_svg
+
     last, total = warmup.steady, heat_sums(warmup)
     bearings = ", ".join(f"{b} {t:.1f}" for b, t in last.bearing_temperatures.items())
     first = warmup.spindle.bearings[0].name
@@ -185,7 +188,7 @@ def warmup_section(warmup: Warmup) -> tuple[str, str]:
         f"mode {k} ({escape(m.kind)}) {b - a:+.1f}"
         for k, (m, a, b) in enumerate(zip(warmup.modes, warmup.frequencies[0], warmup.steady_frequencies, strict=True), 1)
     )
-    unit, scale = power(warmup)
+    unit, scale = power(most_friction(warmup))
     about = (
         f"<p>From {warmup.start:g} °C in air of {warmup.air:g} °C at {warmup.speed / RPM:.0f} rpm. The slowest time constant is "
         f"{warmup.time_constant:.0f} s. In the steady state the bearings are at {escape(bearings)} °C, the preload of {escape(first)} is "

@@ -15,7 +15,6 @@ from thermospindle.model.rotor.elements import ELEMENTS
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import NM, RPM
 from thermospindle.report.folder import mark, whole_folder
-from thermospindle.report.log.impact import write_impact_log
 from thermospindle.report.text import run as text
 from thermospindle.report.verbs.answer import (
     Answer,
@@ -169,6 +168,8 @@ def _virtual_tests(spindle: Spindle, temperatures: Sequence[float], speed_rpm: f
 
 
 def _write_impact(result: Run, folder: Path) -> None:
+    from thermospindle.report.log.impact import write_impact_log  # rerun takes its time to load
+
     text.write_campaign_of(result, folder / "campaign")
     write_impact_log(result, folder / "impact.rrd")
 

@@ -14,7 +14,6 @@ from thermospindle.diagnosis.data.observe import observe
 from thermospindle.diagnosis.runout.compare import RunoutBeside, compare_runout, rms_residual
 from thermospindle.diagnosis.runout.lines import modal_tests
 from thermospindle.model.machine import Spindle
-from thermospindle.report.page.compare import write_comparison
 from thermospindle.report.text.compare import comparison_json, show_before_after, show_comparison
 from thermospindle.report.text.runout_compare import runout_comparison_json, show_errors, show_runout_comparison
 from thermospindle.report.verbs.answer import Answer, answered, progress_bar, with_effects, write_json
@@ -40,7 +39,7 @@ def compare(
     tests = modal_tests(whole)
     if turning and not tests.tests:
         values = {"spindle": spindle.name, "campaign": whole.title, **turning[0]}
-        alone = write_json("comparison.json", lambda folder: write_comparison(None, spindle, folder, *turning[2:], whole.title))
+        alone = write_json("comparison.json", lambda folder: _write(None, spindle, folder, *turning[2:], whole.title))
         return answered(values, turning[1], out, asked, alone)
     with progress_bar((3 if earlier else 2) * len(tests.tests)) as progress:
         observed = observe(tests, spindle, progress)
@@ -59,8 +58,14 @@ def compare(
         if turning:
             turning[1](console)
 
-    write = write_json("comparison.json", lambda folder: write_comparison(comparison, spindle, folder, *(turning[2:] if turning else ())))
+    write = write_json("comparison.json", lambda folder: _write(comparison, spindle, folder, *(turning[2:] if turning else ())))
     return answered(values, show, out, asked, write, left_out(tests))
+
+
+def _write(*what: Any) -> None:
+    from thermospindle.report.page.compare import write_comparison  # matplotlib and rerun take their time to load
+
+    write_comparison(*what)
 
 
 def _of_runout(

@@ -21,7 +21,6 @@ from thermospindle.model.files.formats import CURRENT, DIAGNOSIS, KEY
 from thermospindle.model.machine import Spindle
 from thermospindle.model.scene.reading import content_hash
 from thermospindle.model.whole import whole
-from thermospindle.report.page.diagnosis import write_diagnosis
 from thermospindle.report.text.diagnosis.answer import diagnosis_json
 from thermospindle.report.text.diagnosis.words import show_diagnosis
 from thermospindle.report.text.runout_diagnosis import runout_diagnosis_json, show_runout_diagnosis
@@ -52,7 +51,7 @@ def diagnose(
 
         def alone(folder: Path, answer: dict[str, Any]) -> None:
             write_json("diagnosis.json")(folder, answer)
-            write_diagnosis(None, answer, spindle, folder, of_runout, answer)
+            _write(None, answer, spindle, folder, of_runout, answer)
 
         return answered(told | where, show_runout, out, asked, alone)
     with progress_bar(len(tests.tests) + verdict.STEPS) as progress:
@@ -70,9 +69,15 @@ def diagnose(
 
     def write(folder: Path, answer: dict[str, Any]) -> None:
         write_json("diagnosis.json")(folder, answer)
-        write_diagnosis(found, answer, spindle, folder, *((turning[2], turning[0]) if turning else ()))
+        _write(found, answer, spindle, folder, *((turning[2], turning[0]) if turning else ()))
 
     return answered(values, show, out, asked, write, left_out(tests))
+
+
+def _write(*what: Any) -> None:
+    from thermospindle.report.page.diagnosis import write_diagnosis  # matplotlib takes its time to load
+
+    write_diagnosis(*what)
 
 
 def draft(diagnosis: Path, name: str | None = None, element: str | None = None, out: Path | None = None) -> Answer:

@@ -8,7 +8,6 @@ from pathlib import Path
 from rich.console import Console
 
 from thermospindle.diagnosis.ladder.ladder import ladder as climb
-from thermospindle.report.page.ladder import write_ladder
 from thermospindle.report.text.ladder_table import growing, ladder_json, show_ladder
 from thermospindle.report.verbs.answer import Answer, answered, with_effects, write_json
 from thermospindle.sim.campaign.campaign import read_campaign
@@ -28,5 +27,11 @@ def ladder(
     chosen = None if effects is None else [by_name(name, catalogue) for name in effects]
     with growing(Console(stderr=True, markup=False)) as live:
         found = climb(spindle, tests, chosen, catalogue, live.step, live.progress)
-    write = write_json("ladder.json", lambda folder: write_ladder(found, folder))
+
+    def pictures(folder: Path) -> None:
+        from thermospindle.report.page.ladder import write_ladder  # matplotlib takes its time to load
+
+        write_ladder(found, folder)
+
+    write = write_json("ladder.json", pictures)
     return answered(ladder_json(found), lambda console: show_ladder(console, found), out, asked, write)

@@ -13,8 +13,6 @@ from thermospindle.model.drawn import drawn
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import MINUTE, RPM
-from thermospindle.report.log.turning.map import write_map_log
-from thermospindle.report.log.turning.warmup import write_warmup_log
 from thermospindle.report.text.resonance import map_json, show_map, write_map
 from thermospindle.report.text.runout import runout_json, show_runout, write_runout
 from thermospindle.report.text.warmup import lost_contact, show_warmup, warmup_json, write_warmup
@@ -139,10 +137,14 @@ def resonances(
 
 
 def _write_warmup(found: Warmup, folder: Path) -> None:
+    from thermospindle.report.log.turning.warmup import write_warmup_log  # rerun takes its time to load
+
     write_warmup(found, folder)
     write_warmup_log(found, folder / "warmup.rrd")
 
 
 def _write_map(found: ResonanceMap, folder: Path) -> None:
+    from thermospindle.report.log.turning.map import write_map_log
+
     write_map(found, folder)
     write_map_log(found, folder / "map.rrd")

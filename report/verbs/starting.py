@@ -14,7 +14,6 @@ from thermospindle.model.machine import Condition
 from thermospindle.model.scene.fields import read_toml
 from thermospindle.model.scene.reading import SCENES
 from thermospindle.report.check.odd import looked, odd
-from thermospindle.report.check.page import write_check
 from thermospindle.report.check.understood import understood
 from thermospindle.report.check.words import show_check
 from thermospindle.report.folder import whole_folder
@@ -54,5 +53,11 @@ def check(scene: Path, effect_files: Sequence[Path] = (), out: Path | None = Non
     spindle, catalogue = with_effects(scene, effect_files)
     point = operating_point(spindle, Condition(spindle.reference_temperature))
     values: dict[str, Any] = understood(point, catalogue) | {"odd": odd(looked(spindle, point))}
-    write = write_json("check.json", lambda folder: write_check(point, values, folder))
+
+    def page(folder: Path) -> None:
+        from thermospindle.report.check.page import write_check  # matplotlib takes its time to load
+
+        write_check(point, values, folder)
+
+    write = write_json("check.json", page)
     return answered(values, lambda console: show_check(console, values), out, {"verb": "check"} | asked, write)

@@ -7,6 +7,7 @@ lines         the effects of a setting fitted to the FRF lines and weighed, as `
 section       the section as polygons that move with their bodies
 explanations  explanations with their probabilities, from a diagnosis read or made here
 save          scene, report, and the script that does the same without the page
+shades        the colours of the map of errors, on a light page and on a dark one
 plots         FRFs, the map of errors and the moving section as Bokeh figures
 words         what the page says in words and tables
 controls      a slider for every parameter and tolerance

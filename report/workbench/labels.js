@@ -52,8 +52,21 @@ addEventListener("keydown", event => {
   window.Bokeh.index.get(model)?.el.shadowRoot.querySelector("button")?.click()
 })
 
-// Colours of the pictures follow the page's: drawn again when light turns to dark. A mode moves at once, unless that is not wanted.
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+// Colours of the pictures follow the page's: drawn again when light turns to dark. The map of errors has colours of its own for a dark page.
+const dark = matchMedia("(prefers-color-scheme: dark)")
+function shade() {
+  const map = window.Bokeh?.documents?.[0]?.get_model_by_name("map")
+  if (!map) return false
+  const [fill, ink] = dark.matches ? ["night", "night_ink"] : ["colour", "ink"]
+  for (const { glyph } of map.renderers) {
+    const wanted = glyph.type === "Text" ? { text_color: { field: ink } } : { fill_color: { field: fill }, hatch_color: { field: ink } }
+    glyph.setv(wanted, { sync: false })
+  }
+  return true
+}
+const waiting = setInterval(() => { if (shade()) clearInterval(waiting) }, 50)
+dark.addEventListener("change", () => {
+  shade()
   for (const doc of window.Bokeh?.documents ?? []) for (const model of doc.roots()) window.Bokeh.index.get(model)?.request_paint?.()
 })
 // Said when the program behind the page has ended: nothing on it works then.

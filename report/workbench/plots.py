@@ -19,19 +19,16 @@ from bokeh.models import (
     Toggle,
 )  # fmt: skip
 from bokeh.plotting import figure
-from matplotlib import colormaps
-from matplotlib.colors import to_hex
 
 from thermospindle.model.types import ComplexArray
-from thermospindle.report.figures.common import residual_norm, signed_short
-from thermospindle.report.figures.compare import UNITS
+from thermospindle.report.typeset import SMALLEST, UNITS, signed_short
 from thermospindle.report.workbench.bench import Bench, Curves, Errors
 from thermospindle.report.workbench.section import LARGEST, Piece
+from thermospindle.report.workbench.shades import hexadecimal, shades
 from thermospindle.report.workbench.state import Setting
 
 MEASURED, COMPUTED = "#d2691e", "#2f86d6"  # three to one and more on white and on black
 FITTED, LEFT_OUT, CONDITIONS = "fitted", "left out", "conditions"
-INK, PAPER = "#1b1c1d", "#ffffff"
 PERCENT = 5.0  # of change, the strongest colour where there are no errors
 LEFT = 66  # px of both pictures of an FRF, so that their frequencies stand under each other
 TOOLS = "xbox_zoom,reset"
@@ -86,14 +83,17 @@ def _columns(frequency: np.ndarray, value: ComplexArray) -> dict[str, np.ndarray
 
 
 class ErrorMap:
-    """Errors of every mode in every test as coloured numbers; tests that are left out stand apart, with hatched cells."""
+    """Errors of every mode in every test as coloured numbers; tests that are left out stand apart, with hatched cells.
+
+    The columns `night` and `night_ink` are the colours of the dark page, which the page itself puts in the place of the others (labels.js).
+    """
 
     def __init__(self, bench: Bench) -> None:
         self.bench = bench
-        self.source = ColumnDataSource(data={k: [] for k in ("x", "y", "colour", "ink", "text", "says", "hatch")})
+        self.source = ColumnDataSource(data={k: [] for k in ("x", "y", "colour", "ink", "night", "night_ink", "text", "says", "hatch")})
         self.figure = _figure("map of errors", height=330, tools="", x_range=FactorRange(), y_range=FactorRange(), name="map")
         look = {"source": self.source, "width": 0.94, "height": 0.9}
-        self.figure.rect("x", "y", fill_color="colour", line_color=None, hatch_pattern="hatch", hatch_color=INK, hatch_alpha=0.12, hatch_scale=14, **look)
+        self.figure.rect("x", "y", fill_color="colour", line_color=None, hatch_pattern="hatch", hatch_color="ink", hatch_alpha=0.12, hatch_scale=14, **look)
         self.figure.text("x", "y", text="text", text_color="ink", text_align="center", text_baseline="middle", text_font_size="12px", source=self.source)
         self.figure.add_tools(HoverTool(tooltips=[("mode", "@y"), ("test", "@x"), ("", "@says"), ("error", "@text")]))
         self.figure.xaxis.major_label_orientation = 0.9
@@ -107,8 +107,7 @@ class ErrorMap:
         there = [(c, v) for c, v in cells if v is not None]
         modes = sorted({c.mode for c in found.cells}, key=lambda m: (int(m.split()[0]), m))
         largest = max((abs(v) for _, v in there), default=0.0)
-        norm, colours = residual_norm(largest if self.bench.campaign else 30.0), colormaps["RdBu_r"]
-        scale = 1.0 if self.bench.campaign else 30.0 / PERCENT
+        largest, scale = (largest, 1.0) if self.bench.campaign else (SMALLEST, SMALLEST / PERCENT)
         factors = [self.place(test.id, s) for test in self.bench.shown]
         factors.sort(key=lambda place: place[0] == LEFT_OUT)  # in their order, those left out last
         if self.figure.x_range.factors != factors:
@@ -116,12 +115,11 @@ class ErrorMap:
         if self.figure.y_range.factors != modes[::-1]:
             self.figure.y_range.factors = modes[::-1]
             self.figure.height = 130 + 30 * max(len(modes), 3)
-        shades = [colours(norm(scale * v)) for _, v in there]
+        colours = [shades(scale * v, largest) for _, v in there]
         self.source.data = {
             "x": [self.place(c.test, s) for c, _ in there],
             "y": [c.mode for c, _ in there],
-            "colour": [to_hex(c) for c in shades],
-            "ink": [PAPER if 0.299 * r + 0.587 * g + 0.114 * b < 0.5 else INK for r, g, b, _ in shades],
+            **{name: [c[k] for c in colours] for k, name in enumerate(("colour", "ink", "night", "night_ink"))},
             "text": [signed_short(v) for _, v in there],
             "says": [c.says for c, _ in there],
             "hatch": ["right_diagonal_line" if c.test in s.left_out else "blank" for c, _ in there],
@@ -141,7 +139,7 @@ class MovingSection:
     def __init__(self, drawn: Sequence[Piece]) -> None:
         self.drawn = drawn
         x, z = [p.x.tolist() for p in drawn], [p.z.tolist() for p in drawn]
-        colours = [to_hex(p.rgb) for p in drawn]
+        colours = [hexadecimal(p.rgb) for p in drawn]
         still: Points = [[0.0] * len(row) for row in x]
         self.motion = ColumnDataSource(data={"x": x, "z": z, "xa": still, "xb": still, "za": still, "zb": still})
         self.now = ColumnDataSource(data={"x": x, "z": z, "colour": colours})

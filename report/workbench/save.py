@@ -11,7 +11,6 @@ from thermospindle.diagnosis.compare.compare import compare
 from thermospindle.model.errors import BadInput
 from thermospindle.model.scene.reading import SCENES
 from thermospindle.report.folder import mark, whole_folder
-from thermospindle.report.page.compare import write_comparison
 from thermospindle.report.workbench.bench import Bench, Errors, built
 from thermospindle.report.workbench.state import Setting, Step
 from thermospindle.sim.effects.own import OwnEffect
@@ -36,6 +35,10 @@ def save(bench: Bench, s: Setting, errors: Errors, ladder: tuple[Step, ...], out
         (folder / "workbench.py").write_text(script(bench, s), encoding="utf-8")
         progress("scene and script written, now computing the FRFs of the report")
         if bench.campaign:
+            from thermospindle.report.page.compare import (
+                write_comparison,  # matplotlib and rerun take their time to load: not to open the page
+            )
+
             (folder / "report").mkdir()
             spindle = built(bench, s)
             found = compare(spindle, bench.campaign, bench.observations)

@@ -18,7 +18,6 @@ from typing import TypeVar
 
 import mujoco
 import numpy as np
-from scipy.signal import resample_poly
 
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import HammerTest
@@ -208,6 +207,8 @@ def acquire(
     Velocity sensors read at the start of a step, the force is held from there to the next: half a step apart, which an exact
     shift in frequency takes out. The same linear-phase filter runs over both channels.
     """
+    from scipy.signal import resample_poly  # takes half a second to load, and most verbs strike nothing
+
     n = held.shape[-1]
     frequency = np.fft.rfftfreq(n, test.step)
     hold = np.exp(-1j * np.pi * frequency * test.step) * np.sinc(frequency * test.step)

@@ -22,7 +22,6 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import firwin, upfirdn
 
 from thermospindle.model.errors import BadInput
 from thermospindle.model.rotor.chain import turning_at
@@ -97,6 +96,8 @@ def run_spindle(
     and a stiffer mode's share of the motion, which follows the force at once, to about omega step: 1e-4 of the hub's motion, 2e-3 of the
     shaft's tilt at the scene's step, thirty times less at half of it.
     """
+    from scipy.signal import firwin, upfirdn  # takes half a second to load
+
     step = step or points[0].spindle.hammer.step
     every = _every(points, step, sample_rate)
     samples, settled = round(duration * sample_rate), int(np.ceil(settle * sample_rate))

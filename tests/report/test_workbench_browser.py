@@ -257,6 +257,17 @@ def test_it_fits_the_window_and_can_be_read_in_light_and_dark(tab):
     tab.scheme("light")
 
 
+def test_the_map_of_errors_has_colours_of_its_own_on_a_dark_page(tab):
+    drawn = "window.Bokeh?.documents?.[0]?.get_model_by_name('map')?.renderers"  # a page that is being loaded again has none for a while
+    fields = f"{drawn}?.map(r => (r.glyph.fill_color ?? r.glyph.text_color).field).join()"
+    for scheme, wanted in (("dark", "night,night_ink"), ("light", "colour,ink"), ("dark", "night,night_ink")):
+        tab.scheme(scheme)
+        tab.wait(f"{fields} === '{wanted}'")
+    tab.call("Page.reload")
+    tab.wait(f"document.body?.dataset.ready === 'yes' && {fields} === 'night,night_ink'")
+    tab.scheme("light")
+
+
 def contrast(a, b):
     """Of WCAG 2.1, 1.4.3."""
 

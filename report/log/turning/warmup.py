@@ -18,14 +18,15 @@ from numpy.typing import NDArray
 from thermospindle.model.types import Array
 from thermospindle.model.units import MINUTE, RPM, TO_MM
 from thermospindle.report.figures.common import BEARINGS
-from thermospindle.report.figures.warmup import MODES, PARTS, power
+from thermospindle.report.figures.warmup import MODES, PARTS
 from thermospindle.report.log.blueprint import at, framed
 from thermospindle.report.log.columns import any_values, curve_look, log_curve, number_column, whole_log
 from thermospindle.report.log.drawing import HEAT, outlines
 from thermospindle.report.log.pictures import DARK
 from thermospindle.report.text.warmup import heat_sums, lost_contact, rows
+from thermospindle.report.typeset import power
 from thermospindle.sim.operating import provenance
-from thermospindle.sim.warmup import Warmup
+from thermospindle.sim.warmup import Warmup, most_friction
 
 SECONDS = 12.0  # in which all of it is played
 
@@ -67,7 +68,7 @@ def series(warmup: Warmup) -> dict[str, dict[str, tuple[Array, Any]]]:
     parts = {g.name: g.part for g in spindle.regions}
     friction = [b.name for b in spindle.ringed]
     bearings = [b.name for b in spindle.bearings]
-    unit, scale = power(warmup)
+    unit, scale = power(most_friction(warmup))
     shift = warmup.frequencies - warmup.frequencies[0]
     modes = {f"{k} {m.kind} {f:.0f} Hz": k - 1 for k, (m, f) in enumerate(zip(warmup.modes, warmup.frequencies[0], strict=True), 1)}
     return {
