@@ -6,8 +6,6 @@ under `numbers/` as components with plain names; `Log.table` gives those of one 
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,6 +18,7 @@ import pyarrow as pa
 from rerun.chunk import RrdReader
 
 from thermospindle.model.errors import BadInput
+from thermospindle.model.files.apart import read_apart
 from thermospindle.model.types import Array
 from thermospindle.report.log.content import Peak
 from thermospindle.sim.identification.frf import Frf
@@ -188,9 +187,7 @@ def check_readable(path: Path) -> None:
     """Refuse (`BadInput`) a damaged log on which the library that reads it would abort the whole process, by letting it abort another."""
     if not Path(path).is_file():
         raise BadInput(f"{path}: no such file")
-    done = subprocess.run([sys.executable, "-P", "-c", TRIAL, str(path)], capture_output=True)
-    if done.returncode:
-        raise BadInput(f"{path}: is damaged; the library that reads Rerun logs breaks off on it")
+    read_apart(Path(path), "Rerun logs", TRIAL, str(path))
 
 
 def read_log(path: Path) -> Log:

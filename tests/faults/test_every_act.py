@@ -1,11 +1,16 @@
-"""What a SIGKILL leaves before every single act of a run on its files: copies of the folder, made by the run itself as it goes.
+"""What a SIGKILL would leave at many moments of one run: copies of its folder as it goes, since what takes minutes cannot be killed a hundred times.
 
-`test_kills` kills at random moments, also amid what compiled libraries write; this needs one run for all moments that the interpreter tells of.
+Before every act on its files the run makes one itself (`launch`); between them, amid what compiled libraries write, it is stopped (SIGSTOP) at random
+moments while its folder is copied. Both leave what SIGKILL leaves: all that was written so far, and nothing of what the process still holds. `test_kills` kills.
 """
 
 import os
 import resource
 import shutil
+import signal
+import subprocess
+import sys
+import time
 from collections import Counter
 
 import numpy as np
@@ -15,12 +20,36 @@ from tests.faults.conftest import COUNTS, SEED
 from tests.faults.launch import watch
 from tests.faults.test_kills import state
 from tests.faults.test_surroundings import LEAST
-from tests.faults.verbs import VERBS, Verb, acts, fresh, launched, marked, prepare, tree, work_folders
+from tests.faults.verbs import VERBS, Verb, acts, fresh, launched, marked, prepare, surroundings, tree, work_folders
 from tests.torture.apart import tried_apart
 from thermospindle.cli import main
 
 NEW = next(v for v in VERBS if v.name == "new")
-AGAIN = 2  # of the copies a verb is run in once more
+AGAIN, MOST = 2, 100  # copies that a verb is run in once more, and at random moments
+
+
+def moments(verb: Verb, place, to, cache) -> None:
+    """One run of a verb, with copies before its acts beside `place` and, once it writes, at random moments in the folder `to`."""
+    rng, count, last = np.random.default_rng(SEED), 0, None
+    command = [sys.executable, "-m", "tests.faults.launch", str(place), "-1", str(place.parent / "acts"), *verb.line(place)]
+    running = subprocess.Popen(command, env=surroundings(cache), cwd=place, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        while running.poll() is None:
+            time.sleep(rng.uniform(0.001, 0.1))
+            if count < MOST and work_folders(place) and running.poll() is None:
+                running.send_signal(signal.SIGSTOP)
+                _, status = os.waitpid(running.pid, os.WUNTRACED)
+                if not os.WIFSTOPPED(status):
+                    running.returncode = os.waitstatus_to_exitcode(status)
+                    break
+                now = tuple((p, p.lstat().st_size, p.lstat().st_mtime_ns) for p in sorted(place.rglob("*")))
+                if now != last:  # not what was there a moment ago
+                    shutil.copytree(place, to / str(count := count + 1))
+                    last = now
+                running.send_signal(signal.SIGCONT)
+    finally:
+        running.kill()
+    assert running.wait() == 0
 
 
 def cleared(verb: Verb, place) -> None:
@@ -31,18 +60,19 @@ def cleared(verb: Verb, place) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("verb", VERBS, ids=lambda v: v.name.replace(" ", "_"))
-def test_killed_before_every_act(verb, tmp_path, cache):
+def test_a_kill_at_any_moment_of_one_run(verb, tmp_path, cache):
     first, place = prepare(tmp_path / "first" / "here"), prepare(tmp_path / "here")
     done = launched(first, verb.line(first), cache)
     assert done.returncode == 0, done.stderr
     reference = tree(first / verb.target)
     if verb.whole is marked:
         shutil.copytree(first / verb.target, place / verb.target)  # an older result
-    assert launched(place, verb.line(place), cache, kill_at=-1).returncode == 0
-    copies = sorted((tmp_path / "acts.copies").iterdir(), key=lambda copy: int(copy.name))
-    assert len(copies) == acts(place) > 1
+    (tmp_path / "stopped").mkdir()
+    moments(verb, place, tmp_path / "stopped", cache)
+    copies = [*(tmp_path / "acts.copies").iterdir(), *(tmp_path / "stopped").iterdir()]
+    assert len(copies) >= acts(place) > 1
     found = {copy: state(verb, copy, reference) for copy in copies}
-    COUNTS[f"{verb.name}, acts"] = Counter(found.values())
+    COUNTS[f"{verb.name}, copies"] = Counter(f"{'before an act' if 'acts' in copy.parent.name else 'stopped'}, {what}" for copy, what in found.items())
     left = [copy for copy in copies if found[copy] == "moved away"] or [copy for copy in copies if work_folders(copy)] or copies
     for copy in np.random.default_rng(SEED).permutation(np.array(left, object))[:AGAIN]:
         cleared(verb, copy)

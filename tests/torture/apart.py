@@ -16,7 +16,7 @@ from collections.abc import Callable
 from tempfile import TemporaryFile
 from typing import IO, Any
 
-SECONDS = 30
+SECONDS, SOON = 30, 3
 
 
 class Hangs(Exception):
@@ -47,8 +47,8 @@ def tried_apart(act: Callable[[], object], named: tuple[type[Exception], ...]) -
         raise named[kind](text) if kind >= 0 else AssertionError(text)
 
 
-def started(command: list[str], **_: Any) -> subprocess.CompletedProcess:
-    """As `subprocess.run` of `python -P -c CODE ...`, in a fork of this process."""
+def started(command: list[str], timeout: float | None = None, **_: Any) -> subprocess.CompletedProcess:
+    """As `subprocess.run` of `python -P -c CODE ...`, in a fork of this process; its time is up after `SOON` where it has a limit."""
     assert command[:3] == [sys.executable, "-P", "-c"], command
 
     def child(told: IO[bytes]) -> int:
@@ -64,12 +64,15 @@ def started(command: list[str], **_: Any) -> subprocess.CompletedProcess:
                 return 1
         return 0
 
-    code, said = _forked(child)
+    try:
+        code, said = _forked(child, SOON if timeout else SECONDS)
+    except Hangs:
+        raise subprocess.TimeoutExpired(command, timeout or SECONDS) from None
     return subprocess.CompletedProcess(command, code, "", said.decode(errors="replace"))
 
 
-def _forked(child: Callable[[IO[bytes]], int | None]) -> tuple[int, bytes]:
-    """Exit code (a signal's is negative) and what was written of a `child`, which has `SECONDS` of the processor's time."""
+def _forked(child: Callable[[IO[bytes]], int | None], seconds: int = SECONDS) -> tuple[int, bytes]:
+    """Exit code (a signal's is negative) and what was written of a `child`, which has so many `seconds` of the processor's time."""
     with TemporaryFile() as told:
         number = os.fork()
         if number == 0:
@@ -78,7 +81,7 @@ def _forked(child: Callable[[IO[bytes]], int | None]) -> tuple[int, bytes]:
                 faulthandler.disable()  # a library that breaks off is what is expected
                 for which in (signal.SIGALRM, signal.SIGPROF):
                     signal.signal(which, signal.SIG_DFL)
-                resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 5))
+                resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
                 code = child(told) or 0
                 told.flush()
             finally:
@@ -91,6 +94,6 @@ def _forked(child: Callable[[IO[bytes]], int | None]) -> tuple[int, bytes]:
             raise
         code = os.waitstatus_to_exitcode(status)
         if code == -signal.SIGXCPU:
-            raise Hangs(f"still running after {SECONDS} s of the processor's time")
+            raise Hangs(f"still running after {seconds} s of the processor's time")
         told.seek(0)
         return code, told.read()

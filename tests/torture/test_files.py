@@ -16,7 +16,7 @@ from tests.torture.apart import tried_apart
 from tests.torture.conftest import NAMED, outcome
 from tests.torture.damage import Damage, damaged, damages
 from tests.torture.readers import READERS
-from tests.torture.wholes import MAPPING, STUDIES, TABLE, diagnosis, stiffness
+from tests.torture.wholes import MAPPING, STUDIES, TABLE, diagnosis, matlab, stiffness
 from thermospindle.cli import main
 from thermospindle.diagnosis.add import read_answer
 from thermospindle.diagnosis.draft import draft
@@ -121,6 +121,15 @@ def test_what_breaks_its_library_off_is_refused(tmp_path):
     with pytest.raises(BadInput, match=r"lab\.mat: is damaged; the library that reads \.mat files breaks off on it"):
         read_arrays(tmp_path / "lab.mat")
     assert read_arrays(tmp_path / "whole.mat")["H"].tolist() == [0.0, 1.0, 2.0]
+
+
+def test_what_its_library_never_ends_on_is_refused(tmp_path, monkeypatch):
+    """Found by `make torture`: 72 bytes twice in an HDF5 file, among whose groups h5py goes round for ever."""
+    data = damaged(matlab("hdf5"), [Damage("twice", 0.0177, b"", 0.0177)])
+    (tmp_path / "lab.mat").write_bytes(data)
+    monkeypatch.setattr("thermospindle.model.files.apart.LONGEST", 4.0)
+    with pytest.raises(BadInput, match=r"lab\.mat: is damaged; the library that reads \.mat files comes to no end on it within 4 s"):
+        read_arrays(tmp_path / "lab.mat")
 
 
 def test_values_that_overflow_are_refused(folder):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import struct
-import subprocess
 import sys
 import zipfile
 import zlib
@@ -17,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from thermospindle.model.errors import BadInput
+from thermospindle.model.files.apart import read_apart
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 
@@ -49,14 +49,12 @@ REFUSED = 3  # exit code of a process that has said why
 
 
 def _apart(file: Path) -> dict[str, Any]:
-    """What another process reads of a `.mat` file: the compiled readers of SciPy and HDF5 break off the process that they are in on some damaged files."""
+    """What another process reads of a `.mat` file: the compiled readers of SciPy and HDF5 break off the process that they are in on some damaged files, or never end."""
     with TemporaryDirectory() as place:
         found = Path(place) / "arrays.npz"
-        done = subprocess.run([sys.executable, "-P", "-c", APART, str(file), str(found), str(LARGEST)], capture_output=True, text=True, errors="replace")
+        done = read_apart(file, ".mat files", APART, str(file), str(found), str(LARGEST), ends=(0, REFUSED))
         if done.returncode == REFUSED:
             raise BadInput(done.stderr.strip())
-        if done.returncode or not found.is_file():
-            raise BadInput(f"{file}: is damaged; the library that reads .mat files breaks off on it")
         with np.load(found, allow_pickle=False) as stored:
             names = json.loads(str(stored["names"]))
             return {name: _told(stored[f"arr_{k}"]) for k, name in enumerate(names)}
