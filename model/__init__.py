@@ -3,7 +3,8 @@
 Imports none of the other packages:
 
 =============  ====================================================================================================
-machine        frozen definitions: spindle, materials, bearings, structure, points, condition
+machine        frozen definitions: spindle, section, structure, points, condition; bearings and materials from their modules
+material       frozen definitions: laws over temperature, materials
 span           the temperatures at which a spindle can be computed
 tolerance      the toleranced build parameters of a spindle
 imperfections  unbalance, waviness, ball sizes, cage unbalance

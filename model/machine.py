@@ -1,6 +1,7 @@
 """What a spindle is: frozen definitions in SI units, made by `model.scene.reading.load`.
 
-Temperatures are in degrees Celsius (only differences enter the physics), angles in radians, everything else SI.
+Temperatures are in degrees Celsius (only differences enter the physics), angles in radians, everything else SI. What a bearing and what a material
+is stands in `model.bearing.definitions` and `model.material`.
 """
 
 from __future__ import annotations
@@ -12,61 +13,17 @@ from typing import Any
 
 import numpy as np
 
-from thermospindle.model.errors import BadInput, OutsideRange
+from thermospindle.model.bearing.definitions import Bearing, BearingSet, LinearBearing, RollerBearing
+from thermospindle.model.errors import BadInput
 from thermospindle.model.imperfections import Imperfections
+from thermospindle.model.material import Law, Material
 from thermospindle.model.shaft import Shaft
 
 PARTS = ("stationary", "rotating")
-SENSE = {"back-to-back": (-1, 1), "face-to-face": (1, -1), "tandem": (1, 1)}
-"""`Bearing.sense` of the (lower, upper) bearing of a pair: back-to-back outer rings load as they move apart."""
 RACEWAY_WIDTH = 1.9
 """Width of a bearing over its ball diameter where none is told and rings share a tube: 1.7 to 2.1 in series 70, 719 and miniature ones."""
 MOVES = ("x", "y", "z", "tilt_x", "tilt_y")
 """Degrees of freedom of a body on the spindle axis, in the order of every 5-vector and 5x5 matrix of the project."""
-
-
-@dataclass(frozen=True)
-class Law:
-    """A material property over temperature: piecewise linear between `temperature` (C), constant when there is one entry."""
-
-    temperature: tuple[float, ...]
-    value: tuple[float, ...]
-
-    def __call__(self, temperature: float) -> float:
-        if len(self.value) == 1:
-            return self.value[0]
-        low, high = self.temperature[0], self.temperature[-1]
-        if not low <= temperature <= high:
-            raise OutsideRange(f"a material law given from {low:g} to {high:g} C was asked at {temperature:g} C")
-        return float(np.interp(temperature, self.temperature, self.value))
-
-    def integral(self, start: float, stop: float) -> float:
-        """Integral of the property from `start` to `stop` (C), exact for the piecewise linear law."""
-        if len(self.value) == 1:
-            return self.value[0] * (stop - start)
-        low, high = sorted((start, stop))
-        knots = [low, *[t for t in self.temperature if low < t < high], high]
-        area = float(np.trapezoid([self(t) for t in knots], knots))
-        return area if stop >= start else -area
-
-
-@dataclass(frozen=True)
-class Material:
-    """An isotropic linear thermo-elastic material.
-
-    `thermal_expansion` is the instantaneous coefficient d(strain)/dT; the strain is its integral.
-    """
-
-    name: str
-    youngs_modulus: Law  # Pa
-    poisson_ratio: float
-    thermal_expansion: Law  # 1/K
-    density: float  # kg/m3
-    conductivity: float  # W/(m K)
-    heat_capacity: float  # J/(kg K)
-
-    def thermal_strain(self, temperature: float, reference: float) -> float:
-        return self.thermal_expansion.integral(reference, temperature)
 
 
 @dataclass(frozen=True)
@@ -79,116 +36,6 @@ class Region:
     r: tuple[float, float]
     z: tuple[float, float]
     role: str = ""  # shaft, hub, insert or support: what effects know it by; empty for none of these
-
-
-@dataclass(frozen=True)
-class Bearing:
-    """One ball row at `z` (m), between two ring regions; `contact_angle` is the loaded one of the reference state."""
-
-    name: str
-    z: float
-    inner_ring: str
-    outer_ring: str
-    balls: int
-    ball_diameter: float
-    pitch_diameter: float
-    contact_angle: float
-    inner_conformity: float
-    outer_conformity: float
-    clearance: tuple[float, float] | None  # diametral, smallest and largest; None where nobody says
-    ball_material: str
-    ring_material: str
-    damping_ratio: float  # at Structure.damping_frequency
-    sense: int  # -1 or 1: direction along z in which moving the outer ring loads the row
-    inner_body: str  # the bodies that carry its rings; "ground" stands still
-    outer_body: str
-    turning_ring: str  # inner | outer
-    preload: float  # N, axial, its share of its set's at the reference temperature
-    raceway_width: float | None = None  # m, along z; None for the whole height of a ring that is this bearing's alone
-    constant_factor: float = 1.0  # load-deflection constant over that of Hertz, where a catalogue tells it
-    rated_stiffness: float | None = None  # N/m, radial, as a catalogue or designer states it
-
-    @property
-    def unloaded_distance(self) -> float:
-        """Distance of the groove curvature centres at zero load, (f_i + f_o - 1) d_B: Jang et al. 2003, Eq. (2)."""
-        return (self.inner_conformity + self.outer_conformity - 1.0) * self.ball_diameter
-
-
-@dataclass(frozen=True)
-class LinearBearing:
-    """A bearing given by numbers: the 5x5 matrix of its ring's motion against its seat, constant or over temperature and speed."""
-
-    name: str
-    z: float
-    inner_body: str
-    outer_body: str
-    temperature: tuple[float, ...]  # C, rising; one where nothing depends on it
-    speed: tuple[float, ...]  # rad/s, rising
-    stiffness: tuple[float, ...]  # N/m, N/rad, N m/rad: (temperatures, speeds, 5, 5), flat
-    damping_ratio: float  # at Structure.damping_frequency
-
-
-@dataclass(frozen=True)
-class RollerBearing:
-    """Cylindrical roller rows side by side at `z` (m): line contacts with a radial clearance, free along the axis.
-
-    `clearance` is the diametral one of the mounted bearing at the reference temperature, negative where its rollers are preloaded. Its rings
-    are regions of the section, or none, whose clearance then stays.
-    """
-
-    name: str
-    z: float
-    inner_ring: str  # region; empty for none
-    outer_ring: str
-    rows: int
-    row_spacing: float  # m, between the middles of neighbouring rows
-    rollers: int  # of one row
-    roller_diameter: float
-    roller_length: float  # m, effective, of one roller
-    pitch_diameter: float
-    clearance: float
-    roller_material: str
-    ring_material: str
-    damping_ratio: float  # at Structure.damping_frequency
-    inner_body: str
-    outer_body: str
-    raceway_width: float | None = None  # m, as of a ball row
-
-    @property
-    def ball_diameter(self) -> float:
-        """Diameter of the rolling elements, under the name that ball rows have for it."""
-        return self.roller_diameter
-
-    @property
-    def ball_material(self) -> str:
-        """Material of the rolling elements, under the name that ball rows have for it."""
-        return self.roller_material
-
-
-@dataclass(frozen=True)
-class PreloadSpring:
-    """The spring behind one ring of each of the bearings `rings_of`, which slide as one; the others locate the shaft and take axial loads.
-
-    Without a `rate` the spring's force is the preload wherever the rings slide, and in vibration friction holds them in their seat. With
-    one, force falls as they follow, and they slide in vibration too, with their own `mass`.
-    """
-
-    rings_of: tuple[str, ...]
-    rate: float | None = None  # N/m
-    mass: float = 0.0  # kg, of the sliding rings
-
-
-@dataclass(frozen=True)
-class BearingSet:
-    """Ball rows that are preloaded together: each of the groups that load against each other carries `preload`, its rows share it.
-
-    A set all of whose rows are loaded one way is preloaded from outside.
-    """
-
-    name: str
-    bearings: tuple[str, ...]
-    preload: float  # N, axial, at the reference temperature
-    spring: PreloadSpring | None = None  # None for rings fixed in their seats, and for rows loaded from outside
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from thermospindle.model.machine import PreloadSpring, Spindle
+from thermospindle.model.bearing.definitions import PreloadSpring
+from thermospindle.model.machine import Spindle
 
 
 def told_preload(spindle: Spindle, preload: float) -> Spindle:

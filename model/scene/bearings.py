@@ -12,6 +12,7 @@ from pydantic import Field, Strict, model_validator
 
 from thermospindle.model import machine as m
 from thermospindle.model.bearing.catalogue import CatalogueRow, derived
+from thermospindle.model.bearing.definitions import PreloadSpring
 from thermospindle.model.scene.bearing_numbers import Numbers
 from thermospindle.model.scene.fields import Place, Positive, Share, Span, Table
 from thermospindle.model.units import DEGREE, MM
@@ -225,8 +226,8 @@ class _Preloaded(Table):
             raise ValueError("sprung_ring_mass_g needs preload_rate_N_per_m, the spring on which the ring moves")
         return self
 
-    def _spring(self, rings_of: Sequence[str]) -> m.PreloadSpring:
-        return m.PreloadSpring(tuple(rings_of), self.preload_rate_N_per_m, (self.sprung_ring_mass_g or 0.0) * 1e-3)
+    def _spring(self, rings_of: Sequence[str]) -> PreloadSpring:
+        return PreloadSpring(tuple(rings_of), self.preload_rate_N_per_m, (self.sprung_ring_mass_g or 0.0) * 1e-3)
 
 
 class BearingPair(_Preloaded):

@@ -12,6 +12,7 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from thermospindle.model import machine as m
+from thermospindle.model.bearing.definitions import SENSE
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.formats import CURRENT, SCENE
 from thermospindle.model.scene.bearings import BallRow, Bearing, BearingPair, BearingSet, Mounted, RollerRow, check_sets
@@ -184,7 +185,7 @@ class Scene(Table):
         pair = self.bearing_pair
         sets = tuple(s.set(n) for n, s in self.sets.items()) if pair is None else (pair.set(list(rows)),)
         if pair is not None:
-            senses = dict(zip(rows, m.SENSE[pair.arrangement], strict=True))
+            senses = dict(zip(rows, SENSE[pair.arrangement], strict=True))
         else:
             senses = {n: 1 if b.sense == "+z" else -1 for n, b in rows.items()}
         shares = {n: s.preload / sum(senses[k] == senses[n] for k in s.bearings) for s in sets for n in s.bearings}

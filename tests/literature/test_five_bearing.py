@@ -135,7 +135,7 @@ def test_rigidity_of_sets(five, below, above, hertz, printed):
 
 def test_a_spring_set_keeps_its_force(five):
     """QBC with the upper two on one sleeve: whatever the rings do, both groups carry the spring's force, and each row half."""
-    from thermospindle.model.machine import PreloadSpring
+    from thermospindle.model.bearing.definitions import PreloadSpring
 
     rows = tuple(replace(five.bearings[k % 2], name=f"b{k}", z=0.05 + 0.02 * k, sense=-1 if k < 2 else 1) for k in range(4))
     own = BearingSet("set", tuple(b.name for b in rows), 382.0, PreloadSpring(("b2", "b3")))

@@ -7,8 +7,9 @@ import pytest
 
 from tests.mounting import sprung
 from thermospindle.model.bearing.ball_row import respond
+from thermospindle.model.bearing.definitions import SENSE
 from thermospindle.model.bearing.pair import reference_motion, solve
-from thermospindle.model.machine import SENSE, Condition, Law, RingMotion
+from thermospindle.model.machine import Condition, Law, RingMotion
 from thermospindle.model.tolerance import scaled_preload
 
 

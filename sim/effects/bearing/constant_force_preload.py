@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from thermospindle.model.bearing.definitions import BearingSet, PreloadSpring
 from thermospindle.model.bearing.pair import solve
-from thermospindle.model.machine import BearingSet, Condition, PreloadSpring, RingMotion, Spindle
+from thermospindle.model.machine import Condition, RingMotion, Spindle
 from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values
 
 
