@@ -19,7 +19,7 @@ from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.linear import Linear, Products, Rates, pairs, products, same_chain, together
 from thermospindle.diagnosis.forward.nuisance import Nuisance, ReferenceModes, Resonance, nuisances, reference_modes
 from thermospindle.diagnosis.forward.response import Light, Response
-from thermospindle.diagnosis.forward.table import mode_jacobian, mode_residual
+from thermospindle.diagnosis.forward.table import Table
 from thermospindle.model.errors import NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Condition, RingMotion, Spindle
 from thermospindle.model.rotor.chain import Matrices, matrices
@@ -189,20 +189,26 @@ class CampaignModel:
 
     def residual(self, t: int, x: Array, effects: Applied) -> Array:
         """Residuals (N,) of test `t`, computed less measured, in standard errors."""
+        return self._residual(t, self._standing(t, x, effects, self.linear(t, x, effects)))
+
+    def _residual(self, t: int, answer: Response | Table) -> Array:
+        if isinstance(answer, Table):
+            return answer.residual
         data = self.tests[t]
-        if isinstance(data, ModeData):
-            return mode_residual(data, self.linear(t, x, effects))
-        return self.whitened(t, self._standing(t, x, effects, self.linear(t, x, effects)).value, data.value)
+        assert isinstance(data, LineData)
+        return self.whitened(t, answer.value, data.value)
 
     def response(self, t: int, x: Array, effects: Applied, frequency: Array) -> ComplexArray:
         """FRFs (n_resp, n_ref, n) of test `t`, one of FRF lines, at other frequencies (n,) Hz."""
-        return self._response(t, x, self.linear(t, x, effects), frequency).value
-
-    def _response(self, t: int, x: Array, linear: Linear, frequency: Array | None = None) -> Response:
         data = self.tests[t]
         assert isinstance(data, LineData)
-        if frequency is not None:
-            data = replace(data, frequency=frequency)
+        return self._response(x, t, self.linear(t, x, effects), replace(data, frequency=frequency)).value
+
+    def _answer(self, t: int, x: Array, linear: Linear) -> Response | Table:
+        data = self.tests[t]
+        return Table(linear, data) if isinstance(data, ModeData) else self._response(x, t, linear, data)
+
+    def _response(self, x: Array, t: int, linear: Linear, data: LineData) -> Response:
         cut = 0.0 if self._record is None else float(x[self._record])
         return Response(linear, data, self._gain(t, x), cut, [light for light, _ in self.lights(linear.matrices.dofs, x)])
 
@@ -224,23 +230,25 @@ class CampaignModel:
         """Derivatives (k, N) of the residual of test `t` by the products of two shares each of a light resonance that is not there yet."""
         linear = self.linear(t, x, effects)
         light = self._light(linear.matrices.dofs, resonance)
-        moved = self._standing(t, x, effects, linear).by_products_of_shares(light, *np.triu_indices(len(resonance.shares)))
+        answer = self._standing(t, x, effects, linear)
+        assert isinstance(answer, Response)
+        moved = answer.by_products_of_shares(light, *np.triu_indices(len(resonance.shares)))
         return np.array([self.whitened(t, m, 0.0) for m in moved])
 
     def with_resonance(self, resonance: Resonance) -> CampaignModel:
         """With one light resonance more, whose parameters follow all others."""
         return replace(self, parameters=(*self.parameters, *resonance.nuisances), resonances=(*self.resonances, resonance))
 
-    def _standing(self, t: int, x: Array, effects: Applied, linear: Linear) -> Response:
-        """The response of test `t`; the last one is kept for those who ask more of the same place."""
+    def _standing(self, t: int, x: Array, effects: Applied, linear: Linear) -> Response | Table:
+        """The answer of test `t`; the last one is kept for those who ask more of the same place."""
         key = (x.tobytes(), tuple((id(e), *v.values()) for e, v in effects))
         late = self._responses.get(t)
         if late is None or late[0] != key:
-            late = self._responses[t] = key, self._response(t, x, linear), effects
+            late = self._responses[t] = key, self._answer(t, x, linear), effects
         return late[1]
 
     @cached_property
-    def _responses(self) -> dict[int, tuple[tuple, Response, Applied]]:
+    def _responses(self) -> dict[int, tuple[tuple, Response | Table, Applied]]:
         return {}
 
     @cached_property
@@ -267,11 +275,12 @@ class CampaignModel:
         """Residuals (N,) of test `t`, their derivatives (k + more, N) by k nuisance parameters, and the numbers (k,) of these; rows `more` are
         left zero for whoever has further parameters."""
         data, linear = self.tests[t], self.linear(t, x, effects)
-        if isinstance(data, ModeData):
-            r, found = mode_jacobian(data, linear, together([rates.products[t], *self._by_discrepancies(t, linear)]))
+        response = self._standing(t, x, effects, linear)
+        if isinstance(response, Table):
+            r, found = response.residual, response.moved(together([rates.products[t], *self._by_discrepancies(t, linear)]))
             numbers = np.concatenate([rates.numbers[t], *[row[0] for row in self._discrepancies[t]]])
             return r, np.concatenate([found, np.zeros((more, len(r)))]), numbers
-        response = self._standing(t, x, effects, linear)
+        assert isinstance(data, LineData)
         own, channel = self._gains[t]
         discrepancies = self._discrepancies[t]
         record = [] if self._record is None else [self._record]
@@ -312,16 +321,12 @@ class CampaignModel:
 
         Where matrices alone differ the exact derivative of the FRF is taken, which has no error of the second order in the FRF.
         """
-        data = self.tests[t]
         at, moved = self.linear(t, x, first), self.linear(t, x, second)
-        same = at.layout == moved.layout and at.matrices.dofs == moved.matrices.dofs and same_chain(at.chain, moved.chain)
-        if isinstance(data, ModeData):
-            return (mode_residual(data, moved) - mode_residual(data, at)) / apart
-        response = self._standing(t, x, first, at)
-        if same:
-            difference = [(getattr(moved.matrices, k) - getattr(at.matrices, k)) / apart for k in ("mass", "damping", "stiffness")]
-            return self.whitened(t, response.moved(products(*difference))[0], 0.0)
-        return self.whitened(t, (self._response(t, x, moved).value - response.value) / apart, 0.0)
+        answer = self._standing(t, x, first, at)
+        if at.layout == moved.layout and at.matrices.dofs == moved.matrices.dofs and same_chain(at.chain, moved.chain):
+            by = products(*((getattr(moved.matrices, k) - getattr(at.matrices, k)) / apart for k in ("mass", "damping", "stiffness")))
+            return answer.moved(by)[0] if isinstance(answer, Table) else self.whitened(t, answer.moved(by)[0], 0.0)
+        return (self._residual(t, self._answer(t, x, moved)) - self._residual(t, answer)) / apart
 
     # ------------------------------------------------------------ derivatives of the matrices
 

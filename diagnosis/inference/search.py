@@ -15,6 +15,7 @@ from itertools import chain, zip_longest
 
 import numpy as np
 
+from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import CampaignModel
@@ -222,7 +223,8 @@ def _fitted_all(model, tasks, first: Collection[str], strained: bool, about: Fit
         return []
     if not strained:
         return fitted(model, tasks, TEMPERS[-1:], about, most, expected, workers)
-    alive, early = list(tasks), about.temper * np.sqrt(about.chi2 / about.count) > STALLED
+    peaks = any(isinstance(d, LineData) for d in model.tests)  # a table's frequencies follow their parameters as far as these go
+    alive, early = list(tasks), peaks and about.temper * np.sqrt(about.chi2 / about.count) > STALLED
     for temper in TEMPERS[EARLY:]:
         found = fitted(model, alive, (temper,), about, most, expected, workers, afresh=early)
         early = False
