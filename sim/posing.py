@@ -19,8 +19,8 @@ from thermospindle.model.units import TO_MM
 from thermospindle.sim.operating import OperatingPoint
 from thermospindle.sim.running.runout import Runout
 
-VISIBLE = 0.16  # largest displacement of an animated mode, of the section's largest radius
-VISIBLE_TURNING = 0.04  # the same of the turning model
+VISIBLE = 0.16  # largest displacement of an animated mode, of the size of the spindle
+VISIBLE_TURNING = 0.04  # the same of the turning model, of its largest radius
 CYCLE = 20  # frames of one cycle of an animation
 FRAMES = 16  # of the turning model, a revolution
 
@@ -30,6 +30,12 @@ Poses = dict[str, tuple[Array, Array]]
 def reach(spindle: Spindle) -> float:
     """Largest radius of section and shafts (m)."""
     return extent(spindle)[0]
+
+
+def size(spindle: Spindle) -> float:
+    """Largest radius of section and shafts, or half their length where that is more (m): so that a long shaft is seen to bend."""
+    radius, low, high = extent(spindle)
+    return max(radius, (high - low) / 2)
 
 
 def round_down(value: float) -> float:
@@ -60,7 +66,7 @@ def largest_displacement(point: OperatingPoint, motion: ComplexArray) -> Array:
 def mode_motion(point: OperatingPoint, mode: Mode, frames: int) -> ComplexArray:
     """Motion (n, frames) of a mode shape turning through one cycle every `CYCLE` frames, scaled to be visible."""
     shape = mode.shape[:, None]
-    return VISIBLE * reach(point.spindle) / largest_displacement(point, shape) * shape * _turning(frames)
+    return VISIBLE * size(point.spindle) / largest_displacement(point, shape) * shape * _turning(frames)
 
 
 def sweep_motion(point: OperatingPoint, node: int, frequency: Array) -> ComplexArray:
@@ -70,8 +76,8 @@ def sweep_motion(point: OperatingPoint, node: int, frequency: Array) -> ComplexA
     """
     row = point_rows(point.spindle, point.chain, (node,))
     response = frf(point.linear, np.eye(len(point.linear.mass)), row, frequency, "mobility")[:, 0]
-    size = largest_displacement(point, response)
-    return response * VISIBLE * reach(point.spindle) / np.sqrt(size * size.max()) * _turning(len(frequency))
+    largest = largest_displacement(point, response)
+    return response * VISIBLE * size(point.spindle) / np.sqrt(largest * largest.max()) * _turning(len(frequency))
 
 
 def _turning(frames: int) -> ComplexArray:

@@ -10,7 +10,7 @@ from thermospindle.model.rotor.shaft_look import extent
 from thermospindle.model.units import TO_MM
 from thermospindle.report.log.content import Pair, Shown
 from thermospindle.report.log.pictures import DARK, view
-from thermospindle.sim.posing import CYCLE, reach
+from thermospindle.sim.posing import CYCLE, reach, size
 
 CHARTS = {"bearings": (4.2, 3.7), "records": (4.2, 1.9), "key": (6.2, 0.7)}
 """Width and height in inches of the pictures, in proportion to their views in a window of 1400 x 900."""
@@ -85,9 +85,9 @@ def _section_view(shown: Shown, which: str, name: str) -> rrb.View:
 
 def framed(spindle: Spindle) -> tuple[bool, float, float]:
     """Whether a spindle is longer than wide; what a view must reach, its radius or half its length, and the height of what it looks at, in mm."""
-    radius, low, high = (TO_MM * v for v in extent(spindle))
-    half = (high - low) / 2
-    return (True, half, low + half) if half > radius else (False, radius, 0.0)
+    radius, low, high = extent(spindle)
+    whole = size(spindle)
+    return whole > radius, TO_MM * whole, TO_MM * (low + high) / 2 if whole > radius else 0.0
 
 
 def frf_views(shown: Shown, pair: Pair) -> rrb.Container:

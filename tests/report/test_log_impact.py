@@ -12,12 +12,14 @@ from rerun.chunk import RrdReader
 
 import thermospindle as ts
 from tests.small_run import small_run
-from thermospindle.model.machine import Spindle
+from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.scene.reading import load
 from thermospindle.report.log import impact as log
 from thermospindle.report.log.blueprint import framed
 from thermospindle.report.log.content import decibel, peaks, shown
 from thermospindle.report.log.told import describe
+from thermospindle.sim import posing
+from thermospindle.sim.operating import operating_point
 from thermospindle.sim.run import Run
 
 SCENES = Path(__file__).parents[2] / "scenes"
@@ -115,6 +117,18 @@ def test_a_view_holds_the_whole_spindle(scene: str, long: bool) -> None:
     if long:
         heights = [1e3 * p.position[2] for p in spindle.points]
         assert middle - 1.01 * reach < min(heights) < max(heights) < middle + 1.01 * reach
+
+
+def test_a_long_shaft_is_seen_to_bend() -> None:
+    """By as much of half its length as a disk's spindle moves of its radius; a mode and a swept force alike."""
+    spindle = load(SCENES / "mk7702")
+    point = operating_point(spindle, Condition(20.0))
+    half = 0.711 / 2
+    mode = posing.mode_motion(point, point.modes[1], 20)
+    swept = posing.sweep_motion(point, 1, np.linspace(300.0, 4000.0, 400))
+    for motion in (mode, swept):
+        assert posing.largest_displacement(point, motion).max() == pytest.approx(posing.VISIBLE * half)
+    assert framed(spindle)[1] == pytest.approx(1e3 * half)
 
 
 def test_a_response_that_vanishes_by_symmetry_does_not_set_the_limits(run: Run) -> None:
