@@ -54,6 +54,9 @@ class Curve:
 # ---------------------------------------------------------------- bearing states over temperature
 
 
+FEW, COLUMNS = 2, 3  # bearings named among the curves; names side by side above them
+
+
 @rc_context(STYLE)
 def trend(key: str, temperature: Sequence[float], curves: Mapping[str, Mapping[str, Sequence[float]]], label: str, from_zero: bool) -> str:
     """One quantity of every bearing over temperature, or several beside their names: values by name and by bearing."""
@@ -74,7 +77,11 @@ def trend(key: str, temperature: Sequence[float], curves: Mapping[str, Mapping[s
     if from_zero:
         axes.set_ylim(0, 1.15 * max(max(series) for values in curves.values() for series in values.values()) or 1.0)
     handles = axes.get_lines()[: len(next(iter(curves.values())))]
-    axes.legend(handles=handles[::-1], loc="lower left" if from_zero else "best")
+    if len(handles) > FEW:  # no room among the curves
+        figure.set_size_inches(3.55, 2.45 + 0.2 * -(-len(handles) // COLUMNS))
+        figure.legend(handles=handles[::-1], loc="outside upper center", ncols=COLUMNS, columnspacing=1.0, handletextpad=0.4)
+    else:
+        axes.legend(handles=handles[::-1], loc="lower left" if from_zero else "best")
     return svg(figure, key, f"{label} over temperature")
 
 

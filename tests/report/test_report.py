@@ -334,3 +334,21 @@ def test_residuals_have_one_scale():
     common.residual_bar(figure, norm, figure.subplots())
     figure.canvas.draw()
     assert [t.get_text() for t in figure.axes[1].get_yticklabels()] == ["−10", "−3", "0", "3", "10"]
+
+
+@pytest.mark.parametrize("count", [2, 5])
+def test_names_of_many_bearings_stand_above_their_curves(count, monkeypatch):
+    """Where there is no room among the curves no name lies over one."""
+    from thermospindle.report.figures import report as plots
+
+    drawn = []
+    monkeypatch.setattr(plots, "svg", lambda figure, *more: drawn.append(figure) or "")
+    names = [f"bearing {k}" for k in range(count)]
+    plots.trend("force", [20.0, 40.0, 60.0], {"": {name: [30.0 + k, 35.0 + k, 40.0 + 9 * k] for k, name in enumerate(names)}}, "force, N", True)
+    [figure] = drawn
+    figure.draw_without_rendering()
+    [axes] = figure.axes
+    told = axes.get_legend() or figure.legends[0]
+    assert [t.get_text() for t in told.get_texts()] == names[::-1]
+    over = told.get_window_extent().overlaps(axes.get_window_extent())
+    assert over == (count == 2)
