@@ -183,4 +183,4 @@ class Response:
 def _over(columns: Array, each: ComplexArray) -> ComplexArray:
     """Of what belongs to each degree of freedom (r, n, L) what belongs to `columns` (r, m), (m, n, L): one real product."""
     r, n, lines = each.shape
-    return np.asarray((columns.T @ each.reshape(r, n * lines).view(float)).view(complex).reshape(-1, n, lines))
+    return np.asarray((columns.T @ each.reshape(r, n * lines).view(float)).view(complex).reshape(columns.shape[1], n, lines))

@@ -12,6 +12,7 @@ from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, truth
 from thermospindle.diagnosis.forward.linear import products, together
 from thermospindle.diagnosis.forward.nuisance import BUILD, DAMPING, DRIFT, EXPANSION, GAIN, RECORD, STIFFNESS, TEMPERATURE
 from thermospindle.diagnosis.forward.response import Response
+from thermospindle.diagnosis.ladder.fitting import unseen
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.modes import poles
 from thermospindle.model.scene.reading import load
@@ -71,6 +72,18 @@ def test_derivatives_of_lines(scene, quantity, decay):
         assert worst[kind] < 1e-4, kind
     for kind in (BUILD, EXPANSION, TEMPERATURE):
         assert worst[kind] < 5e-3, kind
+
+
+@pytest.mark.parametrize("rows", [None, 0])
+def test_a_test_that_is_left_out_has_no_derivatives(scene, rows):
+    """Neither lines nor, of a table of modes, responses: what `spindle ladder` holds out. Every ladder over two temperatures once ended here."""
+    model, x = made(scene)
+    left = unseen(model, [1])
+    if rows == 0:
+        left = replace(left, tests=(left.tests[0], replace(left.tests[1], value=left.tests[1].value[:0], sd=left.tests[1].sd[:0])))
+    r, jacobian, numbers = left.jacobian(1, x, [], left.rates(x, [[], []]))
+    assert r.shape == (0,)
+    assert jacobian.shape == (len(numbers), 0)
 
 
 @pytest.mark.slow
