@@ -42,7 +42,7 @@ REPEATS, CAMPAIGN, SCATTER = "repeats", "the campaign", "scatter of neighbouring
 KNOWN = (REPEATS, CAMPAIGN)
 SILENT = 1e-7  # of the largest value of a test: the least noise that is believed
 TRUSTED = 9.0  # times less than a block showed: the least noise by which it is weighed
-CONFIRMED = 1.1  # of a known noise, up to which the scatter of neighbouring lines does not contradict it
+CONFIRMED, PARTS = 1.1, 4  # of a known noise, up to which the scatter of neighbouring lines does not contradict it in any of so many parts of the band
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +104,7 @@ def line_data(test: Test, condition: Condition, stated: Noise | None, expected: 
         if seen is None:
             break
         sd_seen = np.maximum(np.sqrt(seen), least)
-        if known is not None and np.sqrt(np.mean(sd_seen**2 / known**2)) < CONFIRMED:
+        if known is not None and _confirmed(known, sd_seen):
             sd, blocks = known, _blocks(value, known, damped, gaps)
             break
         sd = sd_seen if known is None else np.maximum(known, sd_seen)
@@ -138,17 +138,28 @@ def _falls(value: ComplexArray, sd: Array, damped: float, frequency: Array) -> A
 
 
 def _smooth_sd(value: ComplexArray, sd: Array, falling: Array | None = None) -> Array:
-    """The noise of value and of largest, and that of the shapes `falling` where given, that the standard errors `sd` of single lines follow, FRF by FRF;
-    few hits scatter them."""
-    size = np.abs(value)
+    """The noise of value and of largest, rising with frequency and, where given, of the shapes `falling`, that the standard errors `sd` of single lines
+    follow, FRF by FRF; few hits scatter them."""
+    size, shapes = np.abs(value), _shapes(sd.shape[2], falling)
     largest = size.max(axis=(0, 2))
     smooth = np.empty_like(sd)
     for i, j in np.ndindex(*sd.shape[:2]):
-        of_largest = np.full(sd.shape[2], max(largest[j], 1e-300) ** 2)
-        columns = np.stack([size[i, j] ** 2, of_largest, *(() if falling is None else of_largest * falling)], axis=1)
+        columns = np.stack([size[i, j] ** 2, *(max(largest[j], 1e-300) ** 2 * shapes)], axis=1)
         share = _gamma_fit(columns, sd[i, j] ** 2, np.ones(sd.shape[2]), WIDE if falling is not None else USUAL)
         smooth[i, j] = np.maximum(columns @ share, 1e-14 * largest[j] ** 2)
     return np.sqrt(smooth)
+
+
+def _confirmed(known: Array, seen: Array) -> bool:
+    """Whether the noise that lines themselves have, in each `PARTS`-th of the band, is no more than what is known."""
+    parts = np.array_split(seen**2 / known**2, PARTS, axis=-1)
+    return bool(max(np.sqrt(np.mean(part)) for part in parts) < CONFIRMED)
+
+
+def _shapes(n: int, falling: Array | None) -> Array:
+    """Shapes (shapes, n) over the lines of a noise of largest: level, rising, and `falling` where given."""
+    rising = np.linspace(0, 1, n) ** np.array(RISES)[:, None]
+    return rising if falling is None else np.concatenate([rising, falling])
 
 
 def _basis(k: int, p: int = NODES) -> tuple[Array, Array, Array]:
@@ -197,8 +208,7 @@ def _within_blocks(value: ComplexArray, blocks: list[tuple[int, int]], damped: f
     """Noise variances (n_resp, n_ref, n) from what the polynomials of all blocks leave, as shares of |H|^2 and of the largest |H|^2 to that
     hammer, reference by reference; None where too few degrees of freedom are left."""
     size = np.abs(value) ** 2
-    n = size.shape[-1]
-    rising = [*(np.linspace(0, 1, n) ** power for power in RISES), *(() if falling is None else falling)]
+    shapes = _shapes(size.shape[-1], falling)
     variance = np.empty(size.shape)
     for j in range(value.shape[1]):
         rows, seen, freedom, largest = [], [], [], float(size[:, j].max())
@@ -210,14 +220,14 @@ def _within_blocks(value: ComplexArray, blocks: list[tuple[int, int]], damped: f
             v = value[:, j, first:after]
             left = v - (v @ q) @ q.T
             seen.append(np.sum(np.abs(left) ** 2, axis=1) / left_by(q, damped)[1])
-            floor = [np.full(len(v), largest * r[first:after].mean()) for r in rising]
+            floor = [np.full(len(v), largest * r[first:after].mean()) for r in shapes]
             rows.append(np.stack([size[:, j, first:after].mean(axis=1), *floor], axis=1))
             freedom.append(np.full(len(v), float(k - NODES)))
         if sum(f.sum() for f in freedom) < ENOUGH:
             return None
         a, y, w = np.concatenate(rows), np.concatenate(seen), np.concatenate(freedom)
         share = _gamma_fit(a, y, w, WIDE if falling is not None else USUAL)
-        floor_of = largest * np.sum([c * r for c, r in zip(share[1:], rising, strict=True)], axis=0)
+        floor_of = largest * np.sum([c * r for c, r in zip(share[1:], shapes, strict=True)], axis=0)
         variance[:, j] = np.maximum(share[0] * size[:, j] + floor_of, 1e-14 * largest)
     return variance
 
