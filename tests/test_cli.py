@@ -168,7 +168,7 @@ def test_nothing_is_left_of_a_stopped_run(monkeypatch, capsys, short_scene, tmp_
     def stop(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("thermospindle.report.text.run.write_report", stop)
+    monkeypatch.setattr("thermospindle.report.page.report.write_report", stop)
     assert main(["run", str(short_scene), "--temperatures", "20", "--out", str(tmp_path / "out")]) == 130
     assert list(tmp_path.iterdir()) == []
     assert "stopped" in capsys.readouterr().err
