@@ -4,7 +4,9 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).parent
-sys.path[:0] = [str(HERE), str(HERE.parents[1])]
+ROOT = HERE.parents[1]
+checkout = (ROOT / "thermospindle" / "model").is_dir()  # a source package has no links there: what is installed is documented
+sys.path[:0] = [str(HERE), str(ROOT)] if checkout else [str(HERE)]
 
 from generated import write_all  # noqa: E402
 
