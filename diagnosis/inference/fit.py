@@ -18,7 +18,7 @@ from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.linear import Rates
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import FAILED, Applied, CampaignModel
-from thermospindle.diagnosis.inference.prior import UNMOVED, Learned, precision, roots_of, variances
+from thermospindle.diagnosis.inference.prior import UNMOVED, Learned, precision_and_variances, roots_of
 from thermospindle.model.types import Array, Integers
 
 TEMPERS = (3e-4, 3e-3, 0.03, 0.3, 1.0)
@@ -74,8 +74,9 @@ class Problem:
         self.model, self.mechanisms = model, tuple(mechanisms)
         self.roots = roots_of(model, self.mechanisms)
         scale = 1.0 if learned is None else learned.errors**2
-        self.precision = scale * precision(model, self.mechanisms, learned, moved)
-        self.least_stiff = scale / variances(model, self.mechanisms, learned, moved)  # of each parameter, all others free
+        whole, variances = precision_and_variances(model, self.mechanisms, learned, moved)
+        self.precision = scale * whole
+        self.least_stiff = scale / variances  # of each parameter, all others free
         self.tests = len(model.tests)
         self.nuisances = len(model.parameters)
         self.length = self.nuisances + sum(self.tests + len(m.shape) for m in self.mechanisms)

@@ -151,10 +151,14 @@ def whole_root(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: L
     return replace(nuisance_root(model, learned.sizes, moved), own=np.asarray(np.linalg.cholesky(own + 1e-14 * np.eye(len(own))), float))
 
 
-def precision(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned | None, moved: Array = UNMOVED) -> Array:
-    """The inverse (n, n) of the prior covariance, with next to nothing for sizes of zero; the identity, the reference widths, without `learned`."""
+def precision_and_variances(
+    model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned | None, moved: Array = UNMOVED
+) -> tuple[Array, Array]:
+    """The inverse (n, n) of the prior covariance, with next to nothing for sizes of zero, and the diagonal (n,) of that covariance; of the reference
+    widths, which are ones, without `learned`."""
     if learned is None:
-        return np.eye(len(variances(model, mechanisms, None)))
+        n = len(model.parameters) + sum(len(model.tests) + len(m.shape) for m in mechanisms)
+        return np.eye(n), np.ones(n)
     own_variances, misjudging, own = _floored(model, mechanisms, learned, moved)
     n = len(own_variances)
     found = np.zeros((n + len(own), n + len(own)))
@@ -163,15 +167,7 @@ def precision(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Le
     inner = np.eye(beside.shape[1]) + beside.T @ (beside / alone[:, None])  # Woodbury's identity (Golub & Van Loan, 2.1.4)
     found[:n, :n] = np.diag(alone) - beside @ np.linalg.solve(inner, beside.T)
     found[n:, n:] = np.linalg.inv(own)
-    return found
-
-
-def variances(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned | None, moved: Array = UNMOVED) -> Array:
-    """The diagonal (n,) of the covariance of which `precision` is the inverse."""
-    if learned is None:
-        return np.ones(len(model.parameters) + sum(len(model.tests) + len(m.shape) for m in mechanisms))
-    own_variances, misjudging, own = _floored(model, mechanisms, learned, moved)
-    return np.concatenate([own_variances + np.sum(misjudging**2, axis=1), np.diag(own)])
+    return found, np.concatenate([own_variances + np.sum(misjudging**2, axis=1), np.diag(own)])
 
 
 def _floored(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned, moved: Array) -> tuple[Array, Array, Array]:

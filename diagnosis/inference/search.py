@@ -69,11 +69,12 @@ def search(
     best = max(tried.singles, key=lambda h: h.evidence.ln, default=none)
     wider = with_resonance(model, best, workers) if best.mechanisms else None
     if wider is not None:
-        first, model, none = model, wider[0], _without_effects(wider[0])
+        before, model = len(model.parameters), wider[0]
+        none = _without_effects(model)
         if best.evidence.learned.errors > STRAIN:  # nothing was explained without it
             tried = _singles(model, none, named, free, lambda done: None, workers)  # steps that were counted already
         else:
-            tried = _carried_over(model, none, tried, len(first.parameters), workers)
+            tried = _carried_over(model, none, tried, before, workers)
     singles = tried.singles
     pairs = _joined(model, none, singles, [*named, *free], tried.most, tried.expected, workers)
     progress("pairs fitted")

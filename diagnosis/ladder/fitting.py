@@ -19,7 +19,7 @@ from thermospindle.diagnosis.forward.mechanism import Mechanism, variants
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel, TestData
 from thermospindle.diagnosis.inference.evidence import GRIDS, Evidence, evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, Problem, fit
-from thermospindle.diagnosis.inference.prior import Learned, as_stated, precision
+from thermospindle.diagnosis.inference.prior import Learned, as_stated, precision_and_variances
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import Effect, Values
@@ -73,7 +73,7 @@ class Settled:
 
     @cached_property
     def _precision(self) -> Array:
-        return precision(self.model, self.mechanisms, self.learned, self.fit.moved)
+        return precision_and_variances(self.model, self.mechanisms, self.learned, self.fit.moved)[0]
 
     @cached_property
     def posterior(self) -> tuple[Array, Array]:

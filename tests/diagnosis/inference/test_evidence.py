@@ -27,7 +27,7 @@ from thermospindle.diagnosis.forward.nuisance import (
 )
 from thermospindle.diagnosis.inference.evidence import Learned, Quadratic, _marginal, evidence, left_out  # fmt: skip
 from thermospindle.diagnosis.inference.fit import Fit
-from thermospindle.diagnosis.inference.prior import ACTION, Root, misjudged, nuisance_variances, precision, variances, whole_root
+from thermospindle.diagnosis.inference.prior import ACTION, Root, misjudged, nuisance_variances, precision_and_variances, whole_root
 from thermospindle.model.machine import Condition
 from thermospindle.sim.effects.effect import Effect, Parameter
 
@@ -180,10 +180,11 @@ def test_a_fit_and_the_evidence_have_one_prior():
     found = whole_root(model, made.fit.mechanisms, learned, moved)
     n = len(found.scale) + len(found.own)
     assert (found.beside.shape[1], len(found.own)) == (4, len(tests) + len(made.fit.mechanisms[0].shape))
-    assert variances(model, made.fit.mechanisms, learned, moved) == pytest.approx(np.diag(found.times(found.turned(np.eye(n)))), abs=1e-7)
+    inverse, variances = precision_and_variances(model, made.fit.mechanisms, learned, moved)
+    assert variances == pytest.approx(np.diag(found.times(found.turned(np.eye(n)))), abs=1e-7)
     covariance = found.times(found.turned(np.eye(n)))
     assert np.abs(found.beside).max() > 0.1
-    assert precision(model, made.fit.mechanisms, learned, moved) @ covariance == pytest.approx(np.eye(n), abs=1e-5)
+    assert inverse @ covariance == pytest.approx(np.eye(n), abs=1e-5)
     assert found.within(np.eye(n)) == pytest.approx(found.turned(found.times(np.eye(len(found.within(np.eye(n)))))))
 
 
