@@ -17,7 +17,8 @@ from rich.console import Console
 from rich.table import Table
 
 from tests.virtual_campaign import model_of, virtual_campaign
-from thermospindle.diagnosis.inference.fit import Problem
+from thermospindle.diagnosis.forward.rates import rates_of
+from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import RotorBase, matrices, motion_rows
 from thermospindle.model.rotor.modes import frf, modes
@@ -115,7 +116,7 @@ def diagnosis_setup(spindle: Spindle) -> str:
     campaign = virtual_campaign(spindle, [Condition(20.0), Condition(40.0, FULL / 2)], 1, frequency=np.arange(band[0], band[1], 4.0))
     model = model_of(spindle, campaign)
     problem, place = Problem(model, ()), [0.0]
-    rates = model.rates(np.zeros(problem.length), [[], []])
+    rates = rates_of(model, np.zeros(problem.length), [[], []])
 
     def residuals() -> None:
         place[0] += 1e-6

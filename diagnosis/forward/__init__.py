@@ -7,6 +7,7 @@ linear     one test's linear model, and how its matrices change with parameters
 response   FRFs at the lines of a test, with what their derivatives need
 record     what records that end too early leave out of them
 table      poles and their derivatives for a table of modes
+rates      how the matrices change with tolerances, temperature and ring expansion
 model      residuals of every test in standard errors, and their derivatives
 =========  ========================================================================================================
 """

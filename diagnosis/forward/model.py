@@ -35,7 +35,6 @@ Applied = Sequence[tuple[Effect, Values]]
 TestData = LineData | ModeData
 Discrepancies = tuple[Integers, Integers, Integers, Array]
 
-STEP = 0.02  # of a prior standard deviation, for differences
 MOST_MODES = 16  # of the discrepancy's basis
 IN_BAND, BEYOND = 1.15, 2.2  # of the highest line: modes that are seen, and modes beyond that still lend them some of their shape
 THIN, ENOUGH_LINES = 4, 30  # lines left out of a thinned model, and how many of a test it keeps at least
@@ -93,11 +92,11 @@ class CampaignModel:
         return [keys.index(key) for key in keys]
 
     @cached_property
-    def _expansion(self) -> list[int]:
+    def expansion(self) -> list[int]:
         return [i for i, p in enumerate(self.parameters) if p.kind == kinds_of.EXPANSION]
 
     @cached_property
-    def _temperature(self) -> list[int]:
+    def temperature(self) -> list[int]:
         return [next(i for i, p in enumerate(self.parameters) if p.kind == kinds_of.TEMPERATURE and p.test == t) for t in range(len(self.tests))]
 
     @cached_property
@@ -136,16 +135,16 @@ class CampaignModel:
     def operating(self, t: int, x: Array, effects: Applied) -> OperatingPoint:
         """The operating point of test `t`; what differs in the measuring chain alone is not worked out again."""
         acting = tuple((id(e), *v.values()) for e, v in effects if any(getattr(e, hook) for hook in MEASURING))
-        key = (t, x[: len(self.build)].tobytes(), float(x[self._temperature[t]]), x[self._expansion].tobytes(), acting)
+        key = (t, x[: len(self.build)].tobytes(), float(x[self.temperature[t]]), x[self.expansion].tobytes(), acting)
         late = self._points.get(key)
         if late is None:
             if len(self._points) > 6 * len(self.tests):
                 self._points.clear()
             test = self.tests[t]
-            warmer = float(x[self._temperature[t]]) * self.parameters[self._temperature[t]].sd
+            warmer = float(x[self.temperature[t]]) * self.parameters[self.temperature[t]].sd
             condition = replace(test.condition, temperature=test.condition.temperature + warmer)
-            stretch = [1 + float(x[i]) * self.parameters[i].sd for i in self._expansion]
-            every = [_stretched(*stretch), *self.present, *effects] if x[self._expansion].any() else [*self.present, *effects]
+            stretch = [1 + float(x[i]) * self.parameters[i].sd for i in self.expansion]
+            every = [_stretched(*stretch), *self.present, *effects] if x[self.expansion].any() else [*self.present, *effects]
             late = self._points[key] = operating_point(self._built(t, x), condition, every)
             late.chain  # noqa: B018 - worked out here, so that errors come here
             return late
@@ -328,39 +327,8 @@ class CampaignModel:
             return answer.moved(by)[0] if isinstance(answer, Table) else self.whitened(t, answer.moved(by)[0], 0.0)
         return (self._residual(t, self._answer(t, x, moved)) - self._residual(t, answer)) / apart
 
-    # ------------------------------------------------------------ derivatives of the matrices
-
-    def rates(self, x: Array, effects_of: Sequence[Applied], old: Rates | None = None) -> Rates:
-        """dM, dC, dK by build tolerances, ring expansion and temperature, for every test; what structure alone moves is kept from `old`."""
-        numbers, each = [], []
-        for t, effects in enumerate(effects_of):
-            base = self.operating(t, x, effects)
-            at = matrices(base.chain)
-            own = [*range(len(self.build)), *self._expansion, self._temperature[t]]
-            kept = old.each[t] if old is not None and len(old.each[t][0].left) == len(at.stiffness) else ()
-            found = []
-            for k, i in enumerate(own):
-                if kept and k < len(self.build) and self._structural[k]:
-                    found.append(kept[k])
-                    continue
-                step = x.copy()
-                step[i] += STEP
-                try:
-                    moved = matrices(self.operating(t, step, effects).chain)
-                    apart = STEP
-                except FAILED:  # the end of a law or of contact: from the other side
-                    step[i] -= 2 * STEP
-                    moved = matrices(self.operating(t, step, effects).chain)
-                    apart = -STEP
-                if moved.dofs != at.dofs:
-                    moved = at
-                found.append(products(*((getattr(moved, w) - getattr(at, w)) / apart for w in ("mass", "damping", "stiffness"))))
-            numbers.append(np.array(own))
-            each.append(tuple(found))
-        return Rates(tuple(numbers), tuple(each))
-
     @cached_property
-    def _structural(self) -> list[bool]:
+    def structural(self) -> list[bool]:
         """Which build tolerances leave the bearings alone."""
         ends = [p.apply(self.spindle, 0.01) for p in self.build]
         return [end.bearings is self.spindle.bearings and end.sets is self.spindle.sets for end in ends]

@@ -3,6 +3,7 @@
 ==========  =======================================================================================================
 prior       priors at reference widths, or at those learned
 freeform    what would have to drift where nobody names a cause
+problem     parameters, cost and derivatives of a campaign and the mechanisms that act in it
 fit         tempered Levenberg-Marquardt with priors
 evidence    Laplace evidence with everything of unknown size learned
 screening   what a mechanism promises beside a fitted model

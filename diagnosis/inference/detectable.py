@@ -14,8 +14,9 @@ import numpy as np
 
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import Applied, CampaignModel
-from thermospindle.diagnosis.inference.fit import Fit, Linearisation, built
+from thermospindle.diagnosis.inference.fit import Fit
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
+from thermospindle.diagnosis.inference.problem import Linearisation, built
 from thermospindle.diagnosis.inference.screening import Screened, linearised, screen
 from thermospindle.diagnosis.inference.search import Search
 from thermospindle.model.parallel import in_parallel

@@ -8,21 +8,20 @@ it is judged. A step to where no spindle can be built is taken shorter.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 
-from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.linear import Rates
 from thermospindle.diagnosis.forward.mechanism import Mechanism
-from thermospindle.diagnosis.forward.model import FAILED, Applied, CampaignModel
-from thermospindle.diagnosis.inference.prior import UNMOVED, Learned, precision_and_variances, roots_of
-from thermospindle.model.types import Array, Integers
+from thermospindle.diagnosis.forward.model import CampaignModel
+from thermospindle.diagnosis.forward.rates import rates_of
+from thermospindle.diagnosis.inference.prior import UNMOVED, Learned
+from thermospindle.diagnosis.inference.problem import Linearisation, Point, Problem
+from thermospindle.model.types import Array
 
 TEMPERS = (3e-4, 3e-3, 0.03, 0.3, 1.0)
-LONGEST = 3.0  # prior standard deviations in one step
 MOST_STEPS = (30, 40)  # while errors are taken too large, and at the end
 LEAST_DAMPING, RAISED_DAMPING = 1e-4, 1e-3  # of a parameter's own curvature, at first and after a step that was refused
 MOST_GROWTH = 2.0**6  # of the damping, one refusal after the other
@@ -30,7 +29,6 @@ ENOUGH = 0.3  # of the cost, from which a fit goes on
 ENOUGH_FAR, ENOUGH_EARLY = 2e-3, 0.02  # share of what is left beyond noise, and of all the cost while errors are taken too large, likewise
 TRUSTED, POOR = 0.6, 0.25  # of the gain promised: from there derivatives stay in use, and below it a step is corrected
 CORRECTIONS = 2
-SIZE_STEP = 0.02  # of a size's or shape parameter's prior standard deviation, for differences
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,179 +60,6 @@ class Fit:
         return self.point[: len(self.point) - sum(len(r) + len(m.shape) for r, m in zip(self.roots, self.mechanisms, strict=True))]
 
 
-class Problem:
-    """A campaign and the mechanisms that act in it, as a least-squares problem over p = [x, z_1, u_1, z_2, u_2, ...].
-
-    Priors have their reference widths, or those `learned`, with what may be misjudged of mechanisms that `moved` the modes.
-    """
-
-    def __init__(
-        self, model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned | None = None, moved: Array = UNMOVED
-    ) -> None:
-        self.model, self.mechanisms = model, tuple(mechanisms)
-        self.roots = roots_of(model, self.mechanisms)
-        scale = 1.0 if learned is None else learned.errors**2
-        whole, variances = precision_and_variances(model, self.mechanisms, learned, moved)
-        self.precision = scale * whole
-        self.least_stiff = scale / variances  # of each parameter, all others free
-        self.tests = len(model.tests)
-        self.nuisances = len(model.parameters)
-        self.length = self.nuisances + sum(self.tests + len(m.shape) for m in self.mechanisms)
-        small = (kinds_of.STIFFNESS, kinds_of.DAMPING, kinds_of.STIFFNESS_DRIFT, kinds_of.DAMPING_DRIFT, kinds_of.DRIFT)
-        self.reach = np.ones(self.length)  # what of a parameter's move counts towards the longest step
-        self.reach[: self.nuisances] = [0.05 if q.kind in small else 1.0 for q in model.parameters]
-
-    def parts(self, p: Array) -> tuple[Array, Array, list[Array]]:
-        """Nuisance values (P,), sizes (mechanisms, tests) and shape parameters of a parameter vector, in their units."""
-        at, sizes, shapes = self.nuisances, [], []
-        for m, root in zip(self.mechanisms, self.roots, strict=True):
-            sizes.append(m.size.neutral + root @ p[at : at + self.tests])
-            at += self.tests
-            shapes.append(np.array([np.clip(q.neutral + q.prior_sd * v, *q.limits) for q, v in zip(m.shape, p[at : at + len(m.shape)], strict=True)]))
-            at += len(m.shape)
-        return p[: self.nuisances], np.array(sizes).reshape(len(self.mechanisms), self.tests), shapes
-
-    def start(self, sizes: Mapping[int, float]) -> Array:
-        """The drawing (n,), with mechanism number k at size `sizes[k]`, in its unit and the same in all tests, and the others at none."""
-        p, at = np.zeros(self.length), self.nuisances
-        for k, (m, root) in enumerate(zip(self.mechanisms, self.roots, strict=True)):
-            if k in sizes:
-                p[at : at + self.tests] = np.linalg.solve(root, np.full(self.tests, sizes[k] - m.size.neutral))
-            at += self.tests + len(m.shape)
-        return p
-
-    def applied(self, t: int, sizes: Array, shapes: Sequence[Array]) -> tuple[list, list[float]]:
-        """The effects that act in test `t`, and how far each size lies beyond its limit."""
-        effects, beyond = [], []
-        for m, size, shape in zip(self.mechanisms, sizes[:, t], shapes, strict=True):
-            within = float(np.clip(size, *m.size.limits))
-            effects.append((m.effect, m.values(within, shape.tolist())))
-            beyond.append(float(size) - within)
-        return effects, beyond
-
-    def acting(self, effects: Applied) -> list:
-        """Without those of no size, which change nothing: what was worked out without them serves."""
-        return [(e, v) for (e, v), m in zip(effects, self.mechanisms, strict=True) if v[m.size.name] != m.size.neutral]
-
-    def residual(self, t: int, p: Array) -> Array:
-        x, sizes, shapes = self.parts(p)
-        effects, beyond = self.applied(t, sizes, shapes)
-        r = self.model.residual(t, x, self.acting(effects))
-        for k, over in enumerate(beyond):
-            if over:
-                r = r + over * self.by_size(t, x, effects, k)
-        return r
-
-    def by_size(self, t: int, x: Array, effects: Applied, k: int) -> Array:
-        m = self.mechanisms[k]
-        return self._by_value(t, x, effects, k, m.size)
-
-    def _by_value(self, t: int, x: Array, effects: Applied, k: int, q) -> Array:
-        """Derivative (N,) of the residual of test `t` by parameter `q` of mechanism `k`, from inside its limits."""
-        effect, values = effects[k]
-        step = SIZE_STEP * q.prior_sd
-        for h in (step, -step):
-            if q.limits[0] <= values[q.name] + h <= q.limits[1]:
-                moved = list(effects)
-                moved[k] = (effect, {**values, q.name: values[q.name] + h})
-                try:
-                    return self.model.column(t, x, self.acting(effects), self.acting(moved), h)
-                except FAILED:
-                    continue
-        return np.zeros(self.model.tests[t].count)
-
-    def linearised(self, t: int, p: Array, rates: Rates) -> tuple[Array, Array, Integers]:
-        """Residual (N,), derivatives (k, N) and the numbers (k,) of the parameters of p they belong to."""
-        x, sizes, shapes = self.parts(p)
-        effects, beyond = self.applied(t, sizes, shapes)
-        more = sum(t + 1 + len(m.shape) for m in self.mechanisms)
-        r, jacobian, numbers = self.model.jacobian(t, x, self.acting(effects), rates, more)
-        own: list[int] = []
-        row, at = len(numbers), self.nuisances
-        for k, (m, root) in enumerate(zip(self.mechanisms, self.roots, strict=True)):
-            by_size = self.by_size(t, x, effects, k)
-            if beyond[k]:
-                r = r + beyond[k] * by_size
-            np.multiply(root[t, : t + 1, None], by_size, out=jacobian[row : row + t + 1])
-            own += range(at, at + t + 1)
-            row, at = row + t + 1, at + self.tests
-            for q in m.shape:
-                jacobian[row] = q.prior_sd * self._by_value(t, x, effects, k, q)
-                own.append(at)
-                row, at = row + 1, at + 1
-        return r, jacobian, np.concatenate([numbers, np.array(own, int)])
-
-    def effects_of(self, p: Array) -> list[list]:
-        _, sizes, shapes = self.parts(p)
-        return [self.acting(self.applied(t, sizes, shapes)[0]) for t in range(self.tests)]
-
-    def linearisation(self, p: Array, rates: Rates) -> Linearisation:
-        return Linearisation(self.length, [self.linearised(t, p, rates) for t in range(self.tests)])
-
-    def residuals(self, p: Array) -> list[Array] | None:
-        """Residuals of every test; None where no spindle can be built."""
-        return built(lambda t: self.residual(t, p), self.tests)
-
-    def within_reach(self, move: Array) -> Array:
-        """A step (n,), shortened to `LONGEST`."""
-        return move * min(1.0, LONGEST / max(float((np.abs(move) * self.reach).max()), 1e-300))
-
-    def at(self, p: Array, temper: float) -> Point:
-        residuals = self.residuals(p)
-        return Point(p, residuals, self.cost(p, temper, residuals) if residuals is not None else np.inf)
-
-    def cost(self, p: Array, temper: float, residuals: Sequence[Array] | None = None) -> float:
-        """chi2 with errors 1 / `temper` times the data's, and priors; infinite where no spindle can be built."""
-        if residuals is None:
-            residuals = self.residuals(p)
-        return np.inf if residuals is None else temper**2 * sum(float(r @ r) for r in residuals) + float(p @ self.precision @ p)
-
-
-def built(residual: Callable[[int], Array], tests: int) -> list[Array] | None:
-    """`residual` of every test; None where no spindle can be built."""
-    try:
-        found = [residual(t) for t in range(tests)]
-    except FAILED:
-        return None
-    return found if all(np.all(np.isfinite(r)) for r in found) else None
-
-
-class Linearisation:
-    """Derivatives of all tests at one point: information J^T J, and gradients J^T r of residuals there or near."""
-
-    def __init__(self, length: int, rows: Sequence[tuple[Array, Array, Integers]]) -> None:
-        self.length, self.rows = length, rows
-        self.residuals = [r for r, _, _ in rows]
-        self.by_test = []
-        for _, jacobian, numbers in rows:
-            information = np.zeros((length, length))
-            information[np.ix_(numbers, numbers)] = jacobian @ jacobian.T
-            self.by_test.append(information)
-        self.information: Array = np.sum(self.by_test, axis=0)
-
-    @cached_property
-    def chi2(self) -> float:
-        return sum(float(r @ r) for r in self.residuals)
-
-    @cached_property
-    def gradient(self) -> Array:
-        """J^T r (n,) of all tests at the point itself."""
-        return np.asarray(np.sum(self.gradients(self.residuals), axis=0))
-
-    def slope(self, problem: Problem, at: Point, temper: float) -> Array:
-        """Half the gradient (n,) of the cost at a point near."""
-        assert at.residuals is not None
-        return np.asarray(temper**2 * np.sum(self.gradients(at.residuals), axis=0) + problem.precision @ at.p)
-
-    def gradients(self, residuals: Sequence[Array]) -> list[Array]:
-        found = []
-        for r, (_, jacobian, numbers) in zip(residuals, self.rows, strict=True):
-            gradient = np.zeros(self.length)
-            gradient[numbers] = jacobian @ r
-            found.append(gradient)
-        return found
-
-
 def fit(
     model: CampaignModel, mechanisms: Sequence[Mechanism] = (), start: Array | Sequence[Array] | None = None, rates: Rates | None = None,
     tempers: Sequence[float] = TEMPERS, learned: Learned | None = None, moved: Array = UNMOVED,
@@ -253,19 +78,10 @@ def fit(
         p = min(start, key=lambda at: problem.cost(at, tempers[0])).copy()
     for temper in tempers:
         problem = Problem(model if temper == 1.0 else model.thinned, mechanisms, learned, moved)
-        rates = problem.model.rates(problem.parts(p)[0], problem.effects_of(p), rates)
+        rates = rates_of(problem.model, problem.parts(p)[0], problem.effects_of(p), rates)
         p, lines, residuals = _settled(problem, p, rates, temper)
         done = problem, p, rates, temper, lines, residuals
     return _finished(*done)
-
-
-@dataclass(frozen=True, eq=False)
-class Point:
-    """Parameters (n,), the residuals of every test there (None where no spindle can be built) and their cost."""
-
-    p: Array
-    residuals: Sequence[Array] | None
-    cost: float
 
 
 def _settled(problem: Problem, p: Array, rates: Rates, temper: float) -> tuple[Array, Linearisation, Sequence[Array]]:

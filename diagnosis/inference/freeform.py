@@ -15,7 +15,7 @@ import numpy as np
 
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import CampaignModel
-from thermospindle.diagnosis.inference.fit import Problem
+from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.model.bearing.pair import PairState
 from thermospindle.model.machine import MOVES, Condition, RingMotion, Spindle
 from thermospindle.model.rotor.chain import RotorBase

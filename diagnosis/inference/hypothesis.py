@@ -11,8 +11,9 @@ import numpy as np
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.evidence import Evidence, evidence
-from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, Problem, fit
+from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit
 from thermospindle.diagnosis.inference.prior import Learned, steady
+from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.model.parallel import in_parallel
 from thermospindle.model.types import Array
 

@@ -15,8 +15,9 @@ import numpy as np
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.forward.nuisance import SHARE_SD, Resonance
-from thermospindle.diagnosis.inference.fit import Fit, Linearisation, Problem
+from thermospindle.diagnosis.inference.fit import Fit
 from thermospindle.diagnosis.inference.prior import Learned
+from thermospindle.diagnosis.inference.problem import Linearisation, Problem
 from thermospindle.diagnosis.inference.screening import linearised
 from thermospindle.model.types import Array
 

@@ -12,8 +12,9 @@ from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.evidence import GRIDS, evidence
-from thermospindle.diagnosis.inference.fit import Fit, Linearisation, Problem
+from thermospindle.diagnosis.inference.fit import Fit
 from thermospindle.diagnosis.inference.prior import Learned
+from thermospindle.diagnosis.inference.problem import Linearisation, Problem
 from thermospindle.model.parallel import in_parallel
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import HOOKS

@@ -17,9 +17,11 @@ from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import Mechanism, variants
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel, TestData
+from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.inference.evidence import GRIDS, Evidence, evidence
-from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, Problem, fit
+from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit
 from thermospindle.diagnosis.inference.prior import Learned, as_stated, precision_and_variances
+from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import Effect, Values
@@ -183,7 +185,7 @@ def predicted_squares(found: Settled, tests: Sequence[TestData], group: Sequence
     model = replace(found.model, tests=tuple(tests))
     problem = Problem(model, found.mechanisms)
     point, covariance = found.posterior
-    rates = model.rates(problem.parts(point)[0], problem.effects_of(point))
+    rates = rates_of(model, problem.parts(point)[0], problem.effects_of(point))
     information, gradient, total, count = np.zeros((problem.length,) * 2), np.zeros(problem.length), 0.0, 0
     for t in group:
         r, jacobian, numbers = problem.linearised(t, point, rates)

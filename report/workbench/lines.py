@@ -10,8 +10,9 @@ from thermospindle.diagnosis.compare.before_after import without
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.inference.evidence import evidence
-from thermospindle.diagnosis.inference.fit import Problem, fit
+from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
+from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.inference.verdict import Candidate
 from thermospindle.diagnosis.verdict import campaign_data
 from thermospindle.model.errors import BadInput, NoEquilibrium

@@ -28,9 +28,10 @@ from tests.blind.world import Made, Plan, World, campaign, described, plans, vis
 from thermospindle.diagnosis.draft import draft
 from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.inference.evidence import evidence, left_out
-from thermospindle.diagnosis.inference.fit import TEMPERS, Problem, fit
+from thermospindle.diagnosis.inference.fit import TEMPERS, fit
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
 from thermospindle.diagnosis.inference.prior import steady
+from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.inference.remainder import overlap
 from thermospindle.diagnosis.inference.verdict import coarsening, conditions_of
 from thermospindle.diagnosis.verdict import Diagnosis, diagnose

@@ -12,9 +12,10 @@ from tests.virtual_campaign import mode_campaign, model_of
 from thermospindle.diagnosis.draft import draft, fit_law, laws
 from thermospindle.diagnosis.forward.mechanism import Mechanism, variants
 from thermospindle.diagnosis.inference.evidence import evidence, left_out
-from thermospindle.diagnosis.inference.fit import Problem, fit
+from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.freeform import free_forms
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
+from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM

@@ -7,6 +7,7 @@ import pytest
 
 from tests.diagnosis.test_ladder import tables
 from thermospindle.diagnosis.forward.nuisance import GAIN, TEMPERATURE
+from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.ladder.ladder import conditions
 from thermospindle.diagnosis.verdict import campaign_data
 from thermospindle.model.machine import Law
@@ -24,7 +25,7 @@ def test_a_law_that_ends_at_the_tests_stops_no_derivative(spindle):
     found = []
     for low, high in ((20.0, 60.0), (0.0, 80.0)):
         model = campaign_data(with_law(spindle, low, high), tables(spindle, ()))
-        rates = model.rates(np.zeros(len(model.parameters)), [[], []])
+        rates = rates_of(model, np.zeros(len(model.parameters)), [[], []])
         own = [p for p in range(len(model.parameters)) if model.parameters[p].kind == TEMPERATURE]
         by_temperature = [rates.each[t][list(rates.numbers[t]).index(own[t])] for t in (0, 1)]
         found.append(np.array([p.left * (p.power == 0) @ p.right.T for p in by_temperature]))

@@ -8,8 +8,9 @@ import pytest
 from tests.virtual_campaign import mode_campaign, model_of, virtual_campaign
 from thermospindle.diagnosis.forward.mechanism import Mechanism, likeness, size_covariance, variants
 from thermospindle.diagnosis.forward.nuisance import RECORD
-from thermospindle.diagnosis.inference.fit import Problem
+from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.inference.freeform import alike, free_forms
+from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
 from thermospindle.sim.effects import usable
@@ -139,7 +140,7 @@ def test_derivatives_by_sizes(spindle, model, table):
     p = 0.1 * random.standard_normal(problem.length)
     p[[i for i, q in enumerate(used.parameters) if q.kind == RECORD]] = 0.0  # beside which other derivatives are nearly right only
     p[problem.nuisances :] = np.abs(p[problem.nuisances :])  # within limits: at one of them derivatives are those from inside
-    rates = used.rates(problem.parts(p)[0], problem.effects_of(p))
+    rates = rates_of(used, problem.parts(p)[0], problem.effects_of(p))
     for t in (0, 1):
         _, jacobian, numbers = problem.linearised(t, p, rates)
         for i in numbers[numbers >= problem.nuisances]:

@@ -11,6 +11,7 @@ from tests.conftest import ROOT
 from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, truth, virtual_campaign
 from thermospindle.diagnosis.forward.linear import products, together
 from thermospindle.diagnosis.forward.nuisance import BUILD, DAMPING, DRIFT, EXPANSION, GAIN, RECORD, STIFFNESS, TEMPERATURE
+from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.forward.response import Response
 from thermospindle.diagnosis.ladder.fitting import unseen
 from thermospindle.model.machine import Condition
@@ -51,7 +52,7 @@ def differences(model, t, x, numbers, step=2e-3):
 
 def worst_by_kind(model, t, x):
     """Largest error of a derivative over the length of that derivative, for every kind of nuisance parameter."""
-    rates = model.rates(x, [[] for _ in model.tests])
+    rates = rates_of(model, x, [[] for _ in model.tests])
     r, jacobian, numbers = model.jacobian(t, x, [], rates)
     assert np.array_equal(r, model.residual(t, x, []))
     assert len(set(numbers)) == len(numbers)
@@ -81,7 +82,7 @@ def test_a_test_that_is_left_out_has_no_derivatives(scene, rows):
     left = unseen(model, [1])
     if rows == 0:
         left = replace(left, tests=(left.tests[0], replace(left.tests[1], value=left.tests[1].value[:0], sd=left.tests[1].sd[:0])))
-    r, jacobian, numbers = left.jacobian(1, x, [], left.rates(x, [[], []]))
+    r, jacobian, numbers = left.jacobian(1, x, [], rates_of(left, x, [[], []]))
     assert r.shape == (0,)
     assert jacobian.shape == (len(numbers), 0)
 
@@ -149,7 +150,7 @@ def test_derivatives_of_records_that_end_early(scene):
 def test_parameters_of_other_tests_do_not_move_a_test(scene):
     """What the derivatives leave out moves nothing: temperature and drift of the other test."""
     model, x = made(scene)
-    rates = model.rates(x, [[], []])
+    rates = rates_of(model, x, [[], []])
     for t in (0, 1):
         _, _, numbers = model.jacobian(t, x, [], rates)
         others = [i for i in range(len(x)) if i not in set(numbers)]

@@ -12,8 +12,9 @@ from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.forward.nuisance import BUILD, DRIFT, GAIN, STIFFNESS, TEMPERATURE
 from thermospindle.diagnosis.inference.evidence import evidence
-from thermospindle.diagnosis.inference.fit import Problem, fit
+from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.hypothesis import scan
+from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM

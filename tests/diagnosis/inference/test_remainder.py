@@ -10,6 +10,7 @@ import pytest
 from tests.blind.hidden import on_spring
 from tests.virtual_campaign import drawn, effect, model_of, virtual_campaign
 from thermospindle.diagnosis.forward.nuisance import RESONANCE, Resonance
+from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
@@ -91,7 +92,7 @@ def test_derivatives_by_its_parameters(model):
     x[[i for i, q in enumerate(wider.parameters) if q.kind == "end of records"]] = 0.0
     own = [i for i, q in enumerate(wider.parameters) if q.kind == RESONANCE]
     assert len(own) == len(model.reference.omega) + 2
-    rates = wider.rates(x, [[]] * 3)
+    rates = rates_of(wider, x, [[]] * 3)
     _, jacobian, numbers = wider.jacobian(1, x, [], rates)
     for i in own:
         up, down = x.copy(), x.copy()

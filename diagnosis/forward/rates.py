@@ -1,0 +1,44 @@
+"""How the matrices of every test change with what tolerances, thermometers and ring expansion may be off by."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from thermospindle.diagnosis.forward.linear import Rates, products
+from thermospindle.diagnosis.forward.model import FAILED, Applied, CampaignModel
+from thermospindle.model.rotor.chain import matrices
+from thermospindle.model.types import Array
+
+STEP = 0.02  # of a prior standard deviation, for differences
+
+
+def rates_of(model: CampaignModel, x: Array, effects_of: Sequence[Applied], old: Rates | None = None) -> Rates:
+    """dM, dC, dK by build tolerances, ring expansion and temperature, for every test; what structure alone moves is kept from `old`."""
+    numbers, each = [], []
+    for t, effects in enumerate(effects_of):
+        base = model.operating(t, x, effects)
+        at = matrices(base.chain)
+        own = [*range(len(model.build)), *model.expansion, model.temperature[t]]
+        kept = old.each[t] if old is not None and len(old.each[t][0].left) == len(at.stiffness) else ()
+        found = []
+        for k, i in enumerate(own):
+            if kept and k < len(model.build) and model.structural[k]:
+                found.append(kept[k])
+                continue
+            step = x.copy()
+            step[i] += STEP
+            try:
+                moved = matrices(model.operating(t, step, effects).chain)
+                apart = STEP
+            except FAILED:  # the end of a law or of contact: from the other side
+                step[i] -= 2 * STEP
+                moved = matrices(model.operating(t, step, effects).chain)
+                apart = -STEP
+            if moved.dofs != at.dofs:
+                moved = at
+            found.append(products(*((getattr(moved, w) - getattr(at, w)) / apart for w in ("mass", "damping", "stiffness"))))
+        numbers.append(np.array(own))
+        each.append(tuple(found))
+    return Rates(tuple(numbers), tuple(each))
