@@ -288,10 +288,15 @@ def conditions_of(found: Search) -> list[list[int]]:
 
 
 def _seen(model: CampaignModel) -> str:
-    """The light resonances that the data show in every test."""
-    told = ", ".join(f"{r.frequency:.0f} Hz (damping ratio {r.damping:.2g})" for r in model.resonances)
+    """The light resonances that the data show in every test; one beyond the band stands for what modes up there lend to it."""
+    if not model.resonances:
+        return ""
+    highest = max(float(d.frequency.max()) for d in model.tests)
+    told = ", ".join(
+        f"{r.frequency:.0f} Hz ({f'damping ratio {r.damping:.2g}' if r.frequency <= highest else 'beyond the band'})" for r in model.resonances
+    )
     one = "a light resonance" if len(model.resonances) == 1 else "light resonances"
-    return f" Taken into account: {one} at {told} that the drawing lacks and every test shows, of a table, a fixture or a cable." if told else ""
+    return f" Taken into account: {one} at {told} that the drawing lacks and every test shows, of a table, a fixture or a cable."
 
 
 def _by_another_law(drifting: Names, alike: Mapping[str, frozenset[str]]) -> str:
