@@ -3,8 +3,11 @@
 ==========  ============================================================================================================
 module      what it is
 ==========  ============================================================================================================
-`hidden`    mechanisms times random laws, written without a look at the catalogue; right answers by name
-`world`     a campaign: another mesh, solver and structure, constant errors of modes, drifting gains, noise in lines or time
+`laws`      random laws over temperature and speed
+`hidden`    mechanisms times such laws, written without a look at the catalogue; right answers by name
+`world`     one condition by another program: another mesh, solver and structure, constant errors of modes
+`campaigns` a campaign of it: drifting gains, noise in lines or time
+`visible`   how visible what is hidden is
 `study`     `python -m tests.blind.study --seeds A B [--out FILE]`: makes, diagnoses and keeps, a line of JSON a seed
 `score`     `python -m tests.blind.score FILE ...`: rates with intervals, calibration, set sizes, failures; docs/blind.txt
 ==========  ============================================================================================================

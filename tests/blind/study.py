@@ -23,8 +23,10 @@ from typing import Any
 
 import numpy as np
 
+from tests.blind.campaigns import Made, campaign, described, plans
 from tests.blind.hidden import Hidden, Mechanism, mechanisms
-from tests.blind.world import Made, Plan, World, campaign, described, plans, visibility
+from tests.blind.visible import visibility
+from tests.blind.world import Plan, World
 from thermospindle.diagnosis.draft import draft
 from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.inference.evidence import evidence, left_out

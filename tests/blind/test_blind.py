@@ -4,10 +4,13 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from tests.blind.hidden import law, mechanisms
+from tests.blind.campaigns import campaign, in_contact
+from tests.blind.hidden import mechanisms
+from tests.blind.laws import law
 from tests.blind.score import element_found, interval, most_probable, outcome, show, truth_probability
 from tests.blind.study import FURTHER, FURTHER_FROM, FURTHER_SHARE, SCENES, draw
-from tests.blind.world import Record, World, answer, campaign, in_contact, visibility
+from tests.blind.visible import visibility
+from tests.blind.world import Record, World, answer
 from tests.conftest import ROOT
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load

@@ -2,29 +2,26 @@
 
 `World` says in what; its defaults are the fitted program's own choices, and then `answer` is the same FRF by another way. Nothing of `sim.effects`
 or `sim.operating` is used: rings from `thermal.expand`, ball rows and their tangent from `model.bearing`, the axial balance solved here, matrices
-from the chain, and hidden physics (`hidden`) at each step. A campaign is a spindle off its drawing, thermometers and channels a little wrong, and
-noise either on every line or in time, where decaying records are cut, windowed and transformed.
+from the chain, and hidden physics (`hidden`) at each step.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
 
-from tests.blind.hidden import REFERENCE, Hidden, Place, excited, on_spring
+from tests.blind.hidden import Hidden, excited, on_spring
+from tests.blind.laws import REFERENCE, Place
 from thermospindle.model.bearing.ball_row import BallRow, centred_axial_force
 from thermospindle.model.bearing.pair import PairState, bearing_state, contact_status, reference_motion, row_at
 from thermospindle.model.machine import Condition, RingMotion, Spindle
 from thermospindle.model.rotor.chain import Matrices, RotorBase, matrices, motion_rows, rotor_base
 from thermospindle.model.rotor.modes import Poles, poles
-from thermospindle.model.tolerance import toleranced
 from thermospindle.model.types import Array, ComplexArray
-from thermospindle.sim.campaign.campaign import Campaign, Noise, Test
-from thermospindle.sim.identification.frf import Frf
 from thermospindle.thermal.expansion import expand
 from thermospindle.thermal.influence import TOLERANCE
 
@@ -256,229 +253,3 @@ def perturbed(linear: Matrices, spindle: Spindle, world: World) -> Matrices:
     stiffness[:n, :n] += back @ more_k @ back.T
     damping[:n, :n] += back @ more_c @ back.T
     return replace(linear, stiffness=stiffness, damping=damping)
-
-
-# ---------------------------------------------------------------- a campaign
-
-
-@dataclass(frozen=True, eq=False)
-class Made:
-    """A campaign, and what it was made of: the built spindle, and every test's true condition."""
-
-    campaign: Campaign
-    built: Spindle
-    world: World
-    record: Record
-    plans: tuple[Plan, ...]
-    hidden: tuple[Hidden, ...]
-
-
-def plans(random: np.random.Generator, spindle: Spindle) -> tuple[Plan, ...]:
-    """Four to eight tests between 15 and 65 C, some turning, or all at rest."""
-    style = random.choice(["both", "both", "both", "rest", "grid"])
-    count, top = int(random.integers(4, 9)), spindle.nominal_speed
-    if style == "grid":
-        temperatures = [20.0, 40.0, 60.0] if count > 5 else [20.0, 60.0]
-        found = [Plan(t, n) for n in (0.0, top) for t in temperatures]
-    else:
-        rest = count if style == "rest" else int(random.integers(2, count - 1))
-        cold = np.linspace(20.0, 60.0, rest).round()
-        found = [Plan(float(t), 0.0) for t in cold]
-        for _ in range(count - rest):
-            found.append(Plan(float(random.choice([20.0, 30.0, 40.0, 50.0, 60.0])), float(random.choice([0.5, 1.0])) * top))
-    return tuple(dict.fromkeys(found))
-
-
-def drawn_world(random: np.random.Generator, spindle: Spindle) -> World:
-    """Differences of every kind, each at a size of its own."""
-    body = spindle.structure.body(lowest(spindle))
-
-    def log(low: float, high: float) -> float:
-        return float(np.exp(random.uniform(np.log(low), np.log(high))))
-
-    weak = (body.mass * log(1e-4, 2e-3), float(random.uniform(700.0, 5500.0)), log(0.01, 0.05)) if random.random() < 0.5 else None
-    return World(
-        mesh=float(random.choice([1e-3, 2e-5])),
-        constant_kept=bool(random.random() < 0.5),
-        grooves_follow_faces=float(random.choice([0.0, 0.0, random.uniform(0.0, 1.0)])),
-        weak_mode=weak,
-        stiffness_error=log(1e-3, 1e-2),
-        damping_error=log(0.01, 0.1),
-        seed=int(random.integers(2**31)),
-        gain_drift=0.002,
-    )
-
-
-def drawn_record(random: np.random.Generator) -> Record:
-    told, times = str(random.choice(["nothing", "sd", "noise"])), float(random.choice([0.5, 1.0, 2.0]))
-    if random.random() < 0.5:
-        return Record(told="noise" if told == "sd" else told, times=1.0 if told != "nothing" else times)
-    hits, length = int(random.integers(3, 9)), float(random.choice([0.15, 0.3, 0.6]))
-    told = "nothing" if told == "noise" else told
-    if random.random() < 0.5:
-        return Record("exponential", length, float(random.choice([0.3, 0.05])), hits, told, times)
-    return Record("rectangular", length, 1.0, hits, told, times)
-
-
-def campaign(
-    spindle: Spindle, tests: Sequence[Plan], hidden: Sequence[Hidden], seed: int, world: World | None = None, record: Record | None = None
-) -> Made:
-    """One campaign; the seed draws the world and the record (unless given), tolerances, errors and noise."""
-    random = np.random.default_rng([seed, 61])
-    own, rec = drawn_world(random, spindle), drawn_record(random)
-    world, record = world or own, record or rec
-    built = spindle
-    for parameter in toleranced(spindle):
-        built = parameter.apply(built, parameter.sd * float(np.clip(random.standard_normal(), -3, 3)))
-    gain = 1 + spindle.tolerances.gain * random.standard_normal(len(spindle.points))
-    hidden = in_contact(built, tests, world, hidden)
-    made = []
-    for k, plan in enumerate(tests):
-        true = plan.temperature + spindle.tolerances.temperature * random.standard_normal()
-        at = answer(built, Condition(true, plan.speed), world, hidden, plan.place(spindle))
-        drift = 1 + world.gain_drift * random.standard_normal(len(gain))
-        frf = measured(replace(at, gain=at.gain * gain * drift), spindle, record, random)
-        name = f"T{plan.temperature:g}_n{plan.speed * 30 / np.pi:.0f}_{k}"
-        made.append(Test(name, plan.temperature, plan.speed, frf=frf, window_decay=record.decay))
-    stated = Noise(spindle.hammer.noise_of_value, spindle.hammer.noise_of_largest) if record.told == "noise" else None
-    found = Campaign(f"blind {seed}", spindle.name, "mobility", spindle.points, tuple(made), stated)
-    return Made(found, built, world, record, tuple(tests), tuple(hidden))
-
-
-def in_contact(spindle: Spindle, tests: Sequence[Plan], world: World, hidden: Sequence[Hidden]) -> Sequence[Hidden]:
-    """What is hidden, halved until every bearing carries load in every test, whatever the thermometer's error: a spindle that rattles has no FRF."""
-    off = 4 * spindle.tolerances.temperature
-    places = [Condition(p.temperature + by, p.speed) for p in tests for by in (-off, off)]
-    for _ in range(10):
-        if all(answer(spindle, at, world, hidden).status == "in contact" for at in places):
-            return hidden
-        hidden = [replace(h, size=h.size / 2) for h in hidden]
-    raise ValueError("the spindle as it is built rattles with nothing hidden")
-
-
-def measured(at: Answer, spindle: Spindle, record: Record, random: np.random.Generator) -> Frf:
-    """The FRFs of one test as the analyser writes them."""
-    nodes, sd = tuple(p.node for p in spindle.points), None
-    hammer = spindle.hammer
-    if record.kind == "line":
-        frequency = np.arange(hammer.band[0], hammer.band[1] + 1, 2.5)
-        value = at.frf(frequency, record.decay)
-        one, two = (random.standard_normal((2, *value.shape)) / np.sqrt(2) for _ in range(2))
-        largest = np.abs(value).max(axis=(0, 2), keepdims=True)
-        value = value + record.times * hammer.noise_of_value * np.abs(value) * (one[0] + 1j * one[1])
-        value = value + record.times * hammer.noise_of_largest * largest * (two[0] + 1j * two[1])
-    else:
-        step = 1 / hammer.sample_rate
-        samples = round(record.length * hammer.sample_rate)
-        lines = np.fft.rfftfreq(samples, step)
-        use = (lines >= hammer.band[0]) & (lines <= hammer.band[1])
-        frequency, window = lines[use], np.exp(-record.decay * step * np.arange(samples))
-        value = at.transformed(frequency, record)
-        force = half_sine(frequency, np.pi * np.sqrt(hammer.hammer_mass / hammer.tip_stiffness))
-        # white noise in time whose spectrum, averaged over the hits, has the data sheet's share of the largest answer where the force is whole
-        largest = np.abs(value).max(axis=(0, 2), keepdims=True)
-        level = record.times * hammer.noise_of_largest * largest * np.sqrt(record.hits) / np.sqrt(np.sum(window**2))
-        seen = []
-        for _ in range(record.hits):
-            noise = level * random.standard_normal((*value.shape[:2], samples)) * window
-            seen.append(value + np.fft.rfft(noise, axis=-1)[:, :, use] / force)
-        hits = np.array(seen)
-        value = hits.mean(axis=0)
-        if record.told == "sd":
-            sd = np.sqrt(np.sum(np.abs(hits - value) ** 2, axis=0) / (record.hits - 1) / record.hits)
-    return Frf(frequency, value, nodes, hammer.hammer_nodes, "mobility", sd=sd)
-
-
-def half_sine(frequency: Array, length: float) -> Array:
-    """Magnitude of the spectrum of a half-sine pulse over its value at 0 Hz."""
-    x = frequency * length
-    return np.abs(np.cos(np.pi * x) / (1 - 4 * x**2 + 1e-12))
-
-
-def described(made: Made, spindle: Spindle) -> dict[str, Any]:
-    """What a row of the study says of a world; `leakage` is its largest error of a line at 20 C and rest, in standard deviations of noise."""
-    leakage = 0.0
-    if made.record.kind != "line":
-        frequency, at = np.arange(*spindle.hammer.band, 10.0), answer(spindle, Condition(REFERENCE), World())
-        exact = at.frf(frequency, made.record.decay)
-        size = made.record.times * spindle.hammer.noise_of_largest * np.abs(exact).max(axis=(0, 2), keepdims=True)
-        leakage = float((np.abs(at.transformed(frequency, made.record) - exact) / size).max())
-    return {"world": asdict(made.world), "record": asdict(made.record), "leakage": leakage}
-
-
-# ---------------------------------------------------------------- how visible what is hidden is
-
-
-def visibility(made: Made, spindle: Spindle, lines: int = 160) -> list[float]:
-    """Of every hidden piece: its change of the FRFs in standard errors, after all that build tolerances, temperatures, gains and each mode's
-    constant error, and what couples any two, can take of it. Linear, about the built spindle; sqrt(10) is worth 5 in ln evidence. Of the piece itself and of a hundredth of it times a
-    hundred the smaller: what moves peaks by many widths is no longer what small tolerances do, but a larger tolerance may do the same."""
-    hammer = spindle.hammer
-    frequency = np.linspace(*hammer.band, lines)
-    plain = replace(made.world, stiffness_error=0.0, damping_error=0.0)
-
-    def all_tests(s: Spindle, hidden: Sequence[Hidden] = (), warmer: float = 0.0) -> list[ComplexArray]:
-        return [answer(s, Condition(p.temperature + warmer, p.speed), plain, hidden, p.place(spindle)).frf(frequency) for p in made.plans]
-
-    base = all_tests(made.built)
-    dense = made.campaign.tests[0].frf.frequency.size / lines  # type: ignore[union-attr]
-    sd = []
-    for v in base:
-        largest = np.abs(v).max(axis=(0, 2), keepdims=True)
-        of_value = hammer.noise_of_value * (made.record.kind == "line")
-        sd.append(made.record.times * np.sqrt((of_value * np.abs(v)) ** 2 + (hammer.noise_of_largest * largest) ** 2) / np.sqrt(dense))
-
-    def column(values: Sequence[ComplexArray]) -> Array:
-        z = np.concatenate([((v - b) / s).ravel() for v, b, s in zip(values, base, sd, strict=True)])
-        return np.concatenate([z.real, z.imag]) * np.sqrt(2)
-
-    columns = []
-    for parameter in toleranced(spindle):
-        small = parameter.sd / 10
-        columns.append(column(all_tests(parameter.apply(made.built, small))) * 10)
-    warm = all_tests(made.built, (), 0.02)
-    for k in range(len(base)):
-        columns.append(
-            column([w if i == k else b for i, (w, b) in enumerate(zip(warm, base, strict=True))]) * spindle.tolerances.temperature / 0.02
-        )
-    for i in range(len(spindle.points)):
-        pick = (np.arange(len(spindle.points)) == i)[:, None, None]
-        columns.append(column([b * (1 + spindle.tolerances.gain * pick) for b in base]))
-        for k in range(len(base)):
-            columns.append(column([b * (1 + made.world.gain_drift * pick * (j == k)) for j, b in enumerate(base)]))
-    columns += _modal_columns(made, column, frequency, plain, spindle)
-    a = np.array(columns).T
-    lower = np.linalg.cholesky(np.eye(a.shape[1]) + a.T @ a)
-    found = []
-    for h in made.hidden:
-        seen = []
-        for share in (1.0, 0.01):
-            d = column(all_tests(made.built, [replace(h, size=share * h.size)])) / share
-            seen.append(float(np.sqrt(max(d @ d - np.sum(np.linalg.solve(lower, a.T @ d) ** 2), 0.0))))
-        found.append(min(seen))
-    return found
-
-
-def _modal_columns(made: Made, column, frequency: Array, plain: World, spindle: Spindle) -> list[Array]:
-    """Every mode's constant stiffness and damping error, and what couples every two of them, one at a time."""
-    answers = [answer(made.built, Condition(p.temperature, p.speed), plain) for p in made.plans]
-    reference = answer(made.built, Condition(REFERENCE), plain).linear
-    root = np.sqrt(np.diag(reference.mass))
-    square, vectors = np.linalg.eigh(reference.stiffness / root[:, None] / root[None, :])
-    back = root[:, None] * vectors
-    seen = np.flatnonzero((square > 1.0) & (square < (2 * np.pi * 1.2 * spindle.hammer.band[1]) ** 2))
-    v = back[:, seen] * np.sqrt(square[seen])
-    one, two = np.triu_indices(len(seen), 1)
-    plainly = [at.frf(frequency) for at in answers]
-    moved = []
-    for at in answers:
-        by_one = at.by_modes(frequency, v)
-        by_sum = at.by_modes(frequency, v[:, one] + v[:, two])  # (v + w)(v + w)^T less v v^T and w w^T couples the two
-        moved.append([np.concatenate([of_one, of_sum - of_one[one] - of_one[two]]) for of_one, of_sum in zip(by_one, by_sum, strict=True)])
-    omega = np.sqrt(np.concatenate([square[seen], np.sqrt(square[seen][one] * square[seen][two])]))
-    found = []
-    for j, w in enumerate(omega):
-        for kind, size in enumerate((2 * made.world.stiffness_error, made.world.damping_error * 0.02 / w)):
-            if size:
-                found.append(column([p + size * m[kind][j] for p, m in zip(plainly, moved, strict=True)]))
-    return found
