@@ -98,13 +98,19 @@ def scan(model: CampaignModel, mechanisms: Sequence[Mechanism]) -> tuple[Array, 
 def settled(model: CampaignModel, h: Hypothesis) -> Hypothesis:
     """Fitted anew with priors as wide as was learned, until that moves nothing: the quadratic then stands where the answer is.
 
-    It starts from its own answer, or from the fit where the model is no quadratic as far as that."""
+    It starts from its own answer, or from the fit where the model is no quadratic as far as that. What ends with less evidence than the quadratic promised
+    may have stalled on that way, whatever it costs at first, and is fitted from the other start too.
+    """
     for _ in range(REFITS):
+        refit = partial(fit, model, h.mechanisms, rates=h.fit.rates, tempers=TEMPERS[-1:], learned=h.evidence.learned, moved=h.fit.moved)
+        before = h.evidence
         try:
-            found = fit(model, h.mechanisms, (h.evidence.mean, h.fit.point), h.fit.rates, TEMPERS[-1:], h.evidence.learned, h.fit.moved)
+            found = refit(start=(before.mean, h.fit.point))
+            if evidence(model, found).ln < before.ln - LITTLE:
+                found = min((refit(start=at) for at in (before.mean, h.fit.point)), key=lambda f: f.cost)
         except FAILED:
             return h
-        before, h = h.evidence, Hypothesis(found, evidence(model, found))
+        h = Hypothesis(found, evidence(model, found))
         if h.evidence.learned == before.learned and abs(h.evidence.ln - before.ln) < LITTLE:
             break
     return h

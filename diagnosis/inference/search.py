@@ -32,6 +32,7 @@ from thermospindle.model.types import Array
 BEHIND = 12.0  # tempered ln evidence behind the best from which a mechanism is not followed
 NAMED, FREE = 14, 4  # mechanisms fitted at most, of the catalogue and free forms
 LEADS, CLOSE = 2, 60.0  # single mechanisms of the catalogue to which a second is joined: so many, so near the best in ln evidence
+OWED = 6  # promised by screening and not delivered, fitted once more at most
 SECONDS = 2  # of each kind, joined to each of them
 PAIRS = 6  # fitted at most
 ENOUGH = 5.0  # ln evidence that a second mechanism must promise beside one that leaves a misfit
@@ -125,8 +126,28 @@ def _singles(
     singles = _fitted_all(model, tasks, first, strained, about, most, expected, workers)
     if not strained:
         singles = _better([*singles, *_lasting(model, none, named, most, expected, workers)])
+    elif len(rankings) > 1:
+        singles = _better([*singles, *_owed(model, none, rankings[1], singles, most, expected, workers)])
     progress("effects fitted")
     return Singles(singles, tuple(looked), most, expected)
+
+
+def _owed(
+    model: CampaignModel, none: Hypothesis, looked: Sequence[Screened], singles: Sequence[Hypothesis], most: float, expected: Learned, workers
+) -> list[Hypothesis]:
+    """Fits of what screening beside the model whose modes drift promised, and what fits from enlarged errors on have not delivered: some of these ended
+    early there, or stalled."""
+    nothing = evidence(model, none.fit, [undrifted(none.evidence.learned)]).ln
+    delivered = {h.names[0]: h.evidence.ln - nothing for h in singles}
+    tasks = []
+    for free, count in ((False, OWED), (True, 1)):
+        promised: dict[str, Screened] = {}
+        for s in sorted((s for s in looked if s.mechanism.free == free), key=lambda s: -s.gain):
+            promised.setdefault(s.mechanism.name, s)
+        least = max(PLENTY, max((s.gain for s in promised.values()), default=0.0) - CLOSE)
+        late = [s for s in promised.values() if s.gain > least and delivered.get(s.mechanism.name, -np.inf) < s.gain - OCCAM]
+        tasks += [_task((), none.fit, s, -np.inf, far=True) for s in late[:count]]
+    return fitted(model, tasks, TEMPERS[-1:], none.fit, most, expected, workers)
 
 
 def _cost(model: CampaignModel, none: Hypothesis, expected: Learned) -> float:
