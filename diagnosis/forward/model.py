@@ -93,10 +93,12 @@ class CampaignModel:
 
     @cached_property
     def expansion(self) -> list[int]:
+        """Numbers of the parameters of ring expansion."""
         return [i for i, p in enumerate(self.parameters) if p.kind == kinds_of.EXPANSION]
 
     @cached_property
     def temperature(self) -> list[int]:
+        """For every test the number of its thermometer's parameter."""
         return [next(i for i, p in enumerate(self.parameters) if p.kind == kinds_of.TEMPERATURE and p.test == t) for t in range(len(self.tests))]
 
     @cached_property
@@ -201,13 +203,13 @@ class CampaignModel:
         """FRFs (n_resp, n_ref, n) of test `t`, one of FRF lines, at other frequencies (n,) Hz."""
         data = self.tests[t]
         assert isinstance(data, LineData)
-        return self._response(x, t, self.linear(t, x, effects), replace(data, frequency=frequency)).value
+        return self._response(t, x, self.linear(t, x, effects), replace(data, frequency=frequency)).value
 
     def _answer(self, t: int, x: Array, linear: Linear) -> Response | Table:
         data = self.tests[t]
-        return Table(linear, data) if isinstance(data, ModeData) else self._response(x, t, linear, data)
+        return Table(linear, data) if isinstance(data, ModeData) else self._response(t, x, linear, data)
 
-    def _response(self, x: Array, t: int, linear: Linear, data: LineData) -> Response:
+    def _response(self, t: int, x: Array, linear: Linear, data: LineData) -> Response:
         cut = 0.0 if self._record is None else float(x[self._record])
         return Response(linear, data, self._gain(t, x), cut, [light for light, _ in self.lights(linear.matrices.dofs, x)])
 
