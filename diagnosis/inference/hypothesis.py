@@ -106,11 +106,13 @@ def settled(model: CampaignModel, h: Hypothesis) -> Hypothesis:
         before = h.evidence
         try:
             found = refit(start=(before.mean, h.fit.point))
-            if evidence(model, found).ln < before.ln - LITTLE:
+            told = evidence(model, found)
+            if told.ln < before.ln - LITTLE:
                 found = min((refit(start=at) for at in (before.mean, h.fit.point)), key=lambda f: f.cost)
+                told = evidence(model, found)
         except FAILED:
             return h
-        h = Hypothesis(found, evidence(model, found))
+        h = Hypothesis(found, told)
         if h.evidence.learned == before.learned and abs(h.evidence.ln - before.ln) < LITTLE:
             break
     return h
