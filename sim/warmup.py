@@ -16,8 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from thermospindle.model.bearing.roller import RollerState
 from thermospindle.model.errors import BadInput, OutsideRange
-from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.machine import Condition, RollerBearing, Spindle
 from thermospindle.model.rotor.chain import matrices
 from thermospindle.model.rotor.modes import Mode, modes
 from thermospindle.model.types import Array
@@ -190,3 +191,19 @@ def energy(warmup: Warmup) -> dict[str, float]:
 def most_friction(warmup: Warmup) -> float:
     """The largest friction heat (W) of all bearings together, at any time or in the end."""
     return max(sum(m.friction.values()) for m in (*warmup.moments, warmup.steady))
+
+
+def roller_names(warmup: Warmup) -> list[str]:
+    """Roller bearings with rings in the section, which warm up and make heat."""
+    return [b.name for b in warmup.spindle.ringed if isinstance(b, RollerBearing)]
+
+
+def rollers(warmup: Warmup, name: str) -> dict[str, list[float]]:
+    """Series of a roller bearing, which has clearance where ball rows have preload and angle."""
+    states = [m.point.state.any_bearing(name) for m in warmup.moments]
+    return {
+        "temperature_C": [m.bearing_temperatures[name] for m in warmup.moments],
+        "clearance_um": [1e6 * s.clearance for s in states if isinstance(s, RollerState)],
+        "radial_stiffness_N_per_m": [s.radial_stiffness for s in states],
+        "friction_W": [m.friction[name] for m in warmup.moments],
+    }

@@ -23,6 +23,9 @@ from thermospindle.model.bearing.hertz import in_series
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.types import Array
 
+ROUNDED = 4 * 2.0**-52
+"""Of a distance of groove centres, what rounding may change of the two that a ball's centre divides it into."""
+
 
 @dataclass(frozen=True)
 class BallRow:
@@ -154,8 +157,11 @@ def _settled(row: BallRow, line: Array) -> list[Balance]:
     lines = [(r, z) for r, z in line.tolist()]
     different = dict.fromkeys(lines)
     stretch = max(LEAST_STRETCH, max(hypot(r, z) for r, z in different) - row.unloaded_distance)
-    tolerance, least = 1e-12 * row.constant * stretch**1.5, 1e-9 * row.constant * sqrt(stretch)
-    tolerance += 1e-13 * row.inertia.loads(1.0, 0.0)[0]  # rounding of forces that a light row's contact leaves far behind
+    contact, flung = row.constant * stretch**1.5, row.inertia.loads(1.0, 0.0)[0]
+    tolerance, least = 1e-12 * contact + 1e-13 * flung, 1e-9 * row.constant * sqrt(stretch)
+    # a groove distance is rounded to some of its last bits, which the stiffer race turns into force: 1.5 K^(2/3) F^(1/3) of it
+    stiffest = 1.5 * max(row.inner_constant, row.outer_constant) ** (2 / 3) * max(contact, flung) ** (1 / 3)
+    tolerance += ROUNDED * row.unloaded_distance * stiffest
     found = {at: settled(ball, at, tolerance, least) for at in different}
     return [found[at] for at in lines]
 

@@ -112,12 +112,8 @@ def settled(ball: HeavyBall, line: Vector, tolerance: float, least: float) -> Ba
     resultant falls finds its minimum; the gyroscopic friction is a small addition. `least` (N/m) is added to the stiffness of the
     step, for a ball that touches nothing. Raises `NoEquilibrium`.
     """
-    share = (ball.inner_constant / ball.outer_constant) ** (2 / 3)
-    length = hypot(*line)
-    longest = LONGEST * length
-    stretch = max(length - ball.inner_length - ball.outer_length, LEAST_STRETCH)
-    reach = (ball.inner_length + stretch / (1 + share)) / length
-    r, z = line[0] * reach, line[1] * reach
+    longest = LONGEST * hypot(*line)
+    r, z = _start(ball, line)
     here = balance(ball, (r, z), line)
     for _ in range(STEPS):
         off = here.off
@@ -136,6 +132,30 @@ def settled(ball: HeavyBall, line: Vector, tolerance: float, least: float) -> Ba
             factor /= 2
         r, z = trial
     raise NoEquilibrium(f"ball centres did not settle; the largest residual is {here.off:.2g} N")
+
+
+def _start(ball: HeavyBall, line: Vector) -> Vector:
+    """Where the centre of a ball may be: between two races that press it; flung outward between two that do not.
+
+    Then its centre lies where two circles meet, about the groove centres, each as far as its race is under the centrifugal force; or, where a ball
+    on the outer race alone clears the inner one, on the radius of the outer groove's centre. Steps along a loose ball's circles would be many.
+    """
+    length = hypot(*line)
+    flung = ball.inertia.loads(-line[0] / length, abs(line[1]) / length)[0]
+    inner, outer = (own + (flung / k) ** (2 / 3) for own, k in ((ball.inner_length, ball.inner_constant), (ball.outer_length, ball.outer_constant)))
+    if inner + outer <= length or flung == 0.0:
+        stretch = max(length - ball.inner_length - ball.outer_length, LEAST_STRETCH)
+        share = (ball.inner_constant / ball.outer_constant) ** (2 / 3)
+        reach = (ball.inner_length + stretch / (1 + share)) / length
+        return line[0] * reach, line[1] * reach
+    alone = line[0] + outer, line[1]
+    if hypot(*alone) < ball.inner_length:
+        return alone
+    along = (length**2 + inner**2 - outer**2) / (2 * length)
+    across = sqrt(max(inner**2 - along**2, 0.0))
+    er, ez = line[0] / length, line[1] / length
+    out = 1.0 if ez >= 0 else -1.0  # of the two crossings the one farther from the axis
+    return along * er + across * abs(ez), along * ez - out * across * er
 
 
 def balance(ball: HeavyBall, centre: Vector, line: Vector) -> Balance:

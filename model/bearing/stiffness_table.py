@@ -13,6 +13,7 @@ import numpy as np
 import scipy
 
 from thermospindle.model.bearing.pair import BearingState, LinearState, PairState
+from thermospindle.model.bearing.roller import RollerState
 from thermospindle.model.errors import BadInput, OutsideRange
 from thermospindle.model.files.cells import cell, name_of
 from thermospindle.model.types import Array
@@ -31,6 +32,8 @@ COLUMNS = {
     "coupling_stiffness_N_per_rad": lambda b: b.coupling_stiffness,
 }
 """Property of a bearing state behind every column."""
+OF_ROLLERS = {"clearance_um": lambda b: b.clearance * 1e6}
+"""Columns of a table that has roller bearings."""
 GAPS = "{}: the table has gaps; every bearing needs a row for each temperature and speed, and one only"
 MISSING = -1e308  # in a grid that is being read; NaN is what a bearing given by numbers does not have
 
@@ -68,7 +71,8 @@ def _between(grid: Array, values: Array, where: float, name: str, unit: str) -> 
 
 def tabulate(states: Sequence[Sequence[PairState]], unloads: Mapping[str, float | None], provenance: Mapping[str, str]) -> StiffnessTable:
     """Table of pair states on a grid: `states[i][j]` at temperature i and speed j."""
-    names = [b.name for b in states[0][0].all_bearings]
+    bearings = states[0][0].all_bearings
+    columns = COLUMNS | (OF_ROLLERS if any(isinstance(b, RollerState) for b in bearings) else {})
 
     def column(name: str, read) -> Array:
         return np.array([[_property(state.any_bearing(name), read) for state in row] for row in states])
@@ -76,7 +80,7 @@ def tabulate(states: Sequence[Sequence[PairState]], unloads: Mapping[str, float 
     return StiffnessTable(
         np.array([row[0].condition.temperature for row in states]),
         np.array([state.condition.speed for state in states[0]]),
-        {name: {key: column(name, read) for key, read in COLUMNS.items()} for name in names},
+        {b.name: {key: column(b.name, read) for key, read in columns.items()} for b in bearings},
         dict(unloads),
         dict(provenance),
     )
@@ -96,11 +100,12 @@ def write_table(table: StiffnessTable, path: Path) -> None:
         file.write(f"# provenance: {json.dumps(dict(table.provenance))}\n")
         file.write(f"# unloads_C: {json.dumps(dict(table.unloads))}\n")
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["bearing", "temperature_C", "speed_rpm", *COLUMNS])
+        told = [*COLUMNS, *(c for c in OF_ROLLERS if any(c in columns for columns in table.values.values()))]
+        writer.writerow(["bearing", "temperature_C", "speed_rpm", *told])
         for name, columns in table.values.items():
             for i, t in enumerate(table.temperature):
                 for j, speed in enumerate(table.speed):
-                    writer.writerow([cell(name), repr(float(t)), repr(float(speed / RPM)), *(repr(float(columns[c][i, j])) for c in COLUMNS)])
+                    writer.writerow([cell(name), repr(float(t)), repr(float(speed / RPM)), *(repr(float(columns[c][i, j])) for c in told)])
 
 
 def read_table(path: Path) -> StiffnessTable:
@@ -117,7 +122,7 @@ def read_table(path: Path) -> StiffnessTable:
             raise BadInput(GAPS.format(path))  # before grids are made of it: of a damaged file they could be of any size
         for row in rows:
             where = np.searchsorted(temperature, float(row["temperature_C"])), np.searchsorted(rpm, float(row["speed_rpm"]))
-            for column in COLUMNS:
+            for column in (*COLUMNS, *(c for c in OF_ROLLERS if c in row)):
                 grid = values.setdefault(name_of(row["bearing"]), {}).setdefault(column, np.full((len(temperature), len(rpm)), MISSING))
                 grid[where] = float(row[column])
     except BadInput:

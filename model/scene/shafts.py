@@ -27,6 +27,8 @@ Piece = Annotated[tuple[NotNegative, ...], Strict(False), AfterValidator(_piece)
 
 COARSE = 0.05
 """Longest element over the shaft's length where nobody says: twenty over a shaft, and the nodes that bearings and points need."""
+FINEST = 500
+"""Elements over a shaft's length that a scene may ask for: matrices are dense, and a frequency is exact to all digits that are printed long before."""
 
 
 class ShaftForm(Table):
@@ -56,6 +58,8 @@ class ShaftForm(Table):
             for piece in getattr(self, key):
                 if min(piece[:-1]) <= 0:
                     raise ValueError(f"{key}: a diameter must be greater than 0, not {min(piece[:-1]):g}")
+        if self.longest_element_mm is not None and length > FINEST * self.longest_element_mm:
+            raise ValueError(f"longest_element_mm = {self.longest_element_mm:g}: more than {FINEST} elements over {length:g} mm; at least {length / FINEST:.4g} is allowed")
         for segment in self._segments():
             for k in (0, 1):
                 if min(segment.outer[k], segment.mass_outer[k]) <= segment.bore[k]:

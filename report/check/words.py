@@ -32,6 +32,7 @@ def sentences(values: Mapping[str, Any]) -> list[str]:
         found.append(f"Set {name}: {_and(s['bearings'])}, {s['arrangement']}, preload {s['preload_N']:g} N, {s['kind']}{slides}.")
     if values["sets"]:
         found.append(f"Balls with {values['ball_inertia']:.0%} of their inertia." if values["ball_inertia"] else "Balls without inertia: speed changes no bearing.")
+    found += [_rollers(name, b) for name, b in values["bearings"].items() if b["kind"] == "roller row"]
     if values["axial_load_N"]:
         found.append(f"External axial load {values['axial_load_N']:g} N along z.")
     if any(values["radial_load_N"]):
@@ -92,6 +93,13 @@ def grids(values: Mapping[str, Any]) -> list[tuple[str, list[str], list[list[str
         ("Points", ["node", "point", "on", "x, y, z\nmm", "along", "hammer"], points),
     ]
     return [g for g in every if g[2]]
+
+
+def _rollers(name: str, b: Mapping[str, Any]) -> str:
+    rows = "a row of" if b["rows"] == 1 else f"{b['rows']} rows of"
+    clear = b["clearance_um"]
+    fit = f"pressed by {-clear:.3g} um across, {b['roller_force_N']:.3g} N each" if clear < 0 else f"with {clear:.3g} um of clearance across"
+    return f"Rollers of {name}: {rows} {b['rollers']}, {b['roller_diameter_mm']:g} mm and {b['roller_length_mm']:g} mm long, {fit}; free along the axis."
 
 
 def _spring(s: Mapping[str, Any]) -> str:

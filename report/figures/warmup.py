@@ -14,7 +14,7 @@ from thermospindle.model.types import Array
 from thermospindle.model.units import MINUTE
 from thermospindle.report.figures.common import BEARINGS, PALE, STYLE, save, svg
 from thermospindle.report.typeset import power
-from thermospindle.sim.warmup import Warmup, most_friction
+from thermospindle.sim.warmup import Warmup, most_friction, roller_names, rollers
 
 PARTS = {"stationary": "#3b6ea5", "rotating": "#c2622d"}
 MODES = ("#1f8a70", "#7a3d8f", "#a0741a", "#3b6ea5", "#c9371c", "#555f6b", "#d18a0f", "#b0457b")
@@ -32,9 +32,10 @@ def figure_svg(warmup: Warmup) -> str:
 
 
 def figure(warmup: Warmup) -> Figure:
-    """Four panels over time in minutes; every line is named at its end."""
-    drawn = Figure(figsize=(9.6, 7.0))
-    panels = drawn.subplots(2, 2, sharex=True)
+    """Four panels over time in minutes, six where there are rollers; every line is named at its end."""
+    rolling = roller_names(warmup)
+    drawn = Figure(figsize=(15.5 if rolling else 9.6, 7.0))
+    panels = drawn.subplots(2, 3 if rolling else 2, sharex=True)
     minutes = warmup.times / MINUTE
     bearings = [b.name for b in warmup.spindle.bearings]
     parts = {g.name: g.part for g in warmup.spindle.regions}
@@ -54,19 +55,18 @@ def figure(warmup: Warmup) -> Figure:
     preload = np.array([[m.preload[b] for b in bearings] for m in warmup.moments])
     if warmup.speed:
         unit, scale = power(most_friction(warmup))
-        third = np.array([[scale * m.friction[b] for b in bearings] for m in warmup.moments])
+        third = np.array([[scale * m.friction[b] for b in (*bearings, *rolling)] for m in warmup.moments])
         about = ("Friction heat of each bearing", f"friction heat, {unit}")
     else:
         third = np.degrees([[m.point.state.bearing(b).contact_angle for b in bearings] for m in warmup.moments])
         about = ("Contact angle", "contact angle, degrees")
-    for axes, values, title, label in ((panels[0, 1], preload, "Preload", "preload, N"), (panels[1, 0], third, *about)):
-        same = bool(np.ptp(values, axis=1).max() < 1e-6 * np.abs(values).max())
-        for k, series in enumerate(values.T[:1] if same else values.T):
-            paint, _, dashes = BEARINGS[k % len(BEARINGS)]
-            axes.plot(minutes, series, color=paint, ls=dashes, lw=1.5)
-        names = ["both bearings" if len(bearings) == 2 else f"all {len(bearings)} bearings"] if same else bearings
-        name_ends(axes, values[-1, : len(names)], names, [BEARINGS[k % len(BEARINGS)][0] for k in range(len(names))])
-        axes.set(title=title, ylabel=label)
+    _of_bearings(panels[0, 1], minutes, preload, bearings, "Preload" + " of the ball rows" * bool(rolling), "preload, N")
+    _of_bearings(panels[1, 0], minutes, third, [*bearings, *(rolling if warmup.speed else ())], *about)
+    if rolling:
+        series = [rollers(warmup, name) for name in rolling]
+        clearance, stiffness = (np.array([s[key] for s in series]).T for key in ("clearance_um", "radial_stiffness_N_per_m"))
+        _of_bearings(panels[0, 2], minutes, clearance, rolling, "Clearance of the rollers, pressed below 0", "diametral clearance, µm")
+        _of_bearings(panels[1, 2], minutes, 1e-6 * stiffness, rolling, "Radial stiffness of the rollers", "stiffness, N/µm")
     axes = panels[1, 1]
     shift = warmup.frequencies - warmup.frequencies[0]
     names = [f"{k} {m.kind} {f:.0f}" for k, (m, f) in enumerate(zip(warmup.modes, warmup.frequencies[0], strict=True), 1)]
@@ -81,6 +81,17 @@ def figure(warmup: Warmup) -> Figure:
     for axes in panels.flat:
         axes.set_xlim(0, minutes[-1])
     return drawn
+
+
+def _of_bearings(axes: Axes, minutes: Array, values: Array, bearings: Sequence[str], title: str, label: str) -> None:
+    """A line for each bearing, (times, bearings), or one for all where they are the same."""
+    same = bool(len(bearings) > 1 and np.ptp(values, axis=1).max() < 1e-6 * np.abs(values).max())
+    for k, series in enumerate(values.T[:1] if same else values.T):
+        paint, _, dashes = BEARINGS[k % len(BEARINGS)]
+        axes.plot(minutes, series, color=paint, ls=dashes, lw=1.5)
+    names = ["both bearings" if len(bearings) == 2 else f"all {len(bearings)} bearings"] if same else list(bearings)
+    name_ends(axes, values[-1, : len(names)], names, [BEARINGS[k % len(BEARINGS)][0] for k in range(len(names))])
+    axes.set(title=title, ylabel=label)
 
 
 def _alike(series: Array, parts: Sequence[str]) -> list[list[int]]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from rich.console import Console
 
-from thermospindle.model.bearing.stiffness_table import StiffnessTable, write_table
+from thermospindle.model.bearing.stiffness_table import OF_ROLLERS, StiffnessTable, write_table
 from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.modes import Mode, group_energy
 from thermospindle.model.units import RPM
@@ -44,7 +44,8 @@ def table_json(table: StiffnessTable) -> dict[str, Any]:
     """Lists over temperature at the first speed; with several speeds each entry of `speeds` holds its own."""
 
     def at(speed: int) -> dict[str, Any]:
-        return {name: {c: [None if np.isnan(x) else x for x in v[c][:, speed].tolist()] for c in JSON_COLUMNS} for name, v in table.values.items()}
+        columns = [*JSON_COLUMNS, *OF_ROLLERS]
+        return {name: {c: [None if np.isnan(x) else x for x in v[c][:, speed].tolist()] for c in columns if c in v} for name, v in table.values.items()}
 
     answer = {"temperature_C": table.temperature.tolist(), "bearings": at(0), "unloads_C": dict(table.unloads)}
     if len(table.speed) > 1:
@@ -154,20 +155,20 @@ def write_frf_tables(log: Log, folder: Path) -> None:
 
 
 def show_table(console: Console, table: StiffnessTable) -> None:
-    columns = (
-        "T\nC", "speed\nrpm", "bearing", "angle\ndeg", "deform.\num", "ball\nforce\nN", "ball k\nN/um", "preload\nN", "k_RR\nN/um", "k_AA\nN/um",
-    )  # fmt: skip
     if not table.values:
         console.print("The scene has no bearings.")
         return
-    rows = []
-    scale = (1, 1, 1, 1e-6, 1, 1e-6, 1e-6)
-    digits = (2, 3, 3, 3, 2, 2, 3)
+    shown = [
+        ("contact_angle_deg", "angle\ndeg", 1, 2), ("deformation_um", "deform.\num", 1, 3), ("clearance_um", "clear-\nance\num", 1, 2),
+        ("contact_force_N", "contact\nforce\nN", 1, 3), ("ball_stiffness_N_per_m", "ball k\nN/um", 1e-6, 3), ("preload_N", "preload\nN", 1, 2),
+        ("radial_stiffness_N_per_m", "k_RR\nN/um", 1e-6, 2), ("axial_stiffness_N_per_m", "k_AA\nN/um", 1e-6, 3),
+    ]  # fmt: skip
+    shown = [row for row in shown if all(row[0] in values for values in table.values.values())]
+    columns, rows = ["T\nC", "speed\nrpm", "bearing", *(head for _, head, _, _ in shown)], []
     for i, temperature in enumerate(table.temperature):
         for j, speed in enumerate(table.speed):
             for name, values in table.values.items():
-                cells = zip(JSON_COLUMNS, scale, digits, strict=False)
-                row = ["" if np.isnan(values[c][i, j]) else f"{values[c][i, j] * s:.{d}f}" for c, s, d in cells]
+                row = ["" if np.isnan(values[c][i, j]) else f"{values[c][i, j] * scale:.{digits}f}" for c, _, scale, digits in shown]
                 rows.append([f"{temperature:g}", f"{speed / RPM:g}", name, *row])
     show_grid(console, "Bearing state", columns, rows, ("bearing",), keys=3)
     for name, where in table.unloads.items():

@@ -11,15 +11,16 @@ import numpy as np
 from rich.console import Console
 
 from thermospindle.model.bearing.roller import RollerState
-from thermospindle.model.machine import RollerBearing
 from thermospindle.model.types import Array
 from thermospindle.model.units import MINUTE, RPM
 from thermospindle.report.text.grid import show_grid
 from thermospindle.report.typeset import figure, minus, power, write_csv
 from thermospindle.sim.operating import provenance
-from thermospindle.sim.warmup import Moment, Warmup, energy, most_friction
+from thermospindle.sim.warmup import Moment, Warmup, energy, most_friction, roller_names, rollers
 
 LINES = 16  # of the terminal table
+ROLLER_COLUMNS = (("temperature", "C"), ("clearance", "um"), ("radial stiffness", "N_per_m"), ("friction", "W"))
+"""Of the CSV, in the order of `rollers`."""
 
 
 def warmup_json(warmup: Warmup) -> dict[str, Any]:
@@ -48,24 +49,13 @@ def warmup_json(warmup: Warmup) -> dict[str, Any]:
             }
             for b in warmup.spindle.bearings
         }
-        | {b.name: _rollers(warmup, b.name) for b in warmup.spindle.ringed if isinstance(b, RollerBearing)},
+        | {name: rollers(warmup, name) for name in roller_names(warmup)},
         "status": moments[-1].point.state.status,
         "steady": _steady_json(warmup, first),
         "time_constant_s": warmup.time_constant,
         "energy_J": energy(warmup),
         "left_out_effects": list(warmup.left_out),
         "provenance": provenance(warmup.spindle),
-    }
-
-
-def _rollers(warmup: Warmup, name: str) -> dict[str, list[float]]:
-    """Series of a roller bearing, which has clearance where ball rows have preload and angle."""
-    states = [m.point.state.any_bearing(name) for m in warmup.moments]
-    return {
-        "temperature_C": [m.bearing_temperatures[name] for m in warmup.moments],
-        "clearance_um": [1e6 * s.clearance for s in states if isinstance(s, RollerState)],
-        "radial_stiffness_N_per_m": [s.radial_stiffness for s in states],
-        "friction_W": [m.friction[name] for m in warmup.moments],
     }
 
 
@@ -94,12 +84,15 @@ def rows(warmup: Warmup) -> tuple[list[str], list[list[float]]]:
     for name, unit in (("temperature", "C"), ("preload", "N"), ("contact angle", "deg"), ("friction", "W")):
         header += [f"{name} of {b} bearing_{unit}" for b in bearings]
     header += [f"mode {k} {m.kind}_Hz" for k, m in enumerate(warmup.modes, 1)]
+    of_rollers = {b: rollers(warmup, b) for b in roller_names(warmup)}
+    header += [f"{name} of {b} bearing_{unit}" for b in of_rollers for name, unit in ROLLER_COLUMNS]
+    further = np.array([series for own in of_rollers.values() for series in own.values()]).T.tolist() or [[]] * len(warmup.times)
     body = []
-    for time, moment, frequency in zip(warmup.times, warmup.moments, warmup.frequencies, strict=True):
+    for time, moment, frequency, more in zip(warmup.times, warmup.moments, warmup.frequencies, further, strict=True):
         row = [float(time), *(moment.temperatures[g] for g in regions)]
         row += [moment.bearing_temperatures[b] for b in bearings] + [moment.preload[b] for b in bearings]
         row += [float(np.degrees(moment.point.state.bearing(b).contact_angle)) for b in bearings]
-        body.append(row + [moment.friction[b] for b in bearings] + frequency.tolist())
+        body.append(row + [moment.friction[b] for b in bearings] + frequency.tolist() + more)
     return header, body
 
 
@@ -119,14 +112,15 @@ def show_warmup(console: Console, warmup: Warmup) -> None:
     lost = lost_contact(warmup)
     if lost:
         console.print(f"{lost[0].upper()}{lost[1:]}.\n", highlight=False)
-    bearings = [b.name for b in warmup.spindle.bearings]
+    bearings, of_rollers = [b.name for b in warmup.spindle.bearings], roller_names(warmup)
     unit, scale = power(most_friction(warmup))
-    columns = ["time\nmin", *(f"{b}\nC" for b in bearings), "coolest\nC", "hottest\nC", f"{bearings[0]}\npreload\nN", f"friction\n{unit}"]
+    columns = ["time\nmin", *(f"{b}\nC" for b in (*bearings, *of_rollers)), "coolest\nC", "hottest\nC", f"{bearings[0]}\npreload\nN"]
+    columns += [*(f"{b}\nclearance\num" for b in of_rollers), f"friction\n{unit}"]
     columns += [f"f{k}\nHz" for k in range(1, len(warmup.modes) + 1)]
     rows = [
-        [f"{warmup.times[k] / MINUTE:.2f}", *_cells(warmup.moments[k], bearings, warmup.frequencies[k], scale)] for k in _shown(warmup.times)
+        [f"{warmup.times[k] / MINUTE:.2f}", *_cells(warmup.moments[k], bearings, of_rollers, warmup.frequencies[k], scale)] for k in _shown(warmup.times)
     ]
-    show_grid(console, title, columns, [*rows, ["steady", *_cells(warmup.steady, bearings, warmup.steady_frequencies, scale)]])
+    show_grid(console, title, columns, [*rows, ["steady", *_cells(warmup.steady, bearings, of_rollers, warmup.steady_frequencies, scale)]])
     kinds = ", ".join(f"f{k} {m.kind}" for k, m in enumerate(warmup.modes, 1))
     console.print(f"Bearings, coolest and hottest region; {kinds}.")
     total = heat_sums(warmup)
@@ -160,12 +154,14 @@ def _all_loaded(moment: Moment) -> bool:
     return all(b.in_contact for b in moment.point.state.bearings)
 
 
-def _cells(moment: Moment, bearings: Sequence[str], frequency: Array, scale: float) -> list[str]:
+def _cells(moment: Moment, bearings: Sequence[str], of_rollers: Sequence[str], frequency: Array, scale: float) -> list[str]:
     regions = moment.temperatures.values()
-    temperatures = [*(moment.bearing_temperatures[b] for b in bearings), min(regions), max(regions)]
+    clearances = [1e6 * s.clearance for s in moment.point.state.linear if isinstance(s, RollerState) and s.name in of_rollers]
+    temperatures = [*(moment.bearing_temperatures[b] for b in (*bearings, *of_rollers)), min(regions), max(regions)]
     return [
         *(f"{t:.2f}" for t in temperatures),
         f"{moment.preload[bearings[0]]:.3f}",
+        *(f"{c:.2f}" for c in clearances),
         f"{scale * sum(moment.friction.values()):.0f}",
         *("-" if np.isnan(f) else f"{f:.1f}" for f in frequency),
     ]
@@ -189,11 +185,14 @@ def warmup_section(warmup: Warmup) -> tuple[str, str]:
         for k, (m, a, b) in enumerate(zip(warmup.modes, warmup.frequencies[0], warmup.steady_frequencies, strict=True), 1)
     )
     unit, scale = power(most_friction(warmup))
+    clear = {name: rollers(warmup, name)["clearance_um"][0] for name in roller_names(warmup)}
+    then = {s.name: 1e6 * s.clearance for s in last.point.state.linear if isinstance(s, RollerState)}
+    fits = "".join(f", the clearance of the rollers of {escape(b)} {then[b]:.1f} µm (at the start {c:.1f} µm)" for b, c in clear.items())
     about = (
         f"<p>From {warmup.start:g} °C in air of {warmup.air:g} °C at {warmup.speed / RPM:.0f} rpm. The slowest time constant is "
         f"{warmup.time_constant:.0f} s. In the steady state the bearings are at {escape(bearings)} °C, the preload of {escape(first)} is "
         f"{last.preload[first]:.2f} N (at the start {warmup.moments[0].preload[first]:.2f} N) and bearing friction "
-        f"{scale * sum(last.friction.values()):.0f} {unit}; natural frequencies move by {shifts} Hz.</p>"
+        f"{scale * sum(last.friction.values()):.0f} {unit}{fits}; natural frequencies move by {shifts} Hz.</p>"
         f"<p>Heat: motor {total['motor']}, bearings {total['friction']} in; convection {total['convection']} out; "
         f"stored {total['stored']}.</p>"
     )

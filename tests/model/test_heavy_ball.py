@@ -9,6 +9,10 @@ from thermospindle.model.bearing import heavy_ball
 from thermospindle.model.bearing.ball_row import BallInertia, BallRow, centred_axial_force, respond
 from thermospindle.model.bearing.heavy_ball import HeavyBall, balance, settled
 from thermospindle.model.errors import NoEquilibrium
+from thermospindle.model.machine import Condition
+from thermospindle.model.scene.reading import load
+from thermospindle.model.units import RPM
+from thermospindle.sim.operating import operating_point
 
 DISK_BALL = BallInertia(1.588e-3, 9.1e-3, 7800.0, 0.0, 754.0)
 BOTH_TURN = BallInertia(22.23e-3, 125.26e-3, 7800.0, 1047.0, -300.0, share=0.7)
@@ -100,3 +104,15 @@ def test_centred_rows_are_one_ball_many_times(monkeypatch):
 def test_a_ball_that_does_not_settle_says_so():
     with pytest.raises(NoEquilibrium, match="did not settle; the largest residual"):
         settled(BALL, LINE, 0.0, 1.0)
+
+
+@pytest.mark.parametrize("rpm", [100, 3500, 30_000])
+@pytest.mark.parametrize(("scene", "name"), [("tailstock", "rear1"), ("hdd_2003", "upper")])
+def test_a_ball_settles_wherever_its_rings_are(scene, name, rpm):
+    """Found on `tailstock`: pressed, where what rounding does to a stiff race was more than what was allowed; loose, where steps along a circle were too many."""
+    spindle = load(scene)
+    own, state = spindle.bearing(name), operating_point(spindle, Condition(20.0)).state.bearing(name)
+    inertia = BallInertia(own.ball_diameter, own.pitch_diameter, spindle.materials[own.ball_material].density, rpm * RPM, 0.0)
+    force = [own.sense * centred_axial_force(replace(state.row, inertia=inertia), x) for x in own.sense * np.linspace(-20e-6, 20e-6, 81)]
+    assert (np.diff(force) > -1e-9 * force[-1]).all()
+    assert force[-1] > 2 * abs(force[0])  # loose at one end, but for balls that are flung, pressed at the other

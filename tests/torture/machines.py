@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 
 from tests.conftest import ROOT
 from thermospindle.model.machine import RingMotion
+from thermospindle.model.scene.reading import shipped_rows
 
 FILES = {
-    **{name: ROOT / "scenes" / name / "spindle.toml" for name in ("hdd_2003", "mk7702", "five_bearing", "free_shaft")},
+    **{name: ROOT / "scenes" / name / "spindle.toml" for name in ("hdd_2003", "mk7702", "five_bearing", "tailstock", "free_shaft")},
     **{name: ROOT / "scenes" / "templates" / f"{name}.toml" for name in ("hdd", "machine-tool", "grinding", "rotor")},
 }
 WHOLE = ("node", "balls", "hits", "cpus", "seed")  # keys with whole numbers, left alone
@@ -22,7 +23,15 @@ WHOLE = ("node", "balls", "hits", "cpus", "seed")  # keys with whole numbers, le
 
 @cache
 def parsed(name: str) -> dict:
-    return tomllib.loads(FILES[name].read_text(encoding="utf-8"))
+    """A scene with the shipped rows that its bearings name, whose numbers move too."""
+    raw = tomllib.loads(FILES[name].read_text(encoding="utf-8"))
+    named = {b.get("row") for b in raw.get("bearings", {}).values()}
+    for kind, rows in shipped_rows().items():
+        own = raw.get(kind, {})
+        more = {row: copy.deepcopy(dict(table)) for row, table in rows.items() if row in named and not any(row in raw.get(k, {}) for k in shipped_rows())}
+        if more:
+            raw[kind] = own | more
+    return raw
 
 
 def numbers(node, path=()):

@@ -91,9 +91,12 @@ def checked(raw, condition, expansion=None):
 
 NOTHING_HOLDS_A_TILT = Moved("grinding", ((("structure", "joints", 1, "tilt_stiffness_N_m_per_rad", 0), 0.0),))
 
+TOO_FINE = Moved("mk7702", ((("shafts", 0, "longest_element_mm"), 1e-6),))
+
 
 @given(moved(), conditions, expansions())
 @example(NOTHING_HOLDS_A_TILT, (20.0, 0.0), None)
+@example(TOO_FINE, (20.0, 0.0), None)
 def test_a_machine_keeps_the_laws_or_is_refused(machine, condition, expansion):
     with outcome("machines"):
         spindle, point = checked(machine.raw(), condition, expansion)
