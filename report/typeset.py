@@ -25,8 +25,8 @@ def minus(text: str) -> str:
 
 
 def prose(text: str) -> str:
-    """Plain words of the terminal as HTML: escaped, with true minus, plus-minus and arrow."""
-    return minus(str(escape(text))).replace("+-", "±").replace("-&gt;", "→")
+    """Plain words of the terminal as HTML: escaped, with true minus, plus-minus, arrow and degrees."""
+    return minus(re.sub(r"(?<=\d) C\b", " °C", str(escape(text)))).replace("+-", "±").replace("-&gt;", "→")
 
 
 def signed(value: float, digits: int = 1) -> str:

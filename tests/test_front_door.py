@@ -117,6 +117,8 @@ def test_stopped_while_it_is_loaded():
         (["modes", SCENE, "--speed", "1e300"], "at most 1e+08 rpm can be computed with"),
         (["modes", SCENE, "--speed", "-1e9"], "at most 1e+08 rpm"),
         (["modes", SCENE, "--temperature", "1e300"], "at most 10000 C can be computed with"),
+        (["modes", SCENE, "scenes/mk7702"], "'scenes/mk7702' is one too many: modes takes SCENE"),
+        (["table", SCENE, "--temperatures", "20,60"], "'20,60' is not a number; several stand apart by spaces"),
         (["modes", SCENE, "--highest", "-5"], "--highest -5: must be positive"),
         (["modes", SCENE, "--highest", "0"], "--highest 0: must be positive"),
         (["impact", SCENE, "--seed", "-1"], "-1 is not a whole number"),

@@ -67,6 +67,9 @@ def _run(arguments: list[str]) -> int:
     options, rest = parser.parse_known_args(arguments)
     if rest:
         known = verbs[arguments[0]]._option_string_actions
+        if not rest[0].startswith("-"):
+            taken = " ".join(str(a.metavar) for a in verbs[arguments[0]]._actions if not a.option_strings) or "nothing"
+            parser.error(f"{rest[0]!r} is one too many: {arguments[0]} takes {taken}")
         parser.error(f"{rest[0]} is no option of {arguments[0]}; {instead(rest[0], known)}")
     asked = vars(options)
     as_json, (module, function) = asked.pop("json", False), asked.pop("verb")
@@ -136,7 +139,8 @@ def _number(text: str) -> float:
     try:
         value = float(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+        apart = "; several stand apart by spaces" if "," in text else ""
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number{apart}") from None
     if not isfinite(value):
         raise argparse.ArgumentTypeError(f"{text} is not a finite number")
     return value
@@ -225,10 +229,10 @@ def _parser() -> tuple[_Parser, dict[str, argparse.ArgumentParser]]:
     def one(added: argparse.ArgumentParser) -> None:
         added.add_argument("--temperature", type=_temperature, metavar="C", help="the scene's reference temperature by default")
 
-    def speed(added: argparse.ArgumentParser, text: str | None = None) -> None:
+    def speed(added: argparse.ArgumentParser, text: str = "0, at rest, by default") -> None:
         added.add_argument("--speed", dest="speed_rpm", type=speed_number, metavar="RPM", help=text)
 
-    def speeds(added: argparse.ArgumentParser, text: str | None = None) -> None:
+    def speeds(added: argparse.ArgumentParser, text: str = "0, at rest, by default") -> None:
         added.add_argument("--speeds", dest="speeds_rpm", type=speed_number, nargs="+", metavar="RPM", help=text)
 
     def element(added: argparse.ArgumentParser) -> None:

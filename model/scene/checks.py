@@ -9,7 +9,7 @@ import numpy as np
 
 from thermospindle.model.bearing.hertz import in_series
 from thermospindle.model.bearing.pair import contact_constants, reference_motion, ring_speeds
-from thermospindle.model.errors import BadInput
+from thermospindle.model.errors import BadInput, instead
 from thermospindle.model.machine import Bearing, Region, Spindle
 from thermospindle.model.shaft import SAME_HEIGHT
 
@@ -18,6 +18,10 @@ from thermospindle.model.shaft import SAME_HEIGHT
 
 def _mm(pair: tuple[float, float]) -> list[float]:
     return [round(v * 1e3, 6) for v in pair]
+
+
+def _region_instead(spindle: Spindle, name: str) -> str:
+    return instead(name, [g.name for g in spindle.regions])
 
 
 def _overlap(a: Region, b: Region) -> bool:
@@ -71,7 +75,7 @@ def check_section(file: Path, spindle: Spindle) -> None:
     for key, used in heated:
         for name in used:
             if name not in names:
-                raise BadInput(f"{file}: thermal.{key}: {name!r} names no section region; allowed are {', '.join(names)}")
+                raise BadInput(f"{file}: thermal.{key}: {name!r} names no section region; {instead(name, names)}")
 
 
 def check_bearings(file: Path, spindle: Spindle) -> None:
@@ -79,7 +83,7 @@ def check_bearings(file: Path, spindle: Spindle) -> None:
         where = f"{file}: bearings.{b.name}"
         for key, name in (("inner_ring", b.inner_ring), ("outer_ring", b.outer_ring)):
             if name not in {g.name for g in spindle.regions}:
-                raise BadInput(f"{where}.{key} = {name!r}: names no section region")
+                raise BadInput(f"{where}.{key} = {name!r}: names no section region; {_region_instead(spindle, name)}")
             ring = spindle.region(name)
             if not ring.z[0] <= b.z <= ring.z[1]:
                 raise BadInput(f"{where}.z_mm = {b.z * 1e3:g}: outside its ring {name!r}, which spans z_mm = {_mm(ring.z)}")
@@ -129,7 +133,7 @@ def check_rollers(file: Path, spindle: Spindle) -> None:
             continue
         for key, name in (("inner_ring", b.inner_ring), ("outer_ring", b.outer_ring)):
             if name not in {g.name for g in spindle.regions}:
-                raise BadInput(f"{where}.{key} = {name!r}: names no section region")
+                raise BadInput(f"{where}.{key} = {name!r}: names no section region; {_region_instead(spindle, name)}")
             ring = spindle.region(name)
             if not ring.z[0] <= b.z <= ring.z[1]:
                 raise BadInput(f"{where}.z_mm = {b.z * 1e3:g}: outside its ring {name!r}, which spans z_mm = {_mm(ring.z)}")
@@ -188,7 +192,7 @@ def check_structure(file: Path, spindle: Spindle) -> None:
             raise BadInput(f"{file}: structure.bodies: the name {body.name!r} is taken; body names must differ, and 'ground' is the world")
         for name in body.regions:
             if name not in {g.name for g in spindle.regions}:
-                raise BadInput(f"{file}: structure.bodies.{body.name}.regions: {name!r} names no section region")
+                raise BadInput(f"{file}: structure.bodies.{body.name}.regions: {name!r} names no section region; {_region_instead(spindle, name)}")
     if not structure.bodies:
         raise BadInput(f"{file}: structure.bodies: there is neither a body nor a shaft; a spindle has at least one")
     _check_mountings(file, spindle)

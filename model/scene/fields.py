@@ -149,14 +149,25 @@ def first_error(where: str | Path, raw: Any, form: type[BaseModel], error: Valid
         case "missing":
             return f"{where}: {key}: missing, and has no default"
         case _:
-            message = problem["msg"].removeprefix("Value error, ")
+            message = _told(problem["type"], problem["msg"].removeprefix("Value error, "), problem["input"])
             given = "" if isinstance(problem["input"], Mapping | LawTable) else f" = {_shown(problem['input'])}"
             told = f"{key}{given}: {message[0].lower()}{message[1:]}".removeprefix(": ")
             return f"{where}: {told}"
 
 
+def _told(kind: str, message: str, value: Any) -> str:
+    """pydantic's words in those of a file: what it calls a tuple is a list in brackets, and a number in quotes is none."""
+    if kind in ("tuple_type", "list_type"):
+        return "input should be a list in brackets, as [1.0, 2.0]"
+    if kind in ("float_type", "int_type") and isinstance(value, str) and value.replace(".", "", 1).strip().isdigit():
+        return f"{message}, without quotes"
+    return message
+
+
 def _shown(value: Any) -> str:
     """A value as a message quotes it: no numbers of thousands of digits, no endless text."""
+    if isinstance(value, bool):
+        return str(value).lower()
     try:
         text = repr(value)
     except (ValueError, RecursionError):

@@ -29,6 +29,10 @@ NEAR = 0.05
 """Of the speed, within which a natural frequency is called critical."""
 CONFORMITY = (0.505, 0.58)
 """Groove radius over ball diameter of bearings that are made: 0.515 to 0.53 mostly (Harris, Rolling Bearing Analysis, ch. 2)."""
+LEAST_EXPANSION = 0.01
+"""um/m K: glass ceramics such as Zerodur have 0.02, and whoever writes 1/K has 1e-5."""
+LEAST_DENSITY = 100.0
+"""kg/m3: foams have more, and whoever writes g/cm3 has 1 to 20."""
 OFF = 1.0 * MM
 """How far from its body's surface a point may lie: sensors have bases."""
 MANY_STEPS = 1e6
@@ -109,9 +113,10 @@ def _preload(found: Looked) -> Iterator[str]:
         where = f"at {state.condition.temperature:g} C" + (f" and {state.condition.speed / RPM:.0f} rpm" if state.condition.speed else "")
         pairs = [(b, state.state.bearing(b.name)) for b in found.reference.state.bearings]
         yield from (f"bearing {b.name} loses contact {where}" for b, now in pairs if not now.in_contact)
-        moved = [f"{b.name} {b.preload:.3g} to {now.preload:.3g} N" for b, now in pairs if now.in_contact and not 0.5 < now.preload / b.preload < 2.0]
-        if moved:
-            yield f"{where} preload is less than half or more than twice that of the reference: {', '.join(moved)}"
+        for what, far in (("less than half", lambda ratio: ratio < 0.5), ("more than twice", lambda ratio: ratio > 2.0)):
+            moved = [f"{b.name} {now.preload:.3g} of {b.preload:.3g} N" for b, now in pairs if now.in_contact and far(now.preload / b.preload)]
+            if moved:
+                yield f"{where} the preload is {what} that of the reference: {', '.join(moved)}"
 
 
 def _sense(found: Looked) -> Iterator[str]:
@@ -135,6 +140,16 @@ def _tables(found: Looked) -> Iterator[str]:
 
 def _constant(b: LinearBearing) -> bool:
     return len(b.temperature) * len(b.speed) == 1
+
+
+def _materials(found: Looked) -> Iterator[str]:
+    """Numbers that are of a material in other units than their keys'."""
+    for m in found.spindle.materials.values():
+        expansion = max(m.thermal_expansion.value) / 1e-6
+        if expansion < LEAST_EXPANSION:
+            yield f"material {m.name}: expands by {expansion:.2g} um/m in a kelvin, and even glass ceramics by 0.02; the key takes micrometres per metre and kelvin, of steel 11.5"
+        if m.density < LEAST_DENSITY:
+            yield f"material {m.name}: has {m.density:g} kg/m3, less than any solid part; of steel it is 7800"
 
 
 # ---------------------------------------------------------------- structure
@@ -256,5 +271,5 @@ def _count(n: int, one: str, many: str = "") -> str:
 
 
 QUESTIONS: tuple[Callable[[Looked], Iterator[str]], ...] = (
-    _loose, _same_place, _seats, _contacts, _preload, _sense, _tables, _free, _undamped, _damping, _critical, _sections, _points, _hammer, _running, _effects,
+    _loose, _same_place, _seats, _contacts, _materials, _preload, _sense, _tables, _free, _undamped, _damping, _critical, _sections, _points, _hammer, _running, _effects,
 )  # fmt: skip

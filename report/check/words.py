@@ -78,7 +78,7 @@ def grids(values: Mapping[str, Any]) -> list[tuple[str, list[str], list[list[str
         for name, b in values["bodies"].items()
     ]
     joints = [
-        [name, " - ".join(j["between"]), f"{j['z_mm']:g}", *(f"{k:.3g}" if k else "-" for k in (max(j["stiffness"][:2]), j["stiffness"][2], max(j["stiffness"][3:])))]
+        [name, " - ".join(j["between"]), f"{j['z_mm']:g}", *(_across(k) for k in (j["stiffness"][:2], j["stiffness"][2:3], j["stiffness"][3:]))]
         for name, j in values["joints"].items()
     ]
     points = [
@@ -100,6 +100,12 @@ def _rollers(name: str, b: Mapping[str, Any]) -> str:
     clear = b["clearance_um"]
     fit = f"pressed by {-clear:.3g} um across, {b['roller_force_N']:.3g} N each" if clear < 0 else f"with {clear:.3g} um of clearance across"
     return f"Rollers of {name}: {rows} {b['rollers']}, {b['roller_diameter_mm']:g} mm and {b['roller_length_mm']:g} mm long, {fit}; free along the axis."
+
+
+def _across(values: list[float]) -> str:
+    """Stiffness along or about x and y, once where they are the same."""
+    shown = [f"{k:.3g}" if k else "-" for k in values]
+    return shown[0] if len(set(shown)) == 1 else ", ".join(shown)
 
 
 def _spring(s: Mapping[str, Any]) -> str:

@@ -179,7 +179,7 @@ def _strip(axes: Axes, peaks: Sequence[Peaks], labels: Sequence[str], every: Seq
         marks = [f for f, _ in p.value.values()]
         axes.plot(marks, [y] * len(marks), marker, color=c, mfc=c if filled else "none", ms=4, mew=0.9, ls="none")
     numbered = next((p for p in peaks if p.source == "computed"), None)
-    for names, f in _grouped(numbered, 0.009 * (band[1] - band[0])) if numbered else ():
+    for names, f in grouped(numbered, 0.011 * (band[1] - band[0])) if numbered else ():
         axes.annotate(names, (f, 0.36), ha="center", va="bottom", fontsize=8)
     axes.set(yticks=[-i for i in range(len(labels))], yticklabels=labels, ylim=(-len(labels) + 0.4, 1.15))
     axes.tick_params(axis="both", length=0, labelbottom=False)
@@ -187,15 +187,16 @@ def _strip(axes: Axes, peaks: Sequence[Peaks], labels: Sequence[str], every: Seq
     axes.set_title("Natural frequencies")
 
 
-def _grouped(peaks: Peaks, apart: float) -> list[tuple[str, float]]:
-    """Mode numbers as labels at their frequencies; those less than `apart` (Hz) from the one before share a label."""
-    groups: list[list[tuple[int, float]]] = []
+def grouped(peaks: Peaks, apart: float) -> list[tuple[str, float]]:
+    """Mode numbers as labels at their frequencies; numbers share a label where two would stand less than `apart` (Hz), a digit's width and a half, from each other."""
+    found: list[tuple[str, list[float]]] = []
     for mode, (f, _) in sorted(peaks.value.items(), key=lambda item: item[1][0]):
-        if groups and f - groups[-1][-1][1] < apart:
-            groups[-1].append((mode, f))
-        else:
-            groups.append([(mode, f)])
-    return [(", ".join(str(mode) for mode, _ in g), float(np.mean([f for _, f in g]))) for g in groups]
+        name, at = str(mode), [f]
+        while found and np.mean(at) - np.mean(found[-1][1]) < apart * (0.35 * (len(name) + len(found[-1][0])) + 0.3):
+            before, others = found.pop()
+            name, at = f"{before}, {name}", [*others, *at]
+        found.append((name, at))
+    return [(name, float(np.mean(at))) for name, at in found]
 
 
 # ---------------------------------------------------------------- the section

@@ -99,7 +99,7 @@ def campbell(found: ResonanceMap, at: int | None = None, size: tuple[float, floa
     axes.axvline(found.nominal.speed / RPM, color=PALE, lw=1.0, ls=":")
     axes.set(xlabel="speed, rpm", ylabel="frequency, Hz")
     figure.suptitle(f"Campbell diagram at {found.temperatures[t0]:.4g} °C", x=0.01, ha="left", fontweight="bold", fontsize=9.5)
-    figure.legend(handles=_key(found), loc="outside lower center", ncols=round(size[0] / 1.65), fontsize=7.5)
+    figure.legend(handles=_key(found, drawn_lines(found)), loc="outside lower center", ncols=round(size[0] / 1.65), fontsize=7.5)
     return figure
 
 
@@ -133,7 +133,7 @@ def over_temperature(found: ResonanceMap, size: tuple[float, float] = SIZE, key_
     title = f"Natural frequencies and the strongest lines among them at {found.nominal.speed / RPM:.0f} rpm"
     figure.suptitle(title, x=0.01, ha="left", fontweight="bold", fontsize=9.5)
     if key_below:
-        figure.legend(handles=_key(found), loc="outside lower center", ncols=6, fontsize=7.5)
+        figure.legend(handles=_key(found, shown), loc="outside lower center", ncols=6, fontsize=7.5)
     return figure
 
 
@@ -248,15 +248,16 @@ def _name_tops(axes: Axes, named: list[tuple[float, str, str]], size: float = 7.
         )
 
 
-def _key(found: ResonanceMap) -> list[Line2D]:
+def _key(found: ResonanceMap, lines: Sequence[LineTrack]) -> list[Line2D]:
     handles = [
         Line2D([], [], color=WHIRL[w], lw=1.9, label=f"mode, {'whirls ' + w if w != 'none' else 'axial or standing'}")
         for w in dict.fromkeys(m.whirl for m in found.modes)
     ]
-    causes = dict.fromkeys(t.line.cause for t in drawn_lines(found))
+    causes = dict.fromkeys(t.line.cause for t in lines)
     handles += [Line2D([], [], color=CAUSES[c], lw=0.9, label=c) for c in causes]
-    handles += [Line2D([], [], color=INK, lw=0.9, ls="--", label="line that whirls backward"), _circle()]
-    return handles
+    if any(t.line.whirl < 0 for t in lines):
+        handles.append(Line2D([], [], color=INK, lw=0.9, ls="--", label="line that whirls backward"))
+    return [*handles, _circle()]
 
 
 def _circle() -> Line2D:

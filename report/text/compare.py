@@ -130,14 +130,15 @@ def _show_modes(console: Console, c: Comparison) -> None:
     for t in c.tests:
         for m in t.modes:
             damping = "" if m.damping_measured is None else f"{100 * m.damping_measured:.3f}"
-            damping_error = "" if m.damping_residual is None else f"{m.damping_residual:+.1f}"
+            damping_error = "" if m.damping_residual is None else f"{m.damping_residual:+z.1f}"
             mac = "" if m.mac is None else f"{m.mac:.3f}" + ("*" if m.close else "")
-            error = (f"{m.error:+.2f}", f"{100 * m.error / m.measured:+.2f}", f"{m.residual:+.1f}")
+            error = (f"{m.error:+z.2f}", f"{100 * m.error / m.measured:+z.2f}", f"{m.residual:+z.1f}")
             name = t.test.id if m is t.modes[0] else ""
             frequencies = (f"{m.measured:.2f}", f"{m.sd:.2f}", f"{m.computed:.2f}")
             beside = (damping, f"{100 * m.damping_computed:.3f}", damping_error, mac)
             rows.append([name, str(m.number), m.kind, *frequencies, *error, *beside])
     show_grid(console, "Modes, computed - measured", columns, rows, ("test", "kind"), keys=3)
+    console.print("+-: standard error of the measured frequency, with what the test's temperature is uncertain by")
     if any(m.close and m.mac is not None for t in c.tests for m in t.modes):
         console.print("* close modes: share of the measured shape in the plane of the computed ones")
 
@@ -156,8 +157,8 @@ def _show_by_mode(console: Console, c: Comparison) -> None:
         macs = [o.mac for o in modes if o.mac is not None]
         low, high = min(o.measured for o in modes), max(o.measured for o in modes)
         rows.append([
-            str(number), kind, str(len(modes)), f"{low:.1f}-{high:.1f}", f"{np.mean([o.error for o in modes]):+.2f}", f"{_rms([o.residual for o in modes]):.1f}",
-            f"{m.error:+.2f}", worst, f"{_rms(damping):.1f}" if damping else "", f"{min(macs):.3f}" if macs else "",
+            str(number), kind, str(len(modes)), f"{low:.1f}-{high:.1f}", f"{np.mean([o.error for o in modes]):+z.2f}", f"{_rms([o.residual for o in modes]):.1f}",
+            f"{m.error:+z.2f}", worst, f"{_rms(damping):.1f}" if damping else "", f"{min(macs):.3f}" if macs else "",
         ])  # fmt: skip
     columns = ("mode", "kind", "tests", "measured\nHz", "error, Hz\nmean", "s.e.\nrms", "error, Hz\nworst", "in test", "damping\ns.e. rms", "MAC\nleast")
     show_grid(console, f"Modes of {len(c.tests)} tests, computed - measured", columns, rows, ("kind", "in test"), keys=2)
@@ -181,7 +182,7 @@ def _show_frfs(console: Console, c: Comparison) -> None:
 
 
 def _percent(shift: float | None) -> str:
-    return "-" if shift is None else f"{100 * shift:+.2f}"
+    return "-" if shift is None else f"{100 * shift:+z.2f}"
 
 
 def show_before_after(console: Console, both: BeforeAfter) -> None:

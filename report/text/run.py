@@ -11,6 +11,7 @@ import numpy as np
 from rich.console import Console
 
 from thermospindle.model.bearing.stiffness_table import OF_ROLLERS, StiffnessTable, write_table
+from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.modes import Mode, group_energy
 from thermospindle.model.units import RPM
@@ -197,8 +198,17 @@ def show_impact(console: Console, step: Step) -> None:
     for i, (f, sf, z, sz) in enumerate(zip(m.frequency, m.frequency_sd, m.damping, m.damping_sd, strict=True)):
         exact = computed.get(i)
         own = ("-", "-") if exact is None else (f"{exact.frequency:.2f}", f"{100 * exact.damping_ratio:.3f}")
-        rows.append([f"{f:.2f}", f"{sf:.2f}", f"{100 * z:.3f}", f"{100 * sz:.3f}", *own])
+        rows.append([f"{f:.2f}", _error(sf, 2), f"{100 * z:.3f}", _error(100 * sz, 3), *own])
     show_grid(console, title, ("f\nHz", "+-", "damping\n%", "+-", "model f\nHz", "model damping\n%"), rows)
+    low, high = step.point.spindle.hammer.band
+    unseen = [mode for i, mode in enumerate(step.point.modes) if low <= mode.frequency <= high and i not in identified(step)]
+    if unseen:
+        console.print(f"No peak was found of {', '.join(f'{m.frequency:.2f} Hz ({m.kind})' for m in unseen)}. {_struck(step.point.spindle)}")
+
+
+def _error(value: float, digits: int) -> str:
+    """A standard error with as many digits as the number beside it, or with the first that is not 0: none is that small."""
+    return f"{value:.{digits}f}" if not 0 < value < 0.5 * 10.0**-digits else f"{value:.1g}"
 
 
 def show_run(console: Console, run: Run, out: Path) -> None:
@@ -231,13 +241,13 @@ def show_run(console: Console, run: Run, out: Path) -> None:
     console.print()
     show_grid(console, "Modal peaks of the virtual hammer test, Hz +- standard error", ("mode", *every), peaks)
     if any("-" in row for row in peaks):
-        console.print(f"-: no peak was found. {_struck(run)}")
+        console.print(f"-: no peak was found. {_struck(run.spindle)}")
     console.print(f"\n{out}: report.html, run.rrd, table.csv, modes.csv, spindle_*.xml, campaign/", highlight=False, soft_wrap=True)
     console.print(f"Open in a browser: {(out / 'report.html').resolve().as_uri()}", highlight=False, soft_wrap=True)
 
 
-def _struck(run: Run) -> str:
+def _struck(spindle: Spindle) -> str:
     """Why a mode may stay unseen: where and along which axes the hammer strikes."""
-    points = [run.spindle.point(node) for node in run.spindle.hammer.hammer_nodes]
+    points = [spindle.point(node) for node in spindle.hammer.hammer_nodes]
     places = ", ".join(f"node {p.node} along {'xyz'[int(np.argmax(np.abs(p.direction)))]}" for p in points)
     return f"The hammer strikes {places}: a mode that does not move there, or lies too near a stronger one, shows no peak of its own."

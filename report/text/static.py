@@ -36,12 +36,12 @@ def show_static(console: Console, values: dict[str, Any]) -> None:
     """A table of stiffness and bearing reactions, and one of where the compliance of each point sits."""
     points = values["points"]
     reactions, parts = (list(dict.fromkeys(name for row in points.values() for name in row[key])) for key in ("reactions_N", "compliance_shares"))
-    told = f"bearings {values['bearings']}, beam {values['beam']}"
+    told = f"bearings {values['bearings']}" + (f", beam {values['beam']}" if values["beam"] != "none" else "")
     show_grid(
         console,
         f"Stiffness at each point, and what every bearing bears of 1 N there ({told})",
         ["point", "along", "stiffness\nN/um", *(f"{name}\nN" for name in reactions)],
-        [[name, row["direction"], _stiffness(row), *("-" if row["free"] else f"{row['reactions_N'].get(b, 0.0):+.4f}" for b in reactions)] for name, row in points.items()],
+        [[name, row["direction"], _stiffness(row), *("-" if row["free"] else f"{row['reactions_N'].get(b, 0.0):+z.4f}" for b in reactions)] for name, row in points.items()],
         words=("point", "along"),
     )
     if not parts:

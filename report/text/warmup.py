@@ -181,7 +181,7 @@ def warmup_section(warmup: Warmup) -> tuple[str, str]:
     bearings = ", ".join(f"{b} {t:.1f}" for b, t in last.bearing_temperatures.items())
     first = warmup.spindle.bearings[0].name
     shifts = ", ".join(
-        f"mode {k} ({escape(m.kind)}) {b - a:+.1f}"
+        f"mode {k} ({escape(m.kind)}) {b - a:+z.1f}"
         for k, (m, a, b) in enumerate(zip(warmup.modes, warmup.frequencies[0], warmup.steady_frequencies, strict=True), 1)
     )
     unit, scale = power(most_friction(warmup))

@@ -53,7 +53,10 @@ REFUSED = [
     ("poisson", lambda r: r["materials"]["steel"].update(poisson_ratio=0.6), "materials.steel.poisson_ratio = 0.6", "less than or equal to 0.49"),
     ("misspelt", lambda r: r["materials"]["steel"].update(density=1.0), "materials.steel.density: unknown key", "density_kg_per_m3"),
     ("missing", lambda r: r["materials"]["steel"].pop("poisson_ratio"), "materials.steel.poisson_ratio: missing", "no default"),
-    ("quoted", lambda r: r["bearing_pair"].update(preload_N="16"), "bearing_pair.preload_N = '16'", "valid number"),
+    ("quoted", lambda r: r["bearing_pair"].update(preload_N="16"), "bearing_pair.preload_N = '16'", "valid number, without quotes"),
+    ("true", lambda r: r["bearing_pair"].update(preload_N=True), "bearing_pair.preload_N = true", "valid number"),
+    ("one-of-two", lambda r: named(r["structure"]["bodies"], "seat").update(tilt_inertia_kg_m2=1e-4), "tilt_inertia_kg_m2 = 0.0001", "list in brackets, as [1.0, 2.0]"),
+    ("ring", lambda r: r["bearings"]["lower"].update(inner_ring="lower inner rng"), "'lower inner rng'", "did you mean lower inner ring?"),
     ("quoted-count", lambda r: r["ball_rows"]["hdd"].update(balls="10"), "ball_rows.hdd.balls = '10'", "valid integer"),
     ("quoted-law", lambda r: r["materials"]["steel"].update(youngs_modulus_GPa="208"), "youngs_modulus_GPa", "valid number"),
     ("no-polar", lambda r: by_numbers(r, 2e-6, None), "structure.bodies.hub", "needs polar_inertia_kg_m2"),
@@ -110,7 +113,7 @@ REFUSED = [
     ("node-twice", lambda r: r["measuring"]["points"][0].update(node=2), "node = 2 stands twice", "must differ"),
     ("hammer-node", lambda r: r["hammer_test"].update(hammer_nodes=[9]), "hammer_test.hammer_nodes: 9", "allowed are"),
     ("sampling", lambda r: r["hammer_test"].update(sample_rate_Hz=5000.0), "hammer_test", "2.5 times"),
-    ("heat", lambda r: r["thermal"]["gaps"][0].update(regions=["shaft", "hub"]), "thermal.gaps: 'hub'", "allowed are"),
+    ("heat", lambda r: r["thermal"]["gaps"][0].update(regions=["shaft", "hub"]), "thermal.gaps: 'hub'", "did you mean hub body?"),
     ("unknown-table", lambda r: r.update(extra={}), "extra: unknown key", "materials"),
 ]
 

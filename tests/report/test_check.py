@@ -141,6 +141,9 @@ ODD = [
     ("five_bearing", "[[82, 13], [133, 23], [120, 8], [75, 100]", "[[82, 13], [133, 23], [120, 8], [90, 100]", "begins at a radius of 37.5 mm, and the shaft 'spindle' has 45 mm there"),
     ("five_bearing", "band_Hz = [300.0, 4000.0]", "band_Hz = [1000.0, 4000.0]", "natural frequencies below the band"),
     ("five_bearing", "record_length_s = 0.25", "record_length_s = 0.02", "has not died out when the record of 0.02 s ends"),
+    ("hdd", "thermal_expansion_um_per_m_K = 23.0", "thermal_expansion_um_per_m_K = 23.0e-6", "material aluminium: expands by 2.3e-05 um/m in a kelvin"),
+    ("hdd", "density_kg_per_m3 = 7800.0", "density_kg_per_m3 = 7.8", "material steel: has 7.8 kg/m3, less than any solid part"),
+    ("hdd", "preload_N = 16.0", "preload_N = 15.0", "at 60 C the preload is less than half that of the reference: lower 2."),
     ("free_shaft", "damping_ratio = 1.0e-4", "damping_ratio = 1.0e-9", "4 modes up to 1100 Hz are undamped"),
     ("grinding", "outer_conformity = 0.53", "outer_conformity = 0.60", "the outer groove's radius is 0.6 ball diameters"),
     ("free_shaft", "[tolerances]", "[[effects]]\nname = \"preload_loss\"\n[tolerances]", "effect preload_loss: nothing to act on here"),
@@ -175,6 +178,13 @@ def test_what_moves_freely_and_what_is_constant_is_said(capsys: pytest.CaptureFi
     assert any("against 2 motions" in words for words in checked(SCENES["free_shaft"], capsys)["odd"])
     assert any("constant numbers" in words for words in checked(SCENES["mk7702"], capsys)["odd"])
     assert checked(SCENES["hdd_2003"], capsys)["odd"] == []
+
+
+def test_a_joint_that_differs_along_x_and_y_is_shown_as_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", str(SCENES["hdd"])]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert any(line.startswith("mount") and "1.2e+04, 1.4e+04" in line for line in lines)
+    assert any(line.startswith("flange") and line.split()[-3:] == ["5e+07", "5e+06", "800"] for line in lines)
 
 
 def test_what_cannot_be_used_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -15,6 +15,7 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Body, Condition
 from thermospindle.model.rotor.modes import modes
 from thermospindle.model.units import RPM
+from thermospindle.report.figures.resonance import CAUSES, campbell, over_temperature
 from thermospindle.report.log.read import read_log
 from thermospindle.report.log.told import describe, log_json
 from thermospindle.report.log.turning.map import write_map_log
@@ -167,6 +168,17 @@ def test_nrro_by_the_sum_of_lines(spindle):
     radial, axial = nrro_rms(Exact(alone, {}, {}, 3))
     assert radial == pytest.approx(np.sqrt((x.var() + y.var()) / 2), rel=5e-3)
     assert axial == pytest.approx(z.std(), rel=5e-3)
+
+
+def test_the_key_of_a_figure_names_the_causes_of_its_lines(found):
+    """And of no others: its colours are those that are drawn."""
+    for figure in (campbell(found), over_temperature(found)):
+        [axes], [key_below] = figure.axes, figure.legends
+        entries = zip(key_below.get_lines(), (t.get_text() for t in key_below.get_texts()), strict=True)
+        told = {name: line.get_color() for line, name in entries if name in CAUSES}
+        drawn = {line.get_color() for line in axes.lines if line.get_linewidth() == 0.9}
+        assert told == {cause: paint for cause, paint in CAUSES.items() if paint in drawn}
+        assert len(told) > 1
 
 
 def test_axial_lines_leave_rocking_modes_alone(found):

@@ -1,0 +1,102 @@
+"""Figures of the report: colours, scales, and names that no curve and no other name lies over."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+
+from thermospindle.report.figures import common
+from thermospindle.report.figures import report as plots
+from thermospindle.sim.run import Run
+
+
+def test_exaggeration_is_a_round_number_that_fits(run: Run):
+    """The largest displacement is drawn as at most 6 % of the section, and not less than a third of that."""
+    point = run.steps[-1].point
+    _, scale = plots.section("key", point)
+    mantissa = scale / 10 ** np.floor(np.log10(scale))
+    assert mantissa == pytest.approx(round(mantissa))
+    assert round(mantissa) in (1, 2, 5)
+    _, still = plots.section("key", run.steps[0].point)
+    assert still == 1.0  # nothing moves at the reference temperature
+
+
+def test_temperature_colours_go_from_cold_to_hot():
+    assert common.colour(20, (20, 60)) == "#2166ac"
+    assert common.colour(60, (20, 60)) == "#c9371c"
+    assert common.colour(20, (20,)) == "#2166ac"
+
+
+def test_svg_for_a_page():
+    """Ids are only those referred to, with the figure's own beginning; two figures of one page share none; text stays text."""
+    drawn = []
+    for key in ("a", "b"):
+        with rc_context(common.STYLE):
+            figure = Figure(figsize=(3, 2))
+            axes = figure.subplots()
+            axes.plot([0, 1], [0, 1], "o-", color="#c9371c", label="line")
+            axes.legend()
+            drawn.append(common.svg(figure, key, "a <figure>"))
+    ids = [set(re.findall(r' id="([^"]+)"', text)) for text in drawn]
+    references = [set(re.findall(r'(?:url\(|href=")#([^")]+)', text)) for text in drawn]
+    assert ids[0]
+    assert ids == references
+    assert not ids[0] & ids[1]
+    assert all(name.startswith("a-") for name in ids[0])
+    assert re.sub(r'(["#])a-', r"\1b-", drawn[0]) == drawn[1]
+    assert ">line</text>" in drawn[0]
+    assert "stroke: #c9371c" in drawn[0]
+    assert 'aria-label="a &lt;figure&gt;"' in drawn[0]
+    assert "<metadata" not in drawn[0]
+
+
+def test_a_level_curve_has_no_offset_axis():
+    """A contact angle that stays 25 degrees but for its last digits: ticks are plain numbers around 25, not 0.00 and an offset."""
+    text = plots.trend("k", [20.0, 60.0], {"": {"lower": [25.0, 25.00004], "upper": [25.0, 25.0]}}, "contact angle, degrees", False)
+    ticks = [float(t.replace("−", "-")) for t in re.findall(r">([−+\d.e]+)</text>", text)]
+    assert "e" not in "".join(re.findall(r">([−+\d.e]+)</text>", text))
+    assert len([t for t in ticks if 24 < t < 26]) >= 3
+
+
+def test_residuals_have_one_scale():
+    """Ticks are plain numbers; one standard error is pale on every page."""
+    figure = Figure()
+    norm = common.residual_norm(4.0)
+    assert (norm.vmin, norm.vmax) == (-30.0, 30.0)
+    assert abs(float(norm(1.0)) - 0.5) < 0.15
+    common.residual_bar(figure, norm, figure.subplots())
+    figure.canvas.draw()
+    assert [t.get_text() for t in figure.axes[1].get_yticklabels()] == ["−10", "−3", "0", "3", "10"]
+
+
+@pytest.mark.parametrize("count", [2, 5])
+def test_names_of_many_bearings_stand_above_their_curves(count, monkeypatch):
+    """Where there is no room among the curves no name lies over one."""
+    drawn = []
+    monkeypatch.setattr(plots, "svg", lambda figure, *more: drawn.append(figure) or "")
+    names = [f"bearing {k}" for k in range(count)]
+    plots.trend("force", [20.0, 40.0, 60.0], {"": {name: [30.0 + k, 35.0 + k, 40.0 + 9 * k] for k, name in enumerate(names)}}, "force, N", True)
+    [figure] = drawn
+    figure.draw_without_rendering()
+    [axes] = figure.axes
+    told = axes.get_legend() or figure.legends[0]
+    assert [t.get_text() for t in told.get_texts()] == names[::-1]
+    over = told.get_window_extent().overlaps(axes.get_window_extent())
+    assert over == (count == 2)
+
+
+@pytest.mark.parametrize(
+    ("frequencies", "labels"),
+    [
+        ([1085.0, 1105.0, 1170.0, 2079.0], ["1, 2, 3", "4"]),  # 3 lies off 2, but not off where the two names stand
+        ([1000.0, 1070.0, 3000.0], ["1", "2", "3"]),
+        ([1000.0, 1050.0, 3000.0], ["1, 2", "3"]),
+    ],
+)
+def test_numbers_of_close_modes_share_a_label(frequencies, labels):
+    peaks = plots.Peaks("computed", "computed", 20.0, {k: (f, np.nan) for k, f in enumerate(frequencies, 1)})
+    assert [name for name, _ in plots.grouped(peaks, 0.011 * 5600)] == labels

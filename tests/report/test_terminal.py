@@ -1,0 +1,64 @@
+"""What the terminal shows of runs and tests."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from tests.conftest import ROOT
+from thermospindle.cli import main
+from thermospindle.report.text.run import show_impact, show_run
+from thermospindle.sim.identification.numbering import identified
+from thermospindle.sim.run import Run
+
+
+def test_the_terminal_promises_what_there_is(run: Run):
+    """Measurements stand in a title only where there are some; why a mode has no peak is told by where the hammer strikes."""
+    said = []
+    for measured in (run.measured, ()):
+        out = StringIO()
+        show_run(Console(file=out, width=200), replace(run, measured=measured), Path("out"))
+        said.append(out.getvalue())
+    assert "and what was measured" in said[0]
+    assert "measured" not in said[1]
+    assert "-: no peak was found. The hammer strikes node" in said[1]
+
+
+# ---------------------------------------------------------------- pictures
+
+
+def test_modes_that_an_impact_test_does_not_show_are_named(run: Run):
+    """The tests of the run are looked at up to 1700 Hz only."""
+    step = run.steps[0]
+    band = run.spindle.hammer.band
+    inside = [(i, m) for i, m in enumerate(step.point.modes) if band[0] <= m.frequency <= band[1]]
+    unseen = [m for i, m in inside if i not in identified(step)]
+    assert 0 < len(unseen) < len(inside)
+    out = StringIO()
+    show_impact(Console(file=out, width=80), step)
+    said = re.search(r"No peak was found of (.*?)\. The hammer strikes", " ".join(out.getvalue().split()))
+    assert said is not None
+    assert said[1].split(", ") == [f"{m.frequency:.2f} Hz ({m.kind})" for m in unseen]
+
+
+def test_a_standard_error_is_never_shown_as_none(run: Run):
+    """However small it is, one digit of it is there."""
+    step = run.steps[0]
+    small = replace(step, identified=replace(step.identified, covariance=1e-10 * step.identified.covariance))
+    out = StringIO()
+    show_impact(Console(file=out, width=80), small)
+    rows = [line.split() for line in out.getvalue().splitlines() if re.match(r" *\d+\.\d\d ", line)]
+    assert len(rows) == len(step.identified.frequency)
+    assert all(float(row[1]) > 0 and float(row[3]) > 0 for row in rows)
+
+
+def test_static_says_nothing_of_beams_where_there_are_none(capsys: pytest.CaptureFixture[str]):
+    assert main(["static", str(ROOT / "scenes" / "hdd_2003")]) == 0
+    said = capsys.readouterr().out
+    assert "beam" not in said
+    assert not re.search(r"-0\.0+\b", said)
