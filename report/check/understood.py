@@ -13,7 +13,7 @@ from thermospindle.model.bearing.roller import RollerState
 from thermospindle.model.machine import Bearing, Body, LinearBearing, RollerBearing, Spindle
 from thermospindle.model.shaft import THEORIES, Shaft
 from thermospindle.model.units import RPM
-from thermospindle.report.text.static import axis_name
+from thermospindle.report.text.states import axis_name
 from thermospindle.sim.effects.effect import Effect, refusal
 from thermospindle.sim.hammer.pulse import pulse_duration
 from thermospindle.sim.operating import OperatingPoint

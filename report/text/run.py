@@ -1,4 +1,4 @@
-"""What the command line says: the JSON objects, the terminal tables, and the files of a run's folder."""
+"""What `run` and `impact` say: the JSON objects, the terminal tables, and the files of a run's folder."""
 
 from __future__ import annotations
 
@@ -10,68 +10,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from rich.console import Console
 
-from thermospindle.model.bearing.stiffness_table import OF_ROLLERS, StiffnessTable, write_table
+from thermospindle.model.bearing.stiffness_table import write_table
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor import mjcf
-from thermospindle.model.rotor.modes import Mode, group_energy
+from thermospindle.model.rotor.modes import group_energy
 from thermospindle.model.units import RPM
 from thermospindle.report.text.grid import show_grid
+from thermospindle.report.text.states import modes_json, show_table, write_modes_csv
 from thermospindle.report.typeset import write_csv
 from thermospindle.sim.campaign.campaign import Campaign, write_campaign
 from thermospindle.sim.identification.numbering import identified, measured_rows, numbered
-from thermospindle.sim.operating import OperatingPoint, provenance, stiffness_table
+from thermospindle.sim.operating import provenance, stiffness_table
 from thermospindle.sim.run import Run, Step, as_campaign
 
 if TYPE_CHECKING:
     from thermospindle.report.log.read import Log
 
-JSON_COLUMNS = (
-    "contact_angle_deg",
-    "deformation_um",
-    "contact_force_N",
-    "ball_stiffness_N_per_m",
-    "preload_N",
-    "radial_stiffness_N_per_m",
-    "axial_stiffness_N_per_m",
-    "tilt_stiffness_N_m_per_rad",
-    "coupling_stiffness_N_per_rad",
-)
-
-
 # ---------------------------------------------------------------- JSON
-
-
-def table_json(table: StiffnessTable) -> dict[str, Any]:
-    """Lists over temperature at the first speed; with several speeds each entry of `speeds` holds its own."""
-
-    def at(speed: int) -> dict[str, Any]:
-        columns = [*JSON_COLUMNS, *OF_ROLLERS]
-        return {name: {c: [None if np.isnan(x) else x for x in v[c][:, speed].tolist()] for c in columns if c in v} for name, v in table.values.items()}
-
-    answer = {"temperature_C": table.temperature.tolist(), "bearings": at(0), "unloads_C": dict(table.unloads)}
-    if len(table.speed) > 1:
-        answer["speeds"] = [{"speed_rpm": s / RPM, "bearings": at(i)} for i, s in enumerate(table.speed.tolist())]
-    return answer | {"provenance": dict(table.provenance)}
-
-
-def modes_json(point: OperatingPoint, highest: float) -> dict[str, Any]:
-    return {
-        "temperature_C": point.condition.temperature,
-        "speed_rpm": point.condition.speed / RPM,
-        "status": point.state.status,
-        "modes": [_mode_json(point, m) for m in point.modes_below(highest)],
-    }
-
-
-def _mode_json(point: OperatingPoint, mode: Mode) -> dict[str, Any]:
-    return {
-        "frequency_Hz": mode.frequency,
-        "damping_ratio": mode.damping_ratio,
-        "kind": mode.kind,
-        "whirl": mode.whirl,
-        "energy": group_energy(point.chain, mode),
-        "energy_by_element": dict(mode.energy),
-    }
 
 
 def impact_json(step: Step) -> dict[str, Any]:
@@ -104,23 +59,6 @@ def write_campaign_of(run: Run, folder: Path) -> None:
     write_campaign(campaign_of(run), folder)
 
 
-def write_modes(point: OperatingPoint, folder: Path) -> None:
-    """`modes.csv` and the MuJoCo model `spindle.xml` of one operating point."""
-    (folder / "spindle.xml").write_text(mjcf.xml(point.spec(looks=True)), encoding="utf-8")
-    _write_modes_csv([point], folder / "modes.csv")
-
-
-def _write_modes_csv(points: list[OperatingPoint], path: Path) -> None:
-    elements = [e.name for e in points[0].chain.elements]
-    head = ["temperature_C", "speed_rpm", "mode", "kind", "whirl", "frequency_Hz", "damping_ratio", *(f"energy_share_{name}" for name in elements)]
-    rows = [
-        [p.condition.temperature, p.condition.speed / RPM, i, m.kind, m.whirl, m.frequency, m.damping_ratio, *(m.energy[e] for e in elements)]
-        for p in points
-        for i, m in enumerate(p.modes, 1)
-    ]
-    write_csv(path, head, rows)
-
-
 def write_run(run: Run, folder: Path, progress: Callable[[str], None]) -> None:
     """Everything a run leaves behind: tables, model, campaign, report, Rerun log."""
     from thermospindle.report.log.run import write_log  # matplotlib and rerun take their time to load
@@ -129,7 +67,7 @@ def write_run(run: Run, folder: Path, progress: Callable[[str], None]) -> None:
     temperatures = [s.point.condition.temperature for s in run.steps]
     write_table(stiffness_table(run.spindle, temperatures, [run.steps[0].point.condition.speed]), folder / "table.csv")
     points = [s.point for s in run.steps]
-    _write_modes_csv(points, folder / "modes.csv")
+    write_modes_csv(points, folder / "modes.csv")
     for point in points:
         name = f"spindle_{point.condition.temperature:g}C.xml"
         (folder / name).write_text(mjcf.xml(point.spec(looks=True)), encoding="utf-8")
@@ -153,40 +91,6 @@ def write_frf_tables(log: Log, folder: Path) -> None:
 
 
 # ---------------------------------------------------------------- terminal
-
-
-def show_table(console: Console, table: StiffnessTable) -> None:
-    if not table.values:
-        console.print("The scene has no bearings.")
-        return
-    shown = [
-        ("contact_angle_deg", "angle\ndeg", 1, 2), ("deformation_um", "deform.\num", 1, 3), ("clearance_um", "clear-\nance\num", 1, 2),
-        ("contact_force_N", "contact\nforce\nN", 1, 3), ("ball_stiffness_N_per_m", "ball k\nN/um", 1e-6, 3), ("preload_N", "preload\nN", 1, 2),
-        ("radial_stiffness_N_per_m", "k_RR\nN/um", 1e-6, 2), ("axial_stiffness_N_per_m", "k_AA\nN/um", 1e-6, 3),
-    ]  # fmt: skip
-    shown = [row for row in shown if all(row[0] in values for values in table.values.values())]
-    columns, rows = ["T\nC", "speed\nrpm", "bearing", *(head for _, head, _, _ in shown)], []
-    for i, temperature in enumerate(table.temperature):
-        for j, speed in enumerate(table.speed):
-            for name, values in table.values.items():
-                row = ["" if np.isnan(values[c][i, j]) else f"{values[c][i, j] * scale:.{digits}f}" for c, _, scale, digits in shown]
-                rows.append([f"{temperature:g}", f"{speed / RPM:g}", name, *row])
-    show_grid(console, "Bearing state", columns, rows, ("bearing",), keys=3)
-    for name, where in table.unloads.items():
-        if where is not None:
-            console.print(f"{name} bearing loses contact at {where:.2f} C")
-
-
-def show_modes(console: Console, answer: dict[str, Any], point: OperatingPoint) -> None:
-    groups = list(answer["modes"][0]["energy"]) if answer["modes"] else []
-    title = f"Modes at {answer['temperature_C']:g} C, {answer['speed_rpm']:g} rpm (bearings {answer['status']})"
-    columns = ("mode", "f\nHz", "damping\n%", "kind", "whirl", *(f"{g}\n%" for g in groups))
-    rows = []
-    for i, m in enumerate(answer["modes"], 1):
-        shares = [f"{100 * m['energy'][g]:.1f}" for g in groups]
-        rows.append([str(i), f"{m['frequency_Hz']:.2f}", f"{100 * m['damping_ratio']:.3f}", m["kind"], m["whirl"], *shares])
-    show_grid(console, title, columns, rows, ("kind", "whirl"), keys=2)
-    console.print("The last columns share each mode's strain energy between the element groups.")
 
 
 def show_impact(console: Console, step: Step) -> None:

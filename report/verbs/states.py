@@ -17,8 +17,7 @@ from thermospindle.model.rotor.beam import with_theory
 from thermospindle.model.shaft import THEORIES
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
-from thermospindle.report.text import run as text
-from thermospindle.report.text.static import show_static, static_json
+from thermospindle.report.text import states as text
 from thermospindle.report.verbs.answer import Answer, answered, temperature_or_reference, temperatures_or_range, with_effects, write_json
 from thermospindle.sim.operating import operating_point, stiffness_table
 
@@ -122,9 +121,9 @@ def static(
     point = operating_point(spindle, Condition(temperature_or_reference(temperature, spindle), speed_rpm * RPM))
     chain = statics.rated_chain(spindle, point.chain) if chosen == RATED else point.chain
     answers = [statics.static(spindle, chain, p) for p in spindle.points]
-    values = static_json(answers, chosen, _beam_of(spindle))
+    values = text.static_json(answers, chosen, _beam_of(spindle))
     doubts = sense.of_conditions(spindle, [point.condition]) + sense.of_states(spindle, [point.state.bearings])
-    return answered(values, lambda console: show_static(console, values), out, {"verb": "static"} | asked, write_json("static.json"), doubts)
+    return answered(values, lambda console: text.show_static(console, values), out, {"verb": "static"} | asked, write_json("static.json"), doubts)
 
 
 def _with_beam(spindle: Spindle, beam: str | None) -> Spindle:

@@ -3,74 +3,17 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tests.made_campaign import FREQUENCY, POINTS, ascii_58, rotor_frf
-from thermospindle.model.errors import BadInput, Unanswered
+from tests.sim.importing.exported import FRF, HEAD, PAIRS, SPINDLE, columns, imported, table
+from thermospindle.model.errors import BadInput
 from thermospindle.report.verbs.importing import bring
 from thermospindle.sim.campaign.campaign import read_campaign
 from thermospindle.sim.campaign.uff import write_frf
 from thermospindle.sim.identification.frf import out_of
-from thermospindle.sim.importing import units
-from thermospindle.sim.importing.files.labels import role_of
-from thermospindle.sim.importing.names import conditions_of, plain
-
-FRF = rotor_frf(noise=0.0005)
-SPINDLE = 'spindle = "hdd_2003"\n'
-HEAD = """
-[[tests]]
-id = "T20"
-temperature_C = 20.0
-speed_rpm = 0.0
-[[points]]
-node = 1
-name = "hub_top0"
-body = "hub"
-position_mm = [12.0, 0.0, 20.0]
-direction = "+Z"
-[[points]]
-node = 3
-name = "hub_side0"
-body = "hub"
-position_mm = [12.5, 0.0, 15.0]
-direction = "-X"
-[[points]]
-node = 6
-name = "seat90"
-body = "seat"
-position_mm = [0.0, 20.0, 0.0]
-direction = "+Z"
-"""
-PAIRS = [(r, q) for r in FRF.response_nodes for q in FRF.reference_nodes]
-
-
-def imported(folder: Path, mapping: str, *files: Path):
-    (folder / "mapping.toml").write_text(SPINDLE + mapping + HEAD)
-    bring(files, mapping=folder / "mapping.toml", out=folder / "campaign")
-    return read_campaign(folder / "campaign").tests[0].frf
-
-
-def table(file: Path, heads: list[str], columns: list[np.ndarray], separator: str = ",", comma: bool = False, above: str = "") -> Path:
-    rows = [separator.join(f"{v:.12g}".replace(".", ",") if comma else f"{v:.12g}" for v in row) for row in np.array(columns).T]
-    file.write_text(above + separator.join(heads) + "\n" + "\n".join(rows) + "\n", encoding="utf-8")
-    return file
-
-
-def columns(form: str, unit: str, value=FRF.value):
-    heads, found = [], []
-    for (r, q), h in zip(PAIRS, value.reshape(len(PAIRS), -1), strict=True):
-        parts = {
-            "real": lambda h: [("real", h.real), ("imag", h.imag)],
-            "phase": lambda h: [("mag", np.abs(h)), ("phase [deg]", np.degrees(np.angle(h)))],
-            "decibel": lambda h: [("dB", 20 * np.log10(np.abs(h))), ("phase [rad]", np.angle(h))],
-        }[form](h)
-        for name, v in parts:
-            heads.append(f"H({r},{q}) {name}" + ("" if "[" in name else f" [{unit}]"))
-            found.append(v)
-    return heads, found
 
 
 @pytest.mark.parametrize("form", ["real", "phase", "decibel"])
@@ -179,84 +122,6 @@ def test_one_frf_a_file(tmp_path):
     np.testing.assert_allclose(frf.value, FRF.value[:1], rtol=1e-8, atol=1e-12)
 
 
-def test_direction_turned(tmp_path):
-    """A sensor that looks along +X, at a point along -X: the sign is turned."""
-    heads, found = columns("real", "(m/s)/N", FRF.value * np.array([1, -1, 1])[:, None, None])
-    heads = [h.replace("H(3,", "H(3:+X,") for h in heads]
-    frf = imported(tmp_path, "", table(tmp_path / "T20.csv", ["Hz", *heads], [FREQUENCY, *found]))
-    np.testing.assert_allclose(frf.value, FRF.value, rtol=1e-8, atol=1e-12)
-
-
-def test_everything_open_is_asked_at_once(tmp_path):
-    file = table(tmp_path / "lab.csv", ["Frequency", "H(7,8) mag", "H(7,8) phase"], [FREQUENCY, np.abs(FRF.value[0, 0]), np.angle(FRF.value[0, 0])])
-    with pytest.raises(Unanswered) as caught:
-        bring([file], out=tmp_path / "c")
-    text = "\n".join(caught.value.items)
-    for word in ("phase_unit", "temperature_C", "speed_rpm", "spindle"):
-        assert word in text
-    assert not (tmp_path / "c").exists()
-
-
-def test_the_form_is_written_and_filled_in(tmp_path, capsys):
-    """The form of an unknown file, its open answers filled in by search and replace, makes the campaign."""
-    heads, found = columns("real", "(m/s)/N")
-    file = table(tmp_path / "T20.csv", ["Frequency", *heads], [FREQUENCY, *found])
-    mapping = tmp_path / "lab.toml"
-    answer = bring([file], mapping=mapping)
-    assert len(answer.values["open"]) == 4
-    text = mapping.read_text()
-    assert "temperature_C = 20 " in text
-    for old, new in (('spindle = "?"', 'spindle = "hdd_2003"'), ('speed_rpm = "?"', "speed_rpm = 0.0"), ('body = "?"', 'body = "hub"'),
-                     ('["?", "?", "?"]', "[1.0, 2.0, 3.0]"), ('direction = "?"', 'direction = "+Z"')):  # fmt: skip
-        assert old in text
-        text = text.replace(old, new)
-    mapping.write_text(text)
-    bring([file], mapping=mapping, out=tmp_path / "c")
-    assert [p.node for p in read_campaign(tmp_path / "c").points] == [1, 3, 6]
-
-
-def test_points_of_a_scene(tmp_path):
-    from tests.conftest import SCENE
-
-    heads, found = columns("real", "(m/s)/N", FRF.value)
-    file = table(tmp_path / "T20.csv", ["Frequency", *heads], [FREQUENCY, *found])
-    (tmp_path / "m.toml").write_text('[[tests]]\nid = "T20"\ntemperature_C = 20.0\nspeed_rpm = 0.0\n')
-    values = bring([file], mapping=tmp_path / "m.toml", scene=SCENE, out=tmp_path / "c").values
-    assert values["points"] == [{"node": 1, "name": "hub_top0"}, {"node": 3, "name": "hub_side0"}, {"node": 6, "name": "seat90"}]
-
-
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        (lambda v: v.conj(), r"T20.csv .*conjugated.*conjugate = true"),
-        (lambda v: -v, r"negative real part.*as in 3:-Z"),
-        (lambda v: v * np.where(np.arange(301) == 150, 0, 1), r"zero on 1 lines.*band_Hz"),
-        (lambda v: v * np.array([[1, 3], [1, 1], [1, 1]])[:, :, None], r"reciprocity.*another unit, sign or node"),
-    ],
-    ids=["conjugated", "sign", "gap", "reciprocity"],
-)
-def test_what_no_structure_does_is_told_with_the_users_file(tmp_path, change, said):
-    heads, found = columns("real", "(m/s)/N", change(FRF.value))
-    file = table(tmp_path / "T20.csv", ["Frequency", *heads], [FREQUENCY, *found])
-    with pytest.raises(BadInput, match=said):
-        imported(tmp_path, "", file)
-
-
-def test_a_conjugated_export_is_turned_by_one_key(tmp_path):
-    heads, found = columns("real", "(m/s)/N", FRF.value.conj())
-    frf = imported(tmp_path, '[[files]]\nfile = "*.csv"\nconjugate = true\n', table(tmp_path / "T20.csv", ["Frequency", *heads], [FREQUENCY, *found]))
-    np.testing.assert_allclose(frf.value, FRF.value, rtol=1e-8, atol=1e-12)
-
-
-def test_missing_pairs_leave_the_largest_rectangle(tmp_path):
-    heads, found = columns("real", "(m/s)/N")
-    (tmp_path / "mapping.toml").write_text(SPINDLE + HEAD)
-    file = table(tmp_path / "T20.csv", ["Frequency", *heads[:-2]], [FREQUENCY, *found[:-2]])
-    notes = bring([file], mapping=tmp_path / "mapping.toml", out=tmp_path / "c").values["notes"]
-    assert read_campaign(tmp_path / "c").tests[0].frf.value.shape[:2] == (2, 2)
-    assert any("H(6,1) left out" in n for n in notes)
-
-
 def test_lines_of_the_running_speed_are_said_and_left_as_measured(tmp_path):
     """1440 rpm = 24 Hz: a spike at every multiple is named, kept in the file, and left out where the test is compared."""
     frf = rotor_frf(noise=0.0002)
@@ -273,15 +138,6 @@ def test_lines_of_the_running_speed_are_said_and_left_as_measured(tmp_path):
     out = out_of(test.frf, test.speed).out
     assert out[hit][1:-1].all()
     assert not out[np.abs((FREQUENCY + 12) % 24 - 12) > 2.5].any()
-
-
-def test_modes_picked_by_hand(tmp_path):
-    """The easiest start: a frequency a row, damping in percent, a decimal comma."""
-    (tmp_path / "peaks.csv").write_text("test;mode;frequency [Hz];damping %\nT20;1;1002,5;0,5\nT20;2;1545;\n")
-    (tmp_path / "m.toml").write_text('spindle = "hdd_2003"\nfrequency_sd_Hz = 0.5\n[[tests]]\nid = "T20"\ntemperature_C = 20.0\nspeed_rpm = 0.0\n')
-    bring([tmp_path / "peaks.csv"], mapping=tmp_path / "m.toml", out=tmp_path / "c")
-    rows = read_campaign(tmp_path / "c").tests[0].modes
-    assert [(r.mode, r.frequency, r.frequency_sd, r.damping_ratio) for r in rows] == [(1, 1002.5, 0.5, 0.005), (2, 1545.0, 0.5, None)]
 
 
 @pytest.mark.parametrize(
@@ -304,78 +160,6 @@ def test_damaged_text_is_one_sentence(tmp_path, text, said):
     with pytest.raises(BadInput, match=said):
         bring([tmp_path / "a.csv"], out=tmp_path / "c")
     assert not (tmp_path / "c").exists()
-
-
-@pytest.mark.parametrize(
-    ("text", "found"),
-    [("m/s^2/N", ("accelerance", 1.0)), ("(1/N)*(m/s²)", ("accelerance", 1.0)), ("(m/s²)(N)", ("accelerance", 1.0)), ("1/kg", ("accelerance", 1.0)),
-     ("mm/s/N", ("mobility", 1e-3)), ("µm/kN", ("receptance", 1e-9)), ("N/m", None), ("V/N", None), ("m/s�/N", ("accelerance", 1.0))],
-)  # fmt: skip
-def test_units_of_frfs(text, found):
-    assert units.of_frf(text) == (found if found is None else (found[0], pytest.approx(found[1])))
-
-
-@pytest.mark.parametrize(
-    ("heading", "kind", "part", "ends", "unit"),
-    [
-        ("H(3,1) real [g/N]", "H", "real", ("3", "1"), "g/N"), ("Re H(3:+X, 1)", "H", "real", ("3:+X", "1"), ""), ("FRF(hub, seat) dB", "H", "decibel", ("hub", "seat"), ""),
-        ("Magnitude", "H", "magnitude", ("", ""), ""), ("Coherence(3,1)", "coherence", "", ("3", "1"), ""), ("Frequency (Hz)", "frequency", "", ("", ""), "Hz"),
-        ("force [N]", "force", "", ("", ""), "N"), ("acceleration 3 [g]", "response", "", ("3", ""), "g"), ("Time [s]", "time", "", ("", ""), "s"),
-        ("hub/seat mag [um/N]", "H", "magnitude", ("hub", "seat"), "um/N"), ("3+Z/1+Z Phase (deg)", "H", "phase", ("3:+Z", "1:+Z"), "deg"),
-        ("Acceleration/Force Magnitude [g/N]", "H", "magnitude", ("", ""), "g/N"), ("H(3,1) mag [dB]", "H", "decibel", ("3", "1"), ""),
-        ("H(3,1) [dB re 1 µm/N]", "H", "decibel", ("3", "1"), "µm/N"), ("H(3,1) dB (dB ref 1e-6 m/N)", "H", "decibel", ("3", "1"), "m/N"),
-        ("FRF-2 real", "H", "real", ("FRF-2", ""), ""), ("H21", "H", "complex", ("2", "1"), ""), ("H_12_3 imag [g/N]", "H", "imaginary", ("12", "3"), "g/N"),
-    ],
-)  # fmt: skip
-def test_headings(heading, kind, part, ends, unit):
-    role = role_of(heading)
-    assert role is not None
-    assert (role.kind, role.part, role.unit) == (kind, part, unit)
-    assert (role.response.label, role.reference.label) == ends
-
-
-def test_what_0_dB_are_of_a_unit_counts():
-    assert (role_of("H(3,1) [dB re 1e-6 m/N]").level, role_of("H(3,1) [dB re 1 µm/N]").level) == (1e-6, 1.0)
-
-
-@pytest.mark.parametrize(
-    ("name", "told"),
-    [("Spindel_20C_0rpm", (20, 0)), ("T60_n7200", (60, 7200)), ("warm 41.5deg 3600 rpm", (41.5, 3600)), ("20_C_standstill", (20, 0)), ("test_4", (None, None)),
-     ("run_20_0", (None, None))],
-)  # fmt: skip
-def test_what_names_tell(name, told):
-    found = conditions_of(plain(name))
-    assert (found.get("temperature_C"), found.get("speed_rpm")) == told
-
-
-def test_files_of_one_test_are_put_together_in_the_form(tmp_path):
-    """A file a hammer point, in decibels over micrometres, decimal comma, UTF-16 with its mark: nothing is left to be asked."""
-    force = FRF.value / (2j * np.pi * FREQUENCY) * 1e6
-    for j, q in enumerate(FRF.reference_nodes):
-        heads = [f"H({r},{q}) {part}" for r in FRF.response_nodes for part in ("dB [dB re 1 µm/N]", "Phase [°]")]
-        found = [v for h in force[:, j] for v in (20 * np.log10(np.abs(h)), np.degrees(np.angle(h)))]
-        file = table(tmp_path / f"Spindel_20C_0rpm_Hammer{q}.csv", ["Frequenz [Hz]", *heads], [FREQUENCY, *found], ";", comma=True, above="Prüfer: K. Müller\n\n")
-        file.write_bytes(file.read_text(encoding="utf-8").encode("utf-16"))
-    mapping = tmp_path / "lab.toml"
-    values = bring([tmp_path / "*.csv"], mapping=mapping, scene="hdd_2003").values
-    assert values["proposed"] == ["Spindel_20C_0rpm: 20 C, 0 rpm, 2 files"]
-    bring([tmp_path / "*.csv"], mapping=mapping, scene="hdd_2003", out=tmp_path / "c")
-    (test,) = read_campaign(tmp_path / "c").tests
-    assert test.frf.quantity == "receptance"
-    np.testing.assert_allclose(test.frf["hub_side0", "seat90"], force[1, 1] * 1e-6, rtol=1e-8)
-
-
-def test_a_question_about_all_files_is_answered_once(tmp_path):
-    """What every file lacks stands once in the form, column by column; a point that two files would hold twice keeps them apart."""
-    for name in ("T20_hit1", "T20_hit2", "T60_hit1"):
-        table(tmp_path / f"{name}.csv", ["Frequency [Hz]", "left", "right"], [FREQUENCY, *np.abs(FRF.value[:2, 0])])
-    mapping = tmp_path / "lab.toml"
-    bring([tmp_path / "*.csv"], mapping=mapping, scene="hdd_2003")
-    text = mapping.read_text()
-    assert (text.count('"left" = "?"'), text.count('file = "*.csv"')) == (1, 1)
-    mapping.write_text(text.replace('"left" = "?"', '"left" = "H(1,1) mag"').replace('"right" = "?"', '"right" = "H(3,1) mag"').replace('speed_rpm = "?"', "speed_rpm = 0"))
-    values = bring([tmp_path / "*.csv"], mapping=mapping, scene="hdd_2003", out=tmp_path / "c").values
-    assert [t["id"] for t in values["tests"]] == ["T20", "T60_hit1"]
 
 
 def test_a_sweep_in_uneven_steps(tmp_path):
@@ -415,53 +199,6 @@ def test_noise_of_a_magnitude_makes_no_modes(tmp_path):
     size = np.abs(rotor_frf(lines, noise=0.02).value[:, 0])
     modes, _ = from_peaks([Curve(tmp_path, "", End(k), End(1), lines, row) for k, row in enumerate(size, 1)], 0.0)
     assert [m.frequency for m in modes] == [pytest.approx(480, abs=0.5), pytest.approx(600, abs=0.5)]
-
-
-def test_points_on_a_flexible_shaft_are_told_by_its_name(tmp_path):
-    from thermospindle.model.scene.reading import load
-
-    scene = load("mk7702")
-    shaft = scene.structure.shafts[0]
-    height = scene.points[0].position[2]
-    point = f'[[points]]\nnode = 77\nname = "nose"\nbody = "{shaft.name}"\nposition_mm = [0.0, 0.0, {1e3 * height}]\ndirection = "+X"\n'
-    (tmp_path / "m.toml").write_text('[[tests]]\nid = "T20"\ntemperature_C = 20.0\nspeed_rpm = 0.0\n' + point)
-    h = FRF.value[0, 0]
-    file = table(tmp_path / "T20.csv", ["Frequency", "H(77,77) real [(m/s)/N]", "H(77,77) imag"], [FREQUENCY, h.real, h.imag])
-    bring([file], mapping=tmp_path / "m.toml", scene="mk7702", out=tmp_path / "c")
-    assert read_campaign(tmp_path / "c").points[0].body == shaft.node_at(height)
-    (tmp_path / "m.toml").write_text((tmp_path / "m.toml").read_text().replace(f'body = "{shaft.name}"', 'body = "nowhere"'))
-    with pytest.raises(Unanswered, match=f"a body of the scene mk7702 .*{shaft.name}"):
-        bring([file], mapping=tmp_path / "m.toml", scene="mk7702", out=tmp_path / "d")
-
-
-def test_patterns_and_folders(tmp_path):
-    """A pattern that no shell expanded is expanded; a folder is told from a file."""
-    (tmp_path / "a.csv").write_text("frequency,mode\n1000,1\n")
-    (tmp_path / "b.csv").write_text("frequency,mode\n1001,1\n")
-    assert len(bring([tmp_path / "*.csv"], mapping=tmp_path / "m.toml").values["open"]) == 4
-    with pytest.raises(BadInput, match=r"is a folder; name its files"):
-        bring([tmp_path], out=tmp_path / "c")
-    with pytest.raises(BadInput, match=r"\*\.txt: no file is called so"):
-        bring([tmp_path / "*.txt"], out=tmp_path / "c")
-
-
-@pytest.mark.parametrize(
-    ("wrong", "said"),
-    [
-        ('[[files]]\nfile = "other.csv"\n', r"m.toml: files: file = 'other.csv': is none of T20.csv"),
-        ('[[tests]]\nid = "T30"\n', r"m.toml: tests: id = 'T30': no file makes such a test; there are T20"),
-        ('[[files]]\nfile = "*"\nunits = "g/N"\n', "did you mean unit"),
-        ("[[points]]\nnode = 1\n[[points]]\nnode = 1\n", "points: node = 1 stands 2 times"),
-        ('[[points]]\nnode = 1\nname = "much too long a name"\n', "points.1: name = 'much too long a name'"),
-        ("[records]\nband_Hz = [1.0]\n", "records.band_Hz"),
-    ],
-)
-def test_a_wrong_mapping_is_one_sentence(tmp_path, wrong, said):
-    heads, found = columns("real", "(m/s)/N")
-    file = table(tmp_path / "T20.csv", ["Frequency", *heads], [FREQUENCY, *found])
-    (tmp_path / "m.toml").write_text(wrong)
-    with pytest.raises(BadInput, match=said):
-        bring([file], mapping=tmp_path / "m.toml", out=tmp_path / "c")
 
 
 def test_standard_errors_of_coherence_and_averages(tmp_path):

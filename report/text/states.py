@@ -1,0 +1,172 @@
+"""What `table`, `modes` and `static` say: states of equilibrium as JSON, in the terminal and as files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from thermospindle.model.bearing.stiffness_table import OF_ROLLERS, StiffnessTable
+from thermospindle.model.rotor import mjcf
+from thermospindle.model.rotor.modes import Mode, group_energy
+from thermospindle.model.rotor.static import Static
+from thermospindle.model.units import RPM
+from thermospindle.report.text.grid import show_grid
+from thermospindle.report.typeset import write_csv
+from thermospindle.sim.operating import OperatingPoint
+
+JSON_COLUMNS = (
+    "contact_angle_deg",
+    "deformation_um",
+    "contact_force_N",
+    "ball_stiffness_N_per_m",
+    "preload_N",
+    "radial_stiffness_N_per_m",
+    "axial_stiffness_N_per_m",
+    "tilt_stiffness_N_m_per_rad",
+    "coupling_stiffness_N_per_rad",
+)
+
+
+# ---------------------------------------------------------------- tables of bearings, and modes
+
+
+def table_json(table: StiffnessTable) -> dict[str, Any]:
+    """Lists over temperature at the first speed; with several speeds each entry of `speeds` holds its own."""
+
+    def at(speed: int) -> dict[str, Any]:
+        columns = [*JSON_COLUMNS, *OF_ROLLERS]
+        return {name: {c: [None if np.isnan(x) else x for x in v[c][:, speed].tolist()] for c in columns if c in v} for name, v in table.values.items()}
+
+    answer = {"temperature_C": table.temperature.tolist(), "bearings": at(0), "unloads_C": dict(table.unloads)}
+    if len(table.speed) > 1:
+        answer["speeds"] = [{"speed_rpm": s / RPM, "bearings": at(i)} for i, s in enumerate(table.speed.tolist())]
+    return answer | {"provenance": dict(table.provenance)}
+
+
+def modes_json(point: OperatingPoint, highest: float) -> dict[str, Any]:
+    return {
+        "temperature_C": point.condition.temperature,
+        "speed_rpm": point.condition.speed / RPM,
+        "status": point.state.status,
+        "modes": [_mode_json(point, m) for m in point.modes_below(highest)],
+    }
+
+
+def _mode_json(point: OperatingPoint, mode: Mode) -> dict[str, Any]:
+    return {
+        "frequency_Hz": mode.frequency,
+        "damping_ratio": mode.damping_ratio,
+        "kind": mode.kind,
+        "whirl": mode.whirl,
+        "energy": group_energy(point.chain, mode),
+        "energy_by_element": dict(mode.energy),
+    }
+
+
+def write_modes(point: OperatingPoint, folder: Path) -> None:
+    """`modes.csv` and the MuJoCo model `spindle.xml` of one operating point."""
+    (folder / "spindle.xml").write_text(mjcf.xml(point.spec(looks=True)), encoding="utf-8")
+    write_modes_csv([point], folder / "modes.csv")
+
+
+def write_modes_csv(points: list[OperatingPoint], path: Path) -> None:
+    elements = [e.name for e in points[0].chain.elements]
+    head = ["temperature_C", "speed_rpm", "mode", "kind", "whirl", "frequency_Hz", "damping_ratio", *(f"energy_share_{name}" for name in elements)]
+    rows = [
+        [p.condition.temperature, p.condition.speed / RPM, i, m.kind, m.whirl, m.frequency, m.damping_ratio, *(m.energy[e] for e in elements)]
+        for p in points
+        for i, m in enumerate(p.modes, 1)
+    ]
+    write_csv(path, head, rows)
+
+
+def show_table(console: Console, table: StiffnessTable) -> None:
+    if not table.values:
+        console.print("The scene has no bearings.")
+        return
+    shown = [
+        ("contact_angle_deg", "angle\ndeg", 1, 2), ("deformation_um", "deform.\num", 1, 3), ("clearance_um", "clear-\nance\num", 1, 2),
+        ("contact_force_N", "contact\nforce\nN", 1, 3), ("ball_stiffness_N_per_m", "ball k\nN/um", 1e-6, 3), ("preload_N", "preload\nN", 1, 2),
+        ("radial_stiffness_N_per_m", "k_RR\nN/um", 1e-6, 2), ("axial_stiffness_N_per_m", "k_AA\nN/um", 1e-6, 3),
+    ]  # fmt: skip
+    shown = [row for row in shown if all(row[0] in values for values in table.values.values())]
+    columns, rows = ["T\nC", "speed\nrpm", "bearing", *(head for _, head, _, _ in shown)], []
+    for i, temperature in enumerate(table.temperature):
+        for j, speed in enumerate(table.speed):
+            for name, values in table.values.items():
+                row = ["" if np.isnan(values[c][i, j]) else f"{values[c][i, j] * scale:.{digits}f}" for c, _, scale, digits in shown]
+                rows.append([f"{temperature:g}", f"{speed / RPM:g}", name, *row])
+    show_grid(console, "Bearing state", columns, rows, ("bearing",), keys=3)
+    for name, where in table.unloads.items():
+        if where is not None:
+            console.print(f"{name} bearing loses contact at {where:.2f} C")
+
+
+def show_modes(console: Console, answer: dict[str, Any], point: OperatingPoint) -> None:
+    groups = list(answer["modes"][0]["energy"]) if answer["modes"] else []
+    title = f"Modes at {answer['temperature_C']:g} C, {answer['speed_rpm']:g} rpm (bearings {answer['status']})"
+    columns = ("mode", "f\nHz", "damping\n%", "kind", "whirl", *(f"{g}\n%" for g in groups))
+    rows = []
+    for i, m in enumerate(answer["modes"], 1):
+        shares = [f"{100 * m['energy'][g]:.1f}" for g in groups]
+        rows.append([str(i), f"{m['frequency_Hz']:.2f}", f"{100 * m['damping_ratio']:.3f}", m["kind"], m["whirl"], *shares])
+    show_grid(console, title, columns, rows, ("kind", "whirl"), keys=2)
+    console.print("The last columns share each mode's strain energy between the element groups.")
+
+
+# ---------------------------------------------------------------- a unit force
+
+
+def axis_name(direction: Sequence[float]) -> str:
+    """A unit vector along an axis as +X, -Y ..."""
+    along = max(range(3), key=lambda i: abs(direction[i]))
+    return ("+" if direction[along] > 0 else "-") + "XYZ"[along]
+
+
+def static_json(answers: Sequence[Static], bearings: str, beam: str) -> dict[str, Any]:
+    """By point: stiffness (None where nothing holds it), reactions and shares of the compliance."""
+    points = {
+        a.point.name: {
+            "direction": axis_name(a.point.direction),
+            "stiffness_N_per_m": a.stiffness if 0 < a.stiffness < float("inf") else None,
+            "free": a.stiffness == 0.0,
+            "reactions_N": dict(a.reactions),
+            "compliance_shares": dict(a.shares),
+        }
+        for a in answers
+    }
+    return {"bearings": bearings, "beam": beam, "points": points}
+
+
+def show_static(console: Console, values: dict[str, Any]) -> None:
+    """A table of stiffness and bearing reactions, and one of where the compliance of each point sits."""
+    points = values["points"]
+    reactions, parts = (list(dict.fromkeys(name for row in points.values() for name in row[key])) for key in ("reactions_N", "compliance_shares"))
+    told = f"bearings {values['bearings']}" + (f", beam {values['beam']}" if values["beam"] != "none" else "")
+    show_grid(
+        console,
+        f"Stiffness at each point, and what every bearing bears of 1 N there ({told})",
+        ["point", "along", "stiffness\nN/um", *(f"{name}\nN" for name in reactions)],
+        [[name, row["direction"], _stiffness(row), *("-" if row["free"] else f"{row['reactions_N'].get(b, 0.0):+z.4f}" for b in reactions)] for name, row in points.items()],
+        words=("point", "along"),
+    )
+    if not parts:
+        return  # every point is free to move
+    console.print()
+    show_grid(
+        console,
+        "Share of the compliance at each point in every part, %",
+        ["point", *(f"{name}\n%" for name in parts)],
+        [[name, *("-" if row["free"] else f"{100 * row['compliance_shares'].get(part, 0.0):.1f}" for part in parts)] for name, row in points.items()],
+        words=("point",),
+    )
+
+
+def _stiffness(row: dict[str, Any]) -> str:
+    if row["free"]:
+        return "free to move"
+    return "rigid" if row["stiffness_N_per_m"] is None else f"{row['stiffness_N_per_m'] / 1e6:.6g}"
