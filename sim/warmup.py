@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from thermospindle.model.bearing.roller import RollerState
 from thermospindle.model.errors import BadInput, OutsideRange
 from thermospindle.model.machine import Condition, RollerBearing, Spindle
 from thermospindle.model.rotor.chain import matrices
@@ -98,9 +97,9 @@ def warm_up(
     """
     if duration is not None and not duration > 0:
         raise BadInput(f"duration {duration:g} s: a warm-up needs a positive one")
-    if not spindle.regions or not spindle.bearings:
-        lacking = "section" if not spindle.regions else "ball rows"
-        raise BadInput(f"{spindle.file or spindle.name}: {lacking}: there are none, and a warm-up needs a section that heat flows through and ball rows that make it")
+    if not spindle.regions or not spindle.ringed:
+        lacking = "section" if not spindle.regions else "ball or roller rows between rings of the section"
+        raise BadInput(f"{spindle.file or spindle.name}: {lacking}: there are none, and a warm-up needs a section that heat flows through and rows that make it")
     air = start if air is None else air
     effects = tuple((effect, values) for effect, values in of_scene(spindle) if not effect.temperatures)
     left_out = tuple(effect.name for effect, _ in of_scene(spindle) if effect.temperatures)
@@ -200,10 +199,19 @@ def roller_names(warmup: Warmup) -> list[str]:
 
 def rollers(warmup: Warmup, name: str) -> dict[str, list[float]]:
     """Series of a roller bearing, which has clearance where ball rows have preload and angle."""
-    states = [m.point.state.any_bearing(name) for m in warmup.moments]
     return {
         "temperature_C": [m.bearing_temperatures[name] for m in warmup.moments],
-        "clearance_um": [1e6 * s.clearance for s in states if isinstance(s, RollerState)],
-        "radial_stiffness_N_per_m": [s.radial_stiffness for s in states],
+        "clearance_um": [1e6 * clearance(m, name) for m in warmup.moments],
+        "radial_stiffness_N_per_m": [m.point.state.any_bearing(name).radial_stiffness for m in warmup.moments],
         "friction_W": [m.friction[name] for m in warmup.moments],
     }
+
+
+def clearance(moment: Moment, name: str) -> float:
+    """Diametral clearance (m) of a roller bearing at a moment, negative where its rollers are pressed."""
+    return moment.point.state.rollers[name].clearance
+
+
+def loose_rollers(moment: Moment) -> list[str]:
+    """Roller bearings whose rollers nothing presses: they carry nothing."""
+    return [name for name, state in moment.point.state.rollers.items() if state.load == 0.0]

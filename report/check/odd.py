@@ -134,7 +134,7 @@ def _tables(found: Looked) -> Iterator[str]:
         ):
             if len(values) > 1 and (wanted[0] < values[0] - 1e-9 or wanted[1] > values[-1] + 1e-9):
                 yield f"bearing {b.name}: its table holds {what} from {values[0]:g} to {values[-1]:g} {unit}, and the spindle runs from {wanted[0]:g} to {wanted[1]:g} {unit}"
-    if spindle.linear_bearings and not spindle.bearings and all(_constant(b) for b in spindle.linear_bearings):
+    if spindle.linear_bearings and not spindle.bearings and not spindle.roller_bearings and all(_constant(b) for b in spindle.linear_bearings):
         yield "every bearing is given by constant numbers: temperature changes nothing here, and speed only what is gyroscopic"
 
 

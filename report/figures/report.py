@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch, Rectangle
 
-from thermospindle.model.machine import PARTS, Spindle
+from thermospindle.model.machine import PARTS, RollerBearing, Spindle
 from thermospindle.model.types import Array
 from thermospindle.report.figures.common import BEARINGS, INK, PALE, STYLE, colour, svg
 from thermospindle.sim.operating import OperatingPoint
@@ -73,7 +73,7 @@ def trend(key: str, temperature: Sequence[float], curves: Mapping[str, Mapping[s
     axes.ticklabel_format(useOffset=False)
     every = np.array([series for values in curves.values() for series in values.values()])
     if np.ptp(every) < LEVEL * abs(every.mean()):  # else the axis would be divided into digits that say nothing
-        axes.set_ylim(every.mean() * (1 - LEVEL), every.mean() * (1 + LEVEL))
+        axes.set_ylim(*sorted((every.mean() * (1 - LEVEL), every.mean() * (1 + LEVEL))))
     if from_zero:
         axes.set_ylim(0, 1.15 * max(max(series) for values in curves.values() for series in values.values()) or 1.0)
     handles = axes.get_lines()[: len(next(iter(curves.values())))]
@@ -269,12 +269,17 @@ def _materials(axes: Axes, spindle: Spindle) -> None:
     for g in spindle.regions:
         (r0, r1), (z0, z1) = (np.array(side) * 1e3 for side in (g.r, g.z))
         axes.add_patch(Rectangle((r0, z0), r1 - r0, z1 - z0, fc=paint[g.material], ec=edges[g.part], lw=0.9))
-    for b in spindle.bearings:
-        axes.add_patch(Circle((b.pitch_diameter * 500, b.z * 1e3), b.ball_diameter * 500, fc="#f4f4f2", ec=INK, lw=0.8))
+    for b in spindle.ringed:
+        r, z, size = b.pitch_diameter * 500, b.z * 1e3, b.ball_diameter * 1e3
+        if isinstance(b, RollerBearing):
+            for k in range(b.rows):
+                low = z + 1e3 * (b.row_spacing * (k - (b.rows - 1) / 2) - b.roller_length / 2)
+                axes.add_patch(Rectangle((r - size / 2, low), size, b.roller_length * 1e3, fc="#f4f4f2", ec=INK, lw=0.8))
+        else:
+            axes.add_patch(Circle((r, z), size / 2, fc="#f4f4f2", ec=INK, lw=0.8))
         beside = max(g.r[1] for g in spindle.regions if g.z[0] - 1e-3 < b.z < g.z[1] + 1e-3) * 1e3
         line = {"arrowstyle": "-", "color": INK, "lw": 0.6, "shrinkA": 1, "shrinkB": 4}
-        at = (b.pitch_diameter * 500, b.z * 1e3)
-        axes.annotate(f"{b.name} bearing", at, (beside + 1.2, b.z * 1e3), va="center", fontsize=8.5, arrowprops=line)
+        axes.annotate(f"{b.name} bearing", (r, z), (beside + 1.2, b.z * 1e3), va="center", fontsize=8.5, arrowprops=line)
     handles = [Patch(fc=paint[name], ec="none", label=name) for name in used]
     handles += [Patch(fc="none", ec=edges[part], label=f"{part} part") for part in PARTS]
     axes.legend(handles=handles, loc="upper right", handlelength=1.2)

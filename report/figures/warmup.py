@@ -84,7 +84,10 @@ def figure(warmup: Warmup) -> Figure:
 
 
 def _of_bearings(axes: Axes, minutes: Array, values: Array, bearings: Sequence[str], title: str, label: str) -> None:
-    """A line for each bearing, (times, bearings), or one for all where they are the same."""
+    """A line for each bearing, (times, bearings), or one for all where they are the same; an empty place where there is none."""
+    if not bearings:
+        axes.set_axis_off()
+        return
     same = bool(len(bearings) > 1 and np.ptp(values, axis=1).max() < 1e-6 * np.abs(values).max())
     for k, series in enumerate(values.T[:1] if same else values.T):
         paint, _, dashes = BEARINGS[k % len(BEARINGS)]

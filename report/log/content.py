@@ -113,6 +113,15 @@ def bearing_series(run: Run, name: str) -> dict[tuple[str, str], Array]:
 
     A ring gap is the outer ring's thermal motion less the inner ring's.
     """
+    if any(name in s.point.state.rollers for s in run.steps):
+        rolling = [s.point.state.rollers[name] for s in run.steps]
+        of_rollers = {
+            ("clearance", "µm"): [1e6 * s.clearance for s in rolling],
+            ("roller force", "N"): [s.contact_force for s in rolling],
+            ("k radial", "N/µm"): [1e-6 * s.radial_stiffness for s in rolling],
+            ("k tilt", "N m/rad"): [s.tilt_stiffness for s in rolling],
+        }
+        return {key: np.array(values) for key, values in of_rollers.items()}
     states = [s.point.state.bearing(name) for s in run.steps]
     motions = [expand(run.spindle, s.point.condition.temperature)[name] for s in run.steps]
     series = {

@@ -52,8 +52,9 @@ def _write(content: Shown, recording: rr.RecordingStream, file: Path) -> None:
     run, spindle = content.run, content.run.spindle
     sections = [field(spindle, t) for t in content.temperatures]
     factor = drawing.exaggeration(sections, posing.reach(spindle)) if spindle.regions else 1.0
-    series = {b.name: bearing_series(run, b.name) for b in spindle.bearings}
-    quantities = dict(series[spindle.bearings[0].name]) if spindle.bearings else {}
+    names = [b.name for b in spindle.bearings] + [b.name for b in spindle.roller_bearings]
+    series = {name: bearing_series(run, name) for name in names}
+    quantities = dict.fromkeys(quantity for own in series.values() for quantity in own)
     recording.save(file, default_blueprint=blueprint(content, list(quantities), factor))
     ends = (min(content.temperatures), max(content.temperatures))
     recording.send_recording_name(f"{spindle.name}, " + " to ".join(f"{t:g} C" for t in dict.fromkeys(ends)))

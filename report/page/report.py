@@ -18,7 +18,6 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from thermospindle.model.bearing.pair import BearingState
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.modes import frf, group_energy, point_rows
 from thermospindle.model.scene.reading import content_hash, load
@@ -37,6 +36,8 @@ from thermospindle.thermal.temperature import region_temperatures
 
 Section = tuple[str, str]
 """Title and HTML of one section."""
+Chart = tuple[str, str, str, Mapping[str, Callable[[Any], float]]]
+"""Key, caption, label and the quantities, read of a bearing's state, of one figure over temperature."""
 
 MADE = "<!-- made by -->"
 """Where `stamp` writes the command and the date."""
@@ -80,7 +81,7 @@ def results(run: Run) -> list[Section]:
         ("Natural frequencies", page.frequencies(table, Markup(picture), table.sources())),
         ("Frequency response", page.responses(Markup(fig8), run, steps, table)),
     ]
-    if run.spindle.bearings:
+    if run.spindle.bearings or run.spindle.roller_bearings:
         found.append(("Bearings over temperature", page.bearings(bearing_figures(run), run)))
     if drawn is not None:
         found.append(("Thermal deformation", page.deformation(Markup(drawn[0]), drawn[1], hottest)))
@@ -144,7 +145,7 @@ def _measured_curves(run: Run, step: Step, node: int) -> Iterator[Curve]:
 def bearing_figures(run: Run) -> list[tuple[str, Markup]]:
     """Bearing states over temperature: (caption, SVG)."""
     temperature = [temperature_of(s) for s in run.steps]
-    figures: tuple[tuple[str, str, str, Mapping[str, Callable[[BearingState], float]]], ...] = (
+    figures: tuple[Chart, ...] = (
         ("angle", "Contact angle.", "contact angle, degrees", {"": lambda b: np.degrees(b.contact_angle)}),
         (
             "deformation",
@@ -162,11 +163,17 @@ def bearing_figures(run: Run) -> list[tuple[str, Markup]]:
             {"radial": lambda b: b.radial_stiffness * 1e-6, "axial": lambda b: b.axial_stiffness * 1e-6},
         ),
     )
-    states = {b.name: [s.point.state.bearing(b.name) for s in run.steps] for b in run.spindle.bearings}
+    of_rollers: tuple[Chart, ...] = (
+        ("clearance", "Clearance of rollers across, negative where they are pressed.", "clearance, µm", {"": lambda b: b.clearance * 1e6}),
+        ("roller", "Contact force of the most loaded roller.", "contact force, N", {"": lambda b: b.contact_force}),
+        ("rollers", "Radial stiffness of a roller bearing.", "bearing stiffness, N/µm", {"": lambda b: b.radial_stiffness * 1e-6}),
+    )
+    states, rolling = ({b.name: [s.point.state.any_bearing(b.name) for s in run.steps] for b in kind} for kind in (run.spindle.bearings, run.spindle.roller_bearings))
     answer = []
-    for key, caption, label, quantities in figures:
-        curves = {name: {b: [float(value(s)) for s in states[b]] for b in states} for name, value in quantities.items()}
-        answer.append((caption, Markup(plots.trend(key, temperature, curves, label, from_zero=key != "angle"))))
+    for own, charts in ((states, figures), (rolling, of_rollers)):
+        for key, caption, label, quantities in charts if own else ():
+            curves = {name: {b: [float(value(s)) for s in own[b]] for b in own} for name, value in quantities.items()}
+            answer.append((caption, Markup(plots.trend(key, temperature, curves, label, from_zero=key not in ("angle", "clearance")))))
     return answer
 
 

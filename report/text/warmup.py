@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from thermospindle.model.bearing.roller import RollerState
 from thermospindle.model.types import Array
 from thermospindle.model.units import MINUTE, RPM
 from thermospindle.report.text.grid import show_grid
 from thermospindle.report.typeset import figure, minus, power, write_csv
 from thermospindle.sim.operating import provenance
-from thermospindle.sim.warmup import Moment, Warmup, energy, most_friction, roller_names, rollers
+from thermospindle.sim.warmup import Moment, Warmup, clearance, energy, loose_rollers, most_friction, roller_names, rollers
 
 LINES = 16  # of the terminal table
 ROLLER_COLUMNS = (("temperature", "C"), ("clearance", "um"), ("radial stiffness", "N_per_m"), ("friction", "W"))
@@ -26,17 +25,17 @@ ROLLER_COLUMNS = (("temperature", "C"), ("clearance", "um"), ("radial stiffness"
 def warmup_json(warmup: Warmup) -> dict[str, Any]:
     """Series over `time_s`; a row of `frequencies_Hz` holds all followed modes at one time, null where one was lost.
 
-    `preload_N` is the first bearing's, `friction_W` all bearings' together; `bearings` has each its own, of rollers clearance instead of preload.
+    `preload_N` is the first ball row's, null where there is none, `friction_W` all bearings' together; `bearings` has each its own, of rollers clearance instead of preload.
     """
     moments = warmup.moments
-    first = warmup.spindle.bearings[0].name
+    first = first_row(warmup)
     return {
         "start_C": warmup.start,
         "air_C": warmup.air,
         "speed_rpm": warmup.speed / RPM,
         "time_s": warmup.times.tolist(),
         "temperature_C": {g: [m.temperatures[g] for m in moments] for g in moments[0].temperatures},
-        "preload_N": [m.preload[first] for m in moments],
+        "preload_N": None if first is None else [m.preload[first] for m in moments],
         "friction_W": [sum(m.friction.values()) for m in moments],
         "frequencies_Hz": _numbers(warmup.frequencies),
         "modes": [{"kind": m.kind, "whirl": m.whirl} for m in warmup.modes],
@@ -59,12 +58,17 @@ def warmup_json(warmup: Warmup) -> dict[str, Any]:
     }
 
 
-def _steady_json(warmup: Warmup, first: str) -> dict[str, Any]:
+def first_row(warmup: Warmup) -> str | None:
+    """Name of the lowest ball row, whose preload stands for all; None of a spindle on rollers."""
+    return next((b.name for b in warmup.spindle.bearings), None)
+
+
+def _steady_json(warmup: Warmup, first: str | None) -> dict[str, Any]:
     steady = warmup.steady
     return {
         "temperature_C": dict(steady.temperatures),
         "bearing_temperature_C": dict(steady.bearing_temperatures),
-        "preload_N": steady.preload[first],
+        "preload_N": None if first is None else steady.preload[first],
         "friction_W": sum(steady.friction.values()),
         "frequencies_Hz": _numbers(warmup.steady_frequencies),
         "status": steady.point.state.status,
@@ -114,7 +118,7 @@ def show_warmup(console: Console, warmup: Warmup) -> None:
         console.print(f"{lost[0].upper()}{lost[1:]}.\n", highlight=False)
     bearings, of_rollers = [b.name for b in warmup.spindle.bearings], roller_names(warmup)
     unit, scale = power(most_friction(warmup))
-    columns = ["time\nmin", *(f"{b}\nC" for b in (*bearings, *of_rollers)), "coolest\nC", "hottest\nC", f"{bearings[0]}\npreload\nN"]
+    columns = ["time\nmin", *(f"{b}\nC" for b in (*bearings, *of_rollers)), "coolest\nC", "hottest\nC", *(f"{b}\npreload\nN" for b in bearings[:1])]
     columns += [*(f"{b}\nclearance\num" for b in of_rollers), f"friction\n{unit}"]
     columns += [f"f{k}\nHz" for k in range(1, len(warmup.modes) + 1)]
     rows = [
@@ -134,6 +138,8 @@ def show_warmup(console: Console, warmup: Warmup) -> None:
 
 def lost_contact(warmup: Warmup) -> str:
     """From when on which bearings are without contact, and so without preload and stiffness; empty where none ever is."""
+    if (loose := _loose_rollers(warmup)) and all(map(_all_loaded, (*warmup.moments, warmup.steady))):
+        return loose
     lost = [(t, m) for t, m in zip(warmup.times, warmup.moments, strict=True) if not _all_loaded(m)]
     if lost:
         time, moment = lost[0]
@@ -141,6 +147,15 @@ def lost_contact(warmup: Warmup) -> str:
     if not _all_loaded(warmup.steady):
         return f"in the steady state, after the times computed, the {warmup.steady.point.state.status}"
     return ""
+
+
+def _loose_rollers(warmup: Warmup) -> str:
+    """From when on which rollers are loose; empty where none ever are."""
+    for time, moment in zip(warmup.times, warmup.moments, strict=True):
+        if names := loose_rollers(moment):
+            return f"from {time / MINUTE:.3g} min on the rollers of {' and '.join(names)} are loose: they carry nothing then"
+    names = loose_rollers(warmup.steady)
+    return f"in the steady state, after the times computed, the rollers of {' and '.join(names)} are loose: they carry nothing" if names else ""
 
 
 def heat_sums(warmup: Warmup) -> dict[str, str]:
@@ -156,11 +171,11 @@ def _all_loaded(moment: Moment) -> bool:
 
 def _cells(moment: Moment, bearings: Sequence[str], of_rollers: Sequence[str], frequency: Array, scale: float) -> list[str]:
     regions = moment.temperatures.values()
-    clearances = [1e6 * s.clearance for s in moment.point.state.linear if isinstance(s, RollerState) and s.name in of_rollers]
+    clearances = [1e6 * clearance(moment, b) for b in of_rollers]
     temperatures = [*(moment.bearing_temperatures[b] for b in (*bearings, *of_rollers)), min(regions), max(regions)]
     return [
         *(f"{t:.2f}" for t in temperatures),
-        f"{moment.preload[bearings[0]]:.3f}",
+        *(f"{moment.preload[b]:.3f}" for b in bearings[:1]),
         *(f"{c:.2f}" for c in clearances),
         f"{scale * sum(moment.friction.values()):.0f}",
         *("-" if np.isnan(f) else f"{f:.1f}" for f in frequency),
@@ -179,20 +194,19 @@ def warmup_section(warmup: Warmup) -> tuple[str, str]:
 
     last, total = warmup.steady, heat_sums(warmup)
     bearings = ", ".join(f"{b} {t:.1f}" for b, t in last.bearing_temperatures.items())
-    first = warmup.spindle.bearings[0].name
+    first = first_row(warmup)
+    pressed = "" if first is None else f", the preload of {escape(first)} is {last.preload[first]:.2f} N (at the start {warmup.moments[0].preload[first]:.2f} N)"
     shifts = ", ".join(
         f"mode {k} ({escape(m.kind)}) {b - a:+z.1f}"
         for k, (m, a, b) in enumerate(zip(warmup.modes, warmup.frequencies[0], warmup.steady_frequencies, strict=True), 1)
     )
     unit, scale = power(most_friction(warmup))
     clear = {name: rollers(warmup, name)["clearance_um"][0] for name in roller_names(warmup)}
-    then = {s.name: 1e6 * s.clearance for s in last.point.state.linear if isinstance(s, RollerState)}
-    fits = "".join(f", the clearance of the rollers of {escape(b)} {then[b]:.1f} µm (at the start {c:.1f} µm)" for b, c in clear.items())
+    fits = "".join(f", the clearance of the rollers of {escape(b)} {1e6 * clearance(last, b):.1f} µm (at the start {c:.1f} µm)" for b, c in clear.items())
     about = (
         f"<p>From {warmup.start:g} °C in air of {warmup.air:g} °C at {warmup.speed / RPM:.0f} rpm. The slowest time constant is "
-        f"{warmup.time_constant:.0f} s. In the steady state the bearings are at {escape(bearings)} °C, the preload of {escape(first)} is "
-        f"{last.preload[first]:.2f} N (at the start {warmup.moments[0].preload[first]:.2f} N) and bearing friction "
-        f"{scale * sum(last.friction.values()):.0f} {unit}{fits}; natural frequencies move by {shifts} Hz.</p>"
+        f"{warmup.time_constant:.0f} s. In the steady state the bearings are at {escape(bearings)} °C{pressed}{fits} and bearing friction is "
+        f"{scale * sum(last.friction.values()):.0f} {unit}; natural frequencies move by {shifts} Hz.</p>"
         f"<p>Heat: motor {total['motor']}, bearings {total['friction']} in; convection {total['convection']} out; "
         f"stored {total['stored']}.</p>"
     )

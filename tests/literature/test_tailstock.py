@@ -9,13 +9,15 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from tests.conftest import ROOT
 from thermospindle.cli import main
 from thermospindle.model.bearing.roller import respond, roller_row
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.static import static
-from thermospindle.model.scene.reading import load
+from thermospindle.model.scene.reading import load, shipped_rows
 from thermospindle.sim.operating import operating_point
 
+SCENE = ROOT / "scenes" / "tailstock"
 STEEL, NU, ALPHA = 210e9, 0.3, 11.5e-6
 IRON, NU_IRON, ALPHA_IRON = 120e9, 0.26, 10.5e-6
 
@@ -156,3 +158,46 @@ def test_a_warm_up_presses_the_rollers(tmp_path, capsys):
     assert clearance[0] == pytest.approx(-2.5, abs=1e-6)
     assert -6 < clearance[-1] < -4
     assert float(rows[-1]["friction of front1 bearing_W"]) > sum(float(rows[-1][f"friction of rear{k} bearing_W"]) for k in (1, 2, 3, 4))
+
+
+def on_rollers_alone(tmp_path, clearance_um=-2.5):
+    """The scene with a bearing given by numbers in place of its ball rows."""
+    raw = (SCENE / "spindle.toml").read_text(encoding="utf-8")
+    head, tail = raw.split("[bearings.rear1]")
+    numbers = """[bearings.rear1]
+origin = "assumed"
+source = "test"
+z_mm = 255.0
+[bearings.rear1.numbers]
+radial_stiffness_N_per_um = 100.0
+axial_stiffness_N_per_um = 300.0
+damping_ratio = 0.03
+
+# """
+    own = shipped_rows()["roller_rows"]["NN3014ASK"] | {"mounted_clearance_um": clearance_um}
+    rows = "[roller_rows.own]\n" + "".join(f"{key} = {json.dumps(value)}\n" for key, value in own.items() if key != "origins")
+    text = head.replace('row = "NN3014ASK"', 'row = "own"') + numbers + tail.split("# ------", 1)[1]
+    (tmp_path / "spindle.toml").write_text(text + rows, encoding="utf-8")
+    return str(tmp_path)
+
+
+@pytest.mark.slow
+def test_a_spindle_on_rollers_alone_warms_up(tmp_path, capsys):
+    """Nothing in it has a preload; words, numbers and picture do without."""
+    scene = on_rollers_alone(tmp_path)
+    assert main(["warmup", scene, "--speed", "500", "--minutes", "0.5", "--out", str(tmp_path / "out")]) == 0
+    said = capsys.readouterr().out
+    assert "preload" not in said
+    assert "clearance" in said
+    assert main(["warmup", scene, "--speed", "500", "--minutes", "0.5", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["preload_N"] is None
+    assert answer["bearings"]["front1"]["clearance_um"][-1] < -2.5
+    assert main(["check", scene]) == 0
+    assert "constant numbers" not in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_loose_rollers_are_told_in_a_warm_up(tmp_path, capsys):
+    assert main(["warmup", on_rollers_alone(tmp_path, 5.0), "--speed", "100", "--minutes", "0.5"]) == 0
+    assert "From 0 min on the rollers of front1 are loose: they carry nothing then." in " ".join(capsys.readouterr().out.split())

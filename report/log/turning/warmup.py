@@ -26,8 +26,9 @@ from thermospindle.report.log.pictures import DARK
 from thermospindle.report.text.warmup import heat_sums, lost_contact, rows
 from thermospindle.report.typeset import power
 from thermospindle.sim.operating import provenance
-from thermospindle.sim.warmup import Warmup, most_friction
+from thermospindle.sim.warmup import Warmup, clearance, most_friction, roller_names, rollers
 
+CLEARANCE = "Clearance of rollers, µm across"
 SECONDS = 12.0  # in which all of it is played
 
 
@@ -67,7 +68,7 @@ def series(warmup: Warmup) -> dict[str, dict[str, tuple[Array, Any]]]:
     moments, spindle = warmup.moments, warmup.spindle
     parts = {g.name: g.part for g in spindle.regions}
     friction = [b.name for b in spindle.ringed]
-    bearings = [b.name for b in spindle.bearings]
+    bearings, rolling = [b.name for b in spindle.bearings], roller_names(warmup)
     unit, scale = power(most_friction(warmup))
     shift = warmup.frequencies - warmup.frequencies[0]
     modes = {f"{k} {m.kind} {f:.0f} Hz": k - 1 for k, (m, f) in enumerate(zip(warmup.modes, warmup.frequencies[0], strict=True), 1)}
@@ -80,6 +81,7 @@ def series(warmup: Warmup) -> dict[str, dict[str, tuple[Array, Any]]]:
         "Contact angle, deg": {
             b: (np.degrees([m.point.state.bearing(b).contact_angle for m in moments]), _of_bearing(k)) for k, b in enumerate(bearings)
         },
+        **({CLEARANCE: {b: (np.array(rollers(warmup, b)["clearance_um"]), _of_bearing(friction.index(b))) for b in rolling}} if rolling else {}),
         f"Friction heat, {unit}": {b: (scale * np.array([m.friction[b] for m in moments]), _of_bearing(k)) for k, b in enumerate(friction)},
         "Natural frequencies, Hz of change since the start": {n: (shift[:, k], _light(MODES[k % len(MODES)])) for n, k in modes.items()},
     }
@@ -145,6 +147,9 @@ def summary(warmup: Warmup) -> str:
         lines.append(f"| {b.name}, °C | " + " | ".join(f"{m.bearing_temperatures[b.name]:.2f}" for m in (first, last, steady)) + " |")
     for b in spindle.bearings:
         lines.append(f"| {b.name} preload, N | " + " | ".join(f"{m.preload[b.name]:.2f}" for m in (first, last, steady)) + " |")
+    for name in roller_names(warmup):
+        clear = (1e6 * clearance(m, name) for m in (first, last, steady))
+        lines.append(f"| {name} clearance, µm | " + " | ".join(f"{c:.2f}" for c in clear) + " |")
     for k, mode in enumerate(warmup.modes):
         values = (warmup.frequencies[0, k], warmup.frequencies[-1, k], warmup.steady_frequencies[k])
         lines.append(f"| {k + 1} {mode.kind}, Hz | " + " | ".join(f"{f:.1f}" if np.isfinite(f) else "lost" for f in values) + " |")
