@@ -225,7 +225,8 @@ def section(key: str, point: OperatingPoint) -> tuple[str, float]:
     scale = round_down(0.06 * extent / largest) if largest > 0 else 1.0
     figure = Figure(figsize=(10.3, 4.3))
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
-    _materials(left, spindle)
+    key_entries = _materials(left, spindle)
+    figure.legend(handles=key_entries, loc="outside lower center", ncols=len(key_entries), handlelength=1.2)
     left.set_title("Materials and bearings")
     picture: Any = None
     for part, d in deformed.items():
@@ -262,7 +263,8 @@ def _polyline(d: DeformedSection, position: Array) -> Array:
     return np.insert(ends, 2, np.nan, axis=1).reshape(-1, 2)
 
 
-def _materials(axes: Axes, spindle: Spindle) -> None:
+def _materials(axes: Axes, spindle: Spindle) -> list[Patch]:
+    """Draws regions and rolling elements; the key's entries."""
     used = list(dict.fromkeys(g.material for g in spindle.regions))
     paint = {name: MATERIALS[i % len(MATERIALS)] for i, name in enumerate(used)}
     edges = dict(zip(PARTS, (INK, "#7a3d8f"), strict=True))
@@ -282,4 +284,4 @@ def _materials(axes: Axes, spindle: Spindle) -> None:
         axes.annotate(f"{b.name} bearing", (r, z), (beside + 1.2, b.z * 1e3), va="center", fontsize=8.5, arrowprops=line)
     handles = [Patch(fc=paint[name], ec="none", label=name) for name in used]
     handles += [Patch(fc="none", ec=edges[part], label=f"{part} part") for part in PARTS]
-    axes.legend(handles=handles, loc="upper right", handlelength=1.2)
+    return handles

@@ -5,6 +5,7 @@ import csv
 import json
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,8 @@ from thermospindle.model.bearing.roller import respond, roller_row
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.static import static
 from thermospindle.model.scene.reading import load, shipped_rows
+from thermospindle.report.log.content import bearing_series
+from thermospindle.report.page.report import bearing_figures
 from thermospindle.sim.operating import operating_point
 
 SCENE = ROOT / "scenes" / "tailstock"
@@ -201,3 +204,14 @@ def test_a_spindle_on_rollers_alone_warms_up(tmp_path, capsys):
 def test_loose_rollers_are_told_in_a_warm_up(tmp_path, capsys):
     assert main(["warmup", on_rollers_alone(tmp_path, 5.0), "--speed", "100", "--minutes", "0.5"]) == 0
     assert "From 0 min on the rollers of front1 are loose: they carry nothing then." in " ".join(capsys.readouterr().out.split())
+
+
+def test_the_report_and_the_log_of_a_run_have_the_rollers(tail, cold):
+    """Their figures and series are read of the operating points; nothing of a hammer test is in them."""
+    steps = [SimpleNamespace(point=point) for point in (cold, operating_point(tail, Condition(60.0)))]
+    run = SimpleNamespace(spindle=tail, steps=steps)
+    captions = [caption for caption, _ in bearing_figures(run)]
+    assert "Clearance of rollers across, negative where they are pressed." in captions
+    assert "Preload, the axial force of a bearing." in captions
+    assert bearing_series(run, "front1")["clearance", "µm"] == pytest.approx([-2.5, -5.85], abs=0.02)
+    assert ("preload", "N") in bearing_series(run, "rear1")
