@@ -5,6 +5,7 @@ data/         a campaign as FRF lines, or mode tables with covariances: what the
 prediction/   the modes that a model predicts, and which of them the measured ones are
 forward/      what the model makes of every number measured, with exact derivatives
 inference/    mechanisms and free forms fitted to FRFs or mode tables together, and the evidence for each
+decision/     posterior probabilities, and the answer with the least expected loss
 misfit/       what a drift goes with: temperature, speed or level
 compare/      modes paired through all conditions; errors, MAC, FRAC, COMAC
 ladder/       model forms, tolerances, effects one after the other, and the error at every step

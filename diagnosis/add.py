@@ -56,13 +56,15 @@ class NewScene:
 
 @dataclass(frozen=True)
 class Answer:
-    """What `add` takes of an answer of `diagnose --json`: candidates as (effects, parameters), and the tolerances fitted beside `best`."""
+    """What `add` takes of an answer of `diagnose --json`: candidates as (effects, parameters), the tolerances fitted beside `best`, and the effects of which
+    the data have the laws of their own (`own_laws`)."""
 
     candidates: tuple[tuple[tuple[str, ...], Mapping[str, Any]], ...]
     best: tuple[str, ...]  # empty: no effect was taken for true, and the tolerances are those fitted without any
     build: dict[str, float]
     tests: tuple[str, ...]
     scene_hash: str | None
+    own_laws: frozenset[str] = frozenset()
 
 
 def check_place(target: Path, out: Path) -> None:
@@ -101,6 +103,7 @@ def new_scene(
     if answer and diagnosis:
         fitted = fitted_values(effects, answer, diagnosis)
         build, note = _build_of(effects, answer, diagnosis, old, file)
+        note = "\n".join([*([note] if note else []), *(_lawless(e.name, diagnosis) for e in effects if e.name in answer.own_laws)])
     hand = _by_effect(effects, by_hand)
     added = tuple(_added(e, fitted.get(e.name, {}), hand[e.name], diagnosis) for e in effects)
     _write(file, effects, added, build, answer.tests if answer else (), f"fitted, from {diagnosis}", folder, out, catalogue)
@@ -219,6 +222,7 @@ def answer_of(raw: Any, where: str) -> Answer:
     """The same from the object of such an answer; `where` it is from is what a refusal begins with."""
     try:
         candidates = tuple((tuple(map(_text, c["effects"])), dict(c["parameters"])) for c in raw["candidates"])
+        own_laws = frozenset(_text(name) for c in raw["candidates"][:1] for name in c.get("own_law", ()))
         tolerances = {name: _finite(row["value"]) for name, row in raw.get("tolerances", {}).items()}
         best = candidates[0][0] if candidates and raw.get("effects") else ()
         scene_hash = raw.get("scene_hash")
@@ -226,7 +230,11 @@ def answer_of(raw: Any, where: str) -> Answer:
         raise BadInput(f"{where}: {NO_ANSWER}") from None
     build = {name: float(f"{v:.8g}") for name, v in tolerances.items() if not name.startswith((OF_TEST, OF_CHANNEL))}
     tests = tuple(name.removeprefix(OF_TEST) for name in tolerances if name.startswith(OF_TEST))
-    return Answer(candidates, best, build, tests, scene_hash)
+    return Answer(candidates, best, build, tests, scene_hash, own_laws)
+
+
+def _lawless(name: str, diagnosis: Path) -> str:
+    return f"the data have another law than {name} assumes: spindle draft {diagnosis} --element {name} writes an effect with theirs"
 
 
 def _text(value: Any) -> str:

@@ -133,8 +133,8 @@ def draft(diagnosis: Path, name: str, element: str | None = None) -> str:
     unit = place["unit"]
     rows = place["change"]
     temperature, speed, sd = (np.array([float(r[k]) for r in rows]) for k in ("temperature_C", "speed_rpm", "sd"))
-    change = np.array([float(r["relative" if unit == "%" else f"change_{unit}"]) for r in rows])
-    if unit == "%":  # free forms count per cent of a logarithm
+    change = np.array([float(r[_key(place)]) for r in rows])
+    if _key(place) == "relative":  # free forms count per cent of a logarithm
         change, sd = 100 * np.log1p(np.maximum(change, LEAST)), 100 * sd / (1 + np.maximum(change, LEAST))
     top = float(np.max(np.abs(speed))) or 1.0
     share = np.abs(speed) / top
@@ -151,8 +151,15 @@ def _place(diagnosis: Path, element: str | None) -> Mapping[str, Any]:
         found = [p for p in places if element is None or p["element"] == element]
         if found:
             unit = found[0]["unit"]
-            keys = ("temperature_C", "speed_rpm", "sd", "relative" if unit == "%" else f"change_{unit}")
+            keys = ("temperature_C", "speed_rpm", "sd", _key(found[0]))
             _plain(found[0]["element"], unit, diagnosis.name)
+            effect = found[0].get("effect")
+            if effect is not None:
+                _plain(*effect["at"], *effect["values"])
+                if not {"temperature_C", "speed_rpm"} <= set(effect["at"]) or not all(
+                    abs(float(v)) <= LARGEST for part in ("at", "values") for v in effect[part].values()
+                ):
+                    raise ValueError
             if not found[0]["change"] or not all(abs(float(r[key])) <= LARGEST for r in found[0]["change"] for key in keys):
                 raise ValueError
             return found[0]
@@ -168,6 +175,11 @@ def _place(diagnosis: Path, element: str | None) -> Mapping[str, Any]:
     raise BadInput(f"--element {element}: does not drift in {diagnosis}; allowed are {', '.join(named) or 'none'}")
 
 
+def _key(place: Mapping[str, Any]) -> str:
+    """Of a change: free forms tell per cent as a share of what was."""
+    return "relative" if place["unit"] == "%" and "effect" not in place else f"change_{place['unit']}"
+
+
 def _plain(*texts: str) -> None:
     """Refuse what would be more than a word in the Python file that is drafted: nothing of a data file becomes code."""
     for text in texts:
@@ -181,6 +193,7 @@ def _text(name: str, place: Mapping[str, Any], ranked: Sequence[Fitted], top: fl
     share_of = float(offset / size) if size else 0.0
     rivals = "; ".join(f"{r.law.name} ({r.criterion - best.criterion:+.1f})" for r in ranked[1:] if r.criterion - best.criterion < NEAR) or "none near"
     step = best.law.expression.startswith("where")
+    effect = place.get("effect")  # of the catalogue, with a law of the data's own
     shape = list(zip(best.law.shape, best.values[2:], best.sd[2:], strict=True))
     lines = [
         f'"""{place["element"]} drifts: {best.law.name}. Drafted by `spindle draft` from {diagnosis.name}; name it, read it, edit it.',
@@ -189,7 +202,8 @@ def _text(name: str, place: Mapping[str, Any], ranked: Sequence[Fitted], top: fl
         f"size {size:.4g} +- {best.sd[0]:.2g} {unit}; what is there everywhere {offset:.4g} +- {best.sd[1]:.2g} {unit}"
         + "".join(f", {s[0]} {v:.4g} +- {e:.2g} {s[1]}" for s, v, e in shape)
         + ".",
-        *([f"Per cent of a logarithm: {place['element']} is exp(change / 100) of what it was."] if unit == "%" else []),
+        *([f"Per cent of a logarithm: {place['element']} is exp(change / 100) of what it was."] if unit == "%" and effect is None else []),
+        *([f"The change is of the size of {place['element']}, which acts as its formula has it at {_told(effect['at'])}, at any condition."] if effect else []),
         f"Rivals by the Bayesian information criterion: {rivals}.",
         '"""',
         "",
@@ -209,6 +223,7 @@ def _text(name: str, place: Mapping[str, Any], ranked: Sequence[Fitted], top: fl
         "",
         "EFFECT = drifting(",
         f'    "{place["element"]}",',
+        *([f"    at={_numbers(effect['at'])},", f"    others={_numbers(effect['values'])},"] if effect else []),
         f'    name="{name}",',
         f'    title="{place["element"]} drifts: {best.law.name}",',
         f'    equation="change = size ({best.law.expression} + constant), T in C, n = speed / {top:g} rpm",',
@@ -222,6 +237,14 @@ def _text(name: str, place: Mapping[str, Any], ranked: Sequence[Fitted], top: fl
         ")",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _told(at: Mapping[str, float]) -> str:
+    return ", ".join(f"{value:g} {unit.replace('_', ' ')}" for value, unit in ((v, k.rpartition("_")[2]) for k, v in at.items()))
+
+
+def _numbers(values: Mapping[str, float]) -> str:
+    return "{" + ", ".join(f'"{key}": {float(value):.6g}' for key, value in values.items()) + "}"
 
 
 def _scalar(expression: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
@@ -11,13 +11,13 @@ import numpy as np
 from thermospindle.diagnosis.data.lines import line_data
 from thermospindle.diagnosis.data.mode_table import mode_data
 from thermospindle.diagnosis.data.observe import condition_of
-from thermospindle.diagnosis.forward.mechanism import Mechanism, variants
+from thermospindle.diagnosis.decision.verdict import Verdict, decide
+from thermospindle.diagnosis.forward.mechanism import Mechanism, strongest, variants
 from thermospindle.diagnosis.forward.model import CampaignModel, TestData, campaign_model, expected_noise
 from thermospindle.diagnosis.inference.detectable import smallest, unseen_beside
 from thermospindle.diagnosis.inference.freeform import free_forms
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.search import Search, search
-from thermospindle.diagnosis.inference.verdict import Verdict, decide
 from thermospindle.diagnosis.misfit.patterns import Chosen, choose_for
 from thermospindle.diagnosis.prediction.next_test import NextTest, next_tests
 from thermospindle.model.machine import Condition, Spindle
@@ -33,8 +33,9 @@ STEPS = 7  # of progress, beside one a test
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """What would have to change from test to test without any catalogue: `change` and `sd` (tests,) in `unit`, what they go with, and the ln
-    evidence over the model without effects."""
+    """What would have to change from test to test: without any catalogue an element, or an effect of it with a law of the data's own, its `values` but the
+    size and the condition `at` which its formula is asked in every test. `change` and `sd` (tests,) in `unit`, what they go with, and the ln evidence over
+    the model without effects."""
 
     element: str
     unit: str
@@ -43,11 +44,13 @@ class Drift:
     sd: Array
     pattern: Chosen | None
     gain: float
+    at: Condition | None = None
+    values: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def told(self) -> list[tuple[float, float]]:
         """Change and standard error of every test: what free forms count in per cent of a logarithm as a share of what was."""
-        if self.unit != "%":
+        if self.unit != "%" or self.at is not None:
             return [(float(a), float(s)) for a, s in zip(self.change, self.sd, strict=True)]
         factor = np.exp(self.change / 100)
         return [(float(100 * (f - 1)), float(f * s)) for f, s in zip(factor, self.sd, strict=True)]
@@ -55,14 +58,16 @@ class Drift:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """All that `spindle diagnose` tells; `detectable`: of every effect the variant and size (from neutral, in its unit) that would have shown; `may_hide`
-    what could act beside what the verdict names, unseen."""
+    """All that `spindle diagnose` tells; `own_laws` how much of the effects that the verdict names the data have in every test, where that is not their law;
+    `detectable`: of every effect the variant and size (from neutral, in its unit) that would have shown; `may_hide` what could act beside what the
+    verdict names, unseen."""
 
     spindle: Spindle
     campaign: Campaign
     search: Search
     verdict: Verdict
     drifts: tuple[Drift, ...]
+    own_laws: tuple[Drift, ...]
     tests: tuple[NextTest, ...]
     detectable: Mapping[str, tuple[Mechanism, float]]
     may_hide: tuple[str, ...] = ()
@@ -77,12 +82,14 @@ def diagnose(
     named = [v for e in usable(spindle, catalogue) if e.name not in present for v in variants(e)]
     found = search(model, named, free_forms(spindle), progress)
     verdict = decide(found)
-    drifts = tuple(_drift(found, c.hypothesis, c.delta_evidence) for c in verdict.free if len(c.hypothesis.mechanisms) == 1 and c.delta_evidence > 0)
+    alone = sorted((c for c in verdict.free if len(c.hypothesis.mechanisms) == 1 and c.delta_evidence > 0), key=lambda c: -c.delta_evidence)
+    drifts = tuple(_drift(found, c.hypothesis, 0) for c in alone)
+    own_laws = _own_laws(found, verdict)
     tests = tuple(next_tests(found, verdict)) if verdict.word != "none" else ()
     progress("next tests weighed")
     seen = smallest(found.model, found.base.fit, found.screened)
     progress("smallest sizes found")
-    return Diagnosis(spindle, campaign, found, verdict, drifts, tests, seen, unseen_beside(found, verdict.accepted))
+    return Diagnosis(spindle, campaign, found, verdict, drifts, own_laws, tests, seen, unseen_beside(found, verdict.accepted))
 
 
 def campaign_data(spindle: Spindle, campaign: Campaign, progress: Callable[[str], None] = lambda done: None) -> CampaignModel:
@@ -98,9 +105,23 @@ def _data(stated: Noise | None, expected: Noise, test: Test) -> TestData:
     return line_data(test, condition, stated, expected) if test.frf is not None else mode_data(test, condition)
 
 
-def _drift(found: Search, h: Hypothesis, gain: float) -> Drift:
+def _own_laws(found: Search, verdict: Verdict) -> tuple[Drift, ...]:
+    """Every effect that the verdict names and that is likelier with a law of the data's own, once: from the most probable explanation that has it."""
+    drifts: dict[str, Drift] = {}
+    for c in verdict.candidates:
+        for k, m in enumerate(c.hypothesis.mechanisms):
+            if m.own_law and set(c.names) <= set(verdict.effects):
+                drifts.setdefault(m.name, _drift(found, c.hypothesis, k))
+    return tuple(drifts.values())
+
+
+def _drift(found: Search, h: Hypothesis, k: int) -> Drift:
+    """Of mechanism `k` of an explanation."""
     conditions = tuple(d.condition for d in found.model.tests)
-    change, covariance = h.evidence.sizes[0], h.evidence.size_covariance[0]
+    m, change, covariance = h.mechanisms[k], h.evidence.sizes[k], h.evidence.size_covariance[k]
+    gain = h.evidence.ln - found.base.evidence.ln
     regular = covariance + 1e-6 * np.trace(covariance) / len(change) * np.eye(len(change))
     pattern = choose_for(conditions, change, regular) if len(change) > 2 else None
-    return Drift(h.names[0], h.mechanisms[0].size.unit, conditions, change, np.sqrt(np.diag(covariance)), pattern, gain)
+    values = {name: v for name, v in m.values(0.0, h.fit.shapes[k]).items() if name != m.size.name}
+    at = strongest(found.model.spindle, conditions) if m.own_law else None
+    return Drift(m.name, m.size.unit, conditions, change, np.sqrt(np.diag(covariance)), pattern, gain, at, values)

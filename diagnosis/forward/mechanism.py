@@ -3,21 +3,24 @@
 The size of an effect is its first parameter. Its law is what the effect's formula makes of one size at every condition. A law is a prior,
 not a gospel: the size that acts in test t is a_t = a (1 + r_t), with departures r that are continuous over the conditions (an
 exponential covariance, Rasmussen & Williams, *Gaussian Processes*, 2006, Eq. 4.18) and whose size is learned. Where a law gives nothing it
-goes on giving nothing. Beyond a limit of its size an effect continues in a straight line, so that sizes may scatter about zero.
+goes on giving nothing; with a law of the data's own the same mechanism acts in every test as its formula has it where it does most, and its
+size alone says how much. Beyond a limit of its size an effect continues in a straight line, so that sizes may scatter about zero.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 
-from thermospindle.model.machine import Condition
+from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
-from thermospindle.sim.effects.effect import Effect, Parameter
+from thermospindle.sim.effects.effect import HOOKS, Effect, Parameter
+from thermospindle.sim.operating import operating_point
 
 MEMORY_K = 40.0  # K over which departures from a law are alike
 MEMORY_RPM = 6000.0
@@ -29,12 +32,18 @@ REFERENCE_WIDTH = 2.0  # prior standard deviations of the size, likewise
 
 @dataclass(frozen=True, eq=False)
 class Mechanism:
-    """An effect with its choices made; `free` for free-form models, which have no law and no name in the catalogue."""
+    """An effect with its choices made; `free` for free-form models, which have no law and no name in the catalogue, `own_law` for effects of the
+    catalogue whose law is the data's own."""
 
     effect: Effect
     choices: Mapping[str, float]
     shape: tuple[Parameter, ...]
     free: bool = False
+    own_law: bool = False
+
+    @property
+    def kind(self) -> str:
+        return "free" if self.free else "own law" if self.own_law else "law"
 
     @property
     def name(self) -> str:
@@ -62,6 +71,60 @@ def variants(effect: Effect) -> list[Mechanism]:
             others = tuple(p for p in shape if p is not share)
             found += [Mechanism(effect, choices | {share.name: end}, others) for end in (0.0, 1.0)]
     return found
+
+
+def strongest(spindle: Spindle, conditions: Sequence[Condition]) -> Condition:
+    """Where effects do most, of all that tests were made at together: the temperature furthest from the reference, the highest speed (the nominal one
+    where nothing turned), the hardest hit and the shortest soak."""
+    furthest = max((c.temperature for c in conditions), key=lambda t: abs(t - spindle.reference_temperature))
+    fastest = max((c.speed for c in conditions), key=abs) or spindle.nominal_speed
+    return Condition(furthest, fastest, max(c.level for c in conditions), min(c.soak_time for c in conditions))
+
+
+def with_own_laws(mechanisms: Sequence[Mechanism], spindle: Spindle, at: Condition) -> list[Mechanism]:
+    """The same with laws of the data's own: every effect does at any condition what its formula gives `at` one. Of what lies between two ideal cases of a
+    law one serves for all; what lasts, or asks for no condition, has no law but a constant."""
+    found: dict[tuple, Mechanism] = {}
+    for m in mechanisms:
+        chosen = {p.name: m.choices[p.name] for p in m.effect.parameters if p.choices}
+        if not m.effect.lasting and (m.name, *chosen.items()) not in found and _asks(m.effect, spindle, at):
+            found[m.name, *chosen.items()] = replace(m, effect=asked_at(m.effect, at), own_law=True)
+    return list(found.values())
+
+
+def asked_at(effect: Effect, at: Any) -> Effect:
+    """The effect, whose functions are all given the condition `at` instead of the test's."""
+
+    def asked(hook: Callable) -> Callable:
+        def changed(spindle: Spindle, condition: Condition, *rest: Any) -> Any:
+            return hook(spindle, at, *rest)
+
+        return changed
+
+    hooks: dict[str, Any] = {name: asked(hook) for name in HOOKS if (hook := getattr(effect, name)) is not None}
+    return replace(effect, **hooks)
+
+
+class _Watched:
+    """A condition that knows whether it was asked."""
+
+    def __init__(self, at: Condition) -> None:
+        self._at, self.asked = at, False
+
+    def __getattr__(self, name: str) -> Any:
+        self.asked = True
+        return getattr(self._at, name)
+
+
+def _asks(effect: Effect, spindle: Spindle, at: Condition) -> bool:
+    """Whether what an effect of typical size changes in a hammer test depends on the condition."""
+    watched = _Watched(at)
+    try:
+        point = operating_point(spindle, at, [(asked_at(effect, watched), effect.typical())])
+        point.chain, point.measurement  # noqa: B018 - worked out here
+    except (ArithmeticError, LookupError, RuntimeError, TypeError, ValueError):
+        return True
+    return watched.asked
 
 
 def likeness(conditions: Sequence[Condition]) -> Array:

@@ -12,6 +12,5 @@ hypothesis  mechanisms that act together, fitted, with their evidence
 resonance   the model with a light resonance more
 detectable  smallest sizes that would have shown
 search      fits, pairs: the evidence of every explanation
-verdict     posterior probabilities, and the answer with the least expected loss
 ==========  =======================================================================================================
 """

@@ -35,7 +35,7 @@ def smallest(model: CampaignModel, about: Fit, screened: Sequence[Screened], wor
     best: dict[str, tuple[float, Mechanism]] = {}
     for s in screened:
         m = s.mechanism
-        if not m.free and s.visibility > 0:
+        if m.kind == "law" and s.visibility > 0:
             size = abs(m.size.typical - m.size.neutral) * np.sqrt(2 * ASKED) / s.visibility
             best[m.name] = min(best.get(m.name, (np.inf, m)), (size, m), key=lambda row: row[0])
     tasks = list(best.values())
@@ -47,7 +47,7 @@ def unseen_beside(found: Search, accepted: Hypothesis) -> tuple[str, ...]:
     """Of the effects that resemble those of an explanation the ones whose typical size these data would show alone, but not beside it: how much of
     what it explains is theirs, nobody can tell."""
     alike = {name for m in accepted.mechanisms for name in m.effect.resembles} - set(accepted.names)
-    alone = [s.mechanism for s in found.screened if s.mechanism.name in alike and not s.mechanism.free and s.visibility > SHOWS]
+    alone = [s.mechanism for s in found.screened if s.mechanism.name in alike and s.mechanism.kind == "law" and s.visibility > SHOWS]
     seen: dict[str, float] = {}
     for s in screen(found.model, accepted.fit, 1.0, accepted.evidence.learned, alone, turned=False):
         seen[s.mechanism.name] = max(s.visibility, seen.get(s.mechanism.name, 0.0))

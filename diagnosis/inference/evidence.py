@@ -37,7 +37,7 @@ GRIDS = {
 }
 WIDTHS = (0.5, 1.0, 2.0, 4.0)  # of a size, in its own prior standard deviations
 DEPARTURES = (0.0, 0.1, 0.3, 1.0)  # from a law, of the size
-FREE_WIDTHS = (0.1, 0.3, 1.0, 3.0, 10.0)  # free forms have a width to be learned; their law is a constant
+FREE_WIDTHS = (0.1, 0.3, 1.0, 3.0, 10.0)  # of what has no law but a constant: its width is to be learned
 SWEEPS = 3  # at most, through the sizes of nuisances one after the other
 
 
@@ -81,7 +81,7 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = ()) -> Ev
     p = len(fit.nuisance)
     kinds = {q.kind for q in model.parameters}
     grids = {kind: grid for kind, grid in GRIDS.items() if kind in kinds}
-    own_grids = [_own_grid(m.free, m.effect.lasting) for m in fit.mechanisms]  # (width, departure) of every mechanism
+    own_grids = [_own_grid(m.free or m.own_law, m.effect.lasting) for m in fit.mechanisms]  # (width, departure) of every mechanism
     conditions = tuple(d.condition for d in model.tests)
     roots = [_roots(conditions, grid, len(m.shape)) for m, grid in zip(fit.mechanisms, own_grids, strict=True)]
 
@@ -158,9 +158,9 @@ def _error_scales(whole: Quadratic, count: int) -> Array:
 
 
 @cache
-def _own_grid(free: bool, lasting: bool) -> tuple[tuple[float, float], ...]:
+def _own_grid(lawless: bool, lasting: bool) -> tuple[tuple[float, float], ...]:
     """(width, departure) that one mechanism may have."""
-    return tuple(product(FREE_WIDTHS if free else WIDTHS, DEPARTURES[:1] if lasting else DEPARTURES))
+    return tuple(product(FREE_WIDTHS if lawless else WIDTHS, DEPARTURES[:1] if lasting else DEPARTURES))
 
 
 @lru_cache(maxsize=64)
@@ -230,6 +230,12 @@ def _posterior(q: Quadratic, prior: Root) -> tuple[Array, Array]:
     inverse = np.asarray(np.linalg.inv(inner + np.eye(len(inner))))
     covariance = prior.times(prior.times(inverse).T)
     return covariance @ q.b, covariance
+
+
+def impossible(m: Mechanism, sizes: Array, covariance: Array) -> bool:
+    """Whether a mechanism would need a size (tests,) that it cannot have, by more than twice its standard error."""
+    sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return bool(np.any((sizes < m.size.limits[0] - 2 * sd) | (sizes > m.size.limits[1] + 2 * sd)))
 
 
 def left_out(model: CampaignModel, fit: Fit, found: Evidence, groups: Sequence[Sequence[int]]) -> float:

@@ -7,13 +7,13 @@ whose law is wrong, or an effect that no catalogue has, does not.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from thermospindle.diagnosis.forward.mechanism import Mechanism
+from thermospindle.diagnosis.forward.mechanism import Mechanism, asked_at
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.model.bearing.pair import PairState
@@ -22,7 +22,8 @@ from thermospindle.model.rotor.chain import RotorBase
 from thermospindle.model.tolerance import scaled_preload
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
-from thermospindle.sim.effects.effect import Effect, Parameter, Values
+from thermospindle.sim.effects import CATALOGUE, by_name
+from thermospindle.sim.effects.effect import HOOKS, Effect, Parameter, Values, fitted_to, refusal
 
 STIFFNESS_WIDTH, DAMPING_WIDTH, PRELOAD_WIDTH = 3.0, 20.0, 5.0  # %
 RING_WIDTH = 0.2  # um
@@ -152,40 +153,51 @@ def alike(model: CampaignModel, x: Array, free: Mechanism, named: Mechanism, sha
 
 
 def drifting(
-    element: str, *, name: str, title: str, equation: str, law: Callable, parameters: tuple[Parameter, ...], source: str
+    element: str, *, name: str, title: str, equation: str, law: Callable, parameters: tuple[Parameter, ...], source: str,
+    at: Mapping[str, float] | None = None, others: Mapping[str, float] | None = None,
 ) -> Effect:
-    """An effect of one's own: what the free form called `element` changes, by `law`(temperature C, speed rpm, values) in its unit.
+    """An effect of one's own: what the free form called `element` changes, by `law`(temperature C, speed rpm, values) in its unit; with `at` what the
+    effect of the catalogue called `element` changes at that condition (temperature_C, speed_rpm, level_N, soak_time_min), its size by the law at any, its
+    `others` parameters as given.
 
-    What `spindle draft` writes is made with it; it acts where the free form acts, and at size zero not at all.
+    What `spindle draft` writes is made with it; it acts where the free form or that effect acts, and at size zero not at all.
     """
+    known = None if at is None else by_name(element, CATALOGUE)
 
-    def form(spindle: Spindle) -> Mechanism:
+    def acts(spindle: Spindle) -> Effect:
+        if known is not None and at is not None:
+            return asked_at(fitted_to(known, spindle), _condition(at))
         found = next((m for m in free_forms(spindle) if m.name == element), None)
         if found is None:
             raise ValueError(f"effect {name}: spindle {spindle.name} has no {element}")
-        return found
+        return found.effect
 
     def hook(key: str) -> Callable:
-        def changed(spindle: Spindle, condition: Condition, values: Values, what):
-            acting = getattr(form(spindle).effect, key)
-            change = float(law(condition.temperature, condition.speed / RPM, values))
-            return acting(spindle, condition, {"change": change}, what) if acting and change else what
+        def changed(spindle: Spindle, condition: Condition, values: Values, *what: Any) -> Any:
+            effect, change = acts(spindle), float(law(condition.temperature, condition.speed / RPM, values))
+            acting, size = getattr(effect, key), effect.parameters[0]
+            sized = {**(others or {}), size.name: float(np.clip(size.neutral + change, *size.limits))}
+            return acting(spindle, condition, sized, *what) if acting and change else what[-1] if what else spindle
 
         return changed
 
-    def drawn(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
-        acting = form(spindle).effect.spindle
-        change = float(law(condition.temperature, condition.speed / RPM, values))
-        return acting(spindle, condition, {"change": change}) if acting and change else spindle
-
     def idle(spindle: Spindle) -> str | None:
+        if known is not None:
+            return refusal(known, spindle)
         return None if any(m.name == element for m in free_forms(spindle)) else f"the scene has no {element}"
 
-    alike = ("grease_damping",) if "damping" in element else ("mount_compliance", "modulus_softening")
+    alike: tuple[str, ...] = ("grease_damping",) if "damping" in element else ("mount_compliance", "modulus_softening")
     if any(word in element for word in ("rings", "preload", "bearings")):
         alike = ("preload_loss", "bond_softening")
+    if known is not None:
+        alike = (known.name, *known.resembles)
+    hooks: dict[str, Any] = {key: hook(key) for key in HOOKS if known is None or getattr(known, key)}
     sees = f"whatever a change of {element} shows, over the conditions of its law"
     return Effect(
-        name, title, equation, parameters, sees, alike, f"the tests it was drafted from: {source}", spindle=drawn, pair=hook("pair"),
-        motions=hook("motions"), chain=hook("chain"), idle=idle,
+        name, title, equation, parameters, sees, alike, f"the tests it was drafted from: {source}", idle=idle, **hooks
     )  # fmt: skip
+
+
+def _condition(at: Mapping[str, float]) -> Condition:
+    soak = 60 * at["soak_time_min"] if "soak_time_min" in at else np.inf
+    return Condition(at["temperature_C"], at["speed_rpm"] * RPM, at.get("level_N", 0.0), soak)

@@ -11,7 +11,7 @@ import numpy as np
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
-from thermospindle.diagnosis.inference.evidence import GRIDS, evidence
+from thermospindle.diagnosis.inference.evidence import GRIDS, evidence, impossible
 from thermospindle.diagnosis.inference.fit import Fit
 from thermospindle.diagnosis.inference.prior import Learned
 from thermospindle.diagnosis.inference.problem import Linearisation, Problem
@@ -33,21 +33,22 @@ class Screened:
     gain: float
     start: Array
     visibility: float  # standard errors by which its typical size shows, beside what nuisances can do
+    possible: bool = True  # whether it would have sizes that it can have
 
 
 def screen(
     model: CampaignModel, about: Fit, temper: float, learned: Learned, mechanisms: Sequence[Mechanism], workers: int | None = None, turned: bool = True
 ) -> list[Screened]:
     """Every one of `mechanisms` beside the model `about`, its errors 1 / `temper` times the data's and sizes of discrepancies as `learned`, or smaller;
-    and the best of each name once more with its shape `turned`."""
+    and the best of each name, and kind of law, once more with its shape `turned`."""
     about = replace(about, temper=temper)
     sizes = Learned(learned.sizes, learned.errors if temper == 1.0 else 1.0, (), ())
     nothing = evidence(model, about, [sizes, *smaller(sizes)]).ln
     found = in_parallel(partial(_screened, model, about, sizes, nothing), list(mechanisms), workers)
     found = [replace(s, mechanism=m) for s, m in zip(found, mechanisms, strict=True)]
-    best = {s.mechanism.name: s for s in sorted(found, key=lambda s: s.gain) if turned and s.visibility > 0 and s.mechanism.shape}
+    best = {(s.mechanism.name, s.mechanism.kind): s for s in sorted(found, key=lambda s: s.gain) if turned and s.visibility > 0 and s.mechanism.shape}
     others = in_parallel(partial(_turned, model, about, sizes, nothing), list(best.values()), workers)
-    return found + [replace(s, mechanism=best[s.mechanism.name].mechanism) for s in others]
+    return found + [replace(s, mechanism=drawn.mechanism) for s, drawn in zip(others, best.values(), strict=True)]
 
 
 def linearised(model: CampaignModel, about: Fit) -> Linearisation:
@@ -115,7 +116,8 @@ def _promised(problem: Problem, about: Fit, sizes: Learned, nothing: float, shap
     found = evidence(model, whole, [sizes, *smaller(sizes)])
     start = found.mean
     start[problem.length - len(shape) :] = shape
-    return Screened(mechanism, found.ln - nothing - float(shape @ shape) / 2, start, visibility)
+    possible = not impossible(mechanism, found.sizes[-1], found.size_covariance[-1])
+    return Screened(mechanism, found.ln - nothing - float(shape @ shape) / 2, start, visibility, possible)
 
 
 def smaller(learned: Learned) -> list[Learned]:

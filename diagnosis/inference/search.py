@@ -17,7 +17,7 @@ import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.forward import nuisance as kinds_of
-from thermospindle.diagnosis.forward.mechanism import Mechanism
+from thermospindle.diagnosis.forward.mechanism import Mechanism, strongest, with_own_laws
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit
@@ -30,9 +30,9 @@ from thermospindle.model.parallel import in_parallel
 from thermospindle.model.types import Array
 
 BEHIND = 12.0  # tempered ln evidence behind the best from which a mechanism is not followed
-NAMED, FREE = 14, 4  # mechanisms fitted at most, of the catalogue and free forms
+MOST = {"law": 14, "own law": 4, "free": 4}  # mechanisms fitted at most, of the catalogue with their laws and with laws of the data's own, and free forms
 LEADS, CLOSE = 2, 60.0  # single mechanisms of the catalogue to which a second is joined: so many, so near the best in ln evidence
-OWED = 6  # promised by screening and not delivered, fitted once more at most
+OWED = {"law": 6, "own law": 2, "free": 1}  # promised by screening and not delivered, fitted once more at most
 SECONDS = 2  # of each kind, joined to each of them
 PAIRS = 6  # fitted at most
 ENOUGH = 5.0  # ln evidence that a second mechanism must promise beside one that leaves a misfit
@@ -62,22 +62,23 @@ def search(
 ) -> Search:
     """The evidence of every explanation. A light resonance becomes part of the model where the data show it without effects, or beside the best single
     one."""
+    every = [*named, *with_own_laws(named, model.spindle, strongest(model.spindle, [d.condition for d in model.tests])), *free]
     none = _without_effects(model)
     wider = with_resonance(model, none, workers)
     model, none = wider or (model, none)
     progress("fitted without effects")
-    tried = _singles(model, none, named, free, progress, workers)
+    tried = _singles(model, none, every, progress, workers)
     best = max(tried.singles, key=lambda h: h.evidence.ln, default=none)
     wider = with_resonance(model, best, workers) if best.mechanisms else None
     if wider is not None:
         before, model = len(model.parameters), wider[0]
         none = _without_effects(model)
         if best.evidence.learned.errors > STRAIN:  # nothing was explained without it
-            tried = _singles(model, none, named, free, lambda done: None, workers)  # steps that were counted already
+            tried = _singles(model, none, every, lambda done: None, workers)  # steps that were counted already
         else:
             tried = _carried_over(model, none, tried, before, workers)
     singles = tried.singles
-    pairs = _joined(model, none, singles, [*named, *free], tried.most, tried.expected, workers)
+    pairs = _joined(model, none, singles, every, tried.most, tried.expected, workers)
     progress("pairs fitted")
     finalists = _finalists([*singles, *pairs])
     anew = dict(zip(map(id, finalists), in_parallel(partial(settled, model), finalists, workers), strict=True))
@@ -103,8 +104,7 @@ class Singles:
 
 
 def _singles(
-    model: CampaignModel, none: Hypothesis, named: Sequence[Mechanism], free: Sequence[Mechanism], progress: Callable[[str], None],
-    workers: int | None,
+    model: CampaignModel, none: Hypothesis, mechanisms: Sequence[Mechanism], progress: Callable[[str], None], workers: int | None
 ) -> Singles:
     learned = none.evidence.learned
     strained = learned.errors > STRAIN or any(learned.sizes.get(kind, 0.0) > 0 for kind in DRIFTING)
@@ -113,19 +113,19 @@ def _singles(
         about, temper = fit(model, tempers=TEMPERS[: EARLY + 1], learned=expected), TEMPERS[EARLY]
     else:
         about, temper = none.fit, 1.0
-    looked = screen(model if temper == 1.0 else model.thinned, about, temper, learned, [*named, *free], workers)
+    looked = screen(model if temper == 1.0 else model.thinned, about, temper, learned, mechanisms, workers)
     rankings = [looked]
     if strained and learned.errors <= STRAIN:  # drift alone explains what is missing: what would, were there none
-        rankings.append(screen(model, none.fit, 1.0, undrifted(learned), [*named, *free], workers))
+        rankings.append(screen(model, none.fit, 1.0, undrifted(learned), mechanisms, workers))
     progress("effects screened")
     chosen = _chosen(rankings, strained)
     # tolerances strained to stand in for an effect must give way with it; while errors are enlarged they are not strained yet
     tasks = [_task((), about, s, -np.inf if strained else none.evidence.ln + s.gain - OCCAM, far=not strained) for s in chosen]
     most = _cost(model, none, expected)
-    first = {next((s.mechanism.name for s in sorted(looked, key=lambda s: -s.gain) if s.mechanism.free == free), "") for looked in rankings for free in (False, True)}
+    first = {s.mechanism.name for ranking in rankings for kind in MOST for s in promising(ranking, kind)[:1]}
     singles = _fitted_all(model, tasks, first, strained, about, most, expected, workers)
     if not strained:
-        singles = _better([*singles, *_lasting(model, none, named, most, expected, workers)])
+        singles = _better([*singles, *_lasting(model, none, mechanisms, most, expected, workers)])
     elif len(rankings) > 1:
         singles = _better([*singles, *_owed(model, none, rankings[1], singles, most, expected, workers)])
     progress("effects fitted")
@@ -138,14 +138,14 @@ def _owed(
     """Fits of what screening beside the model whose modes drift promised, and what fits from enlarged errors on have not delivered: some of these ended
     early there, or stalled."""
     nothing = evidence(model, none.fit, [undrifted(none.evidence.learned)]).ln
-    delivered = {h.names[0]: h.evidence.ln - nothing for h in singles}
+    delivered: dict[str, float] = {}
+    for h in singles:
+        delivered[h.names[0]] = max(h.evidence.ln - nothing, delivered.get(h.names[0], -np.inf))
     tasks = []
-    for free, count in ((False, OWED), (True, 1)):
-        promised: dict[str, Screened] = {}
-        for s in sorted((s for s in looked if s.mechanism.free == free), key=lambda s: -s.gain):
-            promised.setdefault(s.mechanism.name, s)
-        least = max(PLENTY, max((s.gain for s in promised.values()), default=0.0) - CLOSE)
-        late = [s for s in promised.values() if s.gain > least and delivered.get(s.mechanism.name, -np.inf) < s.gain - OCCAM]
+    for kind, count in OWED.items():
+        promised = promising(looked, kind)
+        least = max(PLENTY, max((s.gain for s in promised), default=0.0) - CLOSE)
+        late = [s for s in promised if s.gain > least and delivered.get(s.mechanism.name, -np.inf) < s.gain - OCCAM]
         tasks += [_task((), none.fit, s, -np.inf, far=True) for s in late[:count]]
     return fitted(model, tasks, TEMPERS[-1:], none.fit, most, expected, workers)
 
@@ -189,8 +189,13 @@ def _lasting(
 
 
 def _better(found: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Of those with the same mechanisms the one with more evidence."""
-    return list({frozenset(h.names): h for h in sorted(found, key=lambda h: h.evidence.ln)}.values())
+    """Of those with the same mechanisms and laws the one with more evidence."""
+    return list({frozenset((m.name, m.kind) for m in h.mechanisms): h for h in sorted(found, key=lambda h: h.evidence.ln)}.values())
+
+
+def _of_each_name(found: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Of those with the same mechanisms, whatever their laws, the one with more evidence; the best first."""
+    return sorted({frozenset(h.names): h for h in sorted(found, key=lambda h: h.evidence.ln)}.values(), key=lambda h: -h.evidence.ln)
 
 
 def _alike(model: CampaignModel, x: Array, hypotheses: Sequence[Hypothesis]) -> dict[str, frozenset[str]]:
@@ -215,23 +220,34 @@ def _finalists(found: Sequence[Hypothesis]) -> list[Hypothesis]:
     chosen: list[Hypothesis] = []
     for free in (False, True):
         for count, most in FINALISTS.items():
-            own = sorted((h for h in found if h.free == free and len(h.mechanisms) == count), key=lambda h: -h.evidence.ln)
+            own = _of_each_name([h for h in found if h.free == free and len(h.mechanisms) == count])
             chosen += [h for k, h in enumerate(own[:most]) if h.evidence.ln > best - NEAR or (count == 1 and k == 0)]
     return chosen
 
 
+def promising(looked: Sequence[Screened], kind: str) -> list[Screened]:
+    """The best variant of every mechanism of one kind, with the most promising first; of those with laws of the data's own only what promises more than the
+    law that is assumed, at sizes that can be."""
+    by_law = {s.mechanism.name: s.gain for s in sorted(looked, key=lambda s: s.gain) if s.mechanism.kind == "law"}
+    best: dict[str, Screened] = {}
+    for s in sorted((s for s in looked if s.mechanism.kind == kind and np.isfinite(s.gain)), key=lambda s: -s.gain):
+        if kind != "own law" or (s.possible and s.gain > by_law.get(s.mechanism.name, -np.inf) + LITTLE):
+            best.setdefault(s.mechanism.name, s)
+    return list(best.values())
+
+
 def _chosen(rankings: Sequence[Sequence[Screened]], strained: bool) -> list[Screened]:
-    """The most promising mechanisms, one variant of each effect, of the catalogue and of the free forms, from all rankings by turns. Where nothing is
-    strained what screening promises is nearly what a fit will hold, and only what is near the best is followed."""
+    """The most promising mechanisms of every kind, from all rankings by turns. Where nothing is strained what screening promises is nearly what a fit will
+    hold, and only what is near the best is followed."""
     found: list[Screened] = []
-    for free, most in ((False, NAMED), (True, FREE)):
-        promising = []
+    for kind, most in MOST.items():
+        followed = []
         for looked in rankings:
-            ranked = sorted((s for s in looked if s.mechanism.free == free and np.isfinite(s.gain)), key=lambda s: -s.gain)
+            ranked = promising(looked, kind)
             least = -LITTLE if strained or not ranked else max(-LITTLE, ranked[0].gain - CLOSE)
-            promising.append([s for s in ranked if s.gain > least or s is ranked[0]])
+            followed.append([s for s in ranked if s.gain > least or s is ranked[0]])
         chosen: dict[str, Screened] = {}
-        for s in filter(None, chain.from_iterable(zip_longest(*promising))):
+        for s in filter(None, chain.from_iterable(zip_longest(*followed))):
             if len(chosen) < most:
                 chosen.setdefault(s.mechanism.name, s)
         found += chosen.values()
@@ -251,7 +267,7 @@ def _fitted_all(model, tasks, first: Collection[str], strained: bool, about: Fit
         found = fitted(model, alive, (temper,), about, most, expected, workers, afresh=early)
         early = False
         best = max(h.evidence.ln for h in found)
-        keep = {id(h) for kind in (False, True) for h in sorted((h for h in found if h.free == kind), key=lambda h: -h.evidence.ln)[:2]}
+        keep = {id(h) for kind in MOST for h in sorted((h for h in found if h.mechanisms[0].kind == kind), key=lambda h: -h.evidence.ln)[:2]}
         kept = [h for h in found if id(h) in keep or h.names[0] in first or h.evidence.ln > best - BEHIND]
         if temper == TEMPERS[-1]:
             return found
@@ -263,14 +279,14 @@ def _joined(
     model, none: Hypothesis, singles: Sequence[Hypothesis], mechanisms: Sequence[Mechanism], most: float, expected: Learned, workers
 ) -> list[Hypothesis]:
     """The best single mechanisms with every other one that promises to gain beside them, and what promises to gain beside the best two."""
-    ranked = sorted(singles, key=lambda h: -h.evidence.ln)
+    ranked = _of_each_name(singles)
     gains = [h for h in ranked if h.evidence.ln > none.evidence.ln + LITTLE]
     leads = [h for h in gains if not h.free and h.evidence.ln > gains[0].evidence.ln - CLOSE][:LEADS] or [h for h in gains if not h.free][:1]
     if leads and (leads[0] is not gains[0] or leads[0].evidence.learned.errors > 1.0):
         leads += [h for h in gains if h.free][:1]  # two things that drift: where one of the catalogue does not do
     pairs = _beside(model, leads, mechanisms, most, expected, workers)
     if leads and not leads[0].free:
-        pairs = _better([*pairs, *_lasting(model, leads[0], [m for m in mechanisms if not m.free], most, expected, workers)])
+        pairs = _better([*pairs, *_lasting(model, leads[0], mechanisms, most, expected, workers)])
     best = max([*singles, *pairs], key=lambda h: h.evidence.ln, default=none)
     if len(best.mechanisms) < 2:
         return pairs
@@ -286,15 +302,11 @@ def _beside(model, leads: Sequence[Hypothesis], mechanisms: Sequence[Mechanism],
         drifts = all(m.free for m in lead.mechanisms)
         others = [m for m in mechanisms if m.name not in lead.names and not (drifts and not m.free) and not (m.free and lead.free and not drifts)]
         looked = screen(model, lead.fit, 1.0, undrifted(lead.evidence.learned), others, workers)
-        for free in (False, True):
-            best: dict[str, Screened] = {}
-            for s in sorted(looked, key=lambda s: -s.gain):
-                if s.mechanism.free == free and s.gain > asked:
-                    best.setdefault(s.mechanism.name, s)
-            for s in list(best.values())[:SECONDS]:
-                names = frozenset({s.mechanism.name, *lead.names})
-                if names not in done:
-                    done.add(names)
+        for kind in MOST:
+            for s in [s for s in promising(looked, kind) if s.gain > asked][:SECONDS]:
+                whole = frozenset((m.name, m.kind) for m in (s.mechanism, *lead.mechanisms))
+                if whole not in done:
+                    done.add(whole)
                     tasks.append((lead.evidence.ln + s.gain, _task(lead.mechanisms, lead.fit, s, lead.evidence.ln - OCCAM, far=True)))
     chosen = [task for _, task in sorted(tasks, key=lambda t: -t[0])[:PAIRS]]
     if not chosen:

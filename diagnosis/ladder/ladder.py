@@ -19,8 +19,10 @@ import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.observe import observe
+from thermospindle.diagnosis.decision.conditions import SPREAD
+from thermospindle.diagnosis.decision.explanations import Candidate
+from thermospindle.diagnosis.decision.verdict import Verdict
 from thermospindle.diagnosis.forward.model import CampaignModel, TestData
-from thermospindle.diagnosis.inference.verdict import SPREAD, Candidate, Verdict
 from thermospindle.diagnosis.ladder.fitting import CONSTANT, FREE, Settled, predicted_squares, settled, unseen, without
 from thermospindle.diagnosis.ladder.forms import FORMS
 from thermospindle.diagnosis.ladder.step import MeasuredModes, Step, as_drawn, fitted, measured_modes

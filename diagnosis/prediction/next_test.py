@@ -11,11 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from thermospindle.diagnosis.decision.explanations import Candidate, beyond_limits
+from thermospindle.diagnosis.decision.verdict import Verdict
 from thermospindle.diagnosis.forward.mechanism import size_covariance
 from thermospindle.diagnosis.forward.model import FAILED
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.search import Search
-from thermospindle.diagnosis.inference.verdict import Candidate, Verdict, beyond_limits
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.modes import modes
 from thermospindle.model.types import Array

@@ -10,7 +10,7 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from thermospindle.diagnosis.inference.verdict import Candidate
+from thermospindle.diagnosis.decision.explanations import Candidate
 from thermospindle.diagnosis.verdict import Diagnosis
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
@@ -71,7 +71,7 @@ def evidence_bars(names: Sequence[str], value: Array, paint: Sequence[str]) -> F
 
 @rc_context(STYLE)
 def law(d: Diagnosis, c: Candidate) -> Figure:
-    """The size of every effect of a candidate in each test: constant where the effect's law holds."""
+    """The size of every effect of a candidate in each test: constant where the law that the effect assumes holds."""
     count = len(c.hypothesis.mechanisms)
     figure = Figure(figsize=(8.6, 2.4 * count + 0.3), layout="constrained")
     conditions = [t.condition for t in d.search.model.tests]
@@ -81,7 +81,8 @@ def law(d: Diagnosis, c: Candidate) -> Figure:
         _over_temperature(axes, conditions, own.sizes[k], np.sqrt(np.maximum(np.diag(own.size_covariance[k]), 0.0)))
         unit = "" if m.size.unit == "1" else f", {m.size.unit}"
         axes.set_ylabel(f"{m.size.name}{unit}")
-        axes.set_title(f"{m.name}: its size in every test (a level line is the effect's own law)")
+        level = "with a law of the data's own" if m.own_law else "a level line is the law assumed"
+        axes.set_title(f"{m.name}: its size in every test ({level})")
     return figure
 
 

@@ -13,7 +13,6 @@ from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
 from thermospindle.diagnosis.inference.problem import Problem
-from thermospindle.diagnosis.inference.verdict import Candidate
 from thermospindle.diagnosis.verdict import campaign_data
 from thermospindle.model.errors import BadInput, NoEquilibrium
 from thermospindle.report.text.diagnosis.answer import parameters_of
@@ -68,16 +67,15 @@ def weighed(bench: Bench, s: Setting, progress: Callable[[str], None] = lambda d
 
 def _told(best: Hypothesis, none: Hypothesis, parameters) -> Weighed:  # type: ignore[no-untyped-def]
     value, sd = {}, {}
-    told = Candidate(best, tuple(best.names), False, best.evidence.ln - none.evidence.ln, 0.0)
     for k, m in enumerate(best.mechanisms):
-        for name, row in parameters_of(told, k).items():
+        for name, row in parameters_of(best, k).items():
             value[key_of(m.name, name)], sd[key_of(m.name, name)] = row["value"], row["sd"]
     spread = best.evidence.covariance.diagonal()
     for p, mean, variance in zip(parameters, best.evidence.mean, spread, strict=False):
         if p.kind == kinds_of.BUILD:
             value[p.name], sd[p.name] = float(mean * p.sd), float(max(variance, 0.0) ** 0.5 * p.sd)
     n = best.fit.count
-    return Weighed(value, sd, told.delta_evidence, none.evidence.chi2 / n, best.evidence.chi2 / n)
+    return Weighed(value, sd, best.evidence.ln - none.evidence.ln, none.evidence.chi2 / n, best.evidence.chi2 / n)
 
 
 def said(found: Weighed) -> str:

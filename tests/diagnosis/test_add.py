@@ -111,6 +111,15 @@ def test_tolerances_of_another_explanation_are_left_out(add, tmp_path, change, n
     assert load(tmp_path / "new").build is None
 
 
+def test_what_has_another_law_in_the_data_says_where_to_get_it(add):
+    """The catalogue's law goes into the scene, which is not what the data have."""
+    [pair, alone] = answer()["candidates"]
+    said = add("new", "preload_loss", "added_disk", found=answer() | {"candidates": [pair | {"own_law": ["preload_loss"]}, alone]})["note"]
+    assert said.count("another law than") == 1
+    assert "the data have another law than preload_loss assumes: spindle draft" in said
+    assert "--element preload_loss" in said
+
+
 def test_tolerances_of_the_best_explanation_do_not_go_with_the_second(add, tmp_path):
     assert "fitted beside preload_loss + added_disk and do not go with soak_lag" in add("new", "soak_lag")["note"]
     assert load(tmp_path / "new").build is None

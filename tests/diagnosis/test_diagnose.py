@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import DATA
-from thermospindle.diagnosis.inference.verdict import conditions_of
+from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.verdict import diagnose
 from thermospindle.model.machine import Condition
 from thermospindle.report.text.diagnosis.answer import diagnosis_json

@@ -10,7 +10,7 @@ import pytest
 
 from tests.virtual_campaign import mode_campaign, model_of
 from thermospindle.diagnosis.draft import draft, fit_law, laws
-from thermospindle.diagnosis.forward.mechanism import Mechanism, variants
+from thermospindle.diagnosis.forward.mechanism import Mechanism, variants, with_own_laws
 from thermospindle.diagnosis.inference.evidence import evidence, left_out
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.freeform import free_forms
@@ -19,7 +19,9 @@ from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
+from thermospindle.sim.effects import CATALOGUE, by_name
 from thermospindle.sim.effects.own import effect_of
+from thermospindle.sim.operating import operating_point
 
 TEMPERATURE = np.array([10.0, 20, 30, 40, 50, 60, 10, 20, 30, 40, 50, 60])
 SHARE = np.array([0.0, 0, 0, 0, 0, 0, 1, 0.5, 1, 0.5, 1, 0.75])
@@ -110,6 +112,37 @@ def test_with_the_drafted_effect_the_error_falls(slipping, tmp_path):
     assert after.evidence.ln > base.evidence.ln + 10
     assert left(model, after) < left(model, base) / 2
     assert after.evidence.sizes[0].mean() == pytest.approx(100 * np.log(0.8), abs=2.0)
+
+
+def test_an_effect_of_the_catalogue_is_drafted_with_the_law_that_the_data_have(spindle, tmp_path):
+    """Rings warmer by a law of temperature at rest, where friction gives nothing: the file acts as the effect does at 60 C and 7200 rpm, its size by the
+    law; at no size not at all, and what cannot be it is refused as the effect itself is."""
+    at, values = Condition(60.0, 7200 * RPM), {"common_share": 0.2, "level_share": 0.0}
+    rows = [{"temperature_C": t, "speed_rpm": n, "change_1": 0.02 * (t - 20), "sd": 0.01} for t in (20.0, 30.0, 40.0, 60.0) for n in (0.0, 7200.0)]
+    effect = {"at": {"temperature_C": 60.0, "speed_rpm": 7200.0}, "values": values}
+    answer, file = tmp_path / "d.json", tmp_path / "warm.py"
+    place = {"element": "thermal_gradient", "unit": "1", "change": rows, "effect": effect}
+    answer.write_text(json.dumps({"where": [place]}), encoding="utf-8")
+    file.write_text(draft(answer, "warm"), encoding="utf-8")
+    drafted = effect_of(file)
+    assert "linear in temperature" in drafted.title
+    assert drafted.resembles[0] == "thermal_gradient"
+    [own] = with_own_laws(variants(by_name("thermal_gradient", CATALOGUE))[:1], spindle, at)
+    cold, warm = Condition(20.0), Condition(40.0)
+    fitted = drafted.typical()
+    assert operating_point(spindle, cold, [(drafted, fitted)]).state.bearings[0].stiffness == pytest.approx(
+        operating_point(spindle, cold).state.bearings[0].stiffness, rel=1e-4
+    )
+    by_file = operating_point(spindle, warm, [(drafted, fitted)]).state.bearings[0].stiffness
+    by_effect = operating_point(spindle, warm, [(own.effect, {"scale": 0.4, **values})]).state.bearings[0].stiffness
+    plain = operating_point(spindle, warm).state.bearings[0].stiffness
+    assert by_file == pytest.approx(by_effect, rel=1e-4)
+    assert abs(by_file[0, 0] / plain[0, 0] - 1) > 0.002
+    damaged = json.loads(answer.read_text(encoding="utf-8"))
+    damaged["where"][0]["effect"]["at"]["temperature_C"] = "hot"
+    answer.write_text(json.dumps(damaged), encoding="utf-8")
+    with pytest.raises(BadInput, match="elements that drift"):
+        draft(answer, "warm")
 
 
 def test_drafts_of_what_is_not_there_are_refused(slipping, tmp_path):

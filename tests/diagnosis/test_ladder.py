@@ -12,8 +12,8 @@ from rerun.chunk import RrdReader
 
 from tests.conftest import SCENE
 from thermospindle.cli import main
+from thermospindle.diagnosis.decision.explanations import Candidate
 from thermospindle.diagnosis.forward.mechanism import variants
-from thermospindle.diagnosis.inference.verdict import Candidate
 from thermospindle.diagnosis.ladder.fitting import FREE, predicted_squares, settled, unseen, without
 from thermospindle.diagnosis.ladder.forms import FORMS
 from thermospindle.diagnosis.ladder.ladder import CLEAR, DISCREPANCY, TOLERANCES, conditions, ladder, named_by

@@ -13,11 +13,11 @@ from rich.console import Console
 
 from tests.conftest import SCENE
 from thermospindle.cli import main
+from thermospindle.diagnosis.decision.explanations import Candidate
 from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
-from thermospindle.diagnosis.inference.verdict import Candidate
 from thermospindle.diagnosis.prediction.next_test import ModePrediction, NextTest
 from thermospindle.diagnosis.runout.verdict import diagnose_runout
 from thermospindle.model.machine import Condition

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from thermospindle.diagnosis.decision.explanations import Candidate
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.inference.evidence import Evidence
-from thermospindle.diagnosis.inference.verdict import Candidate
+from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.verdict import Diagnosis, Drift
 from thermospindle.model.types import Array
 from thermospindle.report.text.diagnosis.words import condition, drift_words, law_words, would_change
@@ -35,7 +36,7 @@ def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
         "detectable": {name: size for name, (_, size) in d.detectable.items()},
         "detectable_in": {name: {"parameter": m.size.name, "unit": m.size.unit, "size": size} for name, (m, size) in d.detectable.items()},
         "error": {"before": before, "after": after, "held_out_before": _known(v.held_out_before), "held_out_after": _known(v.held_out_after)},
-        "where": [_place(p, d) for p in d.drifts],
+        "where": [_place(p, d) for p in _places(d)],
         "next_test": [
             {
                 "condition": condition(t.condition),
@@ -83,9 +84,10 @@ def _learned(evidence: Evidence) -> dict[str, float]:
 def _candidate(c: Candidate, d: Diagnosis) -> dict[str, Any]:
     parameters: dict[str, Any] = {}
     laws = {}
-    for k, m in enumerate(c.hypothesis.mechanisms):
-        for name, row in parameters_of(c, k).items():
+    for k, m in enumerate(c.told.mechanisms):
+        for name, row in parameters_of(c.told, k).items():
             parameters[f"{m.name}.{name}"] = row
+    for k, m in enumerate(c.hypothesis.mechanisms):
         laws[m.name] = _law(c, k, d)
     own = c.hypothesis.evidence
     n = d.search.base.fit.count
@@ -98,30 +100,26 @@ def _candidate(c: Candidate, d: Diagnosis) -> dict[str, Any]:
         else float(np.sqrt(own.chi2 / max(d.search.base.evidence.chi2, 1e-300))),
         "parameters": parameters,
         "law": laws,
-        "departure_from_law": {m.name: v for m, v in zip(c.hypothesis.mechanisms, own.learned.departures, strict=True)},
+        "own_law": list(c.own_laws),
+        "departure_from_law": {m.name: 1.0 if m.own_law else v for m, v in zip(c.hypothesis.mechanisms, own.learned.departures, strict=True)},
         "chi2_per_number": own.chi2 / n,
         "believable": _believable(c),
     }
 
 
-def parameters_of(c: Candidate, k: int) -> dict[str, dict[str, Any]]:
-    """Values with errors of mechanism `k` of a candidate: one size for all tests, its choices and its shape parameters."""
-    m, own = c.hypothesis.mechanisms[k], c.hypothesis.evidence
+def parameters_of(h: Hypothesis, k: int) -> dict[str, dict[str, Any]]:
+    """Values with errors of mechanism `k` of an explanation: one size for all tests, its choices and its shape parameters."""
+    m, own = h.mechanisms[k], h.evidence
     size, sd = one_size(m, own.sizes[k], own.size_covariance[k])
     rows: dict[str, dict[str, Any]] = {m.size.name: {"value": size, "sd": sd, "unit": m.size.unit}}
     units = {p.name: p.unit for p in m.effect.parameters}
     rows |= {name: {"value": value, "sd": 0.0, "unit": units[name]} for name, value in m.choices.items()}
-    at = len(d_parameters(c)) + sum(len(r) + len(o.shape) for r, o in list(zip(c.hypothesis.fit.roots, c.hypothesis.mechanisms, strict=True))[:k])
-    at += len(c.hypothesis.fit.roots[k])
+    at = len(h.fit.nuisance) + sum(len(r) + len(o.shape) for r, o in list(zip(h.fit.roots, h.mechanisms, strict=True))[:k])
+    at += len(h.fit.roots[k])
     errors = _sd(own)[at : at + len(m.shape)]
-    for p, value, error in zip(m.shape, c.hypothesis.fit.shapes[k], errors, strict=True):
+    for p, value, error in zip(m.shape, h.fit.shapes[k], errors, strict=True):
         rows[p.name] = {"value": value, "sd": float(error * p.prior_sd), "unit": p.unit}
     return rows
-
-
-def d_parameters(c: Candidate) -> Array:
-    """The nuisance parameters of a candidate's fit."""
-    return c.hypothesis.fit.nuisance
 
 
 def one_size(m: Mechanism, sizes: Array, covariance: Array) -> tuple[float, float]:
@@ -143,8 +141,8 @@ def _law(c: Candidate, k: int, d: Diagnosis) -> list[dict[str, Any]]:
 
 def _believable(c: Candidate) -> bool:
     """No size at its limit, and none five prior widths away."""
-    for k, m in enumerate(c.hypothesis.mechanisms):
-        size = parameters_of(c, k)[m.size.name]["value"]
+    for k, m in enumerate(c.told.mechanisms):
+        size = parameters_of(c.told, k)[m.size.name]["value"]
         if size in m.size.limits or abs(size - m.size.neutral) > 5 * max(m.size.prior_sd, abs(m.size.typical - m.size.neutral)):
             return False
     return True
@@ -154,28 +152,29 @@ def _invisible(d: Diagnosis) -> list[str]:
     """Effects whose typical size these data do not show by one standard error, whatever variant."""
     best: dict[str, float] = {}
     for s in d.search.screened:
-        if not s.mechanism.free:
+        if s.mechanism.kind == "law":
             best[s.mechanism.name] = max(best.get(s.mechanism.name, 0.0), s.visibility)
     return sorted(name for name, seen in best.items() if seen < 1.0)
 
 
+def _places(d: Diagnosis) -> list[Drift]:
+    """What changes, with what the verdict goes by first: effects that it names without their laws, or what drifts without any catalogue."""
+    return [*d.own_laws, *d.drifts] if d.verdict.word in ("identified", "two effects") else [*d.drifts, *d.own_laws]
+
+
 def _place(p: Drift, d: Diagnosis) -> dict[str, Any]:
     best = max((c.delta_evidence for c in (*d.verdict.candidates, *d.verdict.free)), default=0.0)
+    relative = p.unit == "%" and p.at is None
+    share, key = (100, "relative") if relative else (1, f"change_{p.unit}")
     return {
         "element": p.element,
         "unit": p.unit,
-        "change": [
-            {**condition(c), ("relative" if p.unit == "%" else f"change_{p.unit}"): _scaled(a, p.unit), "sd": _scaled(s, p.unit)}
-            for c, (a, s) in zip(p.conditions, p.told, strict=True)
-        ],
+        "change": [{**condition(c), key: float(a / share), "sd": float(s / share)} for c, (a, s) in zip(p.conditions, p.told, strict=True)],
+        **({"effect": {"at": condition(p.at), "values": dict(p.values)}} if p.at is not None else {}),
         "with": p.pattern.shape.name if p.pattern else "",
         "removes": float(np.clip(p.gain / best, 0.0, 1.0)) if best > 0 else 0.0,
         "delta_evidence": p.gain,
     }
-
-
-def _scaled(value: float, unit: str) -> float:
-    return float(value / 100 if unit == "%" else value)
 
 
 def _misfit(d: Diagnosis) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from thermospindle.diagnosis.inference.verdict import DEPARTS, beyond_limits
+from thermospindle.diagnosis.decision.explanations import DEPARTS, beyond_limits
 from thermospindle.diagnosis.verdict import Diagnosis, Drift
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
@@ -43,14 +43,18 @@ def drift_words(d: Diagnosis) -> list[str]:
 
 
 def _drift_words(p: Drift) -> str:
+    return f"{p.element}: {_change_words(p)}"
+
+
+def _change_words(p: Drift) -> str:
     if len(p.change) == 1:
         ((change, sd),) = p.told
-        return f"{p.element}: {change:+.3g} +- {sd:.1g} {p.unit} {_where(p.conditions[0])}"
+        return f"{change:+.3g} +- {sd:.1g} {p.unit} {_where(p.conditions[0])}"
     low, high = int(np.argmin(p.change)), int(np.argmax(p.change))
     goes = f", {p.pattern.shape.name}" if p.pattern and p.pattern.shape.name != "constant" else ""
     (least, its_sd), (most, sd) = p.told[low], p.told[high]
     return (
-        f"{p.element}: from {least:+.3g} +- {its_sd:.1g} {p.unit} {_where(p.conditions[low])} to {most:+.3g} +- "
+        f"from {least:+.3g} +- {its_sd:.1g} {p.unit} {_where(p.conditions[low])} to {most:+.3g} +- "
         f"{sd:.1g} {p.unit} {_where(p.conditions[high])}{goes}"
     )
 
@@ -60,7 +64,10 @@ def law_words(d: Diagnosis) -> list[str]:
     v, found = d.verdict, []
     lead = next((c for c in v.candidates if c.hypothesis is v.accepted), None)
     for m, departure in zip(lead.hypothesis.mechanisms, v.accepted.evidence.learned.departures, strict=True) if lead else ():
-        if departure >= DEPARTS or (lead and lead.own_laws and m.name not in lead.own_laws.names):
+        own = next((p for p in d.own_laws if p.element == m.name), None) if m.own_law else None
+        if own is not None:
+            found.append(f"The data do not have the law that {m.name} assumes, but one of their own: its {m.size.name} {_change_words(own)}.")
+        elif departure >= DEPARTS:
             same = [p for p in d.drifts if p.pattern and lead and p.gain > ALIKE * lead.delta_evidence]
             instead = f"; {_drift_words(same[0])}, does as well without any law" if same else ""
             found.append(f"The data do not have the law that {m.name} assumes{instead}.")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.virtual_campaign import mode_campaign, model_of, virtual_campaign
-from thermospindle.diagnosis.forward.mechanism import Mechanism, likeness, size_covariance, variants
+from thermospindle.diagnosis.forward.mechanism import Mechanism, likeness, size_covariance, strongest, variants, with_own_laws
 from thermospindle.diagnosis.forward.nuisance import RECORD
 from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.inference.freeform import alike, free_forms
@@ -53,6 +53,26 @@ def test_a_variant_for_every_choice(spindle):
         for m in found:
             assert set(m.values(1.0, [0.0] * len(m.shape))) <= {p.name for p in e.parameters}
             assert m.values(1.5, [0.0] * len(m.shape))[e.parameters[0].name] == 1.5
+
+
+def test_laws_of_the_datas_own_act_in_every_test_as_where_they_do_most(spindle):
+    """Of all that asks for the condition, once for every choice that is none of its law; masses last, and joints ask for nothing."""
+    at = strongest(spindle, CONDITIONS)
+    assert at == Condition(60.0, 7200 * RPM, 100.0, 60.0)
+    assert strongest(spindle, [Condition(20.0), Condition(-5.0)]) == Condition(-5.0, spindle.nominal_speed)
+    named = [m for e in usable(spindle) for m in variants(e)]
+    own = with_own_laws(named, spindle, at)
+    names = [m.name for m in own]
+    assert {"thermal_gradient", "grease_damping", "bond_softening", "soak_lag", "clearance_opening", "mount_compliance"} <= set(names)
+    assert not {"added_disk", "sensor_mass", "support_anisotropy", "ball_material", "sensor_gain"} & set(names)
+    assert names.count("thermal_gradient") == 1
+    assert all(m.kind == "own law" for m in own)
+    warm = next(m for m in own if m.name == "thermal_gradient")
+    by_region = {g.name: 20.0 for g in spindle.regions}
+    values = warm.values(1.0, [q.neutral for q in warm.shape])
+    at_rest = warm.effect.temperatures(spindle, Condition(20.0), values, by_region)
+    assert at_rest == next(m for m in named if m.name == "thermal_gradient").effect.temperatures(spindle, at, values, by_region)
+    assert max(at_rest.values()) > 20.1
 
 
 @pytest.fixture(scope="module")

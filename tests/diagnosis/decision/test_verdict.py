@@ -8,6 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from thermospindle.diagnosis.decision.conditions import conditions_of
+from thermospindle.diagnosis.decision.explanations import COARSE, OWN_LAW, coarsening
+from thermospindle.diagnosis.decision.loss import FALSE_ALARM, MISSED, WRONG
+from thermospindle.diagnosis.decision.verdict import Verdict, decide
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.nuisance import DAMPING, STIFFNESS
 from thermospindle.diagnosis.inference.evidence import Evidence
@@ -17,16 +21,6 @@ from thermospindle.diagnosis.inference.prior import Learned
 from thermospindle.diagnosis.inference.remainder import between_tests
 from thermospindle.diagnosis.inference.screening import Screened
 from thermospindle.diagnosis.inference.search import Search
-from thermospindle.diagnosis.inference.verdict import (
-    COARSE,
-    FALSE_ALARM,
-    MISSED,
-    WRONG,
-    Verdict,
-    coarsening,
-    conditions_of,
-    decide,
-)
 from thermospindle.model.machine import Condition
 from thermospindle.sim.effects.effect import Effect, Parameter
 
@@ -35,8 +29,8 @@ SIZE = Parameter("size", "1", 0.0, 1.0, 1.0, (-9.0, 9.0), "", "")
 
 
 def mechanism(name: str) -> Mechanism:
-    """A free form where the name starts with `~`."""
-    return Mechanism(Effect(name, "", "", (SIZE,), "", (), ""), {}, (), free=name.startswith("~"))
+    """A free form where the name starts with `~`; with a law of the data's own where it ends with an apostrophe."""
+    return Mechanism(Effect(name.rstrip("'"), "", "", (SIZE,), "", (), ""), {}, (), free=name.startswith("~"), own_law=name.endswith("'"))
 
 
 def hypothesis(names: tuple[str, ...], ln: float) -> Hypothesis:
@@ -175,40 +169,55 @@ def test_a_set_holds_only_what_is_probable():
 
 
 OWN_LAWS = {
-    "that effect's": ({"a": 60.0, "~x": 66.0}, {"a"}, "identified", {"a"}),
-    "two effects'": ({"a": 60.0, "b": 60.0, "~x": 66.0}, {"a", "b"}, "ambiguous", {"a", "b"}),
-    "another's": ({"a": 60.0, "~x": 66.0}, {"b"}, "unexplained", set()),
-    "no effect's": ({"a": 60.0, "~x": 66.0}, set(), "unexplained", set()),
-    "of an effect that gains little of it": ({"a": 6.0, "~x": 66.0}, {"a"}, "unexplained", set()),
-    "one of two": ({"a": 40.0, "~x": 50.0, ("a", "b"): 60.0, ("~x", "b"): 80.0}, {"a"}, "ambiguous", {"a", "b"}),
-    "neither of two": ({"a": 40.0, "~x": 50.0, ("a", "b"): 60.0, ("~x", "~y"): 80.0}, {"a"}, "unexplained", set()),
+    "one effect's": ({"a": 20.0, "a'": 60.0, "~x": 50.0}, "identified", {"a"}, ("a",)),
+    "no better than the one assumed": ({"a": 60.0, "a'": 60.0, "~x": 50.0}, "identified", {"a"}, ()),
+    "two effects'": ({"a": 20.0, "a'": 60.0, "b'": 60.0, "~x": 50.0}, "ambiguous", {"a", "b"}, ("a",)),
+    "behind free drift": ({"a": 20.0, "a'": 60.0, "~x": 70.0}, "unexplained", set(), ("a",)),
+    "one of two": ({"a": 40.0, "a'": 50.0, ("a", "b"): 60.0, ("a'", "b"): 80.0, "~x": 60.0}, "two effects", {"a", "b"}, ("a",)),
+    "both of two": ({"a": 40.0, ("a", "b"): 60.0, ("a'", "b'"): 80.0, "~x": 60.0}, "two effects", {"a", "b"}, ("a", "b")),
 }
 
 
 @pytest.mark.parametrize("case", OWN_LAWS)
-def test_a_free_form_of_an_effects_own_change_is_that_effect_with_a_law_of_its_own(case):
-    """A mechanism is named whatever its law; what no effect of the catalogue changes, or none by as much, is the unknown."""
-    gains, own, word, effects = OWN_LAWS[case]
-    v = decide(replace(made(gains), alike={"~x": frozenset(own)}))
+def test_an_effect_is_named_whatever_its_law(case):
+    """With the law assumed and with one of the data's own it is one explanation, told with the likelier."""
+    gains, word, effects, own = OWN_LAWS[case]
+    v = decide(made(gains))
     assert (v.word, set(v.effects)) == (word, effects)
-    assert (v.candidates[0].own_laws is not None) == (word in ("identified", "ambiguous"))
-    assert ("law of the data's own (~x drift)" in v.reason) == (word == "identified")
+    assert v.candidates[0].own_laws == own
+    assert len({frozenset(c.names) for c in v.candidates}) == len(v.candidates)
+    assert ("with a law of the data's own" in v.reason) == (bool(own) and word in ("identified", "two effects"))
     assert total(v) == pytest.approx(1.0, abs=1e-9)
 
 
 def test_a_size_that_cannot_be_is_no_law_of_its_own():
-    found = replace(made({"a": 60.0, "~x": 66.0}), alike={"~x": frozenset({"a"})})
+    found = made({"a": 20.0, "a'": 66.0, "~x": 60.0})
     negative = tuple(
-        replace(h, evidence=replace(h.evidence, sizes=np.array([[3.0, -10.0]]), size_covariance=1e-4 * np.eye(2)[None])) if h.names == ("a",) else h
+        replace(h, evidence=replace(h.evidence, sizes=np.array([[3.0, -10.0]]), size_covariance=1e-4 * np.eye(2)[None]))
+        if any(m.own_law for m in h.mechanisms)
+        else h
         for h in found.hypotheses
     )
-    assert decide(replace(found, hypotheses=negative)).word == "unexplained"
+    assert decide(found).word == "identified"
+    v = decide(replace(found, hypotheses=negative, alike={"~x": frozenset({"a", "b"})}))
+    assert v.word == "unexplained"
+    assert "which a would do at a size that it cannot have" in v.reason
+
+
+@pytest.mark.parametrize(("named", "alike", "word"), [(64.5, {"a"}, "identified"), (60.0, {"a"}, "unexplained"), (64.5, {"b"}, "unexplained")])
+def test_a_free_form_that_changes_the_same_as_an_effect_is_that_effect(named, alike, word):
+    """Where the effect does as well, with whatever law; beside the same second too."""
+    v = decide(replace(made({"a": 20.0, "a'": named, "~x": 66.0}), alike={"~x": frozenset(alike)}))
+    assert (v.word, v.probability_unknown == 0.0) == (word, word == "identified")
+    assert [c.names for c in v.free] == [("~x",)]  # it still drifts
+    pair = decide(replace(made({("a", "c"): named, ("~x", "c"): 66.0, "c": 20.0}), alike={"~x": frozenset(alike)}))
+    assert (pair.probability_unknown == 0.0) == (word == "identified")
 
 
 def test_odds_of_a_law_of_its_own():
-    """0.33 over thirty effects, half as much for a law of its own, against 0.05 over twenty forms."""
-    v = decide(replace(made({"a": 60.0, "~x": 66.0}), alike={"~x": frozenset({"a"})}))
-    of_effect, of_form = 0.33 / 30 * (np.exp(-6) + 0.5), 0.05 / 20
+    """0.33 over thirty effects and two laws, against 0.05 over twenty forms."""
+    v = decide(made({"a": 60.0, "a'": 66.0, "~x": 66.0}))
+    of_effect, of_form = 0.33 / 30 / (1 + OWN_LAW) * (np.exp(-6) + OWN_LAW), 0.05 / 20
     assert v.probability_unknown == pytest.approx(of_form / (of_effect + of_form), rel=1e-6)
 
 

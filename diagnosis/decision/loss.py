@@ -1,0 +1,72 @@
+"""The answer with the least expected loss.
+
+In units of a set that holds the truth: a wrong name costs ten times as much and a false alarm twenty times; to say "nothing" of a spindle that lacks
+something five times, as much as a set without the truth in it does beyond its own cost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from thermospindle.diagnosis.decision.explanations import Candidate, Names, named_part
+
+WRONG, FALSE_ALARM, MISSED, SET, HALF = 10.0, 20.0, 5.0, 1.0, 3.0
+ENOUGH = 0.95  # posterior probability that a set holds the truth
+NEGLIGIBLE = 1e-3  # probability that adds nothing to a set
+LARGEST = 6  # names in a set, beyond which it says little
+MOSTLY = 0.6  # of the ln evidence of an explanation with free drift in it, or of the misfit that changes, that what is named must reach to be the answer
+
+
+def least_loss(
+    candidates: Sequence[Candidate], none: float, free: Sequence[Candidate], alike: Mapping[str, frozenset[str]]
+) -> tuple[str, Names, dict[str, float]]:
+    unknown = [c for c in free if all(m.free for m in c.hypothesis.mechanisms)]  # also the model whose every mode drifts
+    beside = [c for c in free if not all(m.free for m in c.hypothesis.mechanisms)]  # a named effect and something unknown
+    something = 1 - none
+    losses: dict[str, float] = {"none": MISSED * something}
+    answers: dict[str, tuple[str, Names]] = {"none": ("none", ())}
+    p_beside = sum(c.probability for c in beside)
+    alone = {frozenset(c.names): c.delta_evidence for c in candidates}
+
+    def missed(own: set[str], at_worst: float) -> float:
+        """Of names where something unknown is true: half right where it changes what they change, by another law."""
+        return sum(c.probability * (HALF if any(own & alike.get(n, frozenset()) for n in c.names) else at_worst) for c in unknown)
+
+    def named_loss(own: set[str]) -> float:
+        """Of naming one effect, or two: half right where one of two is named, or one beside something unknown; wrong with any name that is not true."""
+        loss = FALSE_ALARM * none + missed(own, WRONG)
+        for c in (*candidates, *beside):
+            of_it = set(named_part(c))
+            whole = 0.0 if not c.free else SET / 2 if _mostly_named(c, alone) else HALF
+            loss += c.probability * (whole if own == of_it else HALF if own < of_it else WRONG)
+        return loss
+
+    for names in dict.fromkeys([c.names for c in candidates[:8]] + [named_part(c) for c in beside[:3]]):
+        key = " + ".join(names)
+        losses[key], answers[key] = named_loss(set(names)), ("identified" if len(names) == 1 else "two effects", names)
+    explained = sorted([*candidates, *beside], key=lambda c: -c.probability)
+    chosen = list[Candidate]()
+    for c in explained:
+        held = sum(k.probability for k in chosen)
+        if held >= ENOUGH * something or c.probability < NEGLIGIBLE or len({n for k in chosen for n in named_part(k)}) >= LARGEST:
+            break
+        chosen.append(c)
+    names = tuple(dict.fromkeys(n for c in chosen for n in named_part(c)))
+    if len(names) > 1:
+        share = sum(c.probability for c in chosen if not c.free)
+        half = sum(c.probability for c in chosen if c.free)
+        outside = sum(c.probability for c in explained) - share - half
+        key = "one of " + ", ".join(names)
+        losses[key] = FALSE_ALARM * none + SET * share * (1 + 0.1 * max(len(names) - 3, 0)) + HALF * half
+        losses[key] += (SET + MISSED) * outside + missed(set(names), SET + MISSED)
+        answers[key] = ("ambiguous", names)
+    losses["unexplained"] = FALSE_ALARM * none + SET * 2 * sum(c.probability for c in candidates) + SET * p_beside
+    answers["unexplained"] = ("unexplained", ())
+    best = min(losses, key=lambda k: losses[k])
+    return *answers[best], losses
+
+
+def _mostly_named(c: Candidate, alone: Mapping[frozenset[str], float]) -> bool:
+    """Whether the effects of the catalogue, by themselves or some of them, reach most of what an explanation gains with free drift beside them."""
+    own = frozenset(named_part(c))
+    return max((gain for names, gain in alone.items() if names <= own), default=float("-inf")) > MOSTLY * c.delta_evidence

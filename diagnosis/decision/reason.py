@@ -1,0 +1,96 @@
+"""Why a verdict is what it is, in sentences."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from thermospindle.diagnosis.decision.conditions import conditions_of
+from thermospindle.diagnosis.decision.explanations import Names, beyond_limits, named_part
+from thermospindle.diagnosis.decision.loss import NEGLIGIBLE
+from thermospindle.diagnosis.forward import nuisance as kinds_of
+from thermospindle.diagnosis.forward.model import CampaignModel
+from thermospindle.diagnosis.inference.hypothesis import STRAIN, Hypothesis
+from thermospindle.diagnosis.inference.remainder import ALIKE, Overlap
+from thermospindle.diagnosis.inference.search import Search
+
+UNTOLD = "nothing tried"  # what explains data that are missed grossly
+LEFT = "what is left"  # that changes, and tells of something else
+NUMERICS = (1e-4, 0.01)  # drift of frequencies and of damping that two honest programs may differ by
+
+
+def of_verdict(found: Search, word: str, effects: Names, candidates, free, none: float, before: float, after: float) -> str:
+    n, chi2 = found.base.fit.count, found.base.evidence.chi2
+    if word == "none":
+        best = f"; the best effect, {' + '.join(candidates[0].names)}, has a probability of {candidates[0].probability:.1%}" if candidates else ""
+        wrong = found.base.evidence.learned.sizes.get(kinds_of.STIFFNESS, 0.0)
+        which = "; one condition cannot tell that from a missing effect" if len(conditions_of(found)) == 1 else ""
+        constant = f", the model's frequencies being constantly wrong by about {wrong:.1g} of each{which}" if wrong > NUMERICS[0] else ""
+        return f"Tolerances and measuring errors explain the data: chi2 is {chi2 / n:.2f} a number for {n} numbers{constant}{best}."
+    lead = candidates[0] if candidates else None
+    if word == "unexplained":
+        place = "nothing tried explains them, nor do tolerances and measuring errors: units, points, and noise that the files do not tell come first"
+        if free and free[0].names == (LEFT,):
+            left = found.hypotheses[0].fit
+            of = f" of {np.sqrt(chi2 / n):.1f}" if left.mechanisms else ""
+            place = f"the best leaves {np.sqrt(left.chi2 / left.count):.1f} standard errors{of}, and not the same in every test"
+        elif free and free[0].hypothesis.mechanisms:
+            place = f"{' and '.join(free[0].names)} would have to drift ({free[0].delta_evidence:.0f} in ln evidence)"
+            place += _impossible(found, free[0].names)
+        elif free and free[0].names != (UNTOLD,):
+            drift = found.base.evidence.learned.sizes[kinds_of.STIFFNESS_DRIFT]
+            place = f"every mode drifts from test to test, by {drift:.1g} of its frequency, more than two honest programs differ by"
+        if not free or free[0].names == (UNTOLD,):
+            return f"No effect of the catalogue explains the data: {place} (chi2 without effects: {chi2 / n:.2f} a number)."
+        rival = f"; the best of the catalogue, {' + '.join(lead.names)}, reaches {lead.delta_evidence:.0f}" if lead else ""
+        return f"No effect of the catalogue explains the data as well as free drift does: {place}{rival} (chi2 without effects: {chi2 / n:.2f} a number)."
+    named = " + ".join(effects)
+    checked = f"; conditions left out are predicted with {after:.2f} instead of {before:.2f} standard errors" if np.isfinite(after) else ""
+    if word == "ambiguous":
+        rows = [c for c in candidates if set(c.names) <= set(effects)]
+        share = sum(c.probability for c in rows)
+        several = ", or several of them together," if any(len(c.names) > 1 and c.probability > NEGLIGIBLE for c in rows) else ""
+        return f"One of {', '.join(effects)}{several} explains the data (together {share:.0%} probable); no one of them is probable enough to be named{checked}."
+    disagreement = ", which does not confirm it" if after > 0.9 * before else ""
+    told = [c for c in (*candidates, *free) if set(named_part(c)) == set(effects)]
+    chosen = max(told, key=lambda c: c.probability)
+    without, within = (h.evidence.learned.sizes.get(kinds_of.STIFFNESS, 0.0) for h in (found.base, chosen.hypothesis))
+    instead = f"; without, the model's frequencies would have to be constantly wrong by about {without:.1g} of each" if without > 10 * within else ""
+    rest = 1 - sum(c.probability for c in told)
+    odds = "all else together is less probable than 1 in 1000" if rest < 1e-3 else f"all else together has a probability of {rest:.1%}"
+    word_of = "is the explanation" if len(effects) == 1 else "are both needed" if len(effects) == 2 else "are all needed"
+    drifting = [m.name for m in chosen.hypothesis.mechanisms if m.free]
+    beside = f"; beside {'it' if len(effects) == 1 else 'them'} {' and '.join(drifting)} drifts a little" if drifting else ""
+    own = chosen.own_laws
+    before_own = f", {chosen.by_law.evidence.ln - found.base.evidence.ln:.0f} with the law assumed" if chosen.by_law else ""
+    whose = f" of {' and '.join(own)}" if len(effects) > 1 else ""
+    law = f" with a law of the data's own{whose}{before_own}" if own else ""
+    return f"{named} {word_of}: {chosen.delta_evidence:.0f} in ln evidence over the model without effects{law}, {odds}{beside}{instead}{checked}{disagreement}."
+
+
+def _impossible(found: Search, drifting: Names) -> str:
+    """The effects that change what drifts, but would need sizes that they cannot have."""
+    same = set().union(*(found.alike.get(name, ()) for name in drifting))
+    cannot = sorted({h.names[0] for h in found.hypotheses if len(h.names) == 1 and h.names[0] in same and beyond_limits(h)})
+    return f", which {' or '.join(cannot)} would do at a size that it cannot have" if cannot else ""
+
+
+def of_resonances(model: CampaignModel) -> str:
+    """The light resonances that the data show in every test; one beyond the band stands for what modes up there lend to it."""
+    if not model.resonances:
+        return ""
+    highest = max(float(d.frequency.max()) for d in model.tests)
+    told = ", ".join(
+        f"{r.frequency:.0f} Hz ({f'damping ratio {r.damping:.2g}' if r.frequency <= highest else 'beyond the band'})" for r in model.resonances
+    )
+    one = "a light resonance" if len(model.resonances) == 1 else "light resonances"
+    return f" Taken into account: {one} at {told} that the drawing lacks and every test shows, of a table, a fixture or a cable."
+
+
+def of_what_is_left(best: Hypothesis, same: Overlap) -> str:
+    """What is left where the best explanation still misses the data and misses them alike in all tests."""
+    if best.evidence.learned.errors <= STRAIN or same.tests < ALIKE:
+        return ""
+    return (
+        f" What is left even so is {best.evidence.learned.errors:.1f} times the errors, and much the same in every test (correlation {same.tests:.2f}): "
+        "something constant that the model lacks, such as a resonance of the table or the fixture, not a change over the conditions."
+    )

@@ -1,0 +1,96 @@
+"""From the evidence of all hypotheses to a verdict: posterior probabilities, what is no answer whatever they are, and the least expected loss."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from thermospindle.diagnosis.decision import reason
+from thermospindle.diagnosis.decision.conditions import conditions_of
+from thermospindle.diagnosis.decision.explanations import Candidate, Names, explanations, named_part
+from thermospindle.diagnosis.decision.loss import MOSTLY, least_loss
+from thermospindle.diagnosis.decision.reason import LEFT, NUMERICS, UNTOLD
+from thermospindle.diagnosis.forward import nuisance as kinds_of
+from thermospindle.diagnosis.inference.evidence import left_out
+from thermospindle.diagnosis.inference.hypothesis import Hypothesis
+from thermospindle.diagnosis.inference.remainder import ALIKE, Overlap, overlap
+from thermospindle.diagnosis.inference.search import Search
+
+GROSS = 25.0  # chi2 a number, five times the errors, from which nothing has explained the data whatever else explains them no better
+MUCH = 0.5  # squares of the errors, from which what is left and changes tells of something else
+SURE = 5.0  # standard deviations of chi2 by chance, beyond which something is left
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """`word` is none, identified, ambiguous, two effects or unexplained; `effects` what it names; `losses` the expected loss of every answer
+    weighed. `candidates` of the catalogue and `free` ones with the most probable first."""
+
+    word: str
+    effects: Names
+    reason: str
+    candidates: tuple[Candidate, ...]
+    free: tuple[Candidate, ...]
+    probability_none: float
+    probability_unknown: float
+    losses: Mapping[str, float]
+    held_out_before: float
+    held_out_after: float
+    accepted: Hypothesis
+
+
+def decide(found: Search) -> Verdict:
+    """The verdict with the least expected loss."""
+    same = overlap(found.model, found.hypotheses[0].fit)
+    candidates, free, none = explanations(found, same.inflation)
+    candidates, free, none = _unheld(found, same, candidates, free, none)
+    unknown = sum(c.probability for c in free)
+    word, effects, losses = least_loss(candidates, none, free, found.alike)
+    accepted = _accepted(found, word, effects, candidates, free)
+    groups = conditions_of(found)
+    before = left_out(found.model, found.base.fit, found.base.evidence, groups)
+    after = left_out(found.model, accepted.fit, accepted.evidence, groups)
+    why = reason.of_verdict(found, word, effects, candidates, free, none, before, after)
+    why += reason.of_resonances(found.model) + reason.of_what_is_left(found.hypotheses[0], same)
+    return Verdict(word, effects, why, candidates, free, none, unknown, losses, before, after, accepted)
+
+
+def _unheld(
+    found: Search, same: Overlap, candidates: tuple[Candidate, ...], free: tuple[Candidate, ...], none: float
+) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...], float]:
+    """What is only the best of what was tried, with its probability moved to the unknown: nothing missing, where modes drift by more than two honest
+    programs differ by, the data are missed grossly, or much is left that is not alike in all tests; effects, where they leave most of what changes."""
+    alike = overlap(found.model, found.base.fit)
+    kept = changing(found.base, alike), changing(found.hypotheses[0], same)
+    gross = found.base.evidence.chi2 > GROSS * found.base.fit.count
+    by_chance = SURE * np.sqrt(2 / found.base.fit.count)  # standard deviations of chi2 a number
+    changes = len(found.model.tests) > 1 and alike.tests < ALIKE and kept[0] > max(MUCH, by_chance)
+    if _adrift(found.base) or gross or changes:
+        name = UNTOLD if gross else LEFT if changes else "every mode"
+        free = (*free, Candidate(found.base, (name,), True, 0.0, none))
+        none = 0.0
+    if kept[1] > MUCH and kept[1] > (1 - MOSTLY) * kept[0]:
+        free = (*free, Candidate(found.base, (LEFT,), True, 0.0, sum(c.probability for c in candidates)))
+        candidates = tuple(replace(c, probability=0.0) for c in candidates)
+    return candidates, tuple(sorted(free, key=lambda c: -c.probability)), none
+
+
+def changing(h: Hypothesis, same: Overlap) -> float:
+    """Squares of the errors a number that an explanation leaves beyond noise, and not alike in all tests."""
+    return h.excess * (1.0 - same.tests)
+
+
+def _adrift(h: Hypothesis) -> bool:
+    """Whether the modes drift from test to test by more than the model's own numerics."""
+    sizes = h.evidence.learned.sizes
+    return sizes.get(kinds_of.STIFFNESS_DRIFT, 0.0) > NUMERICS[0] or sizes.get(kinds_of.DAMPING_DRIFT, 0.0) > NUMERICS[1]
+
+
+def _accepted(found: Search, word: str, effects: Names, candidates: Sequence[Candidate], free: Sequence[Candidate]) -> Hypothesis:
+    """The hypothesis by which errors after the verdict are told: the best that it names."""
+    if word in ("none", "unexplained"):
+        return found.base
+    there = next((c.hypothesis for c in candidates if set(c.names) <= set(effects)), None)
+    return there or next(c.hypothesis for c in free if set(named_part(c)) == set(effects))
