@@ -23,10 +23,13 @@ from typing import Any
 
 import numpy as np
 
+from tests.blind.alike import right
 from tests.blind.campaigns import Made, campaign, described, plans
 from tests.blind.hidden import Hidden, Mechanism, mechanisms
-from tests.blind.visible import visibility
+from tests.blind.visible import seen, visibility
 from tests.blind.world import Plan, World
+from thermospindle.diagnosis.decision.conditions import conditions_of
+from thermospindle.diagnosis.decision.explanations import coarsening
 from thermospindle.diagnosis.draft import draft
 from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.inference.evidence import evidence, left_out
@@ -35,7 +38,6 @@ from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
 from thermospindle.diagnosis.inference.prior import steady
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.inference.remainder import overlap
-from thermospindle.diagnosis.inference.verdict import coarsening, conditions_of
 from thermospindle.diagnosis.verdict import Diagnosis, diagnose
 from thermospindle.model.machine import Spindle
 from thermospindle.model.scene.reading import load
@@ -112,7 +114,9 @@ def judge(seed: int, without: Sequence[str] = ()) -> dict[str, Any]:
         "truth": [list(h.names) for h in made.hidden],
         "elements": [h.element for h in made.hidden],
     }
-    row |= described(made, drawn.spindle) | {"visibility": visibility(made, drawn.spindle) if made.hidden else []}
+    of = seen(made, drawn.spindle) if made.hidden else None
+    row |= described(made, drawn.spindle) | {"visibility": visibility(made, drawn.spindle, of) if of else []}
+    row |= {"right": right(made, drawn.spindle, of) if of else []}
     start = time.perf_counter()
     try:
         found = diagnose(drawn.spindle, made.campaign)
@@ -145,12 +149,19 @@ def weighed(found: Diagnosis) -> dict[str, Any]:
     best = search.hypotheses[0]
     return {
         "explanations": [
-            [list(h.names), sum(m.free for m in h.mechanisms), round(h.evidence.ln - base, 2), max(h.evidence.learned.departures, default=0.0)]
+            [
+                list(h.names),
+                sum(m.free for m in h.mechanisms),
+                round(h.evidence.ln - base, 2),
+                max(h.evidence.learned.departures, default=0.0),
+            ]
             for h in search.hypotheses
         ],
         "inflation": overlap(search.model, best.fit).inflation,
         "coarse": coarsening(best),
-        "screened": [len({s.mechanism.name for s in search.screened if s.mechanism.free == free and s.visibility > 0}) for free in (False, True)],
+        "screened": [
+            len({s.mechanism.name for s in search.screened if s.mechanism.free == free and s.visibility > 0}) for free in (False, True)
+        ],
     }
 
 

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from tests.blind.alike import right, right_names
 from tests.blind.campaigns import campaign, in_contact
 from tests.blind.hidden import mechanisms
 from tests.blind.laws import law
 from tests.blind.score import element_found, interval, most_probable, outcome, show, truth_probability
 from tests.blind.study import FURTHER, FURTHER_FROM, FURTHER_SHARE, SCENES, draw
-from tests.blind.visible import visibility
+from tests.blind.visible import seen, visibility
 from tests.blind.world import Record, World, answer
 from tests.conftest import ROOT
 from thermospindle.model.machine import Condition
@@ -129,13 +130,40 @@ def test_what_is_hidden_has_right_answers_of_the_catalogue_or_none():
     assert set(kinds) == {"nothing", "one", "two", "outside"}
 
 
+def _visible(drawn, hidden):
+    made = campaign(drawn.spindle, drawn.tests, [hidden], 5)
+    return visibility(made, drawn.spindle, seen(made, drawn.spindle, 40))[0]
+
+
 def test_visibility_grows_with_size_and_gains_hide_a_gain():
     drawn = draw(2)
     m = next(m for m in mechanisms(drawn.spindle, ()) if m.name == "bearing damping")
-    small, large = (visibility(campaign(drawn.spindle, drawn.tests, [m.of_size(s)], 5), drawn.spindle, 40)[0] for s in (0.0, 1.0))
+    small, large = (_visible(drawn, m.of_size(s)) for s in (0.0, 1.0))
     assert 0 < small < large
     gain = next(m for m in mechanisms(drawn.spindle, ()) if m.name == "sensor gain").of_size(0.0)
-    assert visibility(campaign(drawn.spindle, drawn.tests, [gain], 5), drawn.spindle, 40)[0] < 2.0
+    assert _visible(drawn, gain) < 2.0
+
+
+def test_right_answers_are_what_effects_do():
+    """Rings apart are cleared by what opens the clearance, not by a film, which only brings them together; softer bearings by a bond; a whirl force by nothing."""
+    drawn = draw(2)
+    every = {m.name: m for m in mechanisms(drawn.spindle, ("clearance_opening", "lubricant_film", "bond_softening"))}
+    pieces = [every["outer rings grow"].of_size(0.5), every["cross-coupled stiffness of the bearings"].of_size(1.0)]
+    made = campaign(drawn.spindle, drawn.tests, pieces, 5)
+    rings, whirl = right(made, drawn.spindle, seen(made, drawn.spindle, 40))
+    assert "clearance_opening" in rings
+    assert not {"lubricant_film", "sensor_gain", "plate_prestress"} & set(rings)
+    assert whirl == []
+
+
+def test_right_names():
+    """Of a change of 100 standard errors; what its author had in mind may leave 30, what nobody had in mind nothing that could be told or less than that."""
+    left_by = {"meant": 20.0, "nearer": 15.0, "further": 25.0, "nearly": 9.0, "same": 3.0, "off": 90.0}
+    assert right_names(("meant", "off"), left_by, 100.0) == ["meant", "nearer", "nearly", "same"]
+    assert right_names((), left_by, 100.0) == ["nearly", "same"]
+    assert right_names((), left_by, 20.0) == ["same"]
+    assert right_names((), left_by, 4.0) == []
+    assert right_names(("off",), left_by, 2.0) == ["off"]  # too little to be told
 
 
 def row(kind, verdict, effects=(), truth=(), none=0.0, unknown=0.0, candidates=(), drifts=(), elements=()):
@@ -169,9 +197,17 @@ SCORED = [
     (row("one", "error", [], [["a"]]), "error", 0.0),
     (unseen(row("one", "none", [], [["a"]], none=0.9, candidates=[(["a"], 0.05), (["c"], 0.05)]), 2.0), "right", 0.95),
     (unseen(row("one", "identified", ["c"], [["a"]], candidates=[(["c"], 1.0)]), 2.0), "wrong", 0.0),
-    (unseen(row("two", "identified", ["a"], [["a"], ["c"]], candidates=[(["a"], 0.7), (["a", "c"], 0.1), (["c"], 0.2)]), 90.0, 2.0), "right", 0.8),
+    (
+        unseen(row("two", "identified", ["a"], [["a"], ["c"]], candidates=[(["a"], 0.7), (["a", "c"], 0.1), (["c"], 0.2)]), 90.0, 2.0),
+        "right",
+        0.8,
+    ),
     (unseen(row("two", "identified", ["c"], [["a"], ["c"]], candidates=[(["c"], 0.9)]), 90.0, 2.0), "half", 0.0),
     (row("two", "identified", ["a"], [["a"], ["a", "c"]], candidates=[(["a"], 0.9)]), "right", 0.0),
+    (row("one", "identified", ["c"], [["a"]], candidates=[(["c"], 0.9)]) | {"right": [["c"]]}, "right", 0.9),
+    (row("one", "identified", ["a"], [["a"]], candidates=[(["a"], 0.9)]) | {"right": [["c"]]}, "wrong", 0.0),
+    (row("one", "unexplained", [], [["a"]], unknown=0.9) | {"right": [[]]}, "right", 0.9),
+    (row("outside", "identified", ["c"], [[]], candidates=[(["c"], 0.5)], unknown=0.4) | {"right": [["c"]]}, "right", 0.9),
 ]
 
 
@@ -187,9 +223,10 @@ def test_the_table_of_scores():
     with console.capture() as captured:
         show(console, rows)
     text = captured.get()
-    assert "18 campaigns, seeds 0 to 17" in text
+    assert "22 campaigns, seeds 0 to 21" in text
+    assert "of these drawn with an effect in mind that cannot be it: 1; another effect than those in mind is right, too: 3" in text
     assert "false alarm, nothing hidden: 1 of 2" in text
-    assert text.count("\n- ") == 10
+    assert text.count("\n- ") == 11
     assert element_found(SCORED[10][0])
     assert not element_found(SCORED[11][0])
     assert most_probable(SCORED[0][0]) == (0.97, True)

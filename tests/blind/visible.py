@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -15,17 +16,41 @@ from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.tolerance import toleranced
 from thermospindle.model.types import Array, ComplexArray
 
+SMALL = 0.01  # share of a size, at which its change is taken for linear
 
-def visibility(made: Made, spindle: Spindle, lines: int = 160) -> list[float]:
-    """Of every hidden piece: its change of the FRFs in standard errors, after all that build tolerances, temperatures, gains and each mode's
-    constant error, and what couples any two, can take of it. Linear, about the built spindle; sqrt(10) is worth 5 in ln evidence. Of the piece itself and of a hundredth of it times a
-    hundred the smaller: what moves peaks by many widths is no longer what small tolerances do, but a larger tolerance may do the same."""
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What a campaign can tell apart: lines (Hz), standard errors of every test's FRFs there, and the columns (N, k) of all that may stand in for a
+    change, each at one standard deviation: build tolerances, temperatures, gains and each mode's constant error, with what couples any two."""
+
+    frequency: Array
+    sd: tuple[Array, ...]
+    columns: Array
+
+    def whitened(self, moved: Sequence[ComplexArray]) -> Array:
+        """Changes of all tests' FRFs in standard errors (N,)."""
+        z = np.concatenate([(v / s).ravel() for v, s in zip(moved, self.sd, strict=True)])
+        return np.concatenate([z.real, z.imag]) * np.sqrt(2)
+
+    @cached_property
+    def _lower(self) -> Array:
+        return np.asarray(np.linalg.cholesky(np.eye(self.columns.shape[1]) + self.columns.T @ self.columns))
+
+    def inner(self, one: Array, other: Array) -> Array:
+        """Products (m, n) of changes (N, m) and (N, n) after all else has taken of them what it can."""
+        of_one, of_other = (np.linalg.solve(self._lower, self.columns.T @ c) for c in (one, other))
+        return np.asarray(one.T @ other - of_one.T @ of_other)
+
+
+def seen(made: Made, spindle: Spindle, lines: int = 160) -> Seen:
+    """The same of one campaign, linear, about the built spindle."""
     hammer = spindle.hammer
     frequency = np.linspace(*hammer.band, lines)
     plain = replace(made.world, stiffness_error=0.0, damping_error=0.0)
 
-    def all_tests(s: Spindle, hidden: Sequence[Hidden] = (), warmer: float = 0.0) -> list[ComplexArray]:
-        return [answer(s, Condition(p.temperature + warmer, p.speed), plain, hidden, p.place(spindle)).frf(frequency) for p in made.plans]
+    def all_tests(s: Spindle, warmer: float = 0.0) -> list[ComplexArray]:
+        return [answer(s, Condition(p.temperature + warmer, p.speed), plain, (), p.place(spindle)).frf(frequency) for p in made.plans]
 
     base = all_tests(made.built)
     dense = made.campaign.tests[0].frf.frequency.size / lines  # type: ignore[union-attr]
@@ -34,16 +59,16 @@ def visibility(made: Made, spindle: Spindle, lines: int = 160) -> list[float]:
         largest = np.abs(v).max(axis=(0, 2), keepdims=True)
         of_value = hammer.noise_of_value * (made.record.kind == "line")
         sd.append(made.record.times * np.sqrt((of_value * np.abs(v)) ** 2 + (hammer.noise_of_largest * largest) ** 2) / np.sqrt(dense))
+    found = Seen(frequency, tuple(sd), np.zeros((0, 0)))
 
     def column(values: Sequence[ComplexArray]) -> Array:
-        z = np.concatenate([((v - b) / s).ravel() for v, b, s in zip(values, base, sd, strict=True)])
-        return np.concatenate([z.real, z.imag]) * np.sqrt(2)
+        return found.whitened([v - b for v, b in zip(values, base, strict=True)])
 
     columns = []
     for parameter in toleranced(spindle):
         small = parameter.sd / 10
         columns.append(column(all_tests(parameter.apply(made.built, small))) * 10)
-    warm = all_tests(made.built, (), 0.02)
+    warm = all_tests(made.built, 0.02)
     for k in range(len(base)):
         columns.append(
             column([w if i == k else b for i, (w, b) in enumerate(zip(warm, base, strict=True))]) * spindle.tolerances.temperature / 0.02
@@ -54,15 +79,30 @@ def visibility(made: Made, spindle: Spindle, lines: int = 160) -> list[float]:
         for k in range(len(base)):
             columns.append(column([b * (1 + made.world.gain_drift * pick * (j == k)) for j, b in enumerate(base)]))
     columns += _modal_columns(made, column, frequency, plain, spindle)
-    a = np.array(columns).T
-    lower = np.linalg.cholesky(np.eye(a.shape[1]) + a.T @ a)
+    return replace(found, columns=np.array(columns).T)
+
+
+def change(made: Made, spindle: Spindle, of: Seen, h: Hidden, share: float, world: World) -> Array:
+    """What a `share` of one hidden piece does to all tests' FRFs in a `world`, over that share, in standard errors (N,)."""
+
+    def all_tests(hidden: Sequence[Hidden]) -> list[ComplexArray]:
+        return [
+            answer(made.built, Condition(p.temperature, p.speed), world, hidden, p.place(spindle)).frf(of.frequency) for p in made.plans
+        ]
+
+    moved = zip(all_tests([replace(h, size=share * h.size)]), all_tests([]), strict=True)
+    return of.whitened([(v - b) / share for v, b in moved])
+
+
+def visibility(made: Made, spindle: Spindle, of: Seen) -> list[float]:
+    """Of every hidden piece: its change of the FRFs in standard errors, after all that else may take of it; sqrt(10) is worth 5 in ln evidence.
+    Of the piece itself and of a hundredth of it times a hundred the smaller: what moves peaks by many widths is no longer what small
+    tolerances do, but a larger tolerance may do the same."""
+    plain = replace(made.world, stiffness_error=0.0, damping_error=0.0)
     found = []
     for h in made.hidden:
-        seen = []
-        for share in (1.0, 0.01):
-            d = column(all_tests(made.built, [replace(h, size=share * h.size)])) / share
-            seen.append(float(np.sqrt(max(d @ d - np.sum(np.linalg.solve(lower, a.T @ d) ** 2), 0.0))))
-        found.append(min(seen))
+        squares = [of.inner(d[:, None], d[:, None])[0, 0] for d in (change(made, spindle, of, h, share, plain) for share in (1.0, SMALL))]
+        found.append(float(np.sqrt(max(min(squares), 0.0))))
     return found
 
 

@@ -1,0 +1,113 @@
+"""Which effects of the catalogue could be what is hidden, by what they do and not by their names.
+
+Whoever wrote the hidden mechanisms did not know the effects, and named right answers by their names alone: some cannot do what is hidden (a film has
+no negative thickness), and others do the very same. So every effect, of whatever law (its size in each test its own, within its limits), is fitted to
+the change that a hidden piece makes of the FRFs, in the small and linear, in a world that is the model's own, beside all that tolerances can do. What is left of the change tells. This uses the
+effects of the catalogue, but nothing of the diagnosis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from typing import Any
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from tests.blind.campaigns import Made
+from tests.blind.visible import SMALL, Seen, change
+from tests.blind.world import Answer, World
+from thermospindle.diagnosis.forward.mechanism import Mechanism, strongest, variants, with_own_laws
+from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.types import Array, ComplexArray
+from thermospindle.sim.effects import CATALOGUE, usable
+from thermospindle.sim.operating import operating_point
+
+SAME = np.sqrt(10.0)  # standard errors, up to which what is left of a change cannot be told from nothing: 5 in ln evidence
+MOSTLY, NEARLY = 0.3, 0.1  # of a change, that a right answer may leave, and that any may which so is right
+TURNS = (-2.0, -1.0, 1.0, 2.0)  # prior standard deviations by which shape parameters are turned
+STEP = 0.02  # prior standard deviations of a size
+
+
+def right(made: Made, spindle: Spindle, of: Seen) -> list[list[str]]:
+    """Of every hidden piece the effects that are a right answer."""
+    changes = [change(made, spindle, of, h, SMALL, World()) for h in made.hidden]
+    wholes = [np.sqrt(of.inner(d[:, None], d[:, None])[0, 0]) for d in changes]
+    return [right_names(h.names, row, whole) for h, row, whole in zip(made.hidden, left(made, spindle, of, changes), wholes, strict=True)]
+
+
+def left(made: Made, spindle: Spindle, of: Seen, changes: Sequence[Array]) -> list[dict[str, float]]:
+    """What each effect leaves of `changes` (N,) each, in standard errors; of its variants the least."""
+    found: list[dict[str, float]] = [{} for _ in changes]
+    conditions = [Condition(p.temperature, p.speed) for p in made.plans]
+    base = [_frf(made.built, c, [], of) for c in conditions]
+    named = [v for e in usable(spindle, CATALOGUE) for v in variants(e)]
+    for m in [*named, *with_own_laws(named, spindle, strongest(spindle, conditions))]:
+        if not any(getattr(m.effect, hook) for hook in ("spindle", "temperatures", "motions", "pair", "chain", "measurement")):
+            continue
+        for shape in _shapes(m):
+            by_size, low, high = _by_size(made.built, m, shape, conditions, base, of)
+            for d, row in zip(changes, found, strict=True):
+                row[m.name] = min(row.get(m.name, np.inf), _least(of, d, by_size, low, high))
+    return found
+
+
+def right_names(intended: Sequence[str], left_by: dict[str, float], whole: float) -> list[str]:
+    """The effects that are a right answer to a change of `whole` standard errors, of those that do most of it: what leaves nothing that could be told, or
+    next to nothing; what its author had in mind (`intended`); and what comes nearer than the nearest of these."""
+    if whole < SAME:
+        return sorted(intended)  # too little to ask
+    most = {name: rest for name, rest in left_by.items() if rest < MOSTLY * whole}
+    nearest = min((rest for name, rest in most.items() if name in intended), default=0.0)
+    return sorted(name for name, rest in most.items() if rest < max(SAME, NEARLY * whole) or name in intended or rest <= nearest)
+
+
+def _shapes(m: Mechanism) -> list[list[float]]:
+    """Shape parameters as drawn and turned: all of them where there are two at most, else one by one."""
+    turned = [sorted({float(np.clip(q.neutral + turn * q.prior_sd, *q.limits)) for turn in TURNS} | {q.neutral}) for q in m.shape]
+    if len(turned) <= 2:
+        return [list(row) for row in product(*turned)]
+    neutral = [q.neutral for q in m.shape]
+    alone = [[*neutral[:k], at, *neutral[k + 1 :]] for k, row in enumerate(turned) for at in row if at != neutral[k]]
+    return [neutral, *alone]
+
+
+def _by_size(
+    built: Spindle, m: Mechanism, shape: list[float], conditions: Sequence[Condition], base: Sequence[ComplexArray], of: Seen
+) -> tuple[Array, Array, Array]:
+    """Changes (N, k) by one prior standard deviation of the size in each test, or in all at once of what lasts, and the limits (k,) of these."""
+    up = m.size.neutral + STEP * m.size.prior_sd <= m.size.limits[1]
+    step = STEP if up else -STEP
+    values = m.values(m.size.neutral + step * m.size.prior_sd, shape)
+    moved = []
+    for t, (condition, before) in enumerate(zip(conditions, base, strict=True)):
+        try:
+            after = _frf(built, condition, [(m.effect, values)], of)
+        except (ValueError, RuntimeError, ArithmeticError):
+            after = before
+        moved.append(of.whitened([(after - before) / step if k == t else np.zeros_like(b) for k, b in enumerate(base)]))
+    columns = np.array([np.sum(moved, axis=0)] if m.effect.lasting else moved).T
+    low, high = ((limit - m.size.neutral) / m.size.prior_sd for limit in m.size.limits)
+    return columns, np.full(columns.shape[1], low), np.full(columns.shape[1], high)
+
+
+def _frf(built: Spindle, condition: Condition, effects: list[tuple[Any, Any]], of: Seen) -> ComplexArray:
+    point = operating_point(built, condition, effects)
+    how = point.measurement
+    return Answer(point.linear, how.response_rows, how.reference_rows, how.gain, how.delay, how.decay, "").frf(of.frequency)
+
+
+def _least(of: Seen, d: Array, columns: Array, low: Array, high: Array) -> float:
+    """Standard errors left of a change `d` (N,) beside sizes within their limits."""
+    acting = columns.any(axis=0)
+    whole = float(of.inner(d[:, None], d[:, None])[0, 0])
+    if acting.any():
+        own = columns[:, acting]
+        square, cross = of.inner(own, own), of.inner(own, d[:, None])[:, 0]
+        scale = np.sqrt(np.maximum(np.diag(square), 1e-300))
+        lower = np.linalg.cholesky(square / scale[:, None] / scale[None, :] + 1e-9 * np.eye(len(scale)))
+        ends = (low[acting] * scale, np.maximum(high[acting] * scale, low[acting] * scale + 1e-12))
+        sizes = lsq_linear(lower.T, np.linalg.solve(lower, cross / scale), ends).x / scale
+        whole += float(sizes @ square @ sizes) - 2 * float(cross @ sizes)
+    return float(np.sqrt(max(whole, 0.0)))
