@@ -83,6 +83,7 @@ class RollerBearing:
     inner_body: str
     outer_body: str
     raceway_width: float | None = None  # m, as of a ball row
+    race_give: float = 0.0  # m/N: what the clearance opens by, both races together, by the sum of all contact loads
 
     @property
     def ball_diameter(self) -> float:

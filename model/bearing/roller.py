@@ -5,7 +5,8 @@ Palmgren's 3.84e-5 Q^0.9 / L^0.8 mm a contact; Harris, Rolling Bearing Analysis,
 it holds for other moduli too. Each roller is cut into slices that respond by themselves (the lamina model of ISO/TS 16281), which gives the
 moment against tilt; its ends are taken as straight to the edge. With centred rings each roller is pressed by half the negative clearance.
 
-Clearance follows the races and the rollers: c(T) = c0 + 2 (u_outer - u_inner) - 2 D strain_roller, u the races' radial motions.
+Clearance follows the races and the rollers: c(T) = c0 + 2 (u_outer - u_inner) - 2 D strain_roller, u the races' radial motions. Pressed
+rollers widen the outer race and narrow the inner one: c = c(T) + g sum(Q), g the races' give, with the loads of centred rings (rings stay round).
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from thermospindle.model.bearing.state import LinearState
 from thermospindle.model.machine import RingMotion, RollerBearing, Spindle
@@ -110,8 +112,17 @@ def roller_row(spindle: Spindle, b: RollerBearing, motion: RingMotion | None, te
     clearance = b.clearance
     if motion is not None:
         clearance += 2 * (motion.outer_r - motion.inner_r) - 2 * b.roller_diameter * motion.ball_strain
+    constant = line_constant(b.roller_length, 1 / softness)
+    clearance = eased(float(clearance), b.rows * b.rollers * constant, b.race_give)
     offsets = tuple(b.row_spacing * (k - (b.rows - 1) / 2) for k in range(b.rows))
-    return RollerRow(b.rollers, b.roller_length, line_constant(b.roller_length, 1 / softness), float(clearance), offsets)
+    return RollerRow(b.rollers, b.roller_length, constant, clearance, offsets)
+
+
+def eased(clearance: float, constant: float, give: float) -> float:
+    """Clearance (m) c = clearance + give constant (-c / 2)^(10/9) of rollers pressed between races that give; `constant` (N/m^(10/9)) of all rollers."""
+    if clearance >= 0 or give == 0.0:
+        return clearance
+    return float(scipy.optimize.brentq(lambda c: c - clearance - give * constant * (-c / 2) ** EXPONENT, clearance, 0.0, xtol=1e-15, rtol=1e-12))
 
 
 def roller_state(

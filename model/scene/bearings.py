@@ -112,6 +112,7 @@ class Bearing(Table):
     inner_body: str | None = None
     outer_body: str | None = None
     rated_radial_stiffness_N_per_um: Positive | None = None
+    race_give_um_per_kN: Annotated[float, Field(ge=0, le=1000)] | None = None
     numbers: Numbers | None = None
 
     @model_validator(mode="after")
@@ -119,7 +120,7 @@ class Bearing(Table):
         if (self.row is None) == (self.numbers is None):
             raise ValueError("a bearing has either row, the name of its ball row or roller row, or numbers, a table of its stiffness")
         if self.row is None:
-            for key in ("inner_ring", "outer_ring", "raceway_width_mm", "sense", "rated_radial_stiffness_N_per_um"):
+            for key in ("inner_ring", "outer_ring", "raceway_width_mm", "sense", "rated_radial_stiffness_N_per_um", "race_give_um_per_kN"):
                 if getattr(self, key) is not None:
                     raise ValueError(f"{key} is for a ball row; a bearing given by numbers has none")
         return self
@@ -129,6 +130,8 @@ class Bearing(Table):
         for key in ("inner_ring", "outer_ring") if balls else ():
             if getattr(self, key) is None:
                 raise ValueError(f"{key} is missing; a ball row lies between two rings of the section")
+        if balls and self.race_give_um_per_kN is not None:
+            raise ValueError("race_give_um_per_kN is for a roller row, whose clearance opens as its races give under the rollers' loads")
         for key in () if balls else ("sense", "rated_radial_stiffness_N_per_um"):
             if getattr(self, key) is not None:
                 raise ValueError(f"{key} is for a ball row; rollers carry nothing along the axis and compute their own stiffness")
@@ -155,6 +158,7 @@ class Bearing(Table):
             inner_body=inner_body,
             outer_body=outer_body,
             raceway_width=None if self.raceway_width_mm is None else self.raceway_width_mm * MM,
+            race_give=(self.race_give_um_per_kN or 0.0) * 1e-9,
         )
 
     def bearing(self, name: str, rows: Mapping[str, BallRow], sense: int, mounted: Mounted) -> m.Bearing:

@@ -263,6 +263,7 @@ REFUSED = [
     (lambda r: r["roller_rows"]["above"].update(row_spacing_mm=2.0), "row_spacing_mm is for several rows"),
     (lambda r: r["roller_rows"]["above"].update(roller_material="brass"), "roller_material = 'brass': allowed are aluminium, steel"),
     (lambda r: r["roller_rows"]["above"].update(roller_diameter_mm=1.2), "the raceways leave 1.597 mm for rollers of roller_diameter_mm = 1.2"),
+    (lambda r: r["bearings"]["lower"].update(race_give_um_per_kN=0.1), "bearings.lower: race_give_um_per_kN is for a roller row"),
     (lambda r: r["bearings"]["upper"].update(sense="+z"), "bearings.upper: sense is for a ball row"),
     (lambda r: r["bearings"]["upper"].pop("inner_ring"), "inner_ring and outer_ring go together"),
     (lambda r: r["bearings"]["upper"].update(outer_ring="nose"), "outside its ring 'nose'"),
