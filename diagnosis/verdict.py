@@ -12,8 +12,9 @@ from thermospindle.diagnosis.data.lines import line_data
 from thermospindle.diagnosis.data.mode_table import mode_data
 from thermospindle.diagnosis.data.observe import condition_of
 from thermospindle.diagnosis.decision.verdict import Verdict, decide
+from thermospindle.diagnosis.forward.making import campaign_model, expected_noise
 from thermospindle.diagnosis.forward.mechanism import Mechanism, strongest, variants
-from thermospindle.diagnosis.forward.model import CampaignModel, TestData, campaign_model, expected_noise
+from thermospindle.diagnosis.forward.model import CampaignModel, TestData
 from thermospindle.diagnosis.inference.detectable import smallest, unseen_beside
 from thermospindle.diagnosis.inference.freeform import free_forms
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis

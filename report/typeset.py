@@ -24,9 +24,14 @@ def minus(text: str) -> str:
     return re.sub(r"(?<=\d) (?=(%|Hz|N|°C)\b|%)", "\u00a0", re.sub(r"(?<![\w-])-(?=\d)", "−", text))
 
 
+def micro(text: str) -> str:
+    """The letter of micrometres and microseconds, after a number or a slash."""
+    return re.sub(r"(?<=\d[ \u00a0])u(?=[ms]\b)|(?<=/)u(?=m\b)", "µ", text)
+
+
 def prose(text: str) -> str:
-    """Plain words of the terminal as HTML: escaped, with true minus, plus-minus, arrow and degrees."""
-    return minus(re.sub(r"(?<=\d) C\b", " °C", str(escape(text)))).replace("+-", "±").replace("-&gt;", "→")
+    """Plain words of the terminal as HTML: escaped, with true minus, plus-minus, arrow, degrees and micro."""
+    return minus(micro(re.sub(r"(?<=\d) C\b", " °C", str(escape(text))))).replace("+-", "±").replace("-&gt;", "→")
 
 
 def signed(value: float, digits: int = 1) -> str:

@@ -11,7 +11,8 @@ from thermospindle.diagnosis.data.lines import line_data
 from thermospindle.diagnosis.data.mode_table import mode_data
 from thermospindle.diagnosis.data.observe import condition_of
 from thermospindle.diagnosis.forward import nuisance
-from thermospindle.diagnosis.forward.model import CampaignModel, campaign_model, expected_noise
+from thermospindle.diagnosis.forward.making import campaign_model, expected_noise
+from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.tolerance import toleranced
 from thermospindle.model.types import Array, ComplexArray

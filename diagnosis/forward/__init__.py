@@ -8,6 +8,8 @@ response   FRFs at the lines of a test, with what their derivatives need
 record     what records that end too early leave out of them
 table      poles and their derivatives for a table of modes
 rates      how the matrices change with tolerances, temperature and ring expansion
+points     operating points that differ in the measuring chain alone, or in how far the rings expand
 model      residuals of every test in standard errors, and their derivatives
+making     the model of a campaign made: scenes, tolerances, nuisance parameters
 =========  ========================================================================================================
 """

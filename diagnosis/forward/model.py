@@ -17,26 +17,21 @@ from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.mode_table import ModeData
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.linear import Linear, Products, Rates, pairs, products, same_chain, together
-from thermospindle.diagnosis.forward.nuisance import Nuisance, ReferenceModes, Resonance, nuisances, reference_modes
+from thermospindle.diagnosis.forward.nuisance import Nuisance, ReferenceModes, Resonance
+from thermospindle.diagnosis.forward.points import Applied, replace_measuring, stretched
 from thermospindle.diagnosis.forward.response import Light, Response
 from thermospindle.diagnosis.forward.table import Table
 from thermospindle.model.errors import NoEquilibrium, OutsideRange
-from thermospindle.model.machine import Condition, RingMotion, Spindle
+from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import Matrices, matrices
-from thermospindle.model.tolerance import Toleranced, toleranced
+from thermospindle.model.tolerance import Toleranced
 from thermospindle.model.types import Array, ComplexArray, Integers
-from thermospindle.sim.campaign.beside import measured_at
-from thermospindle.sim.campaign.campaign import Campaign, Noise
-from thermospindle.sim.effects import of_scene
-from thermospindle.sim.effects.effect import HOOKS, Effect, Values
+from thermospindle.sim.effects.effect import HOOKS
 from thermospindle.sim.operating import OperatingPoint, operating_point
 
-Applied = Sequence[tuple[Effect, Values]]
 TestData = LineData | ModeData
 Discrepancies = tuple[Integers, Integers, Integers, Array]
 
-MOST_MODES = 16  # of the discrepancy's basis
-IN_BAND, BEYOND = 1.15, 2.2  # of the highest line: modes that are seen, and modes beyond that still lend them some of their shape
 THIN, ENOUGH_LINES = 4, 30  # lines left out of a thinned model, and how many of a test it keeps at least
 MEASURING = frozenset(HOOKS) - {"measurement"}
 FAILED = (NoEquilibrium, OutsideRange, ValueError, RuntimeError, ZeroDivisionError, FloatingPointError, np.linalg.LinAlgError)
@@ -146,7 +141,7 @@ class CampaignModel:
             warmer = float(x[self.temperature[t]]) * self.parameters[self.temperature[t]].sd
             condition = replace(test.condition, temperature=test.condition.temperature + warmer)
             stretch = [1 + float(x[i]) * self.parameters[i].sd for i in self.expansion]
-            every = [_stretched(*stretch), *self.present, *effects] if x[self.expansion].any() else [*self.present, *effects]
+            every = [stretched(*stretch), *self.present, *effects] if x[self.expansion].any() else [*self.present, *effects]
             late = self._points[key] = operating_point(self._built(t, x), condition, every)
             late.chain  # noqa: B018 - worked out here, so that errors come here
             return late
@@ -336,52 +331,8 @@ class CampaignModel:
         return [end.bearings is self.spindle.bearings and end.sets is self.spindle.sets for end in ends]
 
 
-def replace_measuring(point: OperatingPoint, effects: Applied) -> OperatingPoint:
-    """The same point under another list of effects that differs in the measuring chain alone; its chain and matrices are kept."""
-    if tuple(effects) == point.effects:
-        return point
-    other = replace(point, effects=tuple(effects))
-    other.__dict__["chain"] = point.chain
-    if "_bare" in point.__dict__:
-        other.__dict__["_bare"] = point.__dict__["_bare"]
-    return other
-
-
-def _stretched(radial: float, axial: float, grooves: float) -> tuple[Effect, Values]:
-    """Thermal ring motions times a factor each, in radius, along the axis, and of grooves."""
-    factors = {"inner_r": radial, "outer_r": radial, "inner_z": axial, "outer_z": axial, "inner_strain": grooves, "outer_strain": grooves}
-
-    def motions(spindle: Spindle, condition: Condition, values: Values, by_bearing: dict[str, RingMotion]) -> dict[str, RingMotion]:
-        return {b: replace(m, **{k: f * getattr(m, k) for k, f in factors.items()}) for b, m in by_bearing.items()}
-
-    return Effect("expansion", "", "", (), "", (), "", motions=motions), {}
-
-
 def _thin(data: LineData) -> LineData:
     lines = data.value.shape[-1]
     own = slice(THIN // 2, None, THIN) if lines >= ENOUGH_LINES * THIN else slice(None)
     share = np.sqrt(lines / max(data.value[:, :, own].shape[-1], 1)) or 1.0
     return replace(data, frequency=data.frequency[own], value=data.value[:, :, own], sd=data.sd[:, :, own] / share)
-
-
-# ---------------------------------------------------------------- making one
-
-
-def campaign_model(spindle: Spindle, campaign: Campaign, tests: Sequence[TestData]) -> CampaignModel:
-    """The model of a campaign whose tests are `tests`."""
-    scenes = tuple(measured_at(spindle, campaign.points, d.test.frf) for d in tests)
-    present = tuple(of_scene(spindle))
-    reference = matrices(operating_point(spindle, Condition(spindle.reference_temperature), present).chain)
-    highest = max(float(d.frequency.max()) for d in tests)
-    modes = reference_modes(reference, 2 * np.pi * IN_BAND * highest, 2 * np.pi * BEYOND * highest, MOST_MODES)
-    build = tuple(toleranced(spindle))
-    lines = [d for d in tests if isinstance(d, LineData)]
-    channels = max((d.value.shape[0] for d in lines), default=0)
-    names = [d.test.id for d in tests]
-    parameters = nuisances(spindle, build, names, bool(lines), channels, modes)
-    return CampaignModel(spindle, tuple(tests), scenes, build, parameters, modes, present)
-
-
-def expected_noise(spindle: Spindle) -> Noise:
-    """The scene's own measuring accuracy."""
-    return Noise(spindle.hammer.noise_of_value, spindle.hammer.noise_of_largest)

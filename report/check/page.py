@@ -13,7 +13,7 @@ from thermospindle.report.check.drawing import drawing
 from thermospindle.report.check.words import grids, sentences
 from thermospindle.report.figures.common import STYLE, save, svg
 from thermospindle.report.page.report import page
-from thermospindle.report.typeset import figure, minus, prose, table
+from thermospindle.report.typeset import figure, micro, minus, prose, table
 from thermospindle.sim.operating import OperatingPoint
 
 CAPTION = (
@@ -30,7 +30,7 @@ def write_check(point: OperatingPoint, values: Mapping[str, Any], folder: Path) 
     odd = "".join(f"<li>{prose(words)}</li>" for words in values["odd"])
     assumed = [[escape(a["key"]), prose(a["what"])] for a in values["assumed"]]
     tables = "".join(
-        table(head, [[minus(escape(cell)) for cell in row] for row in rows], [k for k, h in enumerate(head) if _words(rows, k)], escape(title))
+        table([micro(h) for h in head], [[minus(escape(cell)) for cell in row] for row in rows], [k for k, h in enumerate(head) if _words(rows, k)], escape(title))
         for title, head, rows in grids(values)
     )
     sections = [

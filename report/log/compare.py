@@ -20,7 +20,7 @@ from thermospindle.model.types import ComplexArray
 from thermospindle.model.units import RPM
 from thermospindle.report.log.blueprint import at
 from thermospindle.report.log.columns import any_values, curve_look, log_curve, log_frf_numbers, log_peak_numbers, over_frequency, whole_log
-from thermospindle.report.log.content import Pair, Peak, decibel
+from thermospindle.report.log.content import Pair, Peak, decibel, level_ends
 from thermospindle.report.log.drawing import heat
 from thermospindle.report.typeset import UNITS
 from thermospindle.sim.campaign.campaign import Test
@@ -134,7 +134,6 @@ def _view(t: FrfsBeside, pair: Pair) -> rrb.View:
     frf = t.measured
     value = np.array([v[frf.response_nodes.index(pair[0]), frf.reference_nodes.index(pair[1])] for v in (frf.value, t.computed)])
     level = decibel(value[value != 0]) if np.any(value) else np.zeros(1)  # one of the two may be nothing: by symmetry, or a channel that was off
-    low, high = (float(v) for v in np.percentile(level, [0.5, 100]))
     ends = [rr.TimeRangeBoundary.absolute(seq=round(f)) for f in (frf.frequency[0], frf.frequency[-1])]
     speed = f", {t.test.speed / RPM:.0f} rpm" if t.test.speed else ""
     unit = UNITS[frf.quantity]
@@ -142,6 +141,6 @@ def _view(t: FrfsBeside, pair: Pair) -> rrb.View:
         origin=_place(t.test, pair, "level"),
         name=f"{t.test.temperature:g} °C{speed}: H({pair[0]},{pair[1]}), computed grey, dB re 1 {unit} over Hz (#)",
         axis_x=rrb.TimeAxis(view_range=rr.TimeRange(*ends)),
-        axis_y=rrb.ScalarAxis(range=(10 * np.floor(low / 10) - 5, 10 * np.ceil(high / 10))),
+        axis_y=rrb.ScalarAxis(range=level_ends(level)),
         plot_legend=rrb.PlotLegend(visible=False),
     )

@@ -182,7 +182,7 @@ def shown(run: Run) -> Shown:
         tuple(peaks(run)),
         tuple(run.steps[0].point.modes[i] for i in in_band(run.steps[0])),
         pairs,
-        (float(10 * np.floor(np.percentile(level, 0.5) / 10) - 10), float(10 * np.ceil(level.max() / 10))),
+        level_ends(level),
         (int(np.floor(low)), int(np.ceil(high))),
         max(round((high - low) / FRAMES), 1),
     )
@@ -207,3 +207,8 @@ def one(array: Array, frf: Frf, pair: Pair) -> Array:
 def decibel(value: Array) -> Array:
     """20 log10 |value|, of zero -300."""
     return 20 * np.log10(np.maximum(np.abs(value), 1e-15))
+
+
+def level_ends(level: Array) -> tuple[float, float]:
+    """Ends of an axis for levels (dB), in tens: with room above the highest peak for its mark, and without the few deepest lines."""
+    return float(10 * np.floor(np.percentile(level, 0.5) / 10) - 5), float(10 * np.ceil((level.max() + 3) / 10))

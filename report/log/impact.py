@@ -94,7 +94,7 @@ def _blueprint(content: Shown) -> rrb.Blueprint:
         row_shares=[1.2, 1],
     )
     left = rrb.Grid(*model_views(content), grid_columns=2)
-    overview = rrb.Horizontal(left, frfs_below_key(content), right, column_shares=[1.1, 1.45, 1.05], name="Overview")
+    overview = rrb.Horizontal(left, frfs_below_key(content), right, column_shares=[1.25, 1.4, 1.05], name="Overview")
     return sweeping(content, overview, _frf_tab(content), _record_tab(content))
 
 

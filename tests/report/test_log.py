@@ -270,6 +270,11 @@ def test_key_and_small_charts_hold_all_there_is() -> None:
 # ---------------------------------------------------------------- files
 
 
+@pytest.mark.parametrize(("highest", "top"), [(-20.4, -10.0), (-23.5, -20.0), (-29.9, -20.0)])
+def test_the_highest_peak_has_room_for_its_mark(highest, top):
+    assert log_content.level_ends(np.linspace(-58.0, highest, 1000)) == (-65.0, top)
+
+
 def test_nothing_half_written(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "run.rrd"
     path.write_bytes(b"the old one")

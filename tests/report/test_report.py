@@ -204,13 +204,19 @@ def test_same_run_same_file_written_whole(run: Run, text: str, tmp_path: Path):
     assert path.read_text(encoding="utf-8") == text
 
 
-def test_extra_sections(run: Run):
+@pytest.fixture(scope="module")
+def alone(run: Run) -> str:
+    """One temperature of a scene without file and measurements, with two sections more."""
+    spindle = replace(run.spindle, file=None)
+    return html(Run(spindle, run.steps[:1], ()), [("Runout <&>", '<p id="runout">1 &lt; 2</p>'), ("Diagnosis", "<p>none</p>")])
+
+
+def test_extra_sections(alone: str):
     """Stand in the given order between results and background; their HTML is kept, their titles are escaped."""
-    made = html(replace(run, steps=run.steps[:1]), [("Runout <&>", '<p id="runout">1 &lt; 2</p>'), ("Diagnosis", "<p>none</p>")])
-    titles = re.findall(r"<h2>(.*?)</h2>", made)
+    titles = re.findall(r"<h2>(.*?)</h2>", alone)
     place = titles.index("Runout &lt;&amp;&gt;")
     assert titles[place - 1 : place + 3] == ["All modes", "Runout &lt;&amp;&gt;", "Diagnosis", "The virtual test"]
-    assert '<p id="runout">1 &lt; 2</p>' in made
+    assert '<p id="runout">1 &lt; 2</p>' in alone
 
 
 def test_title_command_and_date(run: Run, text: str, tmp_path: Path):
@@ -228,10 +234,9 @@ def test_title_command_and_date(run: Run, text: str, tmp_path: Path):
 # ---------------------------------------------------------------- other scenes, temperatures, measurements
 
 
-@pytest.mark.parametrize("chosen", [slice(0, 1), slice(0, 2)], ids=["one temperature", "two"])
-def test_without_measurements_or_file(run: Run, chosen: slice):
-    spindle = replace(run.spindle, file=None)
-    page = Page(html(Run(spindle, run.steps[chosen], ())))
+@pytest.mark.parametrize("temperatures", [1, 2])
+def test_without_measurements_or_file(run: Run, alone: str, temperatures: int):
+    page = Page(alone if temperatures == 1 else html(Run(replace(run.spindle, file=None), run.steps, ())))
     rows = [row for row in page.tables["frequencies"] if row and row[0].isdigit()]
     assert len(rows) == 8
     assert "misses" not in page.tables

@@ -1,0 +1,41 @@
+"""The model of a campaign made: its scenes, tolerances, nuisance parameters and the basis of its discrepancy."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from thermospindle.diagnosis.data.lines import LineData
+from thermospindle.diagnosis.forward.model import CampaignModel, TestData
+from thermospindle.diagnosis.forward.nuisance import nuisances, reference_modes
+from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.rotor.chain import matrices
+from thermospindle.model.tolerance import toleranced
+from thermospindle.sim.campaign.beside import measured_at
+from thermospindle.sim.campaign.campaign import Campaign, Noise
+from thermospindle.sim.effects import of_scene
+from thermospindle.sim.operating import operating_point
+
+MOST_MODES = 16  # of the discrepancy's basis
+IN_BAND, BEYOND = 1.15, 2.2  # of the highest line: modes that are seen, and modes beyond that still lend them some of their shape
+
+
+def campaign_model(spindle: Spindle, campaign: Campaign, tests: Sequence[TestData]) -> CampaignModel:
+    """The model of a campaign whose tests are `tests`."""
+    scenes = tuple(measured_at(spindle, campaign.points, d.test.frf) for d in tests)
+    present = tuple(of_scene(spindle))
+    reference = matrices(operating_point(spindle, Condition(spindle.reference_temperature), present).chain)
+    highest = max(float(d.frequency.max()) for d in tests)
+    modes = reference_modes(reference, 2 * np.pi * IN_BAND * highest, 2 * np.pi * BEYOND * highest, MOST_MODES)
+    build = tuple(toleranced(spindle))
+    lines = [d for d in tests if isinstance(d, LineData)]
+    channels = max((d.value.shape[0] for d in lines), default=0)
+    names = [d.test.id for d in tests]
+    parameters = nuisances(spindle, build, names, bool(lines), channels, modes)
+    return CampaignModel(spindle, tuple(tests), scenes, build, parameters, modes, present)
+
+
+def expected_noise(spindle: Spindle) -> Noise:
+    """The scene's own measuring accuracy."""
+    return Noise(spindle.hammer.noise_of_value, spindle.hammer.noise_of_largest)
