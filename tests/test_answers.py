@@ -51,7 +51,6 @@ QUICK: dict[str, tuple[list[object], list[str]]] = {
     "impact": (["impact", "MADE/short", "--hits", 1], ["impact"]),
     "simulate": (["simulate", "MADE/short", "--temperatures", 20, "--hits", 1, "--out", "OUT"], ["simulate"]),
     "runout": (["runout", SCENE, "--path", "linear", "--seconds", 0.2], ["runout"]),
-    "warmup": (["warmup", SCENE, "--speed", 3600, "--minutes", 2], ["warmup"]),
     "map": (["map", SCENE, "--temperatures", 20, 26, "--speeds", 3600, 7200], ["map"]),
     "new": (["new", "mine", "--like", "hdd", "--out", "OUT"], ["new"]),
     "add": (["add", SCENE, "unbalance", "--out", "OUT"], ["add"]),
@@ -97,13 +96,13 @@ def keys_of(capsys, *arguments: str) -> set[str]:
     ],
     ids=["run", "map", "runout", "impact", "warm-up"],
 )
-def test_inspect_answers_by_what_a_log_holds(words, log, form, made, tmp_path, capsys) -> None:
-    say(*(str(w).replace("MADE", str(made)) for w in words), "--out", tmp_path / "out")
+def test_verbs_that_write_logs_answer_and_inspect_by_what_a_log_holds(words, log, form, made, tmp_path, capsys) -> None:
+    assert keys_of(capsys, *(str(w).replace("MADE", str(made)) for w in words), "--out", str(tmp_path / "out")) == {"warnings", *ANSWERS[words[0]]}
     assert keys_of(capsys, "inspect", str(tmp_path / "out" / log)) == {"warnings", *ANSWERS[form]}
 
 
 def test_every_verb_is_told_and_tried() -> None:
     _, verbs = _parser()
     assert {form.partition(",")[0] for form in ANSWERS} == set(verbs)
-    tried = {str(words[0]) for words, _ in (QUICK | LONG).values()} | {"inspect"}
+    tried = {str(words[0]) for words, _ in (QUICK | LONG).values()} | {"inspect", "warmup"}
     assert tried | SERVED == set(verbs)
