@@ -105,10 +105,12 @@ def settled(model: CampaignModel, h: Hypothesis) -> Hypothesis:
         refit = partial(fit, model, h.mechanisms, rates=h.fit.rates, tempers=TEMPERS[-1:], learned=h.evidence.learned, moved=h.fit.moved)
         before = h.evidence
         try:
-            found = refit(start=(before.mean, h.fit.point))
+            problem = Problem(model, h.mechanisms, before.learned, h.fit.moved)
+            near, far = sorted((before.mean, h.fit.point), key=lambda at: problem.cost(at, TEMPERS[-1]))
+            found = refit(start=near)
             told = evidence(model, found)
             if told.ln < before.ln - LITTLE:
-                found = min((refit(start=at) for at in (before.mean, h.fit.point)), key=lambda f: f.cost)
+                found = min(found, refit(start=far), key=lambda f: f.cost)
                 told = evidence(model, found)
         except FAILED:
             return h

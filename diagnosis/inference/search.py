@@ -244,8 +244,9 @@ def _chosen(rankings: Sequence[Sequence[Screened]], strained: bool) -> list[Scre
         followed = []
         for looked in rankings:
             ranked = promising(looked, kind)
-            least = -LITTLE if strained or not ranked else max(-LITTLE, ranked[0].gain - CLOSE)
-            followed.append([s for s in ranked if s.gain > least or s is ranked[0]])
+            rivals = [s.gain for s in (*ranked, *(promising(looked, "law") if kind == "own law" else ()))]
+            least = -LITTLE if strained else max([-LITTLE, *(gain - CLOSE for gain in rivals)])
+            followed.append([s for s in ranked if s.gain > least or (s is ranked[0] and kind != "own law")])
         chosen: dict[str, Screened] = {}
         for s in filter(None, chain.from_iterable(zip_longest(*followed))):
             if len(chosen) < most:
