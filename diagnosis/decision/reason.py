@@ -15,6 +15,7 @@ from thermospindle.diagnosis.inference.search import Search
 
 UNTOLD = "nothing tried"  # what explains data that are missed grossly
 LEFT = "what is left"  # that changes, and tells of something else
+UNCONFIRMED = "what does not predict"  # conditions left out
 NUMERICS = (1e-4, 0.01)  # drift of frequencies and of damping that two honest programs may differ by
 
 
@@ -27,6 +28,10 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
         constant = f", the model's frequencies being constantly wrong by about {wrong:.1g} of each{which}" if wrong > NUMERICS[0] else ""
         return f"Tolerances and measuring errors explain the data: chi2 is {chi2 / n:.2f} a number for {n} numbers{constant}{best}."
     lead = candidates[0] if candidates else None
+    if word == "unexplained" and free and free[0].names == (UNCONFIRMED,):
+        drifting = next((c for c in free if c.hypothesis.mechanisms), None)
+        drifts = f"; {' and '.join(drifting.names)} would have to drift ({drifting.delta_evidence:.0f} in ln evidence)" if drifting else ""
+        return f"Something changes that no effect of the catalogue explains (chi2 without effects: {chi2 / n:.2f} a number){drifts}."
     if word == "unexplained":
         place = "nothing tried explains them, nor do tolerances and measuring errors: units, points, and noise that the files do not tell come first"
         if free and free[0].names == (LEFT,):
@@ -50,7 +55,6 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
         share = sum(c.probability for c in rows)
         several = ", or several of them together," if any(len(c.names) > 1 and c.probability > NEGLIGIBLE for c in rows) else ""
         return f"One of {', '.join(effects)}{several} explains the data (together {share:.0%} probable); no one of them is probable enough to be named{checked}."
-    disagreement = ", which does not confirm it" if after > 0.9 * before else ""
     told = [c for c in (*candidates, *free) if set(named_part(c)) == set(effects)]
     chosen = max(told, key=lambda c: c.probability)
     without, within = (h.evidence.learned.sizes.get(kinds_of.STIFFNESS, 0.0) for h in (found.base, chosen.hypothesis))
@@ -64,7 +68,13 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
     before_own = f", {chosen.by_law.evidence.ln - found.base.evidence.ln:.0f} with the law assumed" if chosen.by_law else ""
     whose = f" of {' and '.join(own)}" if len(effects) > 1 else ""
     law = f" with a law of the data's own{whose}{before_own}" if own else ""
-    return f"{named} {word_of}: {chosen.delta_evidence:.0f} in ln evidence over the model without effects{law}, {odds}{beside}{instead}{checked}{disagreement}."
+    return f"{named} {word_of}: {chosen.delta_evidence:.0f} in ln evidence over the model without effects{law}, {odds}{beside}{instead}{checked}."
+
+
+def of_what_does_not_predict(effects: Names, before: float, after: float) -> str:
+    """Of a leading explanation, why it is not the answer."""
+    named, they = " + ".join(effects), "leads" if len(effects) == 1 else "lead"
+    return f"{named} {they}, but conditions left out are predicted with {after:.2f} standard errors, {before:.2f} without: no better, so that is not it. "
 
 
 def _impossible(found: Search, drifting: Names) -> str:
