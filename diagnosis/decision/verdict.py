@@ -91,10 +91,11 @@ def _unheld(
 
 
 def _refuted(h: Hypothesis, before: float, after: float) -> bool:
-    """Whether an explanation predicts conditions left out no better than the model without it, which mispredicts them. What is the same in every test is not
-    asked: constant errors of the modes stand in for it there."""
+    """Whether an explanation by laws predicts conditions left out no better than the model without it, which mispredicts them. Not asked is what is the
+    same in every test, where constant errors of the modes stand in for it, and what has no law to go by but the data's own."""
     same = all(m.effect.lasting or not any(getattr(m.effect, hook) for hook in MEASURING) for m in h.mechanisms)
-    return not same and before > MISPREDICTED and after > CONFIRMED * before
+    lawful = all(m.kind == "law" for m in h.mechanisms)
+    return lawful and not same and before > MISPREDICTED and after > CONFIRMED * before
 
 
 def _unconfirmed(

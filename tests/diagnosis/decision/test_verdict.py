@@ -228,6 +228,7 @@ HELD_OUT = {
     "better": (10.0, 8.0, {}, "identified"),
     "nothing to predict": (1.1, 1.1, {}, "identified"),
     "one condition": (np.nan, np.nan, {}, "identified"),
+    "a law of the data's own": (10.0, 9.5, {"own_law": True}, "identified"),
     "a mass": (10.0, 9.5, {"lasting": True}, "identified"),
     "a sensor": (10.0, 9.5, {"chain": None, "measurement": lambda *state: state[-1]}, "identified"),
 }
@@ -240,7 +241,9 @@ def test_an_effect_that_does_not_predict_conditions_left_out_is_not_named(case, 
     found = made({"a": 60.0, "b": 20.0, "~x": 30.0})
 
     def acting(h: Hypothesis) -> Hypothesis:
-        effects = [replace(m, effect=replace(m.effect, **{"chain": lambda *state: state[-1]} | hooks)) for m in h.mechanisms]
+        own = {"own_law": hooks.get("own_law", False)}
+        of_effect = {"chain": lambda *state: state[-1]} | {k: v for k, v in hooks.items() if k not in own}
+        effects = [replace(m, effect=replace(m.effect, **of_effect), **own) for m in h.mechanisms]
         return replace(h, fit=replace(h.fit, mechanisms=tuple(effects)))
 
     hypotheses = tuple(map(acting, found.hypotheses))
