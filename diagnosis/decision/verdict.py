@@ -21,7 +21,7 @@ from thermospindle.diagnosis.inference.search import Search
 
 GROSS = 25.0  # chi2 a number, five times the errors, from which nothing has explained the data whatever else explains them no better
 MUCH = 0.5  # squares of the errors, from which what is left and changes tells of something else
-MISPREDICTED, CONFIRMED = 1.2, 0.9  # standard errors on conditions left out, that a model mispredicts, and the share of them that an effect may leave of it
+MISPREDICTED, CONFIRMED = 2.0, 0.9  # standard errors on conditions left out, that a model mispredicts, and the share of them that an effect may leave of it
 SURE = 5.0  # standard deviations of chi2 by chance, beyond which something is left
 
 

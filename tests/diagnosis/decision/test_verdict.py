@@ -226,7 +226,7 @@ HELD_OUT = {
     "no better": (10.0, 9.5, {}, "unexplained"),
     "worse": (10.0, 25.0, {}, "unexplained"),
     "better": (10.0, 8.0, {}, "identified"),
-    "nothing to predict": (1.1, 1.1, {}, "identified"),
+    "little to predict": (1.9, 1.9, {}, "identified"),
     "one condition": (np.nan, np.nan, {}, "identified"),
     "a law of the data's own": (10.0, 9.5, {"own_law": True}, "identified"),
     "a mass": (10.0, 9.5, {"lasting": True}, "identified"),
