@@ -15,7 +15,7 @@ from thermospindle.model.errors import BadInput, NoEquilibrium, NotConverged, Ou
 if os.name == "nt":  # alarms, pipes and limits of memory are not there
     collect_ignore_glob = ["test_*.py"]
 EXAMPLES = int(os.environ.get("TORTURE_EXAMPLES", "0"))
-FEW, WAIT, BYTES = 6, 300, 8 << 30
+FEW, WAIT, BYTES = 6, 300, 16 << 30  # of addresses: a fine mesh's factors reserve 11 GB and use 2
 NAMED = (BadInput, NoEquilibrium, NotConverged, OutsideRange)
 COUNTS: dict[str, Counter] = {}
 
