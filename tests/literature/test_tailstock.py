@@ -129,6 +129,7 @@ def test_the_nose_by_the_force_method(tail, cold):
     assert nose.reactions["front1"] < -1  # as a lever: more than the force itself
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("standing", "alpha"), [("steel", ALPHA), ("cast iron", ALPHA_IRON)])
 def test_the_clearance_of_whole_parts_over_temperature(stiff, standing, alpha):
     """What turns is one steel and what stands one material: every radius grows by its own alpha dT, 50 mm outside, 41 and twice 4.5 mm inside."""
