@@ -195,11 +195,12 @@ def _text(name: str, place: Mapping[str, Any], ranked: Sequence[Fitted], top: fl
     step = best.law.expression.startswith("where")
     effect = place.get("effect")  # of the catalogue, with a law of the data's own
     shape = list(zip(best.law.shape, best.values[2:], best.sd[2:], strict=True))
+    of_unit = "" if unit == "1" else f" {unit}"
     lines = [
         f'"""{place["element"]} drifts: {best.law.name}. Drafted by `spindle draft` from {diagnosis.name}; name it, read it, edit it.',
         "",
-        f"change = size * ({best.law.expression} + constant) in {unit}, T in C, n = speed / {top:g} rpm.",
-        f"size {size:.4g} +- {best.sd[0]:.2g} {unit}; what is there everywhere {offset:.4g} +- {best.sd[1]:.2g} {unit}"
+        f"change = size * ({best.law.expression} + constant){of_unit and f' in{of_unit}'}, T in C, n = speed / {top:g} rpm.",
+        f"size {size:.4g} +- {best.sd[0]:.2g}{of_unit}; what is there everywhere {offset:.4g} +- {best.sd[1]:.2g}{of_unit}"
         + "".join(f", {s[0]} {v:.4g} +- {e:.2g} {s[1]}" for s, v, e in shape)
         + ".",
         *([f"Per cent of a logarithm: {place['element']} is exp(change / 100) of what it was."] if unit == "%" and effect is None else []),
@@ -215,7 +216,7 @@ def _text(name: str, place: Mapping[str, Any], ranked: Sequence[Fitted], top: fl
         "",
         "",
         "def law(T, rpm, values):",
-        f'    """Change of {place["element"]} in {unit} at temperature T (C) and speed (rpm)."""',
+        f'    """Change of {place["element"]}{of_unit and f" in{of_unit}"} at temperature T (C) and speed (rpm)."""',
         "    n = abs(rpm) / TOP",
         *(f"    {s[0]} = {v:g}  # {s[1]}, between two tests" if step else f'    {s[0]} = values["{s[0]}"]' for s, v, _ in shape),
         f'    return values["size"] * (({_scalar(best.law.expression)}) + values["constant"])',

@@ -65,6 +65,7 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
     drifting = [m.name for m in chosen.hypothesis.mechanisms if m.free]
     beside = f"; beside {'it' if len(effects) == 1 else 'them'} {' and '.join(drifting)} drifts a little" if drifting else ""
     own = chosen.own_laws
+    checked = "" if own else checked  # a law that is read off the data says nothing of others
     before_own = f", {chosen.by_law.evidence.ln - found.base.evidence.ln:.0f} with the law assumed" if chosen.by_law else ""
     whose = f" of {' and '.join(own)}" if len(effects) > 1 else ""
     law = f" with a law of the data's own{whose}{before_own}" if own else ""

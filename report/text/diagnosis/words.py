@@ -49,13 +49,13 @@ def _drift_words(p: Drift) -> str:
 def _change_words(p: Drift) -> str:
     if len(p.change) == 1:
         ((change, sd),) = p.told
-        return f"{change:+.3g} +- {sd:.1g} {p.unit} {_where(p.conditions[0])}"
+        return f"{change:+.3g} +- {sd:.1g}{_unit(p.unit)} {_where(p.conditions[0])}"
     low, high = int(np.argmin(p.change)), int(np.argmax(p.change))
     goes = f", {p.pattern.shape.name}" if p.pattern and p.pattern.shape.name != "constant" else ""
     (least, its_sd), (most, sd) = p.told[low], p.told[high]
     return (
-        f"from {least:+.3g} +- {its_sd:.1g} {p.unit} {_where(p.conditions[low])} to {most:+.3g} +- "
-        f"{sd:.1g} {p.unit} {_where(p.conditions[high])}{goes}"
+        f"from {least:+.3g} +- {its_sd:.1g}{_unit(p.unit)} {_where(p.conditions[low])} to {most:+.3g} +- "
+        f"{sd:.1g}{_unit(p.unit)} {_where(p.conditions[high])}{goes}"
     )
 
 
@@ -66,7 +66,9 @@ def law_words(d: Diagnosis) -> list[str]:
     for m, departure in zip(lead.hypothesis.mechanisms, v.accepted.evidence.learned.departures, strict=True) if lead else ():
         own = next((p for p in d.own_laws if p.element == m.name), None) if m.own_law else None
         if own is not None:
-            found.append(f"The data do not have the law that {m.name} assumes, but one of their own: its {m.size.name} {_change_words(own)}.")
+            theirs = f"its {m.size.name} {_change_words(own)}"
+            drafts = f"`spindle draft` with --element {m.name} writes an effect with that law"
+            found.append(f"The data do not have the law that {m.name} assumes, but one of their own: {theirs}. {drafts}.")
         elif departure >= DEPARTS:
             same = [p for p in d.drifts if p.pattern and lead and p.gain > ALIKE * lead.delta_evidence]
             instead = f"; {_drift_words(same[0])}, does as well without any law" if same else ""
@@ -132,7 +134,8 @@ def show_diagnosis(console: Console, answer: dict[str, Any], verbose: bool = Tru
     if best and answer["effects"]:
         for name, rows in best["law"].items():
             if best["departure_from_law"][name]:
-                console.print(f"\nThe size of {name} as the data have it, test by test (one size would be its own law):")
+                law = "its law is the data's own" if name in best["own_law"] else "one size would be its own law"
+                console.print(f"\nThe size of {name} as the data have it, test by test ({law}):")
                 console.print("  " + ", ".join(f"{r['test']} {r['size']:.3g} +- {r['sd']:.1g}" for r in rows))
     if answer["verdict"] != "none":
         console.print("\nWithout any catalogue, what would have to drift:")
@@ -166,7 +169,9 @@ def _show_little(console: Console, answer: dict[str, Any]) -> None:
 
 def _values(candidate: dict[str, Any]) -> str:
     """Fitted parameters with their errors and units."""
-    return ", ".join(f"{k.split('.', 1)[1]} {plain_error(v['value'], v['sd'])}{_unit(v['unit'])}" for k, v in candidate["parameters"].items())
+    values = ", ".join(f"{k.split('.', 1)[1]} {plain_error(v['value'], v['sd'])}{_unit(v['unit'])}" for k, v in candidate["parameters"].items())
+    own = candidate["own_law"]
+    return f"{values} (in the mean: the law of {' and '.join(own)} is the data's own)" if own else values
 
 
 def _next(test: dict[str, Any]) -> str:
