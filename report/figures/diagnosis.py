@@ -130,6 +130,7 @@ def errors(d: Diagnosis) -> Figure:
     axes.set_xticks(range(len(tests)), [t.test.id for t in tests], rotation=30 if len(tests) > 6 else 0)
     axes.set_ylabel("chi² a number")
     axes.set_title("Error left in every test (1 is noise alone)")
-    axes.legend(frameon=False, fontsize=8)
+    axes.set_ylim(0.0, 1.25 * axes.get_ylim()[1])  # room for the legend above the bars
+    axes.legend(frameon=False, fontsize=8, loc="upper left", ncols=len(shown))
     axes.grid(visible=False, axis="x")
     return figure
