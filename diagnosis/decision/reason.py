@@ -11,6 +11,7 @@ from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.hypothesis import STRAIN, Hypothesis
 from thermospindle.diagnosis.inference.remainder import ALIKE, Overlap
+from thermospindle.diagnosis.inference.resonance import shown
 from thermospindle.diagnosis.inference.search import Search
 
 UNTOLD = "nothing tried"  # what explains data that are missed grossly
@@ -85,15 +86,16 @@ def _impossible(found: Search, drifting: Names) -> str:
     return f", which {' or '.join(cannot)} would do at a size that it cannot have" if cannot else ""
 
 
-def of_resonances(model: CampaignModel) -> str:
+def of_resonances(model: CampaignModel, best: Hypothesis) -> str:
     """The light resonances that the data show in every test; one beyond the band stands for what modes up there lend to it."""
-    if not model.resonances:
+    resonances = shown(model, best)
+    if not resonances:
         return ""
     highest = max(float(d.frequency.max()) for d in model.tests)
     told = ", ".join(
-        f"{r.frequency:.0f} Hz ({f'damping ratio {r.damping:.2g}' if r.frequency <= highest else 'beyond the band'})" for r in model.resonances
+        f"{r.frequency:.0f} Hz ({f'damping ratio {r.damping:.2g}' if r.frequency <= highest else 'beyond the band'})" for r in resonances
     )
-    one = "a light resonance" if len(model.resonances) == 1 else "light resonances"
+    one = "a light resonance" if len(resonances) == 1 else "light resonances"
     return f" Taken into account: {one} at {told} that the drawing lacks and every test shows, of a table, a fixture or a cable."
 
 

@@ -66,7 +66,7 @@ def decide(found: Search) -> Verdict:
         accepted = _accepted(found, word, effects, candidates, free)
         after = held_out(accepted)
     why = unconfirmed + reason.of_verdict(found, word, effects, candidates, free, none, before, after)
-    why += reason.of_resonances(found.model) + reason.of_what_is_left(found.hypotheses[0], same)
+    why += reason.of_resonances(found.model, found.hypotheses[0]) + reason.of_what_is_left(found.hypotheses[0], same)
     return Verdict(word, effects, why, candidates, free, none, unknown, losses, before, after, accepted)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
+from thermospindle.diagnosis.forward.nuisance import Resonance
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit
 from thermospindle.diagnosis.inference.hypothesis import EARLY, PLENTY, STRAIN, Hypothesis, settled
@@ -54,6 +55,22 @@ def with_resonance(model: CampaignModel, h: Hypothesis, workers: int | None = No
     clear = max(CLEARED * h.excess, CHANCE * np.sqrt(2 / h.fit.count))
     asked = found.evidence.ln > h.evidence.ln + PLENTY and (hidden or found.excess < clear)
     return (wider, found) if asked else None
+
+
+def shown(model: CampaignModel, h: Hypothesis) -> list[Resonance]:
+    """The light resonances that an explanation needs, as it has them: where their shares in all modes may be nothing, what they were taken for is explained
+    otherwise."""
+    found, at = [], len(model.parameters) - sum(len(r.nuisances) for r in model.resonances)
+    for r in model.resonances:
+        own = slice(at, at + len(r.nuisances))
+        sd = np.array([q.sd for q in r.nuisances])
+        seen = r.at(sd * h.evidence.mean[own])
+        shares = np.array(seen.shares) / sd[: len(r.shares)]
+        covariance = h.evidence.covariance[own, own][: len(shares), : len(shares)]
+        if shares @ np.linalg.solve(covariance, shares) > 2 * PLENTY:
+            found.append(seen)
+        at = own.stop
+    return found
 
 
 def _from(model: CampaignModel, mechanisms: Sequence[Mechanism], start: tuple[Array, Sequence[float]]) -> Fit:

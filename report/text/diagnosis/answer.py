@@ -11,6 +11,7 @@ from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.inference.evidence import Evidence
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
+from thermospindle.diagnosis.inference.resonance import shown
 from thermospindle.diagnosis.verdict import Diagnosis, Drift
 from thermospindle.model.types import Array
 from thermospindle.report.text.diagnosis.words import condition, drift_words, law_words, would_change
@@ -58,7 +59,7 @@ def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
             if p.kind in (kinds_of.BUILD, kinds_of.TEMPERATURE, kinds_of.GAIN)
         },
         "learned": _learned(accepted.evidence),
-        "light_resonances": [{"frequency_Hz": r.frequency, "damping_ratio": r.damping} for r in d.search.model.resonances],
+        "light_resonances": [{"frequency_Hz": r.frequency, "damping_ratio": r.damping} for r in shown(d.search.model, d.search.hypotheses[0])],
         "noise": {data.test.id: getattr(data, "noise_from", "the table of modes") for data in d.search.model.tests},
     }
 

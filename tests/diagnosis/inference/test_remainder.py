@@ -14,7 +14,7 @@ from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
-from thermospindle.diagnosis.inference.resonance import with_resonance
+from thermospindle.diagnosis.inference.resonance import shown, with_resonance
 from thermospindle.diagnosis.verdict import diagnose
 from thermospindle.model.machine import Condition
 from thermospindle.sim.effects.effect import Effect, Parameter
@@ -57,6 +57,11 @@ def test_it_is_found_where_it_is(model):
     assert wider.resonances[0].damping == pytest.approx(RATIO, rel=0.1)
     assert h.evidence.ln > none.evidence.ln + 100
     assert with_resonance(wider, h) is None
+    assert [r.frequency for r in shown(wider, h)] == pytest.approx([AT], rel=1e-3)
+    resonance, mean = wider.resonances[0], h.evidence.mean.copy()
+    own = slice(len(model.parameters), len(model.parameters) + len(resonance.shares))
+    mean[own] = -np.array(resonance.shares) / [q.sd for q in wider.parameters[own]]
+    assert shown(wider, replace(h, evidence=replace(h.evidence, mean=mean))) == []  # an explanation without it
 
 
 @pytest.mark.parametrize("share", [50, 30])
