@@ -16,7 +16,6 @@ from thermospindle.diagnosis.inference.search import Search
 
 UNTOLD = "nothing tried"  # what explains data that are missed grossly
 LEFT = "what is left"  # that changes, and tells of something else
-UNCONFIRMED = "what does not predict"  # conditions left out
 NUMERICS = (1e-4, 0.01)  # drift of frequencies and of damping that two honest programs may differ by
 
 
@@ -29,10 +28,6 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
         constant = f", the model's frequencies being constantly wrong by about {wrong:.1g} of each{which}" if wrong > NUMERICS[0] else ""
         return f"Tolerances and measuring errors explain the data: chi2 is {chi2 / n:.2f} a number for {n} numbers{constant}{best}."
     lead = candidates[0] if candidates else None
-    if word == "unexplained" and free and free[0].names == (UNCONFIRMED,):
-        drifting = next((c for c in free if c.hypothesis.mechanisms), None)
-        drifts = f"; {' and '.join(drifting.names)} would have to drift ({drifting.delta_evidence:.0f} in ln evidence)" if drifting else ""
-        return f"Something changes that no effect of the catalogue explains (chi2 without effects: {chi2 / n:.2f} a number){drifts}."
     if word == "unexplained":
         place = "nothing tried explains them, nor do tolerances and measuring errors: units, points, and noise that the files do not tell come first"
         if free and free[0].names == (LEFT,):
@@ -67,16 +62,11 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
     beside = f"; beside {'it' if len(effects) == 1 else 'them'} {' and '.join(drifting)} drifts a little" if drifting else ""
     own = chosen.own_laws
     checked = "" if own else checked  # a law that is read off the data says nothing of others
+    disagreement = ", which does not confirm it" if checked and after > 0.9 * before else ""
     before_own = f", {chosen.by_law.evidence.ln - found.base.evidence.ln:.0f} with the law assumed" if chosen.by_law else ""
     whose = f" of {' and '.join(own)}" if len(effects) > 1 else ""
     law = f" with a law of the data's own{whose}{before_own}" if own else ""
-    return f"{named} {word_of}: {chosen.delta_evidence:.0f} in ln evidence over the model without effects{law}, {odds}{beside}{instead}{checked}."
-
-
-def of_what_does_not_predict(effects: Names, before: float, after: float) -> str:
-    """Of a leading explanation, why it is not the answer."""
-    named, they = " + ".join(effects), "leads" if len(effects) == 1 else "lead"
-    return f"{named} {they}, but conditions left out are predicted with {after:.2f} standard errors, {before:.2f} without: no better, so that is not it. "
+    return f"{named} {word_of}: {chosen.delta_evidence:.0f} in ln evidence over the model without effects{law}, {odds}{beside}{instead}{checked}{disagreement}."
 
 
 def _impossible(found: Search, drifting: Names) -> str:

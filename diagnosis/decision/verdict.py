@@ -11,9 +11,8 @@ from thermospindle.diagnosis.decision import reason
 from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.decision.explanations import Candidate, Names, explanations, named_part
 from thermospindle.diagnosis.decision.loss import MOSTLY, least_loss
-from thermospindle.diagnosis.decision.reason import LEFT, NUMERICS, UNCONFIRMED, UNTOLD
+from thermospindle.diagnosis.decision.reason import LEFT, NUMERICS, UNTOLD
 from thermospindle.diagnosis.forward import nuisance as kinds_of
-from thermospindle.diagnosis.forward.model import MEASURING
 from thermospindle.diagnosis.inference.evidence import left_out
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.remainder import ALIKE, Overlap, overlap
@@ -21,7 +20,6 @@ from thermospindle.diagnosis.inference.search import Search
 
 GROSS = 25.0  # chi2 a number, five times the errors, from which nothing has explained the data whatever else explains them no better
 MUCH = 0.5  # squares of the errors, from which what is left and changes tells of something else
-MISPREDICTED, CONFIRMED = 2.0, 0.9  # standard errors on conditions left out, that a model mispredicts, and the share of them that an effect may leave of it
 SURE = 5.0  # standard deviations of chi2 by chance, beyond which something is left
 
 
@@ -49,23 +47,11 @@ def decide(found: Search) -> Verdict:
     candidates, free, none = explanations(found, same.inflation)
     candidates, free, none = _unheld(found, same, candidates, free, none)
     unknown = sum(c.probability for c in free)
-    groups = conditions_of(found)
-
-    def held_out(h: Hypothesis) -> float:
-        return left_out(found.model, h.fit, h.evidence, groups)
-
     word, effects, losses = least_loss(candidates, none, free, found.alike)
     accepted = _accepted(found, word, effects, candidates, free)
-    before, after = held_out(found.base), held_out(accepted)
-    unconfirmed = ""
-    if word in ("identified", "two effects") and _refuted(accepted, before, after):
-        unconfirmed = reason.of_what_does_not_predict(effects, before, after)
-        candidates, free = _unconfirmed(found, effects, candidates, free)
-        unknown = sum(c.probability for c in free)
-        word, effects, losses = least_loss(candidates, none, free, found.alike)
-        accepted = _accepted(found, word, effects, candidates, free)
-        after = held_out(accepted)
-    why = unconfirmed + reason.of_verdict(found, word, effects, candidates, free, none, before, after)
+    groups = conditions_of(found)
+    before, after = (left_out(found.model, h.fit, h.evidence, groups) for h in (found.base, accepted))
+    why = reason.of_verdict(found, word, effects, candidates, free, none, before, after)
     why += reason.of_resonances(found.model, found.hypotheses[0]) + reason.of_what_is_left(found.hypotheses[0], same)
     return Verdict(word, effects, why, candidates, free, none, unknown, losses, before, after, accepted)
 
@@ -88,26 +74,6 @@ def _unheld(
         free = (*free, Candidate(found.base, (LEFT,), True, 0.0, sum(c.probability for c in candidates)))
         candidates = tuple(replace(c, probability=0.0) for c in candidates)
     return candidates, tuple(sorted(free, key=lambda c: -c.probability)), none
-
-
-def _refuted(h: Hypothesis, before: float, after: float) -> bool:
-    """Whether an explanation by laws predicts conditions left out no better than the model without it, which mispredicts them. Not asked is what is the
-    same in every test, where constant errors of the modes stand in for it, and what has no law to go by but the data's own."""
-    same = all(m.effect.lasting or not any(getattr(m.effect, hook) for hook in MEASURING) for m in h.mechanisms)
-    lawful = all(m.kind == "law" for m in h.mechanisms)
-    return lawful and not same and before > MISPREDICTED and after > CONFIRMED * before
-
-
-def _unconfirmed(
-    found: Search, effects: Names, candidates: tuple[Candidate, ...], free: tuple[Candidate, ...]
-) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...]]:
-    """With the probability of explanations by these effects moved to the unknown."""
-    theirs = [set(named_part(c)) == set(effects) for c in (*candidates, *free)]
-    moved = sum(c.probability for c, own in zip((*candidates, *free), theirs, strict=True) if own)
-    kept = [replace(c, probability=0.0) if own else c for c, own in zip((*candidates, *free), theirs, strict=True)]
-    unknown = Candidate(found.base, (UNCONFIRMED,), True, 0.0, moved)
-    by_probability = sorted([unknown, *kept[len(candidates) :]], key=lambda c: -c.probability)
-    return tuple(sorted(kept[: len(candidates)], key=lambda c: -c.probability)), tuple(by_probability)
 
 
 def changing(h: Hypothesis, same: Overlap) -> float:

@@ -8,7 +8,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from thermospindle.diagnosis.decision import verdict
 from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.decision.explanations import COARSE, OWN_LAW, coarsening
 from thermospindle.diagnosis.decision.loss import FALSE_ALARM, MISSED, WRONG
@@ -220,39 +219,6 @@ def test_odds_of_a_law_of_its_own():
     v = decide(made({"a": 60.0, "a'": 66.0, "~x": 66.0}))
     of_effect, of_form = 0.33 / 30 / (1 + OWN_LAW) * (np.exp(-6) + OWN_LAW), 0.05 / 20
     assert v.probability_unknown == pytest.approx(of_form / (of_effect + of_form), rel=1e-6)
-
-
-HELD_OUT = {
-    "no better": (10.0, 9.5, {}, "unexplained"),
-    "worse": (10.0, 25.0, {}, "unexplained"),
-    "better": (10.0, 8.0, {}, "identified"),
-    "little to predict": (1.9, 1.9, {}, "identified"),
-    "one condition": (np.nan, np.nan, {}, "identified"),
-    "a law of the data's own": (10.0, 9.5, {"own_law": True}, "identified"),
-    "a mass": (10.0, 9.5, {"lasting": True}, "identified"),
-    "a sensor": (10.0, 9.5, {"chain": None, "measurement": lambda *state: state[-1]}, "identified"),
-}
-
-
-@pytest.mark.parametrize("case", HELD_OUT)
-def test_an_effect_that_does_not_predict_conditions_left_out_is_not_named(case, monkeypatch):
-    """Whatever its lead, where the model without it mispredicts them; what is the same in every test has nothing to predict there."""
-    before, after, hooks, word = HELD_OUT[case]
-    found = made({"a": 60.0, "b": 20.0, "~x": 30.0})
-
-    def acting(h: Hypothesis) -> Hypothesis:
-        own = {"own_law": hooks.get("own_law", False)}
-        of_effect = {"chain": lambda *state: state[-1]} | {k: v for k, v in hooks.items() if k not in own}
-        effects = [replace(m, effect=replace(m.effect, **of_effect), **own) for m in h.mechanisms]
-        return replace(h, fit=replace(h.fit, mechanisms=tuple(effects)))
-
-    hypotheses = tuple(map(acting, found.hypotheses))
-    monkeypatch.setattr(verdict, "left_out", lambda model, fit, evidence, groups: after if fit.mechanisms else before)
-    v = decide(replace(found, hypotheses=hypotheses, base=next(h for h in hypotheses if not h.mechanisms)))
-    assert v.word == word
-    assert total(v) == pytest.approx(1.0)
-    assert ("no better, so that is not it" in v.reason) == (word == "unexplained")
-    assert (v.candidates[0].probability > 0.9) == (word == "identified")
 
 
 @pytest.mark.parametrize(("leaves", "word"), [(46.0, "unexplained"), (21.0, "unexplained"), (4.0, "identified"), (1.0, "identified")])
