@@ -138,5 +138,5 @@ def test_a_response_that_vanishes_by_symmetry_does_not_set_the_limits(run: Run) 
     value[h1.response_nodes.index(2), h1.reference_nodes.index(1)] *= 1e-6
     less = replace(run, steps=(replace(step, test=replace(step.test, estimate=replace(step.test.estimate, h1=replace(h1, value=value)))),))
     others = [h1.value[h1.response_nodes.index(r), h1.reference_nodes.index(h)] for r, h in shown(run).pairs if (r, h) != (2, 1)]
-    assert shown(less).level[0] == 10 * np.floor(np.percentile(decibel(np.array(others)), 0.5) / 10) - 10
+    assert shown(less).level[0] == 10 * np.floor(np.percentile(decibel(np.array(others)), 0.5) / 10) - 5
     assert shown(less).level[1] == shown(run).level[1]
