@@ -22,6 +22,7 @@ from thermospindle.diagnosis.forward.mechanism import Mechanism, strongest, vari
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.effects import CATALOGUE, usable
+from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.operating import operating_point
 
 SAME = np.sqrt(10.0)  # standard errors, up to which what is left of a change cannot be told from nothing: 5 in ln evidence
@@ -30,19 +31,19 @@ TURNS = (-2.0, -1.0, 1.0, 2.0)  # prior standard deviations by which shape param
 STEP = 0.02  # prior standard deviations of a size
 
 
-def right(made: Made, spindle: Spindle, of: Seen) -> list[list[str]]:
-    """Of every hidden piece the effects that are a right answer."""
+def right(made: Made, spindle: Spindle, of: Seen, catalogue: Sequence[Effect] = CATALOGUE) -> list[list[str]]:
+    """Of every hidden piece the effects of the catalogue that are a right answer."""
     changes = [change(made, spindle, of, h, SMALL, World()) for h in made.hidden]
     wholes = [np.sqrt(of.inner(d[:, None], d[:, None])[0, 0]) for d in changes]
-    return [right_names(h.names, row, whole) for h, row, whole in zip(made.hidden, left(made, spindle, of, changes), wholes, strict=True)]
+    return [right_names(h.names, row, whole) for h, row, whole in zip(made.hidden, left(made, spindle, of, changes, catalogue), wholes, strict=True)]
 
 
-def left(made: Made, spindle: Spindle, of: Seen, changes: Sequence[Array]) -> list[dict[str, float]]:
+def left(made: Made, spindle: Spindle, of: Seen, changes: Sequence[Array], catalogue: Sequence[Effect] = CATALOGUE) -> list[dict[str, float]]:
     """What each effect leaves of `changes` (N,) each, in standard errors; of its variants the least."""
     found: list[dict[str, float]] = [{} for _ in changes]
     conditions = [Condition(p.temperature, p.speed) for p in made.plans]
     base = [_frf(made.built, c, [], of) for c in conditions]
-    named = [v for e in usable(spindle, CATALOGUE) for v in variants(e)]
+    named = [v for e in usable(spindle, tuple(catalogue)) for v in variants(e)]
     for m in [*named, *with_own_laws(named, spindle, strongest(spindle, conditions))]:
         if not any(getattr(m.effect, hook) for hook in ("spindle", "temperatures", "motions", "pair", "chain", "measurement")):
             continue

@@ -67,7 +67,7 @@ def test_a_mass_that_strained_tolerances_hide_is_found(spindle):
 def test_an_effect_is_found_where_its_law_gives_nothing(spindle):
     """The turning part is warmer by a law of temperature, at rest too, where no friction heats it. Its formula's law explains little of that; a law of the
     data's own all, and reads it off: nothing at 20 C, then in proportion."""
-    conditions = [Condition(t, n * RPM) for t, n in ((20.0, 0.0), (20.0, 7200.0), (35.0, 0.0), (50.0, 0.0), (60.0, 0.0), (60.0, 7200.0))]
+    conditions = [Condition(t, n * RPM) for t, n in ((20.0, 0.0), (40.0, 0.0), (60.0, 0.0), (60.0, 7200.0))]
     rings = asked_at(effect("thermal_gradient"), Condition(60.0, 7200.0 * RPM))
     neutral = {q.name: q.neutral for q in rings.parameters}
 
@@ -75,12 +75,12 @@ def test_an_effect_is_found_where_its_law_gives_nothing(spindle):
         return rings.temperatures(spindle, condition, neutral | {"scale": values["scale"] * (condition.temperature - 20) / 40}, by_region)
 
     model = model_of(spindle, mode_campaign(spindle, conditions, 3, [(replace(rings, temperatures=warmer), {"scale": 4.0})]))
-    named = [m for name in ("thermal_gradient", "grease_damping", "mount_compliance") for m in variants(effect(name))]
-    found = search(model, named, [f for f in free_forms(spindle) if f.name in ("preload", "mount stiffness")], workers=1)
+    named = [m for name in ("thermal_gradient", "mount_compliance") for m in variants(effect(name))]
+    found = search(model, named, [f for f in free_forms(spindle) if f.name == "preload"], workers=1)
     by_law = max((h.evidence.ln for h in found.hypotheses if h.names == ("thermal_gradient",) and not h.mechanisms[0].own_law), default=-np.inf)
     v = decide(found)
     assert (v.word, v.effects) == ("identified", ("thermal_gradient",))
     assert v.candidates[0].own_laws == ("thermal_gradient",)
     assert v.accepted.evidence.ln > by_law + 20
-    assert v.accepted.evidence.sizes[0] == pytest.approx([0.0, 0.0, 1.5, 3.0, 4.0, 4.0], abs=0.8)
+    assert v.accepted.evidence.sizes[0] == pytest.approx([0.0, 2.0, 4.0, 4.0], abs=0.8)
     assert "with a law of the data's own" in v.reason
