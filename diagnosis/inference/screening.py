@@ -43,7 +43,8 @@ def screen(
     and the best of each name, and kind of law, once more with its shape `turned`."""
     about = replace(about, temper=temper)
     sizes = Learned(learned.sizes, learned.errors if temper == 1.0 else 1.0, (), ())
-    nothing = evidence(model, about, [sizes, *smaller(sizes)]).ln
+    at = linearised(model, about)  # where a fit has not arrived its own derivatives are of an earlier point
+    nothing = evidence(model, replace(about, chi2=at.chi2, gradient=at.gradient, information=at.information), [sizes, *smaller(sizes)]).ln
     found = in_parallel(partial(_screened, model, about, sizes, nothing), list(mechanisms), workers)
     found = [replace(s, mechanism=m) for s, m in zip(found, mechanisms, strict=True)]
     best = {(s.mechanism.name, s.mechanism.kind): s for s in sorted(found, key=lambda s: s.gain) if turned and s.visibility > 0 and s.mechanism.shape}
