@@ -128,7 +128,7 @@ def _candidate(rows: Sequence[Weighed], base: float, total: float) -> Candidate:
     return Candidate(h, h.names, h.free, h.evidence.ln - base, float(sum(np.exp(w - total) for _, w in rows)), by_law)
 
 
-def _prior(h: Hypothesis, named: int, free: int, either: Collection[str] = ()) -> float:
+def _prior(h: Hypothesis, named: int, free: int, either: Collection[str]) -> float:
     """ln prior probability of one hypothesis: its kind's, shared out evenly, and of effects of which `either` law was fitted that of the one they have."""
     frees = sum(m.free for m in h.mechanisms)
     count = len(h.mechanisms)
