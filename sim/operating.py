@@ -159,7 +159,8 @@ def unloads(spindle: Spindle, states: Sequence[PairState], bearing: str) -> floa
 
     def deformation(temperature: float) -> float:
         condition = Condition(temperature, states[0].condition.speed)
-        return operating_point(spindle, condition).state.bearing(bearing).deformation
+        state = operating_point(spindle, condition).state.bearing(bearing)
+        return state.deformation if state.in_contact else min(state.deformation, -1e-12)
 
     for cold, hot in pairwise(states):
         if cold.bearing(bearing).in_contact != hot.bearing(bearing).in_contact:

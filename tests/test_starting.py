@@ -42,22 +42,24 @@ def test_a_new_scene_has_its_name(scenes: Path, kind: str) -> None:
 
 @pytest.mark.parametrize("verb", ["modes", "static", "table", pytest.param("map", marks=pytest.mark.slow), "runout"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_new_scene_runs(scenes: Path, kind: str, verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_new_scene_runs(scenes: Path, kind: str, verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     more = {
         "table": ["--temperatures", "20", "30"],
         "map": ["--temperatures", "20", "30", "--speeds", "1000", "2000"],
         "runout": ["--speed", "3000", "--path", "linear", "--seconds", "0.3"],
     }.get(verb, [])
-    assert main([verb, str(scenes / kind), *more, "--json"]) == 0
+    assert main([verb, str(scenes / kind), *more, "--json", "--out", str(tmp_path / verb)]) == 0
     said = capsys.readouterr()
     assert json.loads(said.out)["warnings"] == []
+    assert list((tmp_path / verb).iterdir())
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_new_scene_is_hit(scenes: Path, kind: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """The virtual hammer test finds modes where the model has some."""
-    assert main(["impact", str(scenes / kind), "--json"]) == 0
+def test_a_new_scene_is_hit(scenes: Path, kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The virtual hammer test finds modes where the model has some, and its log is written."""
+    assert main(["impact", str(scenes / kind), "--json", "--out", str(tmp_path / "hit")]) == 0
+    assert (tmp_path / "hit" / "impact.rrd").stat().st_size > 1e5
     answer = json.loads(capsys.readouterr().out)
     assert len(answer["modes"]) >= 3
 

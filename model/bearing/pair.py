@@ -23,6 +23,9 @@ from thermospindle.model.errors import BadInput, NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Bearing, BearingSet, Condition, LinearBearing, RingMotion, Spindle
 from thermospindle.model.types import Array
 
+TOUCHING = 1e-9
+"""Contact force, over that of the preload, below which a ball is loose."""
+
 
 @dataclass(frozen=True)
 class BearingState(ByDirection):
@@ -332,6 +335,8 @@ def bearing_state(spindle: Spindle, b: Bearing, row: BallRow) -> BearingState:
     answer: RowForce = respond(row)
     zeta, omega = b.damping_ratio, 2 * np.pi * spindle.structure.damping_frequency
     deformation = float(answer.deformation[0])
+    # where rings are free to move between their balls, the equilibrium that is found lies at an end of that play, a rounding error within contact
+    felt = TOUCHING * b.preload / (b.balls * np.sin(b.contact_angle))
     stiffness = answer.tangent
     if row.inertia is not None:
         # outer-race control makes the tangent of heavy balls unsymmetric, by 1e-4 of it; springs, in MuJoCo too, carry the symmetric part
@@ -348,5 +353,5 @@ def bearing_state(spindle: Spindle, b: Bearing, row: BallRow) -> BearingState:
         stiffness=stiffness,
         damping=2 * zeta / omega * stiffness,
         row=row,
-        in_contact=bool(answer.in_contact.all()),
+        in_contact=bool(answer.in_contact.all() and answer.ball_force.min() > felt),
     )

@@ -89,7 +89,7 @@ def shaft_meshes(spindle: Spindle) -> list[RegionMesh]:
 
 
 def plate_meshes(spindle: Spindle) -> list[RegionMesh]:
-    """A ring plate for every body that no region shows, as wide as its measuring points lie, its top at their height."""
+    """A plate for every body that no region shows: a ring as wide as its measuring points lie, its top at their height, or a disc of its inertia."""
     shown = set(region_bodies(spindle).values()) | {name for shaft in spindle.structure.shafts for name in shaft.bodies}
     return [
         RegionMesh(f"{body.name} plate", body.name, *revolve([plate(spindle, body)]), (*PLATE, 1.0))
@@ -229,9 +229,13 @@ def _bulk(region: Region) -> float:
 
 
 def plate(spindle: Spindle, body: Body) -> Cell:
-    """The ring plate that stands for a body of which no region is drawn."""
+    """The ring plate that stands for a body of which no region is drawn; one whose points all lie on the axis is a disc of its mass and inertia."""
     reach = extent(spindle)[0]
     points = [p.position for p in spindle.points if p.body == body.name]
+    if points and max(float(np.hypot(x, y)) for x, y, _ in points) < 1e-3 * reach:
+        gyration = np.sqrt(2 * max(body.inertia[2], *body.inertia[:2]) / body.mass)
+        thick = 0.1 * reach
+        return Cell(body.name, (0.0, float(np.clip(gyration, thick, 2 * reach))), (body.z - thick / 2, body.z + thick / 2))
     outer = 1.05 * max((float(np.hypot(x, y)) for x, y, _ in points), default=1.2 * reach)
     top = min((z for *_, z in points), default=body.z)
     return Cell(body.name, (min(0.85 * reach, 0.7 * outer), outer), (top - 0.1 * reach, top))

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from tests.conftest import ROOT
 from thermospindle.model.bearing.pair import reference_motion, solve
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor import look, mjcf
@@ -17,6 +18,7 @@ from thermospindle.model.rotor.chain import rotor_base
 from thermospindle.model.rotor.elements import ELEMENTS
 from thermospindle.model.rotor.modes import modes
 from thermospindle.model.rotor.section import Cell, cells
+from thermospindle.model.scene.reading import load
 
 KEPT = 0.75  # of the circle
 ROUND = [Cell("a", (0.0, 1.0), (0.0, 2.0)), Cell("a", (1.0, 2.0), (1.0, 2.0))]  # a shaft with a collar
@@ -144,6 +146,15 @@ def test_the_plate_holds_its_points_on_top(spindle):
     radius = np.hypot(*plate.vertices[:, :2].T)
     assert radius.min() < np.hypot(x, y) < radius.max()
     assert plate.vertices[:, 2].max() == pytest.approx(z)
+
+
+def test_a_body_whose_points_lie_on_the_axis_is_a_disc_of_its_inertia():
+    """A wheel or a collet hit in its middle: a ring as wide as its points would have no width, and MuJoCo refuses it."""
+    wheeled = load(ROOT / "scenes" / "templates" / "grinding.toml")
+    (plate,) = (m for m in look.plate_meshes(wheeled) if m.body == "wheel")
+    assert_closed(plate.triangles)
+    body = wheeled.structure.body("wheel")
+    assert np.hypot(*plate.vertices[:, :2].T).max() == pytest.approx(np.sqrt(2 * body.inertia[2] / body.mass), rel=0.01)
 
 
 def test_touching_regions_of_one_material_differ_in_shade(spindle, meshes):

@@ -8,7 +8,7 @@ import pytest
 from tests.mounting import sprung
 from thermospindle.model.bearing.ball_row import respond
 from thermospindle.model.bearing.definitions import SENSE
-from thermospindle.model.bearing.pair import reference_motion, solve
+from thermospindle.model.bearing.pair import bearing_state, reference_deformation, reference_motion, row_at, solve
 from thermospindle.model.machine import Condition, Law, RingMotion
 from thermospindle.model.tolerance import scaled_preload
 
@@ -78,6 +78,17 @@ def test_unloading_is_a_state(spindle):
         assert np.all(b.stiffness == 0)
         assert b.deformation < 0
     assert state.status == "lower and upper bearing lost contact"
+
+
+@pytest.mark.parametrize(("share", "touching"), [(1e-3, True), (1e-12, False), (1e-16, False)])
+def test_a_rounding_error_of_load_is_no_contact(spindle, share, touching):
+    """Where a rigid pair has play, its equilibrium may be found at an end of it, with 1e-16 of the preload on one side: both are loose."""
+    b = spindle.bearings[0]
+    row = row_at(spindle, b, b.sense, reference_motion(20.0), 0.0)
+    length = row.unloaded_distance + reference_deformation(spindle, b) * share ** (2 / 3)
+    state = bearing_state(spindle, b, replace(row, axial=b.sense * np.sqrt(length**2 - row.radial**2)))
+    assert 0 < state.preload < 1.1 * share * b.preload
+    assert state.in_contact is touching
 
 
 def test_spring_preload_stays_constant(spindle):
