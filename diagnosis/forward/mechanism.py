@@ -26,6 +26,8 @@ MEMORY_K = 40.0  # K over which departures from a law are alike
 MEMORY_RPM = 6000.0
 MEMORY_LEVEL = 2.0  # of ln level
 MEMORY_SOAK = 2.0  # of ln soak time
+LITTLE = 0.02  # of an effect's typical size, which is linear in all that it changes
+SAME = 1e-6  # of the square of a change, by which it may differ from another that is the same
 REFERENCE_DEPARTURE = 0.5  # of the size, in the fit itself; evidence takes others into account
 REFERENCE_WIDTH = 2.0  # prior standard deviations of the size, likewise
 
@@ -83,12 +85,13 @@ def strongest(spindle: Spindle, conditions: Sequence[Condition]) -> Condition:
 
 def with_own_laws(mechanisms: Sequence[Mechanism], spindle: Spindle, at: Condition) -> list[Mechanism]:
     """The same with laws of the data's own: every effect does at any condition what its formula gives `at` one. Of what lies between two ideal cases of a
-    law one serves for all; what lasts, or asks for no condition, has no law but a constant."""
+    law one serves for all, and what there is but another size is no shape; what lasts, or asks for no condition, has no law but a constant."""
     found: dict[tuple, Mechanism] = {}
     for m in mechanisms:
         chosen = {p.name: m.choices[p.name] for p in m.effect.parameters if p.choices}
         if not m.effect.lasting and (m.name, *chosen.items()) not in found and _asks(m.effect, spindle, at):
-            found[m.name, *chosen.items()] = replace(m, effect=asked_at(m.effect, at), own_law=True)
+            own = replace(m, effect=asked_at(m.effect, at), own_law=True)
+            found[m.name, *chosen.items()] = _without_scales(own, spindle, at)
     return list(found.values())
 
 
@@ -103,6 +106,36 @@ def asked_at(effect: Effect, at: Any) -> Effect:
 
     hooks: dict[str, Any] = {name: asked(hook) for name in HOOKS if (hook := getattr(effect, name)) is not None}
     return replace(effect, **hooks)
+
+
+def _without_scales(m: Mechanism, spindle: Spindle, at: Condition) -> Mechanism:
+    """Without the shape parameters that do no more than a size does where one condition alone is asked: a law's, such as the interference by which a fit
+    opens with temperature. They stay where they are neutral."""
+
+    def change(values: Mapping[str, float]) -> Array:
+        found = operating_point(spindle, at, [(m.effect, values)]).linear
+        return np.concatenate([np.ravel(getattr(found, w) - getattr(plain, w)) / np.abs(getattr(plain, w)).max() for w in ("mass", "damping", "stiffness")])
+
+    try:
+        plain = operating_point(spindle, at).linear
+        neutral = m.values(m.size.neutral + LITTLE * (m.size.typical - m.size.neutral), [q.neutral for q in m.shape])
+        drawn = change(neutral)
+        scales = [q for q in m.shape if _parallel(drawn, change({**neutral, q.name: _inside(q)}))]
+    except (ArithmeticError, LookupError, RuntimeError, TypeError, ValueError):
+        return m
+    return replace(m, choices={**m.choices, **{q.name: q.neutral for q in scales}}, shape=tuple(q for q in m.shape if q not in scales))
+
+
+def _inside(q: Parameter) -> float:
+    """A value of a parameter about a prior standard deviation from neutral, within its limits."""
+    up = q.neutral + q.prior_sd
+    return up if up < q.limits[1] else (q.neutral + max(q.limits[0], q.neutral - q.prior_sd)) / 2
+
+
+def _parallel(one: Array, other: Array) -> bool:
+    """Whether two changes, of some size, are the same but for that."""
+    square, across, whole = float(one @ one), float(one @ other), float(other @ other)
+    return min(square, whole) > 0 and square * whole - across**2 < SAME * square * whole
 
 
 class _Watched:

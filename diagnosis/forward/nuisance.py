@@ -36,6 +36,7 @@ STIFFNESS_DRIFT_SD, DAMPING_DRIFT_SD = 1e-4, 0.01  # of one mode in one test, at
 DRIFT_SD = 1e-3  # of one channel's gain from test to test, at the reference width
 SHARE_SD = 0.03  # root of the mass that a mode carries along in a light resonance, over its own modal mass
 RESONANCE_SD = (0.02, 0.5)  # relative, of its frequency and of its damping ratio, about where it was seen
+COINCIDE = 0.01  # of a frequency, within which modes are a pair or a cluster
 RIGID = 1e-6  # of the highest frequency, below which a mode is a rigid body's: rounding leaves some 1e-8 of it, and a beam's highest is in MHz
 EXPANSION_SD = {"radial motion of the rings": 3e-3, "axial motion of the rings": 3e-3, "growth of the grooves": 0.03}
 """Relative errors of thermal motions, the same at all temperatures: two honest finite-element programs differ by a thousandth in the motions, and
@@ -101,10 +102,13 @@ class Resonance:
 
 
 def reference_modes(linear: Matrices, seen: float, highest: float, most: int) -> ReferenceModes:
-    """Modes of the undamped, standing reference below `highest`, `most` of them, and how many of these lie below `seen` (rad/s)."""
+    """Modes of the undamped, standing reference below `highest`, `most` of them, and how many of these lie below `seen` (rad/s). Where there are more, those
+    that coincide are kept or left together: one of the two planes of a shaft alone would make the other a change of what is measured."""
     squares, vectors = eigh(linear.stiffness, linear.mass)
     omega = np.sqrt(np.maximum(squares, 0.0))
-    keep = np.flatnonzero((omega > RIGID * omega.max()) & (omega < highest))[:most]
+    keep = np.flatnonzero((omega > RIGID * omega.max()) & (omega < highest))
+    while len(keep) > most:
+        keep = keep[: int(np.argmax(omega[keep] > (1 - COINCIDE) * omega[keep[-1]]))]
     modal = vectors[:, keep]
     damping = np.einsum("ni,nm,mi->i", modal, (linear.damping + linear.damping.T) / 2, modal) / (2 * omega[keep])
     return ReferenceModes(omega[keep], np.maximum(damping, 1e-4), linear.mass @ modal, linear.dofs, int(np.sum(omega[keep] < seen)))

@@ -28,6 +28,7 @@ from thermospindle.sim.effects.effect import HOOKS, Effect, Parameter, Values, f
 STIFFNESS_WIDTH, DAMPING_WIDTH, PRELOAD_WIDTH = 3.0, 20.0, 5.0  # %
 RING_WIDTH = 0.2  # um
 ALIKE = 2e-4  # of the squares of what an effect moves, that a free form which is its own change may leave
+NEARLY = 0.1  # of them, likewise, where a fit of the effect may start from what the free form says
 OF_BEAMS: list[tuple[str, tuple[int, ...]]] = [("axial", (2,)), ("shear", (0, 1)), ("bending", (3, 4))]
 """What each stiffness of a beam element resists, as its moves are told in `model.rotor.beam`."""
 
@@ -138,18 +139,35 @@ def _preloaded(spindle: Spindle, condition: Condition, values: Values) -> Spindl
 def alike(model: CampaignModel, x: Array, free: Mechanism, named: Mechanism, shape: Sequence[float] | None = None) -> bool:
     """Whether a free form changes what an effect of the catalogue changes, whatever the law: whether in every test the two move all lines in the same
     direction, to `ALIKE` of their squares. `x` (P,) are the nuisances where that is asked, and `shape` the effect's (neutral unless given)."""
+    return _apart(_by_size(model, x, free), _by_size(model, x, named, shape)) < ALIKE
+
+
+def as_told_by(model: CampaignModel, x: Array, free: Mechanism, named: Mechanism, sizes: Array) -> Array | None:
+    """Sizes (tests,) of an effect of the catalogue with a law of the data's own that do, to first order about nuisances `x` (P,), what `sizes` (tests,) of a
+    free form do; None where the two do not move the same: to `NEARLY` of the squares, enough to start a fit from."""
+    of_free, of_named = _by_size(model, x, free), _by_size(model, x, named)
+    if _apart(of_free, of_named) >= NEARLY:
+        return None
+    return np.array([
+        named.size.neutral + change * float(f @ n) / float(n @ n) if n.any() else named.size.neutral
+        for change, f, n in zip(sizes, of_free, of_named, strict=True)
+    ])  # fmt: skip
+
+
+def _by_size(model: CampaignModel, x: Array, m: Mechanism, shape: Sequence[float] | None = None) -> list[Array]:
+    """Derivatives (N,) of every test by the size of a mechanism that does nothing yet."""
+    at = [(m.effect, m.values(m.size.neutral, [q.neutral for q in m.shape] if shape is None else shape))]
+    return [Problem(model, (m,)).by_size(t, x, at, 0) for t in range(len(model.tests))]
+
+
+def _apart(of_free: Sequence[Array], of_named: Sequence[Array]) -> float:
+    """The share of the squares of what an effect moves that a free form's change leaves; all of it where it moves nothing."""
     apart = whole = 0.0
-    columns = []
-    for m in (free, named):
-        values = shape if m is named and shape is not None else [q.neutral for q in m.shape]
-        at = [(m.effect, m.values(m.size.neutral, values))]
-        columns.append([Problem(model, (m,)).by_size(t, x, at, 0) for t in range(len(model.tests))])
-    for of_free, of_named in zip(*columns, strict=True):
-        square, other = float(of_named @ of_named), float(of_free @ of_free)
-        if square > 0:
-            whole += square
-            apart += square - (float(of_free @ of_named) ** 2 / other if other else 0.0)
-    return whole > 0 and apart < ALIKE * whole
+    for f, n in zip(of_free, of_named, strict=True):
+        square, other = float(n @ n), float(f @ f)
+        whole += square
+        apart += square - (float(f @ n) ** 2 / other if other else 0.0)
+    return apart / whole if whole > 0 else 1.0
 
 
 def drifting(

@@ -98,7 +98,7 @@ def scan(model: CampaignModel, mechanisms: Sequence[Mechanism]) -> tuple[Array, 
 def settled(model: CampaignModel, h: Hypothesis) -> Hypothesis:
     """Fitted anew with priors as wide as was learned, until that moves nothing: the quadratic then stands where the answer is.
 
-    It starts from its own answer, or from the fit where the model is no quadratic as far as that. What ends with less evidence than the quadratic promised
+    It starts from its own answer, or from the fit where the model is no quadratic as far as that, without what was learned to be nothing. What ends with less evidence than the quadratic promised
     may have stalled on that way, whatever it costs at first, and is fitted from the other start too.
     """
     for _ in range(REFITS):
@@ -106,7 +106,7 @@ def settled(model: CampaignModel, h: Hypothesis) -> Hypothesis:
         before = h.evidence
         try:
             problem = Problem(model, h.mechanisms, before.learned, h.fit.moved)
-            near, far = sorted((before.mean, h.fit.point), key=lambda at: problem.cost(at, TEMPERS[-1]))
+            near, far = sorted((before.mean, problem.within_prior(h.fit.point)), key=lambda at: problem.cost(at, TEMPERS[-1]))
             found = refit(start=near)
             told = evidence(model, found)
             if told.ln < before.ln - LITTLE:

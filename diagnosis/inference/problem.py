@@ -16,6 +16,7 @@ from thermospindle.diagnosis.inference.prior import UNMOVED, Learned, precision_
 from thermospindle.model.types import Array, Integers
 
 LONGEST = 3.0  # prior standard deviations in one step
+NARROW = 1e4  # precision in reference widths, between those of what may be and of next to nothing
 SIZE_STEP = 0.02  # of a size's or shape parameter's prior standard deviation, for differences
 
 
@@ -60,14 +61,19 @@ class Problem:
             at += len(m.shape)
         return p[: self.nuisances], np.array(sizes).reshape(len(self.mechanisms), self.tests), shapes
 
-    def start(self, sizes: Mapping[int, float]) -> Array:
-        """The drawing (n,), with mechanism number k at size `sizes[k]`, in its unit and the same in all tests, and the others at none."""
+    def start(self, sizes: Mapping[int, float | Array]) -> Array:
+        """The drawing (n,), with mechanism number k at size `sizes[k]` in its unit, one for all tests or (tests,), and the others at none."""
         p, at = np.zeros(self.length), self.nuisances
         for k, (m, root) in enumerate(zip(self.mechanisms, self.roots, strict=True)):
             if k in sizes:
-                p[at : at + self.tests] = np.linalg.solve(root, np.full(self.tests, sizes[k] - m.size.neutral))
+                p[at : at + self.tests] = np.linalg.solve(root, np.broadcast_to(sizes[k] - m.size.neutral, self.tests))
             at += self.tests + len(m.shape)
         return p
+
+    def within_prior(self, p: Array) -> Array:
+        """Where the prior allows next to nothing that is taken from a parameter vector (n,), and the rest of it left: what was fitted with wide priors does
+        not start a fit with narrow ones from a wall."""
+        return np.asarray(np.linalg.solve(self.precision + NARROW * np.eye(self.length), NARROW * p))
 
     def applied(self, t: int, sizes: Array, shapes: Sequence[Array]) -> tuple[list, list[float]]:
         """The effects that act in test `t`, and how far each size lies beyond its limit."""

@@ -21,9 +21,10 @@ from thermospindle.diagnosis.forward.mechanism import Mechanism, strongest, with
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit
-from thermospindle.diagnosis.inference.freeform import alike
+from thermospindle.diagnosis.inference.freeform import alike, as_told_by
 from thermospindle.diagnosis.inference.hypothesis import EARLY, LITTLE, PLENTY, STRAIN, Hypothesis, Task, fitted, scan, settled
 from thermospindle.diagnosis.inference.prior import DRIFTING, Learned, steady, undrifted
+from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.inference.resonance import with_more, with_resonance
 from thermospindle.diagnosis.inference.screening import Screened, screen
 from thermospindle.model.parallel import in_parallel
@@ -77,6 +78,7 @@ def search(
             tried = _singles(model, none, every, lambda done: None, workers)  # steps that were counted already
         else:
             tried = _carried_over(model, none, tried, before, workers)
+    tried = replace(tried, singles=_better([*tried.singles, *_by_own_laws(model, none, tried, every, workers)]))
     singles = tried.singles
     pairs = _joined(model, none, singles, every, tried.most, tried.expected, workers)
     progress("pairs fitted")
@@ -148,6 +150,24 @@ def _owed(
         late = [s for s in promised if s.gain > least and delivered.get(s.mechanism.name, -np.inf) < s.gain - OCCAM]
         tasks += [_task((), none.fit, s, -np.inf, far=True) for s in late[:count]]
     return fitted(model, tasks, TEMPERS[-1:], none.fit, most, expected, workers)
+
+
+def _by_own_laws(model: CampaignModel, none: Hypothesis, tried: Singles, mechanisms: Sequence[Mechanism], workers) -> list[Hypothesis]:
+    """Effects with laws of the data's own, fitted from what the best free form says. Where that does better than an effect which changes much the same by the
+    law assumed, the effect may do as well by another; screening, which is linear, need not have seen it."""
+    told = max((h for h in tried.singles if h.free), key=lambda h: h.evidence.ln, default=none)
+    if not told.free or told.evidence.ln < none.evidence.ln + PLENTY:
+        return []
+    reached = {h.names[0]: h.evidence.ln for h in sorted(tried.singles, key=lambda h: h.evidence.ln)}
+    tasks = []
+    for m in mechanisms:
+        if m.own_law and reached.get(m.name, -np.inf) < told.evidence.ln - LITTLE:
+            sizes = as_told_by(model, none.fit.nuisance, told.mechanisms[0], m, told.evidence.sizes[0])
+            if sizes is not None:
+                start = Problem(model, (m,)).start({0: sizes - min(0.0, (sizes - m.size.limits[0]).min())})
+                start[: len(model.parameters)] = told.fit.nuisance
+                tasks.append(Task((m,), (start,), -np.inf))
+    return fitted(model, tasks, TEMPERS[-1:], told.fit, tried.most, tried.expected, workers)
 
 
 def _cost(model: CampaignModel, none: Hypothesis, expected: Learned) -> float:

@@ -67,7 +67,11 @@ def test_laws_of_the_datas_own_act_in_every_test_as_where_they_do_most(spindle):
     assert not {"added_disk", "sensor_mass", "support_anisotropy", "ball_material", "sensor_gain"} & set(names)
     assert names.count("thermal_gradient") == 1
     assert all(m.kind == "own law" for m in own)
-    warm = next(m for m in own if m.name == "thermal_gradient")
+    of = {m.name: m for m in own}
+    assert [q.name for q in of["flange_fit_loosening"].shape] == ["translation_share", "loss_factor"]  # its interference is but another size there
+    assert of["flange_fit_loosening"].choices == {"interference": 7.0, "closed": 0.0}
+    assert [q.name for q in of["thermal_gradient"].shape] == ["common_share", "level_share"]
+    warm = of["thermal_gradient"]
     by_region = {g.name: 20.0 for g in spindle.regions}
     values = warm.values(1.0, [q.neutral for q in warm.shape])
     at_rest = warm.effect.temperatures(spindle, Condition(20.0), values, by_region)
