@@ -12,13 +12,14 @@ width and its departure from its law (the mean over the grid). What is quoted is
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from itertools import product
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from scipy.special import log_ndtr, logsumexp
+from scipy.sparse import csr_array, eye_array, lil_array
+from scipy.special import log_ndtr, logsumexp, ndtr
 
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import Mechanism, size_covariance
@@ -75,6 +76,8 @@ def quadratic(chi2: float, gradient: Array, information: Array, point: Array) ->
 def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = ()) -> Evidence:
     """The evidence of a fit at its own temper (its errors are 1 / temper times the data's); with `near` the sizes of discrepancies, drift and
     errors are taken from the best of these, which is quick."""
+    turn = amplitudes_apart(fit)
+    fit = turned(fit, turn)
     whole = quadratic(fit.chi2, fit.gradient, fit.information, fit.point)
     t2 = fit.temper**2
     whole = Quadratic(t2 * whole.constant, t2 * whole.b, t2 * whole.a)
@@ -117,7 +120,11 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = ()) -> Ev
     scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
     learned = Learned(sizes, s, tuple(w for w, _ in own), tuple(d for _, d in own))
     mean, spread = _posterior(scaled, whole_root(model, fit.mechanisms, learned, fit.moved))
-    at, means, covariances, truncation = p, [], [], 0.0
+    chi2 = whole.at(mean)
+    mean, spread = fit.point + turn @ (mean - fit.point), turn @ spread @ turn.T
+    truncation = _within_limits(fit, mean, spread)
+    mean[[h.number for h in fit.held]] = fit.point[[h.number for h in fit.held]]
+    at, means, covariances = p, [], []
     tests = len(model.tests)
     for m, root, width_departure in zip(fit.mechanisms, fit.roots, own, strict=True):
         part = slice(at, at + tests)
@@ -127,9 +134,54 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = ()) -> Ev
         at += tests + len(m.shape)
     shape = (len(fit.mechanisms), tests)
     return Evidence(
-        total + truncation, learned, mean, spread, np.array(means).reshape(shape), np.array(covariances).reshape(*shape, tests),
-        whole.at(mean),
+        total + truncation, learned, mean, spread, np.array(means).reshape(shape), np.array(covariances).reshape(*shape, tests), chi2
     )
+
+
+def _within_limits(fit: Fit, mean: Array, spread: Array) -> float:
+    """ln of the posterior probability, to a quadratic, that shape parameters are within their limits, over the prior's; of one that is held at a limit, of the
+    integral of what falls off from there."""
+    found, at, held = 0.0, len(fit.nuisance), {h.number: h for h in fit.held}
+    for m, root in zip(fit.mechanisms, fit.roots, strict=True):
+        for number, q in enumerate(m.shape, at + len(root)):
+            low, high = ((limit - q.neutral) / q.prior_sd for limit in q.limits)
+            if number in held:
+                h = held[number]
+                scaled = h.slope / np.sqrt(h.curvature)
+                inside = scaled**2 / 2 + log_ndtr(-scaled) - np.log(h.curvature) / 2 - fit.point[number] ** 2 / 2
+            else:
+                sd = max(float(np.sqrt(max(spread[number, number], 0.0))), 1e-12)
+                inside = np.log(max(ndtr((high - mean[number]) / sd) - ndtr((low - mean[number]) / sd), 1e-300))
+            found += float(inside - np.log(ndtr(high) - ndtr(low)))
+        at += len(root) + len(m.shape)
+    return found
+
+
+def amplitudes_apart(fit: Fit) -> csr_array:
+    """Coordinates (n, n) of the quadratic about a fit in which a shape parameter of a mechanism with a law of the data's own changes what the mechanism does
+    and not how much of it.
+
+    What a shape parameter moves at the fitted sizes is in proportion to these: to a quadratic it could stand in for them, and for their law over the
+    tests, which of its own it has not. So with each, the size in every test gives way by what it would change of the amount: sizes' part of its column.
+    """
+    turn, at = lil_array(eye_array(len(fit.point))), len(fit.nuisance)
+    for m, root in zip(fit.mechanisms, fit.roots, strict=True):
+        tests, shapes = len(root), slice(at + len(root), at + len(root) + len(m.shape))
+        if m.own_law and m.shape:
+            amounts = np.zeros((tests, len(m.shape)))
+            for t, (_, _, information) in enumerate(fit.by_test):
+                own = information[at + t, at + t]
+                if own > 0:
+                    amounts[t] = root[t, t] * information[at + t, shapes] / own
+            turn[at : at + tests, shapes] = -np.linalg.solve(root, amounts)
+        at = shapes.stop
+    return csr_array(turn)
+
+
+def turned(fit: Fit, turn: csr_array) -> Fit:
+    """The fit with its quadratic, and that of every test, in other coordinates about its point."""
+    by_test = tuple((chi2, turn.T @ gradient, turn.T @ information @ turn) for chi2, gradient, information in fit.by_test)
+    return replace(fit, gradient=turn.T @ fit.gradient, information=turn.T @ fit.information @ turn, by_test=by_test)
 
 
 def _one_sided(model: CampaignModel, mechanism: Mechanism, own: tuple[float, float], mean: Array, covariance: Array) -> float:
@@ -242,6 +294,7 @@ def left_out(model: CampaignModel, fit: Fit, found: Evidence, groups: Sequence[S
     """Root mean square residual, in standard errors of the data, of groups of tests predicted from all others, with what was learned from all."""
     learned = found.learned
     prior = whole_root(model, fit.mechanisms, learned, fit.moved)
+    fit = turned(fit, amplitudes_apart(fit))
     by_test = [quadratic(*b, fit.point) for b in fit.by_test]
     total, count = 0.0, 0
     for group in groups:

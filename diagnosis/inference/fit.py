@@ -31,13 +31,23 @@ TRUSTED, POOR = 0.6, 0.25  # of the gain promised: from there derivatives stay i
 CORRECTIONS = 2
 
 
+@dataclass(frozen=True)
+class Held:
+    """A shape parameter, by its number, at a limit that it would leave: half the slope of the cost towards the inside, and half its curvature with all else
+    fitted anew, with the prior's."""
+
+    number: int
+    slope: float
+    curvature: float
+
+
 @dataclass(frozen=True, eq=False)
 class Fit:
     """Where a model stands: nuisance values x (P,) in prior standard deviations, sizes (mechanisms, tests) and shape parameters of every mechanism
     in their units; and the quadratic of chi2 about it over all parameters p = [x, z, u]: chi2 + 2 gradient (p - point) + (p - point) information
     (p - point), with z the whitened sizes (`roots`) and u the shape parameters, mechanism by mechanism.
 
-    `by_test` holds chi2, gradient and information of every test.
+    `by_test` holds chi2, gradient and information of every test. What is `held` at a limit (`Problem.held`) is no parameter of the quadratic.
     """
 
     mechanisms: tuple[Mechanism, ...]
@@ -53,6 +63,7 @@ class Fit:
     rates: Rates
     temper: float
     moved: Array = field(default_factory=lambda: UNMOVED)  # (mechanisms, tests, 2, modes), of frequency and damping of every mode, relative
+    held: tuple[Held, ...] = ()
     cost: float = np.nan  # chi2, its errors 1 / temper times the data's, and priors: those that it was fitted with
 
     @property
@@ -76,6 +87,7 @@ def fit(
         p = start.copy()
     else:
         p = min(start, key=lambda at: problem.cost(at, tempers[0])).copy()
+    p = problem.within_limits(p)
     for temper in tempers:
         problem = Problem(model if temper == 1.0 else model.thinned, mechanisms, learned, moved)
         rates = rates_of(problem.model, problem.parts(p)[0], problem.effects_of(p), rates)
@@ -95,7 +107,7 @@ def _settled(problem: Problem, p: Array, rates: Rates, temper: float) -> tuple[A
     for _ in range(MOST_STEPS[last]):
         gradient, normal = lines.slope(problem, here, temper), temper**2 * lines.information + problem.precision
         damped = np.diag(temper**2 * np.diag(lines.information) + problem.least_stiff)  # not what is stiff only with all others held
-        move = problem.within_reach(-_solved(normal + damping * damped, gradient))
+        move = problem.step(here.p, gradient, normal + damping * damped)
         promised = -2 * float(gradient @ move) - float(move @ normal @ move)
         if promised < ENOUGH and current:
             break
@@ -128,16 +140,12 @@ def _settled(problem: Problem, p: Array, rates: Rates, temper: float) -> tuple[A
     return here.p, lines, here.residuals
 
 
-def _solved(matrix: Array, right: Array) -> Array:
-    return np.asarray(np.linalg.solve(matrix, right), float)
-
-
 def _corrected(problem: Problem, lines: Linearisation, normal: Array, temper: float, there: Point) -> Point:
     """The best of a few steps on from a point with the derivatives of the one before: peaks narrower than they move bend every valley, and a step along
     it is back on its floor after them."""
     best = there
     for _ in range(CORRECTIONS):
-        there = problem.at(there.p + problem.within_reach(-_solved(normal, lines.slope(problem, there, temper))), temper)
+        there = problem.at(there.p + problem.step(there.p, lines.slope(problem, there, temper), normal), temper)
         if there.residuals is None:
             break
         if there.cost < best.cost:
@@ -147,8 +155,9 @@ def _corrected(problem: Problem, lines: Linearisation, normal: Array, temper: fl
 
 def _finished(problem: Problem, p: Array, rates: Rates, temper: float, lines: Linearisation, residuals: Sequence[Array]) -> Fit:
     _, sizes, shapes = problem.parts(p)
-    gradients = lines.gradients(residuals)
-    by_test = tuple((float(r @ r), g, a) for r, g, a in zip(residuals, gradients, lines.by_test, strict=True))
+    held = _held(problem, p, temper, lines, residuals)
+    lines = lines.without(np.array([h.number for h in held], int))
+    by_test = tuple((float(r @ r), g, a) for r, g, a in zip(residuals, lines.gradients(residuals), lines.by_test, strict=True))
     return Fit(
         problem.mechanisms,
         p,
@@ -156,15 +165,28 @@ def _finished(problem: Problem, p: Array, rates: Rates, temper: float, lines: Li
         tuple(tuple(float(v) for v in s) for s in shapes),
         problem.roots,
         sum(b[0] for b in by_test),
-        np.sum(gradients, axis=0),
+        np.sum([b[1] for b in by_test], axis=0),
         lines.information,
         by_test,
         sum(d.count for d in problem.model.tests),
         rates,
         temper,
         _moved(problem, p) if temper == 1.0 and problem.mechanisms else UNMOVED,
+        held,
         problem.cost(p, temper, residuals),
     )
+
+
+def _held(problem: Problem, p: Array, temper: float, lines: Linearisation, residuals: Sequence[Array]) -> tuple[Held, ...]:
+    slope = lines.slope(problem, Point(p, residuals, np.nan), temper)
+    numbers = problem.held(p, slope)
+    if not len(numbers):
+        return ()
+    normal = temper**2 * lines.information + problem.precision
+    free = np.setdiff1d(np.arange(problem.length), numbers)
+    inner = np.linalg.solve(normal[np.ix_(free, free)], normal[np.ix_(free, numbers)])
+    curvature = np.diag(normal)[numbers] - np.einsum("ij,ij->j", normal[np.ix_(free, numbers)], inner)
+    return tuple(Held(int(n), abs(float(slope[n])), float(c)) for n, c in zip(numbers, curvature, strict=True))
 
 
 def _moved(problem: Problem, p: Array) -> Array:

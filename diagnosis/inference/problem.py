@@ -15,6 +15,7 @@ from thermospindle.diagnosis.forward.model import FAILED, Applied, CampaignModel
 from thermospindle.diagnosis.inference.prior import UNMOVED, Learned, precision_and_variances, roots_of
 from thermospindle.model.types import Array, Integers
 
+NONE: Integers = np.zeros(0, int)
 LONGEST = 3.0  # prior standard deviations in one step
 NARROW = 1e4  # precision in reference widths, between those of what may be and of next to nothing
 SIZE_STEP = 0.02  # of a size's or shape parameter's prior standard deviation, for differences
@@ -47,9 +48,44 @@ class Problem:
         self.tests = len(model.tests)
         self.nuisances = len(model.parameters)
         self.length = self.nuisances + sum(self.tests + len(m.shape) for m in self.mechanisms)
+        shapes = [(at, q) for at, q in zip(self._shape_numbers(), [q for m in self.mechanisms for q in m.shape], strict=True)]
+        self.low, self.high = np.full(self.length, -np.inf), np.full(self.length, np.inf)  # of shape parameters; sizes go on beyond theirs
+        for at, q in shapes:
+            self.low[at], self.high[at] = ((limit - q.neutral) / q.prior_sd for limit in q.limits)
         small = (kinds_of.STIFFNESS, kinds_of.DAMPING, kinds_of.STIFFNESS_DRIFT, kinds_of.DAMPING_DRIFT, kinds_of.DRIFT)
         self.reach = np.ones(self.length)  # what of a parameter's move counts towards the longest step
         self.reach[: self.nuisances] = [0.05 if q.kind in small else 1.0 for q in model.parameters]
+
+    def _shape_numbers(self) -> list[int]:
+        found, at = [], self.nuisances
+        for m in self.mechanisms:
+            found += range(at + self.tests, at + self.tests + len(m.shape))
+            at += self.tests + len(m.shape)
+        return found
+
+    def within_limits(self, p: Array) -> Array:
+        return np.clip(p, self.low, self.high)
+
+    def held(self, p: Array, slope: Array) -> Integers:
+        """Numbers of the shape parameters that stand at a limit beyond which alone the cost, of half gradient `slope` (n,), would fall."""
+        return np.flatnonzero(((p <= self.low) & (slope > 0)) | ((p >= self.high) & (slope < 0)))
+
+    def step(self, p: Array, slope: Array, normal: Array) -> Array:
+        """The move (n,) from `p` to the least of a quadratic within the limits: what would go beyond is taken to its limit, and all else follows (active
+        set: Nocedal & Wright, *Numerical Optimization*, 2006, 16.7)."""
+        free, move = np.ones(self.length, bool), np.zeros(self.length)
+        free[self.held(p, slope)] = False
+        while True:
+            if free.all():
+                move = -np.linalg.solve(normal, slope)
+            else:
+                left = slope[free] + normal[np.ix_(free, ~free)] @ move[~free]
+                move[free] = -np.linalg.solve(normal[np.ix_(free, free)], left)
+            beyond = free & ((p + move < self.low) | (p + move > self.high))
+            if not beyond.any():
+                return move * min(1.0, LONGEST / max(float((np.abs(move) * self.reach).max()), 1e-300))
+            move[beyond] = (self.within_limits(p + move) - p)[beyond]
+            free &= ~beyond
 
     def parts(self, p: Array) -> tuple[Array, Array, list[Array]]:
         """Nuisance values (P,), sizes (mechanisms, tests) and shape parameters of a parameter vector, in their units."""
@@ -57,7 +93,7 @@ class Problem:
         for m, root in zip(self.mechanisms, self.roots, strict=True):
             sizes.append(m.size.neutral + root @ p[at : at + self.tests])
             at += self.tests
-            shapes.append(np.array([np.clip(q.neutral + q.prior_sd * v, *q.limits) for q, v in zip(m.shape, p[at : at + len(m.shape)], strict=True)]))
+            shapes.append(np.array([np.clip(q.neutral + q.prior_sd * v, *q.limits) for q, v in zip(m.shape, p[at : at + len(m.shape)], strict=True)]))  # rounding
             at += len(m.shape)
         return p[: self.nuisances], np.array(sizes).reshape(len(self.mechanisms), self.tests), shapes
 
@@ -140,16 +176,13 @@ class Problem:
         _, sizes, shapes = self.parts(p)
         return [self.acting(self.applied(t, sizes, shapes)[0]) for t in range(self.tests)]
 
-    def linearisation(self, p: Array, rates: Rates) -> Linearisation:
-        return Linearisation(self.length, [self.linearised(t, p, rates) for t in range(self.tests)])
+    def linearisation(self, p: Array, rates: Rates, held: Integers = NONE) -> Linearisation:
+        """Of all tests, without the parameters that are `held` where they are."""
+        return Linearisation(self.length, [self.linearised(t, p, rates) for t in range(self.tests)]).without(held)
 
     def residuals(self, p: Array) -> list[Array] | None:
         """Residuals of every test; None where no spindle can be built."""
         return built(lambda t: self.residual(t, p), self.tests)
-
-    def within_reach(self, move: Array) -> Array:
-        """A step (n,), shortened to `LONGEST`."""
-        return move * min(1.0, LONGEST / max(float((np.abs(move) * self.reach).max()), 1e-300))
 
     def at(self, p: Array, temper: float) -> Point:
         residuals = self.residuals(p)
@@ -183,6 +216,13 @@ class Linearisation:
             information[np.ix_(numbers, numbers)] = jacobian @ jacobian.T
             self.by_test.append(information)
         self.information: Array = np.sum(self.by_test, axis=0)
+
+    def without(self, held: Integers) -> Linearisation:
+        """The same with some parameters held where they are."""
+        if not len(held):
+            return self
+        kept = [~np.isin(numbers, held) for _, _, numbers in self.rows]
+        return Linearisation(self.length, [(r, j[own], n[own]) for (r, j, n), own in zip(self.rows, kept, strict=True)])
 
     @cached_property
     def chi2(self) -> float:

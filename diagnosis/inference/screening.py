@@ -57,7 +57,7 @@ def linearised(model: CampaignModel, about: Fit) -> Linearisation:
     key = (about.point.tobytes(), len(about.mechanisms))
     if key not in model.kept:
         model.kept.clear()
-        model.kept[key] = Problem(model, about.mechanisms).linearisation(about.point, about.rates)
+        model.kept[key] = Problem(model, about.mechanisms).linearisation(about.point, about.rates, np.array([h.number for h in about.held], int))
     return model.kept[key]
 
 
