@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.linear import Rates
@@ -48,20 +49,16 @@ class Problem:
         self.tests = len(model.tests)
         self.nuisances = len(model.parameters)
         self.length = self.nuisances + sum(self.tests + len(m.shape) for m in self.mechanisms)
-        shapes = [(at, q) for at, q in zip(self._shape_numbers(), [q for m in self.mechanisms for q in m.shape], strict=True)]
         self.low, self.high = np.full(self.length, -np.inf), np.full(self.length, np.inf)  # of shape parameters; sizes go on beyond theirs
-        for at, q in shapes:
-            self.low[at], self.high[at] = ((limit - q.neutral) / q.prior_sd for limit in q.limits)
+        at = self.nuisances
+        for m in self.mechanisms:
+            at += self.tests
+            for q in m.shape:
+                self.low[at], self.high[at] = ((limit - q.neutral) / q.prior_sd for limit in q.limits)
+                at += 1
         small = (kinds_of.STIFFNESS, kinds_of.DAMPING, kinds_of.STIFFNESS_DRIFT, kinds_of.DAMPING_DRIFT, kinds_of.DRIFT)
         self.reach = np.ones(self.length)  # what of a parameter's move counts towards the longest step
         self.reach[: self.nuisances] = [0.05 if q.kind in small else 1.0 for q in model.parameters]
-
-    def _shape_numbers(self) -> list[int]:
-        found, at = [], self.nuisances
-        for m in self.mechanisms:
-            found += range(at + self.tests, at + self.tests + len(m.shape))
-            at += self.tests + len(m.shape)
-        return found
 
     def within_limits(self, p: Array) -> Array:
         return np.clip(p, self.low, self.high)
@@ -71,21 +68,18 @@ class Problem:
         return np.flatnonzero(((p <= self.low) & (slope > 0)) | ((p >= self.high) & (slope < 0)))
 
     def step(self, p: Array, slope: Array, normal: Array) -> Array:
-        """The move (n,) from `p` to the least of a quadratic within the limits: what would go beyond is taken to its limit, and all else follows (active
-        set: Nocedal & Wright, *Numerical Optimization*, 2006, 16.7)."""
-        free, move = np.ones(self.length, bool), np.zeros(self.length)
-        free[self.held(p, slope)] = False
-        while True:
-            if free.all():
-                move = -np.linalg.solve(normal, slope)
-            else:
-                left = slope[free] + normal[np.ix_(free, ~free)] @ move[~free]
-                move[free] = -np.linalg.solve(normal[np.ix_(free, free)], left)
-            beyond = free & ((p + move < self.low) | (p + move > self.high))
-            if not beyond.any():
-                return move * min(1.0, LONGEST / max(float((np.abs(move) * self.reach).max()), 1e-300))
-            move[beyond] = (self.within_limits(p + move) - p)[beyond]
-            free &= ~beyond
+        """The move (n,) from `p` to the least of a quadratic of the cost within the limits, shortened to `LONGEST`: the quadratic of what is limited alone, all
+        else following it, is solved between bounds."""
+        limited = np.isfinite(self.low) | np.isfinite(self.high)
+        free, move = ~limited, np.zeros(self.length)
+        follows = np.linalg.solve(normal[np.ix_(free, free)], np.column_stack([slope[free], normal[np.ix_(free, limited)]]))
+        if limited.any():
+            left = np.column_stack([slope[limited], normal[np.ix_(limited, limited)]]) - normal[np.ix_(limited, free)] @ follows
+            factor = np.linalg.cholesky(left[:, 1:])
+            bounds = self.low[limited] - p[limited], self.high[limited] - p[limited]
+            move[limited] = lsq_linear(factor.T, -np.linalg.solve(factor, left[:, 0]), bounds, method="bvls").x
+        move[free] = -follows[:, 0] - follows[:, 1:] @ move[limited]
+        return move * min(1.0, LONGEST / max(float((np.abs(move) * self.reach).max()), 1e-300))
 
     def parts(self, p: Array) -> tuple[Array, Array, list[Array]]:
         """Nuisance values (P,), sizes (mechanisms, tests) and shape parameters of a parameter vector, in their units."""
@@ -93,7 +87,7 @@ class Problem:
         for m, root in zip(self.mechanisms, self.roots, strict=True):
             sizes.append(m.size.neutral + root @ p[at : at + self.tests])
             at += self.tests
-            shapes.append(np.array([np.clip(q.neutral + q.prior_sd * v, *q.limits) for q, v in zip(m.shape, p[at : at + len(m.shape)], strict=True)]))  # rounding
+            shapes.append(np.array([np.clip(q.neutral + q.prior_sd * v, *q.limits) for q, v in zip(m.shape, p[at : at + len(m.shape)], strict=True)]))
             at += len(m.shape)
         return p[: self.nuisances], np.array(sizes).reshape(len(self.mechanisms), self.tests), shapes
 

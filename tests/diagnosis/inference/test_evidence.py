@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 from scipy.stats import multivariate_normal, norm
 
 from thermospindle.diagnosis.forward.mechanism import REFERENCE_DEPARTURE, REFERENCE_WIDTH, Mechanism, size_covariance
@@ -26,7 +27,7 @@ from thermospindle.diagnosis.forward.nuisance import (
     Nuisance,
 )
 from thermospindle.diagnosis.inference.evidence import Learned, Quadratic, _marginal, evidence, left_out  # fmt: skip
-from thermospindle.diagnosis.inference.fit import Fit
+from thermospindle.diagnosis.inference.fit import Fit, Held
 from thermospindle.diagnosis.inference.prior import ACTION, Root, misjudged, nuisance_variances, precision_and_variances, whole_root
 from thermospindle.model.machine import Condition
 from thermospindle.sim.effects.effect import Effect, Parameter
@@ -224,6 +225,46 @@ def test_sizes_that_depart_from_their_law_keep_the_sign_that_all_have():
     gls = np.linalg.solve(found.size_covariance[0], np.ones(3))
     assert gls @ found.sizes[0] / gls.sum() < 1.0 < found.sizes[0].min()
     assert 0 < evidence(bound.model, bound.fit).ln - found.ln < np.log(2) + 1e-9  # the sign is more probable than not
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_a_shape_within_limits_is_the_integral_over_these(held, monkeypatch):
+    """A share from nothing to one, neutral at nothing: the integral over it alone, by quadrature; held at nothing where the data would have it less."""
+    own, plain, random = (1.0, 0.3), toy(3, 0.0, hidden=2.0), np.random.default_rng(8)
+    monkeypatch.setattr("thermospindle.diagnosis.inference.evidence._own_grid", lambda lawless, lasting: (own,))
+    jacobians = [np.column_stack([j, random.standard_normal(len(j))]) for j in plain.jacobians]
+    y = [v + (-0.4 if held else 0.6) * j[:, -1] for v, j in zip(plain.y, jacobians, strict=True)]
+    prior = plain.prior(0.0, 0.0, 0.0, [own])
+    kept = np.diag(prior) > 0  # sizes of nothing are no parameters
+    precision = np.eye(len(kept) + 1)
+    precision[np.ix_([*kept, False], [*kept, False])] = np.linalg.inv(prior[np.ix_(kept, kept)])
+    kept = np.append(kept, True)
+
+    def ln(u: float) -> float:
+        return replace(plain, y=[v - u * j[:, -1] for v, j in zip(y, jacobians, strict=True)]).ln(prior)
+
+    us = np.linspace(0.0, 2.0, 1001)
+    values = np.array([ln(u) + norm.logpdf(u) for u in us]) - np.log(norm.cdf(2.0) - 0.5)
+    by_quadrature = np.log(trapezoid(np.exp(values - values.max()), us)) + values.max()
+
+    whole, right, free = np.concatenate(jacobians), np.concatenate(y), kept.copy()
+    normal, point = whole.T @ whole + precision, np.zeros(len(kept))
+    free[-1] = not held
+    point[free] = np.linalg.solve(normal[np.ix_(free, free)], (whole.T @ right)[free])
+    slope = float(whole[:, -1] @ (whole @ point - right) + point[-1])
+    stands = (Held(len(point) - 1, slope, 1 / np.linalg.inv(normal[np.ix_(kept, kept)])[-1, -1]),) if held else ()
+    moving = [j * np.append(np.ones(len(kept) - 1), not held) for j in jacobians]
+    by_test = tuple((float((r := j @ point - v) @ r), m.T @ r, m.T @ m) for j, m, v in zip(jacobians, moving, y, strict=True))
+    mechanism = replace(plain.mechanisms[0], shape=(Parameter("share", "1", 0.0, 0.0, 0.5, (0.0, 1.0), "", ""),))
+    chi2, gradient, information = (sum(b[k] for b in by_test) for k in range(3))
+    done = replace(
+        plain.fit, mechanisms=(mechanism,), point=point, shapes=((0.5 * point[-1],),), chi2=chi2, gradient=gradient, information=information,
+        by_test=by_test, held=stands,
+    )  # fmt: skip
+    found = evidence(plain.model, done, [Learned({STIFFNESS: 0.0, DAMPING: 0.0, DRIFT: 0.0}, 1.0, (), ())])
+    assert (slope > 0) if held else (point[-1] > 0)
+    assert found.ln == pytest.approx(by_quadrature, abs=0.02)
+    assert (found.mean[-1] == 0.0) == held
 
 
 @pytest.mark.parametrize("hidden", [None, 1.6])

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from scipy import stats
+from scipy import optimize, stats
 
 from tests.conftest import ROOT
-from tests.virtual_campaign import drawn, effect, model_of, truth, virtual_campaign
-from thermospindle.diagnosis.forward.mechanism import variants
+from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, truth, virtual_campaign
+from thermospindle.diagnosis.forward.mechanism import asked_at, variants, with_own_laws
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.forward.nuisance import BUILD, DRIFT, GAIN, STIFFNESS, TEMPERATURE
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.hypothesis import scan
+from thermospindle.diagnosis.inference.prior import steady
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.scene.reading import load
@@ -73,6 +76,57 @@ def test_a_fit_rests(spindle):
     moved = np.concatenate([model.residual(t, done.point + step, []) for t in range(2)])
     promised = done.chi2 + 2 * done.gradient @ step + step @ done.information @ step
     assert moved @ moved == pytest.approx(promised, abs=0.02 * abs(promised - done.chi2) + 0.05)
+
+
+def bounded(low: list[float], high: list[float]) -> Problem:
+    """A problem of which only limits are asked."""
+    problem = object.__new__(Problem)
+    problem.length, problem.low, problem.high, problem.reach = len(low), np.array(low), np.array(high), np.zeros(len(low))
+    return problem
+
+
+def test_a_step_ends_within_limits():
+    """At the least of a quadratic there, by another solver; what stands at a limit that it would leave is held."""
+    random, inf = np.random.default_rng(4), np.inf
+    for _ in range(20):
+        root = random.standard_normal((5, 5))
+        normal, slope = root @ root.T + 0.1 * np.eye(5), 3 * random.standard_normal(5)
+        problem = bounded([-inf, -inf, -inf, 0.0, -inf], [inf] * 5)
+        p = np.array([0.3, -0.2, 0.1, 0.0, 0.4])
+        factor = np.linalg.cholesky(normal)
+        by_other = optimize.lsq_linear(factor.T, -np.linalg.solve(factor, slope), (problem.low - p, problem.high - p), tol=1e-14).x
+        assert problem.step(p, slope, normal) == pytest.approx(by_other, abs=1e-6)
+    problem = bounded([0.0, -1.0, -inf], [2.0, 1.0, inf])
+    slope = np.array([1.0, 1.0, 1.0])
+    assert problem.held(np.array([0.0, 0.5, 0.0]), slope).tolist() == [0]
+    assert problem.held(np.array([2.0, 1.0, 0.0]), slope).tolist() == []
+    assert problem.held(np.array([2.0, 1.0, 0.0]), -slope).tolist() == [0, 1]
+
+
+def test_a_fit_does_not_stall_at_a_limit(spindle):
+    """A share that would be negative is held at nothing, and all else fitted beside it: no worse than without that parameter. It had gone on beyond, where
+    nothing changes, and steps that promised much there and gained nothing ended the fit."""
+    conditions = [Condition(t, n * RPM) for t, n in ((20.0, 0.0), (60.0, 0.0), (60.0, 7200.0))]
+    at = Condition(60.0, 7200.0 * RPM)
+    rings = asked_at(effect("thermal_gradient"), at)
+
+    def warmer(spindle, condition, values, by_region):
+        return rings.temperatures(spindle, condition, values | {"scale": values["scale"] * (condition.temperature - 20) / 40}, by_region)
+
+    hidden = {q.name: q.neutral for q in rings.parameters} | {"scale": 4.0}
+    model = model_of(spindle, mode_campaign(spindle, conditions, 3, [(replace(rings, temperatures=warmer), hidden)]))
+    own = with_own_laws(variants(effect("thermal_gradient")), spindle, at)[0]
+    fixed = replace(own, shape=(), choices={q.name: q.neutral for q in own.shape})
+    prior = steady(evidence(model, fit(model)).learned, (own,))
+    with_shape, without = (fit(model, (m,), scan(model, (m,)), tempers=(1.0,), learned=prior) for m in (own, fixed))
+    assert with_shape.cost < without.cost + 0.5
+    assert all(0.0 <= v <= 1.0 for v in with_shape.shapes[0])
+    shapes = with_shape.point[-2:]
+    assert [h.number for h in with_shape.held] == [len(with_shape.point) - 2 + i for i in np.flatnonzero(shapes == 0.0)]
+    assert len(with_shape.held) > 0
+    assert not with_shape.information[[h.number for h in with_shape.held]].any()
+    known = evidence(model, without)
+    assert evidence(model, with_shape).ln == pytest.approx(known.ln, abs=4.0)
 
 
 @pytest.mark.parametrize("apart", [0, 2])
