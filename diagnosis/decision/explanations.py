@@ -16,8 +16,8 @@ from math import comb
 import numpy as np
 
 from thermospindle.diagnosis.forward import nuisance as kinds_of
-from thermospindle.diagnosis.inference.evidence import impossible
 from thermospindle.diagnosis.inference.hypothesis import LITTLE, STRAIN, Hypothesis
+from thermospindle.diagnosis.inference.limits import impossible
 from thermospindle.diagnosis.inference.search import Search
 
 PRIOR = {"none": 0.5, "one": 0.33, "two": 0.08, "free": 0.05, "two free": 0.02, "one and free": 0.02, "three": 0.01}
@@ -55,8 +55,9 @@ class Candidate:
 def explanations(found: Search, inflation: float) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...], float]:
     """Explanations of the catalogue and free ones, with the most probable first, and the probability of nothing missing. `inflation` is by how much the evidence
     is too large, for residuals that say the same."""
-    named_count = len({s.mechanism.name for s in found.screened if not s.mechanism.free and s.visibility > 0}) or 1
-    free_count = len({s.mechanism.name for s in found.screened if s.mechanism.free and s.visibility > 0}) or 1
+    free_count, named_count = (
+        len({s.mechanism.name for s in found.screened if s.mechanism.free == free and s.visibility > 0}) or 1 for free in (True, False)
+    )
     base = found.base.evidence.ln
     worth = inflation * coarsening(found.hypotheses[0])
     known = [h for h in found.hypotheses if _can_be(h)]

@@ -17,15 +17,15 @@ from functools import cache, lru_cache
 from itertools import product
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse import csr_array, eye_array, lil_array
-from scipy.special import log_ndtr, logsumexp, ndtr
+from scipy.special import logsumexp
 
 from thermospindle.diagnosis.forward import nuisance as kinds_of
-from thermospindle.diagnosis.forward.mechanism import Mechanism, size_covariance
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.fit import Fit
-from thermospindle.diagnosis.inference.prior import Learned, Root, nuisance_root, whitened_covariance, whole_root
+from thermospindle.diagnosis.inference.gaussian import Quadratic, marginal, posterior, quadratic
+from thermospindle.diagnosis.inference.limits import one_sided, within_limits
+from thermospindle.diagnosis.inference.prior import Learned, nuisance_root, whitened_covariance, whole_root
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
 
@@ -56,23 +56,6 @@ class Evidence:
     chi2: float
 
 
-@dataclass(frozen=True, eq=False)
-class Quadratic:
-    """chi2 = constant - 2 b p + p A p."""
-
-    constant: float
-    b: Array
-    a: Array
-
-    def at(self, p: Array) -> float:
-        return float(self.constant - 2 * self.b @ p + p @ self.a @ p)
-
-
-def quadratic(chi2: float, gradient: Array, information: Array, point: Array) -> Quadratic:
-    b = information @ point - gradient
-    return Quadratic(float(chi2 - 2 * gradient @ point + point @ information @ point), b, information)
-
-
 def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = ()) -> Evidence:
     """The evidence of a fit at its own temper (its errors are 1 / temper times the data's); with `near` the sizes of discrepancies, drift and
     errors are taken from the best of these, which is quick."""
@@ -91,7 +74,7 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = ()) -> Ev
     def rated(s: float, sizes: Mapping[str, float]) -> tuple[float, int]:
         """ln evidence, the mean over widths and departures of all mechanisms; and which of these is best."""
         scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
-        inner = _marginal(scaled, nuisance_root(model, sizes, fit.moved))
+        inner = marginal(scaled, nuisance_root(model, sizes, fit.moved))
         values = inner.integrated(roots) - fit.count * np.log(s)
         return float(logsumexp(values) - np.log(len(values))), int(np.argmax(values))
 
@@ -119,10 +102,10 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = ()) -> Ev
     own = [grid[k] for grid, k in zip(own_grids, np.unravel_index(own_best, [len(grid) for grid in own_grids]), strict=True)] if own_grids else []
     scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
     learned = Learned(sizes, s, tuple(w for w, _ in own), tuple(d for _, d in own))
-    mean, spread = _posterior(scaled, whole_root(model, fit.mechanisms, learned, fit.moved))
+    mean, spread = posterior(scaled, whole_root(model, fit.mechanisms, learned, fit.moved))
     chi2 = whole.at(mean)
     mean, spread = fit.point + turn @ (mean - fit.point), turn @ spread @ turn.T
-    truncation = _within_limits(fit, mean, spread)
+    truncation = within_limits(fit, mean, spread)
     mean[[h.number for h in fit.held]] = fit.point[[h.number for h in fit.held]]
     at, means, covariances = p, [], []
     tests = len(model.tests)
@@ -130,31 +113,12 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = ()) -> Ev
         part = slice(at, at + tests)
         means.append(m.size.neutral + root @ mean[part])
         covariances.append(root @ spread[part, part] @ root.T)
-        truncation += _one_sided(model, m, width_departure, means[-1], covariances[-1])
+        truncation += one_sided(model, m, width_departure, means[-1], covariances[-1])
         at += tests + len(m.shape)
     shape = (len(fit.mechanisms), tests)
     return Evidence(
         total + truncation, learned, mean, spread, np.array(means).reshape(shape), np.array(covariances).reshape(*shape, tests), chi2
     )
-
-
-def _within_limits(fit: Fit, mean: Array, spread: Array) -> float:
-    """ln of the posterior probability, to a quadratic, that shape parameters are within their limits, over the prior's; of one that is held at a limit, of the
-    integral of what falls off from there."""
-    found, at, held = 0.0, len(fit.nuisance), {h.number: h for h in fit.held}
-    for m, root in zip(fit.mechanisms, fit.roots, strict=True):
-        for number, q in enumerate(m.shape, at + len(root)):
-            low, high = ((limit - q.neutral) / q.prior_sd for limit in q.limits)
-            if number in held:
-                h = held[number]
-                scaled = h.slope / np.sqrt(h.curvature)
-                inside = scaled**2 / 2 + log_ndtr(-scaled) - np.log(h.curvature) / 2 - fit.point[number] ** 2 / 2
-            else:
-                sd = max(float(np.sqrt(max(spread[number, number], 0.0))), 1e-12)
-                inside = np.log(max(ndtr((high - mean[number]) / sd) - ndtr((low - mean[number]) / sd), 1e-300))
-            found += float(inside - np.log(ndtr(high) - ndtr(low)))
-        at += len(root) + len(m.shape)
-    return found
 
 
 def amplitudes_apart(fit: Fit) -> csr_array:
@@ -184,24 +148,6 @@ def turned(fit: Fit, turn: csr_array) -> Fit:
     return replace(fit, gradient=turn.T @ fit.gradient, information=turn.T @ fit.information @ turn, by_test=by_test)
 
 
-def _one_sided(model: CampaignModel, mechanism: Mechanism, own: tuple[float, float], mean: Array, covariance: Array) -> float:
-    """ln of twice the posterior probability of the sign that limits allow: a size that may not be negative has half its prior.
-
-    The sign is that of the size a which all tests share, about which `own` (width, departure) lets them scatter: a_t = a (1 + r_t), of which the
-    posterior `mean` (n,) and `covariance` (n, n) are given (conditional mean of jointly Gaussian quantities: Rasmussen & Williams, *Gaussian
-    Processes*, 2006, Eq. A.6).
-    """
-    low, high = mechanism.size.limits
-    sign = 1.0 if low >= mechanism.size.neutral else -1.0 if high <= mechanism.size.neutral else 0.0
-    if not sign:
-        return 0.0
-    width, departure = own
-    prior = size_covariance([d.condition for d in model.tests], 1.0, departure)
-    weight = np.linalg.solve(prior, np.ones(len(mean)))
-    variance = (width * mechanism.size.prior_sd) ** 2 * max(1.0 - float(weight.sum()), 0.0) + float(weight @ covariance @ weight)
-    return float(np.log(2) + log_ndtr(sign * float(weight @ (mean - mechanism.size.neutral)) / np.sqrt(max(variance, 1e-300))))
-
-
 def _error_scales(whole: Quadratic, count: int) -> Array:
     """1, and above it steps of 5 % around the root of the least chi2 a number: errors are never taken smaller than stated."""
     least = whole.constant - whole.b @ np.linalg.lstsq(whole.a + 1e-9 * np.eye(len(whole.b)), whole.b, rcond=None)[0]
@@ -224,72 +170,6 @@ def _roots(conditions: tuple[Condition, ...], grid: tuple[tuple[float, float], .
     return np.asarray(np.linalg.cholesky(found + 1e-12 * np.eye(m)), float)
 
 
-@dataclass(frozen=True, eq=False)
-class _Marginal:
-    """The quadratic of [z, u] with nuisances integrated over their priors: ln of the integral is `constant` + b p - p A p / 2."""
-
-    constant: float
-    b: Array
-    a: Array
-
-    def integrated(self, roots: Sequence[Array]) -> Array:
-        """ln of the integral (g_1 g_2 ...,) over the priors of all mechanisms, each with every one of its `roots` (g_k, m_k, m_k): one mechanism
-        after the other, by Schur complements."""
-        constant, b, a = np.array([self.constant]), self.b[None], self.a[None]
-        for root in roots:
-            m, turned = root.shape[-1], root.transpose(0, 2, 1)
-            factor = _factor(turned @ a[:, None, :m, :m] @ root)  # (G, g, m, m)
-            rest = turned @ np.concatenate([b[:, :m, None], a[:, :m, m:]], axis=2)[:, None]
-            solved = np.linalg.solve(factor, rest)
-            of_b, of_a = solved[..., 0], solved[..., 1:]
-            logs = np.log(np.diagonal(factor, axis1=-2, axis2=-1)).sum(axis=-1)
-            constant = (constant[:, None] + 0.5 * np.sum(of_b**2, axis=-1) - logs).reshape(-1)
-            left = of_a.swapaxes(-1, -2)
-            b = (b[:, None, m:] - (left @ of_b[..., None])[..., 0]).reshape(len(constant), -1)
-            a = (a[:, None, m:, m:] - left @ of_a).reshape(len(constant), *(b.shape[-1],) * 2)
-        return np.asarray(constant, float)
-
-
-def _factor(information: Array) -> Array:
-    """Cholesky factors (..., m, m) of 1 + `information`, of which rounding may have made what is nothing less than nothing: where nuisances do all that a
-    mechanism does, their difference is of the rounding of either."""
-    one = np.eye(information.shape[-1])
-    try:
-        return np.asarray(np.linalg.cholesky(information + one))
-    except np.linalg.LinAlgError:
-        value, vector = np.linalg.eigh((information + information.swapaxes(-1, -2)) / 2)
-        return np.asarray(np.linalg.cholesky((vector * np.maximum(value, 0.0)[..., None, :]) @ vector.swapaxes(-1, -2) + one))
-
-
-def _marginal(q: Quadratic, prior: Root) -> _Marginal:
-    """What is left of the quadratic without the first parameters, which have that prior."""
-    p = len(prior.scale)
-    inner = prior.within(q.a[:p, :p])
-    factor, lower = cho_factor(inner + np.eye(len(inner)), lower=True)
-    b1 = prior.turned(q.b[:p, None])[:, 0]
-    solved_b = cho_solve((factor, lower), b1)
-    constant = -0.5 * q.constant + 0.5 * float(b1 @ solved_b) - float(np.log(np.diag(factor)).sum())
-    if q.a.shape[0] == p:
-        return _Marginal(constant, np.zeros(0), np.zeros((0, 0)))
-    cross = prior.turned(q.a[:p, p:])
-    solved = cho_solve((factor, lower), cross)
-    return _Marginal(constant, q.b[p:] - solved.T @ b1, q.a[p:, p:] - cross.T @ solved)
-
-
-def _posterior(q: Quadratic, prior: Root) -> tuple[Array, Array]:
-    """Mean (n,) and covariance (n, n)."""
-    inner = prior.within(q.a)
-    inverse = np.asarray(np.linalg.inv(inner + np.eye(len(inner))))
-    covariance = prior.times(prior.times(inverse).T)
-    return covariance @ q.b, covariance
-
-
-def impossible(m: Mechanism, sizes: Array, covariance: Array) -> bool:
-    """Whether a mechanism would need a size (tests,) that it cannot have, by more than twice its standard error."""
-    sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    return bool(np.any((sizes < m.size.limits[0] - 2 * sd) | (sizes > m.size.limits[1] + 2 * sd)))
-
-
 def left_out(model: CampaignModel, fit: Fit, found: Evidence, groups: Sequence[Sequence[int]]) -> float:
     """Root mean square residual, in standard errors of the data, of groups of tests predicted from all others, with what was learned from all."""
     learned = found.learned
@@ -303,7 +183,7 @@ def left_out(model: CampaignModel, fit: Fit, found: Evidence, groups: Sequence[S
             continue
         s2 = learned.errors**2
         q = Quadratic(0.0, np.sum([r.b for r in rest], axis=0) / s2, np.sum([r.a for r in rest], axis=0) / s2)
-        mean, _ = _posterior(q, prior)
+        mean, _ = posterior(q, prior)
         total += sum(by_test[t].at(mean) for t in group)
         count += sum(model.tests[t].count for t in group)
     return float(np.sqrt(max(total, 0.0) / count)) if count else float("nan")

@@ -11,8 +11,9 @@ import numpy as np
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
-from thermospindle.diagnosis.inference.evidence import GRIDS, evidence, impossible
+from thermospindle.diagnosis.inference.evidence import GRIDS, evidence
 from thermospindle.diagnosis.inference.fit import Fit
+from thermospindle.diagnosis.inference.limits import impossible
 from thermospindle.diagnosis.inference.prior import Learned
 from thermospindle.diagnosis.inference.problem import Linearisation, Problem
 from thermospindle.model.parallel import in_parallel

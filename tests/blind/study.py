@@ -144,7 +144,8 @@ def judge(seed: int, without: Sequence[str] = ()) -> dict[str, Any]:
 
 def weighed(found: Diagnosis) -> dict[str, Any]:
     """What a verdict is made of, for whoever asks what another weighing would have said: of every explanation its names, how many of them are free, ln
-    evidence over the model without effects and the largest departure from a law; the inflation of the evidence, and whether it is coarsened."""
+    evidence over the model without effects, the largest departure from a law and the names whose law is the data's own; the inflation of the evidence, and
+    whether it is coarsened."""
     search, base = found.search, found.search.base.evidence.ln
     best = search.hypotheses[0]
     return {
@@ -154,6 +155,7 @@ def weighed(found: Diagnosis) -> dict[str, Any]:
                 sum(m.free for m in h.mechanisms),
                 round(h.evidence.ln - base, 2),
                 max(h.evidence.learned.departures, default=0.0),
+                [m.name for m in h.mechanisms if m.own_law],
             ]
             for h in search.hypotheses
         ],

@@ -26,8 +26,9 @@ from thermospindle.diagnosis.forward.nuisance import (
     TEMPERATURE,
     Nuisance,
 )
-from thermospindle.diagnosis.inference.evidence import Learned, Quadratic, _marginal, evidence, left_out  # fmt: skip
+from thermospindle.diagnosis.inference.evidence import Learned, evidence, left_out
 from thermospindle.diagnosis.inference.fit import Fit, Held
+from thermospindle.diagnosis.inference.gaussian import Quadratic, marginal
 from thermospindle.diagnosis.inference.prior import ACTION, Root, misjudged, nuisance_variances, precision_and_variances, whole_root
 from thermospindle.model.machine import Condition
 from thermospindle.sim.effects.effect import Effect, Parameter
@@ -159,7 +160,7 @@ def test_what_is_wrong_in_an_effect_is_alike_in_all_tests():
     random = np.random.default_rng(5)
     jacobian, y = random.standard_normal((60, 5)), random.standard_normal(60)
     beside, diagonal = random.standard_normal((5, 2)), np.array([1.0, 0.0, 0.3, 0.0, 2.0])
-    left = _marginal(Quadratic(float(y @ y), jacobian.T @ y, jacobian.T @ jacobian), Root(np.sqrt(diagonal), beside, np.zeros((0, 0))))
+    left = marginal(Quadratic(float(y @ y), jacobian.T @ y, jacobian.T @ jacobian), Root(np.sqrt(diagonal), beside, np.zeros((0, 0))))
     prior = np.diag(diagonal) + beside @ beside.T
     whole = multivariate_normal(np.zeros(60), np.eye(60) + jacobian @ prior @ jacobian.T)
     assert left.constant == pytest.approx(whole.logpdf(y) + 30 * np.log(2 * np.pi), rel=1e-9)
@@ -195,7 +196,7 @@ def test_rounding_does_not_end_an_evidence():
     jacobian = np.stack([column, column, 0.5 * column])
     information = jacobian @ jacobian.T
     information[1:, 1:] -= 1e3 * np.eye(2)  # as rounding may have it
-    left = _marginal(Quadratic(0.0, np.zeros(3), information), Root(np.ones(1), np.zeros((1, 0)), np.zeros((0, 0))))
+    left = marginal(Quadratic(0.0, np.zeros(3), information), Root(np.ones(1), np.zeros((1, 0)), np.zeros((0, 0))))
     root = np.array([np.eye(2), 3 * np.eye(2)])
     assert np.isfinite(left.integrated([root])).all()
 

@@ -1,0 +1,89 @@
+"""Integrals of a quadratic over Gaussian priors: what evidence is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from thermospindle.diagnosis.inference.prior import Root
+from thermospindle.model.types import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Quadratic:
+    """chi2 = constant - 2 b p + p A p."""
+
+    constant: float
+    b: Array
+    a: Array
+
+    def at(self, p: Array) -> float:
+        return float(self.constant - 2 * self.b @ p + p @ self.a @ p)
+
+
+def quadratic(chi2: float, gradient: Array, information: Array, point: Array) -> Quadratic:
+    b = information @ point - gradient
+    return Quadratic(float(chi2 - 2 * gradient @ point + point @ information @ point), b, information)
+
+
+@dataclass(frozen=True, eq=False)
+class Marginal:
+    """The quadratic of [z, u] with nuisances integrated over their priors: ln of the integral is `constant` + b p - p A p / 2."""
+
+    constant: float
+    b: Array
+    a: Array
+
+    def integrated(self, roots: Sequence[Array]) -> Array:
+        """ln of the integral (g_1 g_2 ...,) over the priors of all mechanisms, each with every one of its `roots` (g_k, m_k, m_k): one mechanism
+        after the other, by Schur complements."""
+        constant, b, a = np.array([self.constant]), self.b[None], self.a[None]
+        for root in roots:
+            m, turned = root.shape[-1], root.transpose(0, 2, 1)
+            factor = _factor(turned @ a[:, None, :m, :m] @ root)  # (G, g, m, m)
+            rest = turned @ np.concatenate([b[:, :m, None], a[:, :m, m:]], axis=2)[:, None]
+            solved = np.linalg.solve(factor, rest)
+            of_b, of_a = solved[..., 0], solved[..., 1:]
+            logs = np.log(np.diagonal(factor, axis1=-2, axis2=-1)).sum(axis=-1)
+            constant = (constant[:, None] + 0.5 * np.sum(of_b**2, axis=-1) - logs).reshape(-1)
+            left = of_a.swapaxes(-1, -2)
+            b = (b[:, None, m:] - (left @ of_b[..., None])[..., 0]).reshape(len(constant), -1)
+            a = (a[:, None, m:, m:] - left @ of_a).reshape(len(constant), *(b.shape[-1],) * 2)
+        return np.asarray(constant, float)
+
+
+def _factor(information: Array) -> Array:
+    """Cholesky factors (..., m, m) of 1 + `information`, of which rounding may have made what is nothing less than nothing: where nuisances do all that a
+    mechanism does, their difference is of the rounding of either."""
+    one = np.eye(information.shape[-1])
+    try:
+        return np.asarray(np.linalg.cholesky(information + one))
+    except np.linalg.LinAlgError:
+        value, vector = np.linalg.eigh((information + information.swapaxes(-1, -2)) / 2)
+        return np.asarray(np.linalg.cholesky((vector * np.maximum(value, 0.0)[..., None, :]) @ vector.swapaxes(-1, -2) + one))
+
+
+def marginal(q: Quadratic, prior: Root) -> Marginal:
+    """What is left of the quadratic without the first parameters, which have that prior."""
+    p = len(prior.scale)
+    inner = prior.within(q.a[:p, :p])
+    factor, lower = cho_factor(inner + np.eye(len(inner)), lower=True)
+    b1 = prior.turned(q.b[:p, None])[:, 0]
+    solved_b = cho_solve((factor, lower), b1)
+    constant = -0.5 * q.constant + 0.5 * float(b1 @ solved_b) - float(np.log(np.diag(factor)).sum())
+    if q.a.shape[0] == p:
+        return Marginal(constant, np.zeros(0), np.zeros((0, 0)))
+    cross = prior.turned(q.a[:p, p:])
+    solved = cho_solve((factor, lower), cross)
+    return Marginal(constant, q.b[p:] - solved.T @ b1, q.a[p:, p:] - cross.T @ solved)
+
+
+def posterior(q: Quadratic, prior: Root) -> tuple[Array, Array]:
+    """Mean (n,) and covariance (n, n)."""
+    inner = prior.within(q.a)
+    inverse = np.asarray(np.linalg.inv(inner + np.eye(len(inner))))
+    covariance = prior.times(prior.times(inverse).T)
+    return covariance @ q.b, covariance
