@@ -2,7 +2,7 @@
 
 ============  ====================================================================================================
 data/         a campaign as FRF lines, or mode tables with covariances: what the diagnosis takes as data
-prediction/   the modes that a model predicts, and which of them the measured ones are
+prediction/   what a model predicts: its modes, the next test, the smallest sizes that would have shown
 forward/      what the model makes of every number measured, with exact derivatives
 inference/    mechanisms and free forms fitted to FRFs or mode tables together, and the evidence for each
 decision/     posterior probabilities, and the answer with the least expected loss

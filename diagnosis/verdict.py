@@ -15,11 +15,11 @@ from thermospindle.diagnosis.decision.verdict import Verdict, decide
 from thermospindle.diagnosis.forward.making import campaign_model, expected_noise
 from thermospindle.diagnosis.forward.mechanism import Mechanism, strongest, variants
 from thermospindle.diagnosis.forward.model import CampaignModel, TestData
-from thermospindle.diagnosis.inference.detectable import smallest, unseen_beside
 from thermospindle.diagnosis.inference.freeform import free_forms
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.search import Search, search
 from thermospindle.diagnosis.misfit.patterns import Chosen, choose_for
+from thermospindle.diagnosis.prediction.detectable import smallest, unseen_beside
 from thermospindle.diagnosis.prediction.next_test import NextTest, next_tests
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.parallel import in_parallel

@@ -16,8 +16,8 @@ from math import comb
 import numpy as np
 
 from thermospindle.diagnosis.forward import nuisance as kinds_of
+from thermospindle.diagnosis.inference.gaussian import impossible
 from thermospindle.diagnosis.inference.hypothesis import LITTLE, STRAIN, Hypothesis
-from thermospindle.diagnosis.inference.limits import impossible
 from thermospindle.diagnosis.inference.search import Search
 
 PRIOR = {"none": 0.5, "one": 0.33, "two": 0.08, "free": 0.05, "two free": 0.02, "one and free": 0.02, "three": 0.01}

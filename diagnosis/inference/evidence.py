@@ -23,8 +23,7 @@ from scipy.special import logsumexp
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.fit import Fit
-from thermospindle.diagnosis.inference.gaussian import Quadratic, marginal, posterior, quadratic
-from thermospindle.diagnosis.inference.limits import one_sided, within_limits
+from thermospindle.diagnosis.inference.gaussian import Quadratic, marginal, one_sided, posterior, quadratic, within_limits
 from thermospindle.diagnosis.inference.prior import Learned, nuisance_root, whitened_covariance, whole_root
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array

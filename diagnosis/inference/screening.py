@@ -13,7 +13,7 @@ from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.evidence import GRIDS, evidence
 from thermospindle.diagnosis.inference.fit import Fit
-from thermospindle.diagnosis.inference.limits import impossible
+from thermospindle.diagnosis.inference.gaussian import impossible
 from thermospindle.diagnosis.inference.prior import Learned
 from thermospindle.diagnosis.inference.problem import Linearisation, Problem
 from thermospindle.model.parallel import in_parallel

@@ -7,10 +7,10 @@ import pytest
 
 from tests.virtual_campaign import drawn, effect, model_of, virtual_campaign
 from thermospindle.diagnosis.forward.mechanism import variants
-from thermospindle.diagnosis.inference.detectable import ASKED, smallest, visibility
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.screening import screen
+from thermospindle.diagnosis.prediction.detectable import ASKED, smallest, visibility
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
 

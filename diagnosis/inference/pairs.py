@@ -1,0 +1,92 @@
+"""Mechanisms that act together: second ones beside those that explain most alone, and third ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import chain
+
+import numpy as np
+
+from thermospindle.diagnosis.forward.mechanism import Mechanism
+from thermospindle.diagnosis.forward.model import CampaignModel
+from thermospindle.diagnosis.inference.fit import TEMPERS
+from thermospindle.diagnosis.inference.hypothesis import LITTLE, PLENTY, Hypothesis, Task, fitted
+from thermospindle.diagnosis.inference.prior import Learned, undrifted
+from thermospindle.diagnosis.inference.screening import screen
+from thermospindle.diagnosis.inference.singles import (
+    CLOSE,
+    MOST,
+    OCCAM,
+    Singles,
+    better,
+    fitted_in_steps,
+    lasting,
+    of_each_name,
+    promising,
+    strained,
+    task_of,
+)
+
+LEADS = 2  # single mechanisms of the catalogue to which a second is joined, of those near the best
+SECONDS = 2  # of each kind, joined to each of them
+PAIRS = 6  # fitted at most
+ENOUGH = 5.0  # ln evidence that a second mechanism must promise beside one that leaves a misfit
+
+
+def joined(
+    model, none: Hypothesis, singles: Sequence[Hypothesis], mechanisms: Sequence[Mechanism], most: float, expected: Learned, workers
+) -> list[Hypothesis]:
+    """The best single mechanisms with every other one that promises to gain beside them, and what promises to gain beside the best two."""
+    ranked = of_each_name(singles)
+    gains = [h for h in ranked if h.evidence.ln > none.evidence.ln + LITTLE]
+    leads = [h for h in gains if not h.free and h.evidence.ln > gains[0].evidence.ln - CLOSE][:LEADS] or [h for h in gains if not h.free][:1]
+    if leads and (leads[0] is not gains[0] or leads[0].evidence.learned.errors > 1.0):
+        leads += [h for h in gains if h.free][:1]  # two things that drift: where one of the catalogue does not do
+    pairs = _beside(model, leads, mechanisms, most, expected, workers)
+    if leads and not leads[0].free:
+        pairs = better([*pairs, *lasting(model, leads[0], mechanisms, most, expected, workers)])
+    best = max([*singles, *pairs], key=lambda h: h.evidence.ln, default=none)
+    if len(best.mechanisms) < 2:
+        return pairs
+    best_named = max((h for h in pairs if not h.free), key=lambda h: h.evidence.ln, default=best)
+    return [*pairs, *_beside(model, [best] if best_named is best else [best, best_named], mechanisms, most, expected, workers)]
+
+
+def joined_early(
+    model: CampaignModel, none: Hypothesis, tried: Singles, pairs: Sequence[Hypothesis], mechanisms: Sequence[Mechanism], workers
+) -> list[Hypothesis]:
+    """Two mechanisms joined while errors are still enlarged, where the best that was tried leaves something: where a fit has not arrived, nothing tells what is
+    missing beside it, and two causes of which neither alone moves peaks to where they are let none arrive."""
+    best = max((none, *tried.singles, *pairs), key=lambda h: h.evidence.ln)
+    if not tried.early or not strained(best):
+        return []
+    found: dict[frozenset, tuple[float, Task]] = {}
+    for lead in of_each_name([h for h in tried.early if not h.free])[:LEADS]:
+        others = [m for m in mechanisms if m.name not in lead.names]
+        looked = screen(model.thinned, lead.fit, lead.fit.temper, none.evidence.learned, others, workers)
+        for s in chain.from_iterable(promising(looked, kind)[:SECONDS] for kind in MOST):
+            task = task_of(lead.mechanisms, lead.fit, s, -np.inf, far=True)
+            found.setdefault(frozenset((m.name, m.kind) for m in task.mechanisms), (lead.evidence.ln + s.gain, task))
+    chosen = [task for _, task in sorted(found.values(), key=lambda t: -t[0])[:PAIRS]]
+    return fitted_in_steps(model, chosen, (), True, tried.early[0].fit, tried.most, tried.expected, workers, [])
+
+
+def _beside(model, leads: Sequence[Hypothesis], mechanisms: Sequence[Mechanism], most: float, expected: Learned, workers) -> list[Hypothesis]:
+    """One mechanism more, beside each of the `leads`: of the catalogue, and free beside what is not."""
+    tasks, done = [], set()
+    for lead in leads:
+        asked = ENOUGH if lead.evidence.learned.errors > 1.0 else PLENTY
+        drifts = all(m.free for m in lead.mechanisms)
+        others = [m for m in mechanisms if m.name not in lead.names and not (drifts and not m.free) and not (m.free and lead.free and not drifts)]
+        looked = screen(model, lead.fit, 1.0, undrifted(lead.evidence.learned), others, workers)
+        for kind in MOST:
+            for s in [s for s in promising(looked, kind) if s.gain > asked][:SECONDS]:
+                whole = frozenset((m.name, m.kind) for m in (s.mechanism, *lead.mechanisms))
+                if whole not in done:
+                    done.add(whole)
+                    tasks.append((lead.evidence.ln + s.gain, task_of(lead.mechanisms, lead.fit, s, lead.evidence.ln - OCCAM, far=True)))
+    chosen = [task for _, task in sorted(tasks, key=lambda t: -t[0])[:PAIRS]]
+    if not chosen:
+        return []
+    tempers = TEMPERS[-1:] if leads[0].evidence.learned.errors == 1.0 else TEMPERS[-2:]
+    return fitted(model, chosen, tempers, leads[0].fit, most, expected, workers)

@@ -1,0 +1,231 @@
+"""Mechanisms one at a time: every one screened, the promising ones fitted.
+
+Screening is linear: what each mechanism would do to every line in every test, beside all that nuisances can do, gives the evidence that it
+would have. Where tolerances leave a misfit, it is done while errors are still taken 30 times too large, before tolerances are dragged off
+to fit what they cannot; where modes that drift explain it, also as if none did. What falls behind there is not fitted further (successive
+halving: Jamieson & Talwalkar, AISTATS 2016).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from itertools import chain, zip_longest
+
+import numpy as np
+
+from thermospindle.diagnosis.data.lines import LineData
+from thermospindle.diagnosis.forward import nuisance as kinds_of
+from thermospindle.diagnosis.forward.mechanism import Mechanism
+from thermospindle.diagnosis.forward.model import CampaignModel
+from thermospindle.diagnosis.inference.evidence import evidence
+from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit
+from thermospindle.diagnosis.inference.freeform import as_told_by
+from thermospindle.diagnosis.inference.hypothesis import EARLY, LITTLE, PLENTY, STRAIN, Hypothesis, Task, fitted, scan
+from thermospindle.diagnosis.inference.prior import DRIFTING, Learned, steady, undrifted
+from thermospindle.diagnosis.inference.problem import Problem
+from thermospindle.diagnosis.inference.resonance import with_more
+from thermospindle.diagnosis.inference.screening import Screened, screen
+
+BEHIND = 12.0  # tempered ln evidence behind the best from which a mechanism is not followed
+MOST = {"law": 14, "own law": 4, "free": 4}  # mechanisms fitted at most, of the catalogue with their laws and with laws of the data's own, and free forms
+CLOSE = 60.0  # ln evidence behind the best, from which it is not followed where nothing is strained
+OWED = {"law": 6, "own law": 2, "free": 1}  # promised by screening and not delivered, fitted once more at most
+OCCAM = 20.0  # ln evidence that a second mechanism of no size may cost at most: less tells of a fit that stalled
+STALLED = 0.1  # of the enlarged errors, which the model without effects must reach if fits are to start from it alone
+HIDING = 1e-3  # relative error of frequencies, from which constant discrepancies may hide an effect that is the same in every test
+STRAINED = 4.0  # standard deviations of a build tolerance, from which likewise
+
+
+@dataclass(frozen=True, eq=False)
+class Singles:
+    """Mechanisms one at a time: those fitted, what screening said of all, what priors pairs are fitted with and the cost they should reach; and the fits
+    while errors were still enlarged, where they were."""
+
+    singles: list[Hypothesis]
+    screened: tuple[Screened, ...]
+    most: float
+    expected: Learned
+    early: tuple[Hypothesis, ...] = ()
+
+
+def fit_singles(
+    model: CampaignModel, none: Hypothesis, mechanisms: Sequence[Mechanism], progress: Callable[[str], None], workers: int | None
+) -> Singles:
+    learned = none.evidence.learned
+    misfit = strained(none)
+    expected = steady(learned)
+    if misfit:
+        about, temper = fit(model, tempers=TEMPERS[: EARLY + 1], learned=expected), TEMPERS[EARLY]
+    else:
+        about, temper = none.fit, 1.0
+    looked = screen(model if temper == 1.0 else model.thinned, about, temper, learned, mechanisms, workers)
+    rankings = [looked]
+    if misfit and learned.errors <= STRAIN:  # drift alone explains what is missing: what would, were there none
+        rankings.append(screen(model, none.fit, 1.0, undrifted(learned), mechanisms, workers))
+    progress("effects screened")
+    chosen = _chosen(rankings, misfit)
+    # tolerances strained to stand in for an effect must give way with it; while errors are enlarged they are not strained yet
+    tasks = [task_of((), about, s, -np.inf if misfit else none.evidence.ln + s.gain - OCCAM, far=not misfit) for s in chosen]
+    most = cost_of(model, none, expected)
+    first = {s.mechanism.name for ranking in rankings for kind in MOST for s in promising(ranking, kind)[:1]}
+    early: list[Hypothesis] = []
+    singles = fitted_in_steps(model, tasks, first, misfit, about, most, expected, workers, early)
+    if not misfit:
+        singles = better([*singles, *lasting(model, none, mechanisms, most, expected, workers)])
+    elif len(rankings) > 1:
+        singles = better([*singles, *_owed(model, none, rankings[1], singles, most, expected, workers)])
+    progress("effects fitted")
+    return Singles(singles, tuple(looked), most, expected, tuple(early))
+
+
+def strained(h: Hypothesis) -> bool:
+    """Whether an explanation leaves more than errors, or has modes drift to leave no more."""
+    learned = h.evidence.learned
+    return learned.errors > STRAIN or any(learned.sizes.get(kind, 0.0) > 0 for kind in DRIFTING)
+
+
+def _owed(
+    model: CampaignModel, none: Hypothesis, looked: Sequence[Screened], singles: Sequence[Hypothesis], most: float, expected: Learned, workers
+) -> list[Hypothesis]:
+    """Fits of what screening beside the model whose modes drift promised, and what fits from enlarged errors on have not delivered: some of these ended
+    early there, or stalled."""
+    nothing = evidence(model, none.fit, [undrifted(none.evidence.learned)]).ln
+    delivered: dict[str, float] = {}
+    for h in singles:
+        delivered[h.names[0]] = max(h.evidence.ln - nothing, delivered.get(h.names[0], -np.inf))
+    tasks = []
+    for kind, count in OWED.items():
+        promised = promising(looked, kind)
+        least = max(PLENTY, max((s.gain for s in promised), default=0.0) - CLOSE)
+        late = [s for s in promised if s.gain > least and delivered.get(s.mechanism.name, -np.inf) < s.gain - OCCAM]
+        tasks += [task_of((), none.fit, s, -np.inf, far=True) for s in late[:count]]
+    return fitted(model, tasks, TEMPERS[-1:], none.fit, most, expected, workers)
+
+
+def by_own_laws(model: CampaignModel, none: Hypothesis, tried: Singles, mechanisms: Sequence[Mechanism], workers) -> list[Hypothesis]:
+    """Effects with laws of the data's own, fitted from what the best free form says. Where that does better than an effect which changes much the same by the
+    law assumed, the effect may do as well by another; screening, which is linear, need not have seen it."""
+    told = max((h for h in tried.singles if h.free), key=lambda h: h.evidence.ln, default=none)
+    if not told.free or told.evidence.ln < none.evidence.ln + PLENTY:
+        return []
+    reached = {h.names[0]: h.evidence.ln for h in sorted(tried.singles, key=lambda h: h.evidence.ln)}
+    tasks = []
+    for m in mechanisms:
+        if m.own_law and reached.get(m.name, -np.inf) < told.evidence.ln - LITTLE:
+            sizes = as_told_by(model, none.fit.nuisance, told.mechanisms[0], m, told.evidence.sizes[0])
+            if sizes is not None:
+                start = Problem(model, (m,)).start({0: sizes - min(0.0, (sizes - m.size.limits[0]).min())})
+                start[: len(model.parameters)] = told.fit.nuisance
+                tasks.append(Task((m,), (start,), -np.inf))
+    return fitted(model, tasks, TEMPERS[-1:], told.fit, tried.most, tried.expected, workers)
+
+
+def cost_of(model: CampaignModel, none: Hypothesis, expected: Learned) -> float:
+    """The cost without effects of priors as `expected`, which no mechanism should exceed."""
+    return fit(model, (), (none.evidence.mean, none.fit.point), none.fit.rates, TEMPERS[-1:], learned=expected).cost
+
+
+def carried_over(model: CampaignModel, none: Hypothesis, tried: Singles, before: int, workers: int | None) -> Singles:
+    """Single mechanisms fitted on in a model with a light resonance more; `before` is the number of parameters that the model had."""
+    expected = steady(none.evidence.learned)
+    starts = [with_more(h.fit.point, before, len(model.parameters) - before) for h in tried.singles]
+    tasks = [Task(h.mechanisms, (at,), -np.inf) for h, at in zip(tried.singles, starts, strict=True)]
+    most = cost_of(model, none, expected)
+    return Singles(fitted(model, tasks, TEMPERS[-1:], none.fit, most, expected, workers), tried.screened, most, expected)
+
+
+def lasting(
+    model: CampaignModel, lead: Hypothesis, mechanisms: Sequence[Mechanism], most: float, expected: Learned, workers
+) -> list[Hypothesis]:
+    """Effects that are the same in every test beside an explanation, from a scan of sizes with all else as drawn: constant discrepancies of the model
+    or strained tolerances stand in for them, and beside those screening sees nothing. Followed to the end is what gains something while errors are
+    still enlarged."""
+    n = len(model.parameters)
+    off = max((abs(float(v)) for q, v in zip(model.parameters, lead.evidence.mean, strict=False) if q.kind == kinds_of.BUILD), default=0.0)
+    if lead.evidence.learned.sizes.get(kinds_of.STIFFNESS, 0.0) < HIDING and off < STRAINED:
+        return []
+    own = np.concatenate([np.zeros(n), lead.fit.point[n:]])
+    drawn = {m.name: m for m in reversed(mechanisms) if m.effect.lasting and m.name not in lead.names}
+    tasks = [
+        Task((*lead.mechanisms, m), tuple(np.concatenate([own, at[n:]]) for at in scan(model, (m,))[1:]), -np.inf) for m in drawn.values()
+    ]
+    if not tasks:
+        return []
+    about = fit(model, lead.mechanisms, (own, lead.fit.point), tempers=TEMPERS[:-1], learned=steady(expected, lead.mechanisms))
+    least = evidence(model, about).ln + LITTLE
+    gaining = [h for h in fitted(model, tasks, TEMPERS[:-1], about, most, expected, workers) if h.evidence.ln > least]
+    tasks = [Task(h.mechanisms, (h.fit.point,), -np.inf) for h in gaining]
+    return fitted(model, tasks, TEMPERS[-1:], lead.fit, most, expected, workers)
+
+
+def better(found: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Of those with the same mechanisms and laws the one with more evidence."""
+    return list({frozenset((m.name, m.kind) for m in h.mechanisms): h for h in sorted(found, key=lambda h: h.evidence.ln)}.values())
+
+
+def of_each_name(found: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Of those with the same mechanisms, whatever their laws, the one with more evidence; the best first."""
+    return sorted({frozenset(h.names): h for h in sorted(found, key=lambda h: h.evidence.ln)}.values(), key=lambda h: -h.evidence.ln)
+
+
+def task_of(lead: tuple[Mechanism, ...], about: Fit, s: Screened, hoped: float, far: bool) -> Task:
+    """A screened mechanism beside those of the fit `about`: from there with its size, and with `far` from where screening says it leads or from
+    there without it."""
+    own = s.start[len(about.point) :]
+    starts = (s.start, np.concatenate([about.point, 0 * own])) if far else (np.concatenate([about.point, own]),)
+    return Task((*lead, s.mechanism), starts, hoped)
+
+
+def promising(looked: Sequence[Screened], kind: str) -> list[Screened]:
+    """The best variant of every mechanism of one kind, with the most promising first; of those with laws of the data's own only what promises more than the
+    law that is assumed, at sizes that can be."""
+    by_law = {s.mechanism.name: s.gain for s in sorted(looked, key=lambda s: s.gain) if s.mechanism.kind == "law"}
+    best: dict[str, Screened] = {}
+    for s in sorted((s for s in looked if s.mechanism.kind == kind and np.isfinite(s.gain)), key=lambda s: -s.gain):
+        if kind != "own law" or (s.possible and s.gain > by_law.get(s.mechanism.name, -np.inf) + LITTLE):
+            best.setdefault(s.mechanism.name, s)
+    return list(best.values())
+
+
+def _chosen(rankings: Sequence[Sequence[Screened]], strained: bool) -> list[Screened]:
+    """The most promising mechanisms of every kind, from all rankings by turns. Where nothing is strained what screening promises is nearly what a fit will
+    hold, and only what is near the best is followed."""
+    found: list[Screened] = []
+    for kind, most in MOST.items():
+        followed = []
+        for looked in rankings:
+            ranked = promising(looked, kind)
+            rivals = [s.gain for s in (*ranked, *(promising(looked, "law") if kind == "own law" else ()))]
+            least = -LITTLE if strained else max([-LITTLE, *(gain - CLOSE for gain in rivals)])
+            followed.append([s for s in ranked if s.gain > least or (s is ranked[0] and kind != "own law")])
+        chosen: dict[str, Screened] = {}
+        for s in filter(None, chain.from_iterable(zip_longest(*followed))):
+            if len(chosen) < most:
+                chosen.setdefault(s.mechanism.name, s)
+        found += chosen.values()
+    return found
+
+
+def fitted_in_steps(
+    model, tasks, first: Collection[str], strained: bool, about: Fit, most: float, expected: Learned, workers, early: list[Hypothesis]
+) -> list[Hypothesis]:
+    """All tasks fitted; where much is missing in steps of temper, after which what fell behind is left, but for those that promised most at `first`: the
+    first of two causes that shows while errors are enlarged need not be the one that tells more. The fits of the first temper are added to `early`."""
+    if not tasks:
+        return []
+    if not strained:
+        return fitted(model, tasks, TEMPERS[-1:], about, most, expected, workers)
+    peaks = any(isinstance(d, LineData) for d in model.tests)  # a table's frequencies follow their parameters as far as these go
+    alive, afresh = list(tasks), peaks and about.temper * np.sqrt(about.chi2 / about.count) > STALLED
+    for temper in TEMPERS[EARLY:]:
+        found = fitted(model, alive, (temper,), about, most, expected, workers, afresh=afresh)
+        afresh = False
+        early += found if temper == TEMPERS[EARLY] else []
+        best = max(h.evidence.ln for h in found)
+        keep = {id(h) for kind in MOST for h in sorted((h for h in found if h.mechanisms[0].kind == kind), key=lambda h: -h.evidence.ln)[:2]}
+        kept = [h for h in found if id(h) in keep or h.names[0] in first or h.evidence.ln > best - BEHIND]
+        if temper == TEMPERS[-1]:
+            return found
+        alive = [Task(h.mechanisms, (h.fit.point,), -np.inf) for h in kept]
+    return []
