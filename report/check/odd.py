@@ -9,6 +9,7 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from thermospindle.model import sense
+from thermospindle.model.bearing.pair import joined
 from thermospindle.model.bearing.roller import RollerState
 from thermospindle.model.errors import NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Condition, LinearBearing, Point, Spindle
@@ -117,6 +118,26 @@ def _preload(found: Looked) -> Iterator[str]:
             moved = [f"{b.name} {now.preload:.3g} of {b.preload:.3g} N" for b, now in pairs if now.in_contact and far(now.preload / b.preload)]
             if moved:
                 yield f"{where} the preload is {what} that of the reference: {', '.join(moved)}"
+
+
+def _pushed(found: Looked) -> Iterator[str]:
+    """A spring behind rows that are all loaded one way pushes on what the other rows hold."""
+    spindle = found.spindle
+    if spindle.axial_load:
+        return
+    for group in joined(spindle):
+        own = {b.name for b in group}
+        one_way = [s for s in spindle.sets if s.bearings[0] in own and spindle.one_way(s)]
+        if not sum(spindle.bearing(s.bearings[0]).sense * s.preload for s in one_way):
+            continue
+        for s in (s for s in one_way if s.spring is not None):
+            others = [b.name for b in group if b.name not in s.bearings]
+            if others:
+                push = spindle.bearing(s.bearings[0]).sense * s.preload
+                yield (
+                    f"set {s.name}: the {s.preload:g} N of its spring are held from outside, and nothing of them reaches {', '.join(others)}; "
+                    f"axial_load_N = {-push:g} takes that outer force away, so that they hold the spring"
+                )
 
 
 def _sense(found: Looked) -> Iterator[str]:
@@ -271,5 +292,5 @@ def _count(n: int, one: str, many: str = "") -> str:
 
 
 QUESTIONS: tuple[Callable[[Looked], Iterator[str]], ...] = (
-    _loose, _same_place, _seats, _contacts, _materials, _preload, _sense, _tables, _free, _undamped, _damping, _critical, _sections, _points, _hammer, _running, _effects,
+    _loose, _same_place, _seats, _contacts, _materials, _preload, _pushed, _sense, _tables, _free, _undamped, _damping, _critical, _sections, _points, _hammer, _running, _effects,
 )  # fmt: skip

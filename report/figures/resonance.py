@@ -56,8 +56,8 @@ def drawn_lines(found: ResonanceMap) -> list[LineTrack]:
     at_nominal = [c for c in found.coincidences if c.at_nominal_speed]
     for c in [*strongest(at_nominal), *strongest(found.coincidences)]:
         chosen.setdefault((c.line.cause, c.line.order, c.line.direction, c.line.whirl), tracks[key(c.line)])
-    first = [t for t in found.lines if t.line.cause == "unbalance"]
-    return first + list(chosen.values())[:LINES]
+    first = {(t.line.name, t.line.whirl): t for t in found.lines if t.line.cause == "unbalance"}  # static and couple unbalance are one line
+    return list(first.values()) + list(chosen.values())[:LINES]
 
 
 def campbell(found: ResonanceMap, at: int | None = None, size: tuple[float, float] = SIZE) -> Figure:
@@ -145,12 +145,12 @@ def both(found: ResonanceMap, size: tuple[float, float] = SIZE, key_below: bool 
     named: list[tuple[float, str, str]] = []
     chosen = strongest([c for c in found.coincidences if c.at_nominal_speed])
     chosen += [c for c in strongest(found.coincidences) if all(_pair(c) != _pair(k) for k in chosen)]
-    used = set()
+    used = sorted({c.mode.number for c in chosen[:CURVES]})
+    paints = {number: MODES[i % len(MODES)] for i, number in enumerate(used)}
     for c in chosen[:CURVES]:
         curve = next(k for k in found.curves if key(k.line) == key(c.line) and k.mode.number == c.mode.number)
         order = np.argsort(curve.temperature)
-        paint = MODES[(c.mode.number - 1) % len(MODES)]
-        used.add(c.mode.number)
+        paint = paints[c.mode.number]
         axes.plot(curve.speed[order] / RPM, curve.temperature[order], color=paint, lw=1.2)
         if curve.temperature.max() > found.temperatures[-1] - 1e-9:
             named.append((float(curve.speed[order][-1] / RPM), f"{c.line.name}, {c.mode.number}", paint))
@@ -165,11 +165,7 @@ def both(found: ResonanceMap, size: tuple[float, float] = SIZE, key_below: bool 
     axes.set(xlabel="speed, rpm", ylabel="temperature, °C")
     figure.suptitle("Where the strongest lines meet a mode (line, mode number)", x=0.01, ha="left", fontweight="bold", fontsize=9.5)
     if key_below:
-        handles = [
-            Line2D([], [], color=MODES[(m.number - 1) % len(MODES)], label=f"mode {m.number} {m.kind}")
-            for m in found.modes
-            if m.number in used
-        ]
+        handles = [Line2D([], [], color=paints[m.number], label=f"mode {m.number} {m.kind}") for m in found.modes if m.number in paints]
         handles += [Line2D([], [], color=INK, marker="s", ls="", ms=5, label="nominal"), _circle()]
         figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=7.5)
     return figure

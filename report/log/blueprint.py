@@ -38,7 +38,7 @@ def blueprint(shown: Shown, quantities: list[tuple[str, str]], factor: float) ->
         rrb.TextDocumentView(origin="summary", name="Summary"),
         row_shares=[3.9, 2.1, 2.9],
     )
-    overview = rrb.Horizontal(left, middle, right, column_shares=[1.25, 1.4, 1], name="Overview")
+    overview = rrb.Horizontal(left, middle, right, column_shares=[1.2, 1.5, 1.02], name="Overview")
     return sweeping(shown, overview, _time_tab(shown), _temperature_tab(shown, quantities, factor))
 
 

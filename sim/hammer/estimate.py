@@ -56,8 +56,9 @@ def estimate(
     v = np.fft.rfft(velocity * exponential)[..., lines]
     f = f[:, :, None, :]
     sff, svv, svf = (np.mean(s, axis=1) for s in (np.abs(f) ** 2, np.abs(v) ** 2, v * f.conj()))
-    h1, h2 = svf / sff, svv / svf.conj()
-    coherence = np.minimum(np.abs(svf) ** 2 / (sff * svv), 1.0)
+    with np.errstate(divide="ignore", invalid="ignore"):  # of a dead channel, which `check_frf` refuses
+        h1, h2 = svf / sff, svv / svf.conj()
+        coherence = np.minimum(np.abs(svf) ** 2 / (sff * svv), 1.0)
     per_hit = v / f
     order = (1, 0, 2)  # responses first
     frf = Frf(

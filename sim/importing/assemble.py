@@ -231,6 +231,7 @@ def campaign_of(found: Read, form: MappingForm, scene: Spindle | None, files: Se
     settings = {c.file: settings_of(form, c.file) for c in found.contents}
     notes = list(found.notes)
     placed = {t: [p for c in curves if (p := _placed(c, form, found.points, settings[c.file])) is not None] for t, curves in found.curves.items()}
+    _check_left_out(found, form, settings, mapping)
     said = [p.quantity for every in placed.values() for p in every]
     quantity: str = form.quantity or (max(said, key=said.count) if said else "mobility")
     tests = tuple(_test(t, forms[t], found, placed.get(t, []), quantity, form, notes) for t in found.tests)
@@ -242,6 +243,22 @@ def campaign_of(found: Read, form: MappingForm, scene: Spindle | None, files: Se
     return Campaign(title, spindle, quantity, points, tests, None, note), notes
 
 
+def _names(curve: Curve, response: int | str, reference: int | str) -> set[str]:
+    """What `leave_out` may call a curve between two nodes."""
+    return {f"H({r},{q})" for r in (response, curve.response.label) for q in (reference, curve.reference.label)}
+
+
+def _check_left_out(found: Read, form: MappingForm, settings: dict[Path, FileForm], mapping: Path | None) -> None:
+    """`BadInput` for what `leave_out` names and no file holds; sets of UFF files are left out as they are read."""
+    curves = [c for every in found.curves.values() for c in every if not c.magnitude_only]
+    ends = [[(place(e, form, found.points) or (e.label,))[0] for e in (c.response, c.reference)] for c in curves]
+    known = {n for c, (r, q) in zip(curves, ends, strict=True) for n in _names(c, r, q)}
+    for own in settings.values():
+        for name in own.leave_out:
+            if not name.startswith("set ") and name.replace(" ", "") not in known:
+                raise BadInput(f"{mapping}: files: leave_out: {name!r} is no FRF of the files; there are {listed(sorted(known), 6)}")
+
+
 def _placed(curve: Curve, form: MappingForm, points: dict[int, Point], settings: FileForm) -> Placed | None:
     """A complex curve between points; None for a magnitude, which makes modes, and for what the mapping leaves out."""
     if curve.magnitude_only:
@@ -249,8 +266,7 @@ def _placed(curve: Curve, form: MappingForm, points: dict[int, Point], settings:
     (response, a), (reference, b) = (place(e, form, points) or (0, 1) for e in (curve.response, curve.reference))
     told = scaled(curve, settings)
     assert not isinstance(told, str)
-    names = {f"H({r},{q})" for r in (response, curve.response.label) for q in (reference, curve.reference.label)}
-    if names & {n.replace(" ", "") for n in settings.leave_out}:
+    if _names(curve, response, reference) & {n.replace(" ", "") for n in settings.leave_out}:
         return None
     return Placed(curve, response, reference, told[0], told[1] * a * b)
 

@@ -19,8 +19,8 @@ ADVICE = {
     "conjugated": "conjugate = true in its [[files]] turns it round",
     "negative real part": "where the sensor looks the other way, say so where it is named, as in 3:-Z; the hammer's direction counts too",
     "coherence =": 'leave_out = ["H(response,reference)"] in its [[files]] does without it',
-    "zero on": "band_Hz leaves lines without values out",
     "dead channel": 'leave_out = ["H(response,reference)"] in its [[files]] does without it',
+    "zero on": "band_Hz leaves lines without values out",
     "the same value": "the export held a value: export it again, or leave it out with leave_out",
     "reciprocity": "one of the two has another unit, sign or node than it says, or the spindle changed between the hits",
 }

@@ -162,6 +162,25 @@ def test_what_is_odd_is_said(name: str, right: str, wrong: str, sentence: str, t
     assert not any(sentence in words for words in checked(SCENES[name], capsys)["odd"])
 
 
+def test_a_spring_that_nothing_holds_is_odd(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A floating bearing behind a rigid pair: its spring presses the pair only where no outer force holds it, and `axial_load_N` says so."""
+    text = SCENES["machine-tool"].read_text(encoding="utf-8").replace('z_mm = 60.0\nsense = "-z"', 'z_mm = 60.0\nsense = "+z"')
+    apart = 'bearings = ["front1", "front2"]\npreload_N = 900.0\npreload_kind = "rigid"\n\n[sets.behind]\norigin = "assumed"\nsource = "a floating end"\nbearings = ["rear1", "rear2"]'
+    floating = text.replace('bearings = ["front1", "front2", "rear1", "rear2"]', apart).replace("preload_N = 900.0                  #", "preload_N = 200.0 #")
+    floating = floating.replace("preload_rate_N_per_m = 1.0e6 ", "# preload_rate_N_per_m = 1.0e6 ").replace("sprung_ring_mass_g", "# sprung_ring_mass_g")
+    file = tmp_path / "spindle.toml"
+    file.write_text(floating, encoding="utf-8")
+    before = checked(file, capsys)
+    assert any("set behind: the 200 N of its spring are held from outside" in words and "axial_load_N = -200" in words for words in before["odd"])
+    assert before["bearings"]["front1"]["preload_N"] == pytest.approx(before["bearings"]["front2"]["preload_N"], rel=1e-9)
+
+    file.write_text("axial_load_N = -200.0\n" + floating, encoding="utf-8")
+    after = checked(file, capsys)
+    assert not any("set behind" in words for words in after["odd"])
+    assert after["bearings"]["front1"]["preload_N"] - after["bearings"]["front2"]["preload_N"] == pytest.approx(200.0, rel=1e-6)
+    assert after["bearings"]["rear1"]["preload_N"] == pytest.approx(100.0, rel=1e-9)
+
+
 def test_shares_of_a_radial_load_add_up(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = SCENES["five_bearing"].read_text(encoding="utf-8").replace("ball_inertia = 1.0", "ball_inertia = 1.0\nradial_load_N = [300.0, -100.0]\nradial_load_z_mm = 0.0")
     (tmp_path / "spindle.toml").write_text(text, encoding="utf-8")

@@ -155,7 +155,10 @@ def _curves(file: Path, columns: Sequence[Column], settings: FileForm) -> tuple[
     groups: dict[tuple[End, End], dict[str, Column]] = {}
     for c in own:
         assert c.role is not None
-        groups.setdefault((c.role.response, c.role.reference), {})[c.role.kind if c.role.kind != "H" else c.role.part] = c
+        parts, part = groups.setdefault((c.role.response, c.role.reference), {}), c.role.kind if c.role.kind != "H" else c.role.part
+        if part in parts:
+            raise BadInput(f"{file}: {parts[part].name!r} and {c.name!r}: two columns for the {part} of the same FRF; each may stand once")
+        parts[part] = c
     blank = groups.pop((End(), End()), {})
     if blank and len(groups) == 1:  # a coherence column without a pair beside the one FRF
         next(iter(groups.values())).update({k: v for k, v in blank.items() if k in ("coherence", "sd")})
@@ -202,6 +205,8 @@ def _value(file: Path, parts: Mapping[str, Column], settings: FileForm) -> tuple
         unit = "deg"
     if unit is None:
         return None, [Question(file.name, "phase_unit", f"whether the phase in {name} is in deg or rad")]
+    if unit == "deg" and settings.phase_unit is None and 0.9 * np.pi < np.abs(phase).max() <= np.pi * (1 + 1e-6):
+        return None, [Question(file.name, "phase_unit", "whether its phases are in deg, as their headings say, or in rad: they stay within +-3.14")]
     return size * np.exp(1j * phase * (np.pi / 180 if unit == "deg" else 1.0)), []
 
 

@@ -19,6 +19,8 @@ COLUMNS = {
     "damping_ratio_sd": "damping_sd", "damping_%": "percent", "damping_percent": "percent", "zeta_%": "percent",
 }  # fmt: skip
 """Headings in small letters, with blanks and brackets as _: what they are."""
+KINDS = ("axial", "rocking", "lateral", "unknown")
+"""What modes are paired by."""
 
 
 def headings(file: Path) -> tuple[list[str], str, int] | None:
@@ -62,7 +64,10 @@ def from_modes(file: Path) -> Content:
         if damping is not None and not 0 < damping < 1:
             raise BadInput(f"{where}: damping = {damping:g}: a ratio above 0 and below 1 is allowed; in percent under the heading damping_%")
         sd, damping_sd = (_number(where, told, key, separator) for key in ("sd", "damping_sd"))
-        modes.append(ModeLine(told.get("test", ""), told.get("kind", "unknown"), frequency, sd, damping, damping_sd if damping else None))
+        kind = told.get("kind", "unknown").lower()
+        if kind not in KINDS:
+            raise BadInput(f"{where}: kind = {told['kind']!r}: allowed are {', '.join(KINDS)}, or nothing")
+        modes.append(ModeLine(told.get("test", ""), kind, frequency, sd, damping, damping_sd if damping else None))
     if not modes:
         raise BadInput(f"{file}: has headings of a table of modes and no mode below them")
     return Content(file, modes=tuple(modes))

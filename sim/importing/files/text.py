@@ -12,6 +12,8 @@ from thermospindle.model.errors import BadInput
 
 SEPARATORS = ("\t", ";", ",", None)  # None: any white space
 COMMENT = re.compile(r"^\s*(#|%|//|!)+\s?")
+NUMBER_LIKE = re.compile(r"[-+]?\d[\d.,' ]*([eE][-+]?\d+)?")
+THOUSANDS = re.compile(r"[-+]?\d{1,3}([.,' ]\d{3})+([.,]\d+)?")
 LONGEST_HEADING = 200
 LARGEST_FILE = 400e6  # bytes
 
@@ -99,6 +101,10 @@ def _manner(file: Path, lines: list[str]) -> tuple[str | None, bool]:
             if width and score > best:
                 best, found = score, (separator, comma)
     if found is None:
+        for line in reversed(sample):
+            for cells in (_cells(line, separator) for separator in ("\t", ";", None)):
+                if len(cells) > 1 and all(NUMBER_LIKE.fullmatch(c) for c in cells) and (grouped := [c for c in cells if THOUSANDS.fullmatch(c)]):
+                    raise BadInput(f"{file}: {grouped[0]!r}: thousands are written without a separator")
         raise BadInput(f"{file}: holds no table of numbers; columns separated by tabs, semicolons, commas or spaces are read")
     return found
 
@@ -140,6 +146,8 @@ def _numbers(file: Path, lines: list[tuple[int, str]], separator: str | None, co
                 raise BadInput(f"{file}: line {number}: has {len(row)} numbers, the lines after it {len(rows[-1])}; each must have as many")
             if not rows:
                 raise BadInput(f"{file}: line {number}: {line.strip()[:60]!r} stands below the numbers; nothing may follow them")
+            if row is None:
+                _refuse_gap(file, number, _cells(line, separator), len(rows[-1]), comma)
             break
         rows.append(row)
     else:
@@ -147,5 +155,15 @@ def _numbers(file: Path, lines: list[tuple[int, str]], separator: str | None, co
     rows.reverse()
     for at, row in enumerate(rows):
         if not np.all(np.isfinite(row)):
-            raise BadInput(f"{file}: line {lines[index + 1 + at][0]}: NaN or infinite; only finite numbers are allowed")
+            column = int(np.argmin(np.isfinite(row))) + 1
+            raise BadInput(f"{file}: line {lines[index + 1 + at][0]}: column {column}: NaN or infinite; only finite numbers are allowed")
     return rows, index + 1
+
+
+def _refuse_gap(file: Path, number: int, cells: list[str], width: int, comma: bool) -> None:
+    """`BadInput` where a line above numbers is one of them with a cell that is none; headings begin with a word."""
+    bad = [k for k, c in enumerate(cells) if _parse([c], comma) is None]
+    if len(cells) in (width, width - 1) and NUMBER_LIKE.fullmatch(cells[0]) and len(cells) > 1 and 2 * len(bad) <= len(cells):
+        cell = cells[bad[0]]
+        why = "; thousands are written without a separator" if THOUSANDS.fullmatch(cell) else ""
+        raise BadInput(f"{file}: line {number}: column {bad[0] + 1}: {f'{cell!r} is no number' if cell else 'empty'}; every column of every line needs one{why}")

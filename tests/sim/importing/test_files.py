@@ -145,7 +145,13 @@ def test_lines_of_the_running_speed_are_said_and_left_as_measured(tmp_path):
     [
         ("", "is empty"),
         ("nothing\nhere\n", "no table of numbers"),
-        ("f,H(1,1) real\n1,2\n2,nan\n3,4\n", "line 3: NaN or infinite"),
+        ("f,H(1,1) real\n1,2\n2,nan\n3,4\n", "line 3: column 2: NaN or infinite"),
+        ("f,H(1,1) real,H(1,1) imag\n1,2,3\n2,,4\n3,4,5\n", "line 3: column 2: empty; every column of every line needs one"),
+        ("f,H(1,1) real,H(1,1) imag\n1,overload,4\n3,4,5\n4,5,6\n", "line 2: column 2: 'overload' is no number"),
+        ("f;H(1,1) real;H(1,1) imag\n900,5;2,1;3,2\n1.000,5;4,4;5,6\n900,7;5,2;6,1\n", "line 3: column 1: '1.000,5' is no number; .* thousands are written without a sep"),
+        ("f;H(1,1) real\n1.000,5;4,4\n1.001,5;5,2\n", "'1.001,5': thousands are written without a separator"),
+        ("f,H(1,1) real,H(1,1) imag,H(1,1) real\n1,2,3,4\n2,3,4,5\n", "'H\\(1,1\\) real' and 'H\\(1,1\\) real': two columns for the real of the same FRF"),
+        ("frequency,mode,kind\n1000,1,rockin\n", "line 2: kind = 'rockin': allowed are axial, rocking, lateral, unknown, or nothing"),
         ("f;H(1,1) real\n1;2\n2\n3;4;5\n4;5\n", "numbers"),
         ("f,H(1,1) real\n1,2\n2,3\n3,4\nend of data\n", "line 5: 'end of data' stands below the numbers"),
         ("frequency,mode\n1000,1\nabc,2\n", "line 3: frequency = 'abc': is no number"),
@@ -160,6 +166,17 @@ def test_damaged_text_is_one_sentence(tmp_path, text, said):
     with pytest.raises(BadInput, match=said):
         bring([tmp_path / "a.csv"], out=tmp_path / "c")
     assert not (tmp_path / "c").exists()
+
+
+def test_radians_under_a_heading_of_degrees_are_asked(tmp_path):
+    """Once for all FRFs of a file, and settled by one key either way."""
+    heads, found = columns("decibel", "(m/s)/N")
+    file = table(tmp_path / "T20.csv", ["Frequency [Hz]", *(h.replace("phase [rad]", "phase [deg]") for h in heads)], [FREQUENCY, *found])
+    with pytest.raises(BadInput, match="1 thing is not told") as said:
+        imported(tmp_path, "", file)
+    assert "phase_unit: whether its phases are in deg, as their headings say, or in rad: they stay within +-3.14" in str(said.value)
+    frf = imported(tmp_path, '[[files]]\nfile = "T20.csv"\nphase_unit = "rad"\n', file)
+    assert frf.value.shape == FRF.value.shape
 
 
 def test_a_sweep_in_uneven_steps(tmp_path):

@@ -101,6 +101,25 @@ def test_hits_are_found_judged_and_averaged(folder, tmp_path, estimator):
         assert 0.4 < np.sqrt(np.mean(ratio**2)) < 3
 
 
+def test_a_dead_channel_is_one_sentence_and_can_be_left_out(folder, tmp_path, recwarn):
+    rows = np.loadtxt(folder / "hammer1.csv", delimiter=",", skiprows=1)
+    rows[:, 3] = 0.0
+    head = "Time [s],force 1 [N],velocity 1 [mm/s],velocity 2 [mm/s]"
+    np.savetxt(tmp_path / "hammer1.csv", rows, delimiter=",", header=head, comments="", fmt="%.9g")
+    (tmp_path / "m.toml").write_text(MAPPING)
+    with pytest.raises(BadInput, match="response 2: zero on every line; a dead channel is not allowed; leave_out = "):
+        bring([tmp_path / "hammer1.csv"], mapping=tmp_path / "m.toml", out=tmp_path / "c")
+    assert not [w for w in recwarn if issubclass(w.category, RuntimeWarning)]
+
+    (tmp_path / "m.toml").write_text(MAPPING.replace('test = "T20"', 'test = "T20"\nleave_out = ["H(2,1)"]'))
+    bring([tmp_path / "hammer1.csv"], mapping=tmp_path / "m.toml", out=tmp_path / "c")
+    assert read_campaign(tmp_path / "c").tests[0].frf.response_nodes == (1,)
+
+    (tmp_path / "m.toml").write_text(MAPPING.replace('test = "T20"', 'test = "T20"\nleave_out = ["H(2,9)"]'))
+    with pytest.raises(BadInput, match=r"m.toml: files: leave_out: 'H\(2,9\)' is no FRF of the files; there are H\(1,1\)"):
+        bring([tmp_path / "hammer1.csv"], mapping=tmp_path / "m.toml", out=tmp_path / "d")
+
+
 def test_time_records_of_a_uff_file(tmp_path):
     """Dataset 58, function type 1: force and responses of three hits one after the other, a file for each kind of channel."""
     import pyuff

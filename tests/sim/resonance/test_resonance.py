@@ -15,7 +15,8 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Body, Condition
 from thermospindle.model.rotor.modes import modes
 from thermospindle.model.units import RPM
-from thermospindle.report.figures.resonance import CAUSES, campbell, over_temperature
+from thermospindle.report.figures.resonance import CAUSES, both, campbell, over_temperature
+from thermospindle.report.figures.warmup import MODES
 from thermospindle.report.log.read import read_log
 from thermospindle.report.log.told import describe, log_json
 from thermospindle.report.log.turning.map import write_map_log
@@ -179,6 +180,30 @@ def test_the_key_of_a_figure_names_the_causes_of_its_lines(found):
         drawn = {line.get_color() for line in axes.lines if line.get_linewidth() == 0.9}
         assert told == {cause: paint for cause, paint in CAUSES.items() if paint in drawn}
         assert len(told) > 1
+
+
+def test_static_and_couple_unbalance_are_one_line_of_a_figure(found):
+    unbalance = [t for t in found.lines if t.line.cause == "unbalance"]
+    [axes] = campbell(replace(found, lines=(*found.lines, *unbalance))).axes
+    assert [t.get_text() for t in axes.texts].count("1x") == 1
+
+
+def test_modes_of_the_coincidences_differ_in_colour(found):
+    """However many modes lie below those that lines meet."""
+
+    def far(mode):
+        return replace(mode, number=len(MODES) * mode.number)
+
+    moved = replace(
+        found,
+        modes=tuple(far(m) for m in found.modes),
+        curves=tuple(replace(c, mode=far(c.mode)) for c in found.curves),
+        coincidences=tuple(replace(c, mode=far(c.mode)) for c in found.coincidences),
+    )
+    [key_below] = both(moved).legends
+    paints = [line.get_color() for line in key_below.get_lines() if line.get_linestyle() == "-"]
+    assert len(paints) > 1
+    assert len(set(paints)) == len(paints)
 
 
 def test_axial_lines_leave_rocking_modes_alone(found):
