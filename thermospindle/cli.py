@@ -209,13 +209,13 @@ def _parser() -> tuple[_Parser, dict[str, argparse.ArgumentParser]]:
     verbs = parser.add_subparsers(required=True, metavar="VERB", parser_class=_Parser)
     speed_number = _up_to(FASTEST, 1e-3, " rpm")
 
-    def verb(name: str, function: tuple[str, str], text: str, what: str = "scene") -> argparse.ArgumentParser:
+    def verb(name: str, function: tuple[str, str], text: str, what: str = "scene", out: tuple[str, str] = ("DIR", "folder to write, whole or not at all")) -> argparse.ArgumentParser:
         added = verbs.add_parser(name, help=text, description=text, argument_default=argparse.SUPPRESS)
         added.set_defaults(verb=function)
         if what:
             added.add_argument(what, metavar={"scene": "SCENE", "log": "FILE.rrd", "diagnosis": "DIAGNOSIS.json", "name": "NAME", "file": "STUDY.toml"}[what], type=str if what == "name" else Path)
         added.add_argument("--json", action="store_true", help="one JSON object on standard output, nothing else")
-        added.add_argument("--out", type=Path, metavar="DIR", help="folder to write, whole or not at all")
+        added.add_argument("--out", type=Path, metavar=out[0], help=out[1])
         if what not in ("log", "diagnosis", "name"):
             added.add_argument(
                 "--effect", dest="effect_files", type=Path, action="append", metavar="FILE.py",
@@ -328,7 +328,8 @@ def _parser() -> tuple[_Parser, dict[str, argparse.ArgumentParser]]:
         "--from", dest="diagnosis", type=Path, metavar="DIAGNOSIS.json",
         help="take fitted values and build tolerances from the answer of diagnose --json",
     )  # fmt: skip
-    draft = verb("draft", ("diagnose", "draft"), "an effect file of one's own from what a diagnosis found to drift", what="diagnosis")
+    written = "FILE.py", "effect file to write; nothing is overwritten"
+    draft = verb("draft", ("diagnose", "draft"), "an effect file of one's own from what a diagnosis found to drift", "diagnosis", written)
     draft.add_argument("--element", metavar="NAME", help="the element that drifts (the first one of the diagnosis by default)")
     draft.add_argument("--name", metavar="NAME", help="name of the effect (the file's by default)")
     runout = verb("runout", ("running", "runout"), "repeatable and nonrepeatable runout of the turning spindle, and the lines it is made of")

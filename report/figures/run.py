@@ -38,6 +38,24 @@ def panels(titled: Mapping[str, Curves], columns: int, size: tuple[float, float]
     return figure
 
 
+LETTER = 0.012
+"""Width of a letter of the key over that of the band."""
+
+
+def _numbers(group: Sequence[int]) -> str:
+    return ("mode " if group[0] == 1 else "") + " ".join(map(str, group))
+
+
+def _middle(modes: Sequence[float], group: Sequence[int]) -> float:
+    return float(np.mean([modes[n - 1] for n in group]))
+
+
+def _touch(modes: Sequence[float], left: Sequence[int], right: Sequence[int], band: tuple[float, float]) -> bool:
+    """Whether the numbers of two groups, each about the middle of its modes, would run into each other."""
+    letters = (len(_numbers(left)) + len(_numbers(right))) / 2 + 1
+    return _middle(modes, right) - _middle(modes, left) < letters * LETTER * (band[1] - band[0])
+
+
 def key(curves: Sequence[tuple[str, Colour]], marks: Sequence[tuple[str, Colour, str]], modes: Sequence[float], band: tuple[float, float],
         size: tuple[float, float]) -> Figure:  # fmt: skip
     """What colours and marks (name, colour, marker) of a plot of FRFs mean, and below it the numbers of the `modes` (Hz, from 1) where
@@ -52,12 +70,10 @@ def key(curves: Sequence[tuple[str, Colour]], marks: Sequence[tuple[str, Colour,
         axes.set_axis_off()
         axes.set(xlim=band, ylim=(0, 1))
         groups: list[list[int]] = []
-        for number, f in enumerate(modes, 1):
-            if groups and f - modes[groups[-1][0] - 1] < 0.03 * (band[1] - band[0]):
-                groups[-1].append(number)
-            else:
-                groups.append([number])
+        for number in range(1, len(modes) + 1):
+            groups.append([number])
+            while len(groups) > 1 and _touch(modes, groups[-2], groups[-1], band):
+                groups[-2:] = [groups[-2] + groups[-1]]
         for group in groups:
-            words = ("mode " if group[0] == 1 else "") + " ".join(map(str, group))
-            axes.text(float(np.mean([modes[n - 1] for n in group])), 0.4, words, ha="center", va="center", color=INK)
+            axes.text(_middle(modes, group), 0.4, _numbers(group), ha="center", va="center", color=INK)
     return figure

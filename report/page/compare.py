@@ -17,6 +17,7 @@ from thermospindle.report.figures.runout_campaign import comparison_figures
 from thermospindle.report.log.compare import FrfsBeside, write_comparison_log
 from thermospindle.report.page import runout_compare as runout
 from thermospindle.report.page.report import Section, page
+from thermospindle.report.text.compare import AGREES, TOGETHER
 from thermospindle.report.typeset import figure, minus, signed, table
 
 WORDS = {
@@ -95,6 +96,8 @@ def _summary(c: Comparison) -> str:
             if m.damping_residual is not None and m.damping_measured is not None
         ]
         residual, error, worst = max(residuals, key=lambda row: abs(row[0]))
+        if abs(residual) < c.rms_residual >= AGREES and not any(t.missing for t in c.tests):
+            words.append(f"; {TOGETHER.format(abs(residual))}")
         words.append(f", the largest that of mode {worst.number} ({worst.kind}), {signed(residual, 1)} standard errors or {error}")
     words.append(".</p>")
     remarks = [f"{label(t, ', ')}: {what} {', '.join(f'{f:.1f}' for f in values)} Hz" for t in c.tests

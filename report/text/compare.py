@@ -76,6 +76,9 @@ def _mode_json(m: PairedMode) -> dict[str, Any]:
 
 AGREES, ALMOST = 1.5, 3.0  # standard errors rms up to which a scene and a campaign agree, and nearly do
 
+TOGETHER = "no mode alone is off by more than {:.1f}, but their errors hang together, above all by the temperature of the test, and do not explain all of them at once"
+"""Where the modes' own errors are smaller than their rms residual, which knows what their errors have in common."""
+
 
 def verdict(c: Comparison) -> str:
     """One sentence: whether they agree, by how much they do not, and the mode that is furthest off."""
@@ -84,7 +87,9 @@ def verdict(c: Comparison) -> str:
     every = [(abs(m.residual), t, m) for t in c.tests for m in t.modes]
     if not every or c.rms_residual < AGREES:
         return f"{sentence}."
-    _, t, m = max(every, key=lambda row: row[0])
+    alone, t, m = max(every, key=lambda row: row[0])
+    if alone < c.rms_residual and not any(t.missing for t in c.tests):
+        return f"{sentence}; {TOGETHER.format(alone)}."
     return f"{sentence}; furthest off is the {m.kind} mode at {m.measured:.0f} Hz of {t.test.id}, computed {abs(m.error):.3g} Hz too {'high' if m.error > 0 else 'low'}."
 
 

@@ -19,7 +19,7 @@ from thermospindle.report.figures.compare import figures, label, shown_pairs
 from thermospindle.report.log.compare import FrfsBeside, write_comparison_log
 from thermospindle.report.log.read import read_log
 from thermospindle.report.page.compare import sections, write_comparison
-from thermospindle.report.text.compare import show_comparison
+from thermospindle.report.text.compare import show_comparison, verdict
 from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Noise, Test
 from thermospindle.sim.identification.frf import Frf
 from thermospindle.sim.operating import operating_point
@@ -83,6 +83,17 @@ def test_the_whole_is_one_percent_low(found):
         assert len(test.modes) >= 7
         assert test.correlation.whole.shift == pytest.approx(0.01, abs=5e-4)
         assert test.missing == test.extra == ()
+
+
+def test_errors_that_hang_together_are_told(found):
+    """Where every mode by itself is within what its test's temperature may do, and all of them at once are not, no mode is called the worst."""
+    largest = max(abs(m.residual) for t in found.tests for m in t.modes)
+    together = replace(found, tests=tuple(replace(t, missing=(), residuals=np.full_like(t.residuals, 100 * largest)) for t in found.tests))
+    words = f"no mode alone is off by more than {largest:.1f}, but their errors hang together"
+    assert words in verdict(together)
+    assert "furthest off" not in verdict(together)
+    assert words not in verdict(found)
+    assert any("but their errors hang together" in str(section) for section in sections(together))
 
 
 def test_the_folder(folder):

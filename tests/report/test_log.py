@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -257,6 +258,10 @@ def test_key_and_small_charts_hold_all_there_is() -> None:
     made = figures.key([("20 °C", "k"), ("60 °C", "r")], [("measured 60 °C", "g", "^")], [1000.0, 1790.0, 1820.0], (400.0, 3000.0), (6, 1))
     assert [t.get_text() for t in made.legends[0].get_texts()] == ["20 °C", "60 °C", "measured 60 °C"]
     assert [t.get_text() for t in made.axes[0].texts] == ["mode 1", "2 3"]
+    many = figures.key([("20 °C", "k")], [], [486.0, 543.0, 621.0, 640.0, 743.0, 1363.0, 1498.0, 1514.0], (400.0, 3000.0), (6, 1))
+    many.canvas.draw()
+    boxes = [t.get_window_extent() for t in many.axes[0].texts]
+    assert all(a.x1 < b.x0 for a, b in pairwise(boxes))
     made.canvas.draw()
     box = made.legends[0].get_window_extent()
     assert box.x0 >= 0
