@@ -213,6 +213,10 @@ def _rigid(point: OperatingPoint, d: DeformedSection) -> np.ndarray:
     return movement
 
 
+SLENDER = 0.6
+"""Radius over height below which a section is drawn in a taller and narrower picture."""
+
+
 @rc_context(STYLE)
 def section(key: str, point: OperatingPoint) -> tuple[str, float]:
     """The axisymmetric section with its materials, and deformed at the point's temperature; also the exaggeration drawn."""
@@ -223,7 +227,9 @@ def section(key: str, point: OperatingPoint) -> tuple[str, float]:
     largest = max(float(np.hypot(*u.T).max()) for u in moved.values())
     extent = max(float(np.ptp(np.concatenate([d.nodes for d in deformed.values()]), axis=0).max()), 1e-9)
     scale = round_down(0.06 * extent / largest) if largest > 0 else 1.0
-    figure = Figure(figsize=(10.3, 4.3))
+    radius, height = np.ptp(np.concatenate([d.nodes for d in deformed.values()] + [[[0.0, d.nodes[0, 1]] for d in deformed.values()]]), axis=0)
+    slender = radius < SLENDER * height
+    figure = Figure(figsize=(6.6, 5.2) if slender else (10.3, 4.3))
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
     key_entries = _materials(left, spindle)
     figure.legend(handles=key_entries, loc="outside lower center", ncols=len(key_entries), handlelength=1.2)
@@ -242,7 +248,7 @@ def section(key: str, point: OperatingPoint) -> tuple[str, float]:
     bar.set_label("displacement, µm")
     bar.outline.set_visible(False)
     for axes in (left, right):
-        axes.set_aspect("equal")
+        axes.set_aspect("equal", anchor="W" if slender else "C")  # beside a slender section there is room for names and title
         axes.set_xlabel("radius, mm")
         axes.grid(False)
         axes.axvline(0, color=INK, lw=0.6, ls="-.")

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests.virtual_campaign import mode_campaign, model_of
+from thermospindle.cli import main
 from thermospindle.diagnosis.draft import draft, fit_law, laws
 from thermospindle.diagnosis.forward.mechanism import Mechanism, variants, with_own_laws
 from thermospindle.diagnosis.inference.evidence import evidence, left_out
@@ -143,6 +144,14 @@ def test_an_effect_of_the_catalogue_is_drafted_with_the_law_that_the_data_have(s
     answer.write_text(json.dumps(damaged), encoding="utf-8")
     with pytest.raises(BadInput, match="elements that drift"):
         draft(answer, "warm")
+
+
+def test_help_says_that_a_draft_is_a_file(capsys):
+    with pytest.raises(SystemExit):
+        main(["draft", "--help"])
+    said = capsys.readouterr().out
+    assert "--out FILE.py" in said
+    assert "folder to write" not in said
 
 
 def test_drafts_of_what_is_not_there_are_refused(slipping, tmp_path):

@@ -9,8 +9,11 @@ import pytest
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
+from thermospindle.model.machine import Condition
+from thermospindle.model.scene.reading import load
 from thermospindle.report.figures import common
 from thermospindle.report.figures import report as plots
+from thermospindle.sim.operating import operating_point
 from thermospindle.sim.run import Run
 
 
@@ -23,6 +26,18 @@ def test_exaggeration_is_a_round_number_that_fits(run: Run):
     assert round(mantissa) in (1, 2, 5)
     _, still = plots.section("key", run.steps[0].point)
     assert still == 1.0  # nothing moves at the reference temperature
+
+
+def test_the_section_of_a_slender_spindle_has_a_picture_of_its_shape(run: Run):
+    """In the wide one of a flat spindle most of it would be empty, and its title cut off."""
+    sizes = []
+    for point in (run.steps[0].point, operating_point(load("five_bearing"), Condition(20.0))):
+        drawn, _ = plots.section("key", point)
+        found = re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', drawn)
+        assert found is not None
+        sizes.append(float(found[1]) / float(found[2]))
+    assert sizes[0] > 2
+    assert sizes[1] < 1.4
 
 
 def test_temperature_colours_go_from_cold_to_hot():
