@@ -23,7 +23,7 @@ from scipy.special import logsumexp
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.fit import Fit
-from thermospindle.diagnosis.inference.gaussian import Quadratic, marginal, one_sided, posterior, quadratic, within_limits
+from thermospindle.diagnosis.inference.gaussian import Quadratic, ln_within_limits, marginal, one_sided, posterior, quadratic
 from thermospindle.diagnosis.inference.prior import Learned, nuisance_root, whitened_covariance, whole_root
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
@@ -104,7 +104,7 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = ()) -> Ev
     mean, spread = posterior(scaled, whole_root(model, fit.mechanisms, learned, fit.moved))
     chi2 = whole.at(mean)
     mean, spread = fit.point + turn @ (mean - fit.point), turn @ spread @ turn.T
-    truncation = within_limits(fit, mean, spread)
+    truncation = ln_within_limits(fit, mean, spread)
     mean[[h.number for h in fit.held]] = fit.point[[h.number for h in fit.held]]
     at, means, covariances = p, [], []
     tests = len(model.tests)

@@ -94,7 +94,7 @@ def posterior(q: Quadratic, prior: Root) -> tuple[Array, Array]:
     return covariance @ q.b, covariance
 
 
-def within_limits(fit: Fit, mean: Array, spread: Array) -> float:
+def ln_within_limits(fit: Fit, mean: Array, spread: Array) -> float:
     """ln of the posterior probability, to a quadratic, that shape parameters are within their limits, over the prior's; of one that is held at a limit, of the
     integral of what falls off from there."""
     found, at, held = 0.0, len(fit.nuisance), {h.number: h for h in fit.held}

@@ -25,7 +25,8 @@ import numpy as np
 
 from tests.blind.alike import right
 from tests.blind.campaigns import Made, campaign, described, plans
-from tests.blind.hidden import Hidden, Mechanism, mechanisms
+from tests.blind.hidden import Hidden, Mechanism
+from tests.blind.mechanisms import mechanisms
 from tests.blind.visible import seen, visibility
 from tests.blind.world import Plan, World
 from thermospindle.diagnosis.decision.conditions import conditions_of

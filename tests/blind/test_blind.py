@@ -6,8 +6,8 @@ from rich.console import Console
 
 from tests.blind.alike import right, right_names
 from tests.blind.campaigns import campaign, in_contact
-from tests.blind.hidden import mechanisms
 from tests.blind.laws import law
+from tests.blind.mechanisms import mechanisms
 from tests.blind.score import element_found, interval, most_probable, outcome, show, truth_probability
 from tests.blind.study import FURTHER, FURTHER_FROM, FURTHER_SHARE, SCENES, draw
 from tests.blind.visible import seen, visibility

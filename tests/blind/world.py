@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from tests.blind.hidden import Hidden, excited, on_spring
+from tests.blind.hidden import Hidden
+from tests.blind.hidden_structure import excited, on_spring
 from tests.blind.laws import REFERENCE, Place
 from thermospindle.model.bearing.ball_row import BallRow, centred_axial_force
 from thermospindle.model.bearing.pair import PairState, bearing_state, contact_status, reference_motion, row_at

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.blind.hidden import on_spring
+from tests.blind.hidden_structure import on_spring
 from tests.virtual_campaign import drawn, effect, model_of, virtual_campaign
 from thermospindle.diagnosis.forward.nuisance import RESONANCE, Resonance
 from thermospindle.diagnosis.forward.rates import rates_of
