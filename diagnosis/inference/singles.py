@@ -27,7 +27,7 @@ from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.inference.resonance import with_more
 from thermospindle.diagnosis.inference.screening import Screened, screen
 
-BEHIND = 12.0  # tempered ln evidence behind the best from which a mechanism is not followed
+BEHIND, FAR = 12.0, 200.0  # tempered ln evidence behind the best from which a mechanism is not followed, and from which not even the best two of a kind
 MOST = {"law": 14, "own law": 4, "free": 4}  # mechanisms fitted at most, of the catalogue with their laws and with laws of the data's own, and free forms
 CLOSE = 60.0  # ln evidence behind the best, from which it is not followed where nothing is strained
 OWED = {"law": 6, "own law": 2, "free": 1}  # promised by screening and not delivered, fitted once more at most
@@ -223,7 +223,8 @@ def fitted_in_steps(
         afresh = False
         early += found if temper == TEMPERS[EARLY] else []
         best = max(h.evidence.ln for h in found)
-        keep = {id(h) for kind in MOST for h in sorted((h for h in found if h.mechanisms[0].kind == kind), key=lambda h: -h.evidence.ln)[:2]}
+        near = sorted((h for h in found if h.evidence.ln > best - FAR), key=lambda h: -h.evidence.ln)
+        keep = {id(h) for kind in MOST for h in [h for h in near if h.mechanisms[0].kind == kind][:2]}
         kept = [h for h in found if id(h) in keep or h.names[0] in first or h.evidence.ln > best - BEHIND]
         if temper == TEMPERS[-1]:
             return found
