@@ -12,7 +12,7 @@ width and its departure from its law (the mean over the grid). What is quoted is
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, lru_cache
 from itertools import product
 
@@ -59,8 +59,7 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = ()) -> Ev
     """The evidence of a fit at its own temper (its errors are 1 / temper times the data's); with `near` the sizes of discrepancies, drift and
     errors are taken from the best of these, which is quick."""
     turn = amplitudes_apart(fit)
-    fit = turned(fit, turn)
-    whole = quadratic(fit.chi2, fit.gradient, fit.information, fit.point)
+    whole = turned(turn, fit.chi2, fit.gradient, fit.information, fit.point)
     t2 = fit.temper**2
     whole = Quadratic(t2 * whole.constant, t2 * whole.b, t2 * whole.a)
     p = len(fit.nuisance)
@@ -141,10 +140,9 @@ def amplitudes_apart(fit: Fit) -> csr_array:
     return csr_array(turn)
 
 
-def turned(fit: Fit, turn: csr_array) -> Fit:
-    """The fit with its quadratic, and that of every test, in other coordinates about its point."""
-    by_test = tuple((chi2, turn.T @ gradient, turn.T @ information @ turn) for chi2, gradient, information in fit.by_test)
-    return replace(fit, gradient=turn.T @ fit.gradient, information=turn.T @ fit.information @ turn, by_test=by_test)
+def turned(turn: csr_array, chi2: float, gradient: Array, information: Array, point: Array) -> Quadratic:
+    """A quadratic about a point in other coordinates about it."""
+    return quadratic(chi2, turn.T @ gradient, turn.T @ information @ turn, point)
 
 
 def _error_scales(whole: Quadratic, count: int) -> Array:
@@ -173,8 +171,8 @@ def left_out(model: CampaignModel, fit: Fit, found: Evidence, groups: Sequence[S
     """Root mean square residual, in standard errors of the data, of groups of tests predicted from all others, with what was learned from all."""
     learned = found.learned
     prior = whole_root(model, fit.mechanisms, learned, fit.moved)
-    fit = turned(fit, amplitudes_apart(fit))
-    by_test = [quadratic(*b, fit.point) for b in fit.by_test]
+    turn = amplitudes_apart(fit)
+    by_test = [turned(turn, *b, fit.point) for b in fit.by_test]
     total, count = 0.0, 0
     for group in groups:
         rest = [q for t, q in enumerate(by_test) if t not in group]

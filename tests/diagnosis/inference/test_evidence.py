@@ -26,7 +26,7 @@ from thermospindle.diagnosis.forward.nuisance import (
     TEMPERATURE,
     Nuisance,
 )
-from thermospindle.diagnosis.inference.evidence import Learned, evidence, left_out
+from thermospindle.diagnosis.inference.evidence import Learned, amplitudes_apart, evidence, left_out
 from thermospindle.diagnosis.inference.fit import Fit, Held
 from thermospindle.diagnosis.inference.gaussian import Quadratic, marginal
 from thermospindle.diagnosis.inference.prior import ACTION, Root, misjudged, nuisance_variances, precision_and_variances, whole_root
@@ -266,6 +266,22 @@ def test_a_shape_within_limits_is_the_integral_over_these(held, monkeypatch):
     assert (slope > 0) if held else (point[-1] > 0)
     assert found.ln == pytest.approx(by_quadrature, abs=0.02)
     assert (found.mean[-1] == 0.0) == held
+
+
+def test_a_shape_with_a_law_of_the_datas_own_says_nothing_of_amounts():
+    """What it moves in a test has no part of what the size moves there; of a law that is assumed it keeps it, for it may be the law's."""
+    plain, random = toy(3, 0.0, hidden=2.0), np.random.default_rng(9)
+    share = Parameter("share", "1", 0.0, 0.0, 0.5, (0.0, 1.0), "", "")
+    n = len(plain.fit.nuisance)
+    for own_law in (True, False):
+        m = replace(plain.mechanisms[0], shape=(share,), own_law=own_law)
+        moved = [np.column_stack([j, 3 * j[:, n + t] + random.standard_normal(len(j))]) for t, j in enumerate(plain.jacobians)]
+        by_test = tuple((1.0, np.zeros(n + 4), j.T @ j) for j in moved)
+        done = replace(plain.fit, mechanisms=(m,), point=np.append(plain.fit.point, 0.3), by_test=by_test)
+        turn = amplitudes_apart(done)
+        for t, (_, _, information) in enumerate(by_test):
+            before, after = information[n + t, -1], (turn.T @ information @ turn)[n + t, -1]
+            assert abs(after) < 1e-9 * abs(before) if own_law else after == before
 
 
 @pytest.mark.parametrize("hidden", [None, 1.6])
