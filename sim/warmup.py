@@ -116,7 +116,7 @@ def warm_up(
         field = heat.settled(model, lambda nodal: drive(0.0, nodal))
     except OutsideRange as error:
         where = f"{spindle.file or spindle.name}: from {start:g} C in air of {air:g} C at {speed / RPM:g} rpm"
-        raise OutsideRange(f"{where} the grease or a material is asked for a temperature that its law does not reach: {error}") from None
+        raise OutsideRange(f"{where} the grease or a material is asked for a temperature that its law does not reach: {error}; thermal.convection cools more, thermal.friction heats less") from None
     final = model.nodal(field)
     constant = heat.slowest(model, field, drive(0.0, final))
     progress(f"steady state, time constant {constant:.0f} s")

@@ -10,6 +10,7 @@ from typing import Any
 from rich.console import Console
 
 from thermospindle.model.errors import BadInput, Unanswered
+from thermospindle.model.machine import Spindle
 from thermospindle.model.units import RPM
 from thermospindle.model.whole import whole
 from thermospindle.report.verbs.answer import Answer, progress_bar, with_effects
@@ -53,7 +54,7 @@ def bring(
     except Unanswered as error:
         raise Unanswered(error.head, error.items, f"{mapping} is written: {error.tail}" if fresh else error.tail) from None
     write_campaign(campaign, Path(out))
-    return _written(campaign, Path(out), notes, None if scene is None else Path(scene))
+    return _written(campaign, Path(out), notes, None if scene is None else Path(scene), [] if spindle is None else _doubts(campaign, spindle))
 
 
 def _named(path: Path) -> list[Path]:
@@ -97,7 +98,27 @@ def _form_written(mapping: Path, open_: list[str], left: list[str], proposed: li
     return Answer(values, show)
 
 
-def _written(campaign: Campaign, out: Path, notes: list[str], scene: Path | None) -> Answer:
+FAR = 100.0
+"""K beyond the temperatures that a scene is meant for, at which another unit is likelier than such a test."""
+
+
+def _doubts(campaign: Campaign, spindle: Spindle) -> list[str]:
+    """What fits the scene so badly that it may be in another unit: kelvin for C, kHz for Hz."""
+    low, high = spindle.temperatures[0], spindle.temperatures[-1]
+    first, last = spindle.hammer.band
+    found = []
+    for t in campaign.tests:
+        if not low - FAR <= t.temperature <= high + FAR:
+            found.append(f"test {t.id}: temperature_C = {t.temperature:g}, and {spindle.name} is meant for {low:g} to {high:g} C: is it in another unit?")
+        if t.frf is not None and (t.frf.frequency[-1] < first or t.frf.frequency[0] > last):
+            found.append(
+                f"test {t.id}: lines from {t.frf.frequency[0]:g} to {t.frf.frequency[-1]:g} Hz, and the hammer test of {spindle.name} is from {first:g} to {last:g} Hz: "
+                "are they in another unit?"
+            )
+    return found
+
+
+def _written(campaign: Campaign, out: Path, notes: list[str], scene: Path | None, doubts: list[str]) -> Answer:
     values: dict[str, Any] = {
         "campaign": str(out),
         "spindle": campaign.spindle,
@@ -111,19 +132,20 @@ def _written(campaign: Campaign, out: Path, notes: list[str], scene: Path | None
                 "responses": [] if t.frf is None else [*t.frf.response_nodes],
                 "references": [] if t.frf is None else [*t.frf.reference_nodes],
                 "lines": 0 if t.frf is None else len(t.frf.frequency),
+                "band_Hz": None if t.frf is None else [float(f) for f in t.frf.frequency[[0, -1]]],
                 "modes": len(t.modes),
             }
             for t in campaign.tests
         ],
         "notes": notes,
-        "warnings": left_out(replace(campaign, folder=out)),
+        "warnings": [*doubts, *left_out(replace(campaign, folder=out))],
     }
 
     def show(console: Console) -> None:
         count = len(campaign.tests)
         console.print(f"{out}: a campaign of {count} test{'s' * (count != 1)} for {campaign.spindle}, checked and read back.", highlight=False)
         for t in values["tests"]:
-            frfs = f"{len(t['responses'])} x {len(t['references'])} FRFs of {t['lines']} lines" if t["lines"] else ""
+            frfs = f"{len(t['responses'])} x {len(t['references'])} FRFs of {t['lines']} lines, {t['band_Hz'][0]:g} to {t['band_Hz'][1]:g} Hz" if t["lines"] else ""
             modes = f"{t['modes']} modes" if t["modes"] else ""
             console.print(f"  {t['id']}: {t['temperature_C']:g} C, {t['speed_rpm']:g} rpm: {', '.join(x for x in (frfs, modes) if x)}", highlight=False)
         for note in notes:

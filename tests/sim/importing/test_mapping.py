@@ -56,6 +56,23 @@ def test_points_of_a_scene(tmp_path):
     (tmp_path / "m.toml").write_text('[[tests]]\nid = "T20"\ntemperature_C = 20.0\nspeed_rpm = 0.0\n')
     values = bring([file], mapping=tmp_path / "m.toml", scene=SCENE, out=tmp_path / "c").values
     assert values["points"] == [{"node": 1, "name": "hub_top0"}, {"node": 3, "name": "hub_side0"}, {"node": 6, "name": "seat90"}]
+    assert values["tests"][0]["band_Hz"] == [FREQUENCY[0], FREQUENCY[-1]]
+    assert values["warnings"] == []
+
+
+@pytest.mark.parametrize(
+    ("unit", "temperature", "doubts"),
+    [("Hz", 293.15, ["test T20: temperature_C = 293.15, and hdd_2003 is meant for 20 to 60 C: is it in another unit?"]), ("kHz", 20.0, ["test T20: lines from 400000 to"])],
+)
+def test_other_units_than_the_scenes_are_doubted(tmp_path, unit, temperature, doubts):
+    from tests.conftest import SCENE
+
+    heads, found = columns("real", "(m/s)/N", FRF.value)
+    file = table(tmp_path / "T20.csv", [f"Frequency [{unit}]", *heads], [FREQUENCY, *found])
+    (tmp_path / "m.toml").write_text(f'[[tests]]\nid = "T20"\ntemperature_C = {temperature}\nspeed_rpm = 0.0\n')
+    said = bring([file], mapping=tmp_path / "m.toml", scene=SCENE, out=tmp_path / "c").values["warnings"]
+    assert len(said) == len(doubts)
+    assert all(one.startswith(doubt) for one, doubt in zip(said, doubts, strict=True))
 
 
 @pytest.mark.parametrize(
