@@ -111,6 +111,7 @@ def test_stopped_while_it_is_loaded():
     ("arguments", "said"),
     [
         (["efects"], "verb 'efects' is unknown; did you mean effects?"),
+        (["add", "hdd_2003", "drift.py", "--out", "nowhere"], "effect 'drift.py' is a file; --effect drift.py reads it, and the effect is named by its name"),
         (["effects", "bond"], "effect 'bond' is unknown; did you mean bond_softening?"),
         (["modes", SCENE, "--sped", "3"], "--sped is no option of modes; did you mean --speed?"),
         (["add", SCENE, "added_disk", "--set", "mas=3", "--out", "nowhere"], "unknown parameter; did you mean mass?"),

@@ -118,6 +118,8 @@ def by_name(name: str, catalogue: Sequence[Effect] = CATALOGUE) -> Effect:
     for effect in catalogue:
         if effect.name == name:
             return effect
+    if name.endswith(".py"):
+        raise BadInput(f"effect {name!r} is a file; --effect {name} reads it, and the effect is named by its name")
     raise BadInput(f"effect {name!r} is unknown; {instead(name, (e.name for e in catalogue))}")
 
 
