@@ -17,7 +17,7 @@ from thermospindle.sim.campaign.campaign import Campaign, Noise
 from thermospindle.sim.effects import of_scene
 from thermospindle.sim.operating import operating_point
 
-MOST_MODES = 32  # of the discrepancy's basis
+MOST_MODES = 24  # of the discrepancy's basis
 IN_BAND, BEYOND = 1.15, 2.2  # of the highest line: modes that are seen, and modes beyond that still lend them some of their shape
 
 
