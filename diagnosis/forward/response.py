@@ -56,7 +56,7 @@ class Response:
         self._basis: Array | None = None
         self._lights = lights
         self._matrices = m.mass, m.damping, m.stiffness
-        if len(m.mass) > LARGE:
+        if len(m.mass) > LARGE and len(omega):
             small = reduced(m, np.concatenate([rows, references]), float(omega.max()))
             self._basis = small.basis
             self._matrices = small.mass, small.damping, small.stiffness

@@ -17,6 +17,7 @@ from thermospindle.diagnosis.forward.mechanism import size_covariance
 from thermospindle.diagnosis.forward.model import FAILED
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.search import Search
+from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.modes import modes
 from thermospindle.model.types import Array
@@ -144,6 +145,8 @@ def _frequencies(found: Search, h: Hypothesis, spindle: Spindle, plan: Condition
         applied.append((m.effect, m.values(float(np.clip(size, *m.size.limits)), shape)))
     band = spindle.hammer.band[1]
     point = operating_point(spindle, plan, applied)
+    if (status := point.state.status) != "in contact":  # a spindle that rattles has no modes to be read
+        raise NoEquilibrium(status)
     found_modes = modes(point.chain, found.model.elsewhere(point.linear, h.evidence.mean), band)
     return np.array([mode.frequency for mode in found_modes]), np.array([mode.damping_ratio for mode in found_modes])
 
