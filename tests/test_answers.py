@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from tests.conftest import DATA, ROOT, SCENE
-from thermospindle.cli import _parser, main
+from thermospindle.cli import main
+from thermospindle.options import parsers
 
 ANSWERS = tomllib.loads((ROOT / "docs" / "site" / "answers.toml").read_text(encoding="utf-8"))
 MEASURED = SCENE / "measured" / "jang_2003"
@@ -102,7 +103,7 @@ def test_verbs_that_write_logs_answer_and_inspect_by_what_a_log_holds(words, log
 
 
 def test_every_verb_is_told_and_tried() -> None:
-    _, verbs = _parser()
+    _, verbs = parsers()
     assert {form.partition(",")[0] for form in ANSWERS} == set(verbs)
     tried = {str(words[0]) for words, _ in (QUICK | LONG).values()} | {"inspect", "warmup"}
     assert tried | SERVED == set(verbs)

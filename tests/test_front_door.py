@@ -17,6 +17,7 @@ from tests.conftest import SCENE
 from thermospindle import cli
 from thermospindle.cli import main
 from thermospindle.model.scene.reading import load
+from thermospindle.options import parsers
 from thermospindle.report.verbs.states import modes, table
 
 ROOT = Path(__file__).parents[1]
@@ -57,7 +58,7 @@ def scene(tmp_path):
 
 
 def test_every_option_is_an_argument_of_its_verb():
-    _, verbs = cli._parser()
+    _, verbs = parsers()
     assert len(verbs) == 22
     for parser in verbs.values():
         module, function = parser.get_default("verb")
@@ -74,7 +75,7 @@ def test_completion_knows_every_verb(capsys, shell):
         cli.main(["--completion", shell])
     assert ended.value.code == 0
     script = capsys.readouterr().out
-    assert all(verb in script for verb in cli._parser()[1])
+    assert all(verb in script for verb in parsers()[1])
     assert "held-out" in script
 
 

@@ -186,10 +186,10 @@ def _picture(effect: Effect, folder: Path) -> str | None:
 
 def command_line() -> str:
     """Every verb with its options, and the keys of its answer where they are told."""
-    from thermospindle.cli import _parser
+    from thermospindle.options import parsers
 
     answers = tomllib.loads((Path(__file__).parent / "answers.toml").read_text(encoding="utf-8"))
-    _, verbs = _parser()
+    _, verbs = parsers()
     lines = ["# Command line", "", "`spindle VERB ...`; every verb takes `--json` (one JSON object on standard output, nothing else) and `--out DIR` (a folder written whole or",
              'not at all). What cannot be used ends with one sentence that names file, key, value and what is allowed, and exit code 2. `eval "$(spindle --completion bash)"`',
              "completes verbs and options.", ""]  # fmt: skip

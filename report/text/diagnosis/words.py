@@ -121,8 +121,8 @@ def show_diagnosis(console: Console, answer: dict[str, Any], verbose: bool = Tru
     if answer["may_hide"]:
         console.print(hidden_words(answer["may_hide"]))
     error = answer["error"]
-    unseen = f"; on conditions left out {error['held_out_before']:.2f} -> {error['held_out_after']:.2f}" if error["held_out_after"] is not None else ""
-    console.print(f"Error, rms in standard errors: {error['before']:.2f} -> {error['after']:.2f}{unseen}")
+    unseen = f"on conditions left out {error['held_out_before']:.2f} -> {error['held_out_after']:.2f}, fitted " if error["held_out_after"] is not None else ""
+    console.print(f"Error, rms in standard errors: {unseen}{error['before']:.2f} -> {error['after']:.2f}")
     if not verbose:
         _show_little(console, answer)
         return
