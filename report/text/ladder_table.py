@@ -21,10 +21,10 @@ from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 from thermospindle.report.text.ladder import evidence, sentences
 
-COLUMNS = ("step", "error\ns.e.", "held out\ns.e.", "error\nHz", "error\n%", "of shifts\nHz", "tolerances\ns.d.", "ln evidence")
+COLUMNS = ("step", "error\ns.e.", "held out\ns.e.", "error\nHz", "shifts\nHz", "build\ns.d.", "ln\nevidence")
 LEGEND = (
     "Errors are rms residuals; s.e. are standard errors of the data (of every FRF line, or of a table's numbers) or, held out, of the prediction "
-    "by a fit that has not seen that temperature. Hz and %: of natural frequencies. Tolerances: rms of the fitted build tolerances in their own "
+    "by a fit that has not seen that temperature. Hz: of natural frequencies. Build: rms of the fitted build tolerances in their own "
     "standard deviations."
 )
 
@@ -118,7 +118,7 @@ def _lists(residuals: ResidualMap) -> dict[str, Any]:
 
 def table(steps: Sequence[Step]) -> Table:
     grid = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
-    grid.add_column(COLUMNS[0], min_width=13, overflow="fold")
+    grid.add_column(COLUMNS[0], min_width=22, overflow="fold")
     for column in COLUMNS[1:]:
         grid.add_column(column, justify="right", no_wrap=True)
     for r in steps:
@@ -130,7 +130,7 @@ def cells(r: Step) -> tuple[str, ...]:
     shift = "-" if r.rms_shift_Hz is None else f"{r.rms_shift_Hz:.2f}"
     stretch = f"{r.stretch:.2f}" if r.fitted else "as drawn"
     held_out = f"{r.held_out:.2f}" if np.isfinite(r.held_out) else "-"
-    return (r.name, f"{r.error:.2f}", held_out, f"{r.rms_Hz:.2f}", f"{r.rms_percent:.3f}", shift, stretch, evidence(r.evidence))
+    return (r.name, f"{r.error:.2f}", held_out, f"{r.rms_Hz:.2f}", shift, stretch, evidence(r.evidence))
 
 
 class Growing:
