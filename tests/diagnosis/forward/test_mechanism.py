@@ -9,7 +9,7 @@ from tests.virtual_campaign import mode_campaign, model_of, virtual_campaign
 from thermospindle.diagnosis.forward.mechanism import Mechanism, likeness, size_covariance, strongest, variants, with_own_laws
 from thermospindle.diagnosis.forward.nuisance import RECORD
 from thermospindle.diagnosis.forward.rates import rates_of
-from thermospindle.diagnosis.inference.freeform import alike, free_forms
+from thermospindle.diagnosis.inference.freeform import alike, as_told_by, free_forms
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
@@ -119,6 +119,15 @@ def test_a_free_form_is_alike_to_effects_that_change_the_same(spindle, model, fo
     asked = ("preload_loss", "mount_compliance", "grease_damping", "clearance_opening", "soak_lag", "modulus_softening")
     named = [v for e in usable(spindle) if e.name in asked for v in variants(e)]
     assert {m.name for m in named if alike(model, np.zeros(len(model.parameters)), free, m)} == names
+
+
+def test_a_free_form_says_how_much_of_an_effect_that_would_be(spindle, model):
+    """A preload lower by 2 % and by 4 % (of ln) is a loss of so much, to first order; of what changes otherwise it says nothing."""
+    x, free = np.zeros(len(model.parameters)), {m.name: m for m in free_forms(spindle)}
+    own = with_own_laws([v for e in usable(spindle) if e.name == "preload_loss" for v in variants(e)], spindle, strongest(spindle, CONDITIONS))[0]
+    told = as_told_by(model, x, free["preload"], own, np.array([-2.0, -4.0]))
+    assert told == pytest.approx([0.02, 0.04], rel=0.02)
+    assert as_told_by(model, x, free["flange damping"], own, np.array([-2.0, -4.0])) is None
 
 
 def test_an_element_that_drifts_whole_is_the_sum_of_its_directions(spindle, model):
