@@ -25,6 +25,7 @@ from thermospindle.diagnosis.inference.singles import (
     promising,
     strained,
     task_of,
+    with_laws,
 )
 
 LEADS = 2  # single mechanisms of the catalogue to which a second is joined, of those near the best
@@ -66,9 +67,9 @@ def joined_early(
         looked = screen(model.thinned, lead.fit, lead.fit.temper, none.evidence.learned, others, workers)
         for s in chain.from_iterable(promising(looked, kind)[:SECONDS] for kind in MOST):
             task = task_of(lead.mechanisms, lead.fit, s, -np.inf, far=True)
-            found.setdefault(frozenset((m.name, m.kind) for m in task.mechanisms), (lead.evidence.ln + s.gain, task))
+            found.setdefault(with_laws(task.mechanisms), (lead.evidence.ln + s.gain, task))
     chosen = [task for _, task in sorted(found.values(), key=lambda t: -t[0])[:PAIRS]]
-    return fitted_in_steps(model, chosen, (), True, tried.early[0].fit, tried.most, tried.expected, workers, [])
+    return fitted_in_steps(model, chosen, (), tried.early[0].fit, tried.most, tried.expected, workers)[0]
 
 
 def _beside(model, leads: Sequence[Hypothesis], mechanisms: Sequence[Mechanism], most: float, expected: Learned, workers) -> list[Hypothesis]:
@@ -81,7 +82,7 @@ def _beside(model, leads: Sequence[Hypothesis], mechanisms: Sequence[Mechanism],
         looked = screen(model, lead.fit, 1.0, undrifted(lead.evidence.learned), others, workers)
         for kind in MOST:
             for s in [s for s in promising(looked, kind) if s.gain > asked][:SECONDS]:
-                whole = frozenset((m.name, m.kind) for m in (s.mechanism, *lead.mechanisms))
+                whole = with_laws((s.mechanism, *lead.mechanisms))
                 if whole not in done:
                     done.add(whole)
                     tasks.append((lead.evidence.ln + s.gain, task_of(lead.mechanisms, lead.fit, s, lead.evidence.ln - OCCAM, far=True)))

@@ -70,11 +70,13 @@ def fit_singles(
     most = cost_of(model, none, expected)
     first = {s.mechanism.name for ranking in rankings for kind in MOST for s in promising(ranking, kind)[:1]}
     early: list[Hypothesis] = []
-    singles = fitted_in_steps(model, tasks, first, misfit, about, most, expected, workers, early)
-    if not misfit:
+    if misfit:
+        singles, early = fitted_in_steps(model, tasks, first, about, most, expected, workers)
+        if len(rankings) > 1:
+            singles = better([*singles, *_owed(model, none, rankings[1], singles, most, expected, workers)])
+    else:
+        singles = fitted(model, tasks, TEMPERS[-1:], about, most, expected, workers)
         singles = better([*singles, *lasting(model, none, mechanisms, most, expected, workers)])
-    elif len(rankings) > 1:
-        singles = better([*singles, *_owed(model, none, rankings[1], singles, most, expected, workers)])
     progress("effects fitted")
     return Singles(singles, tuple(looked), most, expected, tuple(early))
 
@@ -161,7 +163,12 @@ def lasting(
 
 def better(found: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Of those with the same mechanisms and laws the one with more evidence."""
-    return list({frozenset((m.name, m.kind) for m in h.mechanisms): h for h in sorted(found, key=lambda h: h.evidence.ln)}.values())
+    return list({with_laws(h.mechanisms): h for h in sorted(found, key=lambda h: h.evidence.ln)}.values())
+
+
+def with_laws(mechanisms: Sequence[Mechanism]) -> frozenset[tuple[str, str]]:
+    """Which mechanisms act, and whose law each has."""
+    return frozenset((m.name, m.kind) for m in mechanisms)
 
 
 def of_each_name(found: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -188,8 +195,8 @@ def promising(looked: Sequence[Screened], kind: str) -> list[Screened]:
     return list(best.values())
 
 
-def _chosen(rankings: Sequence[Sequence[Screened]], strained: bool) -> list[Screened]:
-    """The most promising mechanisms of every kind, from all rankings by turns. Where nothing is strained what screening promises is nearly what a fit will
+def _chosen(rankings: Sequence[Sequence[Screened]], misfit: bool) -> list[Screened]:
+    """The most promising mechanisms of every kind, from all rankings by turns. Where there is no misfit what screening promises is nearly what a fit will
     hold, and only what is near the best is followed."""
     found: list[Screened] = []
     for kind, most in MOST.items():
@@ -197,7 +204,7 @@ def _chosen(rankings: Sequence[Sequence[Screened]], strained: bool) -> list[Scre
         for looked in rankings:
             ranked = promising(looked, kind)
             rivals = [s.gain for s in (*ranked, *(promising(looked, "law") if kind == "own law" else ()))]
-            least = -LITTLE if strained else max([-LITTLE, *(gain - CLOSE for gain in rivals)])
+            least = -LITTLE if misfit else max([-LITTLE, *(gain - CLOSE for gain in rivals)])
             followed.append([s for s in ranked if s.gain > least or (s is ranked[0] and kind != "own law")])
         chosen: dict[str, Screened] = {}
         for s in filter(None, chain.from_iterable(zip_longest(*followed))):
@@ -208,25 +215,20 @@ def _chosen(rankings: Sequence[Sequence[Screened]], strained: bool) -> list[Scre
 
 
 def fitted_in_steps(
-    model, tasks, first: Collection[str], strained: bool, about: Fit, most: float, expected: Learned, workers, early: list[Hypothesis]
-) -> list[Hypothesis]:
-    """All tasks fitted; where much is missing in steps of temper, after which what fell behind is left, but for those that promised most at `first`: the
-    first of two causes that shows while errors are enlarged need not be the one that tells more. The fits of the first temper are added to `early`."""
-    if not tasks:
-        return []
-    if not strained:
-        return fitted(model, tasks, TEMPERS[-1:], about, most, expected, workers)
+    model, tasks: Sequence[Task], first: Collection[str], about: Fit, most: float, expected: Learned, workers
+) -> tuple[list[Hypothesis], list[Hypothesis]]:
+    """All tasks fitted in steps of temper, after which what fell behind is left, but for those that promised most at `first`: the first of two causes that
+    shows while errors are enlarged need not be the one that tells more. Those that arrived, and all of the first step."""
     peaks = any(isinstance(d, LineData) for d in model.tests)  # a table's frequencies follow their parameters as far as these go
     alive, afresh = list(tasks), peaks and about.temper * np.sqrt(about.chi2 / about.count) > STALLED
+    early: list[Hypothesis] = []
+    found: list[Hypothesis] = []
     for temper in TEMPERS[EARLY:]:
         found = fitted(model, alive, (temper,), about, most, expected, workers, afresh=afresh)
-        afresh = False
-        early += found if temper == TEMPERS[EARLY] else []
-        best = max(h.evidence.ln for h in found)
+        afresh, early = False, early or found
+        best = max((h.evidence.ln for h in found), default=-np.inf)
         near = sorted((h for h in found if h.evidence.ln > best - FAR), key=lambda h: -h.evidence.ln)
         keep = {id(h) for kind in MOST for h in [h for h in near if h.mechanisms[0].kind == kind][:2]}
         kept = [h for h in found if id(h) in keep or h.names[0] in first or h.evidence.ln > best - BEHIND]
-        if temper == TEMPERS[-1]:
-            return found
         alive = [Task(h.mechanisms, (h.fit.point,), -np.inf) for h in kept]
-    return []
+    return found, early
