@@ -49,15 +49,15 @@ assert (model.MINE, sim.MINE, thermal.MINE) == ("model", "sim", "thermal")
 
 def copy_of_checkout(folder: Path, links: bool = True) -> Path:
     """What an installation is built from; without `links` as git checks it out on Windows, a text file for each."""
-    for name in ("pyproject.toml", "README.md", "LICENSE"):
+    for name in ("pyproject.toml", "setup.py", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, folder / name)
     junk = shutil.ignore_patterns("__pycache__")
-    for name in (*FOLDERS, "thermospindle"):
+    for name in (*FOLDERS, "thermospindle", "editable"):
         shutil.copytree(ROOT / name, folder / name, symlinks=True, ignore=junk)
-    for link in () if links else FOLDERS:
-        target = (folder / "thermospindle" / link).readlink()
-        (folder / "thermospindle" / link).unlink()
-        (folder / "thermospindle" / link).write_text(target.as_posix(), encoding="utf-8")
+    for link in () if links else (folder / "editable" / "thermospindle", *(folder / "thermospindle" / name for name in FOLDERS)):
+        target = link.readlink()
+        link.unlink()
+        link.write_text(target.as_posix(), encoding="utf-8")
     return folder
 
 
@@ -98,6 +98,11 @@ class Environment:
     def there(self) -> set[str]:
         return {p.name for p in (*self.site.iterdir(), *self.scripts.iterdir()) if p.name != "__pycache__"}
 
+    def paths(self) -> list[Path]:
+        """Folders that an editable install has put on the path; none where an import hook finds the modules."""
+        lines = [line for file in self.site.glob("__editable__*.pth") for line in file.read_text(encoding="utf-8").splitlines()]
+        return [Path(line) for line in lines if not line.startswith("import")]
+
     def install(self, *what: object) -> None:
         pip("--python", self.python, "install", "--no-deps", "--no-index", "--no-build-isolation", *what, cwd=self.site)
 
@@ -127,10 +132,13 @@ def users(tmp_path) -> Path:
     return tmp_path
 
 
-def test_nothing_but_one_name_and_one_command_lands(installed, tmp_path):
+def test_nothing_but_one_name_and_one_command_lands(request, installed, tmp_path):
     new = {re.sub(r"^__editable__.*", "__editable__", name) for name in installed.there() - installed.before}
     information = f"thermospindle-{PROJECT['version']}.dist-info"
     assert new in ({"thermospindle", information, "spindle"}, {"__editable__", information, "spindle"})
+    paths = installed.paths()
+    assert len(paths) == (request.node.callspec.params["installed"] == "editable"), "type checkers follow a path and no hook: test_types_are_seen asks mypy itself"
+    assert [[p.name for p in path.iterdir()] for path in paths] == [["thermospindle"]] * len(paths)
     names = [*FOLDERS, "spindle", "tests"]
     seen = call(installed.python, "-c", f"from importlib.util import find_spec; print([n for n in {names} if find_spec(n)])", cwd=tmp_path)
     assert seen.strip() == "[]"
@@ -150,15 +158,16 @@ def test_a_users_own_modules_of_the_same_names_break_nothing(installed, users, s
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("way", ["wheel", "editable"])
+@pytest.mark.parametrize("way", ["wheel", "editable", "strictly editable without links"])
 def test_types_are_seen(way, wheel, users, tmp_path_factory):
-    """mypy reads the types of an installed wheel, and of an editable install whose files are linked (`editable_mode=strict`), and so finds the one error of
-    this file."""
+    """mypy reads the types of a wheel, of an editable install, and without symbolic links of one whose files are linked one by one
+    (`editable_mode=strict`), and so finds the one error of this file."""
     environment = Environment(users / "venv")
     if way == "wheel":
         environment.install(wheel)
     else:
-        environment.install("--config-settings", "editable_mode=strict", "--editable", copy_of_checkout(tmp_path_factory.mktemp("checkout"), links=False))
+        strictly = ["--config-settings", "editable_mode=strict"] if "strictly" in way else []
+        environment.install(*strictly, "--editable", copy_of_checkout(tmp_path_factory.mktemp("checkout"), links=not strictly))
     (users / "typed.py").write_text(
         "from thermospindle.model.machine import Condition\n"
         "reveal_type(Condition(20.0).temperature)\n"
