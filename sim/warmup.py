@@ -58,7 +58,8 @@ class Warmup:
 
     `moments` stand at `history.times` (s); `frequencies` (times, modes) in Hz follow the modes of the first moment by their shape, NaN
     where one has been lost; `steady` is the end of all times, `steady_frequencies` (modes,) its modes; `time_constant` (s) of the
-    slowest decay about it. `left_out` names effects whose region temperatures are computed here instead.
+    slowest decay about it. `left_out` names effects whose region temperatures are computed here instead. `feedback` is what comes back
+    in the steady state of bearing loads that are added, through the heat that they make: at 1 it would run away.
     """
 
     spindle: Spindle
@@ -73,6 +74,7 @@ class Warmup:
     steady_frequencies: Array
     time_constant: float
     left_out: tuple[str, ...]
+    feedback: float = 0.0
 
     @property
     def times(self) -> Array:
@@ -119,6 +121,7 @@ def warm_up(
         raise OutsideRange(f"{where} the grease or a material is asked for a temperature that its law does not reach: {error}; thermal.convection cools more, thermal.friction heats less") from None
     final = model.nodal(field)
     constant = heat.slowest(model, field, drive(0.0, final))
+    back = heat.feedback(model, field, lambda nodal: drive(0.0, nodal))
     progress(f"steady state, time constant {constant:.0f} s")
     whole = TIME_CONSTANTS * constant
     told = 0
@@ -137,7 +140,7 @@ def warm_up(
     first = tuple(modes(moments[0].point.chain, highest=top))
     followed = _followed(first, [*moments, steady])
     progress("natural frequencies")
-    return Warmup(spindle, start, air, speed, history, moments, first, followed[:-1], steady, followed[-1], constant, left_out)
+    return Warmup(spindle, start, air, speed, history, moments, first, followed[:-1], steady, followed[-1], constant, left_out, back)
 
 
 @dataclass(frozen=True, eq=False)

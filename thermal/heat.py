@@ -8,7 +8,7 @@ temperature in turn (bearing loads), `march` and `settled` repeat this until bot
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -17,7 +17,7 @@ from scipy.sparse import csc_array, csr_array
 from scipy.sparse.linalg import SuperLU, eigsh, splu
 
 from thermospindle.model.bearing.roller import reference_loads
-from thermospindle.model.errors import NoEquilibrium
+from thermospindle.model.errors import NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Spindle
 from thermospindle.thermal import friction
 from thermospindle.thermal.conduction import HeatModel
@@ -34,6 +34,8 @@ ERROR_WEIGHTS = WEIGHTS - np.array([(1 - WEIGHTS[0]) / 3, (3 * WEIGHTS[0] + 1) /
 20 (1996) 21-37."""
 
 RUNAWAY = 1000.0  # C, past any bearing's end; a search that gets there has none
+ROUNDS = 200  # of loads and temperature after each other
+STEP = 1e-3  # of the loads, to see what comes back of it
 ALIKE = 1e-8  # relative change of the bearing loads at which they and the temperature agree
 Drive = Callable[[float, np.ndarray], "Running"]
 """What drives the temperature at a time (s) and nodal temperatures (C)."""
@@ -208,15 +210,57 @@ def _agreed(
     cold = factors.solve(known + (h or 1.0) * _outer_load(model, last))  # without friction
     if not last.speed or not model.spindle.ringed:
         return cold, last
-    for _ in range(60):
-        nodal = cold + _bearing_heat(model, model.bearing @ cold, response @ model.bearing.T, last) @ response
+    names, before, back = list(last.loads), np.zeros(len(last.loads)), 0.0
+    for _ in range(ROUNDS):
+        try:
+            nodal = cold + _bearing_heat(model, model.bearing @ cold, response @ model.bearing.T, last) @ response
+        except OutsideRange as error:
+            raise OutsideRange(f"{error}; {back:.0%} of a load that is added there comes back through its heat, and 100% is runaway" if back > 0.5 else str(error)) from None
         if np.abs(nodal).max() > RUNAWAY:
+            back = 1.0
             break
         now = drive(nodal)
-        if all(abs(now.loads[b] - load) <= ALIKE * (abs(load) + 1e-3) for b, load in last.loads.items()):
+        asked, found = (np.array([d.loads[b] for b in names]) for d in (last, now))
+        change = (found - asked) / (np.abs(asked) + 1e-3)
+        if np.abs(change).max() <= ALIKE:
             return nodal, last
-        last = now
-    raise NotSettled("bearing loads and temperature do not settle: each load heats the bearing to a larger one")
+        if before.any():
+            back = float(change @ before / (before @ before))
+        last, before = (_ahead(now, found - asked, back), np.zeros(len(names))) if before.any() else (now, change)
+    told = "each load heats the bearing to a larger one" if back >= 1 else f"their search ends after {ROUNDS} rounds"
+    raise NotSettled(f"bearing loads and temperature do not settle: {told}")
+
+
+def _ahead(now: Running, change: np.ndarray, back: float) -> Running:
+    """Where loads that have changed by `change`, and by `back` times the change before, are bound for (Aitken): the sum of the geometric
+    series. As they stand where they grow without end, and where the sum would turn a load round."""
+    further = min(back, 0.95) / (1 - min(back, 0.95)) * change
+    bound = {b: load + float(c) for (b, load), c in zip(now.loads.items(), further, strict=True)}
+    return now if back >= 1 or any(bound[b] * load < 0 for b, load in now.loads.items()) else replace(now, loads=bound)
+
+
+def feedback(model: HeatModel, temperature: TemperatureField, drive: Callable[[np.ndarray], Running]) -> float:
+    """What comes back of bearing loads that are added to those of a steady temperature, through the heat that they make: at 1 it runs away.
+
+    The largest eigenvalue of the map from loads to the loads at their steady temperature, by power iteration from loads all raised alike.
+    """
+    nodal = model.nodal(temperature)
+    rest = drive(nodal)
+    if not rest.speed or not model.spindle.ringed:
+        return 0.0
+    factors, response = _factors(model, 0.0)
+    cold = factors.solve(_outer_load(model, rest))
+    own, found = np.array(list(rest.loads.values())), 0.0
+    added = STEP * np.abs(own)
+    for _ in range(4):
+        raised = replace(rest, loads=dict(zip(rest.loads, (own + added).tolist(), strict=True)))
+        heated = cold + _bearing_heat(model, model.bearing @ cold, response @ model.bearing.T, raised) @ response
+        back = np.array(list(drive(heated).loads.values())) - own
+        if not back.any():
+            return 0.0
+        found = float(back @ added / (added @ added))
+        added = STEP * np.abs(own).max() / np.abs(back).max() * back
+    return found
 
 
 def flows(model: HeatModel, temperature: np.ndarray | TemperatureField, drive: Running) -> HeatFlows:

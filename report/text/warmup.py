@@ -18,6 +18,8 @@ from thermospindle.sim.operating import provenance
 from thermospindle.sim.warmup import Moment, Warmup, clearance, energy, loose_rollers, most_friction, roller_names, rollers
 
 LINES = 16  # of the terminal table
+NEAR = 0.5
+"""Of a load that is added, what may come back by heat before a warm-up speaks of it."""
 ROLLER_COLUMNS = (("temperature", "C"), ("clearance", "um"), ("radial stiffness", "N_per_m"), ("friction", "W"))
 """Of the CSV, in the order of `rollers`."""
 
@@ -72,6 +74,7 @@ def _steady_json(warmup: Warmup, first: str | None) -> dict[str, Any]:
         "friction_W": sum(steady.friction.values()),
         "frequencies_Hz": _numbers(warmup.steady_frequencies),
         "status": steady.point.state.status,
+        "load_feedback": warmup.feedback,
     }
 
 
@@ -132,6 +135,8 @@ def show_warmup(console: Console, warmup: Warmup) -> None:
         f"Slowest time constant {warmup.time_constant:.0f} s. Heat of the whole time: motor {total['motor']} and bearings "
         f"{total['friction']} in, convection {total['convection']} out, {total['stored']} stored."
     )
+    if warmup.feedback > NEAR:
+        console.print(f"Near runaway: of bearing loads that are added, {warmup.feedback:.0%} come back through the heat they make; at 100% there is no steady state. It warms up more slowly than the time constant says, which is that of loads that stay.")
     if warmup.left_out:
         console.print(f"Left out, since region temperatures are computed here: {', '.join(warmup.left_out)}.")
 

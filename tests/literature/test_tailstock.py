@@ -13,12 +13,18 @@ import pytest
 from tests.conftest import ROOT
 from thermospindle.cli import main
 from thermospindle.model.bearing.roller import respond, roller_row
+from thermospindle.model.errors import OutsideRange
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.static import static
 from thermospindle.model.scene.reading import load, shipped_rows
+from thermospindle.model.units import RPM
 from thermospindle.report.log.content import bearing_series
 from thermospindle.report.page.report import bearing_figures
+from thermospindle.sim import warmup
 from thermospindle.sim.operating import operating_point
+from thermospindle.thermal import conduction, heat
+from thermospindle.thermal.influence import influence
+from thermospindle.thermal.readout import reading
 
 SCENE = ROOT / "scenes" / "tailstock"
 STEEL, NU, ALPHA = 210e9, 0.3, 11.5e-6
@@ -172,6 +178,36 @@ def test_table_and_check_tell_the_clearance(tmp_path, capsys):
     said = " ".join(capsys.readouterr().out.split())
     assert "Rollers of front1: 2 rows of 26, 9 mm and 8.2 mm long, pressed by 1.4 um across, 74 N each; free along the axis." in said
     assert "Odd: - nothing" in said
+
+
+def heated(tail, rpm):
+    """The heat model of the drawing, and what drives it at the nodal temperatures: the loads of the bearings there."""
+    model = conduction.model(tail, influence(tail).sections)
+    machine, speed = warmup._Machine(tail, rpm * RPM, (), reading(model)), rpm * RPM
+    return model, lambda nodal: heat.Running(20.0, speed, machine.point(nodal).state.loads)
+
+
+def test_at_the_printed_most_speed_there_is_a_steady_state(tail):
+    """3500 rpm are printed as the most. Loads put in for the loads they heat up, round by round, come nearer by the same share each time, which is
+    what comes back of a load; the sum of that series is the steady state. All heat that is made goes out there."""
+    model, drive = heated(tail, 3500)
+    field = heat.settled(model, drive)
+    nodal = model.nodal(field)
+    steady = drive(nodal)
+    flows = heat.flows(model, field, steady)
+    assert flows.friction == pytest.approx(flows.convection, rel=1e-6)
+    assert flows.friction == pytest.approx(387, rel=0.02)
+    rounds = [steady.loads["front1"] * 1.001]
+    for _ in range(3):
+        rounds.append(drive(model.nodal(heat.steady(model, replace(steady, loads={**steady.loads, "front1": rounds[-1]})))).loads["front1"])
+    shares = np.diff(rounds)[1:] / np.diff(rounds)[:-1]
+    assert heat.feedback(model, field, drive) == pytest.approx(shares[-1], abs=0.01)
+    assert 0.7 < shares[-1] < 0.85
+
+
+def test_beyond_it_rollers_run_away(tail):
+    with pytest.raises(OutsideRange, match="% of a load that is added there comes back through its heat"):
+        heat.settled(*heated(tail, 4500))
 
 
 @pytest.mark.slow
