@@ -23,7 +23,6 @@ from thermospindle.diagnosis.inference.search import Search
 PRIOR = {"none": 0.5, "one": 0.33, "two": 0.08, "free": 0.05, "two free": 0.02, "one and free": 0.02, "three": 0.01}
 OWN_LAW = 1.0  # prior odds of a law of the data's own over the one assumed, for an effect whose formula asks for the condition
 COARSE = 4.0  # chosen on blind campaigns 1 to 16, by judgement; others judge it
-DEPARTS = 0.3  # of the size, from which a law does not hold
 
 Names = tuple[str, ...]
 Weighed = tuple[Hypothesis, float]  # and its ln weight
@@ -62,7 +61,7 @@ def explanations(found: Search, inflation: float) -> tuple[tuple[Candidate, ...]
     worth = inflation * coarsening(found.hypotheses[0])
     known = [h for h in found.hypotheses if _can_be(h)]
     either = frozenset(m.name for h in known for m in h.mechanisms if m.own_law)
-    twins = [h for h in known if _is_named(h, known, found.alike)]
+    twins = [h for h in known if _is_named(h, known, found.alike, LITTLE * worth)]
     weighed = [h for h in known if h not in twins]
     rows = [(h, _prior(h, named_count, free_count, either) + (_weighed(h, found.hypotheses) - base) / worth) for h in weighed]
     top = max(w for _, w in rows)
@@ -86,16 +85,23 @@ def coarsening(best: Hypothesis) -> float:
 
 
 def _weighed(h: Hypothesis, every: Sequence[Hypothesis]) -> float:
-    """ln evidence, of which what one mechanism more gains counts a `COARSE`-th where the best explanation without it departs from its law: what is wrong
-    in a law looks like a little of something else, and an effect whose law is not quite its own is not quite its own in what it does either."""
+    """ln evidence, of which what one mechanism more gains counts a `COARSE`-th as far as the best explanation without it gains as much by laws that are not
+    its effects' own: what is wrong in a law looks like a little of something else, and an effect whose law is not quite its own is not quite its own in what
+    it does either."""
     parts = [o for o in every if o.mechanisms and set(o.names) < set(h.names)]
     if not parts:
         return h.evidence.ln
     lead = max(parts, key=lambda o: o.evidence.ln)
     gain = h.evidence.ln - lead.evidence.ln
-    departures = zip(lead.mechanisms, lead.evidence.learned.departures, strict=True)
-    departs = gain > 0 and any(departure >= DEPARTS for m, departure in departures if not m.own_law)
-    return _weighed(lead, every) + (gain / COARSE if departs else gain)
+    in_doubt = min(gain, _by_other_laws(lead, every))
+    return _weighed(lead, every) + gain - (1 - 1 / COARSE) * max(in_doubt, 0.0)
+
+
+def _by_other_laws(h: Hypothesis, every: Sequence[Hypothesis]) -> float:
+    """What of its ln evidence an explanation gains by departures from laws, and by laws of the data's own over those assumed (all of it where no fit with
+    these arrived)."""
+    assumed = [o for o in every if set(o.names) == set(h.names) and not any(m.own_law for m in o.mechanisms)]
+    return h.evidence.ln - max((o.evidence.ln - o.evidence.by_departing for o in assumed), default=-np.inf)
 
 
 def _can_be(h: Hypothesis) -> bool:
@@ -103,14 +109,14 @@ def _can_be(h: Hypothesis) -> bool:
     return not (any(m.own_law for m in h.mechanisms) and beyond_limits(h))
 
 
-def _is_named(h: Hypothesis, every: Sequence[Hypothesis], alike: Mapping[str, frozenset[str]]) -> bool:
-    """Whether free forms in an explanation change the same as effects of the catalogue that do as well, beside the same others."""
+def _is_named(h: Hypothesis, every: Sequence[Hypothesis], alike: Mapping[str, frozenset[str]], little: float) -> bool:
+    """Whether free forms in an explanation change the same as effects of the catalogue that do as well, to a `little` of ln evidence, beside the same others."""
     means = [alike.get(m.name, frozenset()) if m.free else {m.name} for m in h.mechanisms]
 
     def same(names: Names) -> bool:
         return len(names) == len(means) and any(all(n in of for n, of in zip(row, means, strict=True)) for row in permutations(names))
 
-    return h.free and any(not o.free and o.evidence.ln > h.evidence.ln - LITTLE and same(o.names) for o in every)
+    return h.free and any(not o.free and o.evidence.ln > h.evidence.ln - little and same(o.names) for o in every)
 
 
 def _by_names(rows: Sequence[Weighed]) -> list[list[Weighed]]:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache, lru_cache, reduce
 from itertools import product
 
 import numpy as np
@@ -44,7 +44,8 @@ SWEEPS = 3  # at most, through the sizes of nuisances one after the other
 @dataclass(frozen=True, eq=False)
 class Evidence:
     """ln evidence; what was learned; posterior mean (n,) and covariance (n, n) of all parameters, and of the sizes of every mechanism in every
-    test: mean (mechanisms, tests) and covariance (mechanisms, tests, tests), in their units."""
+    test: mean (mechanisms, tests) and covariance (mechanisms, tests, tests), in their units. `by_departing` is what of the ln evidence the mechanisms with a
+    law gain by departing from it."""
 
     ln: float
     learned: Learned
@@ -53,6 +54,7 @@ class Evidence:
     sizes: Array
     size_covariance: Array
     chi2: float
+    by_departing: float = 0.0
 
 
 def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = ()) -> Evidence:
@@ -69,35 +71,30 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = ()) -> Ev
     conditions = tuple(d.condition for d in model.tests)
     roots = [_roots(conditions, grid, len(m.shape)) for m, grid in zip(fit.mechanisms, own_grids, strict=True)]
 
-    def rated(s: float, sizes: Mapping[str, float]) -> tuple[float, int]:
-        """ln evidence, the mean over widths and departures of all mechanisms; and which of these is best."""
+    def each(s: float, sizes: Mapping[str, float]) -> Array:
+        """ln evidence of every combination of widths and departures of the mechanisms."""
         scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
-        inner = marginal(scaled, nuisance_root(model, sizes, fit.moved))
-        values = inner.integrated(roots) - fit.count * np.log(s)
-        return float(logsumexp(values) - np.log(len(values))), int(np.argmax(values))
+        return marginal(scaled, nuisance_root(model, sizes, fit.moved)).integrated(roots) - fit.count * np.log(s)
 
     if near:
-        (total, own_best), s, sizes = max(((rated(n.errors, n.sizes), n.errors, dict(n.sizes)) for n in near), key=lambda row: row[0][0])
+        values, s, sizes = max(((each(n.errors, n.sizes), n.errors, dict(n.sizes)) for n in near), key=lambda row: _ln_mean(row[0]))
     else:
         scales = [1.0] if fit.temper < 1.0 else [float(s) for s in _error_scales(whole, fit.count)]
         s, sizes = scales[len(scales) // 2], {kind: 0.0 for kind in grids}
-        total, own_best = rated(s, sizes)
+        values = each(s, sizes)
         for _ in range(SWEEPS):
-            before = total
+            before = _ln_mean(values)
             for kind, grid in grids.items():
                 for size in grid:
-                    if size != sizes[kind]:
-                        value, best = rated(s, {**sizes, kind: size})
-                        if value > total:
-                            total, own_best, sizes = value, best, {**sizes, kind: size}
+                    if size != sizes[kind] and _ln_mean(there := each(s, {**sizes, kind: size})) > _ln_mean(values):
+                        values, sizes = there, {**sizes, kind: size}
             for scale in scales:
-                if scale != s:
-                    value, best = rated(scale, sizes)
-                    if value > total:
-                        total, own_best, s = value, best, scale
-            if total - before < 0.01:
+                if scale != s and _ln_mean(there := each(scale, sizes)) > _ln_mean(values):
+                    values, s = there, scale
+            if _ln_mean(values) - before < 0.01:
                 break
-    own = [grid[k] for grid, k in zip(own_grids, np.unravel_index(own_best, [len(grid) for grid in own_grids]), strict=True)] if own_grids else []
+    best = np.unravel_index(int(np.argmax(values)), [len(grid) for grid in own_grids]) if own_grids else ()
+    own = [grid[k] for grid, k in zip(own_grids, best, strict=True)]
     scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
     learned = Learned(sizes, s, tuple(w for w, _ in own), tuple(d for _, d in own))
     mean, spread = posterior(scaled, whole_root(model, fit.mechanisms, learned, fit.moved))
@@ -114,9 +111,16 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = ()) -> Ev
         truncation += one_sided(model, m, width_departure, means[-1], covariances[-1])
         at += tests + len(m.shape)
     shape = (len(fit.mechanisms), tests)
+    by_law = [np.array([d == 0.0 or m.kind != "law" for _, d in grid]) for m, grid in zip(fit.mechanisms, own_grids, strict=True)]
+    held = reduce(np.multiply.outer, by_law, np.array(True)).ravel()
     return Evidence(
-        total + truncation, learned, mean, spread, np.array(means).reshape(shape), np.array(covariances).reshape(*shape, tests), chi2
-    )
+        _ln_mean(values) + truncation, learned, mean, spread, np.array(means).reshape(shape), np.array(covariances).reshape(*shape, tests), chi2,
+        _ln_mean(values) - _ln_mean(values[held]),
+    )  # fmt: skip
+
+
+def _ln_mean(values: Array) -> float:
+    return float(logsumexp(values) - np.log(len(values)))
 
 
 def amplitudes_apart(fit: Fit) -> csr_array:

@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from thermospindle.diagnosis.decision.explanations import DEPARTS, beyond_limits
+from thermospindle.diagnosis.decision.explanations import beyond_limits
 from thermospindle.diagnosis.verdict import Diagnosis, Drift
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
 from thermospindle.report.typeset import plain_error
 
 ALIKE = 0.9  # of the evidence of what the verdict names, from which a free drift does as well
+DEPARTS = 0.3  # of the size, from which a law does not hold
 
 
 SENTENCES = {

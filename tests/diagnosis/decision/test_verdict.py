@@ -151,14 +151,27 @@ def test_what_is_missed_in_every_test_is_one_finding(share):
     assert between_tests(left) == pytest.approx(share, abs=0.02)
 
 
-@pytest.mark.parametrize(("departure", "word"), [(0.1, "two effects"), (0.3, "ambiguous")])
-def test_a_little_more_beside_a_law_that_does_not_hold_is_no_second_effect(departure, word):
+def by_departing(h: Hypothesis, gained: float) -> Hypothesis:
+    return replace(h, evidence=replace(h.evidence, by_departing=gained))
+
+
+@pytest.mark.parametrize(("gained", "word"), [(0.5, "two effects"), (100.0, "ambiguous")])
+def test_a_little_more_beside_a_law_that_does_not_hold_is_no_second_effect(gained, word):
     found = made({("first", "more"): 617.0, "first": 600.0, "more": 20.0})
     first = found.hypotheses[1]
     assert first.names == ("first",)
-    departs = replace(first, evidence=replace(first.evidence, learned=replace(first.evidence.learned, departures=(departure,))))
-    v = decide(replace(found, hypotheses=(found.hypotheses[0], departs, *found.hypotheses[2:])))
+    v = decide(replace(found, hypotheses=(found.hypotheses[0], by_departing(first, gained), *found.hypotheses[2:])))
     assert (v.word, v.effects[0]) == (word, "first")
+
+
+@pytest.mark.parametrize(("a", "b", "doubt"), [(0.0, 0.0, 0.0), (15.0, 0.0, 15.0), (15.0, 15.0, 0.0), (900.0, 15.0, 285.0)])
+def test_what_a_law_leaves_in_doubt_is_no_more_than_it_gained(a, b, doubt):
+    """Two effects that explain as much with the same second one: by departures of `a` and a law of `b`'s own, which lose in ln evidence as much of what the
+    second gains as they gained, and all of its 300 at most."""
+    found = made({("a", "c"): 400.0, ("b'", "c"): 400.0, "a": 100.0, "b'": 100.0, "b": 100.0 - b})
+    hypotheses = tuple(by_departing(h, a) if h.names == ("a",) else h for h in found.hypotheses)
+    first, second = (next(c.probability for c in decide(replace(found, hypotheses=hypotheses)).candidates if c.names == (k, "c")) for k in "ab")
+    assert np.log(second / first) == pytest.approx((1 - 1 / COARSE) * doubt - np.log(1 + OWN_LAW), abs=1e-6)
 
 
 def test_a_set_holds_only_what_is_probable():

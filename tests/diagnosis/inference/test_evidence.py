@@ -26,7 +26,7 @@ from thermospindle.diagnosis.forward.nuisance import (
     TEMPERATURE,
     Nuisance,
 )
-from thermospindle.diagnosis.inference.evidence import Learned, amplitudes_apart, evidence, left_out
+from thermospindle.diagnosis.inference.evidence import WIDTHS, Learned, amplitudes_apart, evidence, left_out
 from thermospindle.diagnosis.inference.fit import Fit, Held
 from thermospindle.diagnosis.inference.gaussian import Quadratic, marginal
 from thermospindle.diagnosis.inference.prior import ACTION, Root, misjudged, nuisance_variances, precision_and_variances, whole_root
@@ -228,10 +228,21 @@ def test_sizes_that_depart_from_their_law_keep_the_sign_that_all_have():
     assert 0 < evidence(bound.model, bound.fit).ln - found.ln < np.log(2) + 1e-9  # the sign is more probable than not
 
 
+@pytest.mark.parametrize(("hidden", "much"), [(2.0, False), ((1.2, 4.0, 1.1), True)])
+def test_what_departures_gain_is_told(hidden, much, monkeypatch):
+    """By how much the evidence is larger than that of the same sizes held to their law; less than nothing where the law holds."""
+    made = toy(3, 0.0, hidden=hidden, rows=200)
+    found = evidence(made.model, made.fit)
+    monkeypatch.setattr("thermospindle.diagnosis.inference.evidence._own_grid", lambda lawless, lasting: tuple((w, 0.0) for w in WIDTHS))
+    held = evidence(made.model, made.fit, [found.learned])
+    assert found.by_departing == pytest.approx(found.ln - held.ln, abs=1e-6)
+    assert found.by_departing > 20.0 if much else -2.0 < found.by_departing < 0.0
+
+
 @pytest.mark.parametrize("held", [False, True])
 def test_a_shape_within_limits_is_the_integral_over_these(held, monkeypatch):
     """A share from nothing to one, neutral at nothing: the integral over it alone, by quadrature; held at nothing where the data would have it less."""
-    own, plain, random = (1.0, 0.3), toy(3, 0.0, hidden=2.0), np.random.default_rng(8)
+    own, plain, random = (1.0, 0.0), toy(3, 0.0, hidden=2.0), np.random.default_rng(8)
     monkeypatch.setattr("thermospindle.diagnosis.inference.evidence._own_grid", lambda lawless, lasting: (own,))
     jacobians = [np.column_stack([j, random.standard_normal(len(j))]) for j in plain.jacobians]
     y = [v + (-0.4 if held else 0.6) * j[:, -1] for v, j in zip(plain.y, jacobians, strict=True)]
