@@ -8,6 +8,7 @@
 - balls: ISO 3290-1:2014: variation of the lot diameter V_DwL over the set, deviation from spherical form over order 2 and up;
 - races: amplitude falling with a power of the order, as measured on 17 rings of 608 bearings (*J. Manuf. Mater. Process.* 9 (2025)
   220), Rayleigh distributed with uniform phases;
+- rollers are drawn as balls of the same grade are, as no standard that is open speaks of them; what a race has along the axis they do not feel;
 - cages are drawn balanced: no standard speaks of them.
 """
 
@@ -62,19 +63,19 @@ def drawn(spindle: Spindle, seed: int, grade: Grade = GRADES["high precision"]) 
     permissible = spindle.turning_mass * grade.balance / spindle.nominal_speed
     static, couple = random.uniform(0, 1, 2) * permissible
     phases = random.uniform(0, 2 * np.pi, 2)
-    rows = {b.name: _drawn_row(b.balls, grade, random) for b in spindle.bearings}
+    rows = {b.name: _drawn_row(b.balls, b.elements, grade, random) for b in spindle.rolling}
     return Imperfections(float(static), body.z, float(phases[0]), float(couple * span / 2), float(phases[1]), rows)
 
 
-def _drawn_row(balls: int, grade: Grade, random: np.random.Generator) -> RowImperfections:
+def _drawn_row(balls: int, elements: int, grade: Grade, random: np.random.Generator) -> RowImperfections:
     orders = np.arange(2, RACE_ORDERS * balls + 2)
     races = [_drawn_waves(orders, grade.race * (orders / 2.0) ** -grade.decay, random) for _ in range(4)]
-    sizes = random.uniform(-0.5, 0.5, balls) * grade.ball_lot
+    sizes = random.uniform(-0.5, 0.5, elements) * grade.ball_lot
     sizes -= sizes.mean()  # a common deviation is a preload, not an imperfection
     ball_orders = np.arange(2, BALL_ORDERS + 1)
     # order n alone deviates from the circumscribed sphere by twice its amplitude; a fifth of the limit for order 2 leaves room for chance and the rest
     scale = 0.2 * grade.ball_form * (ball_orders / 2.0) ** -2.0
-    ball_waves = tuple(_drawn_waves(ball_orders, scale, random) for _ in range(balls))
+    ball_waves = tuple(_drawn_waves(ball_orders, scale, random) for _ in range(elements))
     return RowImperfections(races[0], races[1], races[2], races[3], tuple(float(s) for s in sizes), ball_waves)
 
 

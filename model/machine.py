@@ -242,6 +242,11 @@ class Spindle:
         """The bearings whose rings are regions of the section: ball rows, then roller bearings."""
         return (*self.bearings, *(b for b in self.roller_bearings if b.inner_ring))
 
+    @property
+    def rolling(self) -> tuple[Bearing | RollerBearing, ...]:
+        """The bearings with rolling elements: ball rows, then roller bearings."""
+        return (*self.bearings, *self.roller_bearings)
+
     def bearing(self, name: str) -> Bearing:
         """The ball row of that name."""
         return next(b for b in self.bearings if b.name == name)

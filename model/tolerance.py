@@ -25,7 +25,7 @@ class Toleranced:
 
 
 def toleranced(spindle: Spindle) -> list[Toleranced]:
-    """Every toleranced build parameter of a spindle: stiffnesses, masses, inertias, preload, damping ratios."""
+    """Every toleranced build parameter of a spindle: stiffnesses, masses, inertias, preload, clearance of rollers, damping ratios."""
     t = spindle.tolerances
     found = []
     beams = {name for s in spindle.structure.shafts for name in (*s.bodies, *s.elements)}
@@ -58,6 +58,9 @@ def toleranced(spindle: Spindle) -> list[Toleranced]:
         found.append(Toleranced("preload" if len(spindle.sets) == 1 else f"{s.name} preload", t.preload, _scale_preload(s.name)))
     for given in spindle.linear_bearings:
         found.append(Toleranced(f"{given.name} stiffness", t.structure, _scale_linear_bearing(given.name)))
+    for rollers in spindle.roller_bearings:
+        if rollers.clearance != 0.0:  # as mounted; pressed rollers are preloaded by it
+            found.append(Toleranced(f"{rollers.name} clearance", t.preload, _scale_clearance(rollers.name)))
     if spindle.all_bearings:
         found.append(Toleranced("bearing damping", t.damping, _scale_bearing_damping))
     return found
@@ -164,6 +167,14 @@ def _scale_bearing_damping(spindle: Spindle, x: float) -> Spindle:
     given = tuple(replace(b, damping_ratio=b.damping_ratio * (1 + x)) for b in spindle.linear_bearings)
     rollers = tuple(replace(b, damping_ratio=b.damping_ratio * (1 + x)) for b in spindle.roller_bearings)
     return replace(spindle, bearings=rows, linear_bearings=given, roller_bearings=rollers)
+
+
+def _scale_clearance(name: str) -> Callable[[Spindle, float], Spindle]:
+    def apply(spindle: Spindle, x: float) -> Spindle:
+        scaled = (replace(b, clearance=(1 + x) * b.clearance) if b.name == name else b for b in spindle.roller_bearings)
+        return replace(spindle, roller_bearings=tuple(scaled))
+
+    return apply
 
 
 def _scale_linear_bearing(name: str) -> Callable[[Spindle, float], Spindle]:

@@ -88,7 +88,7 @@ def _beside(spindle: Spindle, seen: Seen, points: tuple[Point, ...]) -> RunoutBe
     by_node = {p.node: p for p in points}
     own = phasors(point, point.imperfections, [by_node[n] for n in seen.nodes])
     turning = abs(seen.condition.speed) / (2 * np.pi)
-    balls = {b.name: b.balls for b in point.spindle.bearings}
+    balls = {b.name: b.balls for b in point.spindle.rolling}
     random = np.random.default_rng(0)
     starts = [phasors(point, set_down(point.imperfections, balls, random), [by_node[n] for n in seen.nodes]) for _ in range(STARTS)]
     builds = scatter(spindle, point, [by_node[n] for n in seen.nodes])

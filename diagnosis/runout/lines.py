@@ -145,6 +145,8 @@ def slipped(kin: Mapping[str, Kinematics], slip: float) -> dict[str, Kinematics]
     """Cage and ball speeds with d cos(angle) / D changed by a relative `slip` in every bearing."""
 
     def of(k: Kinematics) -> Kinematics:
+        if not k.angled or k.outer == k.inner:
+            return k
         gamma = (2 * k.cage - k.inner - k.outer) / (k.outer - k.inner)
         changed = gamma * (1 + slip)
         cage = (k.inner * (1 - changed) + k.outer * (1 + changed)) / 2

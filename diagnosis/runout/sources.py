@@ -99,11 +99,11 @@ def units(spindle: Spindle) -> dict[str, Imperfections]:
     """Imperfections in which every source has the amplitude 1."""
     body = spindle.turning
     first, second = {}, {}
-    for b in spindle.bearings:
+    for b in spindle.rolling:
         orders = [1, *(k * b.balls + by for k in range(1, MULTIPLE + 1) for by in (-1, 0, 1))]
         waves = tuple(Wave(n, 1.0, 0.0) for n in orders)
-        balls = (tuple(Wave(n, 1.0, 0.0) for n in range(2, 2 * MULTIPLE + 1, 2)), *[()] * (b.balls - 1))
-        first[b.name] = RowImperfections(waves, (), waves, (), (1.0, *[0.0] * (b.balls - 1)), balls, 1.0)
+        balls = (tuple(Wave(n, 1.0, 0.0) for n in range(2, 2 * MULTIPLE + 1, 2)), *[()] * (b.elements - 1))
+        first[b.name] = RowImperfections(waves, (), waves, (), (1.0, *[0.0] * (b.elements - 1)), balls, 1.0)
         second[b.name] = RowImperfections((), waves, (), waves)
     return {FIRST: Imperfections(1.0, body.z, bearings=first), SECOND: Imperfections(couple_unbalance=1.0, bearings=second)}
 
@@ -145,15 +145,15 @@ def _likely(spindle: Spindle, made: Imperfections, source: SourceKey) -> float:
     if cause == "unbalance":
         body = spindle.turning
         static = 0.5 * spindle.turning_mass * GRADE.balance / spindle.nominal_speed
-        span = max(b.z for b in spindle.bearings) - min(b.z for b in spindle.bearings)
+        span = max(b.z for b in spindle.rolling) - min(b.z for b in spindle.rolling)
         sizes = [scene.unbalance or static, made.unbalance]
         if which == SECOND:
             sizes = [scene.couple_unbalance or 0.5 * span * static, made.couple_unbalance + made.unbalance * abs(made.unbalance_z - body.z)]
         return max(sizes)
-    row, rows = made.row(bearing), [scene.row(b.name) for b in spindle.bearings]
+    row, rows = made.row(bearing), [scene.row(b.name) for b in spindle.rolling]
     if cause == "cage unbalance":
         return max(_rms([r.cage_unbalance for r in rows]) or CAGE, row.cage_unbalance)
-    balls = spindle.bearing(bearing).balls
+    balls = next(b.elements for b in spindle.rolling if b.name == bearing)
     if cause == "ball size":
         level = _rms([d for r in rows for d in r.ball_diameter]) or GRADE.ball_lot / np.sqrt(12)
         return float(

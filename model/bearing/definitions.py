@@ -39,6 +39,11 @@ class Bearing:
     rated_stiffness: float | None = None  # N/m, radial, as a catalogue or designer states it
 
     @property
+    def elements(self) -> int:
+        """How many balls there are."""
+        return self.balls
+
+    @property
     def unloaded_distance(self) -> float:
         """Distance of the groove curvature centres at zero load, (f_i + f_o - 1) d_B: Jang et al. 2003, Eq. (2)."""
         return (self.inner_conformity + self.outer_conformity - 1.0) * self.ball_diameter
@@ -89,6 +94,16 @@ class RollerBearing:
     def ball_diameter(self) -> float:
         """Diameter of the rolling elements, under the name that ball rows have for it."""
         return self.roller_diameter
+
+    @property
+    def balls(self) -> int:
+        """Rolling elements that pass a place of one row's race in a turn of the cage, under the name that ball rows have for it."""
+        return self.rollers
+
+    @property
+    def elements(self) -> int:
+        """How many rollers there are, of all rows."""
+        return self.rows * self.rollers
 
     @property
     def ball_material(self) -> str:

@@ -21,7 +21,8 @@ ball waviness      2 k                   radial     2 k f_ball + f_cage and f_ca
 ball waviness      2 k                   axial      2 k f_ball
 =================  ====================  =========  ==========================================================
 
-Odd orders of a ball lift it at one contact as much as they lower it at the opposite one and cancel to first order.
+Odd orders of a ball lift it at one contact as much as they lower it at the opposite one and cancel to first order. Cylindrical rollers have the
+same lines under the same names, Z those of one row and the contact angle 0, but none along the axis, in which they are free.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from thermospindle.model.bearing.pair import BearingState, PairState, ring_speeds
-from thermospindle.model.machine import Bearing, Spindle
+from thermospindle.model.machine import Bearing, RollerBearing, Spindle
 
 SMALLEST = 1e-9
 """Frequency (Hz) below which a line is a displacement that stands still, not an excitation."""
@@ -43,7 +44,7 @@ class Kinematics:
     """Angular speeds of one ball row (rad/s), signed like the spindle's, positive about +z.
 
     `inner`, `outer`: rings; `cage`: the set of balls about the spindle axis; `spin`: a ball about its own axis, seen from the cage, a
-    magnitude.
+    magnitude; `balls` those of one row, or its rollers, whose `angled` is False: no contact angle moves their lines, and none are axial.
     """
 
     inner: float
@@ -51,6 +52,7 @@ class Kinematics:
     cage: float
     spin: float
     balls: int
+    angled: bool = True
 
     @property
     def over_inner(self) -> float:
@@ -100,21 +102,27 @@ def kinematics(
     Where ball inertia makes the inner and outer contact angles differ, their mean is taken.
     """
     angle = (bearing.contact_angle + bearing.outer_contact_angle) / 2
-    ratio = ball_diameter / pitch_diameter
+    return rolling(angle, balls, ball_diameter / pitch_diameter, inner_speed, outer_speed)
+
+
+def rolling(angle: float, balls: int, ratio: float, inner_speed: float, outer_speed: float, angled: bool = True) -> Kinematics:
+    """Speeds of rolling elements without slip at a contact `angle` (rad), `ratio` their diameter over the pitch diameter."""
     gamma = ratio * np.cos(angle)
     cage = (inner_speed * (1 - gamma) + outer_speed * (1 + gamma)) / 2
     spin = abs(outer_speed - inner_speed) * (1 - gamma**2) / (2 * ratio)
-    return Kinematics(inner_speed, outer_speed, float(cage), float(spin), balls)
+    return Kinematics(inner_speed, outer_speed, float(cage), float(spin), balls, angled)
 
 
 def row_kinematics(spindle: Spindle, state: PairState) -> dict[str, Kinematics]:
-    """Cage and ball speeds of every bearing of a spindle at its operating point, by name."""
+    """Cage and rolling element speeds of every ball and roller bearing of a spindle at its operating point, by name."""
 
-    def of(b: Bearing) -> Kinematics:
+    def of(b: Bearing | RollerBearing) -> Kinematics:
         inner, outer = ring_speeds(spindle, b, state.condition.speed)
+        if isinstance(b, RollerBearing):
+            return rolling(0.0, b.rollers, b.roller_diameter / b.pitch_diameter, inner, outer, angled=False)
         return kinematics(state.bearing(b.name), b.balls, b.ball_diameter, b.pitch_diameter, inner, outer)
 
-    return {b.name: of(b) for b in spindle.bearings}
+    return {b.name: of(b) for b in spindle.rolling}
 
 
 # ---------------------------------------------------------------- lines
@@ -179,19 +187,20 @@ def _radial(bearing: str, cause: str, order: int, name: str, speed: float, kin: 
 def lines(spindle: Spindle, kinematics_by_bearing: Mapping[str, Kinematics], highest_multiple: int = 3, speed: float = 0.0) -> list[Line]:
     """All lines of linear theory for k up to `highest_multiple`, multiples of Z and even ball orders alike, in order of frequency.
 
-    `speed` (rad/s) is the spindle's where it has no ball row to tell. Orders that stand still (order 1 of a ring at rest, anything at speed zero) excite nothing and are left out.
+    `speed` (rad/s) is the spindle's where it has no rolling bearing to tell. Orders that stand still (order 1 of a ring at rest, anything at speed zero) excite nothing and are left out.
     """
     found: list[Line] = []
-    for name in (b.name for b in spindle.bearings):
+    for name in (b.name for b in spindle.rolling):
         kin = kinematics_by_bearing[name]
         found += [cage_line(name, kin, "ball size"), cage_line(name, kin, "cage unbalance")]
         for side in ("inner", "outer"):
             found.append(race_line(name, kin, side, 1, "radial"))
             for passes in range(kin.balls, highest_multiple * kin.balls + 1, kin.balls):
                 found += [race_line(name, kin, side, passes + by, "radial") for by in (-1, 1)]
-                found.append(race_line(name, kin, side, passes, "axial"))
+                found += [race_line(name, kin, side, passes, "axial")] if kin.angled else []
         for order in range(2, 2 * highest_multiple + 1, 2):
-            found += [ball_line(name, kin, order, "radial", by) for by in (-1, 1)] + [ball_line(name, kin, order, "axial")]
+            found += [ball_line(name, kin, order, "radial", by) for by in (-1, 1)]
+            found += [ball_line(name, kin, order, "axial")] if kin.angled else []
     if kinematics_by_bearing:
         speed = next(iter(kinematics_by_bearing.values())).turning
     found.append(unbalance_line(speed))

@@ -20,7 +20,7 @@ from thermospindle.model.bearing.movement import balanced
 from thermospindle.model.bearing.roller import RollerState, roller_state
 from thermospindle.model.bearing.state import ByDirection, LinearState
 from thermospindle.model.errors import BadInput, NoEquilibrium, OutsideRange
-from thermospindle.model.machine import Bearing, BearingSet, Condition, LinearBearing, RingMotion, Spindle
+from thermospindle.model.machine import Bearing, BearingSet, Condition, LinearBearing, RingMotion, RollerBearing, Spindle
 from thermospindle.model.types import Array
 
 TOUCHING = 1e-9
@@ -318,7 +318,7 @@ def _ball_inertia(spindle: Spindle, b: Bearing, speed: float) -> BallInertia | N
     return BallInertia(b.ball_diameter, b.pitch_diameter, density, inner, outer, spindle.ball_inertia)
 
 
-def ring_speeds(spindle: Spindle, b: Bearing, speed: float) -> tuple[float, float]:
+def ring_speeds(spindle: Spindle, b: Bearing | RollerBearing, speed: float) -> tuple[float, float]:
     """Speeds (rad/s) of the inner and the outer ring of a bearing where the spindle turns at `speed`."""
 
     def of(name: str) -> float:

@@ -42,7 +42,10 @@ __all__ = ["Finite", "Name", "NotNegative", "Point", "Positive", "Scene", "Table
 
 
 class Tolerances(Table):
-    """One standard deviation of build and measurement; every key has an assumed default, that of careful small-series work."""
+    """One standard deviation of build and measurement; every key has an assumed default, that of careful small-series work.
+
+    `preload` is also that of the clearance of mounted rollers.
+    """
 
     structure: Positive = 0.015
     hub: Positive = 0.004
@@ -139,12 +142,15 @@ class Scene(Table):
 
     @model_validator(mode="after")
     def _imperfections_fit_the_bearings(self) -> Scene:
+        rolling = {n: b.row for n, b in self.bearings.items() if b.row in self.ball_rows or b.row in self.roller_rows}
         for name, row in self.imperfections.bearings.items():
-            if name not in self.bearings or (own := self.bearings[name].row) is None or own not in self.ball_rows:
-                rows = [n for n, b in self.bearings.items() if b.row in self.ball_rows]
-                raise ValueError(f"imperfections.bearings.{name}: names no bearing with a ball row; allowed are {', '.join(rows)}")
+            if (own := rolling.get(name)) is None:
+                raise ValueError(f"imperfections.bearings.{name}: names no bearing with a ball or roller row; allowed are {', '.join(rolling)}")
             try:
-                row.check(self.ball_rows[own].balls)
+                if own in self.ball_rows:
+                    row.check(self.ball_rows[own].balls)
+                else:
+                    row.check(self.roller_rows[own].rows * self.roller_rows[own].rollers, rollers=True)
             except ValueError as error:
                 raise ValueError(f"imperfections.bearings.{name}.{error}") from None
         return self
@@ -238,7 +244,7 @@ class Scene(Table):
             roller_bearings=tuple(sorted(rollers, key=lambda b: b.z)),
             effects=tuple(m.Addition(effect=e.name, values=dict(e.values)) for e in self.effects),
             build=self.build.build() if self.build else None,
-            imperfections=self.imperfections.imperfections({b.name: b.balls for b in bearings}),
+            imperfections=self.imperfections.imperfections({b.name: b.elements for b in bearings} | {b.name: b.elements for b in rollers}),
             provenance=provenance | assumed(self, provenance),
             file=file,
         )

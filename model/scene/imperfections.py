@@ -60,14 +60,16 @@ class RowImperfections(Table):
     cage_unbalance_g_mm: NotNegative = 0.0
     cage_phase_deg: Finite = 0.0
 
-    def check(self, balls: int) -> None:
-        """Raises ValueError for a list that does not hold one value for every ball."""
+    def check(self, balls: int, rollers: bool = False) -> None:
+        """Raises ValueError for a list that does not hold one value for every ball, or roller of all rows, and for what rollers do not feel."""
+        if rollers and (self.inner_axial or self.outer_axial):
+            raise ValueError(f"{'inner' if self.inner_axial else 'outer'}_axial: cylindrical rollers do not feel it; allowed are inner_radial and outer_radial")
         for key, values in (
             ("ball_diameter_nm", self.ball_diameter_nm),
             *((f"ball_waves.{n}.{key}", getattr(w, key)) for n, w in enumerate(self.ball_waves) for key in ("amplitude_nm", "phase_deg")),
         ):
             if len(values) != balls and (values or key != "ball_diameter_nm"):
-                raise ValueError(f"{key}: has {len(values)} values; allowed is one for each of the {balls} balls")
+                raise ValueError(f"{key}: has {len(values)} values; allowed is one for each of the {balls} {'rollers, row by row' if rollers else 'balls'}")
 
     def row(self, balls: int) -> i.RowImperfections:
         races = [w.waves() if w else () for w in (self.inner_radial, self.inner_axial, self.outer_radial, self.outer_axial)]

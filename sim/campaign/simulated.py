@@ -27,14 +27,14 @@ SECONDS = 0.6
 
 
 def set_down(imperfections: Imperfections, balls: Mapping[str, int], random: np.random.Generator) -> Imperfections:
-    """The same imperfections with every ball set at another azimuth, and every ball turned; `balls` of each bearing."""
+    """The same imperfections with every ball set at another azimuth, and every ball turned; `balls` of each bearing's rows."""
     rows = {name: _set_down(row, balls[name], random) for name, row in imperfections.bearings.items()}
     return replace(imperfections, bearings=rows)
 
 
 def _set_down(row: RowImperfections, balls: int, random: np.random.Generator) -> RowImperfections:
     further, turned = int(random.integers(balls)), float(random.uniform(0, 2 * np.pi))
-    spins = random.uniform(0, 2 * np.pi, balls)
+    spins = random.uniform(0, 2 * np.pi, len(row.ball_waves) or balls)
 
     def seen(waves: tuple[Wave, ...]) -> tuple[Wave, ...]:
         """A row `turned` / Z on meets the waves it feels, of order k Z or k Z +- 1, so much of k Z later; their own place on the ring stays."""
@@ -87,7 +87,7 @@ def runout_campaign(
     `path` is simulated (MuJoCo) or linear (the exact harmonic answer).
     """
     random = np.random.default_rng(seed)
-    points, balls = hub_points(spindle), {b.name: b.balls for b in spindle.bearings}
+    points, balls = hub_points(spindle), {b.name: b.balls for b in spindle.rolling}
     made = []
     for condition in conditions:
         if condition.speed == 0.0:

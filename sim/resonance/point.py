@@ -104,11 +104,11 @@ def unit_imperfections(spindle: Spindle, multiples: int) -> Imperfections:
         return tuple(Wave(n, UNIT_WAVE, 0.0) for n in orders)
 
     rows = {}
-    for b in spindle.bearings:
+    for b in spindle.rolling:
         axial = [b.balls * k for k in range(1, multiples + 1)]
         radial = waves([1, *sorted([n - 1 for n in axial] + [n + 1 for n in axial])])
-        balls = (waves(range(2, 2 * multiples + 1, 2)), *[()] * (b.balls - 1))
-        sizes = (UNIT_WAVE, *[0.0] * (b.balls - 1))
+        balls = (waves(range(2, 2 * multiples + 1, 2)), *[()] * (b.elements - 1))
+        sizes = (UNIT_WAVE, *[0.0] * (b.elements - 1))
         rows[b.name] = RowImperfections(radial, waves(axial), radial, waves(axial), sizes, balls, UNIT_UNBALANCE)
     body = spindle.turning
     return Imperfections(unbalance=UNIT_UNBALANCE, unbalance_z=body.z, bearings=rows)

@@ -9,10 +9,12 @@ moving_balls  ball by ball, with the balls moving: the second way to the running
 revolutions   A running record cut into whole revolutions: what repeats in every one of them, and what does not
 run           the running spindle in time: MuJoCo under the forces of its imperfections, at constant speed, in run-up
               and in coast-down
+rollers       what cylindrical rollers feel of waves and of their own sizes, for the excitation
 runout        runout of a turning spindle: what probes at points in space see, what of it repeats, which lines it holds
               and why
 steady        runout in the steady state from the lines alone, exactly and without a record
 waterfall     line spectra over speed: what a run-up passes through, steady at every speed, with the natural frequencies
               it crosses
+whirl         phasors of what whirls about the axis
 ============  ==========================================================================================================
 """

@@ -11,6 +11,8 @@ contacts. The bearing then pulls with K (q - u) + C (q' - u') instead of K q + C
 order 1) moves its ring by exactly that, whatever stands in series with the row. On the outer body act K u + C u', on the inner one
 the opposite. Sums over balls are taken in numbers: orders that cancel are found to cancel, not said to.
 
+Roller bearings do the same with line contacts (`sim.running.rollers`).
+
 Unbalance U at its height gives U omega^2, a couple unbalance W the moment W omega^2. An unbalanced cage is taken as guided by the outer
 ring: U omega_cage^2 acts on the outer body at the bearing.
 
@@ -43,6 +45,8 @@ from thermospindle.model.rotor.chain import RotorBase, element_rows, matrices, m
 from thermospindle.model.rotor.modes import LARGE, Poles, poles
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.operating import OperatingPoint
+from thermospindle.sim.running.rollers import free_displacements as rollers_displaced
+from thermospindle.sim.running.whirl import whirling
 
 CANCELLED = 1e-11
 """Share of the largest possible sum over the balls below which an order has cancelled; rounding leaves some 1e-15."""
@@ -126,16 +130,19 @@ def excitation(point: OperatingPoint, imperfections: Imperfections | None = None
     for line, force in _unbalance(point, present):
         add(line, 2, force)
     chain, elements = point.chain, {e.name: e for e in point.chain.elements}
+    bearings = {b.name: b for b in point.spindle.rolling}
     for name, kin in row_kinematics(point.spindle, point.state).items():
-        bearing, own, element = point.state.bearing(name), present.row(name), elements[name]
+        bearing, own, element = bearings[name], present.row(name), elements[name]
         if own.cage_unbalance:
-            whirl = _whirling(own.cage_unbalance * np.exp(1j * own.cage_phase), kin.cage)
-            outer = motion_rows(chain, point.spindle.bearing(bearing.name).outer_body, (0.0, 0.0, bearing.z))
+            whirl = whirling(own.cage_unbalance * np.exp(1j * own.cage_phase), kin.cage)
+            outer = motion_rows(chain, bearing.outer_body, (0.0, 0.0, bearing.z))
             add(cage_line(name, kin, "cage unbalance"), 2, whirl @ outer[:2])
         rows = element_rows(chain, element)
         to_element = np.eye(5)  # of a bending shaft, the element may stand at another height than its bearing
         to_element[0, 4], to_element[1, 3] = element.z - bearing.z, bearing.z - element.z
-        for line, free in free_displacements(bearing, kin, own):
+        rollers = point.state.rollers.get(name)
+        displaced = free_displacements(point.state.bearing(name), kin, own) if rollers is None else rollers_displaced(rollers, kin, own)
+        for line, free in displaced:
             free = to_element @ free
             add(line, 0, free @ element.stiffness @ rows)
             add(line, 1, free @ element.damping @ rows)
@@ -148,16 +155,9 @@ def _unbalance(point: OperatingPoint, own: Imperfections) -> Iterator[tuple[Line
     speed = point.condition.speed
     rows = motion_rows(point.chain, turning_at(point.chain, own.unbalance_z).name, (0.0, 0.0, own.unbalance_z))
     if own.unbalance:
-        yield unbalance_line(speed), _whirling(own.unbalance * np.exp(1j * own.unbalance_phase), speed) @ rows[:2]
+        yield unbalance_line(speed), whirling(own.unbalance * np.exp(1j * own.unbalance_phase), speed) @ rows[:2]
     if own.couple_unbalance:  # height times a force towards the phase turns about a quarter turn further
-        yield unbalance_line(speed), _whirling(1j * own.couple_unbalance * np.exp(1j * own.couple_phase), speed) @ rows[3:]
-
-
-def _whirling(amplitude: complex, speed: float) -> ComplexArray:
-    """Phasors (2,) of the real and imaginary part of amplitude exp(i speed t), for time dependence exp(+i |speed| t)."""
-    if speed < 0:
-        return np.array([np.conj(amplitude), 1j * np.conj(amplitude)])
-    return np.array([amplitude, -1j * amplitude])
+        yield unbalance_line(speed), whirling(1j * own.couple_unbalance * np.exp(1j * own.couple_phase), speed) @ rows[3:]
 
 
 # ---------------------------------------------------------------- one row
@@ -194,7 +194,7 @@ def free_displacements(bearing: BearingState, kin: Kinematics, own: RowImperfect
         for side, across in ((1, plus[n]), (-1, minus[n])):
             if abs(across) > limit[n]:
                 speed = kin.cage + side * f.rate
-                force, moment = _whirling(f.pull[0] * across, speed), _whirling(-1j * bearing.row.arm * f.pull[1] * across, speed)
+                force, moment = whirling(f.pull[0] * across, speed), whirling(-1j * bearing.row.arm * f.pull[1] * across, speed)
                 found.append((f.line("radial", side), np.array([*force, 0, *moment])))
     compliance = np.linalg.inv(respond(bearing.row).tangent)
     return [(line, -compliance @ force) for line, force in found]

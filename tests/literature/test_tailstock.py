@@ -12,11 +12,12 @@ import pytest
 
 from tests.conftest import ROOT
 from thermospindle.cli import main
-from thermospindle.model.bearing.roller import respond, roller_row
+from thermospindle.model.bearing.roller import respond, roller_row, roller_state
 from thermospindle.model.errors import OutsideRange
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.static import static
 from thermospindle.model.scene.reading import load, shipped_rows
+from thermospindle.model.tolerance import deviated, toleranced
 from thermospindle.model.units import RPM
 from thermospindle.report.log.content import bearing_series
 from thermospindle.report.page.report import bearing_figures
@@ -133,6 +134,17 @@ def test_the_nose_by_the_force_method(tail, cold):
     nose = static(tail, cold.chain, tail.points[0])
     assert 1 / nose.stiffness == pytest.approx(compliance_by_forces(springs) + clamp, rel=2e-3)
     assert nose.reactions["front1"] < -1  # as a lever: more than the force itself
+
+
+def test_the_clearance_of_rollers_is_a_tolerance(stiff):
+    """Of rigid races: the load of all rollers goes with the 10/9th power of what they are pressed by, their stiffness with the 9th root."""
+    own = next(p for p in toleranced(stiff) if p.name == "front1 clearance")
+    assert own.sd == stiff.tolerances.preload == 0.1
+    before, after = (roller_state(s, s.roller_bearings[0], None, 20.0) for s in (stiff, own.apply(stiff, 0.1)))
+    assert after.clearance == pytest.approx(-2.75e-6, rel=1e-12)
+    assert after.load / before.load == pytest.approx(1.1 ** (10 / 9), rel=1e-9)
+    assert after.radial_stiffness / before.radial_stiffness == pytest.approx(1.1 ** (1 / 9), rel=1e-9)
+    assert deviated(stiff, {"front1 clearance": 0.1}).roller_bearings == own.apply(stiff, 0.1).roller_bearings
 
 
 @pytest.mark.slow
