@@ -16,7 +16,7 @@ from thermospindle.options import parsers
 
 ANSWERS = tomllib.loads((ROOT / "docs" / "site" / "answers.toml").read_text(encoding="utf-8"))
 MEASURED = SCENE / "measured" / "jang_2003"
-SERVED = {"workbench"}  # goes on until it is stopped: tests/report/test_workbench_browser.py compares its answer
+SERVED = {"workbench"}  # goes on until it is stopped: tests/report/test_workbench_served.py compares its answer
 
 
 @pytest.fixture(scope="module")

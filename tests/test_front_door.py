@@ -3,20 +3,18 @@
 import inspect
 import json
 import os
-import re
 import subprocess
 import sys
-import time
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 
-import numpy as np
 import pytest
 
+from tests.command_line import changed_scene, refused
 from tests.conftest import SCENE
 from thermospindle import cli
 from thermospindle.cli import main
-from thermospindle.model.scene.reading import load
 from thermospindle.options import parsers
 from thermospindle.report.verbs.states import modes, table
 
@@ -24,34 +22,9 @@ ROOT = Path(__file__).parents[1]
 HERE = os.environ | {"PYTHONPATH": str(ROOT)}
 
 
-def refused(capsys, *arguments):
-    """The one sentence a refused call says."""
-    try:
-        code = main([str(a) for a in arguments])
-    except SystemExit as stop:
-        code = stop.code
-    captured = capsys.readouterr()
-    assert code == 2
-    assert captured.out == ""
-    assert len(captured.err.strip().splitlines()) == 1
-    assert captured.err.startswith("spindle: ")
-    return captured.err
-
-
 @pytest.fixture
 def scene(tmp_path):
-    """A copy of the scene's file with some text replaced."""
-
-    def changed(*pairs, count=1):
-        text = (SCENE / "spindle.toml").read_text(encoding="utf-8")
-        for old, new in pairs:
-            assert re.search(old, text)
-            text = re.sub(old, new, text, count=count)
-        (tmp_path / "s").mkdir(exist_ok=True)
-        (tmp_path / "s" / "spindle.toml").write_text(text, encoding="utf-8")
-        return tmp_path / "s"
-
-    return changed
+    return partial(changed_scene, tmp_path)
 
 
 # ---------------------------------------------------------------- parsing
@@ -240,135 +213,3 @@ def test_a_campaign_folder_may_look_like_markup(capsys, tmp_path, scene):
     out = tmp_path / "x[" / "b]y"
     assert main(["simulate", str(small), "--temperatures", "20", "--out", str(out)]) == 0
     assert f"{out}: 1 tests: T20_n0" in capsys.readouterr().out
-
-
-# ---------------------------------------------------------------- scenes at the edge
-
-
-def test_one_hit_is_enough(capsys, scene):
-    """A single hit has no scatter, so no standard errors: FRFs go without them, and `run` no longer fails at the end."""
-    small = scene((r"record_length_s = .*", "record_length_s = 0.10"))
-    out = small.parent / "c"
-    assert main(["simulate", str(small), "--temperatures", "20", "--hits", "1", "--out", str(out)]) == 0
-    assert main(["compare", str(SCENE), str(out), "--json"]) == 0
-    capsys.readouterr()
-
-
-def test_a_hammer_without_force_in_the_band_is_refused_before_simulating(capsys, scene):
-    """100 g on a tip of 6e6 N/m: the pulse's first zero lies at 3698 Hz, where FRFs were noise and the driving point 'negative'."""
-    soft = scene((r"hammer_mass_g = .*", "hammer_mass_g = 100.0"), (r"band_Hz = .*", "band_Hz = [50, 4000]"))
-    start = time.perf_counter()
-    assert "this hammer gives no force above 3698 Hz, band_Hz goes to 4000 Hz" in refused(capsys, "impact", soft)
-    assert time.perf_counter() - start < 20
-
-
-EDGE = [
-    ("reference_temperature_C = .*", "reference_temperature_C = 2e101", "reference_temperature_C"),
-    ("youngs_modulus_GPa = .*", "youngs_modulus_GPa = 1e300", "youngs_modulus_GPa"),
-    ("youngs_modulus_GPa = .*", "youngs_modulus_GPa = 1e-9", "must lie between 0.001 and 2000"),
-    ("poisson_ratio = .*", "poisson_ratio = 0.4999999", "poisson_ratio"),
-    ("thermal_expansion_um_per_m_K = .*", "thermal_expansion_um_per_m_K = 1.7e308", "thermal_expansion_um_per_m_K"),
-    ("density_kg_per_m3 = .*", "density_kg_per_m3 = 1e300", "density_kg_per_m3"),
-    ("balls = .*", "balls = 0x" + "f" * 4000, "balls = a int too long to be written"),
-    ("balls = .*", "balls = 1" + 79 * "0", "less than or equal to 1000"),
-    ("node = 1\n", "node = 0x" + "f" * 4000 + "\n", "node"),
-    ("mass_kg = .*", "mass_kg = 1e-300", "mass_kg"),
-    ("preload_N = .*", "preload_N = 1e9", "less than or equal to 10000000"),
-    ("preload_N = .*", 'preload_N = "16"', "valid number"),
-    ("record_length_s = .*", "record_length_s = 1e-4", "modes need 50 at least"),
-    ("record_length_s = .*", "record_length_s = 1e6", "record_length_s"),
-    ("band_Hz = .*", "band_Hz = [1000, 1000.5]", "modes need 50 at least"),
-    ("step_us = .*", "step_us = 1e-9", "steps of integration"),
-    ("hits = .*", "hits = 1000000", "less than or equal to 1000"),
-    ("exponential_end = .*", "exponential_end = 1e-300", "exponential_end"),
-    ("level_N = .*", "level_N = 1e9", "level_N"),
-    ("position_mm = .*", "position_mm = [1e300, 0, 0]", "position_mm"),
-    ("r_mm = .*", "r_mm = [0, 1e9]", "r_mm"),
-    (r"\Z", "\nx = " + 2000 * "[" + 2000 * "]", "nested too deep"),
-    (r"\Z", "\nx = " + 5000 * "1", "not a TOML file"),
-]
-
-
-@pytest.mark.parametrize(("old", "new", "said"), EDGE, ids=[f"{e[0][:12]} {e[1][-12:]}".strip() for e in EDGE])
-def test_numbers_that_cannot_be_computed_with_are_refused(capsys, scene, old, new, said):
-    message = refused(capsys, "modes", scene((old, new)))
-    assert said in message
-    assert len(message) < 600
-
-
-def test_a_scene_has_a_limit_of_regions(capsys, scene):
-    more = "".join(f'\n[[section.regions]]\nname = "g{i}"\npart = "rotating"\nmaterial = "steel"\nr_mm = [1, 2]\nz_mm = [1, 2]\n' for i in range(301))
-    assert "at most 300" in refused(capsys, "modes", scene((r"\Z", more)))
-
-
-@pytest.mark.parametrize("name", ["modes.csv", "campaign.toml"])
-def test_a_pipe_is_no_file(capsys, tmp_path, name):
-    (tmp_path / "c").mkdir()
-    source = (SCENE / "measured" / "jang_2003" / "campaign.toml").read_text()
-    (tmp_path / "c" / "campaign.toml").write_text(source)
-    (tmp_path / "c" / name).unlink(missing_ok=True)
-    os.mkfifo(tmp_path / "c" / name)
-    assert "no such file" in (said := refused(capsys, "compare", SCENE, tmp_path / "c")) or "no campaign there" in said
-
-
-# ---------------------------------------------------------------- other files
-
-
-DAMAGED = [
-    '{"candidates": [{"effects": [3], "parameters": {}}]}',
-    '{"candidates": [{"effects": [["preload_loss"]], "parameters": {}}]}',
-    '{"candidates": [], "tolerances": {"a": {"value": 1' + 400 * "0" + "}}}",
-    '{"candidates": [], "tolerances": {"a": {"value": NaN}}}',
-    '{"candidates": [{"effects": ["preload_loss"], "parameters": {"loss": {"value": 1' + 400 * "0" + "}}}]}",
-    '{"candidates": [{"effects": ["preload_loss"], "parameters": {"loss": {"value": Infinity}}}]}',
-    100000 * "[",
-]
-
-
-@pytest.mark.parametrize("text", DAMAGED, ids=lambda t: t[:60])
-def test_answers_of_another_form_are_refused(capsys, tmp_path, text):
-    (tmp_path / "d.json").write_text(text)
-    said = refused(capsys, "add", SCENE, "preload_loss", "--from", tmp_path / "d.json", "--out", tmp_path / "n")
-    assert "is not an answer of spindle diagnose" in said or "must be a finite number" in said
-
-
-def test_a_log_that_aborts_its_reader_is_refused(capsys, tmp_path, monkeypatch):
-    """The native library kills its process on some damaged logs; a child process dies in place of this one."""
-    from thermospindle.report.log import read
-
-    (tmp_path / "a.rrd").write_bytes(b"RRF2")
-    monkeypatch.setattr(read, "TRIAL", "import os; os.abort()")
-    assert "a.rrd: is damaged; the library that reads Rerun logs breaks off on it" in refused(capsys, "inspect", tmp_path / "a.rrd")
-
-
-def test_the_stiffness_table_is_finite(tmp_path):
-    from thermospindle.model.bearing.stiffness_table import read_table
-    from thermospindle.model.errors import BadInput
-
-    table(SCENE, [20.0], out=tmp_path / "t")
-    file = tmp_path / "t" / "table.csv"
-    lines = file.read_text().splitlines()
-    (tmp_path / "a.csv").write_text("\n".join([*lines[:3], lines[3].rsplit(",", 1)[0] + ",inf", *lines[4:]]))
-    with pytest.raises(BadInput, match="infinite"):
-        read_table(tmp_path / "a.csv")
-    (tmp_path / "b.csv").write_text("\n".join(lines[:3]))
-    with pytest.raises(BadInput, match="gaps"):
-        read_table(tmp_path / "b.csv")
-
-
-def test_a_loose_hub_has_no_nan(recwarn):
-    """Bearings without contact hold nothing: a free body does not oscillate, and its share of strain energy was 0 / 0."""
-    from dataclasses import replace
-
-    from thermospindle.model.machine import Condition
-    from thermospindle.model.rotor.chain import matrices
-    from thermospindle.model.rotor.modes import modes as modes_of
-    from thermospindle.sim.operating import operating_point
-
-    chain = operating_point(load(SCENE), Condition(20.0)).chain
-    loose = replace(chain, elements=tuple(replace(e, stiffness=0 * e.stiffness, damping=0 * e.damping) if e.group == "bearings" else e for e in chain.elements))
-    assert matrices(loose).stiffness.shape == matrices(chain).stiffness.shape
-    found = modes_of(loose)
-    assert found
-    assert all(m.frequency > 1 and np.isclose(sum(m.energy.values()), 1) for m in found)
-    assert not recwarn.list

@@ -79,35 +79,28 @@ def _temperature(text: str) -> float:
     return value
 
 
-def _count(most: int) -> Callable[[str], int]:
-    def count(text: str) -> int:
-        if not (text.isascii() and text.isdigit()) or len(text) > 9 or not 1 <= int(text) <= most:
-            raise argparse.ArgumentTypeError(f"{text} is not a count of one or more, up to {most}")
+def _whole(least: int, most: int, what: str) -> Callable[[str], int]:
+    def whole(text: str) -> int:
+        if not (text.isascii() and text.isdigit()) or len(text) > 18 or not least <= int(text) <= most:
+            raise argparse.ArgumentTypeError(f"{text} is not {what}")
         return int(text)
 
-    return count
+    return whole
 
 
-def _port(text: str) -> int:
-    if not (text.isascii() and text.isdigit()) or not 1 <= int(text) <= 65535:
-        raise argparse.ArgumentTypeError(f"{text} is not a port, 1 to 65535")
-    return int(text)
+def _count(most: int) -> Callable[[str], int]:
+    return _whole(1, most, f"a count of one or more, up to {most}")
 
 
-def _seed(text: str) -> int:
-    if not (text.isascii() and text.isdigit()) or len(text) > 18:
-        raise argparse.ArgumentTypeError(f"{text} is not a whole number from 0 to 18 digits")
-    return int(text)
+_port = _whole(1, 65535, "a port, 1 to 65535")
+_seed = _whole(0, 10**18 - 1, "a whole number from 0 to 18 digits")
 
 
 def _setting(text: str) -> tuple[str, float]:
     name, equals, value = text.partition("=")
     if not (name and equals):
         raise argparse.ArgumentTypeError(f"{text!r} is not of the form name=value")
-    try:
-        return name, _number(value)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r}: {value!r} is not a number") from None
+    return name, _number(value)
 
 
 # ---------------------------------------------------------------- verbs and their options

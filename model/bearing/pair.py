@@ -18,9 +18,9 @@ from thermospindle.model.bearing.ball_row import BallInertia, BallRow, RowForce,
 from thermospindle.model.bearing.hertz import in_series, race_contact
 from thermospindle.model.bearing.movement import balanced
 from thermospindle.model.bearing.roller import RollerState, roller_state
-from thermospindle.model.bearing.state import ByDirection, LinearState
-from thermospindle.model.errors import BadInput, NoEquilibrium, OutsideRange
-from thermospindle.model.machine import Bearing, BearingSet, Condition, LinearBearing, RingMotion, RollerBearing, Spindle
+from thermospindle.model.bearing.state import ByDirection, LinearState, linear_state
+from thermospindle.model.errors import BadInput, NoEquilibrium
+from thermospindle.model.machine import Bearing, BearingSet, Condition, RingMotion, RollerBearing, Spindle
 from thermospindle.model.types import Array
 
 TOUCHING = 1e-9
@@ -232,24 +232,6 @@ def _many_positions(
     if np.abs(end.fun).max() > 1e-6:
         raise NoEquilibrium(f"the bearings between {', '.join(carriers)} find no axial equilibrium")
     return {name: float(m) for name, m in zip(names, motion @ (1e-6 * end.x), strict=True)}
-
-
-def linear_state(spindle: Spindle, b: LinearBearing, condition: Condition) -> LinearState:
-    """A bearing given by numbers at a condition, bilinear between those of its table; `OutsideRange` beyond them."""
-    grid = np.reshape(b.stiffness, (len(b.temperature), len(b.speed), 5, 5))
-    at = []
-    for name, unit, values, where in (
-        ("temperature", "C", b.temperature, condition.temperature),
-        ("speed", "rad/s", b.speed, abs(condition.speed)),
-    ):
-        if len(values) > 1 and not values[0] - 1e-9 <= where <= values[-1] + 1e-9:
-            raise OutsideRange(f"the table of bearing {b.name!r} spans {name} {values[0]:g} to {values[-1]:g} {unit} and was asked at {where:g} {unit}")
-        at.append(float(np.interp(where, values, np.arange(len(values)))))
-    i, j = (min(int(x), n - 1) for x, n in zip(at, grid.shape[:2], strict=True))
-    p, q = at[0] - i, at[1] - j
-    i1, j1 = min(i + 1, grid.shape[0] - 1), min(j + 1, grid.shape[1] - 1)
-    k = (1 - p) * ((1 - q) * grid[i, j] + q * grid[i, j1]) + p * ((1 - q) * grid[i1, j] + q * grid[i1, j1])
-    return LinearState(b.name, b.z, k, 2 * b.damping_ratio / (2 * np.pi * spindle.structure.damping_frequency) * k)
 
 
 def contact_status(bearings: tuple[BearingState, ...]) -> str:

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from thermospindle.model.errors import OutsideRange
+from thermospindle.model.machine import Condition, LinearBearing, Spindle
 from thermospindle.model.types import Array
 
 
@@ -38,3 +42,21 @@ class LinearState(ByDirection):
     z: float
     stiffness: Array
     damping: Array
+
+
+def linear_state(spindle: Spindle, b: LinearBearing, condition: Condition) -> LinearState:
+    """A bearing given by numbers at a condition, bilinear between those of its table; `OutsideRange` beyond them."""
+    grid = np.reshape(b.stiffness, (len(b.temperature), len(b.speed), 5, 5))
+    at = []
+    for name, unit, values, where in (
+        ("temperature", "C", b.temperature, condition.temperature),
+        ("speed", "rad/s", b.speed, abs(condition.speed)),
+    ):
+        if len(values) > 1 and not values[0] - 1e-9 <= where <= values[-1] + 1e-9:
+            raise OutsideRange(f"the table of bearing {b.name!r} spans {name} {values[0]:g} to {values[-1]:g} {unit} and was asked at {where:g} {unit}")
+        at.append(float(np.interp(where, values, np.arange(len(values)))))
+    i, j = (min(int(x), n - 1) for x, n in zip(at, grid.shape[:2], strict=True))
+    p, q = at[0] - i, at[1] - j
+    i1, j1 = min(i + 1, grid.shape[0] - 1), min(j + 1, grid.shape[1] - 1)
+    k = (1 - p) * ((1 - q) * grid[i, j] + q * grid[i, j1]) + p * ((1 - q) * grid[i1, j] + q * grid[i1, j1])
+    return LinearState(b.name, b.z, k, 2 * b.damping_ratio / (2 * np.pi * spindle.structure.damping_frequency) * k)

@@ -1,138 +1,20 @@
-"""The workbench served: refusals over real HTTP and websocket, and a real browser that adds, drags, undoes, leaves out, fits and saves."""
+"""The workbench in a real browser, which adds, drags, undoes, leaves out, fits and saves."""
 
-import asyncio
-import json
-import os
 import re
 import signal
-import subprocess
-import sys
 from pathlib import Path
-from urllib.error import HTTPError
-from urllib.request import Request, urlopen
 
 import pytest
-from tornado.httpclient import HTTPClientError, HTTPRequest
-from tornado.websocket import websocket_connect
 
-from tests.conftest import DATA, ROOT, SCENE
+from tests.conftest import DATA, SCENE
 from tests.report.browser import Browser, installed, until
-from tests.test_site import ANSWERS
-from thermospindle.cli import main
-
-CAMPAIGN = SCENE / "measured" / "jang_2003"
-needs_a_browser = pytest.mark.skipif(installed() is None, reason="no Chromium or Chrome is installed on this machine")
-
-
-def started(folder: Path, *more: object) -> tuple[subprocess.Popen, dict]:
-    """`spindle workbench` in a process of its own, and what it printed."""
-    command = [sys.executable, "-m", "thermospindle", "workbench", *map(str, more), "--json", "--no-browser", "--out", str(folder / "saved")]
-    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=(folder / "stderr").open("w"), text=True)
-    line = process.stdout.readline()
-    assert line, (folder / "stderr").read_text()
-    return process, json.loads(line)
-
-
-@pytest.fixture(scope="module")
-def served(tmp_path_factory):
-    process, told = started(tmp_path_factory.mktemp("served"), SCENE, CAMPAIGN)
-    yield told
-    process.send_signal(signal.SIGINT)
-    rest, _ = process.communicate(timeout=20)
-    assert process.returncode == 0
-    assert rest == "", "one JSON object and nothing else"
-
-
-def status(address, method="GET", **headers):
-    try:
-        with urlopen(Request(address, headers=headers, method=method)) as answer:
-            return answer.status, answer.read().decode(errors="replace")
-    except HTTPError as error:
-        return error.code, error.read().decode()
-
-
-def upgraded(address, origin):
-    """The status with which a websocket is refused, 101 where it is not."""
-
-    async def ask():
-        try:
-            socket = await websocket_connect(HTTPRequest(address, headers={"Origin": origin} if origin else {}), subprotocols=["bokeh", "x"])
-        except HTTPClientError as error:
-            return error.code
-        socket.close()
-        return 101
-
-    return asyncio.run(ask())
-
-
-# ---------------------------------------------------------------- who is let in
-
-
-def test_it_tells_address_token_and_process(served):
-    assert set(served) == {*ANSWERS["workbench"], "warnings"}
-    assert re.fullmatch(rf"http://127\.0\.0\.1:\d+/{served['token']}/", served["address"])
-    assert len(served["token"]) == 48
-    os.kill(served["pid"], 0)
-
-
-def test_with_the_token_the_page_comes_and_needs_no_other_host(served):
-    code, text = status(served["address"])
-    assert code == 200
-    assert "<title>Workbench: HDD spindle" in text
-    hosts = set(re.findall(r"(?:src|href)=[\"'](https?://[^/\"']+)", text))
-    assert hosts <= {served["address"].split("/" + served["token"])[0]}
-
-
-@pytest.mark.parametrize("path", ["", "ws", "static/js/bokeh.min.js", "0" * 48 + "/", "favicon.ico", "autoload.js"])
-def test_without_the_token_nothing_is_served(served, path):
-    base = served["address"].removesuffix(served["token"] + "/")
-    code, text = status(base + path)
-    assert code == (404 if path == "favicon.ico" else 403)
-    assert path == "favicon.ico" or "needs the token that `spindle workbench` printed" in text
-    assert served["token"] not in text
-
-
-@pytest.mark.parametrize("method", ["POST", "PUT", "DELETE"])
-def test_whatever_the_method(served, method):
-    assert status(served["address"].removesuffix(served["token"] + "/") + "x", method)[0] == 403
-
-
-def test_the_websocket_wants_the_token_and_the_own_origin(served):
-    base, own = served["address"].replace("http", "ws"), served["address"].split("/" + served["token"])[0]
-    assert upgraded(base.replace(served["token"], "0" * 48) + "ws", own) == 403
-    assert upgraded(base + "ws", "http://evil.example") == 403
-    assert upgraded(base + "ws", "null") == 403
-
-
-def test_it_listens_on_the_loopback_interface_alone(served):
-    """By the kernel's own table of sockets, where there is one."""
-    table = Path("/proc/net/tcp")
-    if not table.exists():
-        pytest.skip("no /proc/net/tcp on this system")
-    port = int(re.search(r":(\d+)/", served["address"]).group(1))
-    listening = [row.split()[1] for row in table.read_text().splitlines()[1:] if row.split()[3] == "0A"]
-    assert [a for a in listening if a.endswith(f":{port:04X}")] == [f"0100007F:{port:04X}"]
-
-
-def test_a_port_that_is_taken_is_said(served, capsys):
-    port = re.search(r":(\d+)/", served["address"]).group(1)
-    assert main(["workbench", str(SCENE), "--port", port, "--no-browser"]) == 2
-    assert re.match(rf"spindle: --port {port}: Address already in use; another port, or none for a free one", capsys.readouterr().err)
-
-
-@pytest.mark.parametrize("port", ["0", "70000", "http"])
-def test_a_port_that_is_none_is_refused(port, capsys):
-    with pytest.raises(SystemExit) as ended:
-        main(["workbench", str(SCENE), "--port", port])
-    assert ended.value.code == 2
-    assert "is not a port, 1 to 65535" in capsys.readouterr().err
-
-
-# ---------------------------------------------------------------- a real browser
+from tests.report.served import started
 
 
 @pytest.fixture(scope="module")
 def chromium(tmp_path_factory):
+    if installed() is None:
+        pytest.skip("no Chromium or Chrome is installed on this machine")
     browser = Browser(tmp_path_factory.mktemp("chromium"))
     browser.scheme("light")
     yield browser
@@ -164,7 +46,6 @@ def errors_told(tab):
     return tab.run(f"{tab.model('status')}.text")
 
 
-@needs_a_browser
 def test_dragging_changes_curves_and_errors_while_dragging(tab):
     before = errors_told(tab)
     choose(tab, "add", "preload_loss")
@@ -192,7 +73,6 @@ def test_dragging_changes_curves_and_errors_while_dragging(tab):
     until(lambda: errors_told(tab).split("ms for all")[0][:40] == before.split("ms for all")[0][:40], 10)
 
 
-@needs_a_browser
 def test_a_test_is_left_out_the_rest_fitted_the_step_kept(tab):
     choose(tab, "add", "preload_loss")
     tab.wait(f"!!{tab.model('preload_loss.loss')}")
@@ -205,7 +85,6 @@ def test_a_test_is_left_out_the_rest_fitted_the_step_kept(tab):
     tab.wait(f"{tab.model('ladder')}.text.includes('1: preload_loss')")
 
 
-@needs_a_browser
 def test_everything_is_reached_by_keyboard_with_a_name_and_a_visible_focus(tab):
     choose(tab, "add", "bond_softening")
     tab.wait(f"!!{HANDLE.format('transition')}")
@@ -233,7 +112,6 @@ def test_everything_is_reached_by_keyboard_with_a_name_and_a_visible_focus(tab):
         assert wanted in names, f"{wanted} is not reached: {names}"
 
 
-@needs_a_browser
 def test_a_slider_moves_by_arrow_keys(tab):
     choose(tab, "add", "preload_loss")
     tab.wait(f"!!{HANDLE.format('loss')}")
@@ -243,7 +121,6 @@ def test_a_slider_moves_by_arrow_keys(tab):
     tab.wait(f"{tab.model('undo')}.disabled === false")
 
 
-@needs_a_browser
 def test_it_fits_the_window_and_can_be_read_in_light_and_dark(tab):
     button = "find(e => e.classList?.contains('bk-btn') && !e.disabled)"
     for scheme in ("light", "dark"):
@@ -279,7 +156,6 @@ def contrast(a, b):
     return (high + 0.05) / (low + 0.05)
 
 
-@needs_a_browser
 def test_the_keyboard_alone_looks_through_the_effects_adds_one_and_undoes_it(tab):
     """Arrows on the closed list only choose; Enter adds. Ctrl+Z and Ctrl+Y walk, but not while a number is typed."""
     added = "Bokeh.documents[0].get_model_by_name('effects').children.length"
@@ -311,7 +187,6 @@ def test_the_keyboard_alone_looks_through_the_effects_adds_one_and_undoes_it(tab
     tab.wait(f"{added} === 0")
 
 
-@needs_a_browser
 def test_the_section_moves_when_it_is_asked_to(tab):
     corner = f"{tab.model('section')}.renderers[1].data_source.data.z[0][0]"
     first = tab.run(corner)
@@ -322,7 +197,6 @@ def test_the_section_moves_when_it_is_asked_to(tab):
     tab.wait(f"!{tab.model('play')}.active")
 
 
-@needs_a_browser
 @pytest.mark.slow
 def test_saving_from_the_page(tab, served):
     choose(tab, "add", "preload_loss")
@@ -332,7 +206,6 @@ def test_saving_from_the_page(tab, served):
     assert (Path(served["out"]) / "mine" / "scene" / "spindle.toml").is_file()
 
 
-@needs_a_browser
 @pytest.mark.slow
 def test_the_fit_to_the_lines_runs_to_its_end(chromium, tmp_path):
     """On FRFs of another program with a bond that softens (12.5 nm/N): added, fitted by the button, with its gain told, and undone in one step."""
@@ -361,7 +234,6 @@ def test_the_fit_to_the_lines_runs_to_its_end(chromium, tmp_path):
     chromium.open("about:blank")
 
 
-@needs_a_browser
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", ["five_bearing", "mk7702", "free_shaft"])
 def test_other_scenes_without_tests(scene, chromium, tmp_path):
