@@ -9,7 +9,7 @@ from thermospindle.diagnosis.decision.explanations import Names, beyond_limits, 
 from thermospindle.diagnosis.decision.loss import NEGLIGIBLE
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.model import CampaignModel
-from thermospindle.diagnosis.inference.hypothesis import STRAIN, Hypothesis
+from thermospindle.diagnosis.inference.hypothesis import LITTLE, STRAIN, Hypothesis
 from thermospindle.diagnosis.inference.remainder import ALIKE, Overlap
 from thermospindle.diagnosis.inference.resonance import shown
 from thermospindle.diagnosis.inference.search import Search
@@ -19,7 +19,7 @@ LEFT = "what is left"  # that changes, and tells of something else
 NUMERICS = (1e-4, 0.01)  # drift of frequencies and of damping that two honest programs may differ by
 
 
-def of_verdict(found: Search, word: str, effects: Names, candidates, free, none: float, before: float, after: float) -> str:
+def of_verdict(found: Search, word: str, effects: Names, candidates, free, none: float, before: float, after: float, gain: float) -> str:
     n, chi2 = found.base.fit.count, found.base.evidence.chi2
     if word == "none":
         best = f"; the best effect, {' + '.join(candidates[0].names)}, has a probability of {candidates[0].probability:.1%}" if candidates else ""
@@ -45,7 +45,9 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
         rival = f"; the best of the catalogue, {' + '.join(lead.names)}, reaches {lead.delta_evidence:.0f}" if lead else ""
         return f"No effect of the catalogue explains the data as well as free drift does: {place}{rival} (chi2 without effects: {chi2 / n:.2f} a number)."
     named = " + ".join(effects)
-    checked = f"; conditions left out are predicted with {after:.2f} instead of {before:.2f} standard errors" if np.isfinite(after) else ""
+    checked = ""
+    if np.isfinite(after):
+        checked = f"; conditions left out are predicted with {after:.2f} instead of {before:.2f} standard errors, {gain:+.0f} in ln probability density"
     if word == "ambiguous":
         rows = [c for c in candidates if set(c.names) <= set(effects)]
         share = sum(c.probability for c in rows)
@@ -62,7 +64,7 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
     beside = f"; beside {'it' if len(effects) == 1 else 'them'} {' and '.join(drifting)} drifts a little" if drifting else ""
     own = chosen.own_laws
     checked = "" if own else checked  # a law that is read off the data says nothing of others
-    disagreement = ", which does not confirm it" if checked and after > 0.9 * before else ""
+    disagreement = ", which does not confirm it" if checked and gain < LITTLE else ""
     before_own = f", {chosen.by_law.evidence.ln - found.base.evidence.ln:.0f} with the law assumed" if chosen.by_law else ""
     whose = f" of {' and '.join(own)}" if len(effects) > 1 else ""
     law = f" with a law of the data's own{whose}{before_own}" if own else ""

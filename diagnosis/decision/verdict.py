@@ -26,7 +26,8 @@ SURE = 5.0  # standard deviations of chi2 by chance, beyond which something is l
 @dataclass(frozen=True, eq=False)
 class Verdict:
     """`word` is none, identified, ambiguous, two effects or unexplained; `effects` what it names; `losses` the expected loss of every answer
-    weighed. `candidates` of the catalogue and `free` ones with the most probable first."""
+    weighed. `candidates` of the catalogue and `free` ones with the most probable first. `held_out_before` and `held_out_after` are rms residuals, in standard
+    errors, of conditions predicted from all others, without effects and as `accepted`; `held_out_gain` what their ln probability density gains."""
 
     word: str
     effects: Names
@@ -38,6 +39,7 @@ class Verdict:
     losses: Mapping[str, float]
     held_out_before: float
     held_out_after: float
+    held_out_gain: float
     accepted: Hypothesis
 
 
@@ -50,10 +52,10 @@ def decide(found: Search) -> Verdict:
     word, effects, losses = least_loss(candidates, none, free, found.alike)
     accepted = _accepted(found, word, effects, candidates, free)
     groups = conditions_of(found)
-    before, after = (left_out(found.model, h.fit, h.evidence, groups) for h in (found.base, accepted))
-    why = reason.of_verdict(found, word, effects, candidates, free, none, before, after)
+    (before, plain), (after, density) = (left_out(found.model, h.fit, h.evidence, groups) for h in (found.base, accepted))
+    why = reason.of_verdict(found, word, effects, candidates, free, none, before, after, density - plain)
     why += reason.of_resonances(found.model, found.hypotheses[0]) + reason.of_what_is_left(found.hypotheses[0], same)
-    return Verdict(word, effects, why, candidates, free, none, unknown, losses, before, after, accepted)
+    return Verdict(word, effects, why, candidates, free, none, unknown, losses, before, after, density - plain, accepted)
 
 
 def _unheld(

@@ -23,7 +23,7 @@ from scipy.special import logsumexp
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.fit import Fit
-from thermospindle.diagnosis.inference.gaussian import Quadratic, ln_within_limits, marginal, one_sided, posterior, quadratic
+from thermospindle.diagnosis.inference.gaussian import Quadratic, ln_integral, ln_within_limits, marginal, one_sided, posterior, quadratic
 from thermospindle.diagnosis.inference.prior import Learned, nuisance_root, whitened_covariance, whole_root
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
@@ -171,20 +171,27 @@ def _roots(conditions: tuple[Condition, ...], grid: tuple[tuple[float, float], .
     return np.asarray(np.linalg.cholesky(found + 1e-12 * np.eye(m)), float)
 
 
-def left_out(model: CampaignModel, fit: Fit, found: Evidence, groups: Sequence[Sequence[int]]) -> float:
-    """Root mean square residual, in standard errors of the data, of groups of tests predicted from all others, with what was learned from all."""
-    learned = found.learned
-    prior = whole_root(model, fit.mechanisms, learned, fit.moved)
-    turn = amplitudes_apart(fit)
+def left_out(model: CampaignModel, fit: Fit, found: Evidence, groups: Sequence[Sequence[int]]) -> tuple[float, float]:
+    """Of groups of tests predicted each from all others, with what was learned from all: root mean square residual, in standard errors of the data, and the sum
+    of ln of their probability densities, which knows how sure a prediction is (Geisser & Eddy, *J. Am. Statist. Assoc.* 74 (1979) 153). Not a number where
+    there are no others."""
+    s, prior, turn = found.learned.errors, whole_root(model, fit.mechanisms, found.learned, fit.moved), amplitudes_apart(fit)
     by_test = [turned(turn, *b, fit.point) for b in fit.by_test]
-    total, count = 0.0, 0
+    counts = [d.count for d in model.tests]
+
+    def together(tests: Sequence[int]) -> Quadratic:
+        return Quadratic(*(sum(getattr(by_test[t], part) for t in tests) / s**2 for part in ("constant", "b", "a")))
+
+    def ln_density(tests: Sequence[int]) -> float:
+        return ln_integral(together(tests), prior) - sum(counts[t] for t in tests) * float(np.log(s))
+
+    every = range(len(by_test))
+    total, count, density = 0.0, 0, 0.0
     for group in groups:
-        rest = [q for t, q in enumerate(by_test) if t not in group]
-        if not rest:
-            continue
-        s2 = learned.errors**2
-        q = Quadratic(0.0, np.sum([r.b for r in rest], axis=0) / s2, np.sum([r.a for r in rest], axis=0) / s2)
-        mean, _ = posterior(q, prior)
-        total += sum(by_test[t].at(mean) for t in group)
-        count += sum(model.tests[t].count for t in group)
-    return float(np.sqrt(max(total, 0.0) / count)) if count else float("nan")
+        rest = [t for t in every if t not in group]
+        if rest:
+            mean, _ = posterior(together(rest), prior)
+            total += sum(by_test[t].at(mean) for t in group)
+            count += sum(counts[t] for t in group)
+            density += ln_density(every) - ln_density(rest)
+    return (float(np.sqrt(max(total, 0.0) / count)), density) if count else (np.nan, np.nan)

@@ -86,6 +86,14 @@ def marginal(q: Quadratic, prior: Root) -> Marginal:
     return Marginal(constant, q.b[p:] - solved.T @ b1, q.a[p:, p:] - cross.T @ solved)
 
 
+def ln_integral(q: Quadratic, prior: Root) -> float:
+    """ln of the integral of exp(-chi2 / 2) over all parameters, which have that prior."""
+    inner = prior.within(q.a)
+    factor, lower = cho_factor(inner + np.eye(len(inner)), lower=True)
+    b = prior.turned(q.b[:, None])[:, 0]
+    return -0.5 * q.constant + 0.5 * float(b @ cho_solve((factor, lower), b)) - float(np.log(np.diag(factor)).sum())
+
+
 def posterior(q: Quadratic, prior: Root) -> tuple[Array, Array]:
     """Mean (n,) and covariance (n, n)."""
     inner = prior.within(q.a)

@@ -135,7 +135,7 @@ def judge(seed: int, without: Sequence[str] = ()) -> dict[str, Any]:
         "drifts": [[p["element"], p["delta_evidence"]] for p in told["where"]],
         "weighed": weighed(found),
         "rms": [told["error"]["before"], told["error"]["after"]],
-        "held_out": [told["error"]["held_out_before"], told["error"]["held_out_after"]],
+        "held_out": [told["error"][f"held_out_{which}"] for which in ("before", "after", "gain")],
         "learned": told["learned"],
         "noise": sorted(set(told["noise"].values())),
         "seconds": seconds,
@@ -185,7 +185,7 @@ def drafted(found: Diagnosis, told: dict[str, Any]) -> list[float]:
         own = fit(model, (m,), starts, tempers=TEMPERS[1:], learned=prior)
         fits.append(settled(model, Hypothesis(own, evidence(model, own))))
     best = max(fits, key=lambda h: h.evidence.ln)
-    return [left_out(model, h.fit, h.evidence, groups) for h in (base, best)]
+    return [left_out(model, h.fit, h.evidence, groups)[0] for h in (base, best)]
 
 
 def commit() -> str:

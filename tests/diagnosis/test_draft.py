@@ -96,7 +96,7 @@ def slipping(spindle, tmp_path_factory):
 def left(model, h: Hypothesis) -> float:
     """Error on every temperature predicted from all others."""
     at = [c.temperature for c in CONDITIONS]
-    return left_out(model, h.fit, h.evidence, [[k for k, t in enumerate(at) if t == one] for one in sorted(set(at))])
+    return left_out(model, h.fit, h.evidence, [[k for k, t in enumerate(at) if t == one] for one in sorted(set(at))])[0]
 
 
 def test_with_the_drafted_effect_the_error_falls(slipping, tmp_path):

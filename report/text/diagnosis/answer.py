@@ -36,7 +36,8 @@ def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
         "invisible": _invisible(d),
         "detectable": {name: size for name, (_, size) in d.detectable.items()},
         "detectable_in": {name: {"parameter": m.size.name, "unit": m.size.unit, "size": size} for name, (m, size) in d.detectable.items()},
-        "error": {"before": before, "after": after, "held_out_before": _known(v.held_out_before), "held_out_after": _known(v.held_out_after)},
+        "error": {"before": before, "after": after}
+        | {key: _known(getattr(v, key)) for key in ("held_out_before", "held_out_after", "held_out_gain")},
         "where": [_place(p, d) for p in _places(d)],
         "next_test": [
             {

@@ -271,10 +271,22 @@ def test_what_changes_beyond_noise_is_not_nothing_missing(leaves, tests, word):
     """And not the same in every test: in one test alone it may be constant, and a little of it may be chance."""
     found = made({"a": -3.0, "~x": -4.0})
     model = SimpleNamespace(**vars(found.model) | {"tests": found.model.tests[:tests]})
-    wrong = tuple(replace(h, fit=replace(h.fit, chi2=leaves * h.fit.count)) for h in found.hypotheses)
+    wrong = tuple(replace(h, fit=replace(h.fit, chi2=leaves * h.fit.count, by_test=h.fit.by_test[:tests])) for h in found.hypotheses)
     v = decide(replace(found, model=model, hypotheses=wrong, base=next(h for h in wrong if not h.mechanisms)))
     assert (v.word, v.probability_none == 0.0) == (word, word == "unexplained")
     assert ("the best leaves" in v.reason) == (word == "unexplained")
+
+
+@pytest.mark.parametrize(("misses", "confirmed"), [(30.0, True), (80.0, False)])
+def test_what_conditions_left_out_do_not_confirm_is_said(misses, confirmed):
+    """By their probability density: of what leaves them less than nothing does, in squares of the errors, and of what leaves more."""
+    found = made({"a": 60.0})
+    lead = found.hypotheses[0]
+    missed = tuple((misses, *of_test[1:]) for of_test in lead.fit.by_test)
+    v = decide(replace(found, hypotheses=(replace(lead, fit=replace(lead.fit, by_test=missed)), found.base)))
+    assert v.word == "identified"
+    assert v.held_out_gain == pytest.approx(50.0 - misses)
+    assert ("which does not confirm it" in v.reason) != confirmed
 
 
 def test_the_order_of_hypotheses_does_not_matter():

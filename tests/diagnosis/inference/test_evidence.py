@@ -303,10 +303,13 @@ def test_what_is_left_out_is_predicted_from_the_rest(hidden):
     learned = found.learned
     prior = made.prior(*(learned.sizes[k] for k in (STIFFNESS, DAMPING, DRIFT)), list(zip(learned.widths, learned.departures, strict=True)))
     groups = [[0], [1, 2]]
-    total = 0.0
+    total, density = 0.0, 0.0
     for group in groups:
-        jacobian, y = (np.concatenate([v[t] for t in range(3) if t not in group]) for v in (made.jacobians, made.y))
+        rest = [t for t in range(3) if t not in group]
+        jacobian, y = (np.concatenate([v[t] for t in rest]) for v in (made.jacobians, made.y))
         p = prior @ jacobian.T @ np.linalg.solve(learned.errors**2 * np.eye(len(y)) + jacobian @ prior @ jacobian.T, y)
         total += sum(float(np.sum((made.jacobians[t] @ p - made.y[t]) ** 2)) for t in group)
-    assert left_out(made.model, made.fit, found, groups) == pytest.approx(np.sqrt(total / made.fit.count), rel=1e-4)
-    assert np.isnan(left_out(made.model, made.fit, found, [[0, 1, 2]]))
+        without = replace(made, jacobians=[made.jacobians[t] for t in rest], y=[made.y[t] for t in rest])
+        density += made.ln(prior, learned.errors) - without.ln(prior, learned.errors)
+    assert left_out(made.model, made.fit, found, groups) == pytest.approx((np.sqrt(total / made.fit.count), density), rel=1e-4)
+    assert np.isnan(left_out(made.model, made.fit, found, [[0, 1, 2]])).all()
