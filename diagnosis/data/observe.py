@@ -21,6 +21,7 @@ from thermospindle.sim.identification.remembered import extracted
 FREQUENCY_FLOOR = 3e-5  # relative: finite elements and bearing equilibrium of the model itself
 DAMPING_FLOOR = 3e-3  # relative
 SHAPE_FLOOR = 3e-3  # relative, of a shape ratio
+SILENT = 1e-5  # of the largest FRF value of a test: the least noise that is believed, half a step of 16 bits; where symmetry forbids an answer there is rounding alone
 UNCERTAIN = 3e-3  # relative error of a frequency from which a pole says nothing
 
 
@@ -117,6 +118,7 @@ def _from_frf(test: Test, noise: Noise) -> Observation:
     sd = frf.sd
     if sd is None or not np.all(np.isfinite(sd)):  # a single hit has no scatter
         sd = noise_model(frf.value, noise.of_value, noise.of_largest)
+    sd = np.maximum(sd, SILENT * np.abs(frf.value).max())
     found = extracted(frf.frequency, frf.value, sd, frf.quantity, test.window_decay)
     scale = np.concatenate([found.frequency, found.damping])
     covariance = found.covariance / np.outer(scale, scale)

@@ -25,6 +25,7 @@ DEGREE, POLES = 3, 3  # of numerators and the common denominator
 AGAIN = 2  # times that the denominator is found
 CHANCE = 1e-6  # of a spike in a test without any
 LEAST = 1e-8  # of the mean square of the neighbours: scatter that is believed
+NAMED = 8  # of the lines left out; of more, the first ones and the last
 DRIFT = 2e-3  # relative, by which the speed may differ from the one told
 
 
@@ -38,7 +39,8 @@ class RunningLines:
 
     def words(self) -> str:
         """Which they are, in a sentence."""
-        each = ", ".join(f"{f:.1f} Hz ({k}x)" for k, f in zip(self.multiples, self.frequency, strict=True))
+        named = [f"{f:.1f} Hz ({k}x)" for k, f in zip(self.multiples, self.frequency, strict=True)]
+        each = ", ".join(named) if len(named) <= NAMED else f"{', '.join(named[: NAMED - 1])} and {len(named) - NAMED + 1} more up to {named[-1]}"
         many = len(self.multiples) > 1
         return f"{'lines' if many else 'a line'} of the running speed stand{'' if many else 's'} in the FRFs, at {each}: {int(self.out.sum())} lines are left out"
 

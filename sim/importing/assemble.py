@@ -21,7 +21,7 @@ from thermospindle.sim.importing.measured import Content, Curve, End, ModeLine, 
 from thermospindle.sim.importing.names import plain
 from thermospindle.sim.importing.peaks import from_peaks
 from thermospindle.sim.importing.places import place, points_of, unplaced
-from thermospindle.sim.importing.records import frfs_of
+from thermospindle.sim.importing.records import frfs_of, open_units
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ def read(
         progress(f.name)
     points, questions = points_of(form, scene)
     notes = [n for c in contents for n in c.notes]
-    questions += [q for c in contents for q in c.questions]
+    questions += [q for c in contents for q in (*c.questions, *open_units(c.file.name, c.motions))]
     curves: dict[str, list[Curve]] = {}
     modes: dict[str, list[ModeLine]] = {}
     window: dict[str, float] = {}
@@ -93,11 +93,13 @@ def read(
             if x.magnitude_only and np.min(x.value) < 0:
                 questions.append(Question(x.file.name, "columns", f"the imaginary part beside {x.where}: its values are real and some negative, so they are no magnitude"))
     own_curves = [(x.file.name, x) for every in curves.values() for x in every if not x.magnitude_only]
-    blank = sorted({(name, key) for name, x in own_curves for key in ("response", "reference") if not getattr(x, key).label})
+    told = [(name, key, getattr(x, key)) for name, x in own_curves for key in ("response", "reference")]
+    told += [(c.file.name, "reference" if m.force else "response", m.end) for c in contents for m in c.motions]  # asked at once, whatever else is open of them
+    blank = sorted({(name, key) for name, key, end in told if not end.label})
     for key in ("response", "reference"):
         if of := [name for name, k in blank if k == key]:
             questions.append(Question(", ".join(of), key, f"the point that {'answered' if key == 'response' else 'was hit'}: {key} = node or name"))
-    ends = tuple((n, e) for n, x in own_curves for e in (x.response, x.reference) if place(e, form, points) is None)
+    ends = tuple((name, end) for name, _, end in told if place(end, form, points) is None)
     questions += unplaced(ends, points, scene)
     questions += _units(own_curves, settings)
     found = Read(tuple(contents), curves, modes, window, ends, points, tuple(notes), ())

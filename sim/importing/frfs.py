@@ -186,5 +186,18 @@ def _check(frf: Frf, placed: Sequence[Placed], speed: float) -> None:
         if not own and (row := re.match(r"response (\d+)", text)):
             own = [p for p in placed if p.response == int(row[1])]
         where = f"{own[0].curve.file} ({own[0].curve.where})" if own else listed(dict.fromkeys(p.curve.file.name for p in placed), 3)
-        advice = next((a for word, a in ADVICE.items() if word in text), "")
+        advice = (_meant(frf, placed, speed) if "negative real part" in text else "") or next((a for word, a in ADVICE.items() if word in text), "")
         raise BadInput(f"{where}: {text}" + (f"; {advice}" if advice else "")) from None
+
+
+def _meant(frf: Frf, placed: Sequence[Placed], speed: float) -> str:
+    """Whether the same numbers, taken for another quantity, are of a passive structure: then another unit is meant."""
+    told = {p.quantity for p in placed}
+    for other in set(POWER) - told if len(told) == 1 else ():
+        turned = replace(frf, value=frf.value * (2j * np.pi * frf.frequency) ** (POWER[min(told)] - POWER[other]), coherence=None, sd=None)
+        try:
+            check_frf("", turned, speed)
+        except BadInput:
+            continue
+        return f"taken for {other} its numbers pass: is its unit told as that of {min(told)} by mistake?"
+    return ""

@@ -16,6 +16,7 @@ import numpy as np
 from thermospindle.model.types import Array
 from thermospindle.sim.hammer.estimate import Windows, estimate
 from thermospindle.sim.hammer.pulse import PRE_TRIGGER
+from thermospindle.sim.identification.frf import Frf
 from thermospindle.sim.importing import units
 from thermospindle.sim.importing.mapping import RecordForm
 from thermospindle.sim.importing.measured import Curve, End, Motion, Question, listed
@@ -26,17 +27,22 @@ NOISE = 6.0  # standard deviations of the force's noise, which no second pulse i
 DECAYED = 1e-3  # of its peak, to which a response has fallen at the end of a record that needs no exponential window
 ENDS_AT = 0.01  # value of the exponential window at the end of a record that needs one
 REACH = 0.1  # of the largest force spectrum, down to which the hammer excites
+HEARD = 3.0  # standard errors, from which a response stands out of its noise
 HELD = 3  # samples at exactly the extreme that tell an overload
+BEFORE = 5  # times the lead of a hit, over which its channels' offsets are averaged
+FEWEST = 8  # samples before a hit that tell an offset
+TOLD = 0.01  # of a channel's largest value, from which an offset is worth a note
 STEPS = 200  # of quantisation within an extreme, below which held samples tell nothing
 
 
 @dataclass(frozen=True, eq=False)
 class Hit:
-    """One hit: `force` (n,) and `response` (channels, n), `PRE_TRIGGER` before it; `where` names it."""
+    """One hit: `force` (n,) and `response` (channels, n), `PRE_TRIGGER` before it, the response as `recorded` too; `where` names it."""
 
     where: str
     force: Array
     response: Array
+    recorded: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,14 +65,18 @@ def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form
     if any([m.end for m in motions if not m.force] != ends for _, motions in files):
         question = Question(every, "test", "other responses than the files of the same hammer point beside them: a test = \"...\" of their own")
         return FromRecords((), 0.0, 0, (), (question,))
-    scales, questions = _scales(every, files[0][1])
+    scales, questions = _scales(files[0][1]), list[Question]()
     steps = {m.step for _, motions in files for m in motions}
     if max(steps) > min(steps) * (1 + 1e-6):
         questions.append(Question(every, "sample_rate_Hz", f"one sampling rate; its records have {listed(f'{1 / s:g} Hz' for s in sorted(steps))}"))
-    if questions:
+    if questions or scales is None:
         return FromRecords((), 0.0, 0, (), tuple(questions))
     step = min(steps)
-    hits = [hit for path, motions in files for hit in _hits(path, motions, step, form)]
+    hits = []
+    for path, motions in files:
+        own, said = _hits(path, motions, step, form)
+        hits += own
+        notes += said
     good = []
     for hit in hits:
         if (fault := _fault(hit, ends, step, form)) is None:
@@ -85,6 +95,8 @@ def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form
     contact = max(_contact(f, step) for f in force[0])
     windows = Windows(contact + 1e-3, float(decay))
     found = estimate(step * np.arange(float(n)), force, response, windows, band, tuple(range(len(ends))), (0,))
+    from_ = 0 if form.band_Hz else _first(found.h1)
+    lines = slice(from_, None)
     if len(good) == 1:
         notes.append(f"{name}: a single hit: FRFs without coherence and standard errors")
     of = {"H1": found.h1.value, "H2": found.h2, "Hv": np.sqrt(np.abs(found.h1.value) * np.abs(found.h2)) * np.exp(1j * np.angle(found.h1.value))}
@@ -94,13 +106,14 @@ def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form
         told = units.of_response(motion.unit)
         assert told is not None
         several = len(good) > 1
-        coherence, sd = (None if v is None or not several else v[i, 0] for v in (found.h1.coherence, found.h1.sd))
+        coherence, sd = (None if v is None or not several else v[i, 0, lines] for v in (found.h1.coherence, found.h1.sd))
         curves.append(
-            Curve(files[0][0], motion.where, end_of, reference, found.h1.frequency, of[form.estimator][i, 0], told[0], SI[told[0]], coherence, sd)
+            Curve(files[0][0], motion.where, end_of, reference, found.h1.frequency[lines], of[form.estimator][i, 0, lines], told[0], SI[told[0]], coherence, sd)
         )
     notes.append(
-        f"{name}: {len(good)} of {len(hits)} hits, {form.estimator}, {band[0]:.4g} to {band[1]:.4g} Hz in steps of {1 / (n * step):.4g} Hz, "
+        f"{name}: {len(good)} of {len(hits)} hits, {form.estimator}, {found.h1.frequency[from_] if from_ else band[0]:.4g} to {band[1]:.4g} Hz in steps of {1 / (n * step):.4g} Hz, "
         + ("no exponential window" if end == 1 else f"exponential window down to {end:g}")
+        + ("; below, nothing stands out of the noise" if from_ else "")
     )
     return FromRecords(tuple(curves), float(decay), len(good), tuple(notes), ())
 
@@ -108,30 +121,32 @@ def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form
 SI = {"receptance": "m/N", "mobility": "(m/s)/N", "accelerance": "(m/s^2)/N"}
 
 
-def _scales(name: str, motions: Sequence[Motion]) -> tuple[list[float], list[Question]]:
-    """Factors to SI of the force and of every response."""
-    questions = []
-    force = next(m for m in motions if m.force)
-    scales = [units.of_force(force.unit) or 0.0]
-    if not scales[0]:
-        questions.append(Question(name, "columns", f"the unit of its force {force.where!r}, as in \"force [N]\"; found is {force.unit or 'none'!r}", (force.where,)))
-    for m in motions:
-        if not m.force:
-            told = units.of_response(m.unit)
-            scales.append(told[1] if told else 0.0)
-            if told is None:
-                questions.append(
-                    Question(name, "columns", f"the unit of its response {m.where!r}, as in \"response 3 [m/s^2]\"; found is {m.unit or 'none'!r}", (m.where,))
-                )
-    return scales, questions
+def open_units(name: str, motions: Sequence[Motion]) -> list[Question]:
+    """Questions for the channels of a file whose unit is not told, or unknown."""
+    open_ = [m for m in motions if (units.of_force if m.force else units.of_response)(m.unit) is None]
+    return [Question(name, "columns", f"the unit of its {_channel(m)}; found is {m.unit or 'none'!r}", (m.where,)) for m in open_]
 
 
-def _hits(path: Path, motions: Sequence[Motion], step: float, form: RecordForm) -> list[Hit]:
-    """The hits of one file: rows where it has several, else what stands around each pulse of one long record."""
+def _channel(motion: Motion) -> str:
+    return f'force {motion.where!r}, as in "force [N]"' if motion.force else f'response {motion.where!r}, as in "response 3 [m/s^2]"'
+
+
+def _scales(motions: Sequence[Motion]) -> list[float] | None:
+    """Factors to SI of the force and of every response; None where a unit is not told, which `open_units` asks."""
+    force = units.of_force(next(m for m in motions if m.force).unit)
+    told = [units.of_response(m.unit) for m in motions if not m.force]
+    return None if force is None or None in told else [force, *(t[1] for t in told if t is not None)]
+
+
+def _hits(path: Path, motions: Sequence[Motion], step: float, form: RecordForm) -> tuple[list[Hit], list[str]]:
+    """The hits of one file: rows where it has several, else what stands around each pulse of one long record; and notes."""
     forces = next(m for m in motions if m.force).value
-    responses = np.stack([m.value for m in motions if not m.force], axis=1)  # (hits, channels, n)
+    moving = [m for m in motions if not m.force]
+    responses = np.stack([m.value for m in moving], axis=1)  # (hits, channels, n)
+    accelerations: Array = np.array([(units.of_response(m.unit) or ("", 0.0))[0] == "accelerance" for m in moving])
     lead = round(PRE_TRIGGER / step)
     found: list[Hit] = []
+    drifts: list[Array] = []
     strongest = max(np.abs(f - np.median(f)).max() for f in forces)
     for force, response in zip(forces, responses, strict=True):
         quiet = force - np.median(force)
@@ -145,8 +160,29 @@ def _hits(path: Path, motions: Sequence[Motion], step: float, form: RecordForm) 
                 continue  # the record ends with it
             pad = max(-first, 0)
             cut = slice(max(first, 0), first + length)
-            found.append(Hit(where, np.pad(quiet[cut], (pad, 0)), np.pad(response[:, cut], ((0, 0), (pad, 0)))))
-    return found
+            before = response[:, max(start - BEFORE * lead, 0) : start]
+            still, drift = _still(response[:, cut], before, lead - pad, accelerations)
+            drifts.append(drift)
+            found.append(Hit(where, np.pad(quiet[cut], (pad, 0)), np.pad(still, ((0, 0), (pad, 0))), response[:, cut]))
+    worst = np.max(drifts, axis=0, initial=0.0) if drifts else np.zeros(len(moving))
+    wandering = [f"{m.where} {f'{d:.0%}' if d < 1 else 'more than its answer'}" for m, d in zip(moving, worst, strict=True) if d > TOLD]
+    return found, [f"{path.name}: offset and drift taken out, in shares of the largest value: {', '.join(wandering)}"] if wandering else []
+
+
+def _still(response: Array, before: Array, lead: int, accelerations: Array) -> tuple[Array, Array]:
+    """Responses (channels, n) without what their sensors held before the blow, when nothing moves, and its share (channels,) of the largest value.
+
+    `before` (channels, k) is that time, which ends `lead` samples into the responses. What was hit may go on at a constant speed or to another place, but no acceleration stays: of one, the straight
+    line to its mean over the last tenth is taken out, which is the drift of a charge amplifier.
+    """
+    n, k = response.shape[-1], before.shape[-1]
+    tail = max(n // 10, 1)
+    last = response[:, -tail:].mean(axis=-1)
+    first = before.mean(axis=-1) if k >= FEWEST else np.where(accelerations, last, 0.0)
+    slope = np.where(accelerations, last - first, 0.0) / (n - tail / 2 + k / 2 - lead)
+    line = first[:, None] + slope[:, None] * (np.arange(n) + k / 2 - lead)
+    still = response - line
+    return still, np.abs(line).max(axis=-1) / np.maximum(np.abs(still).max(axis=-1), np.finfo(float).tiny)
 
 
 def _starts(force: Array, strongest: float, apart: int) -> list[int]:
@@ -165,13 +201,14 @@ def _starts(force: Array, strongest: float, apart: int) -> list[int]:
 
 def _fault(hit: Hit, ends: Sequence[End], step: float, form: RecordForm) -> str | None:
     """Why a hit cannot be used; None where it can."""
-    channels = [("force", hit.force), *((e.label or "response", r) for e, r in zip(ends, hit.response, strict=True))]
+    channels = [("force", hit.force), *((e.label or "response", r) for e, r in zip(ends, hit.recorded, strict=True))]
     for name, value in channels:
         limit = form.overload.get(name)
+        called = f"response {name}" if name.isdigit() else name
         if limit is not None and np.abs(value).max() >= limit:
-            return f"overload: {name} reaches {np.abs(value).max():.4g}, limit {limit:g}"
+            return f"overload: {called} reaches {np.abs(value).max():.4g}, limit {limit:g}"
         if held := _held(value):
-            return f"overload: {name} reaches {value[np.argmax(np.abs(value))]:.4g} and never more, {held} times"
+            return f"overload: {called} reaches {value[np.argmax(np.abs(value))]:.4g} and never more, {held} times"
     peak = int(np.argmax(hit.force[: round((PRE_TRIGGER + form.apart_s) / step)]))
     after = hit.force[peak:]
     released = np.flatnonzero(after < TOUCHING * hit.force[peak])
@@ -211,6 +248,16 @@ def _band(force: Array, step: float) -> tuple[float, float]:
     fallen = np.flatnonzero((spectrum < REACH * spectrum.max()) & (np.arange(len(spectrum)) > np.argmax(spectrum)))
     high = frequency[fallen[0]] if len(fallen) else frequency[-1]
     return float(frequency[2]), float(min(high, 0.4 / step))
+
+
+def _first(frf: Frf) -> int:
+    """The first line from which some response stands out of its noise, over a few lines: what an accelerometer says of slow motion is noise alone."""
+    if frf.sd is None or not np.all(np.isfinite(frf.sd)):
+        return 0
+    over = (np.abs(frf.value) / np.maximum(frf.sd, np.finfo(float).tiny)).reshape(-1, len(frf.frequency))
+    near = max(len(frf.frequency) // 200, 3)
+    heard = np.array([np.median(over[:, k : k + near], axis=-1).max() > HEARD for k in range(len(frf.frequency) - near + 1)])
+    return int(np.argmax(heard)) if heard.any() else 0
 
 
 def _contact(force: Array, step: float) -> float:

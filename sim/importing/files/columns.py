@@ -170,7 +170,9 @@ def _curves(file: Path, columns: Sequence[Column], settings: FileForm) -> tuple[
         value, open_ = _value(file, parts, settings)
         questions += open_
         if value is None:
-            continue
+            if not open_:
+                continue
+            value = np.zeros(n, complex)  # never used: stands for the FRF, so that what else is open of it is asked at once
         if response == End() and settings.response is not None:
             response = end(str(settings.response))
         if reference == End() and settings.reference is not None:

@@ -187,6 +187,16 @@ def test_noise_alone_is_no_conjugated_frf() -> None:
             check_frf("file", Frf(np.arange(1.0, n + 1), noise, (3,), (1,), "mobility"), 0.0)
 
 
+def test_drift_of_a_silent_sensor_is_no_conjugated_frf() -> None:
+    """What a record without an answer holds, a straight line say, has no direction of time; an answer that can be heard has."""
+    frf = rotor_frf()
+    after = np.fft.fft(np.linspace(0.0, 1.0, len(frf.frequency)))  # its energy is largest just before the end, which is before the blow
+    loud = np.linalg.norm(frf.value[:, 0], axis=-1).max() / np.linalg.norm(after)
+    check_frf("file", part(put((1, 0), lambda v: 5e-4 * loud * after)), 0.0)
+    with pytest.raises(BadInput, match=r"H\(3,1\): .*conjugated"):
+        check_frf("file", part(put((1, 0), lambda v: 5e-3 * loud * after)), 0.0)
+
+
 def test_low_coherence_at_antiresonances_is_accepted() -> None:
     frf = rotor_frf()
     size = np.abs(frf.value)

@@ -16,6 +16,7 @@ from thermospindle.model.machine import Condition
 from thermospindle.sim.campaign.campaign import Campaign, Noise, Test, write_campaign
 from thermospindle.sim.identification.frf import Frf, out_of, without
 from thermospindle.sim.identification.modal import noise_model
+from thermospindle.sim.identification.running_lines import RunningLines
 from thermospindle.sim.operating import operating_point
 
 LINES = np.arange(400.0, 3000.0, 2.0)
@@ -90,6 +91,11 @@ def test_spikes_are_found_and_named_and_nothing_else_is_left_out(spindle):
     assert found.words().startswith("lines of the running speed stand in the FRFs, at 59")
     assert out_of(frf, 0.0).multiples == ()  # at rest there is no running speed
     assert without(frf, found.out).value.shape[-1] == len(LINES) - found.out.sum()
+
+
+def test_many_lines_are_named_in_a_line():
+    many = RunningLines(np.ones(40, bool), tuple(range(1, 21)), tuple(50.0 * k for k in range(1, 21)))
+    assert "350.0 Hz (7x) and 13 more up to 1000.0 Hz (20x): 40 lines are left out" in many.words()
 
 
 def test_modes_and_data_are_as_without_spikes(spindle):

@@ -25,7 +25,7 @@ def test_everything_open_is_asked_at_once(tmp_path):
     with pytest.raises(Unanswered) as caught:
         bring([file], out=tmp_path / "c")
     text = "\n".join(caught.value.items)
-    for word in ("phase_unit", "temperature_C", "speed_rpm", "spindle"):
+    for word in ("phase_unit", "unit: the unit of its FRFs", "called: which points '7', '8' are", "temperature_C", "speed_rpm", "spindle"):
         assert word in text
     assert not (tmp_path / "c").exists()
 
@@ -80,10 +80,11 @@ def test_other_units_than_the_scenes_are_doubted(tmp_path, unit, temperature, do
     [
         (lambda v: v.conj(), r"T20.csv .*conjugated.*conjugate = true"),
         (lambda v: -v, r"negative real part.*as in 3:-Z"),
+        (lambda v: v * 2j * np.pi * FREQUENCY, r"negative real part.*taken for accelerance its numbers pass: is its unit told as that of mobility by mistake"),
         (lambda v: v * np.where(np.arange(301) == 150, 0, 1), r"zero on 1 lines.*band_Hz"),
         (lambda v: v * np.array([[1, 3], [1, 1], [1, 1]])[:, :, None], r"reciprocity.*another unit, sign or node"),
     ],
-    ids=["conjugated", "sign", "gap", "reciprocity"],
+    ids=["conjugated", "sign", "unit", "gap", "reciprocity"],
 )
 def test_what_no_structure_does_is_told_with_the_users_file(tmp_path, change, said):
     heads, found = columns("real", "(m/s)/N", change(FRF.value))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from thermospindle.model.errors import BadInput
+from thermospindle.model.errors import BadInput, Unanswered
 from thermospindle.report.verbs.importing import bring
 from thermospindle.sim.campaign.campaign import read_campaign
 
@@ -43,8 +43,9 @@ def exact(frequency, decay=0.0):
     return np.einsum("rm,qm,mn->rqn", SHAPES, SHAPES, s / (s**2 + 2 * (z * w)[:, None] * s + w[:, None] ** 2))
 
 
-def hit(random, doubled=False):
-    """Force (n,) of one hit of 0.6 ms at 50 ms, and the velocities (2, n) it makes, by discrete convolution with the exact impulse response."""
+def hit(random, doubled=False, power=0):
+    """Force (n,) of one hit of 0.6 ms at 50 ms, and the velocities (2, n) it makes, by discrete convolution with the exact impulse response;
+    accelerations for `power` 1."""
     n, start = round(RATE * LENGTH), round(0.05 * RATE)
     t = np.arange(n) / RATE
     width = 6e-4 * random.uniform(0.9, 1.1)
@@ -57,7 +58,7 @@ def hit(random, doubled=False):
     padded = np.fft.rfftfreq(4 * n, 1 / RATE)
     del damped
     shift = 12.0  # evaluated off the axis, so that the answer has died away within the padded record
-    answer = np.fft.irfft(np.fft.rfft(force * np.exp(-shift * t), 4 * n) * exact(padded, shift), 4 * n)[..., :n] * np.exp(shift * t)
+    answer = np.fft.irfft(np.fft.rfft(force * np.exp(-shift * t), 4 * n) * exact(padded, shift) * (2j * np.pi * padded + shift) ** power, 4 * n)[..., :n] * np.exp(shift * t)
     return force, answer  # (n,), (2 responses, 2 references, n)
 
 
@@ -153,6 +154,65 @@ def test_a_hit_a_row_and_no_hit(tmp_path):
     test = read_campaign(tmp_path / "c").tests[0]
     model = exact(test.frf.frequency, test.window_decay)[:, :1]
     assert np.abs(test.frf.value - model).max() < 1e-3 * np.abs(model).max()
+
+
+def test_what_records_leave_open_is_asked_at_once(tmp_path):
+    """Units, sampling rate, points that were hit: one list, and once its form is filled in nothing more is asked."""
+    random = np.random.default_rng(5)
+    for q in (0, 1):
+        force, answer = zip(*(hit(random) for _ in range(3)), strict=True)
+        np.savez(tmp_path / f"T20_hammer{q + 1}.npz", force=np.array(force), velocity1=np.array(answer)[:, 0, q], velocity2=np.array(answer)[:, 1, q])
+    files = [tmp_path / f"T20_hammer{q}.npz" for q in (1, 2)]
+    (tmp_path / "points.toml").write_text(MAPPING.split('id = "T20"')[0].split("[[files]]")[0] + "[[points]]" + MAPPING.split("[[points]]", 1)[1])
+    with pytest.raises(Unanswered) as caught:
+        bring(files, mapping=tmp_path / "points.toml", out=tmp_path / "c")
+    both = "T20_hammer1.npz, T20_hammer2.npz: "
+    for word in ("sample_rate_Hz", "reference: the point that was hit", *(f"columns: the unit of its {name}" for name in ("force 'force'", "response 'velocity1'", "response 'velocity2'"))):
+        assert sum(item.startswith(both + word) for item in caught.value.items) == 1, word
+    form = MAPPING.replace('"hammer*"', '"*.npz"').replace(
+        'test = "T20"', f'test = "T20"\nsample_rate_Hz = {RATE}\ncolumns = {{ force = "force [N]", velocity1 = "velocity 1 [m/s]", velocity2 = "velocity 2 [m/s]" }}', 1
+    ).replace("[[tests]]", '[[files]]\nfile = "*1.npz"\nreference = 1\n[[files]]\nfile = "*2.npz"\nreference = 2\n[[tests]]')
+    (tmp_path / "m.toml").write_text(form)
+    bring(files, mapping=tmp_path / "m.toml", out=tmp_path / "c")
+    assert read_campaign(tmp_path / "c").tests[0].frf.reference_nodes == (1, 2)
+
+
+def test_offset_and_drift_of_accelerometers_are_taken_out_and_said(tmp_path):
+    """A charge amplifier that wanders by a third of the largest value of both channels, 71 % of its own over the record, not about zero; without that the FRFs are 4 % off."""
+    random = np.random.default_rng(5)
+    force, answer = zip(*(hit(random, power=1) for _ in range(4)), strict=True)
+    motion = np.array(answer)[:, :, 0]
+    wander = np.abs(motion).max() * (0.1 + 0.3 * np.linspace(0, 1, motion.shape[-1]))
+    motion[:, 1] += wander
+    np.savez(tmp_path / "hammer1.npz", fs=RATE, force=np.array(force), acceleration1=motion[:, 0], acceleration2=motion[:, 1])
+    told = MAPPING.replace('test = "T20"', 'test = "T20"\nreference = 1\ncolumns = { force = "force [N]", acceleration1 = "acceleration 1 [m/s^2]", acceleration2 = "acceleration 2 [m/s^2]" }', 1)
+    (tmp_path / "m.toml").write_text(told + "[records]\nband_Hz = [50.0, 1000.0]\n")
+    notes = bring([tmp_path / "hammer1.npz"], mapping=tmp_path / "m.toml", out=tmp_path / "c").values["notes"]
+    assert [n for n in notes if "drift" in n] == ["hammer1.npz: offset and drift taken out, in shares of the largest value: acceleration2 71%"]
+    test = read_campaign(tmp_path / "c").tests[0]
+    s = 2j * np.pi * test.frf.frequency + test.window_decay
+    model = exact(test.frf.frequency, test.window_decay)[:, :1] * s
+    assert test.frf.quantity == "accelerance"
+    assert np.abs(test.frf.value - model).max() < 2e-3 * np.abs(model).max()
+
+
+def test_slow_lines_on_which_nothing_is_heard_are_left_out_and_said(tmp_path):
+    """An accelerometer's noise, a three hundredth of its largest value: below some 30 Hz the answer is less than that."""
+    random = np.random.default_rng(5)
+    force, answer = zip(*(hit(random, power=1) for _ in range(4)), strict=True)
+    motion = np.array(answer)[:, :, 0]
+    motion += 3e-3 * np.abs(motion).max() * random.standard_normal(motion.shape)
+    np.savez(tmp_path / "hammer1.npz", fs=RATE, force=np.array(force), acceleration1=motion[:, 0], acceleration2=motion[:, 1])
+    told = MAPPING.replace('test = "T20"', 'test = "T20"\nreference = 1\ncolumns = { force = "force [N]", acceleration1 = "acceleration 1 [m/s^2]", acceleration2 = "acceleration 2 [m/s^2]" }', 1)
+    (tmp_path / "m.toml").write_text(told)
+    notes = bring([tmp_path / "hammer1.npz"], mapping=tmp_path / "m.toml", out=tmp_path / "c").values["notes"]
+    assert any(n.endswith("below, nothing stands out of the noise") for n in notes)
+    frf = read_campaign(tmp_path / "c").tests[0].frf
+    size = np.abs(exact(frf.frequency[:1]) * 2 * np.pi * frf.frequency[0])[:, 0, 0].max()
+    assert 1.0 < size / frf.sd[:, 0, :10].mean() < 10.0  # as large as its noise where the band begins
+    (tmp_path / "m.toml").write_text(told + "[records]\nband_Hz = [10.0, 1000.0]\n")
+    bring([tmp_path / "hammer1.npz"], mapping=tmp_path / "m.toml", out=tmp_path / "d")
+    assert read_campaign(tmp_path / "d").tests[0].frf.frequency[0] < 12.0 < frf.frequency[0]
 
 
 @pytest.mark.parametrize("order", ["hits, responses", "responses, hits"])
