@@ -120,11 +120,10 @@ def turning_poses(runout: Runout, share: float = VISIBLE_TURNING) -> tuple[Poses
     largest = float(largest_displacement(point, motion.astype(complex)).max())
     factor = round_down(share * reach(point.spindle) / largest) if largest > 0 else 1.0
     moved = poses(point, (factor * motion).astype(complex))
-    spin = quaternions(runout.signals.angle[frames])
     for body in point.chain.bodies:
         if body.turns:
             translation, turn = moved[body.name]
-            moved[body.name] = translation, product(turn, spin)
+            moved[body.name] = translation, product(turn, quaternions(body.speed_ratio * runout.signals.angle[frames]))
     return moved, factor
 
 

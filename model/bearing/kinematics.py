@@ -187,7 +187,7 @@ def _radial(bearing: str, cause: str, order: int, name: str, speed: float, kin: 
 def lines(spindle: Spindle, kinematics_by_bearing: Mapping[str, Kinematics], highest_multiple: int = 3, speed: float = 0.0) -> list[Line]:
     """All lines of linear theory for k up to `highest_multiple`, multiples of Z and even ball orders alike, in order of frequency.
 
-    `speed` (rad/s) is the spindle's where it has no rolling bearing to tell. Orders that stand still (order 1 of a ring at rest, anything at speed zero) excite nothing and are left out.
+    `speed` (rad/s) is the spindle's; left out, that of the first bearing's turning ring. Orders that stand still (order 1 of a ring at rest, anything at speed zero) excite nothing and are left out.
     """
     found: list[Line] = []
     for name in (b.name for b in spindle.rolling):
@@ -201,7 +201,9 @@ def lines(spindle: Spindle, kinematics_by_bearing: Mapping[str, Kinematics], hig
         for order in range(2, 2 * highest_multiple + 1, 2):
             found += [ball_line(name, kin, order, "radial", by) for by in (-1, 1)]
             found += [ball_line(name, kin, order, "axial")] if kin.angled else []
-    if kinematics_by_bearing:
+    if kinematics_by_bearing and not speed:
         speed = next(iter(kinematics_by_bearing.values())).turning
-    found.append(unbalance_line(speed))
+    own = spindle.imperfections
+    carrier = spindle.turning_at(own.unbalance_z) if own.unbalance or own.couple_unbalance else spindle.turning
+    found.append(unbalance_line(speed * carrier.speed_ratio))
     return sorted((line for line in found if line.frequency > SMALLEST), key=lambda line: line.frequency)

@@ -9,6 +9,7 @@ import numpy as np
 from thermospindle.model.errors import OutsideRange
 from thermospindle.model.machine import Condition, LinearBearing, Spindle
 from thermospindle.model.types import Array
+from thermospindle.model.units import RPM
 
 
 class ByDirection:
@@ -49,8 +50,8 @@ def linear_state(spindle: Spindle, b: LinearBearing, condition: Condition) -> Li
     grid = np.reshape(b.stiffness, (len(b.temperature), len(b.speed), 5, 5))
     at = []
     for name, unit, values, where in (
-        ("temperature", "C", b.temperature, condition.temperature),
-        ("speed", "rad/s", b.speed, abs(condition.speed)),
+        ("temperature", "C", list(b.temperature), condition.temperature),
+        ("speed", "rpm", [v / RPM for v in b.speed], abs(condition.speed) / RPM),
     ):
         if len(values) > 1 and not values[0] - 1e-9 <= where <= values[-1] + 1e-9:
             raise OutsideRange(f"the table of bearing {b.name!r} spans {name} {values[0]:g} to {values[-1]:g} {unit} and was asked at {where:g} {unit}")

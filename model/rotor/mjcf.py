@@ -65,7 +65,8 @@ def chain_spec(chain: RotorBase, step: float, stiff: tuple[str, ...] | None = No
     for e in chain.elements:
         stiffness = e.stiffness if stiff is None or e.name in stiff else np.zeros((5, 5))
         add_matrices(out, e.name, stiffness, e.damping, element_rows(chain, e), chain)
-    spin = [chain.speed if name.endswith(".spin") else 0.0 for name in joint_names(chain)]
+    turning = spin_speeds(chain, chain.speed)
+    spin = [turning.get(name, 0.0) for name in joint_names(chain)]
     out.add_key(name="loaded", qpos=np.zeros(len(spin)), qvel=spin)
     return out
 
@@ -189,6 +190,11 @@ def _add_points(out: mujoco.MjSpec, spindle: Spindle, chain: RotorBase) -> None:
             objtype=mujoco.mjtObj.mjOBJ_TENDON,
             objname=tendon.name,
         )
+
+
+def spin_speeds(chain: RotorBase, speed: float) -> dict[str, float]:
+    """Speed (rad/s) of every spin hinge where the spindle turns at `speed`: each turning body has its own ratio. In the order of `spin_dofs`."""
+    return {f"{body.name}.spin": speed * body.speed_ratio for body in chain.bodies if body.turns}
 
 
 def spin_dofs(model: mujoco.MjModel) -> list[int]:

@@ -122,7 +122,8 @@ def resonances(
     speed = spindle.nominal_speed if speed_rpm is None else speed_rpm * RPM
     nominal = Condition(temperature_or_reference(temperature, spindle), speed)
     grid = temperatures_or_range(temperatures, spindle, STEPS_OF_TEMPERATURE)
-    speeds = [s * RPM for s in speeds_rpm] if speeds_rpm else np.linspace(0, 2 * speed, STEPS_OF_SPEED).tolist()
+    fastest = min([2 * speed, *(b.speed[-1] for b in spindle.linear_bearings if len(b.speed) > 1)])  # as far as their tables go
+    speeds = [s * RPM for s in speeds_rpm] if speeds_rpm else np.linspace(0, fastest, STEPS_OF_SPEED).tolist()
     with progress_bar(stages(spindle, len(grid))) as progress:
         found = resonance_map(spindle, grid, speeds, nominal, multiples, progress=progress)
     conditions = [nominal, *(Condition(t, s) for t in grid for s in speeds)]

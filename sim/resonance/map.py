@@ -22,6 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from thermospindle.model.bearing.kinematics import Line, lines, row_kinematics
+from thermospindle.model.bearing.pair import check_centred
 from thermospindle.model.drawn import drawn
 from thermospindle.model.errors import BadInput
 from thermospindle.model.imperfections import Imperfections
@@ -155,6 +156,7 @@ class _Grid:
     def __init__(self, spindle: Spindle, nominal: Condition, multiples: int, highest: float, imperfections: Imperfections | None):
         self.spindle, self.nominal, self.multiples = spindle, nominal, multiples
         first = operating_point(spindle, nominal)
+        check_centred(first.state, "a resonance map")
         self.given, self.drawn_from = imperfections, None
         if imperfections is None and first.imperfections == Imperfections():
             self.given, self.drawn_from = drawn(spindle, SEED), SEED

@@ -152,8 +152,9 @@ def excitation(point: OperatingPoint, imperfections: Imperfections | None = None
 
 
 def _unbalance(point: OperatingPoint, own: Imperfections) -> Iterator[tuple[Line, ComplexArray]]:
-    speed = point.condition.speed
-    rows = motion_rows(point.chain, turning_at(point.chain, own.unbalance_z).name, (0.0, 0.0, own.unbalance_z))
+    carrier = turning_at(point.chain, own.unbalance_z)
+    speed = point.condition.speed * carrier.speed_ratio
+    rows = motion_rows(point.chain, carrier.name, (0.0, 0.0, own.unbalance_z))
     if own.unbalance:
         yield unbalance_line(speed), whirling(own.unbalance * np.exp(1j * own.unbalance_phase), speed) @ rows[:2]
     if own.couple_unbalance:  # height times a force towards the phase turns about a quarter turn further

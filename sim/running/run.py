@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from thermospindle.model.errors import BadInput
 from thermospindle.model.rotor.chain import turning_at
-from thermospindle.model.rotor.mjcf import joint_names, spin_dofs
+from thermospindle.model.rotor.mjcf import joint_names, spin_dofs, spin_speeds
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.hammer.test import check_step
 from thermospindle.sim.operating import OperatingPoint
@@ -64,7 +64,7 @@ class SpeedProfile:
 class RunningRecord:
     """A spindle that ran: time (n,) s, angle (n,) rad and speed (n,) rad/s of the turning body, displacement (n, dofs) m, rad.
 
-    Displacements are those of the chain's degrees of freedom from the loaded state, in a frame that does not turn.
+    Angle and speed are the spindle's, of which every turning body has its own ratio. Displacements are those of the chain's degrees of freedom from the loaded state, in a frame that does not turn.
     """
 
     point: OperatingPoint
@@ -129,8 +129,9 @@ def run_spindle(
     spin = np.concatenate(turned, axis=1)[:, late : late + samples]
     time = np.arange(samples) / sample_rate
     return [
-        RunningRecord(run.point, element, time, spin[i, :, 0], spin[i, :, len(run.spins)], position[i][:, run.free])
+        RunningRecord(run.point, element, time, spin[i, :, k] / run.ratios[k], spin[i, :, len(run.spins) + k] / run.ratios[k], position[i][:, run.free])
         for i, run in enumerate(runs)
+        for k in [int(np.abs(run.ratios).argmax())]  # what turns tells how far the spindle has
     ]
 
 
@@ -168,7 +169,9 @@ def running_model(point: OperatingPoint, element: str = "linear", step: float | 
         full = tilted_inertia(np.asarray(body.inertia), product, carrier.name)
         body.inertia = [0.0, 0.0, 0.0]
         body.fullinertia = full
-    return spec.compile()
+    model = spec.compile()
+    model.body_sameframe[model.body(carrier.name).id] = int(mujoco.mjtSameFrame.mjSAMEFRAME_NONE)  # MuJoCo takes an offset below 1 um for none
+    return model
 
 
 def tilted_inertia(inertia: Array, product: complex, name: str) -> list[float]:
@@ -199,6 +202,7 @@ class _Run:
         self.begin = begin - step  # MuJoCo gives states after a step
         self.model = running_model(point, element, step)
         self.spins = spin_dofs(self.model)
+        self.ratios = np.array(list(spin_speeds(point.chain, 1.0).values()))
         names = joint_names(point.chain)
         self.free = [names.index(f"{body}.{move}") for body, move in point.chain.dofs]
         self.excitation = excitation(point)
@@ -217,7 +221,7 @@ class _Run:
         mujoco.mj_resetData(self.model, data)
         data.qpos[self.free] = moved.sum(axis=0).real
         data.qvel[self.free] = (2j * np.pi * forces.frequency[:, None] * moved).sum(axis=0).real
-        data.qpos[self.spins], data.qvel[self.spins] = speed * self.begin, speed
+        data.qpos[self.spins], data.qvel[self.spins] = self.ratios * speed * self.begin, self.ratios * speed
         state = np.empty(mujoco.mj_stateSize(self.model, mujoco.mjtState.mjSTATE_FULLPHYSICS))
         mujoco.mj_getState(self.model, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
         return state
@@ -231,7 +235,7 @@ class _Run:
         else:
             found[:, self.free] = changing_forces(self.driven, self.point.condition.speed, self.profile, start, self.step, steps)
             edges = self.profile.at(start + np.arange(steps + 1) * self.step)
-            found[:, self.spins] = np.diff(edges)[:, None] / self.step * self._spin_inertia()
+            found[:, self.spins] = np.diff(edges)[:, None] / self.step * self.ratios * self._spin_inertia()
         return found
 
     def _spin_inertia(self) -> Array:

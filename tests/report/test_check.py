@@ -189,8 +189,9 @@ def test_shares_of_a_radial_load_add_up(tmp_path: Path, capsys: pytest.CaptureFi
     assert np.sum([b["radial_force_N"] for b in found["bearings"].values()], axis=0) == pytest.approx([300.0, -100.0], rel=1e-6)
     assert main(["check", str(tmp_path)]) == 0
     assert "External radial load 300, -100 N" in capsys.readouterr().out
-    assert main(["runout", str(tmp_path), "--speed", "3000"]) == 2
-    assert "is for centred rings" in capsys.readouterr().err
+    for verb in ("runout", "map"):
+        assert main([verb, str(tmp_path), "--speed", "3000"]) == 2
+        assert "is for centred rings" in capsys.readouterr().err
 
 
 def test_what_moves_freely_and_what_is_constant_is_said(capsys: pytest.CaptureFixture[str]) -> None:
