@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from unicodedata import category
 
 LONGEST = 3000  # letters of a message
 
@@ -42,3 +43,8 @@ def instead(word: str, known: Iterable[str]) -> str:
     part = [name for name in names if word and (name.startswith(word) or word.startswith(name))]
     near = [*part, *get_close_matches(word, names, n=1)]
     return f"did you mean {near[0]}?" if near else f"allowed are {', '.join(names) or 'none'}"
+
+
+def visible(text: str) -> str:
+    """Text of a file as a terminal may show it: what it would obey (escape sequences) is written out."""
+    return "".join(letter if letter in "\n\t" or category(letter) != "Cc" else repr(letter)[1:-1] for letter in text)

@@ -95,6 +95,9 @@ class Point:
     direction: tuple[float, float, float]
 
 
+FAINTEST = 1e-6  # N, peak force of a hammer: squares of far fainter ones are no numbers any more
+
+
 @dataclass(frozen=True)
 class HammerTest:
     """The virtual impact test: hammer, vibrometer, acquisition and windows."""

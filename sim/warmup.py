@@ -35,6 +35,7 @@ TIME_CONSTANTS = 8.0  # of the slowest decay that a warm-up lasts by default: th
 PARTS = 20  # of the time, after each of which progress is told
 STAGES = PARTS + 3
 """How often a warm-up tells of its progress."""
+SHORTEST = 1e-3  # s that a warm-up lasts: in far less, temperatures move by their rounding
 STEPS = 48  # at least, over a warm-up of that length
 
 
@@ -97,8 +98,8 @@ def warm_up(
     BadInput for a spindle without convection or a duration that is not positive; OutsideRange where a law does not reach; NoEquilibrium
     where preload and friction drive each other up without end.
     """
-    if duration is not None and not duration > 0:
-        raise BadInput(f"duration {duration:g} s: a warm-up needs a positive one")
+    if duration is not None and not duration >= SHORTEST:
+        raise BadInput(f"duration {duration:g} s: a warm-up needs a positive one, of {SHORTEST:g} s or more")
     if not spindle.regions or not spindle.ringed:
         lacking = "section" if not spindle.regions else "ball or roller rows between rings of the section"
         raise BadInput(f"{spindle.file or spindle.name}: {lacking}: there are none, and a warm-up needs a section that heat flows through and rows that make it")

@@ -13,6 +13,7 @@ from thermospindle.cli import main
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
+from thermospindle.options import parsers
 from thermospindle.report.folder import MARK
 from thermospindle.sim.campaign.campaign import read_campaign
 from thermospindle.sim.operating import operating_point
@@ -119,14 +120,18 @@ BAD = [
     (["modes", "nowhere"], "no scene there"),
     (["modes", SCENE, "--temperature", "-300"], "below absolute zero"),
     (["modes", SCENE, "--temperature", "warm"], "'warm' is not a number"),
+    (["modes", SCENE, "--temperature", "1_0"], "'1_0' is not a number"),
+    (["modes", SCENE, "--highest", "\u0664"], "'\u0664' is not a number"),
     (["modes", SCENE, "--speed", "nan"], "not a finite number"),
     (["impact", SCENE, "--element", "magic"], "magic"),
     (["impact", SCENE, "--hits", "0"], "count of one or more"),
     (["impact", SCENE, "--level", "-3"], "must be positive"),
+    (["impact", SCENE, "--level", "5e-324"], "must be positive, 1e-06 N or more"),
     (["simulate", SCENE], "needs the campaign folder"),
     (["simulate", SCENE, "--out", SCENE], "is not empty; a campaign is written to a new or empty folder"),
     (["runout", SCENE, "--speed", "0"], "a spindle at rest has no runout"),
     (["warmup", SCENE, "--minutes", "0"], "lasts longer than nothing"),
+    (["warmup", SCENE, "--minutes", "1e-300"], "lasts longer than nothing"),
     (["map", SCENE, "--speed", "0"], "nominal speed of a map must be positive"),
     (["report", SCENE, "--out", SCENE], "did not write"),
     (["diagnose", SCENE, SCENE], "no campaign there"),
@@ -146,6 +151,17 @@ def test_bad_input_is_one_sentence_and_exit_code_2(capsys, arguments, said):
     before = sorted(p.name for p in SCENE.iterdir())
     assert said in refused(capsys, *arguments)
     assert sorted(p.name for p in SCENE.iterdir()) == before
+
+
+def test_no_option_takes_two_dashes_for_its_value(capsys):
+    """Python 3.11 makes an empty list of them, on which every verb ended with a traceback."""
+    every = [(verb, action.option_strings[0]) for verb, known in parsers()[1].items() for action in known._actions if action.option_strings and action.nargs != 0]
+    assert len(every) > 60
+    for verb, option in every:
+        with pytest.raises(SystemExit) as stop:
+            main([verb, str(SCENE), f"{option}=--"])
+        assert stop.value.code == 2
+        assert "'--'" in capsys.readouterr().err, (verb, option)
 
 
 def test_nothing_is_left_of_a_stopped_run(monkeypatch, capsys, short_scene, tmp_path):

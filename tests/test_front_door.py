@@ -3,6 +3,7 @@
 import inspect
 import json
 import os
+import shutil
 import subprocess
 import sys
 from functools import partial
@@ -206,6 +207,24 @@ def test_names_are_no_markup_and_nothing_is_cut_off(capsys, scene, verb):
     assert "…" not in text
     assert max(map(len, text.splitlines())) <= 80
     assert verb[0] in ("modes",) or "[/x]" in text
+
+
+def test_a_terminal_obeys_nothing_of_a_file(capsys, tmp_path, scene):
+    """Escape sequences in a key, a campaign's title, the kind of a mode: written out, not obeyed."""
+    assert main(["modes", str(scene((r"\A", '"a\\\\u001b[31mkey" = 1\n')))]) == 2
+    assert r"a\x1b[31mkey: unknown key" in capsys.readouterr().err
+    shutil.copytree(SCENE / "measured" / "jang_2003", tmp_path / "c")
+    for name, old, new in (("campaign.toml", 'title = "', 'title = "\\u001b]0;x\\u0007'), ("modes.csv", "axial", "ax\x1b[31mial")):
+        file = tmp_path / "c" / name
+        text = file.read_text(encoding="utf-8")
+        assert old in text
+        file.write_text(text.replace(old, new), encoding="utf-8")
+    code = main(["compare", str(SCENE), str(tmp_path / "c"), "--verbose"])
+    told = capsys.readouterr()
+    assert code in (0, 2), told
+    assert "\x1b" not in told.out + told.err
+    assert "\x07" not in told.out + told.err
+    assert r"\x1b" in told.out + told.err
 
 
 def test_a_campaign_folder_may_look_like_markup(capsys, tmp_path, scene):

@@ -13,11 +13,11 @@ os.environ.setdefault("PYTHONSAFEPATH", "1")  # processes that this one starts i
 import json
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from thermospindle.model.errors import BadInput, NoEquilibrium, NotConverged, OutsideRange, Unanswered, instead
+from thermospindle.model.errors import BadInput, NoEquilibrium, NotConverged, OutsideRange, Unanswered, instead, visible
 from thermospindle.options import parsers
 from thermospindle.report.folder import COMMAND
 
@@ -30,7 +30,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return _run(sys.argv[1:] if arguments is None else list(arguments))
     except Unanswered as error:
-        print(f"spindle: {error.head}", *(f"  {k}. {item}" for k, item in enumerate(error.items, 1)), error.tail, sep="\n", file=sys.stderr)
+        lines = f"spindle: {error.head}", *(f"  {k}. {item}" for k, item in enumerate(error.items, 1)), error.tail
+        print(*map(visible, lines), sep="\n", file=sys.stderr)
         return 2
     except (BadInput, OutsideRange, NoEquilibrium, NotConverged) as error:
         return _refused(str(error))
@@ -69,7 +70,7 @@ def _run(arguments: list[str]) -> int:
     finally:
         COMMAND.reset(token)
     for doubt in answer.values["warnings"]:
-        print(f"spindle: warning: {doubt}", file=sys.stderr)
+        print(f"spindle: warning: {visible(doubt)}", file=sys.stderr)
     if as_json:
         print(json.dumps(answer.values))
     else:
@@ -83,8 +84,13 @@ def _run(arguments: list[str]) -> int:
 def _terminal() -> Console:
     """Where results are shown; names of scenes and files may look like markup. Rich's own ends the program with 1 where a pipe is closed."""
     from rich.console import Console
+    from rich.segment import Segment
 
     class Terminal(Console):
+        def render(self, *arguments: Any, **keywords: Any) -> Iterator[Segment]:
+            for part in super().render(*arguments, **keywords):
+                yield part if part.control else part._replace(text=visible(part.text))
+
         def on_broken_pipe(self) -> None:
             raise BrokenPipeError
 
@@ -92,7 +98,7 @@ def _terminal() -> Console:
 
 
 def _refused(why: str) -> int:
-    print(f"spindle: {' '.join(why.split())}", file=sys.stderr)
+    print(f"spindle: {visible(' '.join(why.split()))}", file=sys.stderr)
     return 2
 
 

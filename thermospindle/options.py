@@ -10,6 +10,7 @@ from math import inf, isfinite
 from pathlib import Path
 from typing import Any, NoReturn
 
+from thermospindle.model.files.cells import plain_number
 from thermospindle.model.rotor.elements import ELEMENTS, HAMMER
 from thermospindle.model.shaft import THEORIES
 
@@ -25,6 +26,11 @@ class _Parser(argparse.ArgumentParser):
     def __init__(self, *arguments: Any, **keywords: Any) -> None:
         super().__init__(*arguments, **keywords)
         self._negative_number_matcher = re.compile(r"-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$", re.IGNORECASE)  # argparse's own knows no exponents
+
+    def _get_values(self, action: argparse.Action, arg_strings: list[str]) -> Any:
+        if action.option_strings and "--" in arg_strings:  # `--speed=--`, of which Python 3.11 makes an empty list
+            raise argparse.ArgumentError(action, "'--' is no value")
+        return super()._get_values(action, arg_strings)  # type: ignore[misc]
 
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"spindle: {message}; see {self.prog} --help\n")
@@ -49,7 +55,7 @@ class _Completion(argparse.Action):
 
 def _number(text: str) -> float:
     try:
-        value = float(text)
+        value = float(plain_number(text))
     except ValueError:
         apart = "; several stand apart by spaces" if "," in text else ""
         raise argparse.ArgumentTypeError(f"{text!r} is not a number{apart}") from None

@@ -32,11 +32,11 @@ class BallRow(Table):
     balls: Annotated[int, Field(ge=3, le=1000)]
     ball_diameter_mm: Annotated[float, Field(ge=1e-3, le=1e3)]
     pitch_diameter_mm: Annotated[float, Field(ge=1e-2, le=1e4)]
-    contact_angle_deg: Annotated[float, Field(gt=0, lt=90)] | None = None
+    contact_angle_deg: Annotated[float, Field(ge=1e-3, lt=90)] | None = None
     inner_conformity: Annotated[float, Field(gt=0.5, lt=1)] | None = None
     outer_conformity: Annotated[float, Field(gt=0.5, lt=1)] | None = None
     diametral_clearance_mm: Span | None = None
-    free_contact_angle_deg: Annotated[float, Field(gt=0, lt=90)] | None = None
+    free_contact_angle_deg: Annotated[float, Field(ge=1e-3, lt=90)] | None = None
     catalogue: Catalogue | None = None
     ball_material: str
     ring_material: str

@@ -8,6 +8,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from unicodedata import category
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, Strict, ValidationError, model_validator
@@ -35,7 +36,17 @@ Radius = Annotated[float, Field(ge=0, le=1e4, allow_inf_nan=False)]
 """mm."""
 Temperature = Annotated[float, Field(gt=-273.15, le=5000, allow_inf_nan=False)]
 """C."""
-Name = Annotated[str, Field(min_length=1, max_length=200)]
+
+
+def _one_line(name: str) -> str:
+    if any(category(letter) in ("Cc", "Zl", "Zp") for letter in name):
+        raise ValueError("a name stands on one line, without control characters")
+    return name
+
+
+OneLine = AfterValidator(_one_line)
+"""MJCF and the lines of UFF files know no line breaks."""
+Name = Annotated[str, Field(min_length=1, max_length=200), OneLine]
 
 
 def _rising(span: tuple[float, float]) -> tuple[float, float]:
@@ -132,6 +143,8 @@ def first_error(where: str | Path, raw: Any, form: type[BaseModel], error: Valid
     location = problem["loc"]
     words, value = [], raw
     for part in location:
+        if part == "[key]":  # pydantic's word for a name that is itself wrong
+            continue
         try:
             value = value[part]
         except (KeyError, IndexError, TypeError):

@@ -84,13 +84,13 @@ class Scene(Table):
     reference_temperature_C: Temperature
     nominal_speed_rpm: Annotated[float, Field(ge=1e-3, le=1e8)] | None = None
     temperature_range_C: TemperatureSpan | None = None
-    materials: dict[str, Material] = Field(min_length=1)
+    materials: dict[Name, Material] = Field(min_length=1)
     section: Section = Section()
-    ball_rows: dict[str, BallRow] = Field(default_factory=dict)
-    roller_rows: dict[str, RollerRow] = Field(default_factory=dict)
-    bearings: dict[str, Bearing] = Field(default_factory=dict)
+    ball_rows: dict[Name, BallRow] = Field(default_factory=dict)
+    roller_rows: dict[Name, RollerRow] = Field(default_factory=dict)
+    bearings: dict[Name, Bearing] = Field(default_factory=dict)
     bearing_pair: BearingPair | None = None
-    sets: dict[str, BearingSet] = Field(default_factory=dict)
+    sets: dict[Name, BearingSet] = Field(default_factory=dict)
     ball_inertia: Annotated[float, Field(ge=0, le=1)] | None = None
     axial_load_N: Finite = 0.0
     radial_load_N: Pair = (0.0, 0.0)

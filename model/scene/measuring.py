@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import AfterValidator, Field, model_validator
 
 from thermospindle.model import machine as m
-from thermospindle.model.scene.fields import Band, NotNegative, Position, Positive, Share, Table
+from thermospindle.model.scene.fields import Band, NotNegative, OneLine, Position, Positive, Share, Table
 from thermospindle.model.units import MM
 
 
@@ -20,7 +20,7 @@ def _along_axis(text: str) -> str:
 
 class Point(Table):
     node: Annotated[int, Field(ge=1, le=999_999_999)]  # ten columns of UFF 58
-    name: Annotated[str, Field(min_length=1, max_length=10)]  # UFF 58 entity names hold ten characters
+    name: Annotated[str, Field(min_length=1, max_length=10), OneLine]  # UFF 58 entity names hold ten characters
     body: str
     position_mm: Position
     direction: Annotated[str, AfterValidator(_along_axis)]
@@ -65,7 +65,7 @@ class HammerTest(Table):
     hammer_nodes: list[int] = Field(default_factory=list)
     tip_stiffness_N_per_m: Positive = 6.0e6
     hammer_mass_g: Positive = 2.0
-    level_N: Annotated[float, Field(gt=0, le=1e6)] = 1.0
+    level_N: Annotated[float, Field(ge=m.FAINTEST, le=1e6)] = 1.0
     level_scatter: Share = 0.10
     hits: Annotated[int, Field(ge=1, le=1000)] = 2
     double_hit_probability: Annotated[float, Field(ge=0, le=1)] = 0.0

@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from thermospindle.model.errors import BadInput
-from thermospindle.model.machine import Spindle
+from thermospindle.model.machine import FAINTEST, Spindle
 from thermospindle.report.folder import mark, whole_folder
 from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.effects.known import equipped
@@ -68,8 +68,8 @@ def temperature_or_reference(temperature: float | None, spindle: Spindle) -> flo
 
 def with_hammer(spindle: Spindle, hits: int | None, level: float | None) -> Spindle:
     """The spindle with another number of hits and another peak force (N) of its hammer test, where given."""
-    if level is not None and level <= 0:
-        raise BadInput(f"--level {level:g}: the hammer's peak force must be positive")
+    if level is not None and not level >= FAINTEST:
+        raise BadInput(f"--level {level:g}: the hammer's peak force must be positive, {FAINTEST:g} N or more")
     changes = {key: value for key, value in (("hits", hits), ("level", level)) if value is not None}
     return replace(spindle, hammer=replace(spindle.hammer, **changes))  # type: ignore[arg-type]
 

@@ -29,7 +29,7 @@ from thermospindle.sim.resonance.found import ResonanceMap
 from thermospindle.sim.resonance.map import resonance_map, stages
 from thermospindle.sim.running.runout import looked_at, with_imperfections
 from thermospindle.sim.running.runout import runout as simulated_runout
-from thermospindle.sim.warmup import STAGES, Warmup, warm_up
+from thermospindle.sim.warmup import SHORTEST, STAGES, Warmup, warm_up
 
 STEPS_OF_TEMPERATURE, STEPS_OF_SPEED = 21, 41  # of a resonance map
 
@@ -84,8 +84,8 @@ def warmup(
 ) -> Answer:
     """From a uniform `temperature` (C) at a speed, the scene's nominal one or 0 for a `soak` in air of another temperature; a folder holds CSV, figure and a Rerun log."""
     asked = dict(locals()) | {"verb": "warmup"}
-    if minutes is not None and minutes <= 0:
-        raise BadInput(f"--minutes {minutes:g}: a warm-up lasts longer than nothing; name a positive number")
+    if minutes is not None and minutes * MINUTE < SHORTEST:
+        raise BadInput(f"--minutes {minutes:g}: a warm-up lasts longer than nothing; name a positive number, {SHORTEST / MINUTE:.1g} or more")
     spindle, _ = with_effects(scene, effect_files)
     speed = (0.0 if soak is not None else spindle.nominal_speed) if speed_rpm is None else speed_rpm * RPM
     duration = None if minutes is None else MINUTE * minutes
