@@ -312,10 +312,14 @@ def ring_speeds(spindle: Spindle, b: Bearing | RollerBearing, speed: float) -> t
     return of(b.inner_body), of(b.outer_body)
 
 
+def damping_time(spindle: Spindle, b: Bearing) -> float:
+    """Damping over stiffness of a bearing (s)."""
+    return 2 * b.damping_ratio / (2 * np.pi * spindle.structure.damping_frequency)
+
+
 def bearing_state(spindle: Spindle, b: Bearing, row: BallRow) -> BearingState:
     """What bearing `b` is with its balls as in `row`, centred rings at their loaded position."""
     answer: RowForce = respond(row)
-    zeta, omega = b.damping_ratio, 2 * np.pi * spindle.structure.damping_frequency
     deformation = float(answer.deformation[0])
     # where rings are free to move between their balls, the equilibrium that is found lies at an end of that play, a rounding error within contact
     felt = TOUCHING * b.preload / (b.balls * np.sin(b.contact_angle))
@@ -333,7 +337,7 @@ def bearing_state(spindle: Spindle, b: Bearing, row: BallRow) -> BearingState:
         ball_stiffness=1.5 * row.constant * max(deformation, 0.0) ** 0.5,
         preload=abs(float(answer.force[2])),
         stiffness=stiffness,
-        damping=2 * zeta / omega * stiffness,
+        damping=damping_time(spindle, b) * stiffness,
         row=row,
         in_contact=bool(answer.in_contact.all() and answer.ball_force.min() > felt),
     )

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from thermospindle.model.bearing import ball_row, roller
-from thermospindle.model.bearing.pair import BearingState, PairState, bearing_state
+from thermospindle.model.bearing.pair import BearingState, PairState, damping_time
 from thermospindle.model.bearing.roller import RollerState
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.machine import Spindle
@@ -141,7 +141,6 @@ def _even(tangent: Array) -> Array:
 
 def _displaced(spindle: Spindle, b: BearingState, q: Array) -> BearingState:
     answer = ball_row.respond(b.row, q)
-    centred = bearing_state(spindle, spindle.bearing(b.name), b.row)
     stiffness = _even(answer.tangent)
     share = answer.ball_force / max(float(answer.ball_force.sum()), 1e-300)
     most = int(np.argmax(answer.ball_force))
@@ -154,7 +153,7 @@ def _displaced(spindle: Spindle, b: BearingState, q: Array) -> BearingState:
         ball_stiffness=1.5 * b.row.constant * max(float(answer.deformation[most]), 0.0) ** 0.5,
         preload=abs(float(answer.force[2])),
         stiffness=stiffness,
-        damping=centred.damping[0, 0] / centred.stiffness[0, 0] * stiffness,
+        damping=damping_time(spindle, spindle.bearing(b.name)) * stiffness,
         in_contact=bool(answer.in_contact.any()),
         displacement=tuple(float(x) for x in q),
         radial_force=(float(answer.force[0]), float(answer.force[1])),

@@ -20,6 +20,8 @@ from bokeh.models import CustomJS
 from bokeh.server.server import Server
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
+from tornado.httputil import HTTPServerRequest
+from tornado.routing import Matcher, Rule
 from tornado.web import RequestHandler
 
 from thermospindle.model.errors import BadInput
@@ -36,8 +38,18 @@ REFUSAL = "This address needs the token that `spindle workbench` printed when it
 silence(EMPTY_LAYOUT)  # no effect is added at the beginning
 
 
+class ElsewhereCalled(Matcher):
+    """Requests to a host of another name: of a page elsewhere whose name was turned to this machine (DNS rebinding)."""
+
+    def __init__(self, own: str) -> None:
+        self.own = own
+
+    def match(self, request: HTTPServerRequest) -> dict[str, Any] | None:
+        return None if request.host == self.own else {}
+
+
 class Refused(RequestHandler):
-    """Whatever is not under the token."""
+    """Whatever is not under the token, or not asked of this address."""
 
     def prepare(self) -> None:
         self.set_status(403)
@@ -56,7 +68,9 @@ def server(bench: Bench, out: Path, known: Explanations | None = None, port: int
         )  # fmt: skip
     except OSError as error:
         raise BadInput(f"--port {chosen}: {error.strerror or error}; another port, or none for a free one, is needed") from None
-    made._tornado.wildcard_router.add_rules([(r".*", Refused)])
+    router = made._tornado.wildcard_router
+    router.add_rules([(r".*", Refused), Rule(ElsewhereCalled(f"{LOOPBACK}:{chosen}"), Refused)])
+    router.rules.insert(0, router.rules.pop())
     return made, f"http://{LOOPBACK}:{chosen}/{secret}/"
 
 

@@ -168,6 +168,19 @@ def test_loose_rollers_are_pressed_by_the_load() -> None:
             assert b.stiffness[1, 1] > b.stiffness[0, 0] > 0
 
 
+def test_balls_that_a_load_brings_into_contact_are_damped_as_any() -> None:
+    """Found by `make torture`: rows without contact before the load have no stiffness to take the damping's share from."""
+    file = ROOT / "scenes" / "tailstock" / "spindle.toml"
+    spindle = replace(build(raw_of(file), file), radial_load=(0.0, 7000.0), radial_load_z=0.0)
+    apart = {b.name: replace(reference_motion(spindle.reference_temperature), outer_r=40e-6 * (b.name in {r.name for r in spindle.bearings})) for b in spindle.ringed}
+    before = solve(spindle, Condition(spindle.reference_temperature, 0.0), apart)
+    assert any(not np.any(b.stiffness) for b in before.bearings)
+    for b in loaded(spindle, before).bearings:
+        assert np.all(np.isfinite(b.damping))
+        own = spindle.bearing(b.name).damping_ratio / (np.pi * spindle.structure.damping_frequency)
+        assert b.damping == pytest.approx(own * b.stiffness, rel=1e-12)
+
+
 def test_a_load_that_nothing_bears_is_refused() -> None:
     spindle = rollers()
     free = replace(spindle, roller_bearings=(), linear_bearings=spindle.linear_bearings)

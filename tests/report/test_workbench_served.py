@@ -74,6 +74,16 @@ def test_the_websocket_wants_the_token_and_the_own_origin(served):
     assert upgraded(base + "ws", "null") == 403
 
 
+@pytest.mark.parametrize("host", ["evil.example", "evil.example:{port}", "localhost:{port}", "127.0.0.1", "127.0.0.1:{port}.evil.example", ""])
+def test_another_name_for_this_machine_is_refused(served, host):
+    """A page elsewhere may turn its own name to 127.0.0.1 (DNS rebinding): then the token alone would not do."""
+    port = re.search(r":(\d+)/", served["address"]).group(1)
+    code, text = status(served["address"], Host=host.format(port=port))
+    assert code in (400, 403)
+    assert "Workbench" not in text
+    assert status(served["address"], Host=f"127.0.0.1:{port}")[0] == 200
+
+
 def test_it_listens_on_the_loopback_interface_alone(served):
     """By the kernel's own table of sockets, where there is one."""
     table = Path("/proc/net/tcp")

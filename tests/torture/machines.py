@@ -66,31 +66,92 @@ def at(raw: dict, path: tuple) -> float:
 
 @dataclass(frozen=True)
 class Moved:
-    """A shipped scene with some of its numbers times a factor."""
+    """A shipped scene with some of its numbers times a factor, and other keys put in."""
 
     name: str
     factors: tuple
+    keys: tuple = ()
 
     def __repr__(self) -> str:
-        told = ", ".join(f"{'.'.join(map(str, path))} * {factor!r}" for path, factor in self.factors)
-        return f"Moved({self.name}: {told})"
+        told = [f"{'.'.join(map(str, path))} * {factor!r}" for path, factor in self.factors]
+        told += [f"{'.'.join(path)} = {value!r}" for path, value in self.keys]
+        return f"Moved({self.name}: {', '.join(told)})"
 
     def raw(self) -> dict:
         raw = copy.deepcopy(parsed(self.name))
         for path, factor in self.factors:
             put(raw, path, at(raw, path) * factor)
+        for path, value in self.keys:
+            put(raw, path, copy.deepcopy(value))
         return raw
 
 
 @st.composite
-def moved(draw, names=tuple(FILES)):
-    """Up to a dozen numbers, most of them by little, seldom one by much."""
+def moved(draw, names=tuple(FILES), most=12, of=places):
+    """Up to a dozen numbers, most of them by little, seldom one by much; every other machine loaded, or with sensors of its own."""
     name = draw(st.sampled_from(names))
     little = st.one_of(st.floats(0.97, 1.03), st.floats(0.7, 1.4))
     much = st.sampled_from([0.0, 0.1, 10.0, -1.0, 1e6, 1e-6])
-    paths = draw(st.lists(st.sampled_from(places(name)), max_size=12, unique=True))
+    paths = draw(st.lists(st.sampled_from(of(name)), max_size=most, unique=True))
     factors = [draw(much if draw(st.integers(0, 30)) == 0 else little) for _ in paths]
-    return Moved(name, tuple(zip(paths, factors, strict=True)))
+    keys = draw(st.one_of(st.just(()), loads(name), sensors(name), st.tuples(loads(name), sensors(name)).map(lambda both: both[0] + both[1])))
+    return Moved(name, tuple(zip(paths, factors, strict=True)), keys)
+
+
+def heights(name: str) -> tuple[float, float]:
+    """mm, of the lowest and the highest measuring point."""
+    found = [point["position_mm"][2] for point in parsed(name)["measuring"]["points"]]
+    return min(found), max(found)
+
+
+@st.composite
+def loads(draw, name):
+    """Forces from outside, from a touch to what no bearing bears."""
+    size = draw(st.sampled_from([0.1, 3.0, 30.0, 300.0, 1e4]))
+    force = _f(-size, size)
+    return (("axial_load_N",), draw(force)), (("radial_load_N",), [draw(force), draw(force)]), (("radial_load_z_mm",), draw(_f(*heights(name))))
+
+
+@st.composite
+def sensors(draw, name):
+    """One to eight measuring points where bodies are, in any direction, and one or two of them hit."""
+    own, (low, high) = parsed(name)["measuring"]["points"], heights(name)
+    nodes = draw(st.lists(st.integers(1, 999_999), min_size=1, max_size=8, unique=True))
+    points = []
+    for k, node in enumerate(nodes):
+        place = draw(st.sampled_from(own))
+        x, y, z = place["position_mm"]
+        at = [x, y, draw(st.one_of(st.just(z), _f(low, high)))]
+        direction = draw(st.sampled_from(["+X", "-X", "+Y", "-Y", "+Z", "-Z"]))
+        letter = draw(st.sampled_from("a\u00e9\u2603[$%"))
+        points.append({"node": node, "name": f"{letter}{k}", "body": place["body"], "position_mm": at, "direction": direction})
+    hit = draw(st.lists(st.sampled_from(nodes), min_size=1, max_size=2, unique=True))
+    return (("measuring", "points"), points), (("hammer_test", "hammer_nodes"), hit)
+
+
+WITH_A_SECTION = tuple(name for name in FILES if parsed(name).get("section"))
+
+
+def beside_the_section(name: str) -> tuple:
+    """Numbers that leave the finite elements of its section as they are, which then are computed once."""
+    return tuple(p for p in places(name) if p[0] not in ("section", "materials") and "z_mm" not in p and p[0] != "reference_temperature_C")
+
+
+heated = st.one_of(moved(WITH_A_SECTION, 8, beside_the_section), moved(WITH_A_SECTION, 8, beside_the_section), moved(WITH_A_SECTION, 3))
+"""Machines with a temperature field: two of three on their drawn section, one with any of its numbers moved, whose finite elements take seconds."""
+
+
+@st.composite
+def fields(draw):
+    """A temperature for every region (C), some kelvins about one that is drawn from where the scenes are made for; a function of the spindle."""
+    seed, spread, middle = draw(st.integers(0, 10**6)), draw(st.sampled_from([0.0, 0.5, 5.0, 20.0])), draw(st.one_of(_f(15, 65), _f(-40, 120)))
+
+    def of(spindle):
+        rng = np.random.default_rng(seed)
+        return {g.name: middle + spread * float(rng.standard_normal()) for g in spindle.regions}
+
+    of.__qualname__ = of.__name__ = f"field_{seed}_{middle:g}_{spread:g}"
+    return of
 
 
 def _f(low: float, high: float):

@@ -1,6 +1,7 @@
 """Random machines at random conditions: a result that keeps the laws of mechanics, or a named error."""
 
 import warnings
+from dataclasses import astuple
 from pathlib import Path
 
 import numpy as np
@@ -9,15 +10,16 @@ from hypothesis import example, given, settings
 from scipy.linalg import LinAlgWarning, lapack, lu_factor, lu_solve
 
 from tests.torture.conftest import EXAMPLES, outcome
-from tests.torture.machines import Moved, conditions, expansions, moved, rotors, stub
+from tests.torture.machines import WITH_A_SECTION, Moved, conditions, expansions, fields, heated, moved, rotors, stub
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.modes import modes
 from thermospindle.model.rotor.static import static
 from thermospindle.model.scene.reading import build
 from thermospindle.model.units import RPM
 from thermospindle.sim.operating import operating_point
+from thermospindle.thermal.expansion import expand
 
-SOME = 60
+SOME, ROUGH = 60, 3e-3
 HERE = Path("random") / "spindle.toml"  # serves messages only
 
 
@@ -89,6 +91,17 @@ def checked(raw, condition, expansion=None):
     return spindle, point
 
 
+def finite(motions) -> float:
+    """The largest motion (m) of any ring, which all are finite."""
+    every = np.array([astuple(motion)[:-1] for motion in motions.values()])
+    assert np.all(np.isfinite(every)), "ring motions"
+    return float(np.abs(every).max(initial=0.0))
+
+
+def difference(one, other) -> float:
+    return max((float(np.abs(np.subtract(astuple(one[b])[:-1], astuple(other[b])[:-1])).max()) for b in one), default=0.0)
+
+
 NOTHING_HOLDS_A_TILT = Moved("grinding", ((("structure", "joints", 1, "tilt_stiffness_N_m_per_rad", 0), 0.0),))
 
 TOO_FINE = Moved("mk7702", ((("shafts", 0, "longest_element_mm"), 1e-6),))
@@ -104,10 +117,26 @@ def test_a_machine_keeps_the_laws_or_is_refused(machine, condition, expansion):
 
 
 @pytest.mark.slow
-@settings(max_examples=max(2, EXAMPLES // 20))
-@given(moved(), conditions)
-def test_so_does_one_with_its_own_temperature_field(machine, condition):
+@settings(max_examples=max(2, EXAMPLES // 4))
+@given(heated, fields(), conditions)
+def test_so_does_one_with_its_own_temperature_field(machine, temperatures, condition):
+    """The finite elements to `ROUGH`, which is seven times quicker; what a field does must be what its regions do together."""
     with outcome("machines with a field"):
+        spindle = build(machine.raw(), HERE)
+        field = temperatures(spindle)
+        motions = expand(spindle, field, ROUGH)
+        size = finite(motions)
+        if len(set(field.values())) == 1:
+            soaked = expand(spindle, next(iter(field.values())), ROUGH)
+            assert difference(soaked, motions) <= 1e-9 * size, "a soak is the field that is the same everywhere"
+        checked(machine.raw(), (next(iter(field.values())), condition[1]), lambda spindle: motions)
+
+
+@pytest.mark.slow
+@settings(max_examples=max(2, EXAMPLES // 40))
+@given(moved(WITH_A_SECTION), conditions)
+def test_and_one_soaked_by_the_whole_chain(machine, condition):
+    with outcome("machines soaked"):
         checked(machine.raw(), condition)
 
 
