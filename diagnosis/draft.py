@@ -20,7 +20,7 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.files.formats import DIAGNOSIS, migrated
 from thermospindle.model.types import Array
 
-REFERENCE = 20.0  # C at which laws are told
+REFERENCE = 20.0  # C from which laws count temperature, where a diagnosis does not tell its scene's reference
 LEAST = -0.999  # of what was: nothing falls further
 LARGEST = 1e9  # of any number that is read
 NEAR = 10.0  # criterion within which rivals are named in the file
@@ -39,25 +39,30 @@ class Law:
         return np.broadcast_to(np.asarray(eval(self.expression, {"__builtins__": {}}, names), float), temperature.shape)  # the text is one of ours, above
 
 
-OF_TEMPERATURE = (
-    Law("linear in temperature", "(T - 20) / 40"),
-    Law("exponential in temperature", "exp((T - 20) / scale) - 1", (("scale", "K", 20.0, (3.0, 200.0)),)),
-    Law("Arrhenius", "exp(activation * (1 / 293.15 - 1 / (T + 273.15))) - 1", (("activation", "K", 4000.0, (300.0, 20000.0)),)),
-    Law("sigmoid in temperature", "1 / (1 + exp((middle - T) / width))", (("middle", "C", 40.0, (-40.0, 200.0)), ("width", "K", 4.0, (0.5, 40.0)))),
-    Law("step in temperature", "where(T > middle, 1.0, 0.0)", (("middle", "C", 35.0, (-40.0, 200.0)),)),
-)
-SMOOTH = OF_TEMPERATURE[:4]
+def of_temperature(reference: float) -> tuple[Law, ...]:
+    """Laws that count temperature from a scene's reference (C)."""
+    from_reference, absolute = f"T {'-' if reference >= 0 else '+'} {abs(reference):.6g}", f"{reference + 273.15:.8g}"
+    return (
+        Law("linear in temperature", f"({from_reference}) / 40"),
+        Law("exponential in temperature", f"exp(({from_reference}) / scale) - 1", (("scale", "K", 20.0, (3.0, 200.0)),)),
+        Law("Arrhenius", f"exp(activation * (1 / {absolute} - 1 / (T + 273.15))) - 1", (("activation", "K", 4000.0, (300.0, 20000.0)),)),
+        Law("sigmoid in temperature", "1 / (1 + exp((middle - T) / width))", (("middle", "C", 40.0, (-40.0, 200.0)), ("width", "K", 4.0, (0.5, 40.0)))),
+        Law("step in temperature", "where(T > middle, 1.0, 0.0)", (("middle", "C", 35.0, (-40.0, 200.0)),)),
+    )
+
+
 OF_SPEED = (Law("linear in speed", "n"), Law("power of speed", "n ** power", (("power", "1", 1.0, (0.2, 4.0)),)))
 
 
-def laws(with_temperature: bool, with_speed: bool) -> list[Law]:
-    """The laws that tests at several temperatures, or several speeds, can tell."""
+def laws(with_temperature: bool, with_speed: bool, reference: float = REFERENCE) -> list[Law]:
+    """The laws that tests at several temperatures, or several speeds, can tell; temperature counts from the `reference` (C)."""
     found = [Law("constant", "1.0")]
-    found += OF_TEMPERATURE if with_temperature else ()
+    thermal = of_temperature(reference)
+    found += thermal if with_temperature else ()
     found += OF_SPEED if with_speed else ()
     if with_temperature and with_speed:
-        found += [Law(f"{s.name}, {t.name}", f"({s.expression}) * (1 + {t.expression})", (*s.shape, *t.shape)) for s in OF_SPEED[:1] for t in OF_TEMPERATURE[:3]]
-        found += [Law(f"{t.name} and linear in speed", f"{t.expression} + of_speed * n", (*t.shape, ("of_speed", "1", 0.0, (-20.0, 20.0)))) for t in SMOOTH]
+        found += [Law(f"{s.name}, {t.name}", f"({s.expression}) * (1 + {t.expression})", (*s.shape, *t.shape)) for s in OF_SPEED[:1] for t in thermal[:3]]
+        found += [Law(f"{t.name} and linear in speed", f"{t.expression} + of_speed * n", (*t.shape, ("of_speed", "1", 0.0, (-20.0, 20.0)))) for t in thermal[:4]]
     return found
 
 
@@ -129,7 +134,7 @@ def draft(diagnosis: Path, name: str, element: str | None = None) -> str:
 
     The first element that would have to drift is taken, or `element`. Raises `BadInput` where the file holds none.
     """
-    place = _place(diagnosis, element)
+    place, reference = _place(diagnosis, element)
     unit = place["unit"]
     rows = place["change"]
     temperature, speed, sd = (np.array([float(r[k]) for r in rows]) for k in ("temperature_C", "speed_rpm", "sd"))
@@ -138,16 +143,20 @@ def draft(diagnosis: Path, name: str, element: str | None = None) -> str:
         change, sd = 100 * np.log1p(np.maximum(change, LEAST)), 100 * sd / (1 + np.maximum(change, LEAST))
     top = float(np.max(np.abs(speed))) or 1.0
     share = np.abs(speed) / top
-    candidates = [fit_law(law, temperature, share, change, np.maximum(sd, 1e-9)) for law in laws(np.ptp(temperature) > 1, np.ptp(speed) > 1)]
+    candidates = [fit_law(law, temperature, share, change, np.maximum(sd, 1e-9)) for law in laws(np.ptp(temperature) > 1, np.ptp(speed) > 1, reference)]
     ranked = sorted((c for c in candidates if c is not None), key=lambda c: c.criterion)
     return _text(name, place, ranked, top, unit, diagnosis)
 
 
-def _place(diagnosis: Path, element: str | None) -> Mapping[str, Any]:
+def _place(diagnosis: Path, element: str | None) -> tuple[Mapping[str, Any], float]:
+    """What drifts, and the reference temperature (C) of the scene."""
     if not diagnosis.is_file():
         raise BadInput(f"{diagnosis}: cannot be read: no such file")
     try:
-        places = migrated(DIAGNOSIS, json.loads(diagnosis.read_text(encoding="utf-8")), diagnosis)["where"]
+        told = migrated(DIAGNOSIS, json.loads(diagnosis.read_text(encoding="utf-8")), diagnosis)
+        places, reference = told["where"], float(told.get("reference_temperature_C", REFERENCE))
+        if not -273.15 < reference < LARGEST:
+            raise ValueError
         found = [p for p in places if element is None or p["element"] == element]
         if found:
             unit = found[0]["unit"]
@@ -162,7 +171,7 @@ def _place(diagnosis: Path, element: str | None) -> Mapping[str, Any]:
                     raise ValueError
             if not found[0]["change"] or not all(abs(float(r[key])) <= LARGEST for r in found[0]["change"] for key in keys):
                 raise ValueError
-            return found[0]
+            return found[0], reference
         named = [str(p["element"]) for p in places]
     except OSError as error:
         raise BadInput(f"{diagnosis}: cannot be read: {error.strerror}") from None

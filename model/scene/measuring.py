@@ -57,13 +57,13 @@ def assumed_points(body: str, ends: tuple[float, float], moves: Sequence[str]) -
 
 
 class HammerTest(Table):
-    """Every key has an assumed default: a miniature hammer on the first point, a light tap, a quiet laser vibrometer up to 3 kHz.
+    """Every key has an assumed default: a miniature hammer on the first point, a light tap (0.14 ms, more than a sample), a quiet laser vibrometer up to 3 kHz.
 
     Without `step_us` the program chooses the integration step (`reading.chosen_step`).
     """
 
     hammer_nodes: list[int] = Field(default_factory=list)
-    tip_stiffness_N_per_m: Positive = 6.0e6
+    tip_stiffness_N_per_m: Positive = 1.0e6
     hammer_mass_g: Positive = 2.0
     level_N: Annotated[float, Field(ge=m.FAINTEST, le=1e6)] = 1.0
     level_scatter: Share = 0.10

@@ -250,6 +250,11 @@ def _hammer(found: Looked) -> Iterator[str]:
         yield f"the hammer gives no force above {1.5 / pulse_duration(test):.0f} Hz, and its band goes to {high:g} Hz: a stiffer tip or a lighter hammer is needed"
     elif abs(np.cos(np.pi * x) / (1 - 4 * x**2) if abs(x - 0.5) > 1e-9 else np.pi / 4) < WEAK:
         yield f"at the upper end of its band, {high:g} Hz, the hammer gives less than a tenth of its force at low frequency"
+    if pulse_duration(test) * test.sample_rate < 1:
+        yield (
+            f"the hammer's pulse of {1e6 * pulse_duration(test):.3g} us is shorter than a sample of {1e6 / test.sample_rate:.3g} us: records show its impulse, "
+            f"and a lower peak than its {test.level:g} N; a softer tip or a higher sample_rate_Hz shows it"
+        )
     inside = [m for m in found.reference.modes if low <= m.frequency <= high]
     if not inside:
         yield f"no natural frequency lies within the band of the hammer test, {low:g} to {high:g} Hz"

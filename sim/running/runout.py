@@ -121,10 +121,11 @@ class Runout:
 
 def hub_probes(spindle: Spindle) -> tuple[Probe, Probe, Probe]:
     """Across the axis along x and y, at the side of the turning body's highest region a tenth of its height below the top, and along the
-    axis, at the centre of its top face. Of a flexible shaft that turns at its first measuring point across the axis, or else its lower end."""
+    axis, at the centre of its top face. Of a flexible shaft that turns at the scene's first measuring point across the axis on what turns, a tool
+    say, or else its lower end."""
     shaft = next((s for s in spindle.structure.shafts if s.turns), None)
     if shaft is not None:
-        body, radius, height = _on_shaft(spindle, shaft)
+        body, radius, height = _first_place(spindle, shaft)
         end = height
     else:
         turning = next((b for b in spindle.structure.bodies if b.turns), None)
@@ -143,19 +144,30 @@ def hub_probes(spindle: Spindle) -> tuple[Probe, Probe, Probe]:
 
 def looked_at(spindle: Spindle) -> str:
     """What the first two probes look at, in a word: the turning body, or the measuring point of a flexible shaft."""
-    probe = hub_probes(spindle)[0]
     shaft = next((s for s in spindle.structure.shafts if s.turns), None)
     if shaft is None:
-        return probe.body
-    here = (p.name for p in spindle.points if p.body in shaft.bodies and abs(p.direction[2]) < 0.5 and p.position[2] == probe.position[2])
-    return next(here, f"end of {shaft.name}")
+        return hub_probes(spindle)[0].body
+    first = _first_point(spindle)
+    return f"end of {shaft.name}" if first is None else first.name
 
 
-def _on_shaft(spindle: Spindle, shaft: Shaft, lowest: bool = True) -> tuple[str, float, float]:
-    """Body, radius (m) and height (m) at which a probe looks at a shaft: its first measuring point across the axis, or the end farthest from it."""
-    across = [p for p in spindle.points if p.body in shaft.bodies and abs(p.direction[2]) < 0.5]
-    first = across[0].position[2] if across else shaft.nodes[0]
-    height = first if lowest else max((shaft.nodes[0], shaft.nodes[-1]), key=lambda z: abs(z - first))
+def _first_point(spindle: Spindle) -> Point | None:
+    """The scene's first measuring point across the axis on what turns."""
+    turning = {b.name for b in spindle.structure.bodies if b.turns}
+    return next((p for p in spindle.points if p.body in turning and abs(p.direction[2]) < 0.5), None)
+
+
+def _first_place(spindle: Spindle, shaft: Shaft) -> tuple[str, float, float]:
+    """Body, radius (m) and height (m) of the first measuring point, or of the lower end of a shaft where there is none."""
+    first = _first_point(spindle)
+    if first is None:
+        return _on_shaft(shaft, shaft.nodes[0])
+    own = next((s for s in spindle.structure.shafts if first.body in s.bodies), None)
+    return (first.body, float(np.hypot(*first.position[:2])), first.position[2]) if own is None else _on_shaft(own, first.position[2])
+
+
+def _on_shaft(shaft: Shaft, height: float) -> tuple[str, float, float]:
+    """Body, radius (m) and height (m) at which a probe looks at a shaft."""
     segment = next((g for g in shaft.segments if g.z[0] <= height <= g.z[1]), shaft.segments[-1])
     return shaft.node_at(height), segment.outer[0], height
 
@@ -165,7 +177,8 @@ def second_plane(spindle: Spindle) -> tuple[Probe, Probe]:
     x, y, _ = hub_probes(spindle)
     shaft = next((s for s in spindle.structure.shafts if s.turns), None)
     if shaft is not None:
-        body, radius, height = _on_shaft(spindle, shaft, lowest=False)
+        ends = [(s, z) for s in spindle.structure.shafts if s.turns for z in (s.nodes[0], s.nodes[-1])]
+        body, radius, height = _on_shaft(*max(ends, key=lambda end: abs(end[1] - x.position[2])))
     else:
         own = spindle.structure.body(x.body)
         low = min((spindle.region(name) for name in own.regions), key=lambda g: (g.z[0], -g.r[1]))

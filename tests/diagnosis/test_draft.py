@@ -146,6 +146,20 @@ def test_an_effect_of_the_catalogue_is_drafted_with_the_law_that_the_data_have(s
         draft(answer, "warm")
 
 
+@pytest.mark.parametrize(("told", "counted"), [({"reference_temperature_C": 35.0}, "(T - 35) / 40"), ({"reference_temperature_C": -5.0}, "(T + 5) / 40"), ({}, "(T - 20) / 40")])
+def test_laws_count_temperature_from_the_scenes_reference(told, counted, tmp_path):
+    """What falls in proportion to the distance from there falls by nothing there, so that no constant is left over; older answers count from 20 C."""
+    zero = told.get("reference_temperature_C", 20.0)
+    rows = [{"temperature_C": t, "speed_rpm": 0.0, "relative": np.expm1(-0.002 * (t - zero)), "sd": 0.001} for t in (zero, 28.0, 36.0, 44.0, 52.0, 60.0)]
+    (tmp_path / "d.json").write_text(json.dumps({"where": [{"element": "preload", "unit": "%", "change": rows}], **told}), encoding="utf-8")
+    text = draft(tmp_path / "d.json", "own")
+    assert f"size * ({counted} + constant)" in text
+    (tmp_path / "own.py").write_text(text, encoding="utf-8")
+    constant = effect_of(tmp_path / "own.py").parameters[1]
+    assert constant.name == "constant"
+    assert abs(constant.typical) < 0.05
+
+
 def test_help_says_that_a_draft_is_a_file(capsys):
     with pytest.raises(SystemExit):
         main(["draft", "--help"])

@@ -131,6 +131,7 @@ def test_defaults_are_told(capsys: pytest.CaptureFixture[str]) -> None:
 
 ODD = [
     ("five_bearing", "tip_stiffness_N_per_m = 3.0e7", "tip_stiffness_N_per_m = 3.0e6", "the hammer gives no force above 2615 Hz"),
+    ("five_bearing", "hammer_mass_g = 100.0", "hammer_mass_g = 10.0", "pulse of 57.4 us is shorter than a sample of 80 us"),
     ("five_bearing", "hammer_mass_g = 100.0", "hammer_mass_g = 370.0", "less than a tenth of its force"),
     ("five_bearing", "position_mm = [66.5, 0.0, 36.0]", "position_mm = [80.5, 0.0, 36.0]", "point flange: lies 14 mm off 'spindle'"),
     ("hdd_2003", "position_mm = [12.5, 0.0, 15.0]", "position_mm = [15.5, 0.0, 15.0]", "point hub_side0: lies 3 mm off 'hub'"),

@@ -38,6 +38,7 @@ def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
         "detectable_in": {name: {"parameter": m.size.name, "unit": m.size.unit, "size": size} for name, (m, size) in d.detectable.items()},
         "error": {"before": before, "after": after}
         | {key: _known(getattr(v, key)) for key in ("held_out_before", "held_out_after", "held_out_gain")},
+        "reference_temperature_C": d.spindle.reference_temperature,
         "where": [_place(p, d) for p in _places(d)],
         "next_test": [
             {

@@ -22,6 +22,7 @@ from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
 from thermospindle.report.figures.runout import motion_figure, spectrum_figure, spread
 from thermospindle.report.text.runout import runout_json, runout_section, write_runout
+from thermospindle.report.verbs.starting import new
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.running import runout as running
 from thermospindle.sim.running.lines import fit
@@ -36,6 +37,7 @@ from thermospindle.sim.running.runout import (
     looked_at,
     measured,
     runout,
+    second_plane,
     whole_turns,
     with_imperfections,
 )
@@ -67,6 +69,15 @@ def test_probes_see_the_hub_at_their_places(spindle):
 def test_what_they_look_at_has_a_name_of_the_machine(scene, points, word):
     own = load(scene)
     assert looked_at(own if points is None else replace(own, points=own.points[:points])) == word
+
+
+@pytest.mark.parametrize(("like", "word", "body", "other"), [("machine-tool", "tip", "tool 0", 0.4), ("grinding", "wheel", "wheel", 0.18), ("rotor", "disc", "disc", 0.6)])
+def test_a_tool_is_looked_at_and_not_the_tail(like, word, body, other, tmp_path):
+    new(like, like=like, out=tmp_path / like)
+    own = load(tmp_path / like)
+    x, _, axial = hub_probes(own)
+    assert (looked_at(own), x.body, x.position[2], axial.position[2]) == (word, body, own.points[0].position[2], own.points[0].position[2])
+    assert second_plane(own)[0].position[2] == pytest.approx(other)
 
 
 # ---------------------------------------------------------------- whole records
