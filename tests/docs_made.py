@@ -22,6 +22,7 @@ HOW = {
     "run.png": "spindle run hdd_2003 --out out; rerun out/run.rrd --screenshot-to docs/run.png --window-size 1400x900",
     "runout.png": "spindle runout hdd_2003 --speed 7200 --temperature 40 --out out; rerun out/*.rrd --screenshot-to docs/runout.png --window-size 1400x900",
     "map.png": "spindle map hdd_2003 --speed 7200 --out out; rerun out/map.rrd --screenshot-to docs/map.png --window-size 1400x900",
+    "errors.png": "spindle compare hdd_2003 tests/data/foreign_bond --out out; out/pulls.png",
     "diagnosis.png": "spindle diagnose hdd_2003 tests/data/foreign_bond --out out; out/explanations.png",
     "workbench.png": "python -m tests.report.workbench_picture",
     "growth.png": "ROSS_PYTHON=... EMA_PYTHON=... make growth",

@@ -66,6 +66,15 @@ def test_import_answers_so_too(capsys, tmp_path):
     assert set(json.loads(capsys.readouterr().out)) == {*ANSWERS["import"], "warnings"}
 
 
+def test_every_effect_has_a_picture_of_what_it_does(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(SITE)
+    page = generated.effects(tmp_path)
+    for effect in generated.CATALOGUE:
+        drawn = (tmp_path / f"{effect.name}.svg").read_text(encoding="utf-8")
+        assert drawn.count("<path") > 10, effect.name
+        assert f"]({effect.name}.svg)" in page
+
+
 @pytest.mark.slow
 def test_the_site_builds_without_a_warning(tmp_path):
     pytest.importorskip("sphinx")

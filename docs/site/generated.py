@@ -125,63 +125,26 @@ def _default(field: Mapping[str, Any]) -> str:
 
 
 def effects(folder: Path) -> str:
-    """The catalogue, with a picture of each effect that can be in the paper's spindle: what it does to the natural frequencies."""
-    lines = ["# Effects", "", "What `spindle diagnose` asks about, and `spindle add` puts into a scene. The pictures show the change of the paper's spindle's",
-             "natural frequencies at the effect's typical size, at 20 and 60 °C at rest and at 60 °C and 7200 rpm.", ""]  # fmt: skip
+    """The catalogue, with a picture of each effect: what it does to natural frequencies, to the lines of the runout, or to a measured FRF."""
+    from effect_pictures import picture
+
+    lines = ["# Effects", "", "What `spindle diagnose` asks about, and `spindle add` puts into a scene. Each picture shows what an effect does at its typical size to a spindle",
+             "that it can be in: the paper's `hdd_2003`, or one that has what the effect needs. A parameter of unit 1 is a plain number.", ""]  # fmt: skip
     for effect in CATALOGUE:
-        lines += _effect(effect, _picture(effect, folder))
+        lines += _effect(effect, *picture(effect, folder))
     return "\n".join(lines)
 
 
-def _effect(effect: Effect, picture: str | None) -> list[str]:
+def _effect(effect: Effect, picture: str, caption: str) -> list[str]:
     lines = [f"## {effect.name}", "", f"**{effect.title}.** Equation: `{effect.equation}`", ""]
     lines += [f"One sees: {effect.sees}.", "", f"Valid: {effect.valid}.", ""]
     if effect.resembles:
         lines += ["Easily taken for: " + ", ".join(f"[{n}](#{n})" for n in effect.resembles) + ".", ""]
-    lines += ["| parameter | unit | neutral | typical | prior s.d. | limits | meaning | source |", "|---|---|---|---|---|---|---|---|"]
+    lines += [f"![{caption}]({picture})", "", f"*{caption}.*", "", "| parameter | unit | neutral | typical | prior s.d. | limits | meaning |", "|---|---|---|---|---|---|---|"]
     for p in effect.parameters:
-        cells = (p.name, p.unit, f"{p.neutral:g}", f"{p.typical:g}", f"{p.prior_sd:g}", f"{p.limits[0]:g} to {p.limits[1]:g}", p.meaning, p.source)
+        cells = (p.name, p.unit, f"{p.neutral:g}", f"{p.typical:g}", f"{p.prior_sd:g}", f"{p.limits[0]:g} to {p.limits[1]:g}", p.meaning)
         lines.append("| " + " | ".join(str(c).replace("|", "\\|") for c in cells) + " |")
-    if picture:
-        lines += ["", f"![Change of natural frequencies by {effect.name}]({picture})"]
-    return [*lines, ""]
-
-
-def _picture(effect: Effect, folder: Path) -> str | None:
-    """A chart of relative changes (percent) by mode; None for an effect that is not in this spindle or moves no frequency."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-    import numpy as np
-
-    import thermospindle as ts
-    from thermospindle.model.rotor.chain import matrices
-    from thermospindle.sim.identification.pairing import follow
-
-    spindle = ts.load("hdd_2003")
-    try:
-        changed = ts.add(spindle, effect.name)
-    except ts.BadInput:
-        return None
-    rows = []
-    for temperature, speed in ((20.0, 0.0), (60.0, 0.0), (60.0, 7200.0)):
-        before, after = (ts.point(s, temperature, speed_rpm=speed) for s in (spindle, changed))
-        first, then = ts.modes(before, highest_Hz=6000), after.modes
-        partner = follow(matrices(before.chain).mass, first, then) if len(matrices(before.chain).mass) == len(matrices(after.chain).mass) else range(len(first))
-        rows.append([100 * (then[j].frequency / m.frequency - 1) if j >= 0 else np.nan for m, j in zip(first, partner, strict=False)])
-    if np.nanmax(np.abs(rows)) < 1e-3:
-        return None
-    figure, axes = plt.subplots(figsize=(7, 2.4), layout="constrained")
-    for k, (row, label) in enumerate(zip(rows, ("20 °C", "60 °C", "60 °C, 7200 rpm"), strict=True)):
-        axes.bar(np.arange(1, len(row) + 1) + 0.25 * (k - 1), row, 0.25, label=label, color=("#56b4e9", "#d55e00", "#1b1c1d")[k])
-    axes.axhline(0, color="#5d6268", linewidth=0.8)
-    axes.set_xlabel("mode, in order of frequency")
-    axes.set_ylabel("change, %")
-    axes.legend(frameon=False, ncols=3, fontsize="small")
-    figure.savefig(folder / f"{effect.name}.svg", metadata={"Date": None})
-    plt.close(figure)
-    return f"{effect.name}.svg"
+    return [*lines, "", *(f"- Source of {p.name}: {p.source}" for p in effect.parameters), ""]
 
 
 def command_line() -> str:

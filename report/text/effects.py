@@ -21,11 +21,11 @@ def summary(effect: Effect) -> dict[str, Any]:
 def show_effects(console: Console, catalogue: Sequence[Effect], refused: Mapping[str, str] = {}) -> None:
     """The catalogue as a table; `refused` says of effects by name why they cannot be in a scene."""
     grid = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
-    for column in ("effect", "what it is", "main\nparameter", "typical", "unit"):
-        words = column == "what it is"
-        grid.add_column(column, justify="right" if column == "typical" else "left", no_wrap=not words, overflow="fold")
+    grid.add_column("effect", no_wrap=True)
+    grid.add_column("what it is (main parameter and its typical value)")
     for e in map(summary, catalogue):
-        grid.add_row(e["name"], e["title"], e["parameter"], f"{e['typical']:g}", e["unit"])
+        unit = "" if e["unit"] == "1" else f" {e['unit']}"
+        grid.add_row(e["name"], f"{e['title']} ({e['parameter']} {e['typical']:g}{unit})")
     console.print(grid)
     for name, why in refused.items():
         console.print(f"{name}: {why}", markup=False, highlight=False)
