@@ -90,11 +90,11 @@ def line_data(test: Test, condition: Condition, stated: Noise | None, expected: 
     damped = test.window_decay * record_length(frf) if np.isfinite(record_length(frf)) else 0.0
     damped = damped if windowed(value, damped) else 0.0
     sd, noise_from = _noise(frf, value, use, stated, expected, damped)
+    least = SILENT * float(np.abs(value).max())  # where symmetry forbids an answer there is rounding alone, or nothing
+    sd = np.maximum(sd, least)
     falling = _falls(value, sd, damped, frequency)
     if falling is not None:
         sd = np.maximum(sd, _smooth_sd(value, scatter(value) / np.sqrt(neighbours(damped)), falling))
-    least = SILENT * float(np.abs(value).max())  # where symmetry forbids an answer there is rounding alone
-    sd = np.maximum(sd, least)
     known, blocks = sd if noise_from in KNOWN else None, _blocks(value, sd, damped, gaps)
     seen = _within_blocks(value, blocks, damped, falling)
     if seen is None and len(frequency) > LINES_THAT_SCATTER:  # noise stated too small divides every block to single lines
@@ -233,11 +233,14 @@ def _within_blocks(value: ComplexArray, blocks: list[tuple[int, int]], damped: f
 
 
 def _gamma_fit(columns: Array, seen: Array, freedom: Array, least: tuple[float, float] = USUAL) -> Array:
-    """Shares (c,) >= 0 with `seen` (n,) about columns (n, c) @ shares: squares have errors in proportion to themselves, weighted anew.
+    """Shares (c,) >= 0 with `seen` (n,) about columns (n, c) @ shares: squares have errors in proportion to themselves, weighted anew. None of anything
+    where nothing was seen.
 
     Weights are those of `least` of the mean at least, in the first step and later, and of `TRUSTED` times less than was seen: a step that leaves a
     block next to nothing would make it rule the following one.
     """
+    if not seen.any():
+        return np.zeros(columns.shape[1])
     mean = seen + least[0] * seen.mean()
     for _ in range(6):
         weight = np.sqrt(freedom) / mean

@@ -225,3 +225,24 @@ def test_a_few_lines_are_kept_as_they_are():
     assert (data.raw, data.count) == (3, 36)
     assert np.array_equal(data.value, frf.value[:, :, 1:])
     assert data.noise_from == "the scene's measuring accuracy"
+
+
+@pytest.mark.parametrize("source", ["repeats", "stated", "scatter"])
+@pytest.mark.parametrize("zero", [np.s_[:, 1], np.s_[1, 0]], ids=["reference", "one FRF"])
+def test_an_answer_that_is_exactly_zero_is_silent(zero, source):
+    """As exact symmetry makes it: its noise is the least that is believed, and all other FRFs are as beside noise there."""
+    exact = modal_frf(FREQUENCY[:400])
+    value = noisy(exact, np.random.default_rng(2), NOISE)
+    sd = noise_model(exact, NOISE.of_value, NOISE.of_largest) if source == "repeats" else None
+    value[zero] = 0.0
+    with np.errstate(all="raise"):
+        frf = Frf(FREQUENCY[:400], value, (1, 3, 6), (1, 3), "mobility", sd=sd)
+        data = line_data(Test("a", 20.0, 0.0, frf=frf), Condition(20.0), NOISE if source == "stated" else None, NOISE)
+    silent = np.zeros((3, 2), bool)
+    silent[zero] = True
+    assert not data.value[silent].any()
+    assert np.all(data.sd > 0)
+    left = np.abs((modal_frf(data.frequency) - data.value) / data.sd)[~silent]
+    assert np.sqrt(np.mean(left**2)) == pytest.approx(1.0, abs=0.1)
+    if source == "scatter":
+        assert data.sd[silent].max() < 1e-2 * data.sd[~silent].min()
