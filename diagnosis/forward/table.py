@@ -41,8 +41,9 @@ class Table:
         moved = np.zeros((len(pole), by.count), complex)
         if len(by.of):
             moved[:, by.of] = -np.add.reduceat(pole[:, None] ** by.power * (left @ by.left) * (right.T @ by.right), by.first, axis=1)
-        by_frequency = (moved * pole.conj()[:, None]).real / np.abs(pole[:, None]) ** 2
-        by_damping = moved.real / pole.real[:, None] - by_frequency
+        seen = (pole - self._linear.chain.decay)[:, None]  # under a window, whose decay no parameter moves
+        by_frequency = (moved * seen.conj()).real / np.abs(seen) ** 2
+        by_damping = moved.real / seen.real - by_frequency
         known = np.isfinite(data.damping_sd)
         return np.concatenate([by_frequency / data.frequency_sd[:, None], by_damping[known] / data.damping_sd[known, None]]).T
 

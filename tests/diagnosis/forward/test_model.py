@@ -182,6 +182,18 @@ def test_derivatives_of_mode_tables():
             assert max(worst_by_kind(model, t, x).values()) < 5e-3
 
 
+@pytest.mark.parametrize("decay", [8.0, -3.0])
+def test_derivatives_of_mode_tables_under_a_window(decay):
+    """One that was not corrected, or corrected though there was none, at speed: damping ratios are those seen, a quarter more than the poles' own. Their
+    derivatives were wrong by as much."""
+    window = effect("window_damping")
+    model = model_of(load(SCENES["symmetric"]), mode_campaign(load(SCENES["symmetric"]), CONDITIONS[1:], 3))
+    model = replace(model, present=((window, {p.name: p.neutral for p in window.parameters} | {"decay": decay}),))
+    x = 0.3 * np.random.default_rng(2).standard_normal(len(model.parameters))
+    assert model.linear(0, x, []).chain.decay == decay
+    assert max(worst_by_kind(model, 0, x).values()) < 5e-3
+
+
 @pytest.mark.parametrize(("name", "size", "values"), [("channel_delay", 30.0, {"skew": 0.1}), ("hammer_position", 1.5, {"axis": 0.0, "node": 0.0})])
 def test_column_of_a_measuring_effect(scene, name, size, values):
     """What moves rows, gains or delays: against central differences of the residual itself."""
