@@ -22,6 +22,8 @@ from uuid import uuid4
 import cloudpickle
 from loky import cpu_count, get_reusable_executor
 
+from thermospindle.model.errors import BadInput
+
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
@@ -39,8 +41,11 @@ _inside = False  # this process is a worker
 
 
 def cores() -> int:
-    """Processor cores that this process may use."""
-    return int(cpu_count())
+    """Processor cores that this process may use; `BadInput` where the environment tells loky a number that is none."""
+    try:
+        return int(cpu_count())
+    except ValueError:
+        raise BadInput(f"LOKY_MAX_CPU_COUNT = {os.environ.get('LOKY_MAX_CPU_COUNT')!r}: must be a whole number, of 1 or more, or not set") from None
 
 
 def in_parallel(

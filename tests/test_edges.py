@@ -1,6 +1,8 @@
 """Scenes and files at the edge of what can be computed with: one sentence, exit code 2."""
 
 import os
+import subprocess
+import sys
 import time
 from dataclasses import replace
 from functools import partial
@@ -9,7 +11,7 @@ import numpy as np
 import pytest
 
 from tests.command_line import changed_scene, refused
-from tests.conftest import SCENE
+from tests.conftest import ROOT, SCENE
 from thermospindle.cli import main
 from thermospindle.model.bearing.stiffness_table import read_table
 from thermospindle.model.errors import BadInput
@@ -146,3 +148,18 @@ def test_a_loose_hub_has_no_nan(recwarn):
     assert found
     assert all(m.frequency > 1 and np.isclose(sum(m.energy.values()), 1) for m in found)
     assert not recwarn.list
+
+
+# ---------------------------------------------------------------- surroundings
+
+
+def test_a_number_of_cores_that_is_none_is_refused(capsys, tmp_path, monkeypatch):
+    monkeypatch.setenv("LOKY_MAX_CPU_COUNT", "abc")
+    (tmp_path / "study.toml").write_text('title = "t"\nkind = "monte-carlo"\nscene = "hdd_2003"\ntemperatures_C = [20]\ndraws = 4\nchunk = 1\n', encoding="utf-8")
+    assert "LOKY_MAX_CPU_COUNT = 'abc': must be a whole number" in refused(capsys, "study", tmp_path / "study.toml", "--out", tmp_path / "out")
+
+
+def test_pictures_need_no_backend_of_the_surroundings():
+    code = "import thermospindle.cli, matplotlib; print(matplotlib.get_backend())"
+    done = subprocess.run([sys.executable, "-c", code], env=os.environ | {"MPLBACKEND": "nonsense"}, cwd=ROOT, capture_output=True, text=True)
+    assert done.stdout.strip() == "agg", done.stderr

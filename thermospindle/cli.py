@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: more threads only wait for each other; set before numpy loads
+os.environ["MPLBACKEND"] = "agg"  # pictures go to files; a backend that there is not would end in a traceback
 os.environ.setdefault("PYTHONSAFEPATH", "1")  # processes that this one starts import nothing from the folder one happens to stand in: it may be a stranger's
 
 import json
