@@ -1,6 +1,6 @@
 """Posterior probabilities of explanations from their evidence.
 
-Prior odds are even between nothing missing and something missing; within the catalogue every effect is as likely as another, two at once a quarter
+Prior odds are even between nothing missing and something missing; within the catalogue every effect is as likely as another, and so is every way in which it may act (on which channel, at which bearing); two at once a quarter
 as likely as one, and something that is in no catalogue a seventh. A mechanism of the catalogue has the law assumed or one of the data's own, either
 as likely; where the law assumed does as well as any, no other was fitted, and it counts for both. A free form that changes the same as an effect that does
 as well is that effect.
@@ -58,12 +58,13 @@ def explanations(found: Search, inflation: float) -> tuple[tuple[Candidate, ...]
         len({s.mechanism.name for s in found.screened if s.mechanism.free == free and s.visibility > 0}) or 1 for free in (True, False)
     )
     base = found.base.evidence.ln
-    worth = inflation * coarsening(found.hypotheses[0])
+    worth = inflation * coarsening(likeliest(found))
     known = [h for h in found.hypotheses if _can_be(h)]
     either = frozenset(m.name for h in known for m in h.mechanisms if m.own_law)
     twins = [h for h in known if _is_named(h, known, found.alike, LITTLE * worth)]
     weighed = [h for h in known if h not in twins]
-    rows = [(h, _prior(h, named_count, free_count, either) + (_weighed(h, found.hypotheses) - base) / worth) for h in weighed]
+    ways = _ways(found)
+    rows = [(h, _prior(h, named_count, free_count, either, ways) + (_weighed(h, found.hypotheses) - base) / worth) for h in weighed]
     top = max(w for _, w in rows)
     total = np.log(sum(np.exp(w - top) for _, w in rows)) + top
     every = [_candidate(same_names, base, float(total)) for same_names in _by_names(rows)]
@@ -73,6 +74,11 @@ def explanations(found: Search, inflation: float) -> tuple[tuple[Candidate, ...]
     return tuple(c for c in every if not c.free), tuple(c for c in every if c.free), none
 
 
+def likeliest(found: Search) -> Hypothesis:
+    """The explanation with the most evidence, of those that can be."""
+    return next(h for h in found.hypotheses if _can_be(h))
+
+
 def coarsening(best: Hypothesis) -> float:
     """What ln evidence is divided by where the best explanation itself shows the model to be a little wrong: `COARSE`, or one.
 
@@ -80,7 +86,8 @@ def coarsening(best: Hypothesis) -> float:
     (Miller & Dunson, *J. Am. Statist. Assoc.* 114 (2019) 1113: the coarsened posterior is a power of the likelihood).
     """
     learned = best.evidence.learned
-    wrong = learned.errors > STRAIN or any(learned.sizes.get(kind, 0.0) > 0.0 for kind in (kinds_of.STIFFNESS, kinds_of.DAMPING))
+    constant = any(learned.sizes.get(kind, 0.0) > 0.0 for kind in (kinds_of.STIFFNESS, kinds_of.DAMPING)) or learned.sizes.get(kinds_of.BUILD, 1.0) > 1.0
+    wrong = learned.errors > STRAIN or constant
     return COARSE if wrong else 1.0
 
 
@@ -135,8 +142,18 @@ def _candidate(rows: Sequence[Weighed], base: float, total: float) -> Candidate:
     return Candidate(h, h.names, h.free, h.evidence.ln - base, float(sum(np.exp(w - total) for _, w in rows)), by_law)
 
 
-def _prior(h: Hypothesis, named: int, free: int, either: Collection[str]) -> float:
-    """ln prior probability of one hypothesis: its kind's, shared out evenly, and of effects of which `either` law was fitted that of the one they have."""
+def _ways(found: Search) -> dict[tuple[str, str], int]:
+    """In how many ways each mechanism, with one kind of law, may act and show: of what an effect has to choose from (a channel, a bearing) one was fitted."""
+    seen: dict[tuple[str, str], set] = {}
+    for s in found.screened:
+        if s.visibility > 0:
+            seen.setdefault((s.mechanism.name, s.mechanism.kind), set()).add(tuple(sorted(s.mechanism.choices.items())))
+    return {key: len(choices) for key, choices in seen.items()}
+
+
+def _prior(h: Hypothesis, named: int, free: int, either: Collection[str], ways: Mapping[tuple[str, str], int]) -> float:
+    """ln prior probability of one hypothesis: its kind's, shared out evenly, of effects of which `either` law was fitted that of the one they have, and of each
+    mechanism that of the way in which it acts."""
     frees = sum(m.free for m in h.mechanisms)
     count = len(h.mechanisms)
     if count == 0:
@@ -150,7 +167,7 @@ def _prior(h: Hypothesis, named: int, free: int, either: Collection[str]) -> flo
     else:
         shared = PRIOR["two free"] / max(comb(free, 2), 1) if frees == 2 else PRIOR["one and free"] / (named * free)
     laws = sum(np.log((OWN_LAW if m.own_law else 1.0) / (1 + OWN_LAW)) for m in h.mechanisms if m.name in either)
-    return float(np.log(shared) + laws)
+    return float(np.log(shared) + laws - sum(np.log(ways.get((m.name, m.kind), 1)) for m in h.mechanisms))
 
 
 def beyond_limits(h: Hypothesis) -> bool:

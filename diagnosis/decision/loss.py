@@ -1,7 +1,8 @@
 """The answer with the least expected loss.
 
 In units of a set that holds the truth: a wrong name costs ten times as much and a false alarm twenty times; to say "nothing" of a spindle that lacks
-something five times, as much as a set without the truth in it does beyond its own cost.
+something five times, as much as a set without the truth in it does beyond its own cost; and as much as such a set to say that something else is missing where it
+is an effect of the catalogue.
 """
 
 from __future__ import annotations
@@ -11,9 +12,8 @@ from collections.abc import Mapping, Sequence
 from thermospindle.diagnosis.decision.explanations import Candidate, Names, named_part
 
 WRONG, FALSE_ALARM, MISSED, SET, HALF = 10.0, 20.0, 5.0, 1.0, 3.0
-ENOUGH = 0.95  # posterior probability that a set holds the truth
+ENOUGH = 0.95  # posterior probability that a set holds the truth, where that is in the catalogue
 NEGLIGIBLE = 1e-3  # probability that adds nothing to a set
-LARGEST = 6  # names in a set, beyond which it says little
 MOSTLY = 0.6  # of the ln evidence of an explanation with free drift in it, or of the misfit that changes, that what is named must reach to be the answer
 
 
@@ -48,7 +48,7 @@ def least_loss(
     chosen = list[Candidate]()
     for c in explained:
         held = sum(k.probability for k in chosen)
-        if held >= ENOUGH * something or c.probability < NEGLIGIBLE or len({n for k in chosen for n in named_part(k)}) >= LARGEST:
+        if held >= ENOUGH * sum(k.probability for k in explained) or c.probability < NEGLIGIBLE:
             break
         chosen.append(c)
     names = tuple(dict.fromkeys(n for c in chosen for n in named_part(c)))
@@ -60,7 +60,7 @@ def least_loss(
         losses[key] = FALSE_ALARM * none + SET * share * (1 + 0.1 * max(len(names) - 3, 0)) + HALF * half
         losses[key] += (SET + MISSED) * outside + missed(set(names), SET + MISSED)
         answers[key] = ("ambiguous", names)
-    losses["unexplained"] = FALSE_ALARM * none + SET * 2 * sum(c.probability for c in candidates) + SET * p_beside
+    losses["unexplained"] = FALSE_ALARM * none + (SET + MISSED) * sum(c.probability for c in candidates) + SET * p_beside
     answers["unexplained"] = ("unexplained", ())
     best = min(losses, key=lambda k: losses[k])
     return *answers[best], losses

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from thermospindle.diagnosis.decision.conditions import conditions_of
-from thermospindle.diagnosis.decision.explanations import Names, beyond_limits, named_part
+from thermospindle.diagnosis.decision.explanations import Names, beyond_limits, likeliest, named_part
 from thermospindle.diagnosis.decision.loss import NEGLIGIBLE
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.model import CampaignModel
@@ -16,6 +16,7 @@ from thermospindle.diagnosis.inference.search import Search
 
 UNTOLD = "nothing tried"  # what explains data that are missed grossly
 LEFT = "what is left"  # that changes, and tells of something else
+OFF, NAMED = 2.0, 4  # stated standard deviations from which a tolerance is said to be off, and how many of these are named
 NUMERICS = (1e-4, 0.01)  # drift of frequencies and of damping that two honest programs may differ by
 
 
@@ -24,26 +25,30 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
     if word == "none":
         best = f"; the best effect, {' + '.join(candidates[0].names)}, has a probability of {candidates[0].probability:.1%}" if candidates else ""
         wrong = found.base.evidence.learned.sizes.get(kinds_of.STIFFNESS, 0.0)
-        which = "; one condition cannot tell that from a missing effect" if len(conditions_of(found)) == 1 else ""
+        which = "; one condition cannot tell that from a missing effect" if len(conditions_of(found.model.spindle, found.model.tests)) == 1 else ""
         constant = f", the model's frequencies being constantly wrong by about {wrong:.1g} of each{which}" if wrong > NUMERICS[0] else ""
         return f"Tolerances and measuring errors explain the data: chi2 is {chi2 / n:.2f} a number for {n} numbers{constant}{best}."
     lead = candidates[0] if candidates else None
     if word == "unexplained":
         place = "nothing tried explains them, nor do tolerances and measuring errors: units, points, and noise that the files do not tell come first"
         if free and free[0].names == (LEFT,):
-            left = found.hypotheses[0].fit
+            left = likeliest(found).fit
             of = f" of {np.sqrt(chi2 / n):.1f}" if left.mechanisms else ""
             place = f"the best leaves {np.sqrt(left.chi2 / left.count):.1f} standard errors{of}, and not the same in every test"
         elif free and free[0].hypothesis.mechanisms:
             place = f"{' and '.join(free[0].names)} would have to drift ({free[0].delta_evidence:.0f} in ln evidence)"
             place += _impossible(found, free[0].names)
         elif free and free[0].names != (UNTOLD,):
-            drift = found.base.evidence.learned.sizes[kinds_of.STIFFNESS_DRIFT]
-            place = f"every mode drifts from test to test, by {drift:.1g} of its frequency, more than two honest programs differ by"
+            sizes = found.base.evidence.learned.sizes
+            drifts = [(sizes.get(kinds_of.STIFFNESS_DRIFT, 0.0), NUMERICS[0], "frequency"), (sizes.get(kinds_of.DAMPING_DRIFT, 0.0), NUMERICS[1], "damping")]
+            by = " and ".join(f"by {size:.1g} of its {what}" for size, least, what in drifts if size > least)
+            place = f"every mode drifts from test to test, {by}, more than two honest programs differ by"
         if not free or free[0].names == (UNTOLD,):
             return f"No effect of the catalogue explains the data: {place} (chi2 without effects: {chi2 / n:.2f} a number)."
         rival = f"; the best of the catalogue, {' + '.join(lead.names)}, reaches {lead.delta_evidence:.0f}" if lead else ""
-        return f"No effect of the catalogue explains the data as well as free drift does: {place}{rival} (chi2 without effects: {chi2 / n:.2f} a number)."
+        no_better = not lead or free[0].delta_evidence >= lead.delta_evidence
+        says = "No effect of the catalogue explains the data as well as free drift does" if no_better else "No effect of the catalogue is probable enough beside free drift"
+        return f"{says}: {place}{rival} (chi2 without effects: {chi2 / n:.2f} a number)."
     named = " + ".join(effects)
     checked = ""
     if np.isfinite(after):
@@ -89,6 +94,17 @@ def of_resonances(model: CampaignModel, best: Hypothesis) -> str:
     )
     one = "a light resonance" if len(resonances) == 1 else "light resonances"
     return f" Taken into account: {one} at {told} that the drawing lacks and every test shows, of a table, a fixture or a cable."
+
+
+def of_tolerances(model: CampaignModel, best: Hypothesis) -> str:
+    """What of the drawing is off by more than the scene's tolerances, where these are taken wider than stated."""
+    times = best.evidence.learned.sizes.get(kinds_of.BUILD, 1.0)
+    if times == 1.0:
+        return ""
+    build = [(float(m), q) for m, q in zip(best.evidence.mean, model.parameters, strict=False) if q.kind == kinds_of.BUILD]
+    off = [f"{q.name} by {m * q.sd:+.0%}" for m, q in sorted(build, key=lambda row: -abs(row[0])) if abs(m) > OFF][:NAMED]
+    which = f": {', '.join(off)}" if off else ""
+    return f" The drawing is off by more than its tolerances, which are taken {times:g} times as wide as stated{which}."
 
 
 def of_what_is_left(best: Hypothesis, same: Overlap) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from thermospindle.diagnosis.decision import reason
 from thermospindle.diagnosis.decision.conditions import conditions_of
-from thermospindle.diagnosis.decision.explanations import Candidate, Names, explanations, named_part
+from thermospindle.diagnosis.decision.explanations import Candidate, Names, explanations, likeliest, named_part
 from thermospindle.diagnosis.decision.loss import MOSTLY, least_loss
 from thermospindle.diagnosis.decision.reason import LEFT, NUMERICS, UNTOLD
 from thermospindle.diagnosis.forward import nuisance as kinds_of
@@ -45,26 +45,28 @@ class Verdict:
 
 def decide(found: Search) -> Verdict:
     """The verdict with the least expected loss."""
-    same = overlap(found.model, found.hypotheses[0].fit)
+    best = likeliest(found)
+    same = overlap(found.model, best.fit)
     candidates, free, none = explanations(found, same.inflation)
-    candidates, free, none = _unheld(found, same, candidates, free, none)
+    candidates, free, none = _unheld(found, best, same, candidates, free, none)
     unknown = sum(c.probability for c in free)
     word, effects, losses = least_loss(candidates, none, free, found.alike)
     accepted = _accepted(found, word, effects, candidates, free)
-    groups = conditions_of(found)
+    groups = conditions_of(found.model.spindle, found.model.tests)
     (before, plain), (after, density) = (left_out(found.model, h.fit, h.evidence, groups) for h in (found.base, accepted))
     why = reason.of_verdict(found, word, effects, candidates, free, none, before, after, density - plain)
-    why += reason.of_resonances(found.model, found.hypotheses[0]) + reason.of_what_is_left(found.hypotheses[0], same)
+    why += reason.of_resonances(found.model, best) + reason.of_what_is_left(best, same)
+    why += reason.of_tolerances(found.model, accepted)
     return Verdict(word, effects, why, candidates, free, none, unknown, losses, before, after, density - plain, accepted)
 
 
 def _unheld(
-    found: Search, same: Overlap, candidates: tuple[Candidate, ...], free: tuple[Candidate, ...], none: float
+    found: Search, best: Hypothesis, same: Overlap, candidates: tuple[Candidate, ...], free: tuple[Candidate, ...], none: float
 ) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...], float]:
     """What is only the best of what was tried, with its probability moved to the unknown: nothing missing, where modes drift by more than two honest
     programs differ by, the data are missed grossly, or much is left that is not alike in all tests; effects, where they leave most of what changes."""
     alike = overlap(found.model, found.base.fit)
-    kept = changing(found.base, alike), changing(found.hypotheses[0], same)
+    kept = changing(found.base, alike), changing(best, same)
     gross = found.base.evidence.chi2 > GROSS * found.base.fit.count
     by_chance = SURE * np.sqrt(2 / found.base.fit.count)  # standard deviations of chi2 a number
     changes = len(found.model.tests) > 1 and alike.tests < ALIKE and kept[0] > max(MUCH, by_chance)
@@ -90,8 +92,8 @@ def _adrift(h: Hypothesis) -> bool:
 
 
 def _accepted(found: Search, word: str, effects: Names, candidates: Sequence[Candidate], free: Sequence[Candidate]) -> Hypothesis:
-    """The hypothesis by which errors after the verdict are told: the best that it names."""
+    """The hypothesis by which errors after the verdict are told: the likeliest that holds all that it names, or of a set the likeliest in it."""
     if word in ("none", "unexplained"):
         return found.base
-    there = next((c.hypothesis for c in candidates if set(c.names) <= set(effects)), None)
-    return there or next(c.hypothesis for c in free if set(named_part(c)) == set(effects))
+    whole = (c.hypothesis for c in (*candidates, *free) if set(named_part(c)) == set(effects))
+    return next(whole) if word != "ambiguous" else next(c.hypothesis for c in candidates if set(c.names) <= set(effects))

@@ -5,7 +5,7 @@ About the fit chi2 is a quadratic in all parameters p: c - 2 b p + p A p. For pr
     ln Z(Pi, s) = -c / 2 s^2 + b (A / s^2 + Pi^-1)^-1 b / 2 s^4 - ln det(1 + Pi A / s^2) / 2 - n ln s,
 
 (MacKay, *Neural Computation* 4 (1992) 415, Eq. 2.6). Sizes learned so, each over a short grid: of the model's constant and drifting
-discrepancies in stiffness and damping, of gain drift and of the errors s (at their likeliest: empirical Bayes), and of every mechanism its
+discrepancies in stiffness and damping, of gain drift, of build tolerances and of the errors s (at their likeliest: empirical Bayes), and of every mechanism its
 width and its departure from its law (the mean over the grid). What is quoted is the posterior at the best place.
 """
 
@@ -28,12 +28,15 @@ from thermospindle.diagnosis.inference.prior import Learned, nuisance_root, whit
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
 
+WIDER = {1.0: 0.0, 2.0: -2.0, 4.0: -3.0, 8.0: -4.0}
+"""Prior odds (ln) that a drawing is off by so many times the build tolerances that the scene states, assumed: who states tolerances means them."""
 GRIDS = {
     kinds_of.STIFFNESS: (0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2),  # relative error of a frequency
     kinds_of.DAMPING: (0.0, 0.01, 0.03, 0.1),
     kinds_of.STIFFNESS_DRIFT: (0.0, 3e-5, 1e-4, 3e-4, 1e-3),
     kinds_of.DAMPING_DRIFT: (0.0, 0.01, 0.03),
     kinds_of.DRIFT: (0.0, 3e-4, 1e-3, 3e-3, 1e-2),
+    kinds_of.BUILD: tuple(WIDER),  # last: modes may be off instead
 }
 WIDTHS = (0.5, 1.0, 2.0, 4.0)  # of a size, in its own prior standard deviations
 DEPARTURES = (0.0, 0.1, 0.3, 1.0)  # from a law, of the size
@@ -74,13 +77,14 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = ()) -> Ev
     def each(s: float, sizes: Mapping[str, float]) -> Array:
         """ln evidence of every combination of widths and departures of the mechanisms."""
         scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
-        return marginal(scaled, nuisance_root(model, sizes, fit.moved)).integrated(roots) - fit.count * np.log(s)
+        wider = WIDER[sizes.get(kinds_of.BUILD, 1.0)]
+        return marginal(scaled, nuisance_root(model, sizes, fit.moved)).integrated(roots) - fit.count * np.log(s) + wider
 
     if near:
         values, s, sizes = max(((each(n.errors, n.sizes), n.errors, dict(n.sizes)) for n in near), key=lambda row: _ln_mean(row[0]))
     else:
         scales = [1.0] if fit.temper < 1.0 else [float(s) for s in _error_scales(whole, fit.count)]
-        s, sizes = scales[len(scales) // 2], {kind: 0.0 for kind in grids}
+        s, sizes = scales[len(scales) // 2], {kind: grid[0] for kind, grid in grids.items()}
         values = each(s, sizes)
         for _ in range(SWEEPS):
             before = _ln_mean(values)

@@ -16,13 +16,14 @@ from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array, Integers
 
 REFERENCE = {
+    kinds_of.BUILD: 1.0,
     kinds_of.STIFFNESS: kinds_of.STIFFNESS_SD,
     kinds_of.DAMPING: kinds_of.DAMPING_SD,
     kinds_of.STIFFNESS_DRIFT: kinds_of.STIFFNESS_DRIFT_SD,
     kinds_of.DAMPING_DRIFT: kinds_of.DAMPING_DRIFT_SD,
     kinds_of.DRIFT: kinds_of.DRIFT_SD,
 }
-"""Widths in which nuisances of unknown size are counted."""
+"""Widths in which nuisances of unknown size are counted; build tolerances in those that the scene states."""
 ACTION = 3.0  # times the relative error of frequencies, which what the model says of an effect may be wrong by
 UNMOVED = np.zeros((0, 0, 2, 0))
 """Of a model without effects, and of fits with errors enlarged, which are a place to start from."""
@@ -31,8 +32,8 @@ NOTHING = 1e-4  # of a reference width: what stands for a size of zero where a p
 
 @dataclass(frozen=True)
 class Learned:
-    """What is likeliest: `sizes` of discrepancies and of gain drift by kind of nuisance, the factor of the stated errors; width and departure of
-    every mechanism."""
+    """What is likeliest: `sizes` of discrepancies, of gain drift and of build tolerances by kind of nuisance, the factor of the stated errors; width and
+    departure of every mechanism."""
 
     sizes: Mapping[str, float]
     errors: float
@@ -44,9 +45,10 @@ DRIFTING = (kinds_of.STIFFNESS_DRIFT, kinds_of.DAMPING_DRIFT)
 
 
 def steady(learned: Learned, mechanisms: Sequence[Mechanism] = ()) -> Learned:
-    """What was learned of constant discrepancies and of gains, for a fit of `mechanisms`: how much modes drift is left as it is on paper, so that
-    drift does not take what the mechanisms should explain."""
-    sizes = {kind: max(REFERENCE[kind], learned.sizes[kind]) if kind not in DRIFTING else REFERENCE[kind] for kind in learned.sizes}
+    """What was learned of constant discrepancies and of gains, for a fit of `mechanisms`: how much modes drift, and a drawing is off, is left as it is on
+    paper, so that neither takes what the mechanisms should explain."""
+    on_paper = (*DRIFTING, kinds_of.BUILD)
+    sizes = {kind: max(REFERENCE[kind], learned.sizes[kind]) if kind not in on_paper else REFERENCE[kind] for kind in learned.sizes}
     return as_stated(sizes, mechanisms)
 
 

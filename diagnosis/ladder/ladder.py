@@ -19,10 +19,10 @@ import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.observe import observe
-from thermospindle.diagnosis.decision.conditions import SPREAD
+from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.decision.explanations import Candidate
 from thermospindle.diagnosis.decision.verdict import Verdict
-from thermospindle.diagnosis.forward.model import CampaignModel, TestData
+from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.ladder.fitting import CONSTANT, FREE, Settled, predicted_squares, settled, unseen, without
 from thermospindle.diagnosis.ladder.forms import FORMS
 from thermospindle.diagnosis.ladder.step import MeasuredModes, Step, as_drawn, fitted, measured_modes
@@ -143,7 +143,8 @@ class Fits:
 
 def fits(model: CampaignModel, below: Fits | None = None, effects: Sequence[Effect] = (), leave_out: bool = True) -> Fits:
     """All fits of a model with `effects` beside those of the step `below`; only that to all tests where nothing is to be left out."""
-    groups: list[list[int]] = [[], *(conditions(model.spindle, model.tests) if leave_out else [])]
+    apart = conditions_of(model.spindle, model.tests)
+    groups: list[list[int]] = [[], *(apart if leave_out and len(apart) > 1 else [])]
     before = [None] * len(groups) if below is None else [below.whole, *(row[0] for row in below.partial)]
     (whole, _, _), *rest = in_parallel(partial(_fitted, model, tuple(effects)), list(zip(groups, before, strict=True)))
     return Fits(whole, tuple(rest))
@@ -155,16 +156,6 @@ def _fitted(model: CampaignModel, effects: tuple[Effect, ...], task: tuple[Seque
     found = settled(unseen(model, group), below, effects)
     squares, count = predicted_squares(found, model.tests, group) if group else (0.0, 0)
     return found, squares, count
-
-
-def conditions(spindle: Spindle, tests: Sequence[TestData]) -> list[list[int]]:
-    """Numbers of the tests of every temperature, those within the thermometer's own scatter together; test by test where all are of
-    one, and none of a single test."""
-    temperature = np.array([d.condition.temperature for d in tests])
-    order = np.argsort(temperature, kind="stable")
-    apart = np.diff(temperature[order]) > SPREAD * spindle.tolerances.temperature
-    groups = [group.tolist() for group in np.split(order, np.flatnonzero(apart if apart.any() else ~apart) + 1)]
-    return groups if len(groups) > 1 else []
 
 
 def _check(chosen: Sequence[Effect], present: Sequence[str], spindle: Spindle) -> None:

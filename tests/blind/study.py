@@ -30,7 +30,7 @@ from tests.blind.mechanisms import mechanisms
 from tests.blind.visible import seen, visibility
 from tests.blind.world import Plan, World
 from thermospindle.diagnosis.decision.conditions import conditions_of
-from thermospindle.diagnosis.decision.explanations import coarsening
+from thermospindle.diagnosis.decision.explanations import coarsening, likeliest
 from thermospindle.diagnosis.draft import draft
 from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.inference.evidence import evidence, left_out
@@ -148,7 +148,7 @@ def weighed(found: Diagnosis) -> dict[str, Any]:
     evidence over the model without effects, the largest departure from a law and the names whose law is the data's own; the inflation of the evidence, and
     whether it is coarsened."""
     search, base = found.search, found.search.base.evidence.ln
-    best = search.hypotheses[0]
+    best = likeliest(search)
     return {
         "explanations": [
             [
@@ -176,7 +176,7 @@ def drafted(found: Diagnosis, told: dict[str, Any]) -> list[float]:
         answer.write_text(json.dumps(told), encoding="utf-8")
         file.write_text(draft(answer, "drafted"), encoding="utf-8")
         mechanisms = variants(effect_of(file))
-    model, base, groups = found.search.model, found.search.base, conditions_of(found.search)
+    model, base, groups = found.search.model, found.search.base, conditions_of(found.search.model.spindle, found.search.model.tests)
     fits = []
     for m in mechanisms:
         prior = steady(base.evidence.learned, (m,))

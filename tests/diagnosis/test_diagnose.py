@@ -45,7 +45,7 @@ def test_probabilities_add_up_to_one(nothing_missing):
 
 
 def test_every_test_is_left_out_once(nothing_missing):
-    groups = conditions_of(nothing_missing.search)
+    groups = conditions_of(nothing_missing.search.model.spindle, nothing_missing.search.model.tests)
     tests = nothing_missing.campaign.tests
     assert sorted(t for g in groups for t in g) == list(range(len(tests)))
     assert [{tests[t].temperature for t in g} for g in groups] == [{20.0}, {40.0}, {60.0}]

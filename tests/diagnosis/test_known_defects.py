@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.diagnosis.test_ladder import tables
+from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.forward.nuisance import GAIN, TEMPERATURE
 from thermospindle.diagnosis.forward.rates import rates_of
-from thermospindle.diagnosis.ladder.ladder import conditions
 from thermospindle.diagnosis.verdict import campaign_data
 from thermospindle.model.machine import Law
 
@@ -50,6 +50,6 @@ def test_a_joint_called_gain_is_no_channel(spindle):
 def test_repeats_at_nearly_one_temperature_are_left_out_together(spindle):
     """20.02 and 19.98 C are one condition: a twin left in would predict its twin."""
     model = campaign_data(spindle, tables(spindle, (), (20.02, 60.0, 19.98)))
-    assert conditions(spindle, model.tests) == [[2, 0], [1]]
+    assert conditions_of(spindle, model.tests) == [[2, 0], [1]]
     one = campaign_data(spindle, tables(spindle, (), (20.0, 20.01)))
-    assert conditions(spindle, one.tests) == [[0], [1]]
+    assert conditions_of(spindle, one.tests) == [[0, 1]]

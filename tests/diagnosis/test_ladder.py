@@ -12,11 +12,12 @@ from rerun.chunk import RrdReader
 
 from tests.conftest import SCENE
 from thermospindle.cli import main
+from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.decision.explanations import Candidate
 from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.ladder.fitting import FREE, predicted_squares, settled, unseen, without
 from thermospindle.diagnosis.ladder.forms import FORMS
-from thermospindle.diagnosis.ladder.ladder import CLEAR, DISCREPANCY, TOLERANCES, conditions, ladder, named_by
+from thermospindle.diagnosis.ladder.ladder import CLEAR, DISCREPANCY, TOLERANCES, ladder, named_by
 from thermospindle.diagnosis.ladder.step import as_drawn
 from thermospindle.diagnosis.prediction.next_test import ModePrediction, NextTest
 from thermospindle.diagnosis.verdict import campaign_data
@@ -132,7 +133,7 @@ def test_a_temperature_left_out_is_not_in_the_fit_that_predicts_it(spindle):
     found = []
     for campaign in (plain, wrong):
         model = without(campaign_data(spindle, campaign), FREE)
-        assert conditions(spindle, model.tests) == [[0], [1]]
+        assert conditions_of(spindle, model.tests) == [[0], [1]]
         blind = settled(unseen(model, [1]))
         found.append((blind.fit.point, *predicted_squares(blind, model.tests, [1])))
     assert np.array_equal(found[0][0], found[1][0])

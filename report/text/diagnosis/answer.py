@@ -210,4 +210,5 @@ LEARNED = {
     kinds_of.STIFFNESS_DRIFT: "frequency_discrepancy_drift",
     kinds_of.DAMPING_DRIFT: "damping_discrepancy_drift",
     kinds_of.DRIFT: "gain_drift",
+    kinds_of.BUILD: "build_tolerances_times",
 }

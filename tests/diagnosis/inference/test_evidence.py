@@ -26,7 +26,7 @@ from thermospindle.diagnosis.forward.nuisance import (
     TEMPERATURE,
     Nuisance,
 )
-from thermospindle.diagnosis.inference.evidence import WIDTHS, Learned, amplitudes_apart, evidence, left_out
+from thermospindle.diagnosis.inference.evidence import GRIDS, WIDER, WIDTHS, Learned, amplitudes_apart, evidence, left_out
 from thermospindle.diagnosis.inference.fit import Fit, Held
 from thermospindle.diagnosis.inference.gaussian import Quadratic, marginal
 from thermospindle.diagnosis.inference.prior import ACTION, Root, misjudged, nuisance_variances, precision_and_variances, whole_root
@@ -65,9 +65,9 @@ class Toy:
 
 def toy(
     seed: int, stiffness: float, hidden: float | tuple[float, ...] | None = None, limits=(-50.0, 50.0), rows: int = 40, errors: float = 1.0,
-    confused: tuple[float, ...] = (0.0, 0.0, 0.0),
+    confused: tuple[float, ...] = (0.0, 0.0, 0.0), build: float = 1.0,
 ) -> Toy:
-    """Data drawn with a discrepancy of the size `stiffness`, and, with a mechanism in the fit, a `hidden` size in every test, of which the first
+    """Data drawn with a discrepancy of the size `stiffness`, build tolerances `build` times those stated, and, with a mechanism in the fit, a `hidden` size in every test, of which the first
     tolerance cannot be told from `confused` times its change."""
     random = np.random.default_rng(seed)
     parameters = [Nuisance(BUILD, f"b{i}", 0.01) for i in range(3)] + [Nuisance(STIFFNESS, f"k{i}", STIFFNESS_SD, modes=(i, i)) for i in range(8)]
@@ -79,7 +79,8 @@ def toy(
         mechanisms = (Mechanism(Effect("toy", "", "", (size,), "", (), ""), {}, ()),)
         roots = (np.linalg.cholesky(size_covariance(CONDITIONS, REFERENCE_WIDTH * size.prior_sd, REFERENCE_DEPARTURE)),)
     n = len(parameters)
-    p = np.array([stiffness / STIFFNESS_SD if q.kind == STIFFNESS else 1.0 if q.kind in (BUILD, TEMPERATURE) else 0.0 for q in parameters])
+    sizes = {STIFFNESS: stiffness / STIFFNESS_SD, BUILD: build, TEMPERATURE: 1.0}
+    p = np.array([sizes.get(q.kind, 0.0) for q in parameters])
     p = np.concatenate([p * random.standard_normal(n), *([np.linalg.solve(r, np.full(3, np.array(hidden) - 1.0)) for r in roots])])
     own_of_test = np.array([q.test is None for q in parameters])
     jacobians, y = [], []
@@ -209,6 +210,19 @@ def test_errors_larger_than_stated_are_learned():
         assert evidence(fine.model, fine.fit).learned.errors < 1.1
 
 
+@pytest.mark.parametrize(("build", "times"), [(1.0, {1.0}), (10.0, {4.0, 8.0})])
+def test_tolerances_wider_than_stated_are_learned(build, times):
+    """And cost their prior odds beside the integral with as wide a prior."""
+    for seed in range(5):
+        made = toy(seed, 0.0, rows=200, build=build)
+        found = evidence(made.model, made.fit)
+        assert found.learned.sizes[BUILD] in times
+        prior = made.prior(*(found.learned.sizes[k] for k in (STIFFNESS, DAMPING, DRIFT)))
+        own = [q.kind == BUILD for q in made.model.parameters]
+        prior[own, own] *= found.learned.sizes[BUILD] ** 2
+        assert found.ln == pytest.approx(made.ln(prior, found.learned.errors) + WIDER[found.learned.sizes[BUILD]], abs=1e-6)
+
+
 def test_a_size_of_one_sign_has_half_a_prior():
     """Twice the probability of the sign that limits allow: for a size well on that side ln 2, on the other far less than nothing."""
     free, bound = toy(4, 0.0, hidden=1.6), toy(4, 0.0, hidden=1.6, limits=(1.0, 50.0))
@@ -218,8 +232,9 @@ def test_a_size_of_one_sign_has_half_a_prior():
     assert evidence(wrong.model, wrong.fit).ln - evidence(other.model, other.fit).ln < norm.logcdf(-5)
 
 
-def test_sizes_that_depart_from_their_law_keep_the_sign_that_all_have():
+def test_sizes_that_depart_from_their_law_keep_the_sign_that_all_have(monkeypatch):
     """Errors that all sizes share weigh them against each other: the mean of least variance of 1.8, 3.4 and 1.7 is then less than 1."""
+    monkeypatch.setitem(GRIDS, BUILD, (1.0,))  # the tolerance as stated, which could take all of it
     sizes = {"hidden": (1.8, 3.4, 1.7), "confused": (0.3, 0.6, 0.3), "rows": 400}
     free, bound = toy(6, 0.0, **sizes), toy(6, 0.0, **sizes, limits=(1.0, 50.0))
     found = evidence(free.model, free.fit)

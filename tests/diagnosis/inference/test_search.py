@@ -10,7 +10,7 @@ import pytest
 from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, virtual_campaign
 from thermospindle.diagnosis.decision.verdict import decide
 from thermospindle.diagnosis.forward.mechanism import asked_at, variants
-from thermospindle.diagnosis.forward.nuisance import STIFFNESS
+from thermospindle.diagnosis.forward.nuisance import BUILD, STIFFNESS
 from thermospindle.diagnosis.inference import hypothesis
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
@@ -23,6 +23,7 @@ from thermospindle.diagnosis.inference.screening import screen
 from thermospindle.diagnosis.inference.search import search
 from thermospindle.diagnosis.inference.singles import HIDING, cost_of, fit_singles, lasting
 from thermospindle.model.machine import Condition
+from thermospindle.model.tolerance import deviated
 from thermospindle.model.units import RPM
 
 TESTS = (Condition(20.0), Condition(40.0), Condition(60.0))
@@ -118,6 +119,19 @@ def test_two_constant_causes_of_which_neither_is_found_alone(spindle, tests):
     assert sizes["mount_compliance"] == pytest.approx(0.3, abs=0.03)
 
 
+def test_a_drawing_that_is_off_is_no_missing_effect(spindle):
+    """Three stiffnesses a tenth off and the preload by an eighth, four to eight times their tolerances, and nothing hidden."""
+    off = {"mount axial stiffness": 0.125, "flange lateral stiffness": -0.107, "flange tilt stiffness": 0.094, "preload": -0.12}
+    conditions = [Condition(t, n * RPM) for t, n in ((20.0, 0.0), (40.0, 0.0), (60.0, 0.0), (60.0, 7200.0))]
+    model = model_of(spindle, mode_campaign(deviated(spindle, off), conditions, 3, []))
+    named = [m for name in ("clearance_opening", "mount_compliance", "ring_growth") for m in variants(effect(name))]
+    found = search(model, named, [f for f in free_forms(spindle) if f.name == "preload"], workers=1)
+    v = decide(found)
+    assert v.word == "none"
+    assert found.base.evidence.learned.sizes[BUILD] > 1.0
+    assert "The drawing is off by more than its tolerances" in v.reason
+
+
 def test_an_effect_is_found_where_its_law_gives_nothing(spindle):
     """The turning part is warmer by a law of temperature, at rest too, where no friction heats it. Its formula's law explains little of that; a law of the
     data's own all, and reads it off: nothing at 20 C, then in proportion."""
@@ -135,6 +149,6 @@ def test_an_effect_is_found_where_its_law_gives_nothing(spindle):
     v = decide(found)
     assert (v.word, v.effects) == ("identified", ("thermal_gradient",))
     assert v.candidates[0].own_laws == ("thermal_gradient",)
-    assert v.accepted.evidence.ln > by_law + 20
+    assert v.accepted.evidence.ln > by_law + 10
     assert v.accepted.evidence.sizes[0] == pytest.approx([0.0, 2.0, 4.0, 4.0], abs=0.8)
     assert "with a law of the data's own" in v.reason
