@@ -15,6 +15,10 @@ def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
     return replace(spindle, ball_inertia=own + share * (1 - own))
 
 
+def idle(spindle: Spindle) -> str | None:
+    return "its balls have all of their inertia already" if spindle.ball_inertia == 1.0 else None
+
+
 EFFECT = Effect(
     name="ball_inertia",
     title="Centrifugal force and gyroscopic moment of the balls",
@@ -39,4 +43,5 @@ EFFECT = Effect(
     valid="rolling without gross slip under outer-race control; loaded balls",
     spindle=spindle,
     acts_on=(ROWS,),
+    idle=idle,
 )

@@ -51,6 +51,14 @@ def mixture(name: str, own: Material, share: float) -> Material:
     )
 
 
+def idle(spindle: Spindle) -> str | None:
+    """Of ceramic are balls that are as stiff and as light as it is, to a tenth."""
+    balls = [spindle.materials[b.ball_material] for b in spindle.bearings]
+    stiff = CERAMIC.youngs_modulus(spindle.reference_temperature)
+    alike = (abs(m.density / CERAMIC.density - 1) < 0.1 and abs(m.youngs_modulus(spindle.reference_temperature) / stiff - 1) < 0.1 for m in balls)
+    return "its balls are ceramic already" if all(alike) else None
+
+
 EFFECT = Effect(
     name="ball_material",
     title="Ceramic (silicon nitride) balls instead of steel",
@@ -81,4 +89,5 @@ EFFECT = Effect(
     valid="mounted to the drawing's preload and loaded contact angle; shares between 0 and 1 only bridge the two materials",
     spindle=spindle,
     acts_on=(ROWS,),
+    idle=idle,
 )

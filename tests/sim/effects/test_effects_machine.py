@@ -181,10 +181,15 @@ def test_a_spindle_without_hub_expands_in_its_housing(machine):
         ("housing_flexibility", "mk7702", None),  # a rigid housing, which the ground stands for
         ("seat_clearance", "mk7702", None),
         ("shear", "mk7702", "nothing to act on here: its flexible shafts shear already"),
+        ("ball_inertia", "five_bearing", "nothing to act on here: its balls have all of their inertia already"),
+        ("ball_inertia", "hdd_2003", None),
+        ("ball_material", "five_bearing", None),
+        ("ball_material", "templates/grinding", "nothing to act on here: its balls are ceramic already"),
         ("taper_contact", "five_bearing", "nothing to act on here: the scene has no joint with role 'holder'"),
         ("shaft_bending", "five_bearing", "outside its validity here"),
     ],
 )
 def test_an_effect_says_where_it_has_nothing_to_act_on(name, scene, words):
-    found = refusal(by_name(name), load(ROOT / "scenes" / scene))
+    file = ROOT / "scenes" / scene
+    found = refusal(by_name(name), load(file if file.is_dir() else file.with_suffix(".toml")))
     assert found is None if words is None else words in found
