@@ -19,7 +19,7 @@ from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
 from thermospindle.diagnosis.inference.pairs import joined_early
 from thermospindle.diagnosis.inference.prior import DRIFTING, steady, undrifted
 from thermospindle.diagnosis.inference.problem import Problem
-from thermospindle.diagnosis.inference.screening import screen
+from thermospindle.diagnosis.inference.screening import linearised, screen
 from thermospindle.diagnosis.inference.search import search
 from thermospindle.diagnosis.inference.singles import HIDING, cost_of, fit_singles, lasting
 from thermospindle.model.machine import Condition
@@ -73,6 +73,9 @@ def test_a_promise_is_over_the_model_without_it_at_the_same_place(spindle):
     late = replace(about, gradient=about.gradient + 10.0, information=1.1 * about.information)
     fresh, old = (screen(model, at, 1.0, learned, [mechanism], 1, turned=False)[0].gain for at in (about, late))
     assert old == pytest.approx(fresh, abs=1e-6)
+    at = np.append(about.point, np.zeros(2))
+    one, other = (replace(about, mechanisms=(m,), point=at) for m in free_forms(spindle)[:2])  # at the very same parameters
+    assert np.abs(linearised(model, one).information - linearised(model, other).information).max() > 1.0
 
 
 def test_a_mass_that_strained_tolerances_hide_is_found(spindle):
