@@ -1,8 +1,9 @@
 """From drift to an effect of one's own: what a free form found, as the simplest law of physics that fits it, written as an effect file.
 
 Laws over temperature T and speed n: none, linear, exponential, Arrhenius, sigmoid, step; and a power of speed, alone, times one of these or beside it.
-Each is fitted to the drift of one element in every test, with a constant beside it, weighted by its standard errors; the Bayesian
-information criterion chooses (Schwarz, *Ann. Statist.* 6 (1978) 461).
+Each is fitted to the drift of one element in every test, with an offset beside it, weighted by its standard errors; the Bayesian information criterion
+chooses (Schwarz, *Ann. Statist.* 6 (1978) 461). A law with as many parameters as tests fits whatever they are: it is taken where chi2 rules all others out, and
+the file says that it is not tested.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
+from scipy.stats import chi2
 
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.formats import DIAGNOSIS, migrated
@@ -23,7 +25,14 @@ from thermospindle.model.types import Array
 REFERENCE = 20.0  # C from which laws count temperature, where a diagnosis does not tell its scene's reference
 LEAST = -0.999  # of what was: nothing falls further
 LARGEST = 1e9  # of any number that is read
+LIMIT = 400.0  # of sizes in their unit, at least
 NEAR = 10.0  # criterion within which rivals are named in the file
+REFUTED = 1e-3  # chance of a chi2 as large, below which a law is ruled out
+
+
+SCALE = ("scale", "K", 20.0, (3.0, 200.0))
+ACTIVATION = ("activation", "K", 4000.0, (300.0, 20000.0))
+KELVIN = 273.15
 
 
 @dataclass(frozen=True)
@@ -39,48 +48,81 @@ class Law:
         return np.broadcast_to(np.asarray(eval(self.expression, {"__builtins__": {}}, names), float), temperature.shape)  # the text is one of ours, above
 
 
-def of_temperature(reference: float) -> tuple[Law, ...]:
-    """Laws that count temperature from a scene's reference (C)."""
-    from_reference, absolute = f"T {'-' if reference >= 0 else '+'} {abs(reference):.6g}", f"{reference + 273.15:.8g}"
+def of_temperature(reference: float, hottest: float) -> tuple[Law, ...]:
+    """Laws that count temperature from a scene's reference (C); the steep ones are 1 at the hottest test (C), so that their sizes are what was seen there."""
+    from_reference, from_hottest = _less(reference), _less(hottest)
+    cold, hot = f"{reference + KELVIN:.8g}", f"{hottest + KELVIN:.8g}"
+    exponential, arrhenius = f"exp(({reference - hottest:.6g}) / scale)", f"exp(activation * (1 / {hot} - 1 / {cold}))"
     return (
         Law("linear in temperature", f"({from_reference}) / 40"),
-        Law("exponential in temperature", f"exp(({from_reference}) / scale) - 1", (("scale", "K", 20.0, (3.0, 200.0)),)),
-        Law("Arrhenius", f"exp(activation * (1 / {absolute} - 1 / (T + 273.15))) - 1", (("activation", "K", 4000.0, (300.0, 20000.0)),)),
+        Law("exponential in temperature", f"(exp(({from_hottest}) / scale) - {exponential}) / (1 - {exponential})", (SCALE,)),
+        Law("Arrhenius", f"(exp(activation * (1 / {hot} - 1 / (T + 273.15))) - {arrhenius}) / (1 - {arrhenius})", (ACTIVATION,)),
         Law("sigmoid in temperature", "1 / (1 + exp((middle - T) / width))", (("middle", "C", 40.0, (-40.0, 200.0)), ("width", "K", 4.0, (0.5, 40.0)))),
         Law("step in temperature", "where(T > middle, 1.0, 0.0)", (("middle", "C", 35.0, (-40.0, 200.0)),)),
     )
 
 
+def of_both(reference: float, hottest: float) -> tuple[Law, ...]:
+    """Laws linear in speed whose slope grows with temperature."""
+    return (
+        Law("linear in speed, linear in temperature", f"n * (1 + ({_less(reference)}) / 40)"),
+        Law("linear in speed, exponential in temperature", f"n * exp(({_less(hottest)}) / scale)", (SCALE,)),
+        Law("linear in speed, Arrhenius", f"n * exp(activation * (1 / {hottest + KELVIN:.8g} - 1 / (T + 273.15)))", (ACTIVATION,)),
+    )
+
+
+def _less(temperature: float) -> str:
+    return f"T {'-' if temperature >= 0 else '+'} {abs(temperature):.6g}"
+
+
 OF_SPEED = (Law("linear in speed", "n"), Law("power of speed", "n ** power", (("power", "1", 1.0, (0.2, 4.0)),)))
 
 
-def laws(with_temperature: bool, with_speed: bool, reference: float = REFERENCE) -> list[Law]:
-    """The laws that tests at several temperatures, or several speeds, can tell; temperature counts from the `reference` (C)."""
+def laws(temperature: Array, share: Array, reference: float = REFERENCE) -> list[Law]:
+    """The laws that tests at temperatures (n,) C and shares (n,) of the highest speed can tell; temperature counts from the `reference` (C)."""
     found = [Law("constant", "1.0")]
-    thermal = of_temperature(reference)
-    found += thermal if with_temperature else ()
-    found += OF_SPEED if with_speed else ()
-    if with_temperature and with_speed:
-        found += [Law(f"{s.name}, {t.name}", f"({s.expression}) * (1 + {t.expression})", (*s.shape, *t.shape)) for s in OF_SPEED[:1] for t in thermal[:3]]
+    hottest = float(temperature.max() if abs(temperature.max() - reference) > 1 else temperature.min())  # a law from the reference is nothing there
+    thermal = of_temperature(reference, hottest) if np.ptp(temperature) > 1 else ()
+    speed = OF_SPEED if np.ptp(share) > 0 else ()
+    found += [*thermal, *speed]
+    if thermal and speed:
+        found += of_both(reference, hottest)
         found += [Law(f"{t.name} and linear in speed", f"{t.expression} + of_speed * n", (*t.shape, ("of_speed", "1", 0.0, (-20.0, 20.0)))) for t in thermal[:4]]
     return found
 
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A law fitted: `size`, `offset` (0 for the constant law) and shape values with standard errors; the criterion, smaller is better."""
+    """A law fitted: `size`, `offset` (0 for the constant law) and shape values with standard errors; chi2 in how many `tests`, and the number of parameters."""
 
     law: Law
     values: Array  # size, offset, shape...
     sd: Array
-    criterion: float
+    chi2: float
+    tests: int
+    count: int
+
+    @property
+    def criterion(self) -> float:
+        """The Bayesian information criterion; smaller is better."""
+        return self.chi2 + self.count * float(np.log(self.tests))
+
+    @property
+    def refuted(self) -> bool:
+        """By chi2; with as many parameters as tests nothing is tested, and that counts as refuted too."""
+        freedom = self.tests - self.count
+        return freedom == 0 or bool(chi2.sf(self.chi2, freedom) < REFUTED)
+
+
+def has_offset(law: Law) -> bool:
+    return law.expression != "1.0"
 
 
 def fit_law(law: Law, temperature: Array, share: Array, change: Array, sd: Array) -> Fitted | None:
     """Least squares in size, offset and shape, the first two linear; None where there are more parameters than tests."""
-    offset = law.expression != "1.0"
+    offset = has_offset(law)
     count = 1 + offset + len(law.shape)
-    if count >= len(change) + (not offset):
+    if count > len(change):
         return None
     best: Fitted | None = None
     for begin in _starts(law, temperature):
@@ -96,11 +138,17 @@ def fit_law(law: Law, temperature: Array, share: Array, change: Array, sd: Array
         if law.shape and law.name != "step in temperature":
             shape = least_squares(lambda v: linear(v)[1], begin, bounds=(low, high)).x
         amplitude, residual = linear(shape)
-        criterion = float(residual @ residual) + count * np.log(len(change))
-        if best is None or criterion < best.criterion:
+        squares = float(residual @ residual)
+        if best is None or squares < best.chi2:
             values = np.concatenate([amplitude, np.zeros(int(not offset)), shape])
-            best = Fitted(law, values, _errors(law, values, offset, temperature, share, sd), criterion)
+            best = Fitted(law, values, _errors(law, values, offset, temperature, share, sd), squares, len(change), count)
     return best
+
+
+def ranked(found: Sequence[Fitted]) -> list[Fitted]:
+    """By the criterion, the best first; laws with as many parameters as tests, which fit whatever the tests are, only where all others are refuted."""
+    tested = [f for f in found if f.count < f.tests]
+    return sorted(found if all(f.refuted for f in tested) else tested, key=lambda f: f.criterion)
 
 
 def _starts(law: Law, temperature: Array) -> list[Array]:
@@ -132,7 +180,7 @@ def _errors(law: Law, values: Array, offset: bool, temperature: Array, share: Ar
 def draft(diagnosis: Path, name: str, element: str | None = None) -> str:
     """The text of an effect file called `name` from the free-form answer in an answer of `spindle diagnose --json`.
 
-    The first element that would have to drift is taken, or `element`. Raises `BadInput` where the file holds none.
+    The first element that would have to drift is taken, or `element`. Raises `BadInput` where the file holds none, or one that changes by nothing.
     """
     place, reference = _place(diagnosis, element)
     unit = place["unit"]
@@ -143,9 +191,10 @@ def draft(diagnosis: Path, name: str, element: str | None = None) -> str:
         change, sd = 100 * np.log1p(np.maximum(change, LEAST)), 100 * sd / (1 + np.maximum(change, LEAST))
     top = float(np.max(np.abs(speed))) or 1.0
     share = np.abs(speed) / top
-    candidates = [fit_law(law, temperature, share, change, np.maximum(sd, 1e-9)) for law in laws(np.ptp(temperature) > 1, np.ptp(speed) > 1, reference)]
-    ranked = sorted((c for c in candidates if c is not None), key=lambda c: c.criterion)
-    return _text(name, place, ranked, top, unit, diagnosis)
+    if not change.any():
+        raise BadInput(f"{diagnosis}: where: {place['element']} changes by 0 in every test; there is nothing to draft")
+    candidates = [fit_law(law, temperature, share, change, np.maximum(sd, 1e-9)) for law in laws(temperature, share, reference)]
+    return _text(name, place, ranked([c for c in candidates if c is not None]), top, unit, diagnosis)
 
 
 def _place(diagnosis: Path, element: str | None) -> tuple[Mapping[str, Any], float]:
@@ -196,11 +245,12 @@ def _plain(*texts: str) -> None:
             raise BadInput(f"{str(text)[:80]!r}: cannot be written into an effect file; names without quotes, braces, backslashes and line ends are allowed")
 
 
-def _text(name: str, place: Mapping[str, Any], ranked: Sequence[Fitted], top: float, unit: str, diagnosis: Path) -> str:
-    best = ranked[0]
+def _text(name: str, place: Mapping[str, Any], fits: Sequence[Fitted], top: float, unit: str, diagnosis: Path) -> str:
+    best = fits[0]
     size, offset = best.values[:2]
-    share_of = float(offset / size) if size else 0.0
-    rivals = "; ".join(f"{r.law.name} ({r.criterion - best.criterion:+.1f})" for r in ranked[1:] if r.criterion - best.criterion < NEAR) or "none near"
+    rivals = "; ".join(f"{r.law.name} ({r.criterion - best.criterion:+.1f})" for r in fits[1:] if r.criterion - best.criterion < NEAR) or "none near"
+    constant = has_offset(best.law)
+    formula = f"size * ({best.law.expression}){' + offset' * constant}"
     step = best.law.expression.startswith("where")
     effect = place.get("effect")  # of the catalogue, with a law of the data's own
     shape = list(zip(best.law.shape, best.values[2:], best.sd[2:], strict=True))
@@ -208,13 +258,15 @@ def _text(name: str, place: Mapping[str, Any], ranked: Sequence[Fitted], top: fl
     lines = [
         f'"""{place["element"]} drifts: {best.law.name}. Drafted by `spindle draft` from {diagnosis.name}; name it, read it, edit it.',
         "",
-        f"change = size * ({best.law.expression} + constant){of_unit and f' in{of_unit}'}, T in C, n = speed / {top:g} rpm.",
-        f"size {size:.4g} +- {best.sd[0]:.2g}{of_unit}; what is there everywhere {offset:.4g} +- {best.sd[1]:.2g}{of_unit}"
+        f"change = {formula}{of_unit and f' in{of_unit}'}, T in C, n = speed / {top:g} rpm.",
+        f"size {size:.4g} +- {best.sd[0]:.2g}{of_unit}"
+        + (f"; what is there everywhere, offset {offset:.4g} +- {best.sd[1]:.2g}{of_unit}" if constant else "")
         + "".join(f", {s[0]} {v:.4g} +- {e:.2g} {s[1]}" for s, v, e in shape)
         + ".",
         *([f"Per cent of a logarithm: {place['element']} is exp(change / 100) of what it was."] if unit == "%" and effect is None else []),
         *([f"The change is of the size of {place['element']}, which acts as its formula has it at {_told(effect['at'])}, at any condition."] if effect else []),
         f"Rivals by the Bayesian information criterion: {rivals}.",
+        _tested(best),
         '"""',
         "",
         *(["from math import exp", ""] if "exp(" in best.law.expression else []),
@@ -228,7 +280,7 @@ def _text(name: str, place: Mapping[str, Any], ranked: Sequence[Fitted], top: fl
         f'    """Change of {place["element"]}{of_unit and f" in{of_unit}"} at temperature T (C) and speed (rpm)."""',
         "    n = abs(rpm) / TOP",
         *(f"    {s[0]} = {v:g}  # {s[1]}, between two tests" if step else f'    {s[0]} = values["{s[0]}"]' for s, v, _ in shape),
-        f'    return values["size"] * (({_scalar(best.law.expression)}) + values["constant"])',
+        f'    return values["size"] * ({_scalar(best.law.expression)})' + ' + values["offset"]' * constant,
         "",
         "",
         "EFFECT = drifting(",
@@ -236,17 +288,30 @@ def _text(name: str, place: Mapping[str, Any], ranked: Sequence[Fitted], top: fl
         *([f"    at={_numbers(effect['at'])},", f"    others={_numbers(effect['values'])},"] if effect else []),
         f'    name="{name}",',
         f'    title="{place["element"]} drifts: {best.law.name}",',
-        f'    equation="change = size ({best.law.expression} + constant), T in C, n = speed / {top:g} rpm",',
+        f'    equation="change = {formula}, T in C, n = speed / {top:g} rpm",',
         "    law=law,",
         "    parameters=(",
-        _parameter("size", unit, 0.0, size, "how much it changes", (-400.0, 400.0)),
-        _parameter("constant", "1", share_of, share_of, "what is there at every temperature and speed, over the size", (-100.0, 100.0)),
+        _parameter("size", unit, 0.0, size, "how much it changes", _about(size)),
+        *([_parameter("offset", unit, 0.0, offset, "what is there at every temperature and speed", _about(offset))] if constant else []),
         *(_parameter(s[0], s[1], v, v, f"shape of the law, +- {e:.2g}", s[3]) for s, v, e in shape if not step),
         "    ),",
         f'    source="fitted to the drift found in {diagnosis.name}",',
         ")",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _tested(best: Fitted) -> str:
+    if best.count == best.tests:
+        return f"{best.count} parameters fit {best.tests} tests whatever they are: that it is this law is not tested."
+    said = f"chi2 {best.chi2:.3g} of {best.tests} tests with {best.count} parameters"
+    return f"{said}: no law here fits, this one least badly." if best.refuted else f"{said}."
+
+
+def _about(value: float) -> tuple[float, float]:
+    """Limits that leave a fit room about `value`."""
+    most = max(LIMIT, float(f"{4 * abs(value):.1g}"))
+    return -most, most
 
 
 def _told(at: Mapping[str, float]) -> str:
