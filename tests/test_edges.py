@@ -163,3 +163,10 @@ def test_pictures_need_no_backend_of_the_surroundings():
     code = "import thermospindle.cli, matplotlib; print(matplotlib.get_backend())"
     done = subprocess.run([sys.executable, "-c", code], env=os.environ | {"MPLBACKEND": "nonsense"}, cwd=ROOT, capture_output=True, text=True)
     assert done.stdout.strip() == "agg", done.stderr
+
+
+@pytest.mark.parametrize("verb", [("modes", SCENE), ("add", SCENE, "bond_softening"), ("new", "mine", "--like", "hdd")], ids=lambda v: v[0])
+def test_an_output_folder_that_is_a_link_to_itself_is_refused(capsys, tmp_path, verb):
+    (tmp_path / "loop").symlink_to("loop")
+    assert "loop" in refused(capsys, *verb, "--out", tmp_path / "loop")
+    assert [p.name for p in tmp_path.iterdir()] == ["loop"]

@@ -98,6 +98,7 @@ def test_every_key_of_a_scene_is_in_some_template() -> None:
     ("words", "why"),
     [
         (["new", "a/b", "--like", "hdd"], "is no name of a folder"),
+        (["new", "a\nb", "--like", "hdd"], "is no name of a folder"),
         (["new", "x", "--like", "tractor"], "invalid choice: 'tractor'"),
         (["new", "x"], "--like"),
     ],

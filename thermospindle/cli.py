@@ -42,6 +42,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         where = f"{error.filename}: " if error.filename is not None else ""
         return _refused(f"{where}{error.strerror or error}")
+    except RuntimeError as error:
+        if not str(error).startswith("Symlink loop"):  # as pathlib tells it before Python 3.13
+            raise
+        return _refused(str(error))
     except MemoryError as error:
         return _refused(f"not enough memory for what was asked{f' ({error})' if str(error) else ''}")
     except KeyboardInterrupt:

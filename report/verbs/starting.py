@@ -26,7 +26,7 @@ TEMPLATES = SCENES / "templates"
 
 def new(name: str, like: str, out: Path | None = None) -> Answer:
     """A commented scene called `name` to start from, in the new folder `out`, by default ./`name`."""
-    if not name.strip() or any(c in name for c in "/\\") or name in (".", ".."):
+    if not name.strip() or any(c in name for c in "/\\") or not name.isprintable() or name in (".", ".."):
         raise BadInput(f"NAME {name!r}: is no name of a folder; --out takes a path")
     kinds = sorted(file.stem for file in TEMPLATES.glob("*.toml"))
     if like not in kinds:
