@@ -76,7 +76,9 @@ class FrfPlots:
 
 
 def _columns(frequency: np.ndarray, value: ComplexArray) -> dict[str, np.ndarray]:
-    return {"f": frequency, "size": np.maximum(np.abs(value), 1e-15), "phase": np.degrees(np.angle(value))}
+    """One curve; its phase from -170 to 190 degrees, so that the noise of what is about 180 draws no strokes across the figure."""
+    phase = np.degrees(np.angle(value))
+    return {"f": frequency, "size": np.maximum(np.abs(value), 1e-15), "phase": np.where(phase < -170, phase + 360, phase)}
 
 
 # ---------------------------------------------------------------- the map of errors

@@ -27,7 +27,7 @@ NOISE = 6.0  # standard deviations of the force's noise, which no second pulse i
 DECAYED = 1e-3  # of its peak, to which a response has fallen at the end of a record that needs no exponential window
 ENDS_AT = 0.01  # value of the exponential window at the end of a record that needs one
 REACH = 0.1  # of the largest force spectrum, down to which the hammer excites
-HEARD = 3.0  # standard errors, from which a response stands out of its noise
+HEARD = 0.7  # coherence, from which a response is that of the hammer
 HELD = 3  # samples at exactly the extreme that tell an overload
 BEFORE = 5  # times the lead of a hit, over which its channels' offsets are averaged
 FEWEST = 8  # samples before a hit that tell an offset
@@ -95,7 +95,7 @@ def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form
     contact = max(_contact(f, step) for f in force[0])
     windows = Windows(contact + 1e-3, float(decay))
     found = estimate(step * np.arange(float(n)), force, response, windows, band, tuple(range(len(ends))), (0,))
-    from_ = 0 if form.band_Hz else _first(found.h1)
+    from_ = 0 if form.band_Hz else _first(found.h1, len(good))
     lines = slice(from_, None)
     if len(good) == 1:
         notes.append(f"{name}: a single hit: FRFs without coherence and standard errors")
@@ -113,7 +113,7 @@ def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form
     notes.append(
         f"{name}: {len(good)} of {len(hits)} hits, {form.estimator}, {found.h1.frequency[from_] if from_ else band[0]:.4g} to {band[1]:.4g} Hz in steps of {1 / (n * step):.4g} Hz, "
         + ("no exponential window" if end == 1 else f"exponential window down to {end:g}")
-        + ("; below, nothing stands out of the noise" if from_ else "")
+        + ("; below, nothing is coherent with the force" if from_ else "")
     )
     return FromRecords(tuple(curves), float(decay), len(good), tuple(notes), ())
 
@@ -250,13 +250,17 @@ def _band(force: Array, step: float) -> tuple[float, float]:
     return float(frequency[2]), float(min(high, 0.4 / step))
 
 
-def _first(frf: Frf) -> int:
-    """The first line from which some response stands out of its noise, over a few lines: what an accelerometer says of slow motion is noise alone."""
-    if frf.sd is None or not np.all(np.isfinite(frf.sd)):
+def _first(frf: Frf, hits: int) -> int:
+    """The first line from which some response is coherent with the force, over a hundredth of the lines: what an accelerometer says of slow motion is noise and drift alone.
+
+    Noise has a coherence of 1 / hits in the mean, and exceeds 1 - p^(1 / (hits - 1)) with probability p (Carter, *Proc. IEEE* 75 (1987) 236).
+    """
+    if frf.coherence is None or hits < 2:
         return 0
-    over = (np.abs(frf.value) / np.maximum(frf.sd, np.finfo(float).tiny)).reshape(-1, len(frf.frequency))
-    near = max(len(frf.frequency) // 200, 3)
-    heard = np.array([np.median(over[:, k : k + near], axis=-1).max() > HEARD for k in range(len(frf.frequency) - near + 1)])
+    least = max(HEARD, 1 - 0.1 ** (1 / (hits - 1)))
+    every = frf.coherence.reshape(-1, len(frf.frequency))
+    near = max(len(frf.frequency) // 100, 5)
+    heard = np.array([np.quantile(every[:, k : k + near], 0.25, axis=-1).max() > least for k in range(len(frf.frequency) - near + 1)])
     return int(np.argmax(heard)) if heard.any() else 0
 
 

@@ -12,7 +12,9 @@ from rich.console import Console
 
 from tests.conftest import ROOT
 from thermospindle.cli import main
+from thermospindle.report.text.effects import show_effects
 from thermospindle.report.text.run import show_impact, show_run
+from thermospindle.sim.effects import CATALOGUE
 from thermospindle.sim.identification.numbering import identified
 from thermospindle.sim.run import Run
 
@@ -30,6 +32,15 @@ def test_the_terminal_promises_what_there_is(run: Run):
 
 
 # ---------------------------------------------------------------- pictures
+
+
+def test_the_list_of_effects_breaks_no_word():
+    out = StringIO()
+    show_effects(Console(file=out, width=80), CATALOGUE)
+    said = out.getvalue()
+    assert max(map(len, said.splitlines())) <= 80
+    told = {word for e in CATALOGUE for word in e.title.split()}
+    assert told <= set(said.split())
 
 
 def test_modes_that_an_impact_test_does_not_show_are_named(run: Run):

@@ -19,6 +19,7 @@ from thermospindle.report.workbench import explanations as told
 from thermospindle.report.workbench import page as pages
 from thermospindle.report.workbench import state
 from thermospindle.report.workbench.page import Page
+from thermospindle.report.workbench.plots import _columns
 from thermospindle.report.workbench.state import Setting
 from thermospindle.sim.effects import by_name
 
@@ -32,6 +33,15 @@ def test_the_page_begins_with_the_scene_as_it_is(page, bench):
     assert len(page.frf.measured.data["f"]) == len(bench.shown[0].test.frf.frequency)
     assert list(page.map.figure.x_range.factors) == [("fitted", "T20_n0"), ("fitted", "T60_n0")]
     assert "agrees" in page.status.text
+
+
+def test_noise_about_180_degrees_draws_no_strokes():
+    """Three degrees of it about a sign that is turned round; the values are what they were."""
+    noise = 0.05 * np.random.default_rng(2).standard_normal(200)
+    data = _columns(np.arange(200.0), np.exp(1j * (np.pi + noise)))
+    assert np.abs(np.diff(data["phase"])).max() < 20
+    np.testing.assert_allclose(np.exp(1j * np.radians(data["phase"])), np.exp(1j * (np.pi + noise)))
+    assert _columns(np.arange(2.0), np.array([1j, -1j]))["phase"].tolist() == [90.0, -90.0]
 
 
 def test_adding_dragging_undoing(page):
