@@ -50,7 +50,7 @@ QUICK: dict[str, tuple[list[object], list[str]]] = {
     "effects of a scene": (["effects", "--scene", SCENE], ["effects", "effects, and with --scene"]),
     "an effect": (["effects", "unbalance"], ["effects, of one effect"]),
     "impact": (["impact", "MADE/short", "--hits", 1], ["impact"]),
-    "simulate": (["simulate", "MADE/short", "--temperatures", 20, "--hits", 1, "--out", "OUT"], ["simulate"]),
+    "simulate": (["simulate", "MADE/short", "--temperatures", 20, "--hits", 1, "--element", "reduced", "--out", "OUT"], ["simulate"]),
     "runout": (["runout", SCENE, "--path", "linear", "--seconds", 0.2], ["runout"]),
     "map": (["map", SCENE, "--temperatures", 20, 26, "--speeds", 3600, 7200], ["map"]),
     "new": (["new", "mine", "--like", "hdd", "--out", "OUT"], ["new"]),

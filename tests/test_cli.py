@@ -75,7 +75,7 @@ def test_impact(capsys, short_scene):
 def simulated(short_scene, tmp_path_factory):
     """The campaign of the short scene's own tests."""
     folder = tmp_path_factory.mktemp("simulated") / "c"
-    assert main(["simulate", str(short_scene), "--temperatures", "20", "60", "--out", str(folder)]) == 0
+    assert main(["simulate", str(short_scene), "--temperatures", "20", "60", "--element", "reduced", "--out", str(folder)]) == 0
     return folder
 
 
@@ -95,7 +95,7 @@ def test_the_campaign_that_ships_is_of_this_scene(capsys):
 
 def test_run_and_inspect(capsys, short_scene, tmp_path):
     out = tmp_path / "run"
-    found = answer(capsys, "run", short_scene, "--temperatures", 20, 60, "--out", out, "--json")
+    found = answer(capsys, "run", short_scene, "--temperatures", 20, 60, "--element", "reduced", "--out", out, "--json")
     assert [c["temperature_C"] for c in found["conditions"]] == [20, 60]
     names = {p.name for p in out.iterdir()}
     assert {"report.html", "run.rrd", "table.csv", "modes.csv", "campaign", "spindle_20C.xml", "spindle_60C.xml", MARK} == names

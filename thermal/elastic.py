@@ -129,6 +129,13 @@ class Solid:
         loads = [thermal_load.assemble(self.basis, lam=self.lam, mu=self.mu, strain=one) for one in strains]
         return self._solve(np.array(loads).T).T.reshape(len(strains), -1, 2)
 
+    def region_displacement(self) -> np.ndarray:
+        """Displacement (regions, nodes, 2) in m of a unit strain of one region after the other: what loads it stands in the region's own elements."""
+        element_loads = thermal_load.coo_data(self.basis, lam=self.lam, mu=self.mu, strain=np.ones_like(self.lam)).data.reshape(self.basis.Nbfun, -1)
+        own = [self.section.region_of == k for k in range(len(self.section.regions))]
+        loads = [np.bincount(self.basis.element_dofs[:, e].ravel(), element_loads[:, e].ravel(), self.basis.N) for e in own]
+        return self._solve(np.array(loads).T).T.reshape(len(loads), -1, 2)
+
     def region_strains(self) -> np.ndarray:
         """Unit strain of one region after the other, (regions, elements, points)."""
         owner = np.arange(len(self.section.regions))[:, None] == self.section.region_of
@@ -160,5 +167,5 @@ class Solid:
         weight = (3 * self.lam + 2 * self.mu) * r * self.basis.dx
         density = np.array([weight * dilatation(self.basis.interpolate(a), r) for a in adjoint])
         units = self.region_strains()
-        response = Response(self.section, tuple(races), np.einsum("ieq,keq->ik", density, units), density, self.displacement(units))
+        response = Response(self.section, tuple(races), np.einsum("ieq,keq->ik", density, units), density, self.region_displacement())
         return response, adjoint.reshape(len(adjoint), -1, 2)

@@ -64,7 +64,7 @@ def test_it_is_found_where_it_is(model):
     assert shown(wider, replace(h, evidence=replace(h.evidence, mean=mean))) == []  # an explanation without it
 
 
-@pytest.mark.parametrize("share", [50, 30])
+@pytest.mark.parametrize("share", [50, pytest.param(30, marks=pytest.mark.slow)])
 def test_a_small_one_that_is_hidden_is_found_by_its_evidence(spindle, share):
     """A few ten thousandths of the base's mass beside its first mode: tolerances and the modes' constant errors take most of the misfit."""
     small, at = MASS / share, 966.0
