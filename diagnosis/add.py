@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from thermospindle.diagnosis.forward.nuisance import BUILD, GAIN, TEMPERATURE
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.formats import DIAGNOSIS, migrated
 from thermospindle.model.machine import Spindle
@@ -24,7 +25,7 @@ from thermospindle.sim.effects import CATALOGUE, by_name, checked, resolved
 from thermospindle.sim.effects.effect import Effect, fitted_to, refusal
 from thermospindle.sim.effects.own import OwnEffect
 
-OF_TEST, OF_CHANNEL = "temperature of ", "gain of channel "  # nuisance parameters that are not the spindle's
+OF_TEST, OF_CHANNEL = "temperature of ", "gain of channel "  # not the spindle's own, in answers of before rows told their `kind`
 
 
 @dataclass(frozen=True)
@@ -218,18 +219,24 @@ def read_answer(file: Path) -> Answer:
 NO_ANSWER = "is not an answer of spindle diagnose --json, with candidates of effects and parameters"
 
 
+def _kind(name: str) -> str:
+    """Of a fitted tolerance, in an answer of before rows told it."""
+    return TEMPERATURE if name.startswith(OF_TEST) else GAIN if name.startswith(OF_CHANNEL) else BUILD
+
+
 def answer_of(raw: Any, where: str) -> Answer:
     """The same from the object of such an answer; `where` it is from is what a refusal begins with."""
     try:
         candidates = tuple((tuple(map(_text, c["effects"])), dict(c["parameters"])) for c in raw["candidates"])
         own_laws = frozenset(_text(name) for c in raw["candidates"][:1] for name in c.get("own_law", ()))
         tolerances = {name: _finite(row["value"]) for name, row in raw.get("tolerances", {}).items()}
+        kinds = {name: row.get("kind", _kind(name)) for name, row in raw.get("tolerances", {}).items()}
         best = candidates[0][0] if candidates and raw.get("effects") else ()
         scene_hash = raw.get("scene_hash")
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError):
         raise BadInput(f"{where}: {NO_ANSWER}") from None
-    build = {name: float(f"{v:.8g}") for name, v in tolerances.items() if not name.startswith((OF_TEST, OF_CHANNEL))}
-    tests = tuple(name.removeprefix(OF_TEST) for name in tolerances if name.startswith(OF_TEST))
+    build = {name: float(f"{v:.8g}") for name, v in tolerances.items() if kinds[name] == BUILD}
+    tests = tuple(str(raw["tolerances"][name].get("test", name.removeprefix(OF_TEST))) for name in tolerances if kinds[name] == TEMPERATURE)
     return Answer(candidates, best, build, tests, scene_hash, own_laws)
 
 

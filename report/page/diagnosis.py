@@ -10,6 +10,7 @@ from typing import Any
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
+from thermospindle.diagnosis.forward.nuisance import TEMPERATURE
 from thermospindle.diagnosis.runout.verdict import RunoutDiagnosis
 from thermospindle.diagnosis.verdict import Diagnosis
 from thermospindle.model.machine import Spindle
@@ -133,7 +134,7 @@ def _tolerances(answer: dict[str, Any]) -> str:
     rows = []
     for name, t in answer["tolerances"].items():
         share = t["sd"] / t["prior_sd"]
-        scale, unit = (1.0, "K") if name.startswith("temperature of") else (100.0, "%")
+        scale, unit = (1.0, "K") if t["kind"] == TEMPERATURE else (100.0, "%")
         rows.append(
             [
                 (escape(name), 0), (_signed(t["value"] / t["prior_sd"]), 1), (f"{share:.2f}", 1),

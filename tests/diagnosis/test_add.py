@@ -7,6 +7,7 @@ import pytest
 
 from tests.conftest import DATA, SCENE
 from thermospindle.cli import main
+from thermospindle.diagnosis.add import answer_of
 from thermospindle.diagnosis.compare.before_after import held_out, without
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
@@ -49,6 +50,16 @@ def add(capsys, tmp_path):
 
 
 # ---------------------------------------------------------------- effects
+
+
+def test_what_a_fitted_tolerance_is_goes_by_its_kind_and_not_by_its_name():
+    """A joint may be called as errors of tests and channels are; answers of before a row told its kind go by names."""
+    told = {"gain of channel 1 axial stiffness": ("build", None), "temperature of T20": ("temperature", "T20"), "gain of channel 1": ("gain", None)}
+    rows = {name: row(0.01) | {"kind": kind} | ({"test": test} if test else {}) for name, (kind, test) in told.items()}
+    found = answer_of(answer() | {"tolerances": rows}, "")
+    assert (found.build, found.tests) == ({"gain of channel 1 axial stiffness": 0.01}, ("T20",))
+    earlier = answer_of(answer(), "")
+    assert (earlier.build, earlier.tests) == (TOLERANCES, ("T20", "T60"))
 
 
 def test_a_pair_comes_with_both_its_values(add, tmp_path):

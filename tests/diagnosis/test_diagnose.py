@@ -59,6 +59,9 @@ def test_json_says_what_could_have_been_shown(nothing_missing):
     assert answer["misfit"]["rejected"] is False
     assert sum(s["count"] for s in answer["misfit"]["shares"]["test"]) == answer["misfit"]["count"]
     assert answer["error"]["before"] == answer["error"]["after"] < 1.5
+    told = [(t["kind"], t.get("test")) for t in answer["tolerances"].values() if t["kind"] != "build"]
+    assert told[: len(ids := [t.id for t in nothing_missing.campaign.tests])] == [("temperature", name) for name in ids]
+    assert {kind for kind, _ in told[len(ids) :]} == {"gain"}
 
 
 @pytest.mark.slow
