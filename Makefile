@@ -57,7 +57,7 @@ bench: $(READY)
 growth: $(READY)
 	.venv/bin/python -m tests.bench_growth --picture docs/growth.png
 
-$(READY): pyproject.toml constraints.txt
+$(READY): pyproject.toml setup.py constraints.txt
 	$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11) and 'Thermospindle needs Python 3.11 or newer')"
 	$(PYTHON) -m venv .venv
 	.venv/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[test]'
