@@ -1,8 +1,8 @@
 """From drift to an effect of one's own: what a free form found, as the simplest law of physics that fits it, written as an effect file.
 
 Laws over temperature T and speed n: none, linear, exponential, Arrhenius, sigmoid, step; and a power of speed, alone, times one of these or beside it.
-Each is fitted to the drift of one element in every test, with an offset beside it, weighted by its standard errors; the Bayesian information criterion
-chooses (Schwarz, *Ann. Statist.* 6 (1978) 461). A law with as many parameters as tests fits whatever they are: it is taken where chi2 rules all others out, and
+Each is fitted to the drift of one element in every test, with an offset beside it, weighted by its covariance over the tests (an answer without one: by its
+standard errors); the Bayesian information criterion chooses (Schwarz, *Ann. Statist.* 6 (1978) 461). A law with as many parameters as tests fits whatever they are: it is taken where chi2 rules all others out, and
 the file says that it is not tested.
 """
 
@@ -25,6 +25,7 @@ from thermospindle.model.types import Array
 REFERENCE = 20.0  # C from which laws count temperature, where a diagnosis does not tell its scene's reference
 LEAST = -0.999  # of what was: nothing falls further
 LARGEST = 1e9  # of any number that is read
+SURE = 1e-6  # of the mean variance, added to each: tests of one condition have one change
 LIMIT = 400.0  # of sizes in their unit, at least
 NEAR = 10.0  # criterion within which rivals are named in the file
 REFUTED = 1e-3  # chance of a chi2 as large, below which a law is ruled out
@@ -118,8 +119,9 @@ def has_offset(law: Law) -> bool:
     return law.expression != "1.0"
 
 
-def fit_law(law: Law, temperature: Array, share: Array, change: Array, sd: Array) -> Fitted | None:
-    """Least squares in size, offset and shape, the first two linear; None where there are more parameters than tests."""
+def fit_law(law: Law, temperature: Array, share: Array, change: Array, white: Array) -> Fitted | None:
+    """Least squares in size, offset and shape, the first two linear; None where there are more parameters than tests. `white` (n, n) makes errors of `change`
+    (n,) independent and of unit variance."""
     offset = has_offset(law)
     count = 1 + offset + len(law.shape)
     if count > len(change):
@@ -129,9 +131,9 @@ def fit_law(law: Law, temperature: Array, share: Array, change: Array, sd: Array
 
         def linear(shape: Array) -> tuple[Any, Array]:
             columns = [law(temperature, share, shape)] + ([np.ones_like(change)] if offset else [])
-            a = np.stack(columns, axis=1) / sd[:, None]
-            found = np.linalg.lstsq(a, change / sd, rcond=None)[0]
-            return found, a @ found - change / sd
+            a = white @ np.stack(columns, axis=1)
+            found = np.linalg.lstsq(a, white @ change, rcond=None)[0]
+            return found, a @ found - white @ change
 
         low, high = ([s[3][k] for s in law.shape] for k in (0, 1))
         shape = begin
@@ -141,7 +143,7 @@ def fit_law(law: Law, temperature: Array, share: Array, change: Array, sd: Array
         squares = float(residual @ residual)
         if best is None or squares < best.chi2:
             values = np.concatenate([amplitude, np.zeros(int(not offset)), shape])
-            best = Fitted(law, values, _errors(law, values, offset, temperature, share, sd), squares, len(change), count)
+            best = Fitted(law, values, _errors(law, values, offset, temperature, share, white), squares, len(change), count)
     return best
 
 
@@ -163,7 +165,7 @@ def _starts(law: Law, temperature: Array) -> list[Array]:
     return [np.where(np.array(names) == "middle", m, start) for m in middles] or [start]
 
 
-def _errors(law: Law, values: Array, offset: bool, temperature: Array, share: Array, sd: Array) -> Array:
+def _errors(law: Law, values: Array, offset: bool, temperature: Array, share: Array, white: Array) -> Array:
     def model(v: Array) -> Array:
         return v[0] * law(temperature, share, v[2:]) + v[1]
 
@@ -172,8 +174,8 @@ def _errors(law: Law, values: Array, offset: bool, temperature: Array, share: Ar
         h = 1e-4 * max(abs(values[i]), 1e-3)
         step = values + h * (np.arange(len(values)) == i)
         columns.append((model(step) - model(values)) / h)
-    columns[1] = columns[1] if offset else np.zeros_like(sd)
-    a = np.stack(columns, axis=1) / sd[:, None]
+    columns[1] = columns[1] if offset else np.zeros_like(temperature)
+    a = white @ np.stack(columns, axis=1)
     return np.sqrt(np.maximum(np.diag(np.linalg.pinv(a.T @ a)), 0.0))
 
 
@@ -187,14 +189,23 @@ def draft(diagnosis: Path, name: str, element: str | None = None) -> str:
     rows = place["change"]
     temperature, speed, sd = (np.array([float(r[k]) for r in rows]) for k in ("temperature_C", "speed_rpm", "sd"))
     change = np.array([float(r[_key(place)]) for r in rows])
+    covariance = np.array(place["change_covariance"], float) if "change_covariance" in place else np.diag(sd**2)
     if _key(place) == "relative":  # free forms count per cent of a logarithm
-        change, sd = 100 * np.log1p(np.maximum(change, LEAST)), 100 * sd / (1 + np.maximum(change, LEAST))
+        factor = 1 + np.maximum(change, LEAST)
+        change, covariance = 100 * np.log(factor), 1e4 * covariance / np.outer(factor, factor)
     top = float(np.max(np.abs(speed))) or 1.0
     share = np.abs(speed) / top
     if not change.any():
         raise BadInput(f"{diagnosis}: where: {place['element']} changes by 0 in every test; there is nothing to draft")
-    candidates = [fit_law(law, temperature, share, change, np.maximum(sd, 1e-9)) for law in laws(temperature, share, reference)]
+    candidates = [fit_law(law, temperature, share, change, _whitening(covariance)) for law in laws(temperature, share, reference)]
     return _text(name, place, ranked([c for c in candidates if c is not None]), top, unit, diagnosis)
+
+
+def _whitening(covariance: Array) -> Array:
+    """W (n, n) with W C W^T = 1 of a covariance C, which may be that of tests without errors of their own."""
+    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-18))
+    value, vector = np.linalg.eigh(covariance / np.outer(scale, scale))
+    return np.asarray((vector / np.sqrt(np.maximum(value, 0.0) + SURE)).T / scale)
 
 
 def _place(diagnosis: Path, element: str | None) -> tuple[Mapping[str, Any], float]:
@@ -220,6 +231,7 @@ def _place(diagnosis: Path, element: str | None) -> tuple[Mapping[str, Any], flo
                     raise ValueError
             if not found[0]["change"] or not all(abs(float(r[key])) <= LARGEST for r in found[0]["change"] for key in keys):
                 raise ValueError
+            _check_covariance(found[0])
             return found[0], reference
         named = [str(p["element"]) for p in places]
     except OSError as error:
@@ -231,6 +243,18 @@ def _place(diagnosis: Path, element: str | None) -> tuple[Mapping[str, Any], flo
     if element is None:
         raise BadInput(f"{diagnosis}: where: is empty; the diagnosis found nothing that drifts, and there is nothing to draft")
     raise BadInput(f"--element {element}: does not drift in {diagnosis}; allowed are {', '.join(named) or 'none'}")
+
+
+def _check_covariance(place: Mapping[str, Any]) -> None:
+    """`ValueError` or `TypeError` for one that is not of the changes, where an answer tells it."""
+    if "change_covariance" in place:
+        found, n = np.array(place["change_covariance"], float), len(place["change"])
+        if found.shape != (n, n) or not np.all(np.abs(found) <= LARGEST**2) or np.any(np.diag(found) < 0):
+            raise ValueError
+        scale = np.sqrt(np.maximum(np.diag(found), 1e-18))
+        correlation = found / np.outer(scale, scale)
+        if not np.allclose(correlation, correlation.T, atol=1e-6) or np.linalg.eigvalsh(correlation).min() < -SURE:
+            raise ValueError
 
 
 def _key(place: Mapping[str, Any]) -> str:
@@ -291,9 +315,9 @@ def _text(name: str, place: Mapping[str, Any], fits: Sequence[Fitted], top: floa
         f'    equation="change = {formula}, T in C, n = speed / {top:g} rpm",',
         "    law=law,",
         "    parameters=(",
-        _parameter("size", unit, 0.0, size, "how much it changes", _about(size)),
-        *([_parameter("offset", unit, 0.0, offset, "what is there at every temperature and speed", _about(offset))] if constant else []),
-        *(_parameter(s[0], s[1], v, v, f"shape of the law, +- {e:.2g}", s[3]) for s, v, e in shape if not step),
+        _parameter("size", unit, 0.0, size, max(abs(size), 1e-3), "how much it changes", _about(size)),
+        *([_parameter("offset", unit, 0.0, offset, max(abs(offset), best.sd[1], 1e-3), "what is there at every temperature and speed", _about(offset))] if constant else []),
+        *(_parameter(s[0], s[1], v, v, max(0.3 * abs(v), 1e-3), f"shape of the law, +- {e:.2g}", s[3]) for s, v, e in shape if not step),
         "    ),",
         f'    source="fitted to the drift found in {diagnosis.name}",',
         ")",
@@ -326,8 +350,7 @@ def _scalar(expression: str) -> str:
     return "1.0 if T > middle else 0.0" if expression.startswith("where") else expression
 
 
-def _parameter(name: str, unit: str, neutral: float, typical: float, meaning: str, limits: tuple[float, float]) -> str:
-    width = max(abs(typical), 1e-3) if neutral == 0.0 else max(0.3 * abs(typical), 1e-3)
+def _parameter(name: str, unit: str, neutral: float, typical: float, width: float, meaning: str, limits: tuple[float, float]) -> str:
     return (
         f'        Parameter("{name}", "{unit}", {neutral:.6g}, {typical:.6g}, {width:.3g}, ({limits[0]:g}, {limits[1]:g}), "{meaning}", "fitted by spindle draft to what a diagnosis found to drift"),'
     )

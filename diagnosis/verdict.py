@@ -35,18 +35,23 @@ STEPS = 7  # of progress, beside one a test
 @dataclass(frozen=True, eq=False)
 class Drift:
     """What would have to change from test to test: without any catalogue an element, or an effect of it with a law of the data's own, its `values` but the
-    size and the condition `at` which its formula is asked in every test. `change` and `sd` (tests,) in `unit`, what they go with, and the ln evidence over
+    size and the condition `at` which its formula is asked in every test. `change` (tests,) with `covariance` (tests, tests) in `unit`, what they go with, and the ln evidence over
     the model without effects."""
 
     element: str
     unit: str
     conditions: tuple[Condition, ...]
     change: Array
-    sd: Array
+    covariance: Array
     pattern: Chosen | None
     gain: float
     at: Condition | None = None
     values: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def sd(self) -> Array:
+        """Standard error of every change."""
+        return np.sqrt(np.diag(self.covariance))
 
     @property
     def told(self) -> list[tuple[float, float]]:
@@ -55,6 +60,14 @@ class Drift:
             return [(float(a), float(s)) for a, s in zip(self.change, self.sd, strict=True)]
         factor = np.exp(self.change / 100)
         return [(float(100 * (f - 1)), float(f * s)) for f, s in zip(factor, self.sd, strict=True)]
+
+    @property
+    def told_covariance(self) -> Array:
+        """Covariance (tests, tests) of the changes that are `told`."""
+        if self.unit != "%" or self.at is not None:
+            return self.covariance
+        factor = np.exp(self.change / 100)
+        return np.asarray(factor[:, None] * self.covariance * factor)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,4 +138,4 @@ def _drift(found: Search, h: Hypothesis, k: int) -> Drift:
     pattern = choose_for(conditions, change, regular) if len(change) > 2 else None
     values = {name: v for name, v in m.values(0.0, h.fit.shapes[k]).items() if name != m.size.name}
     at = strongest(found.model.spindle, conditions) if m.own_law else None
-    return Drift(m.name, m.size.unit, conditions, change, np.sqrt(np.diag(covariance)), pattern, gain, at, values)
+    return Drift(m.name, m.size.unit, conditions, change, covariance, pattern, gain, at, values)

@@ -48,7 +48,7 @@ def test_a_law_that_was_put_in_comes_out(name):
     true, sd = every[name], np.full(12, 0.02)
     change = -8.0 * true(TEMPERATURE, SHARE, PUT_IN[name]) + (0.5 if name != "constant" else 0.0)
     change = change + sd * np.random.default_rng(3).standard_normal(12)
-    found = {n: f for n, law in every.items() if (f := fit_law(law, TEMPERATURE, SHARE, change, sd)) is not None}
+    found = {n: f for n, law in every.items() if (f := fit_law(law, TEMPERATURE, SHARE, change, np.diag(1 / sd))) is not None}
     least, best = min(f.criterion for f in found.values()), found[name]
     assert best.criterion - least < 4
     assert name == "constant" or sum(f.criterion - least < 10 for f in found.values()) <= 6  # every law contains a constant
@@ -62,8 +62,8 @@ def test_a_law_that_was_put_in_comes_out(name):
 def test_no_more_parameters_than_tests():
     """Tests of one condition tell a constant; three tests of one speed no sigmoid."""
     assert {law.name for law in laws(np.full(2, 20.0), np.zeros(2))} == {"constant"}
-    at, change, sd = np.array([20.0, 40, 60]), np.array([0.0, -1, -2]), np.ones(3)
-    told = [law.name for law in laws(at, np.zeros(3)) if fit_law(law, at, np.zeros(3), change, sd) is not None]
+    at, change = np.array([20.0, 40, 60]), np.array([0.0, -1, -2])
+    told = [law.name for law in laws(at, np.zeros(3)) if fit_law(law, at, np.zeros(3), change, np.eye(3)) is not None]
     assert "linear in temperature" in told
     assert "sigmoid in temperature" not in told
 
@@ -118,6 +118,38 @@ def test_a_law_that_two_tests_rule_out_is_not_drafted(tmp_path):
     assert "of 2 tests with 1 parameters" in text
 
 
+COMMON, OWN = 0.3, 0.003  # um, errors that all tests have alike and each its own
+
+
+@pytest.mark.parametrize(("slope", "law"), [(0.1, "linear in temperature"), (0.0, "constant")])
+def test_what_is_wrong_alike_in_all_tests_hides_no_law(slope, law, tmp_path):
+    """0.1 um over 50 K, 33 times what tests have of their own: with the standard errors alone, of nearly nothing but the common one, a constant was drafted.
+    Size and error are those of generalised least squares (Aitken 1936) on paper: the common error leaves the slope alone."""
+    random = np.random.default_rng(1)
+    change = COMMON * random.standard_normal() + slope * (np.array(AT) - 20) / 50 + OWN * random.standard_normal(6)
+    answer = of_rings(tmp_path, change, float(np.hypot(COMMON, OWN)))
+    assert "radially drifts: constant" in draft(answer, "own")  # answers of before
+    raw = json.loads(answer.read_text(encoding="utf-8"))
+    raw["where"][0]["change_covariance"] = (COMMON**2 + OWN**2 * np.eye(6)).tolist()
+    answer.write_text(json.dumps(raw), encoding="utf-8")
+    text, own, _ = drafted(answer, tmp_path)
+    assert law in own.title
+    if slope:
+        x = (np.array(AT) - 20) / 40
+        x -= x.mean()
+        assert own.parameters[0].typical == pytest.approx(x @ change / (x @ x), rel=1e-3)
+        assert f"+- {OWN / np.sqrt(x @ x):.2g} um; what is there" in text
+
+
+@pytest.mark.parametrize("damaged", [[[1.0]], "none", [[1.0, 2.0], [2.0, 1.0]], [[1.0, 0.5], [0.0, 1.0]], [[-1.0, 0.0], [0.0, 1.0]], [[None, 0.0], [0.0, 1.0]], [[1e300, 0.0], [0.0, 1.0]]])
+def test_what_is_no_covariance_is_refused(damaged, tmp_path):
+    raw = json.loads(of_rings(tmp_path, [0.0, 10.0], 0.1, (20.0, 60.0)).read_text(encoding="utf-8"))
+    raw["where"][0]["change_covariance"] = damaged
+    (tmp_path / "d.json").write_text(json.dumps(raw), encoding="utf-8")
+    with pytest.raises(BadInput, match="elements that drift"):
+        draft(tmp_path / "d.json", "own")
+
+
 CONDITIONS = [Condition(t, n * RPM) for t, n in ((20, 0), (20, 7200), (28, 0), (36, 0), (44, 7200), (52, 0), (60, 0), (60, 7200))]
 
 
@@ -140,8 +172,9 @@ def slipping(spindle, tmp_path_factory):
         {"temperature_C": c.temperature, "speed_rpm": c.speed / RPM, "relative": float(f - 1), "sd": float(s)}
         for c, f, s in zip(CONDITIONS, factor, sd, strict=True)
     ]
+    covariance = np.outer(factor, factor) * free.evidence.size_covariance[0] / 1e4
     file = tmp_path_factory.mktemp("slipping") / "diagnosis.json"
-    file.write_text(json.dumps({"where": [{"element": "preload", "unit": "%", "change": rows}]}), encoding="utf-8")
+    file.write_text(json.dumps({"where": [{"element": "preload", "unit": "%", "change": rows, "change_covariance": covariance.tolist()}]}), encoding="utf-8")
     return model, base, file
 
 

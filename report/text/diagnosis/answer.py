@@ -174,6 +174,7 @@ def _place(p: Drift, d: Diagnosis) -> dict[str, Any]:
         "element": p.element,
         "unit": p.unit,
         "change": [{**condition(c), key: float(a / share), "sd": float(s / share)} for c, (a, s) in zip(p.conditions, p.told, strict=True)],
+        "change_covariance": (p.told_covariance / share**2).tolist(),
         **({"effect": {"at": condition(p.at), "values": dict(p.values)}} if p.at is not None else {}),
         "with": p.pattern.shape.name if p.pattern else "",
         "removes": float(np.clip(p.gain / best, 0.0, 1.0)) if best > 0 else 0.0,
