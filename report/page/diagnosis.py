@@ -101,7 +101,7 @@ def _candidates(answer: dict[str, Any]) -> str:
                     (escape(" + ".join(c["effects"])) if first else "", 0),
                     (minus(_evidence(c["delta_evidence"])) if first else "", 1),
                     (f"{c['probability']:.3f}" if first else "", 1),
-                    (f"{100 * c['held_out_error_ratio']:.0f}" if first else "", 1),
+                    ("" if not first else "-" if c["held_out_error_ratio"] is None else f"{100 * c['held_out_error_ratio']:.0f}", 1),
                     (escape(name.split(".", 1)[1]) if len(c["effects"]) == 1 else escape(name), 0),
                     (value + (f" <small>{sd}" if sd else ""), 1),
                     (_unit(v["unit"]), 0),

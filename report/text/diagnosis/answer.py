@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.decision.explanations import Candidate
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import Mechanism
-from thermospindle.diagnosis.inference.evidence import Evidence
+from thermospindle.diagnosis.inference.evidence import Evidence, left_out
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.resonance import shown
 from thermospindle.diagnosis.verdict import Diagnosis, Drift
@@ -99,9 +100,7 @@ def _candidate(c: Candidate, d: Diagnosis) -> dict[str, Any]:
         "effects": list(c.names),
         "delta_evidence": c.delta_evidence,
         "probability": c.probability,
-        "held_out_error_ratio": d.verdict.held_out_after / d.verdict.held_out_before
-        if c.hypothesis is d.verdict.accepted and d.verdict.held_out_before > 0
-        else float(np.sqrt(own.chi2 / max(d.search.base.evidence.chi2, 1e-300))),
+        "held_out_error_ratio": _held_out(c, d),
         "parameters": parameters,
         "law": laws,
         "own_law": list(c.own_laws),
@@ -109,6 +108,13 @@ def _candidate(c: Candidate, d: Diagnosis) -> dict[str, Any]:
         "chi2_per_number": own.chi2 / n,
         "believable": _believable(c),
     }
+
+
+def _held_out(c: Candidate, d: Diagnosis) -> float | None:
+    """Error on conditions predicted from all others, over that without effects; None where nothing can be left out."""
+    model = d.search.model
+    error, _ = left_out(model, c.hypothesis.fit, c.hypothesis.evidence, conditions_of(model.spindle, model.tests))
+    return _known(error / d.verdict.held_out_before) if d.verdict.held_out_before > 0 else None
 
 
 def parameters_of(h: Hypothesis, k: int) -> dict[str, dict[str, Any]]:
