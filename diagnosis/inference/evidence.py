@@ -28,8 +28,9 @@ from thermospindle.diagnosis.inference.prior import Learned, nuisance_root, whit
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
 
-WIDER = {1.0: 0.0, 2.0: -2.0, 4.0: -3.0, 8.0: -4.0}
-"""Prior odds (ln) that a drawing is off by so many times the build tolerances that the scene states, assumed: who states tolerances means them."""
+WIDER = {1.0: 0.0, 2.0: -12.0, 4.0: -13.0, 8.0: -14.0}
+"""Prior odds (ln) that a drawing is off by so many times the build tolerances that the scene states, assumed, and less than those of any two effects: one
+tolerance that is strained tells of an effect, several of a drawing that is off."""
 GRIDS = {
     kinds_of.STIFFNESS: (0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2),  # relative error of a frequency
     kinds_of.DAMPING: (0.0, 0.01, 0.03, 0.1),
