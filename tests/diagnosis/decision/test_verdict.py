@@ -8,59 +8,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tests.hand_made_search import made, total
 from thermospindle.diagnosis.decision import reason
 from thermospindle.diagnosis.decision.conditions import conditions_of
-from thermospindle.diagnosis.decision.explanations import COARSE, OWN_LAW, coarsening
 from thermospindle.diagnosis.decision.loss import FALSE_ALARM, MISSED, WRONG
-from thermospindle.diagnosis.decision.verdict import Verdict, decide
-from thermospindle.diagnosis.forward.mechanism import Mechanism
-from thermospindle.diagnosis.forward.nuisance import BUILD, DAMPING, DAMPING_DRIFT, STIFFNESS, STIFFNESS_DRIFT, Nuisance
-from thermospindle.diagnosis.inference.evidence import Evidence
-from thermospindle.diagnosis.inference.fit import Fit
-from thermospindle.diagnosis.inference.hypothesis import Hypothesis
-from thermospindle.diagnosis.inference.prior import Learned
-from thermospindle.diagnosis.inference.remainder import between_tests
-from thermospindle.diagnosis.inference.screening import Screened
-from thermospindle.diagnosis.inference.search import Search
+from thermospindle.diagnosis.decision.verdict import decide
+from thermospindle.diagnosis.forward.nuisance import BUILD, DAMPING_DRIFT, STIFFNESS_DRIFT, Nuisance
 from thermospindle.model.machine import Condition
-from thermospindle.sim.effects.effect import Effect, Parameter
-
-CONDITIONS = (Condition(20.0), Condition(40.0))
-SIZE = Parameter("size", "1", 0.0, 1.0, 1.0, (-9.0, 9.0), "", "")
-
-
-def mechanism(name: str) -> Mechanism:
-    """A free form where the name starts with `~`; with a law of the data's own where it ends with an apostrophe."""
-    return Mechanism(Effect(name.rstrip("'"), "", "", (SIZE,), "", (), ""), {}, (), free=name.startswith("~"), own_law=name.endswith("'"))
-
-
-def hypothesis(names: tuple[str, ...], ln: float) -> Hypothesis:
-    n, count = 2 * len(names), 100
-    by_test = tuple((50.0, np.zeros(n), np.zeros((n, n))) for _ in CONDITIONS)
-    fit = Fit(
-        tuple(mechanism(k) for k in names), np.zeros(n), np.zeros((len(names), 2)), ((),) * len(names), (np.eye(2),) * len(names), 100.0,
-        np.zeros(n), np.zeros((n, n)), by_test, count, None, 1.0,
-    )  # fmt: skip
-    learned = Learned({}, 1.0, (1.0,) * len(names), (0.1,) * len(names))
-    sizes = np.zeros((len(names), 2))
-    return Hypothesis(fit, Evidence(-1000.0 + ln, learned, np.zeros(n), np.eye(n), sizes, np.zeros((len(names), 2, 2)), 100.0))
-
-
-def made(gains: dict[str | tuple[str, ...], float], catalogue: int = 30, forms: int = 20) -> Search:
-    """A search that found `gains` in ln evidence over the model without effects; so many mechanisms were screened."""
-    spindle = SimpleNamespace(tolerances=SimpleNamespace(temperature=0.2))
-    tests = tuple(SimpleNamespace(condition=c, count=50) for c in CONDITIONS)
-    model = SimpleNamespace(parameters=(), tests=tests, spindle=spindle, resonances=())
-    none = hypothesis((), 0.0)
-    others = [hypothesis((k,) if isinstance(k, str) else k, v) for k, v in gains.items()]
-    screened = [Screened(mechanism(f"effect_{i}"), 0.0, np.zeros(2), 1.0) for i in range(catalogue)]
-    screened += [Screened(mechanism(f"~form_{i}"), 0.0, np.zeros(2), 1.0) for i in range(forms)]
-    return Search(model, none, tuple(sorted([none, *others], key=lambda h: -h.evidence.ln)), tuple(screened))
-
-
-def total(v: Verdict) -> float:
-    return v.probability_none + sum(c.probability for c in (*v.candidates, *v.free))
-
 
 CASES = {
     "nothing tried": ({}, "none", ()),
@@ -90,22 +44,6 @@ def test_words(case):
     assert total(v) == pytest.approx(1.0, abs=1e-9)
     assert v.losses[min(v.losses, key=lambda k: v.losses[k])] == min(v.losses.values())
     assert v.reason
-
-
-def test_probabilities_are_bayes():
-    """Even odds of nothing; 0.33 over thirty effects, 0.05 over twenty forms, 0.08 over 435 pairs, times the evidence."""
-    v = decide(made({"a": 3.0, "b": 1.0, "~x": 4.0, ("a", "b"): 6.0}))
-    weight = {
-        "": 0.5,
-        "a": 0.33 / 30 * np.exp(3),
-        "b": 0.33 / 30 * np.exp(1),
-        "~x": 0.05 / 20 * np.exp(4),
-        "ab": 0.08 / 435 * np.exp(6),
-    }
-    share = {k: w / sum(weight.values()) for k, w in weight.items()}
-    assert v.probability_none == pytest.approx(share[""])
-    assert v.probability_unknown == pytest.approx(share["~x"])
-    assert {"".join(c.names): c.probability for c in (*v.candidates, *v.free)} == pytest.approx({k: s for k, s in share.items() if k})
 
 
 def test_a_false_alarm_costs_what_is_stated():
@@ -144,120 +82,11 @@ def test_a_set_is_as_large_as_its_probability_asks(count):
     assert sum(c.probability for c in v.candidates if set(c.names) <= set(v.effects)) > 0.95
 
 
-def test_of_many_ways_in_which_an_effect_may_act_one_was_fitted():
-    """On eight channels alike: one is an eighth as likely beforehand, and so is the effect as much less probable as it had more to choose from."""
-    found = made({"a": 30.0, "b": 30.0})
-    chosen = [replace(mechanism("a"), choices={"channel": float(k)}) for k in range(8)]
-    shown = [Screened(m, 0.0, np.zeros(2), visibility) for m, visibility in [*((m, 1.0) for m in chosen), (replace(chosen[0], choices={"channel": 9.0}), 0.0)]]
-    v = decide(replace(found, screened=(*found.screened, *shown)))
-    a, b = (next(c.probability for c in v.candidates if c.names == (k,)) for k in "ab")
-    assert b / a == pytest.approx(8.0)
-
-
-@pytest.mark.parametrize(("sizes", "errors", "worth"), [({}, 1.0, 1.0), ({STIFFNESS: 1e-3}, 1.0, COARSE), ({DAMPING: 0.0}, 1.0, 1.0), ({}, 1.1, COARSE)])
-def test_evidence_is_worth_less_where_the_model_is_a_little_wrong(sizes, errors, worth):
-    """A lead of six is a lead of six in a model that is right, and of a quarter of it in one that has an error everywhere."""
-    found = made({"a": 30.0, "b": 24.0})
-    wrong = [replace(h, evidence=replace(h.evidence, learned=replace(h.evidence.learned, sizes=sizes, errors=errors))) for h in found.hypotheses]
-    v = decide(replace(found, hypotheses=tuple(wrong), base=wrong[-1]))
-    first, second = (next(c for c in v.candidates if c.names == (k,)).probability for k in "ab")
-    assert np.log(first / second) == pytest.approx(6.0 / worth)
-    assert coarsening(wrong[0]) == worth
-
-
-@pytest.mark.parametrize("share", [0.0, 0.6, 0.95])
-def test_what_is_missed_in_every_test_is_one_finding(share):
-    """Noise beside a misfit that is the same in four tests at lines of their own: their correlation is its share of the squares."""
-    random = np.random.default_rng(7)
-    left = []
-    for k in range(4):
-        lines = np.linspace(400.0, 6000.0, 300 + 10 * k)
-        same = np.array([np.sin(lines / 500 + channel) for channel in range(14)]) * np.sqrt(2)
-        left.append((lines, np.sqrt(share) * same + np.sqrt(1 - share) * random.standard_normal(same.shape)))
-    assert between_tests(left) == pytest.approx(share, abs=0.02)
-
-
-def by_departing(h: Hypothesis, gained: float) -> Hypothesis:
-    return replace(h, evidence=replace(h.evidence, by_departing=gained))
-
-
-@pytest.mark.parametrize(("gained", "word"), [(0.5, "two effects"), (100.0, "ambiguous")])
-def test_a_little_more_beside_a_law_that_does_not_hold_is_no_second_effect(gained, word):
-    found = made({("first", "more"): 617.0, "first": 600.0, "more": 20.0})
-    first = found.hypotheses[1]
-    assert first.names == ("first",)
-    v = decide(replace(found, hypotheses=(found.hypotheses[0], by_departing(first, gained), *found.hypotheses[2:])))
-    assert (v.word, v.effects[0]) == (word, "first")
-
-
-@pytest.mark.parametrize(("a", "b", "doubt"), [(0.0, 0.0, 0.0), (15.0, 0.0, 15.0), (15.0, 15.0, 0.0), (900.0, 15.0, 285.0)])
-def test_what_a_law_leaves_in_doubt_is_no_more_than_it_gained(a, b, doubt):
-    """Two effects that explain as much with the same second one: by departures of `a` and a law of `b`'s own, which lose in ln evidence as much of what the
-    second gains as they gained, and all of its 300 at most."""
-    found = made({("a", "c"): 400.0, ("b'", "c"): 400.0, "a": 100.0, "b'": 100.0, "b": 100.0 - b})
-    hypotheses = tuple(by_departing(h, a) if h.names == ("a",) else h for h in found.hypotheses)
-    first, second = (next(c.probability for c in decide(replace(found, hypotheses=hypotheses)).candidates if c.names == (k, "c")) for k in "ab")
-    assert np.log(second / first) == pytest.approx((1 - 1 / COARSE) * doubt - np.log(1 + OWN_LAW), abs=1e-6)
-
-
 def test_a_set_holds_only_what_is_probable():
     """One effect alone, with another, or with something that drifts: the set is those two, not what the rest of the catalogue reaches far behind."""
     v = decide(made({("left", "right"): 58.0, "left": 53.5, ("left", "~drift"): 56.0, "behind": 5.0, "far": -40.0}))
     assert 0.5 < max(c.probability for c in v.candidates) < 0.95
     assert (v.word, set(v.effects)) == ("ambiguous", {"left", "right"})
-
-
-OWN_LAWS = {
-    "one effect's": ({"a": 20.0, "a'": 60.0, "~x": 50.0}, "identified", {"a"}, ("a",)),
-    "no better than the one assumed": ({"a": 60.0, "a'": 60.0, "~x": 50.0}, "identified", {"a"}, ()),
-    "two effects'": ({"a": 20.0, "a'": 60.0, "b'": 60.0, "~x": 50.0}, "ambiguous", {"a", "b"}, ("a",)),
-    "behind free drift": ({"a": 20.0, "a'": 60.0, "~x": 70.0}, "unexplained", set(), ("a",)),
-    "one of two": ({"a": 40.0, "a'": 50.0, ("a", "b"): 60.0, ("a'", "b"): 80.0, "~x": 60.0}, "two effects", {"a", "b"}, ("a",)),
-    "both of two": ({"a": 40.0, ("a", "b"): 60.0, ("a'", "b'"): 80.0, "~x": 60.0}, "two effects", {"a", "b"}, ("a", "b")),
-}
-
-
-@pytest.mark.parametrize("case", OWN_LAWS)
-def test_an_effect_is_named_whatever_its_law(case):
-    """With the law assumed and with one of the data's own it is one explanation, told with the likelier."""
-    gains, word, effects, own = OWN_LAWS[case]
-    v = decide(made(gains))
-    assert (v.word, set(v.effects)) == (word, effects)
-    assert v.candidates[0].own_laws == own
-    assert len({frozenset(c.names) for c in v.candidates}) == len(v.candidates)
-    assert ("with a law of the data's own" in v.reason) == (bool(own) and word in ("identified", "two effects"))
-    assert total(v) == pytest.approx(1.0, abs=1e-9)
-
-
-def test_a_size_that_cannot_be_is_no_law_of_its_own():
-    found = made({"a": 20.0, "a'": 66.0, "~x": 60.0})
-    negative = tuple(
-        replace(h, evidence=replace(h.evidence, sizes=np.array([[3.0, -10.0]]), size_covariance=1e-4 * np.eye(2)[None]))
-        if any(m.own_law for m in h.mechanisms)
-        else h
-        for h in found.hypotheses
-    )
-    assert decide(found).word == "identified"
-    v = decide(replace(found, hypotheses=negative, alike={"~x": frozenset({"a", "b"})}))
-    assert v.word == "unexplained"
-    assert "which a would do at a size that it cannot have" in v.reason
-
-
-@pytest.mark.parametrize(("named", "alike", "word"), [(64.5, {"a"}, "identified"), (60.0, {"a"}, "unexplained"), (64.5, {"b"}, "unexplained")])
-def test_a_free_form_that_changes_the_same_as_an_effect_is_that_effect(named, alike, word):
-    """Where the effect does as well, with whatever law; beside the same second too."""
-    v = decide(replace(made({"a": 20.0, "a'": named, "~x": 66.0}), alike={"~x": frozenset(alike)}))
-    assert (v.word, v.probability_unknown == 0.0) == (word, word == "identified")
-    assert [c.names for c in v.free] == [("~x",)]  # it still drifts
-    pair = decide(replace(made({("a", "c"): named, ("~x", "c"): 66.0, "c": 20.0}), alike={"~x": frozenset(alike)}))
-    assert (pair.probability_unknown == 0.0) == (word == "identified")
-
-
-def test_odds_of_a_law_of_its_own():
-    """0.33 over thirty effects and two laws, against 0.05 over twenty forms."""
-    v = decide(made({"a": 60.0, "a'": 66.0, "~x": 66.0}))
-    of_effect, of_form = 0.33 / 30 / (1 + OWN_LAW) * (np.exp(-6) + OWN_LAW), 0.05 / 20
-    assert v.probability_unknown == pytest.approx(of_form / (of_effect + of_form), rel=1e-6)
 
 
 @pytest.mark.parametrize(("leaves", "word"), [(46.0, "unexplained"), (21.0, "unexplained"), (4.0, "identified"), (1.0, "identified")])
@@ -332,22 +161,6 @@ def test_what_conditions_left_out_do_not_confirm_is_said(misses, confirmed):
     assert ("which does not confirm it" in v.reason) != confirmed
 
 
-def test_what_cannot_be_does_not_say_what_is_left():
-    """An effect of a size that it cannot have clears a misfit that changes from test to test; the best that can be leaves most of it."""
-    found = made({"b": 40.0, "a'": 66.0})
-
-    def left(h: Hypothesis) -> Hypothesis:
-        squares = {(): 50.0, ("b",): 40.0, ("a",): 1.0}[h.names]
-        sizes = np.array([[3.0, -10.0]]) if h.names == ("a",) else h.evidence.sizes
-        covariance = 1e-4 * np.eye(2)[None] if h.names == ("a",) else h.evidence.size_covariance
-        return Hypothesis(replace(h.fit, chi2=squares * h.fit.count), replace(h.evidence, sizes=sizes, size_covariance=covariance))
-
-    hypotheses = tuple(map(left, found.hypotheses))
-    v = decide(replace(found, hypotheses=hypotheses, base=hypotheses[-1]))
-    assert v.word == "unexplained"
-    assert "the best leaves 6.3 standard errors" in v.reason
-
-
 def test_errors_are_told_of_all_that_is_named():
     """Of two effects that are named for what they reach beside something that drifts, and not of the one which alone reaches nearly as much."""
     v = decide(made({"a": 40.0, ("a", "b"): 41.0, ("a", "b", "~x"): 62.0}))
@@ -374,14 +187,6 @@ def test_the_order_of_hypotheses_does_not_matter():
     first, second = decide(search), decide(turned)
     assert (first.word, first.effects) == (second.word, second.effects)
     assert first.losses == pytest.approx(second.losses)
-
-
-def test_enormous_evidence_is_still_finite():
-    """A lead of a million, and a loss of a million: no overflow, probabilities that sum to one."""
-    v = decide(made({"a": 1e6, "b": -1e6}))
-    assert v.word == "identified"
-    assert total(v) == pytest.approx(1.0)
-    assert np.isfinite(list(v.losses.values())).all()
 
 
 def test_conditions_within_the_thermometers_scatter_are_one():
