@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.formats import DIAGNOSIS, migrated
@@ -112,7 +112,7 @@ class Fitted:
     def refuted(self) -> bool:
         """By chi2; with as many parameters as tests nothing is tested, and that counts as refuted too."""
         freedom = self.tests - self.count
-        return freedom == 0 or bool(chi2.sf(self.chi2, freedom) < REFUTED)
+        return freedom == 0 or bool(chdtrc(freedom, self.chi2) < REFUTED)
 
 
 def has_offset(law: Law) -> bool:
