@@ -3,6 +3,7 @@
 ===========  ===========================================================================================================
 modes        the modes that a model has at the condition of a test, as its measuring points show them
 detectable   smallest sizes of effects that would have shown
+forecast     what an explanation predicts of a test that has not been made, and the errors that all modes of it share
 next_test    which test would decide between the explanations that survive
 outcomes     what was predicted before a test was read, beside what it then showed: confirmed or refuted
 partners     which measured mode is which computed one: partners, numbers through all conditions, crossings, shapes of

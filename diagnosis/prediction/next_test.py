@@ -1,46 +1,38 @@
 """Which test would decide between the explanations that survive, and what each of them predicts of it.
 
-Two explanations differ at a condition by D in the frequencies of their modes; with the errors S of a test there and of what each leaves
-open, the expected ln odds if either is true are D S^-1 D / 2 (Box & Hill, *Technometrics* 9 (1967) 57).
+Two explanations differ at a condition by D in the frequencies of their modes; with the covariance S of the errors of a test there and of what each leaves
+open, the expected ln odds if either is true are D S^-1 D / 2 (Box & Hill, *Technometrics* 9 (1967) 57). That they leave different things open would add to
+that; it is not counted, for these are known to first order alone.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import product
 
 import numpy as np
 
 from thermospindle.diagnosis.decision.explanations import Candidate, beyond_limits
 from thermospindle.diagnosis.decision.verdict import Verdict
-from thermospindle.diagnosis.forward.mechanism import size_covariance
-from thermospindle.diagnosis.forward.model import FAILED
-from thermospindle.diagnosis.inference.hypothesis import Hypothesis
+from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.search import Search
-from thermospindle.model.errors import NoEquilibrium
-from thermospindle.model.machine import Condition, Spindle
-from thermospindle.model.rotor.modes import modes
+from thermospindle.diagnosis.prediction.forecast import ModePrediction, by_all, covariance, forecast, standing
+from thermospindle.diagnosis.prediction.outcomes import same
+from thermospindle.model.machine import Condition
+from thermospindle.model.parallel import in_parallel
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
-from thermospindle.sim.operating import operating_point
 
 TEMPERATURES = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0)  # C, a chamber's reach
 SPEEDS = (0.0, 0.5, 1.0, 1.5)  # of the spindle's nominal speed
-READING = 5e-5  # relative error of a frequency read from a hammer test
 CERTAIN = np.log(1e6)  # ln odds beyond which nothing is gained, and models are not to be trusted
-DECIDED = np.log(100.0)
 ALIVE = 0.01  # posterior probability from which an explanation is to be told from the best
 TELLS = 2.0  # odds from which a test is worth naming
+DECIDED = np.log(100.0)
 MOST = 3
-
-
-@dataclass(frozen=True)
-class ModePrediction:
-    """Natural frequency (Hz) and damping ratio of a mode, with the standard deviation of the frequency."""
-
-    frequency: float
-    sd: float
-    damping: float
 
 
 @dataclass(frozen=True)
@@ -62,19 +54,26 @@ def next_tests(found: Search, verdict: Verdict) -> list[NextTest]:
     if len(alive) < 2:
         alive += [c for c in verdict.candidates if c not in alive][: 2 - len(alive)]
     alive = [c for c in alive if c.names == verdict.effects or not beyond_limits(c.hypothesis)]
-    if verdict.free and verdict.word != "identified":
-        alive.append(verdict.free[0])
-    if not alive:
+    if verdict.word != "identified":
+        alive += [c for c in verdict.free if c.hypothesis.mechanisms][:1]  # what is only left predicts nothing
+    alive = alive[: MOST + 1]
+    if len(alive) < 2:
         return []
-    lead, rivals = alive[0], alive[1 : MOST + 1]
-    plans = [Condition(t, s * found.model.spindle.nominal_speed) for t in TEMPERATURES for s in SPEEDS]
-    first = {p: _predicted(found, lead.hypothesis, p) for p in plans}
+    lead, rivals = alive[0], alive[1:]
+    first, *others = in_parallel(partial(standing, found.model), [c.hypothesis for c in alive])
+    plans = {}
+    for plan in planned(found.model):
+        try:
+            rates = by_all(found.model, first, plan)  # which of the explanations is true makes no difference to these
+        except FAILED:
+            continue
+        if predicted := forecast(found.model, first, plan, rates):
+            plans[plan] = predicted, rates
     tests = []
-    for rival in rivals:
+    for rival, there in zip(rivals, others, strict=True):
         weighed = []
-        for plan in plans:
-            a, b = first[plan], _predicted(found, rival.hypothesis, plan)
-            if a and b and len(a) == len(b):
+        for plan, (a, rates) in plans.items():
+            if b := forecast(found.model, there, plan, rates):
                 weighed.append(_weighed(plan, lead, rival, a, b))
         weighed = [t for t in weighed if t.odds > TELLS]
         if weighed:
@@ -82,12 +81,18 @@ def next_tests(found: Search, verdict: Verdict) -> list[NextTest]:
     return tests
 
 
+def planned(model: CampaignModel) -> list[Condition]:
+    """Conditions that were not tested, hit and soaked as most tests of the campaign were."""
+    tested = [d.condition for d in model.tests]
+    (how, _), = Counter((c.level, c.soak_time) for c in tested).most_common(1)
+    plans = [Condition(t, s * model.spindle.nominal_speed, *how) for t, s in product(TEMPERATURES, SPEEDS)]
+    return [plan for plan in plans if not any(same(plan, c) for c in tested)]
+
+
 def _weighed(plan: Condition, lead: Candidate, rival: Candidate, a: Sequence[ModePrediction], b: Sequence[ModePrediction]) -> NextTest:
-    difference = np.array([x.frequency - y.frequency for x, y in zip(a, b, strict=True)])
-    sd = np.array([np.hypot(x.sd, y.sd) for x, y in zip(a, b, strict=True)])
-    weight = (difference / sd) ** 2
-    ln_odds = min(float(weight.sum() / 2), CERTAIN)
-    most = int(np.argmax(weight))
+    difference, errors = np.array([x.frequency - y.frequency for x, y in zip(a, b, strict=True)]), of_both(a, b)
+    ln_odds = min(float(difference @ np.linalg.solve(errors, difference)) / 2, CERTAIN)
+    most = int(np.argmax(difference**2 / np.diag(errors)))
     tells = f"the mode near {a[most].frequency:.0f} Hz, which differs by {abs(difference[most]):.1f} Hz"
     repeats = max(1, int(np.ceil(DECIDED / max(ln_odds, 1e-3))))
     return NextTest(
@@ -95,62 +100,14 @@ def _weighed(plan: Condition, lead: Candidate, rival: Candidate, a: Sequence[Mod
     )
 
 
-def _predicted(found: Search, h: Hypothesis, plan: Condition) -> list[ModePrediction] | None:
-    """Modes in the band at a condition under one explanation: tolerances and the model's constant errors as fitted, sizes continued from the
-    tests by their law.
-
-    Errors: of reading, of the thermometer, and of the sizes.
-    """
-    try:
-        spindle = _built(found, h)
-        sizes, errors = zip(*[_continued(found, h, k, plan) for k in range(len(h.mechanisms))], strict=True) if h.mechanisms else ((), ())
-        base = _frequencies(found, h, spindle, plan, sizes)
-        warmer = replace(plan, temperature=plan.temperature + found.model.spindle.tolerances.temperature)
-        moved = [_frequencies(found, h, spindle, warmer, sizes)[0]]
-        for k, error in enumerate(errors):
-            step = [s + (error if i == k else 0.0) for i, s in enumerate(sizes)]
-            moved.append(_frequencies(found, h, spindle, plan, step)[0])
-    except FAILED:
-        return None
-    frequency, damping = base
-    if any(len(m) != len(frequency) for m in moved):
-        return None
-    variance = (READING * frequency) ** 2 + sum((m - frequency) ** 2 for m in moved)
-    return [ModePrediction(float(f), float(s), float(z)) for f, s, z in zip(frequency, np.sqrt(variance), damping, strict=True)]
+def of_both(a: Sequence[ModePrediction], b: Sequence[ModePrediction]) -> Array:
+    """Covariance (k, k) of what a test may show of the difference of two predictions, Hz^2: its own errors, of reading and of its thermometer, once, and what
+    each of the two leaves open."""
+    first, second = covariance(a), covariance([replace(m, sd=float(np.sqrt(max(m.sd**2 - m.common[0] ** 2, 0.0))), common=m.common[1:]) for m in b])
+    one, other = (np.array([m.sd**2 - sum(v**2 for v in m.common) for m in of]) for of in (a, b))
+    return first + second - np.diag(np.minimum(one, other))
 
 
-def _built(found: Search, h: Hypothesis) -> Spindle:
-    spindle = found.model.spindle
-    for parameter, value in zip(found.model.build, h.evidence.mean, strict=False):
-        spindle = parameter.apply(spindle, float(value * parameter.sd))
-    return spindle
-
-
-def _continued(found: Search, h: Hypothesis, k: int, plan: Condition) -> tuple[float, float]:
-    """Size of mechanism `k` at another condition and its standard error, by the prior that was learned for its law."""
-    m, learned = h.mechanisms[k], h.evidence.learned
-    conditions = [*(d.condition for d in found.model.tests), plan]
-    prior = size_covariance(conditions, learned.widths[k] * m.size.prior_sd, learned.departures[k])
-    n = len(conditions) - 1
-    weights = np.linalg.solve(prior[:n, :n], prior[:n, n])
-    covariance = h.evidence.size_covariance[k]
-    variance = prior[n, n] - weights @ prior[:n, n] + weights @ covariance @ weights
-    size = m.size.neutral + float(weights @ (h.evidence.sizes[k] - m.size.neutral))
-    return float(np.clip(size, *m.size.limits)), float(np.sqrt(max(variance, 0.0)))
-
-
-def _frequencies(found: Search, h: Hypothesis, spindle: Spindle, plan: Condition, sizes: Sequence[float]) -> tuple[Array, Array]:
-    applied = [*found.model.present]
-    for m, size, shape in zip(h.mechanisms, sizes, h.fit.shapes, strict=True):
-        applied.append((m.effect, m.values(float(np.clip(size, *m.size.limits)), shape)))
-    band = spindle.hammer.band[1]
-    point = operating_point(spindle, plan, applied)
-    if (status := point.state.status) != "in contact":  # a spindle that rattles has no modes to be read
-        raise NoEquilibrium(status)
-    found_modes = modes(point.chain, found.model.elsewhere(point.linear, h.evidence.mean), band)
-    return np.array([mode.frequency for mode in found_modes]), np.array([mode.damping_ratio for mode in found_modes])
-
-
-def in_words(condition: Condition) -> str:
-    words = f"at {condition.temperature:g} C, {condition.speed / RPM:.0f} rpm"
-    return words
+def in_words(c: Condition) -> str:
+    words = f"at {c.temperature:g} C, {c.speed / RPM:.0f} rpm" + (f", hit with {c.level:g} N" if c.level else "")
+    return words + (f", after {c.soak_time / 60:g} min in the chamber" if np.isfinite(c.soak_time) else "")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isclose
 from pathlib import Path
 from typing import Any
 
@@ -12,19 +13,23 @@ import numpy as np
 from scipy.special import chdtrc
 
 from thermospindle.diagnosis.data.observe import Observation
+from thermospindle.diagnosis.prediction.temperature import whitened
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.formats import DIAGNOSIS, migrated
+from thermospindle.model.machine import Condition
+from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 from thermospindle.sim.identification.pairing import NEAREST, ModeSet, pairs
 
 SAME = {"temperature": 1.0, "speed": 10 * RPM}  # K, rad/s within which a test is the one that was planned
+ROUNDING = 1e-6  # relative
 REFUTED, DOUBTFUL = 1e-6, 1e-2  # probabilities of a misfit as large by chance
 
 
 @dataclass(frozen=True)
 class Outcome:
     """One prediction of one explanation for one test: rms of (measured - predicted) / sd over frequencies and damping
-    of its modes, and in a word what that says."""
+    of its modes, with errors that are common to them taken together, and in a word what that says."""
 
     test: str
     explanation: str
@@ -36,8 +41,8 @@ class Outcome:
 def outcomes(file: Path, observations: Sequence[Observation]) -> list[Outcome]:
     """Every prediction of an earlier diagnosis (its JSON `file`) for which a test has been made since; BadInput for another file.
 
-    Tests with an added mass or a harder hit must say so themselves: they are matched by temperature and speed, and by level and soak
-    time where planned.
+    A test is the one that was planned where temperature, speed, level and soak time are: what is not told of the latter is a light tap, after all the time
+    that it takes.
     """
     if not file.is_file():
         raise BadInput(f"--predictions {file}: cannot be read: no such file")
@@ -45,7 +50,7 @@ def outcomes(file: Path, observations: Sequence[Observation]) -> list[Outcome]:
         planned = migrated(DIAGNOSIS, json.loads(file.read_text(encoding="utf-8")), f"--predictions {file}")["next_test"]
         rows = [(dict(p["condition"]), dict(p["predicted"])) for p in planned]
         return [
-            _outcome(o, name, _table(modes))
+            _outcome(o, name, *_table(modes))
             for condition, predicted in rows
             for o in observations
             if _is(o, condition)
@@ -59,35 +64,49 @@ def outcomes(file: Path, observations: Sequence[Observation]) -> list[Outcome]:
         raise BadInput(f"--predictions {file}: is not an answer of spindle diagnose --json with predictions in next_test") from None
 
 
-def _table(modes: Sequence[dict[str, Any]]) -> np.ndarray:
-    """Predicted modes (k, 4): frequency and its error in Hz, damping ratio and its error; ValueError for none, and for what is no number."""
+def _table(modes: Sequence[dict[str, Any]]) -> tuple[Array, Array]:
+    """Predicted modes (k, 4): frequency and its error in Hz, damping ratio and its error; and what errors common to all modes move each by (k, c), Hz, none
+    where the answer has none. ValueError for no modes, and for what is no number."""
     columns = {"frequency_Hz": None, "sd_Hz": None, "damping": 1.0, "damping_sd": np.inf}
     rows = [[row[key] if default is None else row.get(key, default) for key, default in columns.items()] for row in modes]
     table = np.array(rows, float)
     if not rows or not np.all(table > 0) or not np.all(np.isfinite(table[:, :3])):
         raise ValueError("modes need positive numbers")
-    return table
+    common = np.array([row.get("common_Hz", []) for row in modes], float)
+    if common.ndim != 2 or not np.all(np.sum(common**2, axis=1) <= (1 + ROUNDING) * table[:, 1] ** 2):
+        raise ValueError("errors common to all modes are part of each mode's error")
+    return table, common
 
 
-def _is(o: Observation, condition: dict[str, Any]) -> bool:
-    there = o.condition
+def same(one: Condition, other: Condition) -> bool:
+    """Whether tests at two conditions are the same test."""
     return bool(
-        abs(there.temperature - condition["temperature_C"]) < SAME["temperature"]
-        and abs(there.speed - condition["speed_rpm"] * RPM) < SAME["speed"]
-        and ("level_N" not in condition or there.level == condition["level_N"])
-        and ("soak_time_min" not in condition or there.soak_time == 60 * condition["soak_time_min"])
-        and "added_mass_g" not in condition
+        abs(one.temperature - other.temperature) < SAME["temperature"]
+        and abs(one.speed - other.speed) < SAME["speed"]
+        and isclose(one.level, other.level, rel_tol=ROUNDING)
+        and isclose(one.soak_time, other.soak_time, rel_tol=ROUNDING)
     )
 
 
-def _outcome(o: Observation, name: str, predicted: np.ndarray) -> Outcome:
+def _is(o: Observation, planned: dict[str, Any]) -> bool:
+    level, soak = planned.get("level_N", 0.0), 60 * planned.get("soak_time_min", np.inf)
+    return "added_mass_g" not in planned and same(o.condition, Condition(planned["temperature_C"], planned["speed_rpm"] * RPM, level, soak))
+
+
+def _outcome(o: Observation, name: str, predicted: Array, common: Array) -> Outcome:
     """Modes paired in the way that costs least in ln frequency; frequencies and, where known and predicted, ln damping ratios."""
-    m, error = len(o.frequency), np.sqrt(np.diag(o.covariance))
     seen, expected = pairs(ModeSet(o.frequency), ModeSet(predicted[:, 0]), NEAREST).T
     frequency, sd, damping, damping_sd = predicted[expected].T
     off = np.log(np.concatenate([o.frequency[seen] / frequency, o.damping[seen] / damping]))
-    known = np.hypot(np.concatenate([error[:m][seen], error[m:][seen]]), np.concatenate([sd / frequency, damping_sd / damping]))
-    residual = (off / known)[np.isfinite(known)]
+    shared = common[expected] / frequency[:, None]
+    own = np.maximum((sd / frequency) ** 2 - np.sum(shared**2, axis=1), 0.0)
+    measured = np.concatenate([seen, len(o.frequency) + seen])
+    variance = np.diag(o.covariance)[measured] + np.concatenate([own, (damping_sd / damping) ** 2])
+    known = np.isfinite(variance)
+    both = np.concatenate([shared, np.zeros_like(shared)])[known]
+    covariance = o.covariance[np.ix_(measured[known], measured[known])] + both @ both.T
+    np.fill_diagonal(covariance, variance[known] + np.sum(both**2, axis=1))
+    residual = whitened(off[known], covariance)
     chance = float(chdtrc(len(residual), float(residual @ residual)))
     verdict = "refuted" if chance < REFUTED else "doubtful" if chance < DOUBTFUL else "confirmed"
     return Outcome(o.test.id, name, float(np.sqrt(np.mean(residual**2))), len(seen), verdict)

@@ -51,6 +51,30 @@ def test_damping_alone_refutes(spindle, tmp_path):
     assert said(hidden(spindle, [], 21)) == {"as it is": "confirmed", "four times as damped": "refuted"}
 
 
+def test_a_true_explanation_is_doubted_once_in_a_hundred(tmp_path):
+    """Errors drawn as they are stated: 2 % of true explanations were refuted, which chance does once in a million, and 9 % doubtful."""
+    random, at = np.random.default_rng(0), np.linspace(1000.0, 5000.0, 9)
+    common = random.standard_normal((9, 2))
+    rows = [{"frequency_Hz": f, "sd_Hz": float(np.sqrt(0.01 + c @ c)), "common_Hz": list(c)} for f, c in zip(at, common, strict=True)]
+    said, words = told(tmp_path, {"true": rows}), []
+    for _ in range(600):
+        seen = at + common @ random.standard_normal(2) + 0.1 * random.standard_normal(9)
+        covariance = np.diag([*np.full(9, 1e-12), *np.full(9, np.inf)])
+        words.append(said([Observation(Test("t", 60.0, 0.0), Condition(60.0), seen, np.full(9, np.nan), covariance, *[None] * 5)])["true"])
+    assert "refuted" not in words
+    assert 0 < words.count("doubtful") < 15
+
+
+@pytest.mark.parametrize(("planned", "level", "soak", "judged"), [({}, 0.0, np.inf, 1), ({}, 50.0, np.inf, 0), ({}, 0.0, 60.0, 0),
+    ({"level_N": 50.0, "soak_time_min": 1.0}, 50.0, 60.0, 1), ({"level_N": 50.0, "soak_time_min": 1.0}, 50.0, 120.0, 0)])  # fmt: skip
+def test_a_test_is_judged_by_what_was_planned_like_it(planned, level, soak, judged, tmp_path):
+    file = tmp_path / "diagnosis.json"
+    rows = {"one": [{"frequency_Hz": 900.0, "sd_Hz": 1.0}]}
+    file.write_text(json.dumps({"next_test": [{"condition": {"temperature_C": 60.0, "speed_rpm": 0.0, **planned}, "predicted": rows}]}))
+    seen = Observation(Test("t", 60.0, 0.0), Condition(60.0, 0.0, level, soak), np.array([900.0]), np.full(1, 0.01), 1e-6 * np.eye(2), *[None] * 5)
+    assert len(outcomes(file, [seen])) == judged
+
+
 def test_another_file_is_refused(tmp_path):
     file = tmp_path / "other.json"
     file.write_text("{}")
@@ -71,6 +95,8 @@ def test_another_file_is_refused(tmp_path):
         '{"next_test": [{"condition": {"temperature_C": 20, "speed_rpm": 0}, "predicted": {"a": [{"frequency_Hz": NaN, "sd_Hz": 1}]}}]}',
         '{"next_test": [{"condition": {"temperature_C": 20, "speed_rpm": 0}, "predicted": {"a": [{"frequency_Hz": 900, "sd_Hz": -1}]}}]}',
         '{"next_test": [{"condition": {"temperature_C": 20, "speed_rpm": 0}, "predicted": {"a": {"b": 1}}}]}',
+        '{"next_test": [{"condition": {"temperature_C": 20, "speed_rpm": 0}, "predicted": {"a": [{"frequency_Hz": 9, "sd_Hz": 1, "common_Hz": [2]}]}}]}',
+        '{"next_test": [{"condition": {"temperature_C": 20, "speed_rpm": 0}, "predicted": {"a": [{"frequency_Hz": 9, "sd_Hz": 1, "common_Hz": 1}]}}]}',
         '{"next_test": 3}',
         "[" * 100_000,
     ],

@@ -49,7 +49,7 @@ def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
                 "repeats": t.repeats,
                 "tells": t.tells,
                 "predicted": {
-                    name: [{"frequency_Hz": m.frequency, "sd_Hz": m.sd} for m in rows]
+                    name: [{"frequency_Hz": m.frequency, "sd_Hz": m.sd, "common_Hz": list(m.common)} for m in rows]
                     for name, rows in zip(t.separates, t.predictions, strict=True)
                 },
             }
