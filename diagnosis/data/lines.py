@@ -67,6 +67,11 @@ class LineData:
         return np.inf if self.test.frf is None else record_length(self.test.frf)
 
     @property
+    def sensors(self) -> tuple[int, ...]:
+        """Nodes of the rows: what a channel is, in whatever order a test has them."""
+        return () if self.test.frf is None else self.test.frf.response_nodes
+
+    @property
     def count(self) -> int:
         """Real numbers in the likelihood."""
         return 2 * self.value.size

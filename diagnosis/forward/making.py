@@ -30,7 +30,7 @@ def campaign_model(spindle: Spindle, campaign: Campaign, tests: Sequence[TestDat
     modes = reference_modes(reference, 2 * np.pi * IN_BAND * highest, 2 * np.pi * BEYOND * highest, MOST_MODES)
     build = tuple(toleranced(spindle))
     lines = [d for d in tests if isinstance(d, LineData)]
-    channels = max((d.value.shape[0] for d in lines), default=0)
+    channels = len({node for d in lines for node in d.sensors})
     names = [d.test.id for d in tests]
     parameters = nuisances(spindle, build, names, bool(lines), channels, modes)
     return CampaignModel(spindle, tuple(tests), scenes, build, parameters, modes, present)

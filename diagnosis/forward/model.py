@@ -129,6 +129,13 @@ class CampaignModel:
             found.append((number, channel))
         return found
 
+    @cached_property
+    def _channel_of(self) -> list[Integers]:
+        """For every test the channel of each row: a sensor keeps its gain at whichever row it is."""
+        nodes = [d.sensors if isinstance(d, LineData) else () for d in self.tests]
+        number = {node: c for c, node in enumerate(dict.fromkeys(node for own in nodes for node in own))}
+        return [np.array([number[node] for node in own], int) for own in nodes]
+
     def operating(self, t: int, x: Array, effects: Applied) -> OperatingPoint:
         """The operating point of test `t`; what differs in the measuring chain alone is not worked out again."""
         acting = tuple((id(e), *v.values()) for e, v in effects if any(getattr(e, hook) for hook in MEASURING))
@@ -255,7 +262,7 @@ class CampaignModel:
         number, channel = self._gains[t]
         gain = np.zeros(self.channels)
         np.add.at(gain, channel, x[number] * np.array([self.parameters[i].sd for i in number]))
-        return np.exp(gain)
+        return np.asarray(np.exp(gain)[self._channel_of[t]])
 
     @property
     def channels(self) -> int:
@@ -297,9 +304,9 @@ class CampaignModel:
         for power, (_, i, j, size) in enumerate(discrepancies):
             at = fill(at, response.moved_together(w, power, i, j, size * np.where(i == j, 0.5, 1.0)))
         for k, c in enumerate(channel):
-            if c < n_resp:
-                gain = response.value[c] * weight[c] * self.parameters[own[k]].sd
-                jacobian[at + k, 0, c], jacobian[at + k, 1, c] = gain.real, gain.imag
+            for row in np.flatnonzero(self._channel_of[t][:n_resp] == c):
+                gain = response.value[row] * weight[row] * self.parameters[own[k]].sd
+                jacobian[at + k, 0, row], jacobian[at + k, 1, row] = gain.real, gain.imag
         at += len(own)
         if record:
             at = fill(at, response.cut_off[None])

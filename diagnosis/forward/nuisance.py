@@ -48,7 +48,7 @@ in whether a groove grows with its ring's free strain or follows its face."""
 class Nuisance:
     """One nuisance parameter; `sd` is one prior standard deviation in its own unit (relative or K).
 
-    `index` is the number of the toleranced parameter (build), the channel (gain), or unused; `modes` the pair of a discrepancy.
+    `index` is the number of the toleranced parameter (build), the channel (gain: sensors in the order in which tests first have them), or unused; `modes` the pair of a discrepancy.
     """
 
     kind: str

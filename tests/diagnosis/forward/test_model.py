@@ -20,8 +20,10 @@ from thermospindle.model.rotor.chain import matrices
 from thermospindle.model.rotor.modes import poles
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
+from thermospindle.sim.campaign.campaign import Noise
 from thermospindle.sim.operating import operating_point
 
+NOISELESS = Noise(0.0, 0.0)
 CONDITIONS = (Condition(20.0), Condition(45.0, 7200 * RPM))
 FREQUENCY = np.arange(400.0, 6000.1, 40.0)
 KINDS = (BUILD, EXPANSION, TEMPERATURE, GAIN, DRIFT, STIFFNESS, DAMPING, RECORD)
@@ -170,6 +172,26 @@ def test_parameters_of_other_tests_do_not_move_a_test(scene):
         assert others
         assert {model.parameters[i].test for i in others} == {1 - t}
         assert not differences(model, t, x, others).any()
+
+
+@pytest.mark.parametrize("rows", [(3, 1, 2), (2, 3)])
+def test_gains_go_with_sensors_and_not_with_rows(rows):
+    """Sensors in another order in the second test, or one of them missing: at what was put in nothing is left, and derivatives are those of the residual."""
+    scene, each, frequency = load(SCENES["symmetric"]), {1: 0.03, 2: -0.02, 3: 0.05}, np.arange(400.0, 3000.1, 200.0)
+    tests = []
+    for t, own in enumerate(((1, 2, 3), rows)):
+        test = virtual_campaign(scene, CONDITIONS[:1], t, responses=own, references=(1,), frequency=frequency, noise=NOISELESS).tests[0]
+        gain = np.exp([each[n] for n in own])[:, None, None]
+        tests.append(replace(test, id=f"t{t}", frf=replace(test.frf, value=test.frf.value * gain)))
+    campaign = virtual_campaign(scene, CONDITIONS[:1], 0, references=(1,), frequency=frequency)
+    model = model_of(scene, replace(campaign, tests=tuple(tests)))
+    gains = [i for i, p in enumerate(model.parameters) if p.kind == GAIN]
+    assert len(gains) == 3
+    x = np.zeros(len(model.parameters))
+    x[gains] = np.array(list(each.values())) / model.parameters[gains[0]].sd
+    assert np.abs(model.residual(1, x, [])).max() < 1e-6
+    assert np.abs(model.residual(1, 0 * x, [])).max() > 1
+    assert worst_by_kind(model, 1, x)[GAIN] < 1e-4
 
 
 def test_derivatives_of_mode_tables():
