@@ -132,7 +132,8 @@ def _own_laws(found: Search, verdict: Verdict) -> tuple[Drift, ...]:
 def _drift(found: Search, h: Hypothesis, k: int) -> Drift:
     """Of mechanism `k` of an explanation."""
     conditions = tuple(d.condition for d in found.model.tests)
-    m, change, covariance = h.mechanisms[k], h.evidence.sizes[k], h.evidence.size_covariance[k]
+    m, covariance = h.mechanisms[k], h.evidence.size_covariance[k]
+    change = h.evidence.sizes[k] - m.size.neutral
     gain = h.evidence.ln - found.base.evidence.ln
     regular = covariance + 1e-6 * np.trace(covariance) / len(change) * np.eye(len(change))
     pattern = choose_for(conditions, change, regular) if len(change) > 2 else None

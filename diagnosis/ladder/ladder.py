@@ -174,10 +174,12 @@ def named_by(found: Verdict) -> list[Asked]:
     if found.word in ("unexplained", "ambiguous"):
         word, rivals = ("nearest:", found.candidates[:NEAREST]) if found.word == "unexplained" else ("or", _alternatives(found))
         return [(f"{word} {' + '.join(c.names)}", _effects(c), DISCREPANCY) for c in rivals]
-    best = next(c for c in found.candidates if set(c.names) == set(found.effects))
+    exact = [c for c in found.candidates if set(c.names) == set(found.effects)]
+    among = exact[:1] or [*found.candidates, *found.free]  # beside something that drifts freely alone, maybe
+    effects = {m.name: m.effect for c in reversed(among) for m in c.hypothesis.mechanisms if m.name in found.effects}
     alone = {c.names[0]: c.delta_evidence for c in found.candidates if len(c.names) == 1}
     steps, below = list[Asked](), DISCREPANCY
-    for effect in sorted(_effects(best), key=lambda e: -alone.get(e.name, -np.inf)):
+    for effect in sorted(effects.values(), key=lambda e: -alone.get(e.name, -np.inf)):
         steps.append((f"+ {effect.name}", (effect,), below))
         below = steps[-1][0]
     return steps

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import runpy
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.freeform import free_forms
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
 from thermospindle.diagnosis.inference.problem import Problem
+from thermospindle.diagnosis.verdict import _drift
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
@@ -116,6 +118,17 @@ def test_a_law_that_two_tests_rule_out_is_not_drafted(tmp_path):
     text = draft(of_rings(tmp_path, [5.0, 5.1], 0.1, (20.0, 60.0)), "own")  # as it must be where nothing rules it out
     assert "radially drifts: constant" in text
     assert "of 2 tests with 1 parameters" in text
+
+
+def test_a_drift_is_told_from_where_an_effect_is_neutral():
+    """As a drafted file adds it there: an effect of one's own may be neutral at 1."""
+    mechanism = SimpleNamespace(name="own", own_law=False, size=SimpleNamespace(name="size", unit="1", neutral=1.0), values=lambda size, shape: {})
+    tests = [SimpleNamespace(condition=Condition(t)) for t in (20.0, 60.0)]
+    h = SimpleNamespace(
+        mechanisms=[mechanism], fit=SimpleNamespace(shapes=[()]), evidence=SimpleNamespace(ln=2.0, sizes=np.array([[1.0, 1.5]]), size_covariance=np.eye(2)[None])
+    )
+    found = SimpleNamespace(model=SimpleNamespace(tests=tests), base=SimpleNamespace(evidence=SimpleNamespace(ln=0.0)))
+    assert _drift(found, h, 0).change.tolist() == [0.0, 0.5]
 
 
 COMMON, OWN = 0.3, 0.003  # um, errors that all tests have alike and each its own

@@ -202,6 +202,13 @@ def test_steps_that_a_diagnosis_asks_for(word, effects, candidates, expected):
     assert all(name.split(" ", 1)[1] == " + ".join(e.name for e in own) for name, own, _ in steps)
 
 
+def test_an_effect_named_beside_something_that_drifts_is_a_step():
+    """No candidate is of that effect alone: the ladder once ended in a traceback."""
+    beside = replace(candidate(90, "soak_lag"), names=("soak_lag", "mount stiffness"), free=True)
+    found = SimpleNamespace(word="identified", effects=("soak_lag",), candidates=(candidate(3, "added_disk"),), free=(beside,))
+    assert [(name, [e.name for e in own], on) for name, own, on in named_by(found)] == [("+ soak_lag", ["soak_lag"], DISCREPANCY)]
+
+
 def named(lagging, word, tests=()):
     """The climbed ladder as if a diagnosis had chosen its effects."""
     return replace(lagging, diagnosis=SimpleNamespace(verdict=SimpleNamespace(word=word, reason="Because.")), tests=tests)
