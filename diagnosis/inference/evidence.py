@@ -28,17 +28,16 @@ from thermospindle.diagnosis.inference.prior import Learned, nuisance_root, whit
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
 
-WIDER = {1.0: 0.0, 2.0: -12.0, 4.0: -13.0, 8.0: -14.0}
-"""Prior odds (ln) that a drawing is off by so many times the build tolerances that the scene states, assumed, and less than those of any two effects: one
-tolerance that is strained tells of an effect, several of a drawing that is off."""
 GRIDS = {
     kinds_of.STIFFNESS: (0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2),  # relative error of a frequency
     kinds_of.DAMPING: (0.0, 0.01, 0.03, 0.1),
     kinds_of.STIFFNESS_DRIFT: (0.0, 3e-5, 1e-4, 3e-4, 1e-3),
     kinds_of.DAMPING_DRIFT: (0.0, 0.01, 0.03),
     kinds_of.DRIFT: (0.0, 3e-4, 1e-3, 3e-3, 1e-2),
-    kinds_of.BUILD: tuple(WIDER),  # last: modes may be off instead
 }
+WIDER = {1.0: 0.0, 2.0: -12.0, 4.0: -13.0, 8.0: -14.0}
+"""Prior odds (ln) that a drawing is off by so many times the build tolerances that the scene states, assumed, and less than those of any two effects: one
+tolerance that is strained tells of an effect, several of a drawing that is off."""
 WIDTHS = (0.5, 1.0, 2.0, 4.0)  # of a size, in its own prior standard deviations
 DEPARTURES = (0.0, 0.1, 0.3, 1.0)  # from a law, of the size
 FREE_WIDTHS = (0.1, 0.3, 1.0, 3.0, 10.0)  # of what has no law but a constant: its width is to be learned
@@ -61,16 +60,16 @@ class Evidence:
     by_departing: float = 0.0
 
 
-def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = ()) -> Evidence:
+def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide: bool = False) -> Evidence:
     """The evidence of a fit at its own temper (its errors are 1 / temper times the data's); with `near` the sizes of discrepancies, drift and
-    errors are taken from the best of these, which is quick."""
+    errors are taken from the best of these, which is quick. Build tolerances are as stated, or with `wide` as much wider as is likeliest."""
     turn = amplitudes_apart(fit)
     whole = turned(turn, fit.chi2, fit.gradient, fit.information, fit.point)
     t2 = fit.temper**2
     whole = Quadratic(t2 * whole.constant, t2 * whole.b, t2 * whole.a)
     p = len(fit.nuisance)
     kinds = {q.kind for q in model.parameters}
-    grids = {kind: grid for kind, grid in GRIDS.items() if kind in kinds}
+    grids = {kind: grid for kind, grid in GRIDS.items() if kind in kinds} | ({kinds_of.BUILD: tuple(WIDER)} if wide else {})  # last: modes may be off instead
     own_grids = [_own_grid(m.free or m.own_law, m.effect.lasting) for m in fit.mechanisms]  # (width, departure) of every mechanism
     conditions = tuple(d.condition for d in model.tests)
     roots = [_roots(conditions, grid, len(m.shape)) for m, grid in zip(fit.mechanisms, own_grids, strict=True)]

@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.evidence import Evidence, evidence
@@ -101,6 +102,7 @@ def settled(model: CampaignModel, h: Hypothesis) -> Hypothesis:
     It starts from its own answer, or from the fit where the model is no quadratic as far as that, without what was learned to be nothing. What ends with less evidence than the quadratic promised
     may have stalled on that way, whatever it costs at first, and is fitted from the other start too.
     """
+    wide = kinds_of.BUILD in h.evidence.learned.sizes
     for _ in range(REFITS):
         refit = partial(fit, model, h.mechanisms, rates=h.fit.rates, tempers=TEMPERS[-1:], learned=h.evidence.learned, moved=h.fit.moved)
         before = h.evidence
@@ -108,13 +110,22 @@ def settled(model: CampaignModel, h: Hypothesis) -> Hypothesis:
             problem = Problem(model, h.mechanisms, before.learned, h.fit.moved)
             near, far = sorted((before.mean, problem.within_prior(h.fit.point)), key=lambda at: problem.cost(at, TEMPERS[-1]))
             found = refit(start=near)
-            told = evidence(model, found)
+            told = evidence(model, found, wide=wide)
             if told.ln < before.ln - LITTLE:
                 found = min(found, refit(start=far), key=lambda f: f.cost)
-                told = evidence(model, found)
+                told = evidence(model, found, wide=wide)
         except FAILED:
             return h
         h = Hypothesis(found, told)
         if h.evidence.learned == before.learned and abs(h.evidence.ln - before.ln) < LITTLE:
             break
     return h
+
+
+def widened(model: CampaignModel, h: Hypothesis) -> Hypothesis:
+    """With build tolerances wider than stated, where that is likelier: a drawing that is off. Nothing is sought with them, for they would take what is missing
+    before anything is found."""
+    wide = evidence(model, h.fit, wide=True)
+    if wide.learned.sizes[kinds_of.BUILD] == 1.0:
+        return h
+    return max(h, settled(model, Hypothesis(h.fit, wide)), key=lambda h: h.evidence.ln)

@@ -123,13 +123,10 @@ def _promised(problem: Problem, about: Fit, sizes: Learned, nothing: float, shap
 
 
 def smaller(learned: Learned) -> list[Learned]:
-    """With smaller constant discrepancies, and build tolerances as stated: what is missing in every test alike has made them as large as they are."""
+    """With smaller constant discrepancies: what is missing in every test alike has made them as large as they are."""
     grid = GRIDS[kinds_of.STIFFNESS]
     below = [size for size in grid if 0.0 < size < learned.sizes.get(kinds_of.STIFFNESS, 0.0)]
-    found = [replace(learned, sizes={**learned.sizes, kinds_of.STIFFNESS: size}) for size in below[-SMALLER:]]
-    if learned.sizes.get(kinds_of.BUILD, 1.0) > 1.0:
-        found += [replace(one, sizes={**one.sizes, kinds_of.BUILD: 1.0}) for one in (learned, *found)]
-    return found
+    return [replace(learned, sizes={**learned.sizes, kinds_of.STIFFNESS: size}) for size in below[-SMALLER:]]
 
 
 def _visibility(cross: Array, square: float, information: Array, mechanism: Mechanism) -> float:

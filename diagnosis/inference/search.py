@@ -11,7 +11,7 @@ from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.freeform import alike
-from thermospindle.diagnosis.inference.hypothesis import STRAIN, Hypothesis, settled
+from thermospindle.diagnosis.inference.hypothesis import STRAIN, Hypothesis, settled, widened
 from thermospindle.diagnosis.inference.pairs import joined, joined_early
 from thermospindle.diagnosis.inference.resonance import with_resonance
 from thermospindle.diagnosis.inference.screening import Screened
@@ -62,7 +62,8 @@ def search(
     pairs = better([*pairs, *joined_early(model, none, tried, pairs, every, workers)])
     progress("pairs fitted")
     finalists = _finalists([*singles, *pairs])
-    anew = dict(zip(map(id, finalists), in_parallel(partial(settled, model), finalists, workers), strict=True))
+    anew = dict(zip(map(id, finalists), in_parallel(partial(_at_the_end, model), finalists, workers), strict=True))
+    none = widened(model, none)
     ranked = [replace(anew[id(h)], fit=replace(anew[id(h)].fit, mechanisms=h.mechanisms)) if id(h) in anew else h for h in [*singles, *pairs]]
     progress("the best fitted anew")
     hypotheses = tuple(sorted([none, *ranked], key=lambda h: -h.evidence.ln))
@@ -72,6 +73,10 @@ def search(
 def _without_effects(model: CampaignModel) -> Hypothesis:
     first = fit(model)
     return settled(model, Hypothesis(first, evidence(model, first)))
+
+
+def _at_the_end(model: CampaignModel, h: Hypothesis) -> Hypothesis:
+    return widened(model, settled(model, h))
 
 
 def _finalists(found: Sequence[Hypothesis]) -> list[Hypothesis]:

@@ -81,7 +81,8 @@ def _learned(evidence: Evidence) -> dict[str, float]:
     """Sizes of the model's own constant discrepancy (relative, of frequencies and damping), of gain drift, and the factor on stated errors."""
     s = evidence.learned
     return {
-        **{LEARNED[kind]: size for kind, size in s.sizes.items()},
+        **{LEARNED[kind]: size for kind, size in s.sizes.items() if kind in LEARNED},
+        "build_tolerances_times": s.sizes.get(kinds_of.BUILD, 1.0),
         "errors_times": s.errors,
     }
 
@@ -218,5 +219,4 @@ LEARNED = {
     kinds_of.STIFFNESS_DRIFT: "frequency_discrepancy_drift",
     kinds_of.DAMPING_DRIFT: "damping_discrepancy_drift",
     kinds_of.DRIFT: "gain_drift",
-    kinds_of.BUILD: "build_tolerances_times",
 }
