@@ -49,6 +49,15 @@ OneLine = AfterValidator(_one_line)
 Name = Annotated[str, Field(min_length=1, max_length=200), OneLine]
 
 
+def _printed(title: str) -> str:
+    _one_line(title.replace("\n", " "))
+    return title
+
+
+Title = Annotated[str, Field(min_length=1, max_length=200), AfterValidator(_printed)]
+"""May have line breaks."""
+
+
 def _rising(span: tuple[float, float]) -> tuple[float, float]:
     if not span[0] < span[1]:
         raise ValueError("the first number must be smaller than the second")

@@ -27,6 +27,7 @@ from thermospindle.model.scene.fields import (
     Table,
     Temperature,
     TemperatureSpan,
+    Title,
     first_error,
     format_of,
 )
@@ -38,7 +39,7 @@ from thermospindle.model.scene.structure import Structure, StructureBody
 from thermospindle.model.scene.thermal import Thermal
 from thermospindle.model.units import MM, RPM
 
-__all__ = ["Finite", "Name", "NotNegative", "Point", "Positive", "Scene", "Table", "first_error"]
+__all__ = ["Finite", "Name", "NotNegative", "Point", "Positive", "Scene", "Table", "Title", "first_error"]
 
 
 class Tolerances(Table):
@@ -80,7 +81,7 @@ class Build(Table):
 
 class Scene(Table):
     format: format_of(SCENE) = CURRENT[SCENE]  # type: ignore[valid-type]
-    title: Name
+    title: Title
     reference_temperature_C: Temperature
     nominal_speed_rpm: Annotated[float, Field(ge=1e-3, le=1e8)] | None = None
     temperature_range_C: TemperatureSpan | None = None

@@ -16,7 +16,7 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.files.cells import plain_number
 from thermospindle.model.files.formats import CAMPAIGN, CURRENT
 from thermospindle.model.scene.fields import format_of
-from thermospindle.model.scene.form import Finite, Name, NotNegative, Positive, first_error
+from thermospindle.model.scene.form import Finite, Name, NotNegative, Positive, Title, first_error
 from thermospindle.model.scene.form import Point as PointTable
 
 MODE_COLUMNS = ("test", "mode", "kind", "frequency_Hz", "frequency_sd_Hz", "damping_ratio", "damping_ratio_sd")
@@ -56,7 +56,7 @@ class TestTable(Table):
 
 class CampaignTable(Table):
     format: format_of(CAMPAIGN) = CURRENT[CAMPAIGN]  # type: ignore[valid-type]
-    title: Name
+    title: Title
     spindle: Name
     quantity: Literal["receptance", "mobility", "accelerance", "displacement"]
     note: str = ""

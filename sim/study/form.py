@@ -13,7 +13,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.formats import CURRENT, STUDY
-from thermospindle.model.scene.fields import Name, Temperature, first_error, format_of, read_file
+from thermospindle.model.scene.fields import Name, Temperature, Title, first_error, format_of, read_file
 from thermospindle.sim.campaign.form import Table
 
 SWEEP, MONTE_CARLO, FLEET = "sweep", "monte-carlo", "fleet"
@@ -44,7 +44,7 @@ class Steps(Table):
 
 class StudyForm(Table):
     format: format_of(STUDY) = CURRENT[STUDY]  # type: ignore[valid-type]
-    title: Name
+    title: Title
     kind: Literal["sweep", "monte-carlo", "fleet"]
     scene: Name
     temperatures_C: list[Temperature] | None = Field(None, min_length=1, max_length=100_000)
