@@ -98,11 +98,10 @@ class CampaignModel:
 
     @cached_property
     def _discrepancies(self) -> list[tuple[Discrepancies, Discrepancies]]:
-        """For every test, of stiffness and of damping: parameter numbers, first and second mode of each, and its factor in the modal matrix; the last
-        row is of no test, and has what is constant alone."""
+        """For every test, of stiffness and of damping: parameter numbers, first and second mode of each, and its factor in the modal matrix."""
         found = []
         omega, damping = self.reference.omega, np.sqrt(2 * self.reference.damping * self.reference.omega)
-        for t in (*range(len(self.tests)), None):
+        for t in range(len(self.tests)):
             of_test = []
             for kinds_, scale, twice in (
                 ((kinds_of.STIFFNESS, kinds_of.STIFFNESS_DRIFT), omega, 2.0),
@@ -172,11 +171,6 @@ class CampaignModel:
         stiffness, damping = self._discrepancy(t, bare, x)
         whole = Matrices(bare.mass, bare.damping + damping, bare.stiffness + stiffness, bare.dofs)
         return Linear(whole, point.measurement, point.chain.layout)
-
-    def elsewhere(self, linear: Matrices, x: Array) -> Matrices:
-        """The matrices of another condition with the model's constant discrepancy."""
-        stiffness, damping = self._discrepancy(-1, linear, x)
-        return Matrices(linear.mass, linear.damping + damping, linear.stiffness + stiffness, linear.dofs)
 
     def _discrepancy(self, t: int, linear: Matrices, x: Array) -> tuple[Array, Array]:
         w = self.reference.over(linear.dofs)

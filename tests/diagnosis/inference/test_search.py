@@ -125,10 +125,10 @@ def test_two_constant_causes_of_which_neither_is_found_alone(spindle, tests):
 def test_a_drawing_that_is_off_is_no_missing_effect(spindle):
     """Three stiffnesses a tenth off and the preload by an eighth, four to eight times their tolerances, and nothing hidden."""
     off = {"mount axial stiffness": 0.125, "flange lateral stiffness": -0.107, "flange tilt stiffness": 0.094, "preload": -0.12}
-    conditions = [Condition(t, n * RPM) for t, n in ((20.0, 0.0), (40.0, 0.0), (60.0, 0.0), (60.0, 7200.0))]
+    conditions = [Condition(t, n * RPM) for t, n in ((20.0, 0.0), (60.0, 0.0), (60.0, 7200.0))]
     model = model_of(spindle, mode_campaign(deviated(spindle, off), conditions, 3, []))
-    named = [m for name in ("clearance_opening", "mount_compliance", "ring_growth") for m in variants(effect(name))]
-    found = search(model, named, [f for f in free_forms(spindle) if f.name == "preload"], workers=1)
+    named = [m for name in ("clearance_opening", "mount_compliance") for m in variants(effect(name))]
+    found = search(model, named, [], workers=1)
     v = decide(found)
     assert v.word == "none"
     assert found.base.evidence.learned.sizes[BUILD] > 1.0
