@@ -45,10 +45,11 @@ def least_loss(
         key = " + ".join(names)
         losses[key], answers[key] = named_loss(set(names)), ("identified" if len(names) == 1 else "two effects", names)
     explained = sorted([*candidates, *beside], key=lambda c: -c.probability)
+    enough = ENOUGH * sum(c.probability for c in explained)
     chosen = list[Candidate]()
     for c in explained:
         held = sum(k.probability for k in chosen)
-        if held >= ENOUGH * sum(k.probability for k in explained) or c.probability < NEGLIGIBLE:
+        if held >= enough or c.probability < NEGLIGIBLE:
             break
         chosen.append(c)
     names = tuple(dict.fromkeys(n for c in chosen for n in named_part(c)))

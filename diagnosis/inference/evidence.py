@@ -190,6 +190,7 @@ def left_out(model: CampaignModel, fit: Fit, found: Evidence, groups: Sequence[S
         return ln_integral(together(tests), prior) - sum(counts[t] for t in tests) * float(np.log(s))
 
     every = range(len(by_test))
+    whole = ln_density(every)
     total, count, density = 0.0, 0, 0.0
     for group in groups:
         rest = [t for t in every if t not in group]
@@ -197,5 +198,5 @@ def left_out(model: CampaignModel, fit: Fit, found: Evidence, groups: Sequence[S
             mean, _ = posterior(together(rest), prior)
             total += sum(by_test[t].at(mean) for t in group)
             count += sum(counts[t] for t in group)
-            density += ln_density(every) - ln_density(rest)
+            density += whole - ln_density(rest)
     return (float(np.sqrt(max(total, 0.0) / count)), density) if count else (np.nan, np.nan)
