@@ -101,7 +101,7 @@ def diagnose(
     own_laws = _own_laws(found, verdict)
     tests = tuple(next_tests(found, verdict)) if verdict.word != "none" else ()
     progress("next tests weighed")
-    seen = smallest(found.model, found.base.fit, found.screened)
+    seen = smallest(found.model, found.base.fit, verdict.accepted.evidence.learned, found.screened)
     progress("smallest sizes found")
     return Diagnosis(spindle, campaign, found, verdict, drifts, own_laws, tests, seen, unseen_beside(found, verdict.accepted))
 

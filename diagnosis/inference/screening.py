@@ -14,7 +14,7 @@ from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.evidence import GRIDS, evidence
 from thermospindle.diagnosis.inference.fit import Fit
 from thermospindle.diagnosis.inference.gaussian import impossible
-from thermospindle.diagnosis.inference.prior import Learned
+from thermospindle.diagnosis.inference.prior import Learned, as_stated
 from thermospindle.diagnosis.inference.problem import Linearisation, Problem
 from thermospindle.model.parallel import in_parallel
 from thermospindle.model.types import Array
@@ -37,6 +37,17 @@ class Screened:
     possible: bool = True  # whether it would have sizes that it can have
 
 
+@dataclass(frozen=True, eq=False)
+class _Beside:
+    """What is fitted already, its discrepancies and errors of the sizes learned: the prior's precision (n, n), and the ln evidence."""
+
+    model: CampaignModel
+    about: Fit
+    sizes: Learned
+    precision: Array
+    ln: float
+
+
 def screen(
     model: CampaignModel, about: Fit, temper: float, learned: Learned, mechanisms: Sequence[Mechanism], workers: int | None = None, turned: bool = True
 ) -> list[Screened]:
@@ -44,12 +55,14 @@ def screen(
     and the best of each name, and kind of law, once more with its shape `turned`."""
     about = replace(about, temper=temper)
     sizes = Learned(learned.sizes, learned.errors if temper == 1.0 else 1.0, (), ())
+    prior = Problem(model, about.mechanisms, replace(as_stated(learned.sizes, about.mechanisms), errors=sizes.errors))
     at = linearised(model, about)  # where a fit has not arrived its own derivatives are of an earlier point
     nothing = evidence(model, replace(about, chi2=at.chi2, gradient=at.gradient, information=at.information), [sizes, *smaller(sizes)]).ln
-    found = in_parallel(partial(_screened, model, about, sizes, nothing), list(mechanisms), workers)
+    beside = _Beside(model, about, sizes, prior.precision, nothing)
+    found = in_parallel(partial(_screened, beside), list(mechanisms), workers)
     found = [replace(s, mechanism=m) for s, m in zip(found, mechanisms, strict=True)]
     best = {(s.mechanism.name, s.mechanism.kind): s for s in sorted(found, key=lambda s: s.gain) if turned and s.visibility > 0 and s.mechanism.shape}
-    others = in_parallel(partial(_turned, model, about, sizes, nothing), list(best.values()), workers)
+    others = in_parallel(partial(_turned, beside), list(best.values()), workers)
     return found + [replace(s, mechanism=drawn.mechanism) for s, drawn in zip(others, best.values(), strict=True)]
 
 
@@ -62,31 +75,31 @@ def linearised(model: CampaignModel, about: Fit) -> Linearisation:
     return model.kept[key]
 
 
-def _screened(model: CampaignModel, about: Fit, sizes: Learned, nothing: float, mechanism: Mechanism) -> Screened:
-    problem = Problem(model, [*about.mechanisms, mechanism])
+def _screened(beside: _Beside, mechanism: Mechanism) -> Screened:
+    problem, fitted = Problem(beside.model, [*beside.about.mechanisms, mechanism]), beside.about.point
     if any(getattr(mechanism.effect, hook) for hook in SEEN):
-        return _promised(problem, about, sizes, nothing, np.zeros(len(mechanism.shape)))
-    return Screened(mechanism, -np.inf, np.concatenate([about.point, np.zeros(problem.length - len(about.point))]), 0.0)
+        return _promised(problem, beside, np.zeros(len(mechanism.shape)))
+    return Screened(mechanism, -np.inf, np.concatenate([fitted, np.zeros(problem.length - len(fitted))]), 0.0)
 
 
-def _turned(model: CampaignModel, about: Fit, sizes: Learned, nothing: float, drawn: Screened) -> Screened:
+def _turned(beside: _Beside, drawn: Screened) -> Screened:
     """The best that a mechanism promises with its shape parameters moved in turn: what a disk on the hub would not do, one within the hub may."""
     mechanism = drawn.mechanism
-    problem, shape, best = Problem(model, [*about.mechanisms, mechanism]), np.zeros(len(mechanism.shape)), drawn
+    problem, shape, best = Problem(beside.model, [*beside.about.mechanisms, mechanism]), np.zeros(len(mechanism.shape)), drawn
     for k, q in enumerate(mechanism.shape):
         ends = np.clip(q.neutral + TURN * q.prior_sd * np.array([-1.0, 1.0]), *q.limits)
         for turn in (ends - q.neutral) / q.prior_sd:
             if turn:
-                tried = _promised(problem, about, sizes, nothing, np.where(np.arange(len(shape)) == k, turn, shape))
+                tried = _promised(problem, beside, np.where(np.arange(len(shape)) == k, turn, shape))
                 best = tried if tried.gain > best.gain else best
         shape = best.start[problem.length - len(shape) :]
     return replace(best, visibility=drawn.visibility)
 
 
-def _promised(problem: Problem, about: Fit, sizes: Learned, nothing: float, shape: Array) -> Screened:
+def _promised(problem: Problem, beside: _Beside, shape: Array) -> Screened:
     """The quadratic of the fitted model, with the sizes of the last mechanism beside its parameters; its `shape` parameters stay where they are, in prior
     standard deviations from neutral."""
-    model, mechanism, first = problem.model, problem.mechanisms[-1], len(about.point)
+    model, about, mechanism, first = beside.model, beside.about, problem.mechanisms[-1], len(beside.about.point)
     p = np.concatenate([about.point, np.zeros(problem.length - first)])
     p[problem.length - len(shape) :] = shape
     x, own_sizes, shapes = problem.parts(p)
@@ -112,14 +125,15 @@ def _promised(problem: Problem, about: Fit, sizes: Learned, nothing: float, shap
         about, mechanisms=problem.mechanisms, point=p, sizes=own_sizes, shapes=tuple(tuple(float(v) for v in s) for s in shapes),
         roots=problem.roots, chi2=at.chi2, gradient=gradient, information=information, by_test=(),
     )  # fmt: skip
-    visibility = _visibility(typical, square, at.information, mechanism)
+    left = square - float(typical @ np.linalg.solve(at.information + beside.precision, typical))
+    visibility = float(abs(mechanism.size.typical - mechanism.size.neutral) * np.sqrt(max(left, 0.0))) / beside.sizes.errors
     if visibility == 0.0:
         return Screened(mechanism, -np.inf, p, 0.0)
-    found = evidence(model, whole, [sizes, *smaller(sizes)])
+    found = evidence(model, whole, [beside.sizes, *smaller(beside.sizes)])
     start = found.mean
     start[problem.length - len(shape) :] = shape
     possible = not impossible(mechanism, found.sizes[-1], found.size_covariance[-1])
-    return Screened(mechanism, found.ln - nothing - float(shape @ shape) / 2, start, visibility, possible)
+    return Screened(mechanism, found.ln - beside.ln - float(shape @ shape) / 2, start, visibility, possible)
 
 
 def smaller(learned: Learned) -> list[Learned]:
@@ -127,10 +141,3 @@ def smaller(learned: Learned) -> list[Learned]:
     grid = GRIDS[kinds_of.STIFFNESS]
     below = [size for size in grid if 0.0 < size < learned.sizes.get(kinds_of.STIFFNESS, 0.0)]
     return [replace(learned, sizes={**learned.sizes, kinds_of.STIFFNESS: size}) for size in below[-SMALLER:]]
-
-
-def _visibility(cross: Array, square: float, information: Array, mechanism: Mechanism) -> float:
-    """Standard errors of the typical size, the same in all tests, after all else is fitted anew: of its column c `square` is c c, and `cross` (n,) that
-    with the columns of all else, which have `information` (n, n)."""
-    left = square - float(cross @ np.linalg.solve(information + np.eye(len(cross)), cross))
-    return float(abs(mechanism.size.typical - mechanism.size.neutral) * np.sqrt(max(left, 0.0)))

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.virtual_campaign import drawn, effect, model_of, virtual_campaign
+from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
@@ -20,34 +23,53 @@ NAMES = ("preload_loss", "sensor_mass", "channel_delay")
 
 @pytest.fixture(scope="module")
 def plain(spindle):
-    """The fitted model of a campaign with nothing hidden, and what screening says of some effects."""
+    """The fitted model of a campaign with nothing hidden, what was learned of it, and what screening says of some effects."""
     model = model_of(spindle, virtual_campaign(spindle, THREE, 4, [], drawn(spindle, 3, 4)))
     done = fit(model)
-    looked = screen(model, done, 1.0, evidence(model, done).learned, [v for name in NAMES for v in variants(effect(name))], 1)
-    return model, done, looked
+    learned = evidence(model, done).learned
+    return model, done, learned, screen(model, done, 1.0, learned, [v for name in NAMES for v in variants(effect(name))], 1)
 
 
 def test_what_is_left_at_the_smallest_size_is_worth_what_is_asked(plain):
-    model, done, looked = plain
-    found = smallest(model, done, looked, 1)
+    model, done, learned, looked = plain
+    found = smallest(model, done, learned, looked, 1)
     assert set(found) == set(NAMES)
     for m, size in found.values():
-        assert visibility(model.thinned, done, m, m.size.neutral + size) == pytest.approx(np.sqrt(2 * ASKED), rel=0.1)
-        assert visibility(model.thinned, done, m, m.size.neutral) == pytest.approx(0.0, abs=1e-9)
+        seen = visibility(model.thinned, done, learned, m, m.size.neutral + size)
+        assert seen**2 / 2 - np.log1p((m.size.prior_sd * seen / size) ** 2) / 2 == pytest.approx(ASKED, rel=0.2)
+        assert visibility(model.thinned, done, learned, m, m.size.neutral) == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("worse", "least", "most"),
+    [
+        (lambda learned: replace(learned, errors=2.0), 0.45, 0.8),
+        (lambda learned: replace(learned, sizes={**learned.sizes, kinds_of.STIFFNESS_DRIFT: 1e-3, kinds_of.DAMPING_DRIFT: 0.03}), 0.3, 0.8),
+    ],
+    ids=["errors twice as large", "modes that drift by a thousandth"],
+)
+def test_beside_a_model_that_is_worse_less_shows(plain, worse, least, most):
+    """Errors and discrepancies are those learned, and not those that a fit starts with: what is stated of a good model is not stated of a bad one."""
+    model, done, learned, looked = plain
+    m, size = smallest(model, done, learned, looked, 1)["sensor_mass"]
+    known, now = (visibility(model.thinned, done, of, m, m.size.neutral + size) for of in (learned, worse(learned)))
+    assert least < now / known < most
+    known, now = (screen(model, done, 1.0, of, [m], 1, turned=False)[0].visibility for of in (learned, worse(learned)))
+    assert least < now / known < 0.95
 
 
 def test_what_tolerances_take_is_not_counted(plain):
     """A mass at a sensor is nearly a heavier body: to first order it would show at a sixth of the size that it needs."""
-    model, done, looked = plain
-    m, size = smallest(model, done, looked, 1)["sensor_mass"]
+    model, done, learned, looked = plain
+    m, size = smallest(model, done, learned, looked, 1)["sensor_mass"]
     promised = min(np.sqrt(2 * ASKED) * m.size.typical / s.visibility for s in looked if s.mechanism.name == "sensor_mass" and s.visibility > 0)
     assert size > 3 * promised
 
 
 @pytest.mark.parametrize(("times", "seen"), [(2.0, True), (0.4, False)])
 def test_a_fit_finds_it_at_twice_that_size(spindle, plain, times, seen):
-    model, done, looked = plain
-    m, size = smallest(model, done, looked, 1)["preload_loss"]
+    model, done, learned, looked = plain
+    m, size = smallest(model, done, learned, looked, 1)["preload_loss"]
     values = m.values(m.size.neutral + times * size, [q.neutral for q in m.shape])
     hidden = model_of(spindle, virtual_campaign(spindle, THREE, 4, [(m.effect, values)], drawn(spindle, 3, 4)))
     without, beside = fit(hidden), fit(hidden, (m,))
