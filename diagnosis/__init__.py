@@ -13,7 +13,7 @@ runout/       the same for tests of the turning spindle
 verdict       `spindle diagnose`
 fleet         many campaigns of one drawing, a row each, and which stand apart
 line_fit      toleranced parameters fitted to the lines of one test, for scripts
-draft         an effect of one's own from what drifts, by the simplest law of physics that fits
+draft/        an effect of one's own from what drifts, by the simplest law of physics that fits
 add           a scene with more effects and the tolerances fitted beside them
 ============  ====================================================================================================
 

@@ -12,7 +12,7 @@ from rich.console import Console
 from thermospindle.diagnosis import verdict
 from thermospindle.diagnosis.compare.before_after import without
 from thermospindle.diagnosis.data.observe import observe
-from thermospindle.diagnosis.draft import draft as drafted
+from thermospindle.diagnosis.draft.draft import draft as drafted
 from thermospindle.diagnosis.prediction.outcomes import outcomes
 from thermospindle.diagnosis.runout.lines import modal_tests
 from thermospindle.diagnosis.runout.verdict import RunoutDiagnosis, diagnose_runout

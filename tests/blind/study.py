@@ -31,7 +31,7 @@ from tests.blind.visible import seen, visibility
 from tests.blind.world import Plan, World
 from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.decision.explanations import coarsening, likeliest
-from thermospindle.diagnosis.draft import draft
+from thermospindle.diagnosis.draft.draft import draft
 from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.inference.evidence import evidence, left_out
 from thermospindle.diagnosis.inference.fit import TEMPERS, fit

@@ -12,7 +12,8 @@ import pytest
 
 from tests.virtual_campaign import mode_campaign, model_of
 from thermospindle.cli import main
-from thermospindle.diagnosis.draft import draft, fit_law, laws
+from thermospindle.diagnosis.draft.draft import draft
+from thermospindle.diagnosis.draft.laws import fit_law, laws
 from thermospindle.diagnosis.forward.mechanism import Mechanism, variants, with_own_laws
 from thermospindle.diagnosis.inference.evidence import evidence, left_out
 from thermospindle.diagnosis.inference.fit import fit

@@ -35,7 +35,7 @@ from tests.torture.wholes import (
     uffs,
 )
 from thermospindle.diagnosis.add import read_answer
-from thermospindle.diagnosis.draft import draft
+from thermospindle.diagnosis.draft.draft import draft
 from thermospindle.diagnosis.prediction.outcomes import outcomes
 from thermospindle.model.bearing.stiffness_table import read_table
 from thermospindle.model.errors import BadInput

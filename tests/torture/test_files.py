@@ -19,7 +19,7 @@ from tests.torture.readers import READERS
 from tests.torture.wholes import MAPPING, STUDIES, TABLE, diagnosis, matlab, stiffness
 from thermospindle.cli import main
 from thermospindle.diagnosis.add import read_answer
-from thermospindle.diagnosis.draft import draft
+from thermospindle.diagnosis.draft.draft import draft
 from thermospindle.model.errors import BadInput
 from thermospindle.sim.importing.assemble import campaign_of, read
 from thermospindle.sim.importing.files.arrays import read_arrays

@@ -1,0 +1,52 @@
+"""From drift to an effect of one's own: what a free form found, as the simplest law of physics that fits it, written as an effect file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
+
+from thermospindle.diagnosis.draft.answer import place_of, whitening
+from thermospindle.diagnosis.draft.laws import fit_law, laws, ranked
+
+LIMIT = 400.0  # of sizes in their unit, at least
+NEAR = 10.0  # criterion within which rivals are named in the file
+
+
+def draft(diagnosis: Path, name: str, element: str | None = None) -> str:
+    """The text of an effect file called `name` from the free-form answer in an answer of `spindle diagnose --json`.
+
+    The first element that would have to drift is taken, or `element`. Raises `BadInput` where the file holds none, or one that changes by nothing.
+    """
+    place, reference = place_of(diagnosis, element)
+    temperature, speed = place.of_tests("temperature_C"), np.abs(place.of_tests("speed_rpm"))
+    change, covariance = place.logarithmic
+    top = float(speed.max()) or 1.0
+    tried = [fit_law(law, temperature, speed / top, change, whitening(covariance)) for law in laws(temperature, speed / top, reference)]
+    best, *others = ranked([f for f in tried if f is not None])
+    constant = " + offset" if best.law.has_offset else ""
+    return _template().render(
+        name=name,
+        place=place,
+        best=best,
+        rivals=[(f.law.name, f"{f.criterion - best.criterion:+.1f}") for f in others if f.criterion - best.criterion < NEAR],
+        shape=list(zip(best.law.shape, best.values[2:], best.sd[2:], strict=True)),
+        formula=f"size * ({best.law.expression}){constant}",
+        top=top,
+        file=diagnosis.name,
+        limits=[_about(v) for v in best.values[:2]],
+    )
+
+
+def _template() -> Template:
+    loader = FileSystemLoader(str(Path(__file__).parent))
+    environment = Environment(loader=loader, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)
+    environment.filters["short"] = lambda value, digits: f"{value:.{digits}g}"
+    return environment.get_template("effect.py.j2")
+
+
+def _about(value: float) -> tuple[float, float]:
+    """Limits that leave a fit room about `value`."""
+    most = max(LIMIT, float(f"{4 * abs(value):.1g}"))
+    return -most, most

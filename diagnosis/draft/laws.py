@@ -1,0 +1,176 @@
+"""The simple laws that physics has over temperature T and speed n, and how each fits what drifts.
+
+None, linear, exponential, Arrhenius, sigmoid, step; and a power of speed, alone, times one of these or beside it. Each is fitted with an offset beside it,
+weighted by the covariance over the tests; the Bayesian information criterion chooses (Schwarz, *Ann. Statist.* 6 (1978) 461). A law with as many parameters
+as tests fits whatever they are: it is taken where chi2 rules all others out, and the file says that it is not tested.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.special import chdtrc
+
+from thermospindle.model.types import Array
+
+REFERENCE = 20.0  # C from which laws count temperature, where a diagnosis does not tell its scene's reference
+REFUTED = 1e-3  # chance of a chi2 as large, below which a law is ruled out
+SCALE = ("scale", "K", 20.0, (3.0, 200.0))
+ACTIVATION = ("activation", "K", 4000.0, (300.0, 20000.0))
+KELVIN = 273.15
+
+
+@dataclass(frozen=True)
+class Law:
+    """A law g(T, n; shape): its Python expression, the shape parameters with unit, start and limits."""
+
+    name: str
+    expression: str
+    shape: tuple[tuple[str, str, float, tuple[float, float]], ...] = ()
+
+    @property
+    def has_offset(self) -> bool:
+        return self.expression != "1.0"
+
+    @property
+    def is_step(self) -> bool:
+        """Between two tests: nothing tells where."""
+        return self.expression.startswith("where")
+
+    def __call__(self, temperature: Array, share: Array, values: Any) -> Array:
+        names = {"T": temperature, "n": share, "exp": np.exp, "where": np.where, **{s[0]: v for s, v in zip(self.shape, values, strict=True)}}
+        return np.broadcast_to(np.asarray(eval(self.expression, {"__builtins__": {}}, names), float), temperature.shape)  # the text is one of ours, above
+
+
+def of_temperature(reference: float, hottest: float) -> tuple[Law, ...]:
+    """Laws that count temperature from a scene's reference (C); the steep ones are 1 at the hottest test (C), so that their sizes are what was seen there."""
+    from_reference, from_hottest = _less(reference), _less(hottest)
+    cold, hot = f"{reference + KELVIN:.8g}", f"{hottest + KELVIN:.8g}"
+    exponential, arrhenius = f"exp(({reference - hottest:.6g}) / scale)", f"exp(activation * (1 / {hot} - 1 / {cold}))"
+    return (
+        Law("linear in temperature", f"({from_reference}) / 40"),
+        Law("exponential in temperature", f"(exp(({from_hottest}) / scale) - {exponential}) / (1 - {exponential})", (SCALE,)),
+        Law("Arrhenius", f"(exp(activation * (1 / {hot} - 1 / (T + 273.15))) - {arrhenius}) / (1 - {arrhenius})", (ACTIVATION,)),
+        Law("sigmoid in temperature", "1 / (1 + exp((middle - T) / width))", (("middle", "C", 40.0, (-40.0, 200.0)), ("width", "K", 4.0, (0.5, 40.0)))),
+        Law("step in temperature", "where(T > middle, 1.0, 0.0)", (("middle", "C", 35.0, (-40.0, 200.0)),)),
+    )
+
+
+def of_both(reference: float, hottest: float) -> tuple[Law, ...]:
+    """Laws linear in speed whose slope grows with temperature."""
+    return (
+        Law("linear in speed, linear in temperature", f"n * (1 + ({_less(reference)}) / 40)"),
+        Law("linear in speed, exponential in temperature", f"n * exp(({_less(hottest)}) / scale)", (SCALE,)),
+        Law("linear in speed, Arrhenius", f"n * exp(activation * (1 / {hottest + KELVIN:.8g} - 1 / (T + 273.15)))", (ACTIVATION,)),
+    )
+
+
+def _less(temperature: float) -> str:
+    return f"T {'-' if temperature >= 0 else '+'} {abs(temperature):.6g}"
+
+
+OF_SPEED = (Law("linear in speed", "n"), Law("power of speed", "n ** power", (("power", "1", 1.0, (0.2, 4.0)),)))
+
+
+def laws(temperature: Array, share: Array, reference: float = REFERENCE) -> list[Law]:
+    """The laws that tests at temperatures (n,) C and shares (n,) of the highest speed can tell; temperature counts from the `reference` (C)."""
+    found = [Law("constant", "1.0")]
+    hottest = float(temperature.max() if abs(temperature.max() - reference) > 1 else temperature.min())  # a law from the reference is nothing there
+    thermal = of_temperature(reference, hottest) if np.ptp(temperature) > 1 else ()
+    speed = OF_SPEED if np.ptp(share) > 0 else ()
+    found += [*thermal, *speed]
+    if thermal and speed:
+        found += of_both(reference, hottest)
+        found += [Law(f"{t.name} and linear in speed", f"{t.expression} + of_speed * n", (*t.shape, ("of_speed", "1", 0.0, (-20.0, 20.0)))) for t in thermal[:4]]
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A law fitted: `size`, `offset` (0 for the constant law) and shape values with standard errors; chi2 in how many `tests`, and the number of parameters."""
+
+    law: Law
+    values: Array  # size, offset, shape...
+    sd: Array
+    chi2: float
+    tests: int
+    count: int
+
+    @property
+    def tested(self) -> bool:
+        """Whether there are more tests than parameters: else a law fits whatever the tests are."""
+        return self.count < self.tests
+
+    @property
+    def criterion(self) -> float:
+        """The Bayesian information criterion; smaller is better."""
+        return self.chi2 + self.count * float(np.log(self.tests))
+
+    @property
+    def refuted(self) -> bool:
+        """By chi2; what is not tested counts as refuted too."""
+        return not self.tested or bool(chdtrc(self.tests - self.count, self.chi2) < REFUTED)
+
+
+def fit_law(law: Law, temperature: Array, share: Array, change: Array, white: Array) -> Fitted | None:
+    """Least squares in size, offset and shape, the first two linear; None where there are more parameters than tests. `white` (n, n) makes errors of `change`
+    (n,) independent and of unit variance."""
+    offset = law.has_offset
+    count = 1 + offset + len(law.shape)
+    if count > len(change):
+        return None
+    best: Fitted | None = None
+    for begin in _starts(law, temperature):
+
+        def linear(shape: Array) -> tuple[Any, Array]:
+            columns = [law(temperature, share, shape)] + ([np.ones_like(change)] if offset else [])
+            a = white @ np.stack(columns, axis=1)
+            found = np.linalg.lstsq(a, white @ change, rcond=None)[0]
+            return found, a @ found - white @ change
+
+        low, high = ([s[3][k] for s in law.shape] for k in (0, 1))
+        shape = begin
+        if law.shape and not law.is_step:
+            shape = least_squares(lambda v: linear(v)[1], begin, bounds=(low, high)).x
+        amplitude, residual = linear(shape)
+        squares = float(residual @ residual)
+        if best is None or squares < best.chi2:
+            values = np.concatenate([amplitude, np.zeros(int(not offset)), shape])
+            best = Fitted(law, values, _errors(law, values, offset, temperature, share, white), squares, len(change), count)
+    return best
+
+
+def ranked(found: Sequence[Fitted]) -> list[Fitted]:
+    """By the criterion, the best first; laws with as many parameters as tests, which fit whatever the tests are, only where all others are refuted."""
+    tested = [f for f in found if f.tested]
+    return sorted(found if all(f.refuted for f in tested) else tested, key=lambda f: f.criterion)
+
+
+def _starts(law: Law, temperature: Array) -> list[Array]:
+    if not law.shape:
+        return [np.zeros(0)]
+    start = np.array([s[2] for s in law.shape])
+    names = [s[0] for s in law.shape]
+    if "middle" not in names:
+        return [start]
+    every = np.unique(temperature)
+    middles = np.clip((every[1:] + every[:-1]) / 2, *law.shape[names.index("middle")][3])
+    return [np.where(np.array(names) == "middle", m, start) for m in middles] or [start]
+
+
+def _errors(law: Law, values: Array, offset: bool, temperature: Array, share: Array, white: Array) -> Array:
+    def model(v: Array) -> Array:
+        return v[0] * law(temperature, share, v[2:]) + v[1]
+
+    columns = []
+    for i in range(len(values)):
+        h = 1e-4 * max(abs(values[i]), 1e-3)
+        step = values + h * (np.arange(len(values)) == i)
+        columns.append((model(step) - model(values)) / h)
+    columns[1] = columns[1] if offset else np.zeros_like(temperature)
+    a = white @ np.stack(columns, axis=1)
+    return np.sqrt(np.maximum(np.diag(np.linalg.pinv(a.T @ a)), 0.0))
