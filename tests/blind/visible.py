@@ -10,8 +10,7 @@ import numpy as np
 
 from tests.blind.campaigns import Made
 from tests.blind.hidden import Hidden
-from tests.blind.laws import REFERENCE
-from tests.blind.world import World, answer
+from tests.blind.world import World, answer, modal_errors
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.tolerance import toleranced
 from thermospindle.model.types import Array, ComplexArray
@@ -107,25 +106,17 @@ def visibility(made: Made, spindle: Spindle, of: Seen) -> list[float]:
 
 
 def _modal_columns(made: Made, column, frequency: Array, plain: World, spindle: Spindle) -> list[Array]:
-    """Every mode's constant stiffness and damping error, and what couples every two of them, one at a time."""
+    """Every mode's constant stiffness and damping error, as the world draws them, and what couples every two of them, one at a time."""
     answers = [answer(made.built, Condition(p.temperature, p.speed), plain) for p in made.plans]
-    reference = answer(made.built, Condition(REFERENCE), plain).linear
-    root = np.sqrt(np.diag(reference.mass))
-    square, vectors = np.linalg.eigh(reference.stiffness / root[:, None] / root[None, :])
-    back = root[:, None] * vectors
-    seen = np.flatnonzero((square > 1.0) & (square < (2 * np.pi * 1.2 * spindle.hammer.band[1]) ** 2))
-    v = back[:, seen] * np.sqrt(square[seen])
-    one, two = np.triu_indices(len(seen), 1)
     plainly = [at.frf(frequency) for at in answers]
-    moved = []
-    for at in answers:
-        by_one = at.by_modes(frequency, v)
-        by_sum = at.by_modes(frequency, v[:, one] + v[:, two])  # (v + w)(v + w)^T less v v^T and w w^T couples the two
-        moved.append([np.concatenate([of_one, of_sum - of_one[one] - of_one[two]]) for of_one, of_sum in zip(by_one, by_sum, strict=True)])
-    omega = np.sqrt(np.concatenate([square[seen], np.sqrt(square[seen][one] * square[seen][two])]))
     found = []
-    for j, w in enumerate(omega):
-        for kind, size in enumerate((2 * made.world.stiffness_error, made.world.damping_error * 0.02 / w)):
-            if size:
-                found.append(column([p + size * m[kind][j] for p, m in zip(plainly, moved, strict=True)]))
+    for kind, v in enumerate(modal_errors(spindle, made.world)[:2]):
+        v = v[:, np.abs(v).max(axis=0) > 1e-9 * np.abs(v).max()]  # not a rigid motion, which has neither stiffness nor damping
+        one, two = np.triu_indices(v.shape[1], 1)
+        moved = []
+        for at in answers:
+            of_one = at.by_modes(frequency, v)[kind]
+            of_sum = at.by_modes(frequency, v[:, one] + v[:, two])[kind]  # (v + w)(v + w)^T less v v^T and w w^T couples the two
+            moved.append(np.concatenate([of_one, of_sum - of_one[one] - of_one[two]]))
+        found += [column([p + m[j] for p, m in zip(plainly, moved, strict=True)]) for j in range(len(moved[0]))]
     return found

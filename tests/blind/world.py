@@ -231,26 +231,28 @@ def _grooves(spindle: Spindle, name: str, motion: RingMotion, share: float) -> R
 def perturbed(linear: Matrices, spindle: Spindle, world: World) -> Matrices:
     """K and C with a random symmetric matrix in the modes of the drawing at 20 C and rest, the same in every test. A weak mode is none of these: it
     stays an oscillator on its body, which modal errors of the spindle do not couple to anything else."""
+    of_k, of_c, kept = modal_errors(spindle, world)
+    n = len(kept)  # what is hidden, and a weak mode, may have added bodies, after these
+    random = np.random.default_rng([world.seed, 51])
+
+    def symmetric() -> Array:
+        g = random.standard_normal((n, n))
+        return (np.tril(g) + np.tril(g, -1).T)[np.ix_(kept, kept)]
+
+    stiffness, damping = linear.stiffness.copy(), linear.damping.copy()
+    stiffness[:n, :n] += of_k @ symmetric() @ of_k.T
+    damping[:n, :n] += of_c @ symmetric() @ of_c.T
+    return replace(linear, stiffness=stiffness, damping=damping)
+
+
+def modal_errors(spindle: Spindle, world: World) -> tuple[Array, Array, Array]:
+    """Columns (n, m) each of an error of K and of C, v v^T or v w^T + w v^T, at one standard deviation: of the drawing's modes to twice the band, (n,)
+    true of all. A mode's frequency is wrong by half of its stiffness, relatively; its damping by a share of its own."""
     reference = answer(spindle, Condition(REFERENCE), replace(world, stiffness_error=0.0, damping_error=0.0, weak_mode=None)).linear
     root = np.sqrt(np.diag(reference.mass))
     square, vectors = np.linalg.eigh(reference.stiffness / root[:, None] / root[None, :])
     omega = np.sqrt(np.maximum(square, 0.0))
-    back = root[:, None] * vectors  # M phi: takes modal matrices to the dofs'
-    own = vectors.T @ (reference.damping / root[:, None] / root[None, :]) @ vectors
-    loss = np.sqrt(np.maximum(np.diag(own), 0.0))
-    random = np.random.default_rng([world.seed, 51])
-
-    def symmetric() -> Array:
-        g = random.standard_normal((len(root), len(root)))
-        return np.tril(g) + np.tril(g, -1).T
-
-    of_k, of_c = symmetric(), symmetric()
-    in_band = omega < 2 * np.pi * 2 * spindle.hammer.band[1]
-    of_k, of_c = (g * in_band[:, None] * in_band[None, :] for g in (of_k, of_c))
-    more_k = world.stiffness_error * 2 * omega[:, None] * omega[None, :] * of_k  # a mode's frequency is wrong by half of that
-    more_c = world.damping_error * loss[:, None] * loss[None, :] * of_c
-    n = len(root)  # what is hidden, and a weak mode, may have added bodies, after these
-    stiffness, damping = linear.stiffness.copy(), linear.damping.copy()
-    stiffness[:n, :n] += back @ more_k @ back.T
-    damping[:n, :n] += back @ more_c @ back.T
-    return replace(linear, stiffness=stiffness, damping=damping)
+    loss = np.sqrt(np.maximum(np.diag(vectors.T @ (reference.damping / root[:, None] / root[None, :]) @ vectors), 0.0))
+    kept = omega < 2 * np.pi * 2 * spindle.hammer.band[1]
+    back = (root[:, None] * vectors)[:, kept]  # M phi: takes modal matrices to the dofs'
+    return back * omega[kept] * np.sqrt(2 * world.stiffness_error), back * loss[kept] * np.sqrt(world.damping_error), kept
