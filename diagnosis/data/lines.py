@@ -29,7 +29,9 @@ from thermospindle.sim.identification.modal import noise_model, scatter
 
 NODES = 5  # of a block: polynomials of degree 4
 LONGEST = 160  # lines in a block
+OPEN = 1.0  # standard errors of the noise of value, told between peaks, by which it may be more at them
 BEYOND = 4  # polynomials of the next degrees, where what a block lacks shows first
+LEFT_OUT, SCATTERING = 2, 3  # polynomials of the next degrees left out where a block tells the noise, and lines at least beyond them
 LACK_OF_FIT = 4.0  # standard deviations of a block's chi2, and of that of the next degrees alone, from which it is divided
 LINES_THAT_SCATTER = 50  # of an FRF at least, from whose neighbours its noise can be told
 RISES = (0, 2, 4)  # powers of frequency in which noise of largest is told: a hammer's force falls, and noise over it rises
@@ -211,30 +213,43 @@ def _lacking(squares: Array, mean: float, variance: float) -> bool:
 
 def _within_blocks(value: ComplexArray, blocks: list[tuple[int, int]], damped: float, falling: Array | None = None) -> Array | None:
     """Noise variances (n_resp, n_ref, n) from what the polynomials of all blocks leave, as shares of |H|^2 and of the largest |H|^2 to that
-    hammer, reference by reference; None where too few degrees of freedom are left."""
+    hammer, reference by reference; none of an FRF that is silent. None where too few degrees of freedom are left."""
     size = np.abs(value) ** 2
     shapes = _shapes(size.shape[-1], falling)
-    variance = np.empty(size.shape)
-    for j in range(value.shape[1]):
-        rows, seen, freedom, largest = [], [], [], float(size[:, j].max())
+    variance = np.zeros(size.shape)
+    heard = size.max(axis=-1) > SILENT**2 * size.max()
+    for j in np.flatnonzero(heard.any(axis=0)):
+        of, strength = value[heard[:, j], j], size[heard[:, j], j]
+        rows, seen, freedom, largest = [], [], [], float(strength.max())
         for first, after in blocks:
             k = after - first
             if k <= NODES + 1:
                 continue
-            q, _, _ = _basis(k)
-            v = value[:, j, first:after]
+            p = min(NODES + LEFT_OUT, max(NODES, k - SCATTERING))
+            q, _, _ = _basis(k, p)
+            v = of[:, first:after]
             left = v - (v @ q) @ q.T
             seen.append(np.sum(np.abs(left) ** 2, axis=1) / left_by(q, damped)[1])
             floor = [np.full(len(v), largest * r[first:after].mean()) for r in shapes]
-            rows.append(np.stack([size[:, j, first:after].mean(axis=1), *floor], axis=1))
-            freedom.append(np.full(len(v), float(k - NODES)))
+            rows.append(np.stack([strength[:, first:after].mean(axis=1), *floor], axis=1))
+            freedom.append(np.full(len(v), float(k - p)))
         if sum(f.sum() for f in freedom) < ENOUGH:
             return None
         a, y, w = np.concatenate(rows), np.concatenate(seen), np.concatenate(freedom)
         share = _gamma_fit(a, y, w, WIDE if falling is not None else USUAL)
+        share[0] += OPEN * _error_of_first(share, a, w)
         floor_of = largest * np.sum([c * r for c, r in zip(share[1:], shapes, strict=True)], axis=0)
-        variance[:, j] = np.maximum(share[0] * size[:, j] + floor_of, 1e-14 * largest)
+        variance[heard[:, j], j] = np.maximum(share[0] * strength + floor_of, 1e-14 * largest)
     return variance
+
+
+def _error_of_first(share: Array, columns: Array, freedom: Array) -> float:
+    """Standard error of the first of the shares, beside those that are not none."""
+    used = share > 0
+    used[0] = True
+    scaled = columns[:, used] * (np.sqrt(freedom) / np.maximum(columns @ share, 1e-300))[:, None]
+    triangle = np.linalg.qr(scaled[:, ::-1], mode="r")  # the first last: its own part, that the others cannot take
+    return float(1 / np.abs(triangle[-1, -1])) if triangle[-1, -1] else 0.0
 
 
 def _gamma_fit(columns: Array, seen: Array, freedom: Array, least: tuple[float, float] = USUAL) -> Array:
