@@ -18,6 +18,8 @@ read              reads any of our logs back: numbers bit for bit as computed
 run               the Rerun log of a run: one `.rrd` with what was computed, and a blueprint that shows it at a glance
 study/            the Rerun log of a study
 told              what a log holds, as JSON and in words
+views             what all blueprints are made of: paths of entities, views and their axes, and the window that holds
+                  them
 turning/          the Rerun logs of a spindle that turns, and of how it warms up
 ================  ======================================================================================================
 """

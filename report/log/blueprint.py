@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import rerun as rr
 import rerun.blueprint as rrb
 
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.shaft_look import extent
 from thermospindle.model.units import TO_MM
 from thermospindle.report.log.content import Pair, Shown
-from thermospindle.report.log.pictures import DARK, view
+from thermospindle.report.log.pictures import view
+from thermospindle.report.log.views import at, axis, scene, summary_view, window
 from thermospindle.sim.posing import CYCLE, reach, size
 
 CHARTS = {"bearings": (4.2, 3.7), "records": (4.2, 1.9), "key": (6.2, 0.7)}
 """Width and height in inches of the pictures, in proportion to their views in a window of 1400 x 900."""
-
-
-def at(*parts: str) -> str:
-    """The path of an entity from its parts, which may hold any characters."""
-    return rr.new_entity_path(list(parts))
 
 
 def pair_path(pair: Pair) -> tuple[str, str, str]:
@@ -35,7 +30,7 @@ def blueprint(shown: Shown, quantities: list[tuple[str, str]], factor: float) ->
     right = rrb.Vertical(
         view("charts/bearings", f"Bearings: {_sides(shown)}", CHARTS["bearings"]),
         view("charts/records", "First hits of the hammers", CHARTS["records"]),
-        rrb.TextDocumentView(origin="summary", name="Summary"),
+        summary_view(),
         row_shares=[3.9, 2.1, 2.9],
     )
     overview = rrb.Horizontal(left, middle, right, column_shares=[1.2, 1.5, 1.02], name="Overview")
@@ -44,14 +39,7 @@ def blueprint(shown: Shown, quantities: list[tuple[str, str]], factor: float) ->
 
 def sweeping(shown: Shown, *tabs: rrb.Container) -> rrb.Blueprint:
     """The tabs in a window of their own, the cursor of `frequency` sweeping through the band."""
-    return rrb.Blueprint(
-        rrb.Tabs(*tabs),
-        rrb.BlueprintPanel(state="hidden"),
-        rrb.SelectionPanel(state="hidden"),
-        rrb.TimePanel(state="collapsed", timeline="frequency", fps=CYCLE * shown.step, play_state="playing", loop_mode="all"),
-        auto_views=False,
-        auto_layout=False,
-    )
+    return window(rrb.Tabs(*tabs), "frequency", fps=CYCLE * shown.step)
 
 
 def frfs_below_key(shown: Shown) -> rrb.Container:
@@ -68,19 +56,14 @@ def model_views(shown: Shown) -> list[rrb.View]:
     views = [(f"{i} {m.kind} {m.frequency:.0f} Hz", f"mode_{i}") for i, m in enumerate(shown.modes[:5], 1)]
     views.append((f"Sweep at {shown.pairs[0][1]}", "sweep"))
     _, r, z = framed(shown.run.spindle)
-    eye = rrb.EyeControls3D(position=(1.8 * r, -1.4 * r, z + 1.35 * r), look_target=(0, 0, z - 0.08 * r), eye_up=(0, 0, 1))
-    return [
-        rrb.Spatial3DView(origin=at("model", entity), name=name, eye_controls=eye, line_grid=False, background=DARK)
-        for name, entity in views
-    ]
+    return [scene(at("model", entity), name, (1.8 * r, -1.4 * r, z + 1.35 * r), (0, 0, z - 0.08 * r)) for name, entity in views]
 
 
 def _section_view(shown: Shown, which: str, name: str) -> rrb.View:
     long, r, z = framed(shown.run.spindle)
     x, away = (0.0, 1.3) if which == "compared" else (0.5, 2.2)  # one half in a tall view
     x, away, z = (x * r, away * r, 0.3 * r) if not long else (x * TO_MM * reach(shown.run.spindle), 2.2 * r, z)
-    eye = rrb.EyeControls3D(position=(x, -away, z), look_target=(x, 0, z), eye_up=(0, 0, 1))
-    return rrb.Spatial3DView(origin=at("section", which), name=name, eye_controls=eye, line_grid=False, background=DARK)
+    return scene(at("section", which), name, (x, -away, z), (x, 0, z))
 
 
 def framed(spindle: Spindle) -> tuple[bool, float, float]:
@@ -104,11 +87,10 @@ def frf_views(shown: Shown, pair: Pair) -> rrb.Container:
 
 def plot(shown: Shown, origin: str, name: str, limits: tuple[float, float]) -> rrb.View:
     """Series over the band, between `limits`."""
-    ends = [rr.TimeRangeBoundary.absolute(seq=f) for f in shown.band]
     return rrb.TimeSeriesView(
         origin=origin,
         name=name,
-        axis_x=rrb.TimeAxis(view_range=rr.TimeRange(*ends)),
+        axis_x=axis("seq", *shown.band),
         axis_y=rrb.ScalarAxis(range=limits),
         plot_legend=rrb.PlotLegend(visible=False),
     )
@@ -122,10 +104,8 @@ def _time_tab(shown: Shown) -> rrb.Container:
         series = [("force", f"force of hammer {hammer}, N", 0.006)]
         series += [(f"velocity {n}", f"velocity at {n}, mm/s, hammer at {hammer}", length) for n in hammers]
         for entity, name, end in series:
-            ends = [rr.TimeRangeBoundary.absolute(seconds=t) for t in (0.0, end)]
-            axis = rrb.TimeAxis(view_range=rr.TimeRange(*ends))
             origin = at("records", f"hammer {hammer}", entity)
-            views.append(rrb.TimeSeriesView(origin=origin, name=name, axis_x=axis, plot_legend=rrb.Corner2D.RightTop))
+            views.append(rrb.TimeSeriesView(origin=origin, name=name, axis_x=axis("seconds", 0.0, end), plot_legend=rrb.Corner2D.RightTop))
     return rrb.Grid(*views, grid_columns=1 + len(hammers), name="Records (choose the timeline time)")
 
 

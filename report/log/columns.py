@@ -2,28 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import rerun as rr
+import rerun.blueprint as rrb
 
 from thermospindle.model.errors import BadInput
 from thermospindle.model.rotor.look import RegionMesh
 from thermospindle.model.types import Array
 from thermospindle.model.units import TO_MM
 from thermospindle.model.whole import whole
-from thermospindle.report.log.blueprint import at
 from thermospindle.report.log.content import Peak
 from thermospindle.report.log.read import APPLICATION
+from thermospindle.report.log.views import at
 from thermospindle.sim.identification.frf import Frf
 
 
 @contextmanager
-def whole_log(path: Path) -> Iterator[tuple[rr.RecordingStream, Path]]:
-    """A recording, and the file to save it to, which gets the name `path` when all has gone well and is removed otherwise.
+def whole_log(path: Path, kind: str, name: str, about: Mapping[str, Any], blueprint: rrb.Blueprint) -> Iterator[rr.RecordingStream]:
+    """A recording into the file `path`, whole or not at all; its property `kind` says what it is `about` (`report.log.read.KINDS`).
 
     Rerun's errors are raised here; else it prints them and goes on, and the log would lack something. BadInput if the folder of `path`
     does not exist.
@@ -37,7 +38,10 @@ def whole_log(path: Path) -> Iterator[tuple[rr.RecordingStream, Path]]:
         with whole(path) as file:
             recording = rr.RecordingStream(APPLICATION, send_properties=False)
             try:
-                yield recording, file
+                recording.save(file, default_blueprint=blueprint)
+                recording.send_recording_name(name)
+                recording.send_property(kind, rr.AnyValues(**about))
+                yield recording
             finally:
                 recording.disconnect()
     finally:
@@ -47,8 +51,9 @@ def whole_log(path: Path) -> Iterator[tuple[rr.RecordingStream, Path]]:
 # ---------------------------------------------------------------- numbers
 
 
-def any_values(named: dict[str, Any]) -> rr.AnyValues:
-    return rr.AnyValues(**named)
+def log_values(recording: rr.RecordingStream, entity: str, named: dict[str, Any]) -> None:
+    """Lists of numbers or words of one length, by plain names."""
+    recording.log(entity, rr.AnyValues(**named), static=True)
 
 
 def number_column(name: str, numbers: Array) -> rr.ComponentColumnList:
@@ -73,15 +78,20 @@ def log_frf_numbers(recording: rr.RecordingStream, id: str, order: int, temperat
     recording.send_columns(at("numbers", id), [over_frequency(frf.frequency)], columns)
     about = {"id": id, "order": order, "temperature_C": temperature, "speed_rad_per_s": speed, "quantity": frf.quantity}
     about |= {"response_nodes": frf.response_nodes, "reference_nodes": frf.reference_nodes}
-    recording.log(at("numbers", id, "about"), any_values(about), static=True)
+    log_values(recording, at("numbers", id, "about"), about)
 
 
 def log_peak_numbers(recording: rr.RecordingStream, peaks: Sequence[Peak]) -> None:
     values = {name: [getattr(p, name) for p in peaks] for name in Peak.__dataclass_fields__}
-    recording.log("numbers/peaks", any_values(values), static=True)
+    log_values(recording, "numbers/peaks", values)
 
 
 # ---------------------------------------------------------------- for the eye
+
+
+def log_words(recording: rr.RecordingStream, entity: str, text: str, static: bool = True) -> None:
+    """Markdown."""
+    recording.log(entity, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=static)
 
 
 def log_curve(

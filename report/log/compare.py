@@ -18,10 +18,10 @@ import rerun.blueprint as rrb
 from thermospindle.model.machine import Spindle
 from thermospindle.model.types import ComplexArray
 from thermospindle.model.units import RPM
-from thermospindle.report.log.blueprint import at
-from thermospindle.report.log.columns import any_values, curve_look, log_curve, log_frf_numbers, log_peak_numbers, over_frequency, whole_log
-from thermospindle.report.log.content import Pair, Peak, decibel, level_ends
+from thermospindle.report.log.columns import curve_look, log_curve, log_frf_numbers, log_peak_numbers, over_frequency, whole_log
+from thermospindle.report.log.content import Pair, Peak, decibel, level_ends, one
 from thermospindle.report.log.drawing import heat
+from thermospindle.report.log.views import at, axis, window
 from thermospindle.report.typeset import UNITS
 from thermospindle.sim.campaign.campaign import Test
 from thermospindle.sim.identification.frf import Frf
@@ -47,10 +47,8 @@ def write_comparison_log(
     spindle: Spindle, title: str, tests: Sequence[FrfsBeside], peaks: Mapping[str, Sequence[PairedPeak]], path: Path
 ) -> None:
     """Write the log, whole or not at all; `peaks` by test id. BadInput if its folder does not exist."""
-    with whole_log(path) as (recording, partial):
-        recording.save(partial, default_blueprint=_blueprint(title, tests))
-        recording.send_recording_name(f"{spindle.name} beside {title}")
-        recording.send_property("run", any_values({"title": f"{spindle.title}: {title}", **provenance(spindle)}))
+    about = {"title": f"{spindle.title}: {title}", **provenance(spindle)}
+    with whole_log(path, "run", f"{spindle.name} beside {title}", about, _blueprint(title, tests)) as recording:
         _log_numbers(recording, tests, peaks)
         _log_frfs(recording, tests, peaks)
 
@@ -69,14 +67,13 @@ def _log_frfs(recording: rr.RecordingStream, tests: Sequence[FrfsBeside], peaks:
     temperatures = [t.test.temperature for t in tests]
     for shown in tests:
         frf, colour = shown.measured, heat(shown.test.temperature, temperatures)
-        axis = over_frequency(frf.frequency)
+        lines = over_frequency(frf.frequency)
         for pair in pairs_of(frf):
-            i, j = frf.response_nodes.index(pair[0]), frf.reference_nodes.index(pair[1])
-            levels = {"measured": decibel(frf.value[i, j]), "computed": decibel(shown.computed[i, j])}
+            levels = {"measured": decibel(one(frf.value, frf, pair)), "computed": decibel(one(shown.computed, frf, pair))}
             # Rerun draws in the order of names: the computed curve is a broad band below the measured one, visible where both agree
             looks = {"measured": curve_look(colour, f"measured, {shown.test.id}", 1.2), "computed": curve_look(COMPUTED, "computed", 4.0)}
             for name, level in levels.items():
-                log_curve(recording, f"{_place(shown.test, pair, 'level')}/{name}", axis, level, looks[name])
+                log_curve(recording, f"{_place(shown.test, pair, 'level')}/{name}", lines, level, looks[name])
             for which, name in ((2, "measured"), (4, "computed")):
                 own = np.array([p[which] for p in peaks.get(shown.test.id, ())])
                 own = own[(own >= frf.frequency[0]) & (own <= frf.frequency[-1])]
@@ -120,27 +117,19 @@ def _blueprint(title: str, tests: Sequence[FrfsBeside]) -> rrb.Blueprint:
     driving = pairs_of(frf)[: max(1, min(2, sum(p[0] == p[1] for p in pairs_of(frf))))]
     overview = [_view(tests[k], pair) for k in some for pair in driving if pair in pairs_of(tests[k].measured)]
     every = [rrb.Grid(*(_view(t, p) for p in pairs_of(t.measured)), grid_columns=2, name=t.test.id) for t in tests]
-    return rrb.Blueprint(
-        rrb.Tabs(rrb.Grid(*overview, grid_columns=len(driving), name=f"Measured and computed: {title}"), *every),
-        rrb.BlueprintPanel(state="hidden"),
-        rrb.SelectionPanel(state="hidden"),
-        rrb.TimePanel(state="collapsed", timeline="frequency"),
-        auto_views=False,
-        auto_layout=False,
-    )
+    return window(rrb.Tabs(rrb.Grid(*overview, grid_columns=len(driving), name=f"Measured and computed: {title}"), *every), "frequency")
 
 
 def _view(t: FrfsBeside, pair: Pair) -> rrb.View:
     frf = t.measured
-    value = np.array([v[frf.response_nodes.index(pair[0]), frf.reference_nodes.index(pair[1])] for v in (frf.value, t.computed)])
+    value = np.array([one(v, frf, pair) for v in (frf.value, t.computed)])
     level = decibel(value[value != 0]) if np.any(value) else np.zeros(1)  # one of the two may be nothing: by symmetry, or a channel that was off
-    ends = [rr.TimeRangeBoundary.absolute(seq=round(f)) for f in (frf.frequency[0], frf.frequency[-1])]
     speed = f", {t.test.speed / RPM:.0f} rpm" if t.test.speed else ""
     unit = UNITS[frf.quantity]
     return rrb.TimeSeriesView(
         origin=_place(t.test, pair, "level"),
         name=f"{t.test.temperature:g} °C{speed}: H({pair[0]},{pair[1]}), computed grey, dB re 1 {unit} over Hz (#)",
-        axis_x=rrb.TimeAxis(view_range=rr.TimeRange(*ends)),
+        axis_x=axis("seq", round(frf.frequency[0]), round(frf.frequency[-1])),
         axis_y=rrb.ScalarAxis(range=level_ends(level)),
         plot_legend=rrb.PlotLegend(visible=False),
     )

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.modes import Mode
 from thermospindle.model.types import Array
 from thermospindle.sim.campaign.campaign import Test
@@ -91,8 +92,12 @@ def summary(run: Run, found: Sequence[Peak]) -> str:
         if p.source == "identified" and not p.mode
     ]
     lines += ["", "Measured:", "", *(f"- {c.title}" for c in run.measured)] if run.measured else []
-    lines += ["", "Made from:", "", *(f"- {name}: {text}" for name, text in provenance(run.spindle).items())]
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *made_from(run.spindle)]) + "\n"
+
+
+def made_from(spindle: Spindle) -> list[str]:
+    """The end of every summary: scene and versions."""
+    return ["", "Made from:", "", *(f"- {name}: {text}" for name, text in provenance(spindle).items())]
 
 
 def _table(found: Sequence[Peak], temperatures: Sequence[float]) -> list[str]:
@@ -199,7 +204,7 @@ def frf_of(test: Test) -> Frf:
     return test.frf
 
 
-def one(array: Array, frf: Frf, pair: Pair) -> Array:
+def one(array: np.ndarray, frf: Frf, pair: Pair) -> np.ndarray:
     """The lines (n,) of one pair of an array (responses, references, n) of `frf`."""
     return array[frf.response_nodes.index(pair[0]), frf.reference_nodes.index(pair[1])]
 

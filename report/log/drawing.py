@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
 from thermospindle.model.machine import Spindle
@@ -17,11 +18,17 @@ Colours = NDArray[np.uint8]
 HEAT = np.array([(70, 120, 255), (60, 200, 255), (235, 235, 120), (255, 160, 50), (255, 60, 60)], float)  # cold to hot
 
 
-def heat(temperature: float, temperatures: Sequence[float]) -> Colours:
-    """Colour (3,) of a temperature, from blue for the lowest to red for the highest."""
+def heat(temperature: float | Array, temperatures: Sequence[float]) -> Colours:
+    """Colour (..., 3) of temperatures (...), from blue for the lowest of all to red for the highest."""
     low, high = min(temperatures), max(temperatures)
-    place = (temperature - low) / (high - low) if high > low else 0.0
-    return np.array([np.interp(place, np.linspace(0, 1, len(HEAT)), channel) for channel in HEAT.T]).astype(np.uint8)
+    place = (temperature - low) / (high - low) if high > low else 0.0 * temperature
+    return np.stack([np.interp(place, np.linspace(0, 1, len(HEAT)), channel) for channel in HEAT.T], axis=-1).astype(np.uint8)
+
+
+def light(paint: str, least: float = 0.35) -> tuple[int, int, int]:
+    """A colour of the figures, light enough for a dark ground: no channel below `least`."""
+    red, green, blue = (round(255 * (least + (1 - least) * c)) for c in to_rgb(paint))
+    return red, green, blue
 
 
 def exaggeration(sections: Sequence[dict[str, DeformedSection]], radius: float) -> float:

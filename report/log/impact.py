@@ -15,12 +15,13 @@ import rerun.blueprint as rrb
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 from thermospindle.report.figures import run as figures
-from thermospindle.report.log.blueprint import at, frfs_below_key, model_views, pair_path, plot, sweeping
-from thermospindle.report.log.columns import any_values, curve_look, log_curve, whole_log
-from thermospindle.report.log.content import Shown, frf_of, shown, summary
+from thermospindle.report.log.blueprint import frfs_below_key, model_views, pair_path, plot, sweeping
+from thermospindle.report.log.columns import curve_look, log_curve, log_values, whole_log
+from thermospindle.report.log.content import Shown, frf_of, shown
 from thermospindle.report.log.drawing import heat
 from thermospindle.report.log.pictures import for_dark, log_figure, view
-from thermospindle.report.log.run import log_frfs, log_key, log_motion, log_numbers, log_peaks
+from thermospindle.report.log.run import log_test
+from thermospindle.report.log.views import at, axis, summary_view
 from thermospindle.sim.hammer.pulse import pulse_duration
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.run import Run
@@ -32,23 +33,13 @@ MOST = 12  # FRFs in the tab that shows them beside each other
 
 def write_impact_log(run: Run, path: Path) -> None:
     """Write the log of a run that is one impact test, whole or not at all. BadInput if its folder does not exist."""
-    with whole_log(path) as (recording, partial):
-        _write(shown(run), recording, partial)
-
-
-def _write(content: Shown, recording: rr.RecordingStream, file: Path) -> None:
-    run, [test] = content.run, content.tests
-    recording.save(file, default_blueprint=_blueprint(content))
+    content = shown(run)
+    [test] = content.tests
     name = f"impact test of {run.spindle.name} at {test.temperature:g} C, {test.speed / RPM:.6g} rpm"
-    recording.send_recording_name(name)
-    recording.send_property("run", any_values({"title": f"{run.spindle.title}: {name}", **provenance(run.spindle)}))
-    log_numbers(recording, content)
-    log_frfs(recording, content)
-    log_peaks(recording, content)
-    log_key(recording, content)
-    log_motion(recording, content)
-    log_records(recording, content)
-    recording.log("summary", rr.TextDocument(summary(run, content.peaks), media_type=rr.MediaType.MARKDOWN), static=True)
+    about = {"title": f"{run.spindle.title}: {name}", **provenance(run.spindle)}
+    with whole_log(path, "run", name, about, _blueprint(content)) as recording:
+        log_test(recording, content)
+        log_records(recording, content)
 
 
 def log_records(recording: rr.RecordingStream, content: Shown) -> None:
@@ -58,8 +49,8 @@ def log_records(recording: rr.RecordingStream, content: Shown) -> None:
     time = rr.TimeColumn("time", duration=record.time)
     hits = record.force.shape[1]
     about = {"hammer": list(hammers), "hits": [hits] * len(hammers), "sample_rate_Hz": [step.test.settings.sample_rate] * len(hammers)}
-    recording.log("numbers/records", any_values(about), static=True)
-    recording.log("numbers/responses", any_values({"node": list(nodes)}), static=True)
+    log_values(recording, "numbers/records", about)
+    log_values(recording, "numbers/responses", {"node": list(nodes)})
     paints, colours = [heat(k, (0, max(hits - 1, 1))) for k in range(hits)], [heat(k, range(len(nodes))) for k in range(len(nodes))]
     panels: dict[str, list[tuple[Array, Array, figures.Colour]]] = {}
     for h, hammer in enumerate(hammers):
@@ -90,7 +81,7 @@ def _blueprint(content: Shown) -> rrb.Blueprint:
     hits = content.run.steps[0].test.record.force.shape[1]
     right = rrb.Vertical(
         view("charts/records", "Every hit at its hammer point" if hits > 1 else "The hits at their hammer points", CHART),
-        rrb.TextDocumentView(origin="summary", name="Summary"),
+        summary_view(),
         row_shares=[1.2, 1],
     )
     left = rrb.Grid(*model_views(content), grid_columns=2)
@@ -136,13 +127,11 @@ def _record_tab(content: Shown) -> rrb.Container:
 
 def _over_time(origin: str, name: str, within: tuple[float, float], contents: list[str], look: rr.SeriesLines | None = None) -> rrb.View:
     """Series `contents` of all below `origin`, in a range of time (s), with a `look` other than their own."""
-    ends = [rr.TimeRangeBoundary.absolute(seconds=t) for t in within]
-    axis = rrb.TimeAxis(view_range=rr.TimeRange(*ends))
     return rrb.TimeSeriesView(
         origin=origin,
         name=name,
         contents=contents,
         overrides={path: look for path in contents if look is not None},
-        axis_x=axis,
+        axis_x=axis("seconds", *within),
         plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop),
     )

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import rerun as rr
@@ -19,9 +18,10 @@ from matplotlib.figure import Figure
 
 from thermospindle.model.types import Array
 from thermospindle.report.figures.common import PALE, STYLE, broken, cells, logarithmic, residual_norm
-from thermospindle.report.log.columns import curve_look, log_curve, log_peak_numbers, over_frequency, whole_log
+from thermospindle.report.log.columns import curve_look, log_curve, log_peak_numbers, log_values, log_words, over_frequency, whole_log
 from thermospindle.report.log.content import Peak
 from thermospindle.report.log.pictures import for_dark, log_figure, view
+from thermospindle.report.log.views import at, window
 from thermospindle.report.typeset import signed_short
 
 MEASURED, COMPUTED, HELD_OUT = np.array([(120, 255, 140), (255, 170, 80), (90, 200, 255)], np.uint8)
@@ -78,46 +78,33 @@ class ShownLadder:
 
 def write_ladder_log(content: ShownLadder, path: Path) -> None:
     """Write the log of a ladder, whole or not at all. BadInput if its folder does not exist."""
-    with whole_log(path) as (recording, partial):
-        _write(content, recording, partial)
-
-
-def _write(content: ShownLadder, recording: rr.RecordingStream, file: Path) -> None:
-    recording.save(file, default_blueprint=_blueprint(content))
-    recording.set_log_time_enabled(False)
-    recording.send_recording_name(content.title)
-    about: dict[str, Any] = {"title": content.title, **content.provenance}
-    recording.send_property("run", rr.AnyValues(**about))
-    log_peak_numbers(recording, content.peaks)
-    numbers: dict[str, Any] = {"names": [r.name for r in content.steps], "error": [r.error for r in content.steps], "top": content.top}
-    recording.log("numbers/steps", rr.AnyValues(**numbers), static=True)
-    for k, step in enumerate(content.steps, 1):
-        recording.set_time("step", sequence=k)
-        for name, figure in (("error", errors(content, k - 1)), ("residuals", residuals(content, step)), ("responses", responses(content, step))):
-            log_figure(recording, f"charts/{name}", figure, static=False)
-        recording.log("step", rr.TextDocument(words(content, k - 1), media_type=rr.MediaType.MARKDOWN))
-        for name, value in (("all data", step.error), ("temperatures left out", step.held_out)):
-            recording.log(rr.new_entity_path(["error", name]), rr.Scalars(value))
-    for name, colour in (("all data", COMPUTED), ("temperatures left out", HELD_OUT)):
-        recording.log(rr.new_entity_path(["error", name]), rr.SeriesLines(colors=[colour], names=name), static=True)
-    log_levels(recording, content)
+    with whole_log(path, "run", content.title, {"title": content.title, **content.provenance}, _blueprint(content)) as recording:
+        recording.set_log_time_enabled(False)
+        log_peak_numbers(recording, content.peaks)
+        steps = content.steps
+        log_values(recording, "numbers/steps", {"names": [r.name for r in steps], "error": [r.error for r in steps], "top": content.top})
+        for k, step in enumerate(steps, 1):
+            recording.set_time("step", sequence=k)
+            for name, figure in (("error", errors(content, k - 1)), ("residuals", residuals(content, step)), ("responses", responses(content, step))):
+                log_figure(recording, f"charts/{name}", figure, static=False)
+            log_words(recording, "step", words(content, k - 1), static=False)
+            for name, value in (("all data", step.error), ("temperatures left out", step.held_out)):
+                recording.log(at("error", name), rr.Scalars(value))
+        for name, colour in (("all data", COMPUTED), ("temperatures left out", HELD_OUT)):
+            recording.log(at("error", name), rr.SeriesLines(colors=[colour], names=name), static=True)
+        log_levels(recording, content)
 
 
 def log_levels(recording: rr.RecordingStream, content: ShownLadder) -> None:
     """FRFs on the timeline `frequency` (whole Hz): measured, and of every step, the later the brighter."""
     for i, level in enumerate(content.steps[0].levels):
         times = over_frequency(level.frequency)
-        origin = _level_path(level)
         curves = [("measured", level.measured, MEASURED, 2.0)]
         for k, step in enumerate(content.steps):
             bright = COMPUTED * (0.35 + 0.65 * (k / max(len(content.steps) - 1, 1)))
             curves.append((f"{k + 1} {step.name}", step.levels[i].computed, bright.astype(np.uint8), 1.0 if k != content.top else 2.0))
         for name, values, colour, width in curves:
-            log_curve(recording, rr.new_entity_path([*origin, name]), times, values, curve_look(colour, name, width))
-
-
-def _level_path(level: Level) -> list[str]:
-    return ["frf", level.test, level.name]
+            log_curve(recording, at("frf", level.test, level.name, name), times, values, curve_look(colour, name, width))
 
 
 # ---------------------------------------------------------------- pictures of one step
@@ -205,18 +192,8 @@ def _blueprint(content: ShownLadder) -> rrb.Blueprint:
     tabs: list[rrb.View | rrb.Container] = [rrb.Horizontal(left, right, column_shares=[1, 1.5], name="Ladder")]
     if levels:
         views = [
-            rrb.TimeSeriesView(
-                origin=rr.new_entity_path(_level_path(level)),
-                name=f"{level.name}, {level.test}, {content.unit}, over frequency (#1000 is 1000 Hz)",
-            )
-            for level in levels
+            rrb.TimeSeriesView(origin=at("frf", g.test, g.name), name=f"{g.name}, {g.test}, {content.unit}, over frequency (#1000 is 1000 Hz)")
+            for g in levels
         ]
         tabs.append(rrb.Grid(*views, grid_columns=2, name="FRFs (choose the timeline frequency)"))
-    return rrb.Blueprint(
-        rrb.Tabs(*tabs),
-        rrb.BlueprintPanel(state="hidden"),
-        rrb.SelectionPanel(state="hidden"),
-        rrb.TimePanel(state="collapsed", timeline="step", fps=0.7, play_state="playing", loop_mode="all"),
-        auto_views=False,
-        auto_layout=False,
-    )
+    return window(rrb.Tabs(*tabs), "step", fps=0.7)

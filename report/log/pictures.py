@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 
 from thermospindle.model.types import Array
 from thermospindle.report.figures.common import STYLE
+from thermospindle.report.log.views import DARK
 
-DARK = (13, 13, 15)
-"""The viewer's own ground."""
 DOTS = 180  # per inch: of a figure that is an inch for every 90 points of its view, sharp where a point has two dots
 
 Pixels = NDArray[np.uint8]

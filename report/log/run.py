@@ -17,20 +17,21 @@ import rerun as rr
 from thermospindle.model.types import Array
 from thermospindle.report.figures import run as figures
 from thermospindle.report.log import drawing
-from thermospindle.report.log.blueprint import CHARTS, at, blueprint, pair_path
+from thermospindle.report.log.blueprint import CHARTS, blueprint, pair_path
 from thermospindle.report.log.columns import (
-    any_values,
     curve_look,
     log_curve,
     log_frf_numbers,
     log_mesh,
     log_peak_numbers,
+    log_words,
     over_frequency,
     whole_log,
 )
 from thermospindle.report.log.content import Pair, Peak, Shown, bearing_series, decibel, frf_of, one, shown, summary
 from thermospindle.report.log.drawing import heat
 from thermospindle.report.log.pictures import for_dark, log_figure
+from thermospindle.report.log.views import at
 from thermospindle.sim import posing
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.run import Run
@@ -44,32 +45,30 @@ LIGHT = (235, 235, 235)
 
 def write_log(run: Run, path: Path) -> None:
     """Write the log of a run, whole or not at all. BadInput if its folder does not exist."""
-    with whole_log(path) as (recording, partial):
-        _write(shown(run), recording, partial)
-
-
-def _write(content: Shown, recording: rr.RecordingStream, file: Path) -> None:
-    run, spindle = content.run, content.run.spindle
+    content, spindle = shown(run), run.spindle
     sections = [field(spindle, t) for t in content.temperatures]
     factor = drawing.exaggeration(sections, posing.reach(spindle)) if spindle.regions else 1.0
     names = [b.name for b in spindle.bearings] + [b.name for b in spindle.roller_bearings]
     series = {name: bearing_series(run, name) for name in names}
     quantities = dict.fromkeys(quantity for own in series.values() for quantity in own)
-    recording.save(file, default_blueprint=blueprint(content, list(quantities), factor))
     ends = (min(content.temperatures), max(content.temperatures))
-    recording.send_recording_name(f"{spindle.name}, " + " to ".join(f"{t:g} C" for t in dict.fromkeys(ends)))
-    recording.send_property("run", any_values({"title": spindle.title, **provenance(spindle)}))
+    name = f"{spindle.name}, " + " to ".join(f"{t:g} C" for t in dict.fromkeys(ends))
+    with whole_log(path, "run", name, {"title": spindle.title, **provenance(spindle)}, blueprint(content, list(quantities), factor)) as recording:
+        log_test(recording, content)
+        log_section(recording, content, sections, factor)
+        if series:
+            log_bearings(recording, content, series)
+        log_records(recording, content)
+
+
+def log_test(recording: rr.RecordingStream, content: Shown) -> None:
+    """What the logs of a run and of an impact test have in common: FRFs, peaks, mode shapes and the summary."""
     log_numbers(recording, content)
     log_frfs(recording, content)
     log_peaks(recording, content)
     log_key(recording, content)
     log_motion(recording, content)
-    log_section(recording, content, sections, factor)
-    if series:
-        log_bearings(recording, content, series)
-    log_records(recording, content)
-    text = rr.TextDocument(summary(run, content.peaks), media_type=rr.MediaType.MARKDOWN)
-    recording.log("summary", text, static=True)
+    log_words(recording, "summary", summary(content.run, content.peaks))
 
 
 # ---------------------------------------------------------------- frequency response

@@ -14,16 +14,16 @@ import numpy as np
 import pyarrow as pa
 import rerun as rr
 import rerun.blueprint as rrb
-from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from thermospindle.model.machine import Spindle
 from thermospindle.model.types import Array
 from thermospindle.report.figures.common import colour
-from thermospindle.report.log.blueprint import at
-from thermospindle.report.log.columns import any_values, curve_look, log_curve, number_column, whole_log
+from thermospindle.report.log.columns import curve_look, log_curve, log_words, number_column, whole_log
+from thermospindle.report.log.drawing import light
 from thermospindle.report.log.pictures import log_figure, view
 from thermospindle.report.log.study.series import series_of
+from thermospindle.report.log.views import at, summary_view, window
 from thermospindle.sim.operating import provenance
 
 CASE = "case"
@@ -33,24 +33,20 @@ Told = dict[str, Any]
 
 def write_study_log(spindle: Spindle, told: Mapping[str, Any], table: pa.Table, drawn: Mapping[str, Figure], path: Path) -> None:
     """Write the log, whole or not at all; `told` is the study's summary, `drawn` its figures by name. BadInput if its folder does not exist."""
-    with whole_log(path) as (recording, partial):
-        series = series_of(table)
-        recording.save(partial, default_blueprint=blueprint(series, drawn))
-        recording.send_recording_name(f"{told['title']}, {spindle.name}")
-        about = {"title": told["title"], "kind": told["kind"], "cases": told["cases"], "rows": told["rows"], "errors": told["errors"]}
-        recording.send_property("study", any_values({**about, **provenance(spindle)}))
+    series = series_of(table)
+    about = {key: told[key] for key in ("title", "kind", "cases", "rows", "errors")} | provenance(spindle)
+    with whole_log(path, "study", f"{told['title']}, {spindle.name}", about, blueprint(series, drawn)) as recording:
         _log_series(recording, series)
         _log_rows(recording, table)
         for name, figure in drawn.items():
             log_figure(recording, at("charts", name), figure)
-        recording.log("summary", rr.TextDocument(_summary(told), media_type=rr.MediaType.MARKDOWN), static=True)
+        log_words(recording, "summary", _summary(told))
 
 
 def _log_series(recording: rr.RecordingStream, series: Mapping[str, Mapping[str, tuple[Array, Array]]]) -> None:
     for name, by_condition in series.items():
         for k, (condition, (case, values)) in enumerate(by_condition.items()):
-            paint = [round(255 * (0.35 + 0.65 * c)) for c in to_rgb(colour(k, range(max(2, len(by_condition)))))]
-            look = curve_look(paint, condition, 1.5)
+            look = curve_look(light(colour(k, range(max(2, len(by_condition))))), condition, 1.5)
             log_curve(recording, at("series", name, condition), rr.TimeColumn(CASE, sequence=case), values, look)
 
 
@@ -96,12 +92,4 @@ def blueprint(series: Mapping[str, Any], drawn: Mapping[str, Figure]) -> rrb.Blu
     views = [rrb.TimeSeriesView(origin=at("series", name), name=name, plot_legend=rrb.PlotLegend(visible=k == 0)) for k, name in enumerate(series)]
     pictures = [view(at("charts", name), name, tuple(figure.get_size_inches())) for name, figure in drawn.items()]
     right: list[Any] = [rrb.Tabs(*pictures)] if pictures else []
-    right.append(rrb.TextDocumentView(origin="summary", name="Summary"))
-    return rrb.Blueprint(
-        rrb.Horizontal(rrb.Grid(*views, grid_columns=2), rrb.Vertical(*right), column_shares=[1.2, 1]),
-        rrb.BlueprintPanel(state="hidden"),
-        rrb.SelectionPanel(state="hidden"),
-        rrb.TimePanel(state="collapsed", timeline=CASE),
-        auto_views=False,
-        auto_layout=False,
-    )
+    return window(rrb.Horizontal(rrb.Grid(*views, grid_columns=2), rrb.Vertical(*right, summary_view()), column_shares=[1.2, 1]), CASE)

@@ -7,7 +7,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from thermospindle.report.log.blueprint import framed
-from thermospindle.report.log.pictures import DARK, view
+from thermospindle.report.log.pictures import view
+from thermospindle.report.log.views import DARK, scene, summary_view, window
 from thermospindle.sim.running.runout import Runout, looked_at
 
 WATERFALL, POLAR = (6.6, 4.8), (4.2, 3.3)  # inches
@@ -19,9 +20,8 @@ def blueprint(runout: Runout, factor: float, waterfall: bool) -> rrb.Blueprint:
     """`factor`: by which the model's displacements are enlarged; `waterfall`: whether there is one."""
     cut, turning, where = runout.by_lines, abs(runout.turning), looked_at(runout.point.spindle)
     _, r, z = framed(runout.point.spindle)
-    eye = rrb.EyeControls3D(position=(1.8 * r, -1.4 * r, z + 1.9 * r), look_target=(0.1 * r, -0.1 * r, z + 0.1 * r), eye_up=(0, 0, 1))
     title = f"Displacements × {factor:g}, {PLAYED:g} revolutions a second"
-    model = rrb.Spatial3DView(origin="model", name=title, eye_controls=eye, line_grid=False, background=DARK)
+    model = scene("model", title, (1.8 * r, -1.4 * r, z + 1.9 * r), (0.1 * r, -0.1 * r, z + 0.1 * r))
     span = 1.1e9 * float(np.abs(cut.value[:2] - cut.value[:2].mean(axis=(1, 2), keepdims=True)).max()) or 1.0
     grown = rrb.VisibleTimeRange("time", start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.cursor_relative(seconds=0.0))
     orbit = rrb.Spatial2DView(
@@ -39,15 +39,8 @@ def blueprint(runout: Runout, factor: float, waterfall: bool) -> rrb.Blueprint:
     series = [_series(part, some, 4 / turning, where) for part, some in (("RRO", (0, 1, 2)), ("NRRO", (3, 4, 5)))]
     middle = rrb.Vertical(*([rrb.Tabs(*charts)] if charts else []), *series, row_shares=[2.6, 1, 1] if charts else [1, 1])
     polar = view("charts/polar", f"Error motion of {where} x", POLAR)
-    right = rrb.Vertical(polar, rrb.TextDocumentView(origin="summary", name="Summary"), row_shares=[1, 1.5])
-    return rrb.Blueprint(
-        rrb.Horizontal(rrb.Vertical(model, orbit), middle, right, column_shares=[1, 1.55, 1.0]),
-        rrb.BlueprintPanel(state="hidden"),
-        rrb.SelectionPanel(state="hidden"),
-        rrb.TimePanel(state="collapsed", timeline="time", playback_speed=PLAYED / turning, play_state="playing", loop_mode="all"),
-        auto_views=False,
-        auto_layout=False,
-    )
+    right = rrb.Vertical(polar, summary_view(), row_shares=[1, 1.5])
+    return window(rrb.Horizontal(rrb.Vertical(model, orbit), middle, right, column_shares=[1, 1.55, 1.0]), "time", playback_speed=PLAYED / turning)
 
 
 def _series(part: str, chosen: tuple[int, ...], seconds: float, where: str) -> rrb.View:

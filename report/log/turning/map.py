@@ -14,17 +14,18 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from matplotlib import rc_context
-from matplotlib.colors import to_rgb
 
 from thermospindle.model.units import RPM
 from thermospindle.report.figures.common import STYLE
 from thermospindle.report.figures.resonance import CAUSES, both, campbell, drawn_lines, over_temperature
-from thermospindle.report.log.blueprint import at
-from thermospindle.report.log.columns import any_values, curve_look, log_curve, number_column, whole_log
+from thermospindle.report.log.columns import curve_look, log_curve, log_values, log_words, number_column, whole_log
+from thermospindle.report.log.content import made_from
+from thermospindle.report.log.drawing import light
 from thermospindle.report.log.pictures import log_figure, log_figures, place, view
+from thermospindle.report.log.views import at, summary_view, window
 from thermospindle.report.text.resonance import map_json, sentences
 from thermospindle.sim.operating import provenance
-from thermospindle.sim.resonance.found import LineTrack, ResonanceMap, strongest
+from thermospindle.sim.resonance.found import ResonanceMap, strongest
 
 CAMPBELL, SMALL = (8.5, 8.3), (6.5, 3.1)  # inches
 WHIRL = {"forward": (255, 110, 80), "backward": (90, 160, 255), "none": (90, 220, 160)}
@@ -38,19 +39,13 @@ TEMPERATURE = "temperature, 0.01 C"
 
 def write_map_log(found: ResonanceMap, path: Path) -> None:
     """Write the log, whole or not at all. BadInput if its folder does not exist."""
-    with whole_log(path) as (recording, partial):
-        _write(found, recording, partial)
-
-
-def _write(found: ResonanceMap, recording: rr.RecordingStream, file: Path) -> None:
-    recording.save(file, default_blueprint=blueprint(found))
-    recording.send_recording_name(f"{found.spindle.name}, resonance map")
     about = {"title": found.spindle.title, "temperature_C": found.nominal.temperature, "speed_rad_per_s": found.nominal.speed}
-    recording.send_property("map", any_values({**about, **provenance(found.spindle)}))
-    log_numbers(recording, found)
-    log_pictures(recording, found)
-    log_series(recording, found)
-    recording.log("summary", rr.TextDocument(summary(found), media_type=rr.MediaType.MARKDOWN), static=True)
+    about |= provenance(found.spindle)
+    with whole_log(path, "map", f"{found.spindle.name}, resonance map", about, blueprint(found)) as recording:
+        log_numbers(recording, found)
+        log_pictures(recording, found)
+        log_series(recording, found)
+        log_words(recording, "summary", summary(found))
 
 
 def _over_temperature(found: ResonanceMap) -> rr.TimeColumn:
@@ -59,14 +54,14 @@ def _over_temperature(found: ResonanceMap) -> rr.TimeColumn:
 
 def log_numbers(recording: rr.RecordingStream, found: ResonanceMap) -> None:
     """Speeds, and a row a temperature with all modes over all speeds; coincidences in columns."""
-    recording.log("numbers/speeds", any_values({"speed_rad_per_s": found.speeds}), static=True)
+    log_values(recording, "numbers/speeds", {"speed_rad_per_s": found.speeds})
     grid = np.stack([m.frequency for m in found.modes], axis=1)  # (T, modes, S)
     columns: list[rr.ComponentColumn] = [*number_column("temperature_C", found.temperatures)]
     columns += number_column("frequency_Hz", grid.reshape(-1)).partition(np.full(len(grid), grid[0].size))
     recording.send_columns("numbers/modes", [_over_temperature(found)], columns)
     rows = map_json(found)["coincidences"]
     if rows:
-        recording.log("numbers/coincidences", any_values({name: [c[name] for c in rows] for name in rows[0]}), static=True)
+        log_values(recording, "numbers/coincidences", {name: [c[name] for c in rows] for name in rows[0]})
 
 
 def log_pictures(recording: rr.RecordingStream, found: ResonanceMap) -> None:
@@ -98,9 +93,8 @@ def log_series(recording: rr.RecordingStream, found: ResonanceMap) -> None:
             log_curve(recording, at("series", f"over {over}", f"mode {m.number}"), times, pick(m.frequency), look)
         for track in drawn_lines(found):
             name = f"{track.line.name} {track.line.cause} {track.line.order} {track.line.bearing}"
-            log_curve(
-                recording, at("series", f"over {over}", name), times, pick(track.frequency), curve_look(_paint(track), track.line.name)
-            )
+            look = curve_look(light(CAUSES[track.line.cause], 0.45), track.line.name)
+            log_curve(recording, at("series", f"over {over}", name), times, pick(track.frequency), look)
     along = (
         ("temperature", TICK * found.nrro_temperature[:, 0], found.nrro_temperature),
         ("speed", found.nrro_speed[:, 0] / RPM, found.nrro_speed),
@@ -108,19 +102,8 @@ def log_series(recording: rr.RecordingStream, found: ResonanceMap) -> None:
     for over, places, values in along:
         times = rr.TimeColumn(TEMPERATURE if over == "temperature" else over, sequence=np.round(places).astype(int))
         for column, direction, paint in ((1, "radial", (200, 140, 255)), (2, "axial", (240, 200, 90))):
-            log_curve(
-                recording,
-                at("nrro", f"over {over}", direction),
-                times,
-                1e9 * values[:, column],
-                curve_look(paint, f"{direction} NRRO, nm rms", 1.5),
-            )
-
-
-def _paint(track: LineTrack) -> tuple[int, int, int]:
-    """The colour of a line's cause, light enough for a dark ground."""
-    red, green, blue = (round(255 * (0.45 + 0.55 * c)) for c in to_rgb(CAUSES[track.line.cause]))
-    return red, green, blue
+            look = curve_look(paint, f"{direction} NRRO, nm rms", 1.5)
+            log_curve(recording, at("nrro", f"over {over}", direction), times, 1e9 * values[:, column], look)
 
 
 def summary(found: ResonanceMap) -> str:
@@ -133,8 +116,7 @@ def summary(found: ResonanceMap) -> str:
     for c in strongest(found.coincidences)[:16]:
         numbers = f"{c.condition.temperature:.1f} | {c.condition.speed / RPM:.0f} | {c.frequency:.0f} | {1e9 * c.strength:.1f} | {100 * c.margin:+.1f}"
         lines.append(f"| {c.line.name} | {c.line.cause} {c.line.bearing} | {c.mode.number} {c.mode.kind} | {numbers} |")
-    lines += ["", "Made from:", "", *(f"- {name}: {text}" for name, text in provenance(found.spindle).items())]
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *made_from(found.spindle)]) + "\n"
 
 
 def blueprint(found: ResonanceMap) -> rrb.Blueprint:
@@ -145,7 +127,7 @@ def blueprint(found: ResonanceMap) -> rrb.Blueprint:
         rrb.Vertical(
             view("coincidences", "Where the strongest lines meet a mode (line, mode)", SMALL),
             view("temperature", f"Over temperature at {rpm}", SMALL),
-            rrb.TextDocumentView(origin="summary", name="Summary"),
+            summary_view(),
             row_shares=[1.25, 1.25, 1],
         ),
         column_shares=[1.3, 1],
@@ -159,11 +141,4 @@ def blueprint(found: ResonanceMap) -> rrb.Blueprint:
         )
         for over in ("temperature", "speed")
     ]
-    return rrb.Blueprint(
-        rrb.Tabs(overview, *tabs),
-        rrb.BlueprintPanel(state="hidden"),
-        rrb.SelectionPanel(state="hidden"),
-        rrb.TimePanel(state="collapsed", timeline=TEMPERATURE, fps=4.0 * TICK, play_state="playing", loop_mode="all"),
-        auto_views=False,
-        auto_layout=False,
-    )
+    return window(rrb.Tabs(overview, *tabs), TEMPERATURE, fps=4.0 * TICK)

@@ -18,10 +18,11 @@ from thermospindle.model.rotor.look import stripe_meshes
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM, TO_MM, TO_NM
 from thermospindle.report.figures.runout import polar_figure, waterfall_figure
-from thermospindle.report.log.blueprint import at
-from thermospindle.report.log.columns import any_values, log_mesh, number_column, whole_log
+from thermospindle.report.log.columns import log_mesh, log_values, log_words, number_column, whole_log
+from thermospindle.report.log.content import made_from
 from thermospindle.report.log.pictures import log_figure
 from thermospindle.report.log.turning.blueprint import POLAR, WATERFALL, blueprint
+from thermospindle.report.log.views import at
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.posing import body_meshes, cage_turns, frame_indices, turning_poses
 from thermospindle.sim.running.runout import AXIAL, Runout, X, Y
@@ -34,28 +35,20 @@ SEGMENTS = 8  # of a revolution: pieces in which the orbit grows
 
 def write_runout_log(runout: Runout, spectra: Sequence[LineSpectrum], path: Path) -> None:
     """Write the log of a record and of the `spectra` over speed (may be empty), whole or not at all. BadInput if its folder does not exist."""
-    with whole_log(path) as (recording, partial):
-        _write(runout, spectra, recording, partial)
-
-
-def _write(runout: Runout, spectra: Sequence[LineSpectrum], recording: rr.RecordingStream, file: Path) -> None:
     condition, spindle = runout.point.condition, runout.point.spindle
     spectra = spectra if any(len(s.frequency) for s in spectra) else ()  # of a perfect spindle there is nothing to show
     moved, factor = turning_poses(runout)
-    recording.save(file, default_blueprint=blueprint(runout, factor, bool(spectra)))
     name = f"{spindle.name} at {condition.temperature:g} C, {condition.speed / RPM:.6g} rpm"
-    recording.send_recording_name(name)
     about = {"title": spindle.title, "temperature_C": condition.temperature, "speed_rad_per_s": condition.speed}
     about |= {"revolutions": runout.averaged.count, "samples": len(runout.averaged.angle), "displacements_are_drawn_times": factor}
-    recording.send_property("runout", any_values({**about, **provenance(spindle)}))
-    log_signals(recording, runout)
-    log_orbit(recording, runout)
-    log_model(recording, runout, moved)
-    log_numbers(recording, runout)
-    log_waterfall(recording, spectra)
-    log_figure(recording, "charts/polar", polar_figure(runout, POLAR))
-    text = rr.TextDocument(summary(runout), media_type=rr.MediaType.MARKDOWN)
-    recording.log("summary", text, static=True)
+    with whole_log(path, "runout", name, about | provenance(spindle), blueprint(runout, factor, bool(spectra))) as recording:
+        log_signals(recording, runout)
+        log_orbit(recording, runout)
+        log_model(recording, runout, moved)
+        log_numbers(recording, runout)
+        log_waterfall(recording, spectra)
+        log_figure(recording, "charts/polar", polar_figure(runout, POLAR))
+        log_words(recording, "summary", summary(runout))
 
 
 def log_signals(recording: rr.RecordingStream, runout: Runout) -> None:
@@ -123,7 +116,7 @@ def log_numbers(recording: rr.RecordingStream, runout: Runout) -> None:
     values = runout.values()
     names = list(next(iter(values.values())).__dataclass_fields__)
     quoted = {"probe": list(values), **{n: [asdict(m)[n] for m in values.values()] for n in names}}
-    recording.log("numbers/quoted", any_values(quoted), static=True)
+    log_values(recording, "numbers/quoted", quoted)
     lines = runout.lines
     plain = ("frequency", "direction", "amplitude", "forward", "backward", "repeatable")
     columns_of_lines = {name: [getattr(g, name) for g in lines] for name in plain} | {"orders": [g.order for g in lines]}
@@ -131,7 +124,7 @@ def log_numbers(recording: rr.RecordingStream, runout: Runout) -> None:
     columns_of_lines["cause"] = [g.causes[0].cause if g.causes else "unexplained" for g in lines]
     columns_of_lines["bearing"] = [g.causes[0].bearing if g.causes else "" for g in lines]
     if lines:
-        recording.log("numbers/lines", any_values(columns_of_lines), static=True)
+        log_values(recording, "numbers/lines", columns_of_lines)
 
 
 def log_waterfall(recording: rr.RecordingStream, spectra: Sequence[LineSpectrum]) -> None:
@@ -166,5 +159,4 @@ def summary(runout: Runout) -> str:
         cause = f"{g.causes[0].bearing} {g.causes[0].cause}".strip() if g.causes else "unexplained"
         name = g.causes[0].name if g.causes else ""
         lines.append(f"| {g.frequency:.1f} | {g.direction} | {TO_NM * g.amplitude:.1f} | {name} | {cause} |")
-    lines += ["", "Made from:", "", *(f"- {name}: {text}" for name, text in provenance(runout.point.spindle).items())]
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *made_from(runout.point.spindle)]) + "\n"

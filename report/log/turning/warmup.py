@@ -12,17 +12,16 @@ from typing import Any
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
-from matplotlib.colors import to_rgb
-from numpy.typing import NDArray
 
 from thermospindle.model.types import Array
 from thermospindle.model.units import MINUTE, RPM, TO_MM
 from thermospindle.report.figures.common import BEARINGS
 from thermospindle.report.figures.warmup import MODES, PARTS
-from thermospindle.report.log.blueprint import at, framed
-from thermospindle.report.log.columns import any_values, curve_look, log_curve, number_column, whole_log
-from thermospindle.report.log.drawing import HEAT, outlines
-from thermospindle.report.log.pictures import DARK
+from thermospindle.report.log.blueprint import framed
+from thermospindle.report.log.columns import curve_look, log_curve, log_words, number_column, whole_log
+from thermospindle.report.log.content import made_from
+from thermospindle.report.log.drawing import heat, light, outlines
+from thermospindle.report.log.views import at, axis, scene, summary_view, window
 from thermospindle.report.text.warmup import heat_sums, lost_contact, rows
 from thermospindle.report.typeset import power
 from thermospindle.sim.operating import provenance
@@ -34,20 +33,14 @@ SECONDS = 12.0  # in which all of it is played
 
 def write_warmup_log(warmup: Warmup, path: Path) -> None:
     """Write the log, whole or not at all. BadInput if its folder does not exist."""
-    with whole_log(path) as (recording, partial):
-        _write(warmup, recording, partial)
-
-
-def _write(warmup: Warmup, recording: rr.RecordingStream, file: Path) -> None:
-    recording.save(file, default_blueprint=_blueprint(warmup))
-    recording.send_recording_name(f"warm-up of {warmup.spindle.name} at {warmup.speed / RPM:.6g} rpm")
+    name = f"warm-up of {warmup.spindle.name} at {warmup.speed / RPM:.6g} rpm"
     about = {"title": warmup.spindle.title, "start_C": warmup.start, "air_C": warmup.air, "speed_rad_per_s": warmup.speed}
     about |= {"time_constant_s": warmup.time_constant, **provenance(warmup.spindle)}
-    recording.send_property("warmup", any_values(about))
-    log_numbers(recording, warmup)
-    log_series(recording, warmup)
-    log_section(recording, warmup)
-    recording.log("summary", rr.TextDocument(summary(warmup), media_type=rr.MediaType.MARKDOWN), static=True)
+    with whole_log(path, "warmup", name, about, _blueprint(warmup)) as recording:
+        log_numbers(recording, warmup)
+        log_series(recording, warmup)
+        log_section(recording, warmup)
+        log_words(recording, "summary", summary(warmup))
 
 
 def _over_time(warmup: Warmup) -> rr.TimeColumn:
@@ -74,7 +67,7 @@ def series(warmup: Warmup) -> dict[str, dict[str, tuple[Array, Any]]]:
     modes = {f"{k} {m.kind} {f:.0f} Hz": k - 1 for k, (m, f) in enumerate(zip(warmup.modes, warmup.frequencies[0], strict=True), 1)}
     return {
         "Regions, °C: stationary blue, rotating orange": {
-            g: (np.array([m.temperatures[g] for m in moments]), _light(PARTS[parts[g]])) for g in moments[0].temperatures
+            g: (np.array([m.temperatures[g] for m in moments]), light(PARTS[parts[g]])) for g in moments[0].temperatures
         },
         "Bearings, °C": {b: (np.array([m.bearing_temperatures[b] for m in moments]), _of_bearing(k)) for k, b in enumerate(friction)},
         "Preload, N": {b: (np.array([m.preload[b] for m in moments]), _of_bearing(k)) for k, b in enumerate(bearings)},
@@ -83,7 +76,7 @@ def series(warmup: Warmup) -> dict[str, dict[str, tuple[Array, Any]]]:
         },
         **({CLEARANCE: {b: (np.array(rollers(warmup, b)["clearance_um"]), _of_bearing(friction.index(b))) for b in rolling}} if rolling else {}),
         f"Friction heat, {unit}": {b: (scale * np.array([m.friction[b] for m in moments]), _of_bearing(k)) for k, b in enumerate(friction)},
-        "Natural frequencies, Hz of change since the start": {n: (shift[:, k], _light(MODES[k % len(MODES)])) for n, k in modes.items()},
+        "Natural frequencies, Hz of change since the start": {n: (shift[:, k], light(MODES[k % len(MODES)])) for n, k in modes.items()},
     }
 
 
@@ -93,14 +86,8 @@ def log_series(recording: rr.RecordingStream, warmup: Warmup) -> None:
             log_curve(recording, at("series", group, name), _over_time(warmup), values, curve_look(paint, name, 1.5))
 
 
-def _light(paint: str) -> tuple[int, int, int]:
-    """A colour of the figures, light enough for a dark ground."""
-    red, green, blue = (round(255 * (0.35 + 0.65 * c)) for c in to_rgb(paint))
-    return red, green, blue
-
-
 def _of_bearing(k: int) -> tuple[int, int, int]:
-    return _light(BEARINGS[k % len(BEARINGS)][0])
+    return light(BEARINGS[k % len(BEARINGS)][0])
 
 
 def _ends(warmup: Warmup) -> tuple[float, float]:
@@ -110,12 +97,12 @@ def _ends(warmup: Warmup) -> tuple[float, float]:
 
 def log_section(recording: rr.RecordingStream, warmup: Warmup) -> None:
     """Both halves of the section with the temperature of every corner of its elements as its colour, at every time."""
-    model, (low, high) = warmup.history.model, _ends(warmup)
+    model = warmup.history.model
     for part, span in model.spans.items():
         mesh = model.sections[part].mesh  # nodal values of its second-order elements begin with its corners
         r, z = TO_MM * mesh.p
         corners = np.concatenate([mesh.t[[0, k, k + 1]].T for k in range(1, len(mesh.t) - 1)])
-        paint = np.concatenate([_coloured(row[span][: len(r)], low, high) for row in warmup.history.nodal])
+        paint = np.concatenate([heat(row[span][: len(r)], _ends(warmup)) for row in warmup.history.nodal])
         for side, name in ((-1, "left"), (1, "right")):
             entity = at("section", part, name)
             shape = rr.Mesh3D.from_fields(vertex_positions=np.stack([side * r, 0 * r, z], axis=1), triangle_indices=corners)
@@ -124,12 +111,6 @@ def log_section(recording: rr.RecordingStream, warmup: Warmup) -> None:
             recording.send_columns(entity, [_over_time(warmup)], columns)
     lines = [strip * [side, 1, 1] for strip in outlines(warmup.spindle) for side in (-1, 1)]
     recording.log("section/outline", rr.LineStrips3D(lines, colors=[(255, 255, 255, 90)], radii=rr.Radius.ui_points(0.4)), static=True)
-
-
-def _coloured(temperature: Array, low: float, high: float) -> NDArray[np.uint8]:
-    """Colours (nodes, 3), as `report.log.drawing.heat` has them."""
-    place = (temperature - low) / (high - low) if high > low else 0 * temperature
-    return np.stack([np.interp(place, np.linspace(0, 1, len(HEAT)), channel) for channel in HEAT.T], axis=1).astype(np.uint8)
 
 
 def summary(warmup: Warmup) -> str:
@@ -157,8 +138,7 @@ def summary(warmup: Warmup) -> str:
     lines += ["", f"Slowest time constant {warmup.time_constant:.0f} s.", ""]
     lines += [f"Heat: motor {heat['motor']}, bearings {heat['friction']} in; convection {heat['convection']} out; stored {heat['stored']}."]
     lines += ["", f"Left out: {', '.join(warmup.left_out)}."] if warmup.left_out else []
-    lines += ["", "Made from:", "", *(f"- {name}: {text}" for name, text in provenance(spindle).items())]
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *made_from(spindle)]) + "\n"
 
 
 # ---------------------------------------------------------------- what is shown
@@ -169,23 +149,13 @@ def _blueprint(warmup: Warmup) -> rrb.Blueprint:
     low, high = _ends(warmup)
     long, r, z = framed(warmup.spindle)
     away, height = (2.1 * r, z) if long else (2.6 * r, 0.3 * r)
-    eye = rrb.EyeControls3D(position=(0, -away, height), look_target=(0, 0, height), eye_up=(0, 0, 1))
-    section = rrb.Spatial3DView(
-        origin="section", name=f"Section, blue {low:.4g} °C to red {high:.4g} °C", eye_controls=eye, line_grid=False, background=DARK
-    )
-    ends = [rr.TimeRangeBoundary.absolute(seconds=float(t)) for t in (0.0, warmup.times[-1])]
-    axis, named = rrb.TimeAxis(view_range=rr.TimeRange(*ends)), rrb.PlotLegend(corner=rrb.Corner2D.RightTop)
+    section = scene("section", f"Section, blue {low:.4g} °C to red {high:.4g} °C", (0, -away, height), (0, 0, height))
+    times, named = axis("seconds", 0.0, float(warmup.times[-1])), rrb.PlotLegend(corner=rrb.Corner2D.RightTop)
     hidden = rrb.PlotLegend(visible=False)  # more regions than a legend holds
     views = [
-        rrb.TimeSeriesView(origin=at("series", group), name=group, axis_x=axis, plot_legend=hidden if group.startswith("Regions") else named)
+        rrb.TimeSeriesView(origin=at("series", group), name=group, axis_x=times, plot_legend=hidden if group.startswith("Regions") else named)
         for group in series(warmup)
     ]
-    left = rrb.Vertical(section, rrb.TextDocumentView(origin="summary", name="Summary"), row_shares=[1.2, 1])
-    return rrb.Blueprint(
-        rrb.Horizontal(left, rrb.Grid(*views, grid_columns=2), column_shares=[1, 1.9]),
-        rrb.BlueprintPanel(state="hidden"),
-        rrb.SelectionPanel(state="hidden"),
-        rrb.TimePanel(state="collapsed", timeline="time", playback_speed=float(warmup.times[-1]) / SECONDS, play_state="playing", loop_mode="all"),
-        auto_views=False,
-        auto_layout=False,
-    )
+    left = rrb.Vertical(section, summary_view(), row_shares=[1.2, 1])
+    everything = rrb.Horizontal(left, rrb.Grid(*views, grid_columns=2), column_shares=[1, 1.9])
+    return window(everything, "time", playback_speed=float(warmup.times[-1]) / SECONDS)
