@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.linalg import splu
-from skfem import Basis, BilinearForm, ElementVector, FacetBasis, LinearForm
+from skfem import Basis, ElementVector, FacetBasis, LinearForm
 
 from thermospindle.thermal.mesh import PartMesh, element
 
@@ -53,14 +54,6 @@ def dilatation(u, r):
     return u.grad[0, 0] + u.grad[1, 1] + u[0] / r
 
 
-@BilinearForm
-def stiffness(u, v, w):
-    """Virtual work of the stress of u on the strain of v."""
-    r = w.x[0]
-    (err, ezz, ett, grz), (drr, dzz, dtt, drz) = strain(u, r), strain(v, r)
-    return (w.lam * (err + ezz + ett) * (drr + dzz + dtt) + w.mu * (2 * (err * drr + ezz * dzz + ett * dtt) + grz * drz)) * r
-
-
 @LinearForm
 def thermal_load(v, w):
     """Virtual work of the stress that would suppress the thermal strain: (3 lambda + 2 mu) strain tr e(v)."""
@@ -87,6 +80,7 @@ class Solid:
 
     def __init__(self, section: PartMesh, elasticity: Mapping[str, Elasticity]):
         self.section = section
+        self.elasticity = elasticity
         self.scalar = Basis(section.mesh, element(section.mesh), intorder=QUADRATURE_ORDER)
         lame = np.array([elasticity[name].lame for name in section.regions])[section.region_of]
         points = (1, self.scalar.X.shape[-1])
@@ -102,8 +96,32 @@ class Solid:
         return self.scalar.doflocs.T
 
     @cached_property
+    def element_stiffness(self) -> np.ndarray:
+        """Stiffness matrices (n, n, elements) of the n functions of every element: virtual work of the stress of one on the strain of the other."""
+        r = self.basis.global_coordinates()[0]
+        normal = np.array([strain(of[0], r)[:3] for of in self.basis.basis])  # (n, 3, elements, points)
+        shear = np.array([strain(of[0], r)[3] for of in self.basis.basis])
+        trace, volume = normal.sum(axis=1), r * self.basis.dx
+        found = np.einsum("iep,jep->ije", trace * (self.lam * volume), trace)
+        found += np.einsum("icep,jcep->ije", normal * (2 * self.mu * volume), normal)
+        return found + np.einsum("iep,jep->ije", shear * (self.mu * volume), shear)
+
+    def stiffness(self, elements: np.ndarray | slice = slice(None)) -> csr_matrix:
+        """Stiffness matrix (dofs, dofs) of the part, or of some of its `elements` alone."""
+        own, dofs = self.element_stiffness[..., elements], self.basis.element_dofs[:, elements]
+        rows, columns = np.broadcast_arrays(dofs[:, None], dofs[None, :])
+        return coo_matrix((own.ravel(), (rows.ravel(), columns.ravel())), shape=(self.basis.N, self.basis.N)).tocsr()
+
+    def with_moduli(self, elasticity: Mapping[str, Elasticity]) -> Solid:
+        """The same part with other Young's moduli but the same Poisson's ratios, in whose proportion its elements are stiffer."""
+        other = Solid(self.section, elasticity)
+        ratio = np.array([elasticity[name].youngs_modulus / self.elasticity[name].youngs_modulus for name in self.section.regions])
+        other.basis, other.element_stiffness = self.basis, self.element_stiffness * ratio[self.section.region_of]
+        return other
+
+    @cached_property
     def _solve(self) -> Callable[[np.ndarray], np.ndarray]:
-        matrix = stiffness.assemble(self.basis, lam=self.lam, mu=self.mu).tocsc()
+        matrix = self.stiffness().tocsc()
         held = np.zeros(self.basis.N, dtype=bool)
         held[0::2] = self.nodes[:, 0] == 0.0
         held[1] = True  # loads are in axial balance, so this node takes no force
@@ -129,12 +147,16 @@ class Solid:
         loads = [thermal_load.assemble(self.basis, lam=self.lam, mu=self.mu, strain=one) for one in strains]
         return self._solve(np.array(loads).T).T.reshape(len(strains), -1, 2)
 
-    def region_displacement(self) -> np.ndarray:
-        """Displacement (regions, nodes, 2) in m of a unit strain of one region after the other: what loads it stands in the region's own elements."""
+    def region_loads(self) -> np.ndarray:
+        """Loads (regions, dofs) of a unit strain of one region after the other: each stands in the region's own elements."""
         element_loads = thermal_load.coo_data(self.basis, lam=self.lam, mu=self.mu, strain=np.ones_like(self.lam)).data.reshape(self.basis.Nbfun, -1)
         own = [self.section.region_of == k for k in range(len(self.section.regions))]
-        loads = [np.bincount(self.basis.element_dofs[:, e].ravel(), element_loads[:, e].ravel(), self.basis.N) for e in own]
-        return self._solve(np.array(loads).T).T.reshape(len(loads), -1, 2)
+        return np.array([np.bincount(self.basis.element_dofs[:, e].ravel(), element_loads[:, e].ravel(), self.basis.N) for e in own])
+
+    def region_displacement(self) -> np.ndarray:
+        """Displacement (regions, nodes, 2) in m of a unit strain of one region after the other."""
+        loads = self.region_loads()
+        return self._solve(loads.T).T.reshape(len(loads), -1, 2)
 
     def region_strains(self) -> np.ndarray:
         """Unit strain of one region after the other, (regions, elements, points)."""

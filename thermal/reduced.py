@@ -17,11 +17,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csr_matrix
 from skfem import Basis
 
 from thermospindle.model.machine import Law
-from thermospindle.thermal.elastic import Elasticity, Race, Response, Solid, dilatation, stiffness, thermal_load
+from thermospindle.thermal.elastic import Elasticity, Race, Response, Solid, dilatation
 from thermospindle.thermal.mesh import PartMesh
 from thermospindle.thermal.refine import largest_motion
 
@@ -96,6 +95,7 @@ def reduced(section: PartMesh, races: Sequence[Race], regions: Sequence[Region],
     """The space of a part on a mesh, from `reference` (C) and the ends of every material's law, widened until it holds `ACCURACY`."""
     regions = tuple(next(r for r in regions if r.name == name) for name in section.regions)
     centre = _moduli(regions, dict.fromkeys((r.youngs_modulus for r in regions), reference))
+    at_centre = Solid(section, _elastic(regions, centre))
     snapshots: list[np.ndarray] = []
     solved = 0
 
@@ -103,7 +103,7 @@ def reduced(section: PartMesh, races: Sequence[Race], regions: Sequence[Region],
         """Solve at a state, keep its fields, and return its gain."""
         nonlocal solved
         solved += 1
-        response, adjoint = Solid(section, _elastic(regions, moduli)).respond(races)
+        response, adjoint = at_centre.with_moduli(_elastic(regions, moduli)).respond(races)
         scale = moduli.mean()  # adjoint displacements are per newton
         snapshots.extend([*response.shape, *(scale * adjoint)])
         return response.gain
@@ -111,12 +111,12 @@ def reduced(section: PartMesh, races: Sequence[Race], regions: Sequence[Region],
     whole(centre)
     for state in _ends(regions, reference):
         whole(state)
-    found = _project(section, races, regions, snapshots, centre, solved)
+    found = _project(at_centre, races, regions, snapshots, solved)
     for state in _between(regions):
         guess = found.solution(state)[0]
         gain = whole(state)
         error = largest_motion(guess - gain) / largest_motion(gain)
-        found = _project(section, races, regions, snapshots, centre, solved)
+        found = _project(at_centre, races, regions, snapshots, solved)
         if error <= ACCURACY or solved >= MOST:
             break
     return replace(found, error=error, solved=solved)
@@ -155,36 +155,25 @@ def _elastic(regions: Sequence[Region], moduli: np.ndarray) -> dict[str, Elastic
     return {r.name: Elasticity(float(e), r.poisson_ratio) for r, e in zip(regions, moduli, strict=True)}
 
 
-def _project(
-    section: PartMesh, races: Sequence[Race], regions: tuple[Region, ...], snapshots: list[np.ndarray], centre: np.ndarray, solved: int
-) -> Reduced:
-    """The span of snapshots (nodes, 2) each, orthonormal in the elastic energy at `centre`, and the problem on it."""
-    flat = np.array(snapshots).reshape(len(snapshots), -1)
-    parts = [_of_one(section, regions, name) for name in section.regions]
-    inner = np.array([flat @ (k @ flat.T) for k, _ in parts])
-    whole = np.tensordot(centre, inner, axes=1)
+def _project(solid: Solid, races: Sequence[Race], regions: tuple[Region, ...], snapshots: list[np.ndarray], solved: int) -> Reduced:
+    """The span of snapshots (nodes, 2) each, orthonormal in the elastic energy of `solid`, and the problem on it."""
+    section, flat = solid.section, np.array(snapshots).reshape(len(snapshots), -1)
+    modulus = np.array([solid.elasticity[r.name].youngs_modulus for r in regions])
+    inner = np.array([flat @ (solid.stiffness(section.region_of == k) @ flat.T) for k in range(len(regions))])
+    whole = inner.sum(axis=0)
     size = np.sqrt(np.diag(whole))
     value, vector = np.linalg.eigh(whole / np.outer(size, size))
     kept = value > SMALL * value[-1]
     turn = (vector[:, kept] / np.sqrt(value[kept])).T / size
     fields = turn @ flat
-    functional = Solid(section, _elastic(regions, centre)).functionals(races)
     return Reduced(
         section,
         tuple(races),
         regions,
         fields.reshape(len(fields), -1, 2),
-        np.array([turn @ k @ turn.T for k in inner]),
-        np.array([fields @ f for _, f in parts]),
-        functional @ fields.T,
+        np.array([turn @ k @ turn.T for k in inner]) / modulus[:, None, None],
+        (solid.region_loads() @ fields.T) / modulus[:, None],
+        solid.functionals(races) @ fields.T,
         error=float("inf"),
         solved=solved,
     )
-
-
-def _of_one(section: PartMesh, regions: tuple[Region, ...], name: str) -> tuple[csr_matrix, np.ndarray]:
-    """Stiffness matrix, and thermal load of a unit strain, of one region with a modulus of 1 Pa."""
-    solid = Solid(section, {r.name: Elasticity(float(r.name == name), r.poisson_ratio) for r in regions})
-    strain = np.ones_like(solid.lam) * np.ones((1, solid.basis.X.shape[-1]))
-    matrix = stiffness.assemble(solid.basis, lam=solid.lam, mu=solid.mu)
-    return matrix, thermal_load.assemble(solid.basis, lam=solid.lam, mu=solid.mu, strain=strain)

@@ -248,7 +248,7 @@ def _error_of_first(share: Array, columns: Array, freedom: Array) -> float:
     used = share > 0
     used[0] = True
     scaled = columns[:, used] * (np.sqrt(freedom) / np.maximum(columns @ share, 1e-300))[:, None]
-    triangle = np.linalg.qr(scaled[:, ::-1], mode="r")  # the first last: its own part, that the others cannot take
+    triangle = np.asarray(np.linalg.qr(scaled[:, ::-1], mode="r"))  # the first last: its own part, that the others cannot take
     return float(1 / np.abs(triangle[-1, -1])) if triangle[-1, -1] else 0.0
 
 
