@@ -34,6 +34,16 @@ def prose(text: str) -> str:
     return minus(micro(re.sub(r"(?<=\d) C\b", " °C", str(escape(text))))).replace("+-", "±").replace("-&gt;", "→")
 
 
+def unit_word(unit: str, before: str = "") -> str:
+    """A unit with what stands before it; nothing of a plain number."""
+    return "" if unit == "1" else before + unit
+
+
+def known(values: Any) -> Any:
+    """A number for JSON, or an array as nested lists of them: None where there is none."""
+    return [known(v) for v in values] if np.ndim(values) else float(values) if np.isfinite(values) else None
+
+
 def signed(value: float, digits: int = 1) -> str:
     return minus(f"{round(value, digits) + 0.0:+.{digits}f}")  # + 0.0: never -0.0
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -21,9 +21,13 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize, SymLogNorm, to
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.ticker import LogLocator, NullLocator
+from scipy.optimize import isotonic_regression
 
 from thermospindle.model.types import Array
+from thermospindle.model.units import RPM
 from thermospindle.report.typeset import LINEAR, SMALLEST
+from thermospindle.report.typeset import figure as framed
+from thermospindle.sim.campaign.campaign import Test
 
 INK, PALE = "#1b1c1d", "#84898f"
 TEMPERATURES = LinearSegmentedColormap.from_list("cold to hot", ["#2166ac", "#8073ac", "#c9371c"])
@@ -82,6 +86,13 @@ def save(figure: Figure, folder: Path, name: str, dpi: float = 150) -> None:
         figure.savefig(folder / f"{name}.svg", dpi=dpi, facecolor="white", metadata={"Date": None})
 
 
+def save_all(figures: Mapping[str, Figure], folder: Path, dpi: float = 150) -> None:
+    """Every figure as a PNG and an SVG of its name."""
+    for name, figure in figures.items():
+        save(figure, folder, name, dpi)
+
+
+@rc_context(STYLE)
 def svg(figure: Figure, key: str, description: str) -> str:
     """The figure as an SVG element for the inside of a page; `key` keeps its ids apart from those of other figures.
 
@@ -107,6 +118,31 @@ def svg(figure: Figure, key: str, description: str) -> str:
     text = ElementTree.tostring(root, encoding="unicode", short_empty_elements=True)
     text = re.sub(r' xmlns(:xlink)?="[^"]+"', "", text)  # HTML knows both
     return re.sub(r"\n\s*", "\n", re.sub(r"(\d\.\d\d)\d+", r"\1", text))
+
+
+def pictures(figures: Mapping[str, Figure], captions: Mapping[str, str], key: str = "") -> dict[str, str]:
+    """Figures as HTML of a page above their captions; `key` stands before their names in ids."""
+    return {name: framed(svg(one, f"{key}{name}".replace("_", "-"), captions[name]), captions[name]) for name, one in figures.items()}
+
+
+def label(test: Test, line: str = "\n") -> str:
+    """A test in two short lines: temperature, and speed, level and repeat where they say something."""
+    words = [f"{test.temperature:g} °C"]
+    words += [f"{test.speed / RPM:.0f} rpm"] if test.speed else []
+    words += [f"{test.level:g} N"] if test.level else []
+    words += [f"no. {test.repeat}"] if test.repeat > 1 else []
+    return line.join(words)
+
+
+def spread(wanted: Array, apart: float, low: float = 0.0, high: float = 1.0) -> Array:
+    """Places (n,) nearest to the `wanted` ones (any order), in least squares, that keep their order, are `apart` and lie between `low` and `high`; closer
+    together where so many do not fit."""
+    if not len(wanted):
+        return wanted
+    order = np.argsort(wanted, kind="stable")
+    steps = min(apart, (high - low) / max(len(wanted) - 1, 1)) * np.arange(len(wanted))
+    level = isotonic_regression(wanted[order] - steps).x
+    return np.asarray((np.clip(level, low, high - steps[-1]) + steps)[np.argsort(order)])
 
 
 # ---------------------------------------------------------------- residuals in standard errors

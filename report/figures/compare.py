@@ -14,9 +14,9 @@ from matplotlib.lines import Line2D
 from thermospindle.diagnosis.compare.compare import Comparison, PairedMode, TestComparison
 from thermospindle.diagnosis.compare.correlation import Correlation, Pair
 from thermospindle.model.types import Array
-from thermospindle.model.units import RPM
-from thermospindle.report.figures.common import INK, PALE, STYLE, cells, colour, residual_bar, residual_norm
+from thermospindle.report.figures.common import INK, PALE, STYLE, cells, colour, label, residual_bar, residual_norm
 from thermospindle.report.typeset import UNITS, signed_short
+from thermospindle.sim.identification.frf import decibel
 
 FDAC_LINES = 260  # about, of an FDAC map
 
@@ -33,15 +33,6 @@ def figures(c: Comparison) -> dict[str, Figure]:
 
 def with_frfs(c: Comparison) -> list[tuple[TestComparison, Correlation]]:
     return [(t, t.correlation) for t in c.tests if t.correlation is not None]
-
-
-def label(t: TestComparison, line: str = "\n") -> str:
-    """A test in two short lines: temperature, and speed, level and repeat where they say something."""
-    words = [f"{t.test.temperature:g} °C"]
-    words += [f"{t.test.speed / RPM:.0f} rpm"] if t.test.speed else []
-    words += [f"{t.test.level:g} N"] if t.test.level else []
-    words += [f"no. {t.test.repeat}"] if t.test.repeat > 1 else []
-    return line.join(words)
 
 
 @rc_context(STYLE)
@@ -61,7 +52,7 @@ def residual_map(c: Comparison) -> Figure:
     for axes, grid, (title, _) in zip(panels, grids, measures, strict=True):
         cells(axes, grid, norm, "RdBu_r", signed_short)
         axes.set_title(f"{title}: computed − measured")
-        axes.set_xticks(range(len(c.tests)), [label(t) for t in c.tests], fontsize=7.5)
+        axes.set_xticks(range(len(c.tests)), [label(t.test) for t in c.tests], fontsize=7.5)
     panels[0].set_yticks(range(len(modes) + 2), [*modes.values(), "only measured", "only computed"])
     for k, t in enumerate(c.tests):
         for row, lost in enumerate((t.missing, t.extra)):
@@ -107,7 +98,7 @@ def overlay(c: Comparison) -> Figure:
                 continue
             axes.plot(found.frequency, decibel(found.measured[ij]), color=colour(t.test.temperature, every), lw=2.4, alpha=0.55)
             axes.plot(found.frequency, decibel(found.computed[ij]), color=INK, lw=0.8, ls=(0, (4, 2)))
-        row[0].set_ylabel(label(t))
+        row[0].set_ylabel(label(t.test))
     for k, pair in enumerate(pairs):
         panels[0, k].set_title(f"H({pair[0]},{pair[1]})" + (" driving point" if pair[0] == pair[1] else ""))
         panels[-1, k].set_xlabel("frequency, Hz")
@@ -125,10 +116,6 @@ def shown_pairs(found: Correlation) -> list[Pair]:
     driving = [p for p in found.pairs if p[0] == p[1]]
     loudest = max(found.pairs, key=lambda p: float(np.linalg.norm(found.measured[found.pairs[p]])))
     return driving[:3] or [loudest]
-
-
-def decibel(value: np.ndarray) -> Array:
-    return np.asarray(20 * np.log10(np.maximum(np.abs(value), 1e-15)), float)
 
 
 def _share(value: float) -> str:
@@ -163,7 +150,7 @@ def by_band(c: Comparison) -> Figure:
         axes.set_xticks(range(len(edges)), [f"{a:.0f}–{b:.0f}" for a, b in edges], fontsize=7, rotation=90)
         axes.set_xlabel("band, Hz")
         figure.colorbar(picture, ax=axes, shrink=0.9, pad=0.02, aspect=22).outline.set_visible(False)
-    panels[0].set_yticks(range(len(tests)), [label(t, ", ") for t, _ in tests])
+    panels[0].set_yticks(range(len(tests)), [label(t.test, ", ") for t, _ in tests])
     return figure
 
 
@@ -182,7 +169,7 @@ def by_frf(c: Comparison) -> Figure:
     for axes, grid, title in zip(panels, grids, ("Shape: FRAC", "Amplitude: CSF"), strict=True):
         picture = cells(axes, grid, Normalize(0, 1), "YlGnBu", lambda v: f"{v:.2f}", 7.0)
         axes.set_title(title)
-        axes.set_xticks(range(len(tests)), [label(t) for t, _ in tests], fontsize=7.5)
+        axes.set_xticks(range(len(tests)), [label(t.test) for t, _ in tests], fontsize=7.5)
     panels[0].set_yticks(range(len(pairs)), [f"H({r},{h})" for r, h in pairs])
     figure.colorbar(picture, ax=list(panels), shrink=0.9, pad=0.015, aspect=25).outline.set_visible(False)
     return figure
@@ -204,7 +191,7 @@ def fdac_maps(c: Comparison) -> Figure:
         for (low, high), shift in shifts.items():
             axes.plot([low, high], np.array([low, high]) * (1 + shift), color="#c9371c", lw=1.4)
         words = "" if found.whole.shift is None else f", shift {100 * found.whole.shift:+.2f} %".replace("-", "−")
-        axes.set_title(f"{label(t, ', ')}{words}")
+        axes.set_title(f"{label(t.test, ', ')}{words}")
         axes.set(xlabel="measured frequency, Hz", ylabel="computed frequency, Hz", aspect="equal")
         axes.set(xlim=(lines[0], lines[-1]), ylim=(lines[0], lines[-1]))
         axes.grid(False)

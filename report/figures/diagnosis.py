@@ -16,6 +16,7 @@ from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 from thermospindle.report.figures.common import INK, STYLE
+from thermospindle.report.typeset import unit_word
 
 NAMED, OTHER, FREE = "#1f6f5c", "#8c9aa8", "#d9b36c"
 MOST = 10  # explanations, and three drifts
@@ -79,8 +80,7 @@ def law(d: Diagnosis, c: Candidate) -> Figure:
         axes = figure.add_subplot(count, 1, k + 1)
         own = c.hypothesis.evidence
         _over_temperature(axes, conditions, own.sizes[k], np.sqrt(np.maximum(np.diag(own.size_covariance[k]), 0.0)))
-        unit = "" if m.size.unit == "1" else f", {m.size.unit}"
-        axes.set_ylabel(f"{m.size.name}{unit}")
+        axes.set_ylabel(m.size.name + unit_word(m.size.unit, ", "))
         level = "with a law of the data's own" if m.own_law else "a level line is the law assumed"
         axes.set_title(f"{m.name}: its size in every test ({level})")
     return figure

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,23 +11,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from thermospindle.diagnosis.ladder.ladder import Ladder
-from thermospindle.report.figures.common import (
-    PALE,
-    STYLE,
-    broken,
-    cells,
-    logarithmic,
-    residual_bar,
-    residual_norm,
-    save,
-    svg,
-)
+from thermospindle.report.figures.common import PALE, STYLE, broken, cells, logarithmic, residual_bar, residual_norm
 from thermospindle.report.text.ladder_table import ResidualMap, residual_map
 from thermospindle.report.typeset import signed_short
 
 ERROR, HELD_OUT = "#b3402a", "#2166ac"
 
 
+@rc_context(STYLE)
 def figure(found: Ladder) -> Figure:
     first, last = (residual_map(found, r) for r in (found.steps[0], found.top))
     rows = 1 if first.damping is None else 2
@@ -92,15 +82,3 @@ def draw_maps(part: Any, steps: Sequence[tuple[str, ResidualMap]]) -> None:
 
 def _short(value: float) -> str:
     return f"{value:.0f}" if value >= 99.5 else (f"{value:.1f}" if value >= 9.95 else f"{value:.2f}")
-
-
-def picture(found: Ladder) -> str:
-    """The figure as an SVG element for a page."""
-    with rc_context(STYLE):
-        return svg(figure(found), "ladder", "Error at every step of the ladder, and residuals on the first and the last")
-
-
-def write(found: Ladder, folder: Path) -> None:
-    """The figure as `ladder.png` and `ladder.svg`."""
-    with rc_context(STYLE):
-        save(figure(found), folder, "ladder", 130)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib import rc_context
@@ -13,8 +12,8 @@ from matplotlib.lines import Line2D
 
 from thermospindle.model.bearing.kinematics import Line
 from thermospindle.model.units import RPM
-from thermospindle.report.figures.common import INK, PALE, STYLE, save, svg
-from thermospindle.report.figures.warmup import MODES, name_ends, spread
+from thermospindle.report.figures.common import INK, PALE, STYLE, spread
+from thermospindle.report.figures.warmup import LETTERS, MODES, name_ends
 from thermospindle.sim.resonance.found import Coincidence, LineTrack, ResonanceMap, Track, strongest
 from thermospindle.sim.resonance.point import key
 from thermospindle.sim.running.runout import looked_at
@@ -33,18 +32,7 @@ LINES = 9  # drawn in a diagram
 CURVES = 14  # drawn in the map
 
 
-def write_figures(found: ResonanceMap, folder: Path) -> None:
-    """`campbell`, `temperature`, `coincidences`, `nrro`, each as PNG and SVG."""
-    with rc_context(STYLE):
-        for name, figure in figures(found).items():
-            save(figure, folder, name)
-
-
-def figures_svg(found: ResonanceMap) -> dict[str, str]:
-    with rc_context(STYLE):
-        return {name: svg(figure, f"map-{name}", name) for name, figure in figures(found).items()}
-
-
+@rc_context(STYLE)
 def figures(found: ResonanceMap) -> dict[str, Figure]:
     return {"campbell": campbell(found), "temperature": over_temperature(found), "coincidences": both(found), "nrro": runout(found)}
 
@@ -216,7 +204,7 @@ def _mark(axes: Axes, marked: Sequence[tuple[float, float, float]]) -> None:
         axes.scatter(x, y, s=size, facecolors="none", edgecolors=INK, lw=1.0, zorder=5)
 
 
-def _name_tops(axes: Axes, named: list[tuple[float, str, str]], size: float = 7.5) -> None:
+def _name_tops(axes: Axes, named: list[tuple[float, str, str]]) -> None:
     """Upright names above lines that leave through the top, moved apart along it."""
     if not named:
         return
@@ -227,7 +215,7 @@ def _name_tops(axes: Axes, named: list[tuple[float, str, str]], size: float = 7.
     columns = spec.get_geometry()[1] if spec else 1
     width = 0.75 * figure.get_size_inches()[0] / columns * 72
     wanted = np.array([(x - low) / (high - low) for x, _, _ in named])
-    for start, place, (_, name, paint) in zip(wanted, spread(wanted, 1.35 * size / width), named, strict=True):
+    for start, place, (_, name, paint) in zip(wanted, spread(wanted, 1.35 * LETTERS / width), named, strict=True):
         axes.annotate(
             name,
             xy=(start, 1.0),
@@ -237,7 +225,7 @@ def _name_tops(axes: Axes, named: list[tuple[float, str, str]], size: float = 7.
             rotation=90,
             ha="center",
             va="bottom",
-            fontsize=size,
+            fontsize=LETTERS,
             color=INK if paint == PALE else paint,
             annotation_clip=False,
             arrowprops={"arrowstyle": "-", "color": paint, "lw": 0.5, "shrinkA": 0, "shrinkB": 0, "relpos": (0.5, 0.0)},

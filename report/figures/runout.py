@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from matplotlib.projections.polar import PolarAxes
 
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM, TO_NM
-from thermospindle.report.figures.common import INK, PALE, STYLE, colour, save, svg
+from thermospindle.report.figures.common import INK, PALE, STYLE, colour, spread
 from thermospindle.sim.posing import round_down
 from thermospindle.sim.running.lines import FoundLine
 from thermospindle.sim.running.revolutions import ErrorMotion, Revolutions, once_per_revolution
@@ -45,20 +44,9 @@ def motion_figure(runout: Runout) -> Figure:
     return figure
 
 
-def motion_svg(runout: Runout, description: str) -> str:
-    with rc_context(STYLE):
-        return svg(motion_figure(runout), "runout-motion", description)
-
-
-def spectrum_svg(runout: Runout, description: str) -> str:
-    with rc_context(STYLE):
-        return svg(spectrum_figure(runout), "runout-spectrum", description)
-
-
-def write_figures(runout: Runout, folder: Path) -> None:
-    """Motion and spectrum, as SVG and PNG."""
-    for name, drawn in (("motion", motion_figure(runout)), ("spectrum", spectrum_figure(runout))):
-        save(drawn, folder, name, 130)
+def figures(runout: Runout) -> dict[str, Figure]:
+    """By the names of their files."""
+    return {"motion": motion_figure(runout), "spectrum": spectrum_figure(runout)}
 
 
 def _orbit(axes: Axes, cut: Revolutions, x: int, y: int, where: str) -> None:
@@ -226,22 +214,3 @@ def _labels(axes: Axes, named: Sequence[tuple[FoundLine, str]], highest: float, 
         look = {"arrowstyle": "-", "color": PALE, "lw": 0.6, "shrinkA": 0, "shrinkB": 3}
         peak, place = (line.frequency, TO_NM * line.amplitude), (x, 2.2 * top)
         axes.annotate(label, peak, place, rotation=90, ha="center", va="bottom", ma="left", fontsize=7, linespacing=1.1, arrowprops=look)
-
-
-def spread(wanted: Array, apart: float, low: float, high: float) -> Array:
-    """Places nearest to the rising `wanted` ones that are `apart` and lie between `low` and `high`, as far as they fit."""
-    n = len(wanted)
-    if n == 0:
-        return wanted
-    apart = min(apart, (high - low) / max(n - 1, 1))
-    steps = apart * np.arange(n)
-    free = wanted - steps  # must not fall: pool neighbours that violate it (isotonic regression)
-    blocks: list[list[float]] = []
-    for value in free:
-        blocks.append([value, 1.0])
-        while len(blocks) > 1 and blocks[-2][0] > blocks[-1][0]:
-            mean, count = blocks.pop()
-            before, earlier = blocks.pop()
-            blocks.append([(mean * count + before * earlier) / (count + earlier), count + earlier])
-    level = np.concatenate([np.full(int(count), mean) for mean, count in blocks])
-    return np.clip(level, low, high - steps[-1]) + steps

@@ -14,10 +14,10 @@ from thermospindle.diagnosis.runout.compare import LineBeside, RunoutBeside
 from thermospindle.diagnosis.runout.explanation import Explanation
 from thermospindle.diagnosis.runout.moved import MovedLine, leading, moved_lines
 from thermospindle.diagnosis.runout.verdict import RunoutDiagnosis
-from thermospindle.model.units import RPM, TO_NM
-from thermospindle.report.figures.common import INK, PALE, STYLE, cells, residual_bar, residual_norm
+from thermospindle.model.units import TO_NM
+from thermospindle.report.figures.common import INK, PALE, STYLE, cells, label, residual_bar, residual_norm, spread
 from thermospindle.report.figures.diagnosis import NAMED, OTHER, evidence_bars
-from thermospindle.report.figures.runout import BAND, REPEATS, spread
+from thermospindle.report.figures.runout import BAND, REPEATS
 from thermospindle.report.typeset import signed_short
 
 PANELS = 6  # tests whose lines are drawn, those that agree least
@@ -45,12 +45,6 @@ def diagnosis_figures(d: RunoutDiagnosis) -> dict[str, Figure]:
     if lead and moved:
         drawn["runout_moved"] = moved_figure(moved, lead)
     return drawn
-
-
-def condition_words(t: RunoutBeside, line: str = "\n") -> str:
-    """A test in two short lines."""
-    words = [f"{t.test.temperature:g} °C", f"{t.test.speed / RPM:.0f} rpm", *([f"no. {t.test.repeat}"] if t.test.repeat > 1 else [])]
-    return line.join(words)
 
 
 def line_words(g: LineBeside) -> str:
@@ -112,7 +106,7 @@ def _lines(axes: Axes, t: RunoutBeside) -> None:
     axes.set_yticks([v for v in axes.get_yticks() if low <= v <= 2 * top])
     axes.yaxis.set_minor_locator(NullLocator())
     axes.set_ylim(low, high)
-    axes.set_title(f"{t.test.id}: {condition_words(t, ', ')}")
+    axes.set_title(f"{t.test.id}: {label(t.test, ', ')}")
 
 
 @rc_context(STYLE)
@@ -134,7 +128,7 @@ def pulls_figure(found: Sequence[RunoutBeside]) -> Figure:
     axes = figure.subplots()
     norm = residual_norm(float(np.nanmax(np.abs(grid))))
     cells(axes, grid, norm, "RdBu_r", signed_short)
-    axes.set_xticks(range(len(found)), [condition_words(t) for t in found], fontsize=7)
+    axes.set_xticks(range(len(found)), [label(t.test) for t in found], fontsize=7)
     axes.set_yticks(range(len(rows)), rows, fontsize=7.5)
     axes.set_title("Lines: computed − measured")
     residual_bar(figure, norm, axes, shrink=0.9, pad=0.02, aspect=25)

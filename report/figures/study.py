@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from thermospindle.model.types import Array
-from thermospindle.report.figures.common import INK, PALE, STYLE, colour, save
+from thermospindle.report.figures.common import INK, PALE, STYLE, colour
 from thermospindle.sim.study.rows import OF_RUNOUT, Cases
 from thermospindle.sim.study.sensitivity import APART
 from thermospindle.sim.study.summary import at_conditions, frequencies, numbers
@@ -24,12 +23,6 @@ Told = dict[str, Any]
 SHOWN = 12  # parameters of a map of sensitivities, campaigns' numbers of a map of distances
 PANELS, COLUMNS = 6, 4  # half the modes drawn, and how many beside each other
 KEYED = 12  # lines named below a figure
-
-
-def write_figures(figures: Mapping[str, Figure], folder: Path) -> None:
-    """A PNG and an SVG of every figure, into a folder that exists."""
-    for name, figure in figures.items():
-        save(figure, folder, name, 140)
 
 
 def sweep(of: Cases, table: pa.Table) -> dict[str, Figure]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib import rc_context
@@ -12,25 +11,16 @@ from matplotlib.figure import Figure
 
 from thermospindle.model.types import Array
 from thermospindle.model.units import MINUTE
-from thermospindle.report.figures.common import BEARINGS, PALE, STYLE, save, svg
+from thermospindle.report.figures.common import BEARINGS, PALE, STYLE, spread
 from thermospindle.report.typeset import power
 from thermospindle.sim.warmup import Warmup, most_friction, roller_names, rollers
 
 PARTS = {"stationary": "#3b6ea5", "rotating": "#c2622d"}
+LETTERS = 7.5  # points, of names beside lines
 MODES = ("#1f8a70", "#7a3d8f", "#a0741a", "#3b6ea5", "#c9371c", "#555f6b", "#d18a0f", "#b0457b")
 
 
-def write_figure(warmup: Warmup, folder: Path) -> None:
-    """`warmup.png` and `warmup.svg`."""
-    with rc_context(STYLE):
-        save(figure(warmup), folder, "warmup")
-
-
-def figure_svg(warmup: Warmup) -> str:
-    with rc_context(STYLE):
-        return svg(figure(warmup), "warmup", "temperatures, preload, friction and natural frequencies over time")
-
-
+@rc_context(STYLE)
 def figure(warmup: Warmup) -> Figure:
     """Four panels over time in minutes, six where there are rollers; every line is named at its end."""
     rolling = roller_names(warmup)
@@ -118,7 +108,7 @@ def _group_name(names: Sequence[str], parts: Mapping[str, str]) -> str:
     return ", ".join(names) if len(names) < 3 else f"{names[0]} and {len(names) - 1} more"
 
 
-def name_ends(axes: Axes, ends: Array, names: Sequence[str], colours: Sequence[str], size: float = 7.5) -> None:
+def name_ends(axes: Axes, ends: Array, names: Sequence[str], colours: Sequence[str]) -> None:
     """Names beside the right ends of lines, moved apart where they would overlap; a thin line leads to a name that moved."""
     used = [k for k in range(len(names)) if np.isfinite(ends[k])]
     low, high = axes.get_ylim()
@@ -128,7 +118,7 @@ def name_ends(axes: Axes, ends: Array, names: Sequence[str], colours: Sequence[s
     spec = axes.get_subplotspec()
     rows = spec.get_geometry()[0] if spec else 1
     height = 0.8 * figure.get_size_inches()[1] / rows * 72  # points, about
-    at = spread((np.array([ends[k] for k in used]) - low) / (high - low), 1.25 * size / height)
+    at = spread((np.array([ends[k] for k in used]) - low) / (high - low), 1.25 * LETTERS / height)
     for k, place in zip(used, at, strict=True):
         start = (ends[k] - low) / (high - low)
         axes.annotate(
@@ -138,32 +128,8 @@ def name_ends(axes: Axes, ends: Array, names: Sequence[str], colours: Sequence[s
             xycoords="axes fraction",
             textcoords="axes fraction",
             va="center",
-            fontsize=size,
+            fontsize=LETTERS,
             color=colours[k],
             annotation_clip=False,
             arrowprops={"arrowstyle": "-", "color": colours[k], "lw": 0.5, "shrinkA": 0, "shrinkB": 0, "relpos": (0.0, 0.5)},
         )
-
-
-def spread(wanted: Array, gap: float) -> Array:
-    """Places near the `wanted` ones (any order), at least `gap` apart and, where they all fit, within 0 and 1.
-
-    Neighbours that are too close become a block about their mean: least squares under the order of the places.
-    """
-    order = np.argsort(wanted, kind="stable")
-    blocks: list[tuple[float, int]] = []  # (sum of wanted - offset, count)
-    for value in wanted[order]:
-        block = (float(value), 1)
-        while (
-            blocks and blocks[-1][0] / blocks[-1][1] + gap * (blocks[-1][1] - 1) / 2 + gap > block[0] / block[1] - gap * (block[1] - 1) / 2
-        ):
-            last = blocks.pop()
-            block = (last[0] + block[0], last[1] + block[1])
-        blocks.append(block)
-    places = np.concatenate([total / count + gap * (np.arange(count) - (count - 1) / 2) for total, count in blocks])
-    places = np.clip(places, gap * np.arange(len(places)), None)
-    top = max(1.0, gap * (len(places) - 1))
-    places = np.clip(places, None, top - gap * np.arange(len(places))[::-1])
-    answer = np.empty_like(places)
-    answer[order] = places
-    return answer

@@ -14,7 +14,7 @@ from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.modes import Mode
 from thermospindle.model.types import Array
 from thermospindle.sim.campaign.campaign import Test
-from thermospindle.sim.identification.frf import Frf
+from thermospindle.sim.identification.frf import Frf, decibel
 from thermospindle.sim.identification.numbering import identified, in_band, numbered
 from thermospindle.sim.identification.pairing import by_kind
 from thermospindle.sim.operating import provenance
@@ -207,11 +207,6 @@ def frf_of(test: Test) -> Frf:
 def one(array: np.ndarray, frf: Frf, pair: Pair) -> np.ndarray:
     """The lines (n,) of one pair of an array (responses, references, n) of `frf`."""
     return array[frf.response_nodes.index(pair[0]), frf.reference_nodes.index(pair[1])]
-
-
-def decibel(value: Array) -> Array:
-    """20 log10 |value|, of zero -300."""
-    return 20 * np.log10(np.maximum(np.abs(value), 1e-15))
 
 
 def level_ends(level: Array) -> tuple[float, float]:

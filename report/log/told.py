@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
 from thermospindle.model.units import RPM, TO_NM
 from thermospindle.report.log.read import Log
+from thermospindle.report.typeset import known
 
 
 def log_json(log: Log) -> dict[str, Any]:
@@ -70,7 +69,7 @@ def _map_json(log: Log) -> dict[str, Any]:
     temperatures, speeds, modes = log.grid
     return {
         "grid": {"temperature_C": temperatures.tolist(), "speed_rpm": (speeds / RPM).tolist()},
-        "modes_Hz": [[[float(f) if np.isfinite(f) else None for f in row] for row in m] for m in modes],
+        "modes_Hz": known(modes),
         "coincidences": log.rows("/numbers/coincidences"),
     }
 
@@ -128,11 +127,14 @@ def _runout_words(log: Log) -> list[str]:
     return lines
 
 
+def _columns(log: Log, entity: str) -> dict[str, Any]:
+    return {name: known(values) for name, values in log.table(entity).items()}
+
+
 def _warmup_json(log: Log) -> dict[str, Any]:
     """Columns as in `warmup.csv`, null where a mode was lost."""
     about = {"start_C": log.about["start_C"], "air_C": log.about["air_C"], "speed_rpm": log.about["speed_rad_per_s"] / RPM}
-    columns = {name: [v if v == v else None for v in values] for name, values in log.table("/numbers/warmup").items()}
-    return {**about, "time_constant_s": log.about["time_constant_s"], "columns": columns}
+    return {**about, "time_constant_s": log.about["time_constant_s"], "columns": _columns(log, "/numbers/warmup")}
 
 
 def _warmup_words(log: Log) -> list[str]:
@@ -145,16 +147,15 @@ def _warmup_words(log: Log) -> list[str]:
 def _study_json(log: Log) -> dict[str, Any]:
     """Columns of numbers as they stand in the results, null where a row has none."""
     told = {key: log.about[key] for key in ("title", "kind", "cases", "rows", "errors")}
-    table = log.table("/numbers/rows")
-    return told | {"columns": {name: [v if v == v else None for v in values] for name, values in table.items()}}
+    return told | {"columns": _columns(log, "/numbers/rows")}
 
 
 def _study_words(log: Log) -> list[str]:
     about = log.about
     lines = [f"{about['kind']} of {about['cases']} cases: {about['rows']} rows, {about['errors']} without a result"]
     for name, values in log.table("/numbers/rows").items():
-        known = [v for v in values if v == v]
-        lines.append(f"{name}: {len(known)} of {len(values)} known" + (f", {min(known):.6g} to {max(known):.6g}" if known else ""))
+        given = [v for v in values if v == v]
+        lines.append(f"{name}: {len(given)} of {len(values)} known" + (f", {min(given):.6g} to {max(given):.6g}" if given else ""))
     return lines
 
 

@@ -6,17 +6,16 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from markupsafe import Markup
-from matplotlib import rc_context
 
 from thermospindle.diagnosis.compare.compare import Comparison
 from thermospindle.diagnosis.runout.compare import RunoutBeside
 from thermospindle.model.machine import Spindle
-from thermospindle.report.figures.common import STYLE, save, svg
-from thermospindle.report.figures.compare import figures, label
+from thermospindle.report.figures.common import label, save, svg
+from thermospindle.report.figures.compare import figures
 from thermospindle.report.figures.runout_campaign import comparison_figures
 from thermospindle.report.log.compare import FrfsBeside, write_comparison_log
 from thermospindle.report.page import runout_compare as runout
-from thermospindle.report.page.report import Section, page
+from thermospindle.report.page.report import Section, write_page
 from thermospindle.report.text.compare import AGREES, TOGETHER
 from thermospindle.report.typeset import figure, minus, signed, table
 
@@ -45,8 +44,7 @@ WORDS = {
 def sections(c: Comparison) -> list[Section]:
     """What the comparison adds to a report: the map of residuals and errors in a table, then what its FRFs say, where it has any."""
     found: list[Section] = []
-    with rc_context(STYLE):
-        drawn = {name: svg(one, f"compare-{name}", WORDS[name][0]) for name, one in figures(c).items()}
+    drawn = {name: svg(one, f"compare-{name}", WORDS[name][0]) for name, one in figures(c).items()}
     modal = "".join(figure(drawn[name], WORDS[name][1]) for name in ("pulls",) if name in drawn)
     found.append(("Measured beside computed", _summary(c) + modal + _table(c)))
     spectral = [name for name in ("frfs", "bands", "channels", "fdac") if name in drawn]
@@ -71,8 +69,7 @@ def write_comparison(
     drawn = comparison_figures(turning)
     every = [*(sections(c) if c else []), *(runout.sections(turning, drawn, errors) if turning else [])]
     ids = {t.test.id for t in (c.tests if c else ())} | {t.test.id for t in turning}
-    conditions = f"the conditions of {len(ids)} test{'s' if len(ids) > 1 else ''}" + f": {c.campaign if c else campaign}"
-    (folder / "report.html").write_text(page(spindle, conditions, every, "Comparison"), encoding="utf-8")
+    write_page(folder, spindle, len(ids), c.campaign if c else campaign, every, "Comparison")
     progress("page written")
     for name, one in ((figures(c) if c else {}) | drawn).items():
         save(one, folder, name)
@@ -100,7 +97,7 @@ def _summary(c: Comparison) -> str:
             words.append(f"; {TOGETHER.format(abs(residual))}")
         words.append(f", the largest that of mode {worst.number} ({worst.kind}), {signed(residual, 1)} standard errors or {error}")
     words.append(".</p>")
-    remarks = [f"{label(t, ', ')}: {what} {', '.join(f'{f:.1f}' for f in values)} Hz" for t in c.tests
+    remarks = [f"{label(t.test, ', ')}: {what} {', '.join(f'{f:.1f}' for f in values)} Hz" for t in c.tests
             for what, values in (("measured, not computed (a mode the model lacks, or a false pole):", t.missing), ("computed, not measured:", t.extra))
             if values]  # fmt: skip
     remarks += list(c.crossings)
@@ -117,7 +114,7 @@ def _table(c: Comparison) -> str:
         for k, m in enumerate(t.modes):
             damping = "–" if m.damping_measured is None else f"{100 * m.damping_measured:.3f}"
             cells = [
-                label(t, ", ") if k == 0 else "", str(m.number), m.kind, f"{m.measured:.2f} <small>± {m.sd:.2g}</small>", f"{m.computed:.2f}",
+                label(t.test, ", ") if k == 0 else "", str(m.number), m.kind, f"{m.measured:.2f} <small>± {m.sd:.2g}</small>", f"{m.computed:.2f}",
                 signed(m.error, 2), signed(100 * m.error / m.measured, 2), signed(m.residual, 1), damping, f"{100 * m.damping_computed:.3f}",
                 "–" if m.mac is None else f"{m.mac:.3f}" + ("*" if m.close else ""),
             ]  # fmt: skip

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
 
-from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from thermospindle.diagnosis.forward.nuisance import TEMPERATURE
 from thermospindle.diagnosis.runout.verdict import RunoutDiagnosis
 from thermospindle.diagnosis.verdict import Diagnosis
 from thermospindle.model.machine import Spindle
-from thermospindle.report.figures.common import STYLE, save, svg
+from thermospindle.report.figures.common import pictures, save
 from thermospindle.report.figures.diagnosis import figures
 from thermospindle.report.figures.runout_campaign import diagnosis_figures
 from thermospindle.report.page import runout_diagnosis
-from thermospindle.report.page.report import Section, page
+from thermospindle.report.page.report import Section, write_page
 from thermospindle.report.text.diagnosis.words import hidden_words, plan_words
-from thermospindle.report.typeset import figure, minus, prose, table, with_error
+from thermospindle.report.typeset import minus, prose, signed, table, unit_word, with_error
 
 CAPTIONS = {
     "errors": "Mean square of the whitened residuals of every test's FRF lines: one is noise alone.",
@@ -35,8 +33,7 @@ UNSEEN = 0.9  # standard error over that of the tolerance, from which the data s
 def sections(d: Diagnosis, answer: dict[str, Any], drawn: dict[str, Figure] | None = None) -> list[Section]:
     """Titles and HTML; `answer` is the JSON answer of the diagnosis."""
     drawn = figures(d) if drawn is None else drawn
-    with rc_context(STYLE):
-        shown = {name: figure(svg(f, f"diagnosis-{name}", CAPTIONS[name]), CAPTIONS[name]) for name, f in drawn.items()}
+    shown = pictures(drawn, CAPTIONS, "diagnosis-")
     found = [("Verdict", _verdict(answer) + shown["errors"])]
     found.append(("Explanations", shown.get("explanations", "") + _candidates(answer)))
     if "law" in shown:
@@ -60,9 +57,7 @@ def write_diagnosis(
     if told:
         every += runout_diagnosis.sections(told, runout)
     count = (len(d.search.model.tests) if d else 0) + (len(turning.seen) if turning else 0)
-    conditions = f"the conditions of {count} test{'s' if count > 1 else ''}: {answer['campaign']}"
-    text = page(spindle, conditions, every, "Diagnosis")
-    (folder / "report.html").write_text(text, encoding="utf-8")
+    write_page(folder, spindle, count, answer["campaign"], every, "Diagnosis")
     for name, one in (modal | runout).items():
         one.set_layout_engine("none")  # laid out for the page already
         save(one, folder, name, 130)
@@ -72,10 +67,8 @@ def _verdict(answer: dict[str, Any]) -> str:
     named = f": {', '.join(answer['effects'])}" if answer["effects"] else ""
     error = answer["error"]
     kinds = [("all tests", ""), ("temperatures left out one after the other", "held_out_")]
-    rows = [
-        [(name, 0), *((f"{error[which + when]:.2f}", 1) for when in ("before", "after"))] for name, which in kinds if error[which + "after"] is not None
-    ]
-    grid = _grid("Error, rms in standard errors: with tolerances fitted, and with what the verdict names.", ["", "before", "after"], rows)
+    rows = [[name, *(f"{error[which + when]:.2f}" for when in ("before", "after"))] for name, which in kinds if error[which + "after"] is not None]
+    grid = table(["", "before", "after"], rows, caption="Error, rms in standard errors: with tolerances fitted, and with what the verdict names.")
     card = f'<div class="cards"><div class="card"><span>verdict</span><b>{escape(answer["verdict"] + named)}</b></div></div>'
     said = "".join(f"<p>{prose(answer[key])}</p>" for key in ("reason", "would_change")) + "".join(f"<p>{prose(s)}</p>" for s in answer["law_departs"])
     said += f"<p>{prose(hidden_words(answer['may_hide']))}</p>" if answer["may_hide"] else ""
@@ -91,24 +84,24 @@ CANDIDATES = (
 
 def _candidates(answer: dict[str, Any]) -> str:
     head = ["effects", "ln evidence", "probability", "error, %", "value", "", "unit", "believable"]
-    rows: list[list[tuple[str, int]]] = []
+    rows = []
     for c in answer["candidates"]:
         for k, (name, v) in enumerate(c["parameters"].items()):
             first = k == 0
             value, _, sd = _with_error(v["value"], v["sd"]).partition(" <small>")
             rows.append(
                 [
-                    (escape(" + ".join(c["effects"])) if first else "", 0),
-                    (minus(_evidence(c["delta_evidence"])) if first else "", 1),
-                    (f"{c['probability']:.3f}" if first else "", 1),
-                    ("" if not first else "-" if c["held_out_error_ratio"] is None else f"{100 * c['held_out_error_ratio']:.0f}", 1),
-                    (escape(name.split(".", 1)[1]) if len(c["effects"]) == 1 else escape(name), 0),
-                    (value + (f" <small>{sd}" if sd else ""), 1),
-                    (_unit(v["unit"]), 0),
-                    (("yes" if c["believable"] else "no, at a limit") if first else "", 0),
+                    escape(" + ".join(c["effects"])) if first else "",
+                    minus(_evidence(c["delta_evidence"])) if first else "",
+                    f"{c['probability']:.3f}" if first else "",
+                    "" if not first else "-" if c["held_out_error_ratio"] is None else f"{100 * c['held_out_error_ratio']:.0f}",
+                    escape(name.split(".", 1)[1] if len(c["effects"]) == 1 else name),
+                    value + (f" <small>{sd}" if sd else ""),
+                    escape(unit_word(v["unit"])),
+                    ("yes" if c["believable"] else "no, at a limit") if first else "",
                 ]
             )
-    return _grid(CANDIDATES, head, rows)
+    return table(head, rows, (0, 4, 6, 7), CANDIDATES)
 
 
 def _tests(answer: dict[str, Any]) -> str:
@@ -119,10 +112,10 @@ def _tests(answer: dict[str, Any]) -> str:
         words = f"<h3>A test {escape(plan_words(t['condition']))}</h3><p>It separates {first} from {second} with odds of {_odds(t['odds'])} to 1{times}; most by {prose(t['tells'])}.</p>"
         most = max(len(rows) for rows in t["predicted"].values())
         rows = [
-            [(escape(name), 0), *((_with_error(r["frequency_Hz"], r["sd_Hz"], 1), 1) for r in predicted), *[("", 1)] * (most - len(predicted))]
+            [escape(name), *(_with_error(r["frequency_Hz"], r["sd_Hz"], 1) for r in predicted), *[""] * (most - len(predicted))]
             for name, predicted in t["predicted"].items()
         ]
-        parts.append(words + _grid("What each predicts of it, Hz.", ["", *(f"mode {k}" for k in range(1, most + 1))], rows))
+        parts.append(words + table(["", *(f"mode {k}" for k in range(1, most + 1))], rows, caption="What each predicts of it, Hz."))
     return "".join(parts)
 
 
@@ -137,37 +130,28 @@ def _tolerances(answer: dict[str, Any]) -> str:
         scale, unit = (1.0, "K") if t["kind"] == TEMPERATURE else (100.0, "%")
         rows.append(
             [
-                (escape(name), 0), (_signed(t["value"] / t["prior_sd"]), 1), (f"{share:.2f}", 1),
-                (_signed(scale * t["value"]), 1), (f"{scale * t['prior_sd']:.2f}", 1), (unit, 0),
-                ("cannot be seen" if share > UNSEEN else "", 0),
+                escape(name), signed(t["value"] / t["prior_sd"], 2), f"{share:.2f}", signed(scale * t["value"], 2), f"{scale * t['prior_sd']:.2f}", unit,
+                "cannot be seen" if share > UNSEEN else "",
             ]
         )  # fmt: skip
     head = ["", "fitted, s.d.", "its error, s.d.", "fitted", "tolerance, s.d.", "unit", ""]
-    return _grid("Build tolerances and measuring errors, fitted with their standard deviations as prior.", head, rows)
+    return table(head, rows, (0, 5, 6), "Build tolerances and measuring errors, fitted with their standard deviations as prior.")
 
 
 def _detectable(answer: dict[str, Any]) -> str:
     rows = [
         [
-            (escape(name), 0), (escape(row["parameter"]), 0), (f"{row['size']:.2g}", 1), (_unit(row["unit"]), 0),
-            ("not visible at a typical size" if name in answer["invisible"] else "", 0),
+            escape(name), escape(row["parameter"]), f"{row['size']:.2g}", escape(unit_word(row["unit"])),
+            "not visible at a typical size" if name in answer["invisible"] else "",
         ]
         for name, row in sorted(answer["detectable_in"].items())
     ]  # fmt: skip
     caption = "Size from which each effect would have been separated from the tolerances, which are fitted anew beside it; its own lines are worked out at that size."
-    return _grid(caption, ["effect", "parameter", "smallest", "unit", ""], rows)
-
-
-def _signed(value: float) -> str:
-    return minus(f"{round(value, 2) + 0.0:+.2f}")  # never -0.00
+    return table(["effect", "parameter", "smallest", "unit", ""], rows, (0, 1, 3, 4), caption)
 
 
 def _evidence(value: float) -> str:
     return f"{value:+.1f}" if abs(value) < 1000 else f"{value:+.0f}"
-
-
-def _unit(unit: str) -> str:
-    return "" if unit == "1" else escape(unit)
 
 
 def _with_error(value: float, sd: float, digits: int = 3) -> str:
@@ -177,9 +161,3 @@ def _with_error(value: float, sd: float, digits: int = 3) -> str:
     if 1e-3 <= max(abs(value), sd) < 1e5:
         return str(with_error((value, sd), digits=digits))
     return minus(f"{value:.3g}") + f" <small>± {sd:.1g}</small>"
-
-
-def _grid(caption: str, head: Sequence[str], rows: Sequence[Sequence[tuple[str, int]]]) -> str:
-    """A table; a cell is its HTML and whether it is a number, set right."""
-    words = [k for k in range(len(head)) if not rows or not rows[0][k][1]]
-    return table(head, [[text for text, _ in row] for row in rows], words, escape(caption))

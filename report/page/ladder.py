@@ -7,6 +7,7 @@ from pathlib import Path
 
 from thermospindle.diagnosis.ladder.ladder import Ladder
 from thermospindle.report.figures import ladder as ladder_plots
+from thermospindle.report.figures.common import save, svg
 from thermospindle.report.text.ladder import sentences
 from thermospindle.report.text.ladder_table import COLUMNS, LEGEND, cells
 from thermospindle.report.typeset import figure, prose, table
@@ -17,7 +18,7 @@ def section(found: Ladder) -> tuple[str, str]:
     grid = table(COLUMNS, [[prose(c) for c in cells(r)] for r in found.steps], caption=escape(LEGEND))
     caption = "Above: the error at every step, of all data and of each temperature predicted by a fit that has not seen it. Below: residuals of every mode "
     caption += f"in every test at the first step and at '{escape(found.top.name)}'."
-    drawn = figure(ladder_plots.picture(found), caption)
+    drawn = figure(svg(ladder_plots.figure(found), "ladder", "Error at every step of the ladder, and residuals on the first and the last"), caption)
     words = "".join(f"<p>{prose(s)}</p>" for s in sentences(found))
     return f"The ladder: {found.campaign.title}", drawn + grid + words
 
@@ -26,10 +27,8 @@ def write_ladder(found: Ladder, folder: Path) -> None:
     """`ladder.png` and `ladder.svg`, `ladder.rrd` and `report.html` into an existing folder."""
     from thermospindle.report.log.ladder import write_ladder_log
     from thermospindle.report.log.ladder_content import shown
-    from thermospindle.report.page.report import page
+    from thermospindle.report.page.report import write_page
 
-    ladder_plots.write(found, folder)
-    count = len(found.model.tests)
-    conditions = f"the conditions of {count} test{'s' if count > 1 else ''}: {found.campaign.title}"
-    (folder / "report.html").write_text(page(found.spindle, conditions, [section(found)], "Ladder"), encoding="utf-8")
+    save(ladder_plots.figure(found), folder, "ladder", 130)
+    write_page(folder, found.spindle, len(found.model.tests), found.campaign.title, [section(found)], "Ladder")
     write_ladder_log(shown(found), folder / "ladder.rrd")

@@ -60,6 +60,12 @@ def page(spindle: Spindle, conditions: str, sections: Sequence[Section], kind: s
     return str(_page().page(spindle, conditions, [(title, Markup(body)) for title, body in sections], kind, Markup(MADE)))
 
 
+def write_page(folder: Path, spindle: Spindle, tests: int, campaign: str, sections: Sequence[Section], kind: str) -> None:
+    """`report.html` on so many tests of a campaign."""
+    conditions = f"the conditions of {tests} test{'s' if tests > 1 else ''}: {campaign}"
+    (folder / "report.html").write_text(page(spindle, conditions, sections, kind), encoding="utf-8")
+
+
 def stamp(folder: Path, command: str, date: str) -> None:
     """Write into the pages of a folder, below their titles, with which command and when they were made."""
     line = f'<p class="under"><code>{escape(command)}</code>, {escape(date)}</p>'

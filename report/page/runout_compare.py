@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from markupsafe import escape
-from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from thermospindle.diagnosis.runout.compare import RunoutBeside, rms_residual
 from thermospindle.model.units import TO_NM
-from thermospindle.report.figures.common import STYLE, svg
-from thermospindle.report.figures.runout_campaign import PANELS, condition_words, strongest_probe
+from thermospindle.report.figures.common import label, pictures
+from thermospindle.report.figures.runout_campaign import PANELS, strongest_probe
 from thermospindle.report.page.report import Section
-from thermospindle.report.typeset import figure, minus, signed, table, with_error
+from thermospindle.report.text.runout_compare import before_after
+from thermospindle.report.typeset import minus, signed, table, with_error
 
 LINES = 12  # of a test in the table
 CAPTIONS = {
@@ -26,10 +26,8 @@ CAPTIONS = {
 
 def sections(found: Sequence[RunoutBeside], drawn: Mapping[str, Figure], errors: Mapping[str, float | None] | None = None) -> list[Section]:
     """Lines with pictures and a table; repeatable and nonrepeatable parts; `errors` are those of before and after, where two scenes were compared."""
-    with rc_context(STYLE):
-        shown = {name: figure(svg(f, name.replace("_", "-"), CAPTIONS[name]), CAPTIONS[name]) for name, f in drawn.items()}
     few = f"<p>Drawn are the {PANELS} tests that agree least.</p>" if len(found) > PANELS else ""
-    lines = _summary(found, errors) + few + "".join(shown.values()) + _lines(found)
+    lines = _summary(found, errors) + few + "".join(pictures(drawn, CAPTIONS).values()) + _lines(found)
     return [("Runout, lines measured beside computed", lines), ("Runout, repeatable and nonrepeatable parts", _parts(found))]
 
 
@@ -44,11 +42,8 @@ def _summary(found: Sequence[RunoutBeside], errors: Mapping[str, float | None] |
             f"computed {TO_NM * g.computed:.3g} nm, measured {TO_NM * g.measured:.3g} nm."
         )
     words.append("</p>")
-    for which in ("", "fitted_", "held_out_") if errors else ():
-        assert errors is not None
-        one, other = errors[f"{which}before"], errors[f"{which}after"]
-        if one is not None and other is not None:
-            words.append(f"<p>{(which or 'all_')[:-1].replace('_', ' ').capitalize()} tests: {one:.3g} → {other:.3g} standard errors.</p>")
+    for tests, one, other in before_after(errors or {}):
+        words.append(f"<p>{tests.capitalize()} tests: {one:.3g} → {other:.3g} standard errors.</p>")
     unknown = [(t, u) for t in found for u in t.unexplained]
     items = [f"{escape(t.test.id)}: {u.frequency:.1f} Hz, {u.order:.3f} orders, {TO_NM * u.amplitude:.3g} nm at node {u.node}" for t, u in unknown]
     return minus("".join(words)) + (f"<p>Lines that no theory of bearings explains:</p><ul>{''.join(f'<li>{minus(i)}</li>' for i in items)}</ul>" if items else "")
@@ -61,7 +56,7 @@ def _lines(found: Sequence[RunoutBeside]) -> str:
             cause = g.causes[0]
             rows.append(
                 [
-                    f"{escape(t.test.id)}<br><small>{condition_words(t, ', ')}</small>" if k == 0 else "", str(escape(cause.name)),
+                    f"{escape(t.test.id)}<br><small>{label(t.test, ', ')}</small>" if k == 0 else "", str(escape(cause.name)),
                     str(escape(f"{cause.bearing} {cause.cause}".strip())) + (f" {cause.order}" if cause.order else ""), f"{g.frequency:.2f}", f"{g.order:.3f}",
                     str(g.node), str(with_error((TO_NM * g.measured, TO_NM * g.measured_sd))), str(with_error((TO_NM * g.computed, TO_NM * g.scatter))), signed(g.residual, 1),
                 ]
@@ -75,7 +70,7 @@ def _parts(found: Sequence[RunoutBeside]) -> str:
     rows = []
     for t in found:
         for r, n in zip(t.rro, t.nrro, strict=True):
-            test = f"{escape(t.test.id)}<br><small>{condition_words(t, ', ')}</small>" if r is t.rro[0] else ""
+            test = f"{escape(t.test.id)}<br><small>{label(t.test, ', ')}</small>" if r is t.rro[0] else ""
             valleys = [("–" if v is None else f"{TO_NM * v:.1f}") for p in (r, n) for v in (p.measured, p.computed)]
             rms = [f"{TO_NM * v:.2f}" for p in (r, n) for v in (p.measured_rms, p.computed_rms)]
             rows.append([test, str(r.node), rms[0], rms[1], valleys[0], valleys[1], rms[2], rms[3], valleys[2], valleys[3]])

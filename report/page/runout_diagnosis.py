@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from html import escape
 from typing import Any
 
-from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from thermospindle.report.figures.common import STYLE, svg
+from thermospindle.report.figures.common import pictures
 from thermospindle.report.page.report import Section
-from thermospindle.report.text.runout_diagnosis import CLEAR, next_words
-from thermospindle.report.typeset import figure, minus, prose, table
+from thermospindle.report.text.diagnosis.words import next_words
+from thermospindle.report.text.runout_diagnosis import CLEAR
+from thermospindle.report.typeset import minus, prose, table, unit_word
 
 CAPTIONS = {
     "runout_explanations": "Green: what the verdict names. Every explanation is fitted to the lines that it can move, with the build's tolerances and what the "
@@ -23,8 +23,7 @@ CAPTIONS = {
 
 def sections(answer: dict[str, Any], drawn: Mapping[str, Figure]) -> list[Section]:
     """Verdict, explanations, lines that the effect moves, what is larger than the scene gives, the next test, and what could have been seen."""
-    with rc_context(STYLE):
-        shown = {name: figure(svg(f, name.replace("_", "-"), CAPTIONS[name]), CAPTIONS[name]) for name, f in drawn.items()}
+    shown = pictures(drawn, CAPTIONS)
     found = [("Runout: verdict", _verdict(answer))]
     if answer["candidates"]:
         found.append(("Runout: explanations", shown.get("runout_explanations", "") + _candidates(answer)))
@@ -59,11 +58,10 @@ def _candidates(answer: dict[str, Any]) -> str:
         for k, (name, v) in enumerate(c["parameters"].items()):
             first = k == 0
             value = minus(f"{v['value']:.4g}") + (f" <small>± {v['sd']:.2g}</small>" if v["sd"] else "")
-            unit = "" if v["unit"] == "1" else escape(v["unit"])
             rows.append(
                 [
                     escape(" + ".join(c["effects"])) if first else "", minus(f"{c['delta_evidence']:+.1f}") if first else "",
-                    f"{c['probability']:.3f}" if first else "", escape(name.split(".", 1)[1] if len(c["effects"]) == 1 else name), value, unit,
+                    f"{c['probability']:.3f}" if first else "", escape(name.split(".", 1)[1] if len(c["effects"]) == 1 else name), value, escape(unit_word(v["unit"])),
                     ("yes" if c["believable"] else "no, at a limit") if first else "",
                 ]
             )  # fmt: skip
@@ -97,7 +95,7 @@ def _next(answer: dict[str, Any]) -> str:
             for a, b in zip(t["predicted"][first], t["predicted"][second], strict=True)
         ]
         at = t["condition"]
-        words = f"<h3>A test {escape(t['changed'])}</h3><p>{prose(next_words(t))}</p>"
+        words = f"<h3>A test {escape(t['changed'])}</h3><p>{prose(next_words(t, t['changed']))}</p>"
         head = ["Hz", "line", "node", escape(first), escape(second), "scene alone, likely"]
         caption = (
             f"What each predicts of it, nm zero to peak: at {at['temperature_C']:g} °C, {at['speed_rpm']:.0f} rpm, records of {at['seconds']:.3g} s at nodes "
@@ -109,7 +107,7 @@ def _next(answer: dict[str, Any]) -> str:
 
 def _detectable(answer: dict[str, Any]) -> str:
     rows = [
-        [escape(name), escape(row["parameter"]), f"{row['size']:.2g}", "" if row["unit"] == "1" else escape(row["unit"])]
+        [escape(name), escape(row["parameter"]), f"{row['size']:.2g}", escape(unit_word(row["unit"]))]
         for name, row in sorted(answer["detectable_in"].items())
     ]
     caption = f"Size from which each effect would have stood out by {CLEAR:g} in ln evidence of what the scene likely has of the same lines."

@@ -13,6 +13,7 @@ from thermospindle.diagnosis.compare.compare import Comparison, PairedMode, Test
 from thermospindle.diagnosis.compare.correlation import Band
 from thermospindle.model.units import RPM
 from thermospindle.report.text.grid import grid, show_grid
+from thermospindle.report.typeset import known
 
 FEW = 20  # modes of all tests, up to which each has a row of its own
 
@@ -24,7 +25,7 @@ def comparison_json(c: Comparison) -> dict[str, Any]:
         "tests": [_test_json(t) for t in c.tests],
         "comac": {str(node): value for node, value in c.comac.items()},
         "crossings": list(c.crossings),
-        "rms_pull": c.rms_residual if np.isfinite(c.rms_residual) else None,
+        "rms_pull": known(c.rms_residual),
     }
 
 
@@ -44,12 +45,11 @@ def _test_json(t: TestComparison) -> dict[str, Any]:
 
 def _band_json(b: Band) -> dict[str, Any]:
     """Means over the lines of a band; the shift is by how much computed frequencies lie above measured ones."""
-    numbers = {"csac": b.csac, "csf": b.csf, "fdac": b.fdac}
     return {
         "low_Hz": b.low,
         "high_Hz": b.high,
         "lines": b.lines,
-        **{name: value if np.isfinite(value) else None for name, value in numbers.items()},
+        **{name: known(getattr(b, name)) for name in ("csac", "csf", "fdac")},
         "shift_percent": None if b.shift is None else 100 * b.shift,
         "frfs": {f"{response},{reference}": {"frac": s.frac, "csf": s.csf} for (response, reference), s in b.by_frf.items()},
     }
@@ -118,8 +118,8 @@ def show_comparison(console: Console, c: Comparison, verbose: bool = True) -> No
         for node, comac in c.comac.items():
             cells = []
             for r in references:
-                known = [v for t in c.tests if (v := t.frac.get((node, r))) is not None]
-                cells.append(f"{min(known):.3f}" if known else "-")
+                found = [v for t in c.tests if (v := t.frac.get((node, r))) is not None]
+                cells.append(f"{min(found):.3f}" if found else "-")
             rows.append([str(node), "-" if comac is None else f"{comac:.4f}", *cells])
         title = "COMAC, and smallest FRAC of all tests by hammer point"
         show_grid(console, title, ("node", "COMAC", *(f"hammer {r}" for r in references)), rows)

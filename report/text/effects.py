@@ -9,6 +9,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
+from thermospindle.report.typeset import unit_word
 from thermospindle.sim.effects.effect import Effect
 
 
@@ -24,8 +25,7 @@ def show_effects(console: Console, catalogue: Sequence[Effect], refused: Mapping
     grid.add_column("effect", no_wrap=True)
     grid.add_column("what it is (main parameter and its typical value)")
     for e in map(summary, catalogue):
-        unit = "" if e["unit"] == "1" else f" {e['unit']}"
-        grid.add_row(e["name"], f"{e['title']} ({e['parameter']} {e['typical']:g}{unit})")
+        grid.add_row(e["name"], f"{e['title']} ({e['parameter']} {e['typical']:g}{unit_word(e['unit'], ' ')})")
     console.print(grid)
     for name, why in refused.items():
         console.print(f"{name}: {why}", markup=False, highlight=False)

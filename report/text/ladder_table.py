@@ -20,6 +20,7 @@ from thermospindle.diagnosis.ladder.step import Step
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 from thermospindle.report.text.ladder import evidence, sentences
+from thermospindle.report.typeset import known
 
 COLUMNS = ("step", "error\ns.e.", "held out\ns.e.", "error\nHz", "shifts\nHz", "build\ns.d.", "ln\nevidence")
 LEGEND = (
@@ -50,8 +51,8 @@ def residual_map(found: Ladder, step: Step) -> ResidualMap:
     for number, t, of_frequency, of_damping in rows:
         if number:
             frequency[row[int(number)], column[int(t)]], damping[row[int(number)], column[int(t)]] = of_frequency, of_damping
-    known = damping if np.isfinite(damping).any() else None
-    return ResidualMap([f"{n} {kind}" for n, kind in measured.kinds.items()], _tests([tests[t] for t in order]), frequency, known)
+    modes = [f"{n} {kind}" for n, kind in measured.kinds.items()]
+    return ResidualMap(modes, _tests([tests[t] for t in order]), frequency, damping if np.isfinite(damping).any() else None)
 
 
 def _place(o: Observation) -> tuple[float, float, str]:
@@ -75,7 +76,7 @@ def ladder_json(found: Ladder) -> dict[str, Any]:
         "verdict": None if found.diagnosis is None else found.diagnosis.verdict.word,
         "top": found.top.name,
         "rungs": [_step_json(r) for r in found.steps],
-        "forms": [{"name": f[0], "error": f[1], "held_out": _known(f[2]), "evidence": f[3]} for f in found.forms],
+        "forms": [{"name": f[0], "error": f[1], "held_out": known(f[2]), "evidence": f[3]} for f in found.forms],
         "pulls": {"modes": first.modes, "tests": first.tests, "first": _lists(first), "top": _lists(top)},  # residuals in standard errors
         "words": sentences(found),
     }
@@ -88,7 +89,7 @@ def _step_json(r: Step) -> dict[str, Any]:
         "on": r.above,
         "effects": list(r.effects),
         "error": r.error,
-        "held_out": _known(r.held_out),
+        "held_out": known(r.held_out),
         "rms_Hz": r.rms_Hz,
         "rms_percent": r.rms_percent,
         "rms_shift_Hz": r.rms_shift_Hz,
@@ -101,16 +102,8 @@ def _step_json(r: Step) -> dict[str, Any]:
     }
 
 
-def _known(value: float) -> float | None:
-    """None for an error of tests left out where there is nothing to leave out."""
-    return float(value) if np.isfinite(value) else None
-
-
 def _lists(residuals: ResidualMap) -> dict[str, Any]:
-    def rows(a: np.ndarray | None) -> list[list[float | None]] | None:
-        return None if a is None else [[None if np.isnan(v) else float(v) for v in row] for row in a]
-
-    return {"frequency": rows(residuals.frequency), "damping": rows(residuals.damping)}
+    return {"frequency": known(residuals.frequency), "damping": None if residuals.damping is None else known(residuals.damping)}
 
 
 # ---------------------------------------------------------------- terminal

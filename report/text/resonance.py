@@ -11,7 +11,7 @@ from rich.console import Console
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 from thermospindle.report.text.grid import show_grid
-from thermospindle.report.typeset import figure, prose, table, write_csv
+from thermospindle.report.typeset import figure, known, prose, table, write_csv
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.resonance.found import Coincidence, ResonanceMap, strongest
 from thermospindle.sim.running.runout import looked_at
@@ -26,7 +26,7 @@ def map_json(found: ResonanceMap) -> dict[str, Any]:
         "nominal": {"temperature_C": found.nominal.temperature, "speed_rpm": found.nominal.speed / RPM},
         "sentences": sentences(found),
         "coincidences": [_coincidence_json(c) for c in found.coincidences],
-        "modes": [{"mode": m.number, "kind": m.kind, "whirl": m.whirl, "frequency_Hz": _numbers(m.frequency)} for m in found.modes],
+        "modes": [{"mode": m.number, "kind": m.kind, "whirl": m.whirl, "frequency_Hz": known(m.frequency)} for m in found.modes],
         "lines": [
             {
                 "line": t.line.name,
@@ -94,10 +94,6 @@ def _coincidence_json(c: Coincidence) -> dict[str, Any]:
 def _runout_json(along: Array, name: str, unit: float) -> dict[str, list[float]]:
     place, radial, axial = along.T
     return {name: (unit * place).tolist(), "radial": (1e6 * radial).tolist(), "axial": (1e6 * axial).tolist()}
-
-
-def _numbers(values: Array) -> list[Any]:
-    return [[float(v) if np.isfinite(v) else None for v in row] for row in values]
 
 
 def sentences(found: ResonanceMap) -> list[str]:
@@ -194,9 +190,10 @@ def write_map(found: ResonanceMap, folder: Path) -> None:
         for j, s in enumerate(found.speeds)
     ]
     write_csv(folder / "modes.csv", ["temperature_C", "speed_rpm", *(f"mode {m.number} {m.kind}_Hz" for m in found.modes)], grid, about)
-    from thermospindle.report.figures.resonance import write_figures  # matplotlib takes its time to load
+    from thermospindle.report.figures.common import save_all  # matplotlib takes its time to load
+    from thermospindle.report.figures.resonance import figures
 
-    write_figures(found, folder)
+    save_all(figures(found), folder)
 
 
 def map_section(found: ResonanceMap) -> tuple[str, str]:
@@ -204,13 +201,14 @@ def map_section(found: ResonanceMap) -> tuple[str, str]:
     said = "".join(f"<p>{prose(s)}</p>" for s in told(found))
     head = ("line", "wave and order", "bearing", "mode", "°C", "rpm", "Hz", "strength, nm", "NRRO (nonrepeatable runout), nm rms", "margin, %")
     grid = table(head, [[prose(cell) for cell in _cells(c)] for c in strongest(found.coincidences)[:SHOWN]], range(4))
-    from thermospindle.report.figures.resonance import figures_svg
+    from thermospindle.report.figures.common import svg
+    from thermospindle.report.figures.resonance import figures
 
-    drawings = figures_svg(found)
+    drawn = figures(found)
     captions = {
         "campbell": "Campbell diagram: natural frequencies and lines over speed.",
         "temperature": "The same over temperature at the nominal speed.",
         "coincidences": "Where lines meet modes, over both.",
         "nrro": "Nonrepeatable runout along temperature and speed, linear response.",
     }
-    return "Resonance map", said + grid + "".join(figure(drawings[k], caption) for k, caption in captions.items())
+    return "Resonance map", said + grid + "".join(figure(svg(drawn[k], f"map-{k}", k), caption) for k, caption in captions.items())

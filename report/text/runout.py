@@ -17,7 +17,7 @@ from rich.console import Console
 from thermospindle.model.machine import Spindle
 from thermospindle.model.units import RPM, TO_UM
 from thermospindle.report.text.grid import grid, show_grid
-from thermospindle.report.typeset import figure, table, write_csv
+from thermospindle.report.typeset import table, write_csv
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.running.lines import FoundLine
 from thermospindle.sim.running.revolutions import ErrorMotion
@@ -137,7 +137,8 @@ def show_runout(console: Console, answer: dict[str, Any], where: str) -> None:
 def write_runout(runout: Runout, spindle: Spindle, answer: dict[str, Any], folder: Path, progress: Callable[[str], None]) -> None:
     """`record.csv`, `repeatable.csv`, `lines.csv`, both figures as SVG and PNG, and the log `runout.rrd` with a waterfall of the `spindle`
     (as its scene has it, without what its effects change)."""
-    from thermospindle.report.figures.runout import write_figures  # matplotlib and rerun take their time to load
+    from thermospindle.report.figures.common import save_all  # matplotlib and rerun take their time to load
+    from thermospindle.report.figures.runout import figures
     from thermospindle.report.log.turning.runout import write_runout_log
 
     _write_record(runout, folder / "record.csv")
@@ -145,7 +146,7 @@ def write_runout(runout: Runout, spindle: Spindle, answer: dict[str, Any], folde
     names = [k for k in line_json(runout.lines[0]) if k != "causes"] if runout.lines else ["frequency_Hz"]
     write_csv(folder / "lines.csv", names, ([row[k] for k in names] for row in answer["lines"]))
     progress("tables written")
-    write_figures(runout, folder)
+    save_all(figures(runout), folder, 130)
     progress("figures written")
     condition = runout.point.condition
     write_runout_log(runout, waterfall(spindle, condition.temperature, run_up(condition.speed)), folder / "runout.rrd")
@@ -180,11 +181,15 @@ def _table(path: Path, names: list[str], columns: list[Any]) -> None:
 
 def runout_section(runout: Runout, answer: dict[str, Any]) -> tuple[str, str]:
     """A section of the report: title and HTML."""
-    from thermospindle.report.figures.runout import motion_svg, spectrum_svg  # matplotlib takes its time to load
+    from thermospindle.report.figures.common import pictures  # matplotlib takes its time to load
+    from thermospindle.report.figures.runout import figures
 
     where = looked_at(runout.point.spindle)
-    said = f"Orbit of the {where}, and its error motion over the angle of the turning part.", "Amplitude over frequency; a mark is a line fitted at its known frequency."
-    drawn = [figure(svg(runout, words), escape(words)) for svg, words in zip((motion_svg, spectrum_svg), said, strict=True)]
+    captions = {
+        "motion": f"Orbit of the {where}, and its error motion over the angle of the turning part.",
+        "spectrum": "Amplitude over frequency; a mark is a line fitted at its known frequency.",
+    }
+    drawn = pictures(figures(runout), captions, "runout-")
     quoted = [[escape(meaning), *(f"{1e3 * answer[key][d]:.2f}" for d in MAIN)] for key, meaning in STATISTICS.items()]
     lines = [
         [
@@ -197,7 +202,7 @@ def runout_section(runout: Runout, answer: dict[str, Any]) -> tuple[str, str]:
         f"<p>{answer['revolutions']} revolutions at {answer['temperature_C']:g} °C and {answer['speed_rpm']:.6g} rpm, bearings {answer['status']}, "
         f"imperfections {answer['imperfections']}. The repeatable part is made of the lines at whole multiples of the turning frequency.</p>"
         f"{table(('nm', f'radial ({escape(where)} x)', 'axial'), quoted)}"
-        f"{''.join(drawn)}"
+        f"{''.join(drawn.values())}"
         f"{table(('Hz', 'orders', 'direction', 'nm', 'line', 'cause'), lines, (2, 4, 5))}"
     )
     return "Runout", text

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -105,10 +105,14 @@ def _nm(value: float) -> str:
     return f"{1e9 * value:.2f}"
 
 
-def show_errors(console: Console, errors: dict[str, float | None]) -> None:
-    """One line each for all, fitted and held-out tests: the errors before and after."""
-    for which in ("", "fitted_", "held_out_"):
-        one, other = errors[f"{which}before"], errors[f"{which}after"]
+def before_after(errors: Mapping[str, float | None]) -> Iterator[tuple[str, float, float]]:
+    """Of all, fitted and held-out tests, as far as there are such, the errors before and after."""
+    for tests, which in (("all", ""), ("fitted", "fitted_"), ("held out", "held_out_")):
+        one, other = errors.get(f"{which}before"), errors.get(f"{which}after")
         if one is not None and other is not None:
-            tests = (which or "all_")[:-1].replace("_", " ")
-            console.print(f"Runout, {tests} tests: rms residual {one:.3g} -> {other:.3g} standard errors", highlight=False)
+            yield tests, one, other
+
+
+def show_errors(console: Console, errors: Mapping[str, float | None]) -> None:
+    for tests, one, other in before_after(errors):
+        console.print(f"Runout, {tests} tests: rms residual {one:.3g} -> {other:.3g} standard errors", highlight=False)

@@ -13,7 +13,8 @@ from thermospindle.diagnosis.runout.next_test import NextRunout
 from thermospindle.diagnosis.runout.sources import SourceKey
 from thermospindle.diagnosis.runout.verdict import CLEAR, RunoutDiagnosis
 from thermospindle.model.units import RPM, TO_UM
-from thermospindle.report.typeset import plain_error
+from thermospindle.report.text.diagnosis.words import next_words
+from thermospindle.report.typeset import known, plain_error, unit_word
 from thermospindle.sim.effects.effect import Effect
 
 SHOWN = 12  # candidates
@@ -43,8 +44,8 @@ def runout_diagnosis_json(d: RunoutDiagnosis, catalogue: tuple[Effect, ...]) -> 
         "error": {
             "before": before,
             "after": float(np.sqrt(accepted.chi2 / d.count)) if accepted else before,
-            "held_out_before": _number(d.held_out_before),
-            "held_out_after": _number(d.held_out_after if accepted else d.held_out_before),
+            "held_out_before": known(d.held_out_before),
+            "held_out_after": known(d.held_out_after if accepted else d.held_out_before),
         },
         "where": where(d),
         "moved_lines": [_moved_json(m) for m in moved_lines(d, accepted)] if accepted else [],
@@ -94,10 +95,6 @@ def _next_json(t: NextRunout) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
-
-
 def _candidate(e: Explanation) -> dict[str, Any]:
     parameters = {}
     for v, size, sd in zip(e.variants, e.size, e.size_sd, strict=True):
@@ -110,7 +107,7 @@ def _candidate(e: Explanation) -> dict[str, Any]:
         "effects": list(e.effects),
         "delta_evidence": e.delta_evidence,
         "probability": e.probability,
-        "held_out_error_ratio": _number(e.held_out_ratio),
+        "held_out_error_ratio": known(e.held_out_ratio),
         "parameters": parameters,
         "believable": e.believable,
     }
@@ -158,13 +155,6 @@ def would_change(d: RunoutDiagnosis) -> str:
     return f"Records that the next best explanation ({rival}) predicts better would change that."
 
 
-def next_words(t: dict[str, Any]) -> str:
-    """The test to make, in a sentence."""
-    first, second = t["separates"]
-    odds = "more than a million" if t["odds"] >= 1e6 * (1 - 1e-9) else f"{t['odds']:.3g}"
-    return f"A test {t['changed']} would tell {first} from {second} with odds of {odds} to 1, most by {t['tells']}."
-
-
 def show_runout_diagnosis(console: Console, answer: dict[str, Any]) -> None:
     named = f": {', '.join(answer['effects'])}" if answer["effects"] else ""
     console.print(f"runout: {answer['verdict']}{named}", style="bold")
@@ -175,10 +165,7 @@ def show_runout_diagnosis(console: Console, answer: dict[str, Any]) -> None:
     if answer["verdict"] not in ("none",):
         console.print("\nBest explanations (ln evidence over the scene's own imperfections):")
         for c in answer["candidates"][:5]:
-            values = ", ".join(
-                f"{k.split('.')[1]} {plain_error(v['value'], v['sd'])}" + (f" {v['unit']}" if v["unit"] != "1" else "")
-                for k, v in c["parameters"].items()
-            )
+            values = ", ".join(f"{k.split('.')[1]} {plain_error(v['value'], v['sd'])}{unit_word(v['unit'], ' ')}" for k, v in c["parameters"].items())
             console.print(
                 f"  {' + '.join(c['effects'])}: {c['delta_evidence']:+.1f}, probability {c['probability']:.3f}; {values}", highlight=False
             )
@@ -191,7 +178,7 @@ def show_runout_diagnosis(console: Console, answer: dict[str, Any]) -> None:
                     highlight=False,
                 )
     for t in answer["next_test"]:
-        console.print(next_words(t), highlight=False)
+        console.print(next_words(t, t["changed"]), highlight=False)
     if answer["no_next_test"] and answer["verdict"] not in ("none", "unexplained"):
         console.print(answer["no_next_test"], highlight=False)
     for g in answer["unexplained_lines"]:

@@ -13,7 +13,7 @@ from rich.console import Console
 from thermospindle.model.types import Array
 from thermospindle.model.units import MINUTE, RPM
 from thermospindle.report.text.grid import show_grid
-from thermospindle.report.typeset import figure, minus, power, write_csv
+from thermospindle.report.typeset import figure, known, minus, power, write_csv
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.warmup import Moment, Warmup, clearance, energy, loose_rollers, most_friction, roller_names, rollers
 
@@ -39,7 +39,7 @@ def warmup_json(warmup: Warmup) -> dict[str, Any]:
         "temperature_C": {g: [m.temperatures[g] for m in moments] for g in moments[0].temperatures},
         "preload_N": None if first is None else [m.preload[first] for m in moments],
         "friction_W": [sum(m.friction.values()) for m in moments],
-        "frequencies_Hz": _numbers(warmup.frequencies),
+        "frequencies_Hz": known(warmup.frequencies),
         "modes": [{"kind": m.kind, "whirl": m.whirl} for m in warmup.modes],
         "bearings": {
             b.name: {
@@ -72,15 +72,10 @@ def _steady_json(warmup: Warmup, first: str | None) -> dict[str, Any]:
         "bearing_temperature_C": dict(steady.bearing_temperatures),
         "preload_N": None if first is None else steady.preload[first],
         "friction_W": sum(steady.friction.values()),
-        "frequencies_Hz": _numbers(warmup.steady_frequencies),
+        "frequencies_Hz": known(warmup.steady_frequencies),
         "status": steady.point.state.status,
         "load_feedback": warmup.feedback,
     }
-
-
-def _numbers(values: Array) -> list[Any]:
-    """Nested lists with None where a value is not a number."""
-    return [_numbers(v) if isinstance(v, np.ndarray) else (float(v) if np.isfinite(v) else None) for v in values]
 
 
 def rows(warmup: Warmup) -> tuple[list[str], list[list[float]]]:
@@ -108,9 +103,10 @@ def write_warmup(warmup: Warmup, folder: Path) -> None:
     header, body = rows(warmup)
     about = ", ".join(f"{k} {v}" for k, v in provenance(warmup.spindle).items())
     write_csv(folder / "warmup.csv", header, body, about)
-    from thermospindle.report.figures.warmup import write_figure  # matplotlib takes its time to load
+    from thermospindle.report.figures.common import save  # matplotlib takes its time to load
+    from thermospindle.report.figures.warmup import figure as drawn
 
-    write_figure(warmup, folder)
+    save(drawn(warmup), folder, "warmup")
 
 
 def show_warmup(console: Console, warmup: Warmup) -> None:
@@ -195,7 +191,8 @@ def _shown(times: Array) -> list[int]:
 
 def warmup_section(warmup: Warmup) -> tuple[str, str]:
     """Title and HTML of a report section."""
-    from thermospindle.report.figures.warmup import figure_svg
+    from thermospindle.report.figures.common import svg
+    from thermospindle.report.figures.warmup import figure as drawn
 
     last, total = warmup.steady, heat_sums(warmup)
     bearings = ", ".join(f"{b} {t:.1f}" for b, t in last.bearing_temperatures.items())
@@ -215,4 +212,4 @@ def warmup_section(warmup: Warmup) -> tuple[str, str]:
         f"<p>Heat: motor {total['motor']}, bearings {total['friction']} in; convection {total['convection']} out; "
         f"stored {total['stored']}.</p>"
     )
-    return "Warm-up", minus(about) + figure(figure_svg(warmup))
+    return "Warm-up", minus(about) + figure(svg(drawn(warmup), "warmup", "temperatures, preload, friction and natural frequencies over time"))

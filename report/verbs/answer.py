@@ -13,11 +13,13 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from thermospindle.model import sense
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import FAINTEST, Spindle
 from thermospindle.report.folder import mark, whole_folder
 from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.effects.known import equipped
+from thermospindle.sim.operating import OperatingPoint
 
 STEPS = 5  # of temperature over a scene's range, unless a verb is given others
 
@@ -64,6 +66,11 @@ def temperatures_or_range(temperatures: Sequence[float] | None, spindle: Spindle
 def temperature_or_reference(temperature: float | None, spindle: Spindle) -> float:
     """The temperature (C) asked for, or the reference temperature of the scene."""
     return spindle.reference_temperature if temperature is None else temperature
+
+
+def doubts(spindle: Spindle, points: Sequence[OperatingPoint]) -> list[str]:
+    """What is odd about conditions and about the states of the bearings there."""
+    return sense.of_conditions(spindle, [p.condition for p in points]) + sense.of_states(spindle, [p.state.bearings for p in points])
 
 
 def with_hammer(spindle: Spindle, hits: int | None, level: float | None) -> Spindle:

@@ -19,13 +19,14 @@ from thermospindle.report.text import run as text
 from thermospindle.report.verbs.answer import (
     Answer,
     answered,
+    doubts,
     progress_bar,
     temperature_or_reference,
     temperatures_or_range,
     with_effects,
     with_hammer,
 )
-from thermospindle.sim.campaign.campaign import Campaign, write_campaign
+from thermospindle.sim.campaign.campaign import write_campaign
 from thermospindle.sim.campaign.simulated import runout_campaign
 from thermospindle.sim.hammer.test import stages
 from thermospindle.sim.run import Run
@@ -117,17 +118,13 @@ def simulate(
         conditions = [Condition(t, s * RPM) for t in steps for s in speeds]
         with progress_bar(int(seconds / RECORD) + 2) as progress:
             campaign = runout_campaign(spindle, conditions, seconds, element, seed, NM * noise_nm, progress=progress)
-        doubts, kind = sense.of_conditions(spindle, conditions), "runout tests"
+        odd, kind = sense.of_conditions(spindle, conditions), "runout tests"
     else:
         result = _virtual_tests(spindle, steps, speed_rpm, element, seed)
-        campaign, doubts, kind = text.campaign_of(result), _doubts(result), "tests"
+        campaign, odd, kind = text.campaign_of(result), _doubts(result), "tests"
     write_campaign(campaign, out)
-    return _of_campaign(campaign, out, kind, doubts)
-
-
-def _of_campaign(campaign: Campaign, out: Path, kind: str, warnings: Sequence[str]) -> Answer:
     tests = [t.id for t in campaign.tests]
-    values = {"campaign": str(out), "tests": tests, "warnings": list(warnings)}
+    values = {"campaign": str(out), "tests": tests, "warnings": odd}
     return Answer(values, _line(f"{out}: {len(tests)} {kind}: {', '.join(tests)}"))
 
 
@@ -175,9 +172,7 @@ def _write_impact(result: Run, folder: Path) -> None:
 
 
 def _doubts(result: Run) -> list[str]:
-    points = [s.point for s in result.steps]
-    doubts = sense.of_conditions(result.spindle, [p.condition for p in points])
-    return doubts + sense.of_states(result.spindle, [p.state.bearings for p in points])
+    return doubts(result.spindle, [s.point for s in result.steps])
 
 
 def _line(sentence: str) -> Callable[[Console], None]:

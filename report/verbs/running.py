@@ -19,6 +19,7 @@ from thermospindle.report.text.warmup import lost_contact, show_warmup, warmup_j
 from thermospindle.report.verbs.answer import (
     Answer,
     answered,
+    doubts,
     progress_bar,
     temperature_or_reference,
     temperatures_or_range,
@@ -60,9 +61,9 @@ def runout(
         found = simulated_runout(point, seconds, element, path)
         progress("record analysed")
         values = runout_json(found, path, element, seed) | {"speed_from": "the scene's nominal speed" if speed_rpm is None else "--speed"}
-        doubts = sense.of_conditions(spindle, [point.condition]) + sense.of_states(spindle, [point.state.bearings])
+        odd = doubts(spindle, [point])
         if not found.lines:
-            doubts.append(
+            odd.append(
                 "the scene names no imperfections, so nothing moves; --seed 1 draws plausible ones, and the table [imperfections] of the "
                 "scene holds its own"
             )
@@ -70,7 +71,7 @@ def runout(
         def write(folder: Path, answer: dict[str, Any]) -> None:
             write_runout(found, spindle, answer, folder, progress)
 
-        return answered(values, lambda console: show_runout(console, values, looked_at(spindle)), out, asked, write, doubts)
+        return answered(values, lambda console: show_runout(console, values, looked_at(spindle)), out, asked, write, odd)
 
 
 def warmup(
@@ -91,16 +92,14 @@ def warmup(
     duration = None if minutes is None else MINUTE * minutes
     with progress_bar(STAGES) as progress:
         found = warm_up(spindle, speed, temperature_or_reference(temperature, spindle), soak, duration, progress=progress)
-    points = [m.point for m in (*found.moments, found.steady)]
     lost = lost_contact(found)
-    doubts = sense.of_conditions(spindle, [p.condition for p in points]) + sense.of_states(spindle, [p.state.bearings for p in points])
     return answered(
         warmup_json(found),
         lambda console: show_warmup(console, found),
         out,
         asked,
         lambda folder, _: _write_warmup(found, folder),
-        [*([lost] if lost else []), *doubts],
+        [*([lost] if lost else []), *doubts(spindle, [m.point for m in (*found.moments, found.steady)])],
     )
 
 

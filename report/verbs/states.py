@@ -18,7 +18,15 @@ from thermospindle.model.shaft import THEORIES
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 from thermospindle.report.text import states as text
-from thermospindle.report.verbs.answer import Answer, answered, temperature_or_reference, temperatures_or_range, with_effects, write_json
+from thermospindle.report.verbs.answer import (
+    Answer,
+    answered,
+    doubts,
+    temperature_or_reference,
+    temperatures_or_range,
+    with_effects,
+    write_json,
+)
 from thermospindle.sim.operating import operating_point, stiffness_table
 
 
@@ -83,14 +91,13 @@ def modes(
     spindle = _with_beam(with_effects(scene, effect_files)[0], beam)
     point = operating_point(spindle, Condition(temperature_or_reference(temperature, spindle), speed_rpm * RPM))
     values = text.modes_json(point, spindle.hammer.band[1] if highest is None else highest)
-    doubts = sense.of_conditions(spindle, [point.condition]) + sense.of_states(spindle, [point.state.bearings])
     return answered(
         values,
         lambda console: text.show_modes(console, values, point),
         out,
         {"verb": "modes"} | asked,
         lambda folder, _: text.write_modes(point, folder),
-        doubts,
+        doubts(spindle, [point]),
     )
 
 
@@ -122,8 +129,7 @@ def static(
     chain = statics.rated_chain(spindle, point.chain) if chosen == RATED else point.chain
     answers = [statics.static(spindle, chain, p) for p in spindle.points]
     values = text.static_json(answers, chosen, _beam_of(spindle))
-    doubts = sense.of_conditions(spindle, [point.condition]) + sense.of_states(spindle, [point.state.bearings])
-    return answered(values, lambda console: text.show_static(console, values), out, {"verb": "static"} | asked, write_json("static.json"), doubts)
+    return answered(values, lambda console: text.show_static(console, values), out, {"verb": "static"} | asked, write_json("static.json"), doubts(spindle, [point]))
 
 
 def _with_beam(spindle: Spindle, beam: str | None) -> Spindle:

@@ -19,6 +19,7 @@ from thermospindle.model.files.formats import SCENE
 from thermospindle.model.scene.fields import read_file
 from thermospindle.model.scene.reading import content_hash, scene_path
 from thermospindle.report.figures import study as figures
+from thermospindle.report.figures.common import save_all
 from thermospindle.report.folder import digest
 from thermospindle.report.log.study.log import write_study_log
 from thermospindle.report.text.grid import show_grid
@@ -60,7 +61,7 @@ def study(file: Path, cluster: str | None = None, effect_files: Sequence[Path] =
         values = {"title": asked.title, "kind": asked.kind, "scene": spindle.name, "cases": of.count, **told}
         write_table(table, folder.path / RESULTS)
         write(folder.path / SUMMARY, json.dumps(values, indent=1))
-        figures.write_figures(drawn, folder.path)
+        save_all(drawn, folder.path, 140)
         write_study_log(spindle, values, table, drawn, folder.path / LOG)
     values |= {"out": str(place), "parts": folder.count, "parts_found": there, "warnings": _warnings(values)}
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermospindle.model.errors import BadInput
+from thermospindle.model.types import Array
 from thermospindle.sim.identification.modal import scatter
 from thermospindle.sim.identification.running_lines import RunningLines, running_lines
 
@@ -58,6 +59,11 @@ def _same(a: Any, b: Any) -> bool:
     if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
         return a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
     return type(a) is type(b) and bool(a == b)
+
+
+def decibel(value: np.ndarray) -> Array:
+    """20 log10 |value|, of zero -300."""
+    return np.asarray(20 * np.log10(np.maximum(np.abs(value), 1e-15)), float)
 
 
 def even(values: np.ndarray) -> float:

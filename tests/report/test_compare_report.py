@@ -14,8 +14,8 @@ from rich.console import Console
 from thermospindle.diagnosis.compare.compare import compare
 from thermospindle.diagnosis.data.observe import observe
 from thermospindle.model.machine import Condition
-from thermospindle.report.figures.common import STYLE, svg
-from thermospindle.report.figures.compare import figures, label, shown_pairs
+from thermospindle.report.figures.common import STYLE, label, svg
+from thermospindle.report.figures.compare import figures, shown_pairs
 from thermospindle.report.log.compare import FrfsBeside, write_comparison_log
 from thermospindle.report.log.read import read_log
 from thermospindle.report.page.compare import sections, write_comparison
@@ -215,5 +215,5 @@ def test_many_tests_are_a_row_a_mode(found):
 
 
 def test_labels_and_pairs(found, campaign):
-    assert [label(t, ", ") for t in found.tests] == ["20 °C", "60 °C, 7200 rpm"]
+    assert [label(t.test, ", ") for t in found.tests] == ["20 °C", "60 °C, 7200 rpm"]
     assert shown_pairs(found.tests[0].correlation) == [(n, n) for n in campaign.tests[0].frf.reference_nodes]

@@ -16,8 +16,11 @@ from thermospindle.diagnosis.inference.resonance import shown
 from thermospindle.diagnosis.verdict import Diagnosis, Drift
 from thermospindle.model.types import Array
 from thermospindle.report.text.diagnosis.words import condition, drift_words, law_words, would_change
+from thermospindle.report.typeset import known
 
 SHOWN = 12  # candidates
+
+
 def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
     """Everything as one object; keys carry units where values have them."""
     v, base = d.verdict, d.search.base
@@ -38,7 +41,7 @@ def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
         "detectable": {name: size for name, (_, size) in d.detectable.items()},
         "detectable_in": {name: {"parameter": m.size.name, "unit": m.size.unit, "size": size} for name, (m, size) in d.detectable.items()},
         "error": {"before": before, "after": after}
-        | {key: _known(getattr(v, key)) for key in ("held_out_before", "held_out_after", "held_out_gain")},
+        | {key: known(getattr(v, key)) for key in ("held_out_before", "held_out_after", "held_out_gain")},
         "reference_temperature_C": d.spindle.reference_temperature,
         "where": [_place(p, d) for p in _places(d)],
         "next_test": [
@@ -66,11 +69,6 @@ def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
         "light_resonances": [{"frequency_Hz": r.frequency, "damping_ratio": r.damping} for r in shown(d.search.model, d.search.hypotheses[0])],
         "noise": {data.test.id: getattr(data, "noise_from", "the table of modes") for data in d.search.model.tests},
     }
-
-
-def _known(value: float) -> float | None:
-    """None of what could not be told: nothing can be left out of one condition."""
-    return value if np.isfinite(value) else None
 
 
 def _sd(evidence: Evidence) -> Array:
@@ -115,7 +113,7 @@ def _held_out(c: Candidate, d: Diagnosis) -> float | None:
     """Error on conditions predicted from all others, over that without effects; None where nothing can be left out."""
     model = d.search.model
     error, _ = left_out(model, c.hypothesis.fit, c.hypothesis.evidence, conditions_of(model.spindle, model.tests))
-    return _known(error / d.verdict.held_out_before) if d.verdict.held_out_before > 0 else None
+    return known(error / d.verdict.held_out_before) if d.verdict.held_out_before > 0 else None
 
 
 def parameters_of(h: Hypothesis, k: int) -> dict[str, dict[str, Any]]:

@@ -11,7 +11,7 @@ from thermospindle.diagnosis.decision.explanations import beyond_limits
 from thermospindle.diagnosis.verdict import Diagnosis, Drift
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
-from thermospindle.report.typeset import plain_error
+from thermospindle.report.typeset import plain_error, unit_word
 
 ALIKE = 0.9  # of the evidence of what the verdict names, from which a free drift does as well
 DEPARTS = 0.3  # of the size, from which a law does not hold
@@ -50,13 +50,13 @@ def _drift_words(p: Drift) -> str:
 def _change_words(p: Drift) -> str:
     if len(p.change) == 1:
         ((change, sd),) = p.told
-        return f"{change:+.3g} +- {sd:.1g}{_unit(p.unit)} {_where(p.conditions[0])}"
+        return f"{change:+.3g} +- {sd:.1g}{unit_word(p.unit, ' ')} {_where(p.conditions[0])}"
     low, high = int(np.argmin(p.change)), int(np.argmax(p.change))
     goes = f", {p.pattern.shape.name}" if p.pattern and p.pattern.shape.name != "constant" else ""
     (least, its_sd), (most, sd) = p.told[low], p.told[high]
     return (
-        f"from {least:+.3g} +- {its_sd:.1g}{_unit(p.unit)} {_where(p.conditions[low])} to {most:+.3g} +- "
-        f"{sd:.1g}{_unit(p.unit)} {_where(p.conditions[high])}{goes}"
+        f"from {least:+.3g} +- {its_sd:.1g}{unit_word(p.unit, ' ')} {_where(p.conditions[low])} to {most:+.3g} +- "
+        f"{sd:.1g}{unit_word(p.unit, ' ')} {_where(p.conditions[high])}{goes}"
     )
 
 
@@ -143,7 +143,7 @@ def show_diagnosis(console: Console, answer: dict[str, Any], verbose: bool = Tru
         for sentence in answer["misfit"]["words"]:
             console.print(f"  {sentence}")
     for t in answer["next_test"]:
-        console.print(f"\n{_next(t)}")
+        console.print(f"\n{next_words(t, plan_words(t['condition']))}")
     for o in answer.get("predictions", []):
         console.print(
             f"\nPredicted earlier by {o['explanation']} for {o['test']}: {o['verdict']}, {o['rms']:.2g} standard errors rms over {o['modes']} modes"
@@ -152,7 +152,7 @@ def show_diagnosis(console: Console, answer: dict[str, Any], verbose: bool = Tru
         small = sorted(answer["detectable_in"].items())
         console.print("\nSmallest size these data would have shown:")
         for name, row in small:
-            console.print(f"  {name}: {row['parameter']} {row['size']:.2g}{_unit(row['unit'])}")
+            console.print(f"  {name}: {row['parameter']} {row['size']:.2g}{unit_word(row['unit'], ' ')}")
         console.print(f"Not visible in these data at a typical size: {', '.join(answer['invisible']) or 'nothing'}")
 
 
@@ -162,7 +162,7 @@ def _show_little(console: Console, answer: dict[str, Any]) -> None:
         if set(c["effects"]) <= set(answer["effects"]) and answer["effects"]:
             console.print(f"  {' + '.join(c['effects'])}, {_percent(c['probability'])}: {_values(c)}")
     for t in answer["next_test"][:1]:
-        console.print(_next(t))
+        console.print(next_words(t, plan_words(t["condition"])))
     for o in answer.get("predictions", []):
         console.print(f"Predicted earlier by {o['explanation']} for {o['test']}: {o['verdict']}, {o['rms']:.2g} standard errors rms")
     console.print("--verbose shows every explanation, what would drift, and what these data could have shown.", style="dim")
@@ -170,20 +170,17 @@ def _show_little(console: Console, answer: dict[str, Any]) -> None:
 
 def _values(candidate: dict[str, Any]) -> str:
     """Fitted parameters with their errors and units."""
-    values = ", ".join(f"{k.split('.', 1)[1]} {plain_error(v['value'], v['sd'])}{_unit(v['unit'])}" for k, v in candidate["parameters"].items())
+    values = ", ".join(f"{k.split('.', 1)[1]} {plain_error(v['value'], v['sd'])}{unit_word(v['unit'], ' ')}" for k, v in candidate["parameters"].items())
     own = candidate["own_law"]
     return f"{values} (in the mean: the law of {' and '.join(own)} is the data's own)" if own else values
 
 
-def _next(test: dict[str, Any]) -> str:
+def next_words(test: dict[str, Any], which: str) -> str:
+    """The test to make, in a sentence."""
     first, second = test["separates"]
     odds = "more than a million" if test["odds"] >= 1e6 * (1 - 1e-9) else f"{test['odds']:.3g}"
-    return f"A test {plan_words(test['condition'])} would tell {first} from {second} with odds of {odds} to 1, most by {test['tells']}."
+    return f"A test {which} would tell {first} from {second} with odds of {odds} to 1, most by {test['tells']}."
 
 
 def _percent(probability: float) -> str:
     return f"{probability:.1%}" if probability > 1e-3 else "less than 0.1 %"
-
-
-def _unit(unit: str) -> str:
-    return "" if unit == "1" else f" {unit}"

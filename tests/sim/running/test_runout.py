@@ -20,7 +20,8 @@ from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.chain import motion_rows
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
-from thermospindle.report.figures.runout import motion_figure, spectrum_figure, spread
+from thermospindle.report.figures.common import spread
+from thermospindle.report.figures.runout import motion_figure, spectrum_figure
 from thermospindle.report.text.runout import runout_json, runout_section, write_runout
 from thermospindle.report.verbs.starting import new
 from thermospindle.sim.operating import operating_point
