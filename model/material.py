@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from dataclasses import dataclass
 
 import numpy as np
 
 from thermospindle.model.errors import OutsideRange
+from thermospindle.model.types import Array
+
+BEYOND = 0.01  # K, to which a law goes on straight beyond its ends: computed temperatures overshoot by as much, and no thermometer tells
 
 
 @dataclass(frozen=True)
@@ -19,10 +23,17 @@ class Law:
     def __call__(self, temperature: float) -> float:
         if len(self.value) == 1:
             return self.value[0]
-        low, high = self.temperature[0], self.temperature[-1]
-        if not low <= temperature <= high:
-            raise OutsideRange(f"a material law given from {low:g} to {high:g} C was asked at {temperature:g} C")
-        return float(np.interp(temperature, self.temperature, self.value))
+        self.check(temperature)
+        k = min(max(bisect_right(self.temperature, temperature), 1), len(self.value) - 1)
+        (start, end), (first, last) = self.temperature[k - 1 : k + 1], self.value[k - 1 : k + 1]
+        return first + (temperature - start) / (end - start) * (last - first)
+
+    def check(self, temperature: float | Array) -> None:
+        """OutsideRange where one of some temperatures (C) lies further than `BEYOND` from a law of several entries."""
+        (low, high), (least, most) = (self.temperature[0], self.temperature[-1]), (np.min(temperature), np.max(temperature))
+        if not (low - BEYOND <= least and most <= high + BEYOND):
+            asked = f"at {least:.6g} C" if least == most else f"from {least:.6g} to {most:.6g} C"
+            raise OutsideRange(f"a material law given from {low:g} to {high:g} C was asked {asked}")
 
     def integral(self, start: float, stop: float) -> float:
         """Integral of the property from `start` to `stop` (C), exact for the piecewise linear law."""

@@ -116,7 +116,7 @@ def warm_up(
         return heat.Running(air, speed, machine.point(nodal).state.loads)
 
     try:
-        field = heat.settled(model, lambda nodal: drive(0.0, nodal))
+        field = heat.settled(model, lambda nodal: drive(0.0, nodal), start)
     except OutsideRange as error:
         where = f"{spindle.file or spindle.name}: from {start:g} C in air of {air:g} C at {speed / RPM:g} rpm"
         raise OutsideRange(f"{where} the grease or a material is asked for a temperature that its law does not reach: {error}; thermal.convection cools more, thermal.friction heats less") from None

@@ -103,15 +103,15 @@ def running(spindle: Spindle, air: float, speed: float, loads: Mapping[str, floa
 
 def steady(model: HeatModel, drive: Running) -> TemperatureField:
     """The steady temperature. ValueError without convection; OutsideRange where the viscosity law does not reach."""
-    return settled(model, lambda _: drive)
+    return settled(model, lambda _: drive, drive.air)
 
 
-def settled(model: HeatModel, drive: Callable[[np.ndarray], Running]) -> TemperatureField:
-    """The steady temperature under loads that follow it: raises as `steady`, and NotSettled where the two do not meet."""
+def settled(model: HeatModel, drive: Callable[[np.ndarray], Running], start: float) -> TemperatureField:
+    """The steady temperature under loads that follow it, sought from a uniform `start` (C): raises as `steady`, and NotSettled where the two do not meet."""
     if not model.film.any():
         raise ValueError("a spindle without convection has no steady temperature")
-    start = np.full(model.film.size, drive(np.zeros(model.film.size)).air)
-    return model.field(_agreed(model, 0.0, np.zeros(model.film.size), start, drive)[0])
+    nothing = np.zeros(model.film.size)
+    return model.field(_agreed(model, 0.0, nothing, nothing + start, drive)[0])
 
 
 def transient(

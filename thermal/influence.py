@@ -132,9 +132,9 @@ def _family(spindle: Spindle, part: str, tolerance: float) -> Family:
 
 @lru_cache(maxsize=16)
 def _space(family: Family) -> Reduced:
-    if (found := store.load_space(repr(family), family.regions)) is not None:
-        return found
     response = _kept(family.reference)[0]
+    if (found := store.load_space(repr(family), response.section, family.regions)) is not None:
+        return found
     space = reduced(response.section, response.races, family.regions, family.temperature)
     store.save_space(repr(family), space)
     return space

@@ -11,12 +11,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.sparse import coo_array, csr_array, vstack
 from skfem import Basis, LinearForm
 
 from thermospindle.model.machine import RingMotion, Spindle
 from thermospindle.thermal.conduction import HeatModel
-from thermospindle.thermal.elastic import Race, Solid
+from thermospindle.thermal.elastic import Race, Response, Solid
 from thermospindle.thermal.expansion import expand, ring_motions
 from thermospindle.thermal.influence import elasticity, influence
 from thermospindle.thermal.mesh import element
@@ -51,13 +52,17 @@ class Reading:
         return dict(zip(self.regions, (self.means @ nodal).tolist(), strict=True))
 
     def motions(self, spindle: Spindle, nodal: np.ndarray) -> dict[str, RingMotion]:
-        """As `expand(spindle, field)`. `spindle` may differ from the model's in anything; where its elasticity does (or follows the
-        temperature), the finite elements are asked again."""
+        """As `expand(spindle, field)`. `spindle` may differ from the model's in anything; where its elasticity follows the temperature, the influence is taken
+        there; where it is another at the reference temperature, which has meshes of its own, the finite elements are asked again."""
         means = {g.name: spindle.reference_temperature for g in spindle.regions} | self.region_means(nodal)
+        gain = self.gain
         if elasticity(spindle, means) != self.moduli:
-            return expand(spindle, self.model.field(nodal))
+            responses = influence(spindle, temperatures=means).responses
+            if any(response.section.mesh is not self.model.sections[part].mesh for part, response in responses.items()):
+                return expand(spindle, self.model.field(nodal))
+            gain = _gain(responses)
         materials = [spindle.materials[spindle.region(name).material] for name in self.regions]
-        if all(len(m.thermal_expansion.value) == 1 for m in materials):
+        if gain is self.gain and all(len(m.thermal_expansion.value) == 1 for m in materials):
             each = (self.by_region @ (nodal - spindle.reference_temperature)).reshape(len(materials), -1)
             motion = np.array([m.thermal_expansion.value[0] for m in materials]) @ each
         else:
@@ -66,7 +71,7 @@ class Reading:
             for k, material in enumerate(materials):
                 own = self.region_of == k
                 strain[own] = thermal_strain(material, values[own], spindle.reference_temperature)
-            motion = self.gain @ strain
+            motion = gain @ strain
         moves = [(r, z) for r, z in motion.reshape(-1, 2).tolist()]
         return ring_motions(spindle, means, dict(zip(self.races, moves, strict=True)))
 
@@ -77,7 +82,7 @@ def reading(model: HeatModel) -> Reading:
     responses, moduli = influence(spindle).responses, elasticity(spindle)
     regions: list[str] = []
     races: list[Race] = []
-    means, points, owners, gains = [], [], [], []
+    means, points, owners = [], [], []
     for part, response in responses.items():
         section, span = response.section, model.spans[part]
         if model.sections[part].mesh is not section.mesh:
@@ -88,15 +93,14 @@ def reading(model: HeatModel) -> Reading:
         points.append(_at(_interpolation(solid.scalar), span, size))
         each = solid.scalar.X.shape[-1]
         owners.append(len(regions) + np.repeat(section.region_of, each))
-        gains.append(response.density.reshape(len(response.density), -1))
         regions += section.regions
         races += response.races
-    gain = np.zeros((sum(len(g) for g in gains), sum(g.shape[1] for g in gains)))
-    row = column = 0
-    for g in gains:
-        gain[row : row + len(g), column : column + g.shape[1]] = g
-        row, column = row + len(g), column + g.shape[1]
-    return Reading(model, tuple(regions), _stack(means), _stack(points), np.concatenate(owners), tuple(races), gain, moduli)
+    return Reading(model, tuple(regions), _stack(means), _stack(points), np.concatenate(owners), tuple(races), _gain(responses), moduli)
+
+
+def _gain(responses: Mapping[str, Response]) -> np.ndarray:
+    """Motion (2 races, points) of the races of all parts for a unit strain at the quadrature points of all."""
+    return block_diag(*(response.density.reshape(len(response.density), -1) for response in responses.values()))
 
 
 def _interpolation(basis: Basis) -> csr_array:

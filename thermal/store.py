@@ -39,13 +39,14 @@ def save(question: str, response: Response, convergence: Convergence) -> None:
     _write(question, response.section, response.races, notes, {name: getattr(response, name) for name in ARRAYS})
 
 
-def load_space(question: str, regions: Sequence[Region]) -> Reduced | None:
-    """The kept space of a part whose `regions` follow the temperature, or None."""
+def load_space(question: str, section: PartMesh, regions: Sequence[Region]) -> Reduced | None:
+    """The kept space of a part whose `regions` follow the temperature, if it was made on the mesh of `section`, or None."""
     if (found := _read(question)) is None:
         return None
     notes, data = found
     try:
-        section = _section(notes, data)
+        if not all(np.array_equal(data[name], getattr(section.mesh, name)) for name in ("p", "t")):
+            return None
         ordered = tuple(next(r for r in regions if r.name == name) for name in section.regions)
         fields, stiffness, load, motion = (data[name] for name in SPACE)
         return Reduced(section, _races(notes), ordered, fields, stiffness, load, motion, notes["error"], notes["solved"])

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from skfem import Basis, LinearForm
 
-from thermospindle.model.errors import OutsideRange
 from thermospindle.model.machine import Law, Material, Spindle
 from thermospindle.thermal.mesh import PartMesh, element
 
@@ -63,9 +62,7 @@ def _integral(law: Law, temperature: np.ndarray) -> np.ndarray:
     if len(law.value) == 1:
         return law.value[0] * temperature
     t, v = np.array(law.temperature), np.array(law.value)
-    if np.min(temperature) < t[0] or np.max(temperature) > t[-1]:
-        asked = f"{np.min(temperature):g} to {np.max(temperature):g} C"
-        raise OutsideRange(f"an expansion law given from {t[0]:g} to {t[-1]:g} C was asked from {asked}")
+    law.check(temperature)
     below = np.concatenate([[0.0], np.cumsum(np.diff(t) * (v[1:] + v[:-1]) / 2)])
     k = np.clip(np.searchsorted(t, temperature, side="right") - 1, 0, t.size - 2)
     step = temperature - t[k]

@@ -8,9 +8,10 @@ import pytest
 from tests.diagnosis.test_ladder import tables
 from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.forward.nuisance import GAIN, TEMPERATURE
-from thermospindle.diagnosis.forward.rates import rates_of
+from thermospindle.diagnosis.forward.rates import STEP, rates_of
 from thermospindle.diagnosis.verdict import campaign_data
 from thermospindle.model.machine import Law
+from thermospindle.model.material import BEYOND
 
 
 def with_law(spindle, low, high):
@@ -23,6 +24,8 @@ def with_law(spindle, low, high):
 def test_a_law_that_ends_at_the_tests_stops_no_derivative(spindle):
     """A law from 20 to 60 C, tests at 20 and 60 C: derivatives by temperature, whose steps lead outside, are those of a law without ends."""
     found = []
+    spindle = replace(spindle, tolerances=replace(spindle.tolerances, temperature=1.0))
+    assert STEP * spindle.tolerances.temperature > BEYOND
     for low, high in ((20.0, 60.0), (0.0, 80.0)):
         model = campaign_data(with_law(spindle, low, high), tables(spindle, ()))
         rates = rates_of(model, np.zeros(len(model.parameters)), [[], []])

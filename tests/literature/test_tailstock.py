@@ -203,7 +203,7 @@ def test_at_the_printed_most_speed_there_is_a_steady_state(tail):
     """3500 rpm are printed as the most. Loads put in for the loads they heat up, round by round, come nearer by the same share each time, which is
     what comes back of a load; the sum of that series is the steady state. All heat that is made goes out there."""
     model, drive = heated(tail, 3500)
-    field = heat.settled(model, drive)
+    field = heat.settled(model, drive, 20.0)
     nodal = model.nodal(field)
     steady = drive(nodal)
     flows = heat.flows(model, field, steady)
@@ -219,7 +219,7 @@ def test_at_the_printed_most_speed_there_is_a_steady_state(tail):
 
 def test_beyond_it_rollers_run_away(tail):
     with pytest.raises(OutsideRange, match="% of a load that is added there comes back through its heat"):
-        heat.settled(*heated(tail, 4500))
+        heat.settled(*heated(tail, 4500), 20.0)
 
 
 @pytest.mark.slow

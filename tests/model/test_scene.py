@@ -194,6 +194,16 @@ def test_laws():
         law(120.0)
 
 
+def test_a_law_goes_on_a_little_beyond_its_ends():
+    """A temperature that was computed may miss an end by its last digit: the sentence then was "given from 20 to 60 C was asked at 20 C"."""
+    law = Law((20.0, 40.0, 60.0), (1.0, 2.0, 4.0))
+    assert [law(t) for t in (19.999, 20.0, 40.0, 60.0, 60.001)] == pytest.approx([0.99995, 1.0, 2.0, 4.0, 4.0001], rel=1e-12)
+    assert law.integral(19.999, 60.0) == pytest.approx(90.001, rel=1e-6)
+    for outside, said in ((19.98, "19.98"), (60.1, "60.1")):
+        with pytest.raises(OutsideRange, match=rf"^a material law given from 20 to 60 C was asked at {said} C$"):
+            law(outside)
+
+
 def test_what_a_scene_leaves_out_is_assumed_and_said(raw):
     """Thermal data, tolerances and the hammer test have defaults, which the provenance names."""
     for table in ("thermal", "tolerances", "hammer_test"):

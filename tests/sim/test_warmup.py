@@ -60,6 +60,30 @@ def test_reading_with_an_expansion_law(spindle, model):
     assert [m.outer_r for m in found.values()] != pytest.approx([m.outer_r for m in expand(spindle, field).values()], rel=1e-3)
 
 
+def test_reading_where_the_modulus_falls(spindle, model, monkeypatch):
+    """The influence at the field's own temperatures, as `expand` takes it, and no points of another mesh looked for."""
+    law = Law((0.0, 20.0, 100.0), (71e9, 70e9, 64e9))
+    softer = replace(spindle, materials={**spindle.materials, "aluminium": replace(spindle.materials["aluminium"], youngs_modulus=law)})
+    field = heat.steady(model, heat.running(spindle, 35.0, 2 * SPEED))
+    own = conduction.model(softer, influence(softer).sections)
+    expected, hard = expand(softer, field), expand(spindle, field)
+    monkeypatch.setattr("thermospindle.thermal.readout.expand", lambda *_: pytest.fail("the finite elements are asked again"))
+    found = reading(own).motions(softer, own.nodal(field))
+    for name, motion in expected.items():
+        assert np.array(list(vars(found[name]).values())) == pytest.approx(np.array(list(vars(motion).values())), rel=1e-9, abs=1e-18)
+    assert found["upper"].outer_z != pytest.approx(hard["upper"].outer_z, rel=1e-4)
+
+
+def test_a_law_that_begins_where_the_warm_up_does(spindle):
+    """Steel given from 20 to 100 C: the steady state is sought from the start, not from 0 C, and what rounding puts below 20 C is 20 C."""
+    found = []
+    for low in (20.0, 0.0):
+        steel = replace(spindle.materials["steel"], thermal_expansion=Law((low, 100.0), (11.5e-6, 11.5e-6)))
+        found.append(warm_up(replace(spindle, materials={**spindle.materials, "steel": steel}), SPEED, 20.0, duration=20.0))
+    for a, b in zip(*(w.frequencies for w in found), strict=True):
+        assert a == pytest.approx(b, rel=1e-9)
+
+
 # ------------------------------------------------------------------ steps in time
 
 
