@@ -12,6 +12,8 @@ from thermospindle.model.rotor.chain import Matrices
 from thermospindle.model.types import Array, Integers
 from thermospindle.sim.effects.effect import Measurement
 
+Dofs = tuple[tuple[str, str], ...]
+
 EXACT = 1e-11  # of the largest singular value of a change: products that are left out
 
 
@@ -74,10 +76,11 @@ def together(every: Sequence[Products]) -> Products:
 
 @dataclass(frozen=True, eq=False)
 class Rates:
-    """Derivatives of mass, damping and stiffness of every test by the nuisance parameters `numbers` (k,), each by itself."""
+    """Derivatives of mass, damping and stiffness of every test, over its `dofs`, by the nuisance parameters `numbers` (k,), each by itself."""
 
     numbers: tuple[Integers, ...]
     each: tuple[tuple[Products, ...], ...]
+    dofs: tuple[Dofs, ...]
 
     @cached_property
     def products(self) -> list[Products]:
@@ -86,7 +89,7 @@ class Rates:
 
     def __getstate__(self) -> dict:
         """Without what was worked out: it is on its way to another process."""
-        return {"numbers": self.numbers, "each": self.each}
+        return {"numbers": self.numbers, "each": self.each, "dofs": self.dofs}
 
 
 def same_chain(a: Measurement, b: Measurement) -> bool:

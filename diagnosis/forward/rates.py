@@ -16,12 +16,12 @@ STEP = 0.02  # of a prior standard deviation, for differences
 
 def rates_of(model: CampaignModel, x: Array, effects_of: Sequence[Applied], old: Rates | None = None) -> Rates:
     """dM, dC, dK by build tolerances, ring expansion and temperature, for every test; what structure alone moves is kept from `old`."""
-    numbers, each = [], []
+    numbers, each, dofs = [], [], []
     for t, effects in enumerate(effects_of):
         base = model.operating(t, x, effects)
         at = matrices(base.chain)
         own = [*range(len(model.build)), *model.expansion, model.temperature[t]]
-        kept = old.each[t] if old is not None and len(old.each[t][0].left) == len(at.stiffness) else ()
+        kept = old.each[t] if old is not None and old.dofs[t] == at.dofs else ()
         found = []
         for k, i in enumerate(own):
             if kept and k < len(model.build) and model.structural[k]:
@@ -41,4 +41,5 @@ def rates_of(model: CampaignModel, x: Array, effects_of: Sequence[Applied], old:
             found.append(products(*((getattr(moved, w) - getattr(at, w)) / apart for w in ("mass", "damping", "stiffness"))))
         numbers.append(np.array(own))
         each.append(tuple(found))
-    return Rates(tuple(numbers), tuple(each))
+        dofs.append(at.dofs)
+    return Rates(tuple(numbers), tuple(each), tuple(dofs))

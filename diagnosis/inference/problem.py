@@ -13,6 +13,7 @@ from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.linear import Rates
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import FAILED, Applied, CampaignModel
+from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.inference.prior import UNMOVED, Learned, precision_and_variances, roots_of
 from thermospindle.model.types import Array, Integers
 
@@ -171,7 +172,11 @@ class Problem:
         return [self.acting(self.applied(t, sizes, shapes)[0]) for t in range(self.tests)]
 
     def linearisation(self, p: Array, rates: Rates, held: Integers = NONE) -> Linearisation:
-        """Of all tests, without the parameters that are `held` where they are."""
+        """Of all tests, without the parameters that are `held` where they are; with rates of its own where a mechanism that has gone, or come, took degrees of
+        freedom with it."""
+        x, effects_of = self.parts(p)[0], self.effects_of(p)
+        if any(self.model.linear(t, x, own).matrices.dofs != dofs for t, (own, dofs) in enumerate(zip(effects_of, rates.dofs, strict=True))):
+            rates = rates_of(self.model, x, effects_of, rates)
         return Linearisation(self.length, [self.linearised(t, p, rates) for t in range(self.tests)]).without(held)
 
     def residuals(self, p: Array) -> list[Array] | None:

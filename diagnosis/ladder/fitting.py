@@ -81,13 +81,12 @@ class Settled:
     def posterior(self) -> tuple[Array, Array]:
         """Mean (n,) and covariance (n, n) of all parameters, with the width and the departure from its law that were learned of every effect.
 
-        These move the mean away from where the fit stands; where the quadratic does not hold so far, the fit itself is taken, with its
-        wider priors.
+        These move the mean away from where the fit stands; where the quadratic of an effect does not hold so far, or no spindle can be built
+        there, the fit itself is taken, with its wider priors.
         """
-        if self.mechanisms:
-            there = Problem(self.model, self.mechanisms).residuals(self.evidence.mean)
-            if there is None or sum(float(r @ r) for r in there) > HOLDS * self.evidence.chi2:
-                return self.fit.point, self.covariance
+        there = Problem(self.model, self.mechanisms).residuals(self.evidence.mean)
+        if there is None or (self.mechanisms and sum(float(r @ r) for r in there) > HOLDS * self.evidence.chi2):
+            return self.fit.point, self.covariance
         return self.evidence.mean, self.evidence.covariance
 
     def applied(self, t: int) -> list[tuple[Effect, Values]]:

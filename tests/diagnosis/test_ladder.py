@@ -22,7 +22,7 @@ from thermospindle.diagnosis.ladder.step import as_drawn
 from thermospindle.diagnosis.prediction.next_test import ModePrediction, NextTest
 from thermospindle.diagnosis.verdict import campaign_data
 from thermospindle.model.errors import BadInput
-from thermospindle.model.machine import Addition, Condition
+from thermospindle.model.machine import Addition, Condition, Law
 from thermospindle.model.units import RPM
 from thermospindle.report.figures.ladder import residual_map
 from thermospindle.report.log.ladder_content import response, shown
@@ -140,6 +140,19 @@ def test_a_temperature_left_out_is_not_in_the_fit_that_predicts_it(spindle):
     assert found[0][2] == found[1][2] == 8
     assert found[0][1] < 25
     assert found[1][1] > 100 * 8
+
+
+def test_a_mean_where_no_spindle_can_be_built_predicts_nothing(spindle):
+    """Laws from 20 to 60 C, tests at both ends: a learned mean that has the chamber at 19.7 C is none to predict the other test from; the fit itself serves."""
+    steel = spindle.materials["steel"]
+    ending = replace(steel, thermal_expansion=Law((20.0, 60.0), (11.5e-6, 11.5e-6)))
+    measured = replace(spindle, materials={**spindle.materials, "steel": ending})
+    model = without(campaign_data(measured, tables(measured, ())), FREE)
+    blind = settled(unseen(model, [1]))
+    colder = np.where(np.arange(len(blind.fit.point)) == model.temperature[0], -1.0, blind.evidence.mean)
+    outside = replace(blind, evidence=replace(blind.evidence, mean=colder))
+    assert np.array_equal(outside.posterior[0], outside.fit.point)
+    assert predicted_squares(outside, model.tests, [1])[1] == 8
 
 
 @pytest.mark.slow

@@ -231,3 +231,15 @@ def test_errors_come_true_over_many_seeds(name):
     if squares / free > 1.3:
         pytest.xfail(f"posterior means are not taken about the learned priors: mean square of z {squares / free:.2f}")
     assert squares / free > 0.7
+
+
+def test_a_part_of_its_own_may_go_and_come(spindle):
+    """A hub whose rim tilts by itself has two degrees of freedom more, and none where its web is stiff: fits from one side of that and from the other end at
+    one cost. The derivatives of the one did not fit the matrices of the other, and such an effect was no candidate without a word."""
+    model = model_of(spindle, virtual_campaign(spindle, COLD_AND_WARM, 0, responses=(1, 3, 6), frequency=np.arange(400.0, 6000.1, 8.0)))
+    rim = next(m for m in variants(effect("hub_flexibility")) if m.choices == {"seat_share": 0.0})
+    problem = Problem(model, (rim,))
+    found = [fit(model, (rim,), problem.start({0: size}), tempers=(1.0,)) for size in (3.0, 0.0)]
+    assert found[0].cost == pytest.approx(found[1].cost, abs=1.0)
+    dofs = [len(model.linear(0, f.nuisance, problem.effects_of(problem.start({0: size}))[0]).matrices.dofs) for f, size in zip(found, (3.0, 0.0), strict=True)]
+    assert dofs[0] == dofs[1] + 2
