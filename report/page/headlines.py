@@ -22,25 +22,22 @@ def headlines(run: Run, table: Table) -> list[tuple[str, str, str]]:
     """(what, number, explanation): preload, bearing angle and stiffness, and how far the modes of each flexibility move."""
     cold, hot = table.temperatures
     first, last = (next(s.point.state for s in run.steps if temperature_of(s) == t) for t in (cold, hot))
-    preload = [s.bearings[0].preload if s.bearings else 0.0 for s in (first, last)]
-    if cold == hot:
-        return [("Preload", f"{preload[0]:.1f} N", f"at {cold:g} °C")] if first.bearings else []
     pairs = list(zip(first.bearings, last.bearings, strict=True))[::-1]
-    angle = " / ".join(f"{np.degrees(b.contact_angle - a.contact_angle):+.2f}" for a, b in pairs)
-    radial = " / ".join(_change(a.radial_stiffness, b.radial_stiffness) for a, b in pairs)
-    axial = " / ".join(_change(a.axial_stiffness, b.axial_stiffness) for a, b in pairs)
-    names = " / ".join(b.name for _, b in pairs) + " bearing"
-    cards = [
-        (
-            "Preload",
-            f"{preload[0]:.1f} → {preload[1]:.1f} N",
-            f"{100 * preload[1] / preload[0]:.0f} % of it is left at {hot:g} °C",
-        ),
-        ("Contact angle", f"{angle} degrees", f"{names}, from {cold:g} to {hot:g} °C"),
-        ("Radial bearing stiffness", radial, f"{names}; axial {axial}"),
-    ]
-    if not pairs:
-        cards = []
+    if cold == hot:
+        return [("Preload", f"{pairs[-1][0].preload:.1f} N", f"at {cold:g} °C")] if pairs else []
+    cards = []
+    if pairs:
+        before, after = (b.preload for b in pairs[-1])
+        angle = " / ".join(f"{np.degrees(b.contact_angle - a.contact_angle):+.2f}" for a, b in pairs)
+        radial = " / ".join(_change(a.radial_stiffness, b.radial_stiffness) for a, b in pairs)
+        axial = " / ".join(_change(a.axial_stiffness, b.axial_stiffness) for a, b in pairs)
+        names = " / ".join(b.name for _, b in pairs) + " bearing"
+        left = f"{100 * after / before:.0f} % of it is left at {hot:g} °C" if before else f"none at {cold:g} °C"
+        cards = [
+            ("Preload", f"{before:.1f} → {after:.1f} N", left),
+            ("Contact angle", f"{angle} degrees", f"{names}, from {cold:g} to {hot:g} °C"),
+            ("Radial bearing stiffness", radial, f"{names}; axial {axial}"),
+        ]
     groups: dict[tuple[str, str], list[int]] = {}
     for row in table.rows:
         named = (row.published_flexibility, "as published") if row.published_flexibility else (row.flexibility, "by the model")

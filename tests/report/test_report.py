@@ -6,17 +6,21 @@ import re
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from tests.conftest import ROOT
 from tests.made_campaign import other_campaign
+from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.modes import group_energy
-from thermospindle.model.scene.reading import content_hash
-from thermospindle.report.page.comparison import compared
-from thermospindle.report.page.headlines import misses
+from thermospindle.model.scene.reading import content_hash, load
+from thermospindle.report.page.comparison import Table, compared
+from thermospindle.report.page.headlines import headlines, misses
 from thermospindle.report.page.report import background, html, stamp, write_report
 from thermospindle.sim.campaign.campaign import ModeRow
+from thermospindle.sim.operating import operating_point
 from thermospindle.sim.run import Run
 
 VOID = {"meta", "br", "img", "link", "hr", "input"}
@@ -258,3 +262,14 @@ def test_changed_spindle_is_told(run: Run):
     changed = replace(run.spindle, reference_temperature=21.0)
     said = {title: str(body) for title, body in background(Run(changed, run.steps, ()))}
     assert "differs from its file" in said["Where the numbers come from"]
+
+
+@pytest.mark.parametrize(("scene", "cards"), [("mk7702", 0), ("hdd_2003", 3)])
+def test_headlines_of_scenes_with_and_without_ball_rows(scene: str, cards: int) -> None:
+    """A division by a preload that nothing has was a traceback of every `run` of a scene on rated bearings."""
+    spindle = load(ROOT / "scenes" / scene)
+    steps = [SimpleNamespace(point=operating_point(spindle, Condition(t))) for t in (20.0, 40.0)]
+    table = Table((), (), (20.0, 40.0), {}, ())
+    assert len(headlines(SimpleNamespace(steps=steps), table)) == cards  # type: ignore[arg-type]
+    none = [SimpleNamespace(point=replace(s.point, state=replace(s.point.state, bearings=tuple(replace(b, preload=0.0) for b in s.point.state.bearings)))) for s in steps]
+    assert all("0.0 → 0.0 N" in number for what, number, _ in headlines(SimpleNamespace(steps=none), table) if what == "Preload")  # type: ignore[arg-type]
