@@ -83,6 +83,21 @@ class Structure:
     def body(self, name: str) -> Body:
         return next(b for b in self.bodies if b.name == name)
 
+    @property
+    def rigid_bodies(self) -> list[Body]:
+        """Those that are no node of a shaft."""
+        return [b for b in self.bodies if self.carrier(b.name) == b.name]
+
+    @property
+    def parts(self) -> list[str]:
+        """Names of what is axially rigid: of bodies, and of shafts in place of their nodes."""
+        return [*(b.name for b in self.rigid_bodies), *(s.name for s in self.shafts)]
+
+    @property
+    def own_joints(self) -> list[Joint]:
+        """Those that are no element of a shaft."""
+        return [j for j in self.joints if not any(j.name in s.elements for s in self.shafts)]
+
 
 @dataclass(frozen=True)
 class Point:
@@ -93,6 +108,12 @@ class Point:
     body: str
     position: tuple[float, float, float]
     direction: tuple[float, float, float]
+
+    @property
+    def axis(self) -> str:
+        """Its direction as +X, -Y ..."""
+        along = max(range(3), key=lambda i: abs(self.direction[i]))
+        return ("+" if self.direction[along] > 0 else "-") + "XYZ"[along]
 
 
 FAINTEST = 1e-6  # N, peak force of a hammer: squares of far fainter ones are no numbers any more

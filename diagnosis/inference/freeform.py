@@ -37,7 +37,7 @@ def free_forms(spindle: Spindle) -> list[Mechanism]:
     """One mechanism for everything that might drift; its size in per cent (of ln) or um is what changes in each test."""
     found = []
     shafts = spindle.structure.shafts
-    joints = [j for j in spindle.structure.joints if not any(j.name in s.elements for s in shafts)]
+    joints = spindle.structure.own_joints
     parts: list[tuple[str, tuple[str, ...], list[tuple[str, tuple[int, ...]]]]] = [(j.name, (j.name,), _groups(j.stiffness)) for j in joints]
     parts += [(s.name, s.elements, OF_BEAMS) for s in shafts]  # a shaft is one piece: its elements drift together
     for name, elements, groups in parts:

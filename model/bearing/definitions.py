@@ -101,6 +101,11 @@ class RollerBearing:
         return self.rollers
 
     @property
+    def offsets(self) -> tuple[float, ...]:
+        """Heights (rows,) m of the rows above `z`."""
+        return tuple(self.row_spacing * (k - (self.rows - 1) / 2) for k in range(self.rows))
+
+    @property
     def elements(self) -> int:
         """How many rollers there are, of all rows."""
         return self.rows * self.rollers

@@ -114,8 +114,7 @@ def roller_row(spindle: Spindle, b: RollerBearing, motion: RingMotion | None, te
         clearance += 2 * (motion.outer_r - motion.inner_r) - 2 * b.roller_diameter * motion.ball_strain
     constant = line_constant(b.roller_length, 1 / softness)
     clearance = eased(float(clearance), b.rows * b.rollers * constant, b.race_give)
-    offsets = tuple(b.row_spacing * (k - (b.rows - 1) / 2) for k in range(b.rows))
-    return RollerRow(b.rollers, b.roller_length, constant, clearance, offsets)
+    return RollerRow(b.rollers, b.roller_length, constant, clearance, b.offsets)
 
 
 def eased(clearance: float, constant: float, give: float) -> float:

@@ -186,7 +186,7 @@ def check_structure(file: Path, spindle: Spindle) -> None:
     shafts = [s.name for s in structure.shafts]
     for key, name in mountings:
         if name not in (*names, *shafts, "ground"):
-            raise BadInput(f"{file}: {key} = {name!r}: allowed are {', '.join((*_plain(spindle), *shafts))}")
+            raise BadInput(f"{file}: {key} = {name!r}: allowed are {', '.join(spindle.structure.parts)}")
     for body in structure.bodies:
         if len(set(names)) < len(names) or body.name == "ground":
             raise BadInput(f"{file}: structure.bodies: the name {body.name!r} is taken; body names must differ, and 'ground' is the world")
@@ -203,7 +203,7 @@ def check_structure(file: Path, spindle: Spindle) -> None:
         for name in joint.bodies:
             if name not in (*names, "ground"):
                 raise BadInput(
-                    f"{file}: structure.joints.{joint.name}.between: {name!r} is no body; allowed are ground, {', '.join((*_plain(spindle), *shafts))}"
+                    f"{file}: structure.joints.{joint.name}.between: {name!r} is no body; allowed are ground, {', '.join(spindle.structure.parts)}"
                 )
     nodes = [p.node for p in spindle.points]
     for point in spindle.points:
@@ -212,7 +212,7 @@ def check_structure(file: Path, spindle: Spindle) -> None:
         if point.name and [p.name for p in spindle.points].count(point.name) > 1:
             raise BadInput(f"{file}: measuring.points: name = {point.name!r} stands twice; names must differ")
         if point.body not in names:
-            raise BadInput(f"{file}: measuring.points.{point.node}.body = {point.body!r}: allowed are {', '.join((*_plain(spindle), *shafts))}")
+            raise BadInput(f"{file}: measuring.points.{point.node}.body = {point.body!r}: allowed are {', '.join(spindle.structure.parts)}")
     for node in spindle.hammer.hammer_nodes:
         if node not in nodes:
             raise BadInput(f"{file}: hammer_test.hammer_nodes: {node} is no measuring point; allowed are {nodes}")
@@ -223,16 +223,11 @@ def _as_pair(spindle: Spindle) -> bool:
     return "bearing_pair.preload_N" in spindle.provenance
 
 
-def _plain(spindle: Spindle) -> list[str]:
-    """Names of the bodies that are no nodes of a shaft."""
-    return [b.name for b in spindle.structure.bodies if spindle.structure.carrier(b.name) == b.name]
-
-
 def _check_mountings(file: Path, spindle: Spindle) -> None:
     """Bodies that carry rings exist, and of the two of a ball row one turns against the other."""
     structure = spindle.structure
     names = {b.name for b in structure.bodies}
-    allowed = ", ".join(("ground", *_plain(spindle), *(s.name for s in structure.shafts)))
+    allowed = ", ".join(("ground", *structure.parts))
     for b in spindle.all_bearings:
         for key, name in (("inner_body", b.inner_body), ("outer_body", b.outer_body)):
             if name != "ground" and name not in names:

@@ -140,8 +140,8 @@ def _row(axes: Axes, b: Bearing, angle: float, frame: Frame) -> None:
 def _rollers(axes: Axes, b: RollerBearing) -> None:
     """A rectangle a row, with its load line across the axis."""
     length, half = b.roller_length / MM, b.roller_diameter / MM / 2
-    for k in range(b.rows):
-        z, r = b.z / MM + (k - (b.rows - 1) / 2) * b.row_spacing / MM, b.pitch_diameter / MM / 2
+    for offset in b.offsets:
+        z, r = (b.z + offset) / MM, b.pitch_diameter / MM / 2
         axes.add_patch(Rectangle((z - length / 2, r - half), length, 2 * half, fc="#fdfdfb", ec=INK, lw=0.8, zorder=3))
         axes.plot([z, z], [r + 1.4 * half, 0], color=LOAD, lw=0.9, ls=(0, (5, 2)), zorder=4)
 
@@ -186,16 +186,14 @@ def _beams(axes: Axes, spindle: Spindle, frame: Frame) -> None:
 
 
 def _centres_and_joints(axes: Axes, spindle: Spindle, frame: Frame) -> None:
-    structure = spindle.structure
-    for b in structure.bodies:
-        if structure.carrier(b.name) == b.name:
-            z, size = b.z / MM, 0.075 * frame.per_inch
-            axes.add_patch(Circle((z, -0.5 * frame.bottom), size, fc="white", ec=INK, lw=0.8, zorder=5))
-            for quarter in (0, 180):  # as drawings mark a centre of mass
-                arc = np.radians(np.linspace(quarter, quarter + 90, 12))
-                corners = [(z, -0.5 * frame.bottom), *zip(z + size * np.cos(arc), -0.5 * frame.bottom + size * np.sin(arc), strict=True)]
-                axes.add_patch(Polygon(corners, fc=INK, ec="none", zorder=6))
-    for z in {j.z for j in structure.joints if not any(j.name in s.elements for s in structure.shafts)}:
+    for b in spindle.structure.rigid_bodies:
+        z, size = b.z / MM, 0.075 * frame.per_inch
+        axes.add_patch(Circle((z, -0.5 * frame.bottom), size, fc="white", ec=INK, lw=0.8, zorder=5))
+        for quarter in (0, 180):  # as drawings mark a centre of mass
+            arc = np.radians(np.linspace(quarter, quarter + 90, 12))
+            corners = [(z, -0.5 * frame.bottom), *zip(z + size * np.cos(arc), -0.5 * frame.bottom + size * np.sin(arc), strict=True)]
+            axes.add_patch(Polygon(corners, fc=INK, ec="none", zorder=6))
+    for z in {j.z for j in spindle.structure.own_joints}:
         axes.plot(z / MM, -0.82 * frame.bottom, "D", mfc="white", mec=JOINT, ms=5, mew=1.3, zorder=6)
 
 
@@ -221,9 +219,8 @@ def _labels(spindle: Spindle, frame: Frame) -> tuple[list[Label], list[Label]]:
     for s in structure.shafts:
         middle = (s.nodes[0] + s.nodes[-1]) / 2
         low.append((s.name, middle / MM, -min(max(g.outer) for g in s.segments if g.z[0] <= middle <= g.z[1]) / MM, INK))
-    low += [(b.name, b.z / MM, -0.5 * frame.bottom, INK) for b in structure.bodies if structure.carrier(b.name) == b.name]
-    joints = [j for j in structure.joints if not any(j.name in s.elements for s in structure.shafts)]
-    low += [(f"{j.name} ({' - '.join(structure.carrier(n) for n in j.bodies)})", j.z / MM, -0.82 * frame.bottom, JOINT) for j in joints]
+    low += [(b.name, b.z / MM, -0.5 * frame.bottom, INK) for b in structure.rigid_bodies]
+    low += [(f"{j.name} ({' - '.join(structure.carrier(n) for n in j.bodies)})", j.z / MM, -0.82 * frame.bottom, JOINT) for j in structure.own_joints]
     return _staggered(top, frame), _staggered(low, frame)
 
 
@@ -284,8 +281,8 @@ def _legend(spindle: Spindle) -> list[Line2D | Patch]:
         handles.append(Line2D([], [], color=INK, marker="o", mfc="none", ls="none", ms=6, label="along y"))
     if spindle.structure.shafts:
         handles.append(Line2D([], [], color=INK, marker="|", ls="none", ms=7, label="beam node"))
-    if any(structure.carrier(b.name) == b.name for b in structure.bodies):
+    if structure.rigid_bodies:
         handles.append(Line2D([], [], color=INK, marker="o", ls="none", ms=6, label="centre of mass"))
-    if any(not any(j.name in s.elements for s in structure.shafts) for j in structure.joints):
+    if structure.own_joints:
         handles.append(Line2D([], [], color=JOINT, marker="D", mfc="white", ls="none", ms=5, label="joint"))
     return handles

@@ -7,11 +7,9 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from matplotlib import rc_context
-
 from thermospindle.report.check.drawing import drawing
 from thermospindle.report.check.words import grids, sentences
-from thermospindle.report.figures.common import STYLE, save, svg
+from thermospindle.report.figures.common import save, svg
 from thermospindle.report.page.report import page
 from thermospindle.report.typeset import figure, micro, minus, prose, table
 from thermospindle.sim.operating import OperatingPoint
@@ -25,8 +23,6 @@ CAPTION = (
 def write_check(point: OperatingPoint, values: Mapping[str, Any], folder: Path) -> None:
     """`check.html`, and the picture as `section.svg` and `section.png`, into a folder that exists."""
     picture = drawing(point)
-    with rc_context(STYLE):
-        drawn = svg(picture, "check", CAPTION)
     odd = "".join(f"<li>{prose(words)}</li>" for words in values["odd"])
     assumed = [[escape(a["key"]), prose(a["what"])] for a in values["assumed"]]
     tables = "".join(
@@ -34,7 +30,7 @@ def write_check(point: OperatingPoint, values: Mapping[str, Any], folder: Path) 
         for title, head, rows in grids(values)
     )
     sections = [
-        ("What it is", "".join(f"<p>{prose(words)}</p>" for words in sentences(values)) + figure(drawn, CAPTION)),
+        ("What it is", "".join(f"<p>{prose(words)}</p>" for words in sentences(values)) + figure(svg(picture, "check", CAPTION), CAPTION)),
         ("What is odd", f"<ul>{odd}</ul>" if odd else "<p>Nothing.</p>"),
         ("Parts", tables),
         ("What is assumed", table(["key", "what stands for it"], assumed, (0, 1)) if assumed else "<p>Nothing: the scene says it all.</p>"),

@@ -13,7 +13,6 @@ from thermospindle.model.bearing.roller import RollerState
 from thermospindle.model.machine import Bearing, Body, LinearBearing, RollerBearing, Spindle
 from thermospindle.model.shaft import THEORIES, Shaft
 from thermospindle.model.units import RPM
-from thermospindle.report.text.states import axis_name
 from thermospindle.sim.effects.effect import Effect, refusal
 from thermospindle.sim.hammer.pulse import pulse_duration
 from thermospindle.sim.operating import OperatingPoint
@@ -26,7 +25,7 @@ def understood(point: OperatingPoint, catalogue: Sequence[Effect]) -> dict[str, 
     """The keys of `spindle check --json` but `odd` and `warnings`; `point` is the spindle at its reference temperature, at rest."""
     spindle = point.spindle
     structure = spindle.structure
-    plain = [b for b in structure.bodies if structure.carrier(b.name) == b.name]
+    plain = structure.rigid_bodies
     refused = {e.name: why for e in catalogue if (why := refusal(e, spindle))}
     return {
         "scene": spindle.name,
@@ -65,15 +64,14 @@ def understood(point: OperatingPoint, catalogue: Sequence[Effect]) -> dict[str, 
                 "damping_ratio": j.damping_ratio,
                 "role": j.role,
             }
-            for j in structure.joints
-            if not any(j.name in s.elements for s in structure.shafts)
+            for j in structure.own_joints
         },
         "points": {
             p.name: {
                 "node": p.node,
                 "on": structure.carrier(p.body),
                 "position_mm": [_mm(x) for x in p.position],
-                "direction": axis_name(p.direction),
+                "direction": p.axis,
                 "hammer": p.node in spindle.hammer.hammer_nodes,
             }
             for p in spindle.points

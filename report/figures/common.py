@@ -153,12 +153,13 @@ def residual_norm(largest: float) -> SymLogNorm:
     return SymLogNorm(LINEAR, vmin=-max(SMALLEST, largest), vmax=max(SMALLEST, largest))
 
 
-def logarithmic(axes: Axes) -> None:
-    """A logarithmic y axis with plain numbers at 1, 2 and 5 of every decade."""
-    axes.set_yscale("log")
-    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.yaxis.set_major_formatter("{x:g}")
-    axes.yaxis.set_minor_locator(NullLocator())
+def logarithmic(axes: Axes, which: str = "y") -> None:
+    """A logarithmic axis with plain numbers at 1, 2 and 5 of every decade."""
+    axes.set(**{f"{which}scale": "log"})
+    axis = axes.yaxis if which == "y" else axes.xaxis
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_locator(NullLocator())
 
 
 def residual_bar(part: Any, norm: SymLogNorm, axes: Any, **look: Any) -> None:

@@ -280,8 +280,8 @@ def _materials(axes: Axes, spindle: Spindle) -> list[Patch]:
     for b in spindle.ringed:
         r, z, size = b.pitch_diameter * 500, b.z * 1e3, b.ball_diameter * 1e3
         if isinstance(b, RollerBearing):
-            for k in range(b.rows):
-                low = z + 1e3 * (b.row_spacing * (k - (b.rows - 1) / 2) - b.roller_length / 2)
+            for offset in b.offsets:
+                low = z + 1e3 * (offset - b.roller_length / 2)
                 axes.add_patch(Rectangle((r - size / 2, low), size, b.roller_length * 1e3, fc="#f4f4f2", ec=INK, lw=0.8))
         else:
             axes.add_patch(Circle((r, z), size / 2, fc="#f4f4f2", ec=INK, lw=0.8))

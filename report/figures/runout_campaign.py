@@ -15,7 +15,7 @@ from thermospindle.diagnosis.runout.explanation import Explanation
 from thermospindle.diagnosis.runout.moved import MovedLine, leading, moved_lines
 from thermospindle.diagnosis.runout.verdict import RunoutDiagnosis
 from thermospindle.model.units import TO_NM
-from thermospindle.report.figures.common import INK, PALE, STYLE, cells, label, residual_bar, residual_norm, spread
+from thermospindle.report.figures.common import INK, PALE, STYLE, cells, label, logarithmic, residual_bar, residual_norm, spread
 from thermospindle.report.figures.diagnosis import NAMED, OTHER, evidence_bars
 from thermospindle.report.figures.runout import BAND, REPEATS
 from thermospindle.report.typeset import signed_short
@@ -161,10 +161,7 @@ def moved_figure(moved: Sequence[MovedLine], lead: Explanation) -> Figure:
     figure = Figure(figsize=(8.6, 1.25 + 0.27 * len(shown)), layout="constrained")
     axes = figure.subplots()
     y = np.arange(len(shown))
-    axes.set_xscale("log")
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.xaxis.set_major_formatter("{x:g}")
-    axes.xaxis.set_minor_locator(NullLocator())
+    logarithmic(axes, "x")
     scene, effect, measured, sd = (TO_NM * np.array([getattr(m, name) for m in shown]) for name in ("scene", "with_effect", "measured", "measured_sd"))
     axes.hlines(y, scene, effect, color=PALE, lw=1.0)
     axes.plot(scene, y, "o", mfc="none", color=OTHER, ms=6, ls="none", label="scene alone, likely")

@@ -153,5 +153,5 @@ def show_run(console: Console, run: Run, out: Path) -> None:
 def _struck(spindle: Spindle) -> str:
     """Why a mode may stay unseen: where and along which axes the hammer strikes."""
     points = [spindle.point(node) for node in spindle.hammer.hammer_nodes]
-    places = ", ".join(f"node {p.node} along {'xyz'[int(np.argmax(np.abs(p.direction)))]}" for p in points)
+    places = ", ".join(f"node {p.node} along {p.axis[1].lower()}" for p in points)
     return f"The hammer strikes {places}: a mode that does not move there, or lies too near a stronger one, shows no peak of its own."

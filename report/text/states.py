@@ -121,17 +121,11 @@ def show_modes(console: Console, answer: dict[str, Any], point: OperatingPoint) 
 # ---------------------------------------------------------------- a unit force
 
 
-def axis_name(direction: Sequence[float]) -> str:
-    """A unit vector along an axis as +X, -Y ..."""
-    along = max(range(3), key=lambda i: abs(direction[i]))
-    return ("+" if direction[along] > 0 else "-") + "XYZ"[along]
-
-
 def static_json(answers: Sequence[Static], bearings: str, beam: str) -> dict[str, Any]:
     """By point: stiffness (None where nothing holds it), reactions and shares of the compliance."""
     points = {
         a.point.name: {
-            "direction": axis_name(a.point.direction),
+            "direction": a.point.axis,
             "stiffness_N_per_m": a.stiffness if 0 < a.stiffness < float("inf") else None,
             "free": a.stiffness == 0.0,
             "reactions_N": dict(a.reactions),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import floor, log10
 from typing import Any, Protocol
 
 from bokeh.models import Button, Checkbox, Column, CustomJSTickFormatter, Div, NumericInput, Row, Select, Slider, Toggle
@@ -22,6 +21,7 @@ from thermospindle.report.workbench.state import (
     span_of_tolerance,
 )  # fmt: skip
 from thermospindle.sim.effects.effect import Effect, Parameter
+from thermospindle.sim.posing import round_down
 
 STEPS = 400  # of a slider, about
 WIDE: Any = {"sizing_mode": "stretch_width"}
@@ -132,20 +132,13 @@ class Controls:
 
     def _parameter(self, effect: Effect, p: Parameter, s: Setting) -> Row:
         key, value, unit = key_of(effect.name, p.name), s.effects[effect.name][p.name], "" if p.unit == "1" else f", {p.unit}"
-        says = {"description": None, "html_attributes": {**labelled(f"{p.name}{unit}"), "title": p.meaning}}
+        says = {**labelled(f"{p.name}{unit}"), "title": p.meaning}
         if p.choices:
-            chosen = Select(title=p.name, value=f"{value:g}", options=[f"{c:g}" for c in p.choices], stylesheets=[LOOK], **says, **WIDE)
+            chosen = Select(title=p.name, value=f"{value:g}", options=[f"{c:g}" for c in p.choices], stylesheets=[LOOK], description=None, html_attributes=says, **WIDE)
             chosen.on_change("value", lambda attr, old, new: self._set(effect.name, p.name, float(new), False))
             self.sliders[key] = chosen
             return Row(chosen, **WIDE)
-        low, high = span(p, value)
-        del says["description"]
-        slider = Slider(
-            title=f"{p.name}{unit}", start=low, end=high, value=value, step=step_of(low, high), format=CustomJSTickFormatter(code=PLAIN), stylesheets=[LOOK], tooltips=False, show_value=False, name=key, **says, **WIDE
-        )
-        slider.on_change("value", lambda attr, old, new: self._set(effect.name, p.name, new, True))
-        slider.on_change("value_throttled", lambda attr, old, new: self._set(effect.name, p.name, new, False))
-        self.sliders[key] = slider
+        slider = self._slider(key, f"{p.name}{unit}", span(p, value), value, PLAIN, says, lambda v, dragging: self._set(effect.name, p.name, v, dragging))
         number = self._number(key, value, 1.0, lambda v: self._set(effect.name, p.name, min(max(v, p.limits[0]), p.limits[1]), False))
         return Row(slider, number, self._tick(key, s), **WIDE)
 
@@ -153,17 +146,28 @@ class Controls:
         self.change(lambda s: set_value(s, effect, parameter, value) if effect in s.effects else s, dragging, key_of(effect, parameter))
 
     def _tolerance(self, name: str, sd: float, s: Setting) -> Row:
-        low, high = span_of_tolerance(sd)
-        slider = Slider(
-            title=f"{name}, % (±\u00a0{100 * sd:.3g})", start=low, end=high, value=s.deviations.get(name, 0.0), step=step_of(low, high), format=CustomJSTickFormatter(code=PERCENT), stylesheets=[LOOK], tooltips=False, show_value=False,
-            name=name, html_attributes=labelled(name), **WIDE,
-        )  # fmt: skip
-        slider.on_change("value", lambda attr, old, new: self.change(lambda s: set_deviation(s, name, new), True, name))
-        slider.on_change("value_throttled", lambda attr, old, new: self.change(lambda s: set_deviation(s, name, new), False, name))
-        self.sliders[name] = slider
+        value, title = s.deviations.get(name, 0.0), f"{name}, % (±\u00a0{100 * sd:.3g})"
+
+        def take(v: float, dragging: bool) -> None:
+            self.change(lambda s: set_deviation(s, name, v), dragging, name)
+
+        slider = self._slider(name, title, span_of_tolerance(sd), value, PERCENT, labelled(name), take)
         low, high = FURTHEST
         number = self._number(name, slider.value, 100.0, lambda v: self.change(lambda s: set_deviation(s, name, min(max(v, low), high)), False))
         return Row(slider, number, self._tick(name, s), **WIDE)
+
+    def _slider(
+        self, key: str, title: str, ends: tuple[float, float], value: float, shown: str, says: dict[str, str], take: Callable[[float, bool], None]
+    ) -> Slider:
+        """Between `ends`; `take` is told its value, and whether it is still being dragged."""
+        slider = Slider(
+            title=title, start=ends[0], end=ends[1], value=value, step=step_of(*ends), format=CustomJSTickFormatter(code=shown), stylesheets=[LOOK], tooltips=False,
+            show_value=False, name=key, html_attributes=says, **WIDE,
+        )  # fmt: skip
+        slider.on_change("value", lambda attr, old, new: take(new, True))
+        slider.on_change("value_throttled", lambda attr, old, new: take(new, False))
+        self.sliders[key] = slider
+        return slider
 
     def _number(self, key: str, value: float, times: float, take: Callable[[float], None]) -> NumericInput:
         """The value to be typed, times a factor (100: percent); a slider's own steps are round ones."""
@@ -192,6 +196,4 @@ def rounded(value: float) -> float:
 
 def step_of(low: float, high: float) -> float:
     """A round step, about `STEPS` of them from one end to the other."""
-    size = (high - low) / STEPS
-    decade = 10.0 ** floor(log10(size))
-    return float(f"{decade * max(k for k in (1, 2, 5) if k * decade <= size * 1.0000001):.6g}")
+    return float(f"{round_down((high - low) / STEPS):.6g}")

@@ -26,6 +26,7 @@ from thermospindle.report.workbench.bench import Bench, Curves, Errors
 from thermospindle.report.workbench.section import LARGEST, Piece
 from thermospindle.report.workbench.shades import hexadecimal, shades
 from thermospindle.report.workbench.state import Setting
+from thermospindle.sim.posing import round_down
 
 MEASURED, COMPUTED = "#d2691e", "#2f86d6"  # three to one and more on white and on black
 FITTED, LEFT_OUT, CONDITIONS = "fitted", "left out", "conditions"
@@ -163,7 +164,7 @@ class MovingSection:
         self.figure.grid.grid_line_color = None
         self.figure.xaxis.axis_label = "r, mm"
         self.figure.yaxis.axis_label = "z, mm"
-        self.figure.axis.ticker = SingleIntervalTicker(interval=_round_step(max(half) / 2))
+        self.figure.axis.ticker = SingleIntervalTicker(interval=round_down(max(half) / 2))
         self.play = Toggle(label="Play", active=False, name="play", width=90)
         move = CustomJS(args={"motion": self.motion, "now": self.now, "play": self.play}, code=MOVE)
         self.play.js_on_change("active", move)
@@ -174,11 +175,6 @@ class MovingSection:
         self.now.data = dict(self.now.data) | {"x": [x.tolist() for x, _ in start], "z": [z.tolist() for _, z in start]}
         parts = {"xa": [x.real for x, _ in moved], "xb": [x.imag for x, _ in moved], "za": [z.real for _, z in moved], "zb": [z.imag for _, z in moved]}
         self.motion.data = dict(self.motion.data) | {k: [row.tolist() for row in rows] for k, rows in parts.items()}
-
-
-def _round_step(size: float) -> float:
-    decade = 10.0 ** np.floor(np.log10(size))
-    return float(decade * max(k for k in (1, 2, 5) if k * decade <= size))
 
 
 SQUARE = """

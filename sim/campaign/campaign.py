@@ -25,7 +25,7 @@ from thermospindle.model.units import MINUTE, MM, RPM
 from thermospindle.model.whole import whole
 from thermospindle.sim.campaign.form import MODE_COLUMNS, ModeTable, checked, in_unit, toml
 from thermospindle.sim.campaign.runout_record import RunoutRecord, read_runout, same, write_runout
-from thermospindle.sim.campaign.uff import LARGEST, axis_number, read_frf, write_frf
+from thermospindle.sim.campaign.uff import LARGEST, read_frf, write_frf
 from thermospindle.sim.identification.frf import LIMITS, Frf, Limits, check_frf
 
 
@@ -224,7 +224,7 @@ def _toml_text(campaign: Campaign) -> str:
             "name": p.name,
             "body": p.body,
             "position_mm": [in_unit(x, MM) for x in p.position],
-            "direction": "-+"[axis_number(p.direction) > 0] + "XYZ"[abs(axis_number(p.direction)) - 1],
+            "direction": p.axis,
         }
         for p in campaign.points
     ]

@@ -9,7 +9,6 @@ from thermospindle.model.machine import Point, Spindle
 from thermospindle.model.scene.measuring import axis_vector
 from thermospindle.model.scene.shafts import resolved_body
 from thermospindle.model.units import MM
-from thermospindle.sim.campaign.uff import axis_number
 from thermospindle.sim.importing.mapping import MadePoint, MappingForm
 from thermospindle.sim.importing.measured import End, Question, listed
 
@@ -21,7 +20,7 @@ def points_of(form: MappingForm, scene: Spindle | None) -> tuple[dict[int, Point
     found = {p.node: p for p in scene.points} if scene else {}
     questions = []
     shafts = {s.name: s for s in scene.structure.shafts} if scene else {}
-    bodies = body_names(scene) if scene else []
+    bodies = scene.structure.parts if scene else []
     for made in form.points:
         base = found.get(made.node)
         missing = [key for key in NEEDED if getattr(made, key) is None] if base is None else []
@@ -36,22 +35,11 @@ def points_of(form: MappingForm, scene: Spindle | None) -> tuple[dict[int, Point
     return found, questions
 
 
-def body_names(scene: Spindle) -> list[str]:
-    """What a point may be on: bodies, and shafts by their names in place of their nodes."""
-    nodes = {b for s in scene.structure.shafts for b in s.bodies}
-    return [*(b.name for b in scene.structure.bodies if b.name not in nodes), *(s.name for s in scene.structure.shafts)]
-
-
 def _point(made: MadePoint, base: Point | None) -> Point:
     position = tuple(v * MM for v in made.position_mm) if made.position_mm is not None else (base.position if base else (0.0, 0.0, 0.0))
     direction = axis_vector(made.direction) if made.direction else (base.direction if base else (0.0, 0.0, 1.0))
     name, body = made.name or (base.name if base else ""), made.body or (base.body if base else "")
     return Point(made.node, name, body, position, direction)  # type: ignore[arg-type]
-
-
-def direction_of(point: Point) -> str:
-    number = axis_number(point.direction)
-    return ("+" if number > 0 else "-") + "XYZ"[abs(number) - 1]
 
 
 def place(end: End, form: MappingForm, points: dict[int, Point]) -> tuple[int, int] | None:
@@ -68,13 +56,13 @@ def place(end: End, form: MappingForm, points: dict[int, Point]) -> tuple[int, i
             return point.node, 1
     if end.node in points:
         point = points[end.node]
-        if not end.direction or end.direction[1] == direction_of(point)[1]:
+        if not end.direction or end.direction[1] == point.axis[1]:
             return point.node, _sign(end, point)
     return None
 
 
 def _sign(end: End, point: Point) -> int:
-    own = direction_of(point)
+    own = point.axis
     return -1 if end.direction and end.direction[1] == own[1] and end.direction[0] != own[0] else 1
 
 
@@ -86,6 +74,6 @@ def unplaced(ends: Sequence[tuple[str, End]], points: dict[int, Point], scene: S
             labels.setdefault(end.label, []).append(file)
     if not labels:
         return []
-    there = f"; points there are {listed(f'{p.node} {p.name} {direction_of(p)}' for p in points.values())}" if points else ""
+    there = f"; points there are {listed(f'{p.node} {p.name} {p.axis}' for p in points.values())}" if points else ""
     hint = "" if scene else "; --scene takes those of a scene"
     return [Question("points", "called", f'which points {listed(repr(n) for n in labels)} are: a [[points]] with called = ["{next(iter(labels))}"]{there}{hint}')]

@@ -14,7 +14,6 @@ from thermospindle.sim.importing.assemble import Read
 from thermospindle.sim.importing.files.labels import ROLES
 from thermospindle.sim.importing.measured import End, Question, listed
 from thermospindle.sim.importing.names import conditions_of, hit_at, plain, tests_of
-from thermospindle.sim.importing.places import body_names
 
 HEAD = """\
 # What the files do not tell. Put an answer in the place of each "?"; a key that is left out, or "?", is open.
@@ -117,7 +116,7 @@ def _points(found: Read, scene: Spindle | None) -> Iterable[list[str]]:
     places = {n: p for c in found.contents for n, p in c.places.items()}
     unscaled = {n: p for c in found.contents for n, p in c.unscaled.items()}
     taken = set(found.points)
-    bodies = f"    # a body of the scene: {', '.join(body_names(scene))}" if scene else "    # the body of the scene that it is on"
+    bodies = f"    # a body of the scene: {', '.join(scene.structure.parts)}" if scene else "    # the body of the scene that it is on"
     for label, end in ends.items():
         node = end.node if end.node and end.node not in taken else next(n for n in range(1, 10**6) if n not in taken)
         taken.add(node)
