@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Console
@@ -19,7 +19,9 @@ from thermospindle.model.machine import FAINTEST, Spindle
 from thermospindle.report.folder import mark, whole_folder
 from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.effects.known import equipped
-from thermospindle.sim.operating import OperatingPoint
+
+if TYPE_CHECKING:
+    from thermospindle.sim.operating import OperatingPoint
 
 STEPS = 5  # of temperature over a scene's range, unless a verb is given others
 
