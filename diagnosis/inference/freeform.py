@@ -1,4 +1,4 @@
-"""What would have to drift, where nobody names a cause: every element's stiffness and damping, the rings' positions, the preload.
+"""What would have to drift, where nobody names a cause: every element's stiffness and damping, the rings' positions, the preload, and the mass of what turns.
 
 Free-form models compete with the named effects by the same evidence. They have no law: how much they change in each test is free, only
 continuous over the conditions, and its width is learned. So a named effect whose law holds beats them, for it has less to choose; one
@@ -17,7 +17,7 @@ from thermospindle.diagnosis.forward.mechanism import Mechanism, asked_at
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.model.bearing.pair import PairState
-from thermospindle.model.machine import MOVES, Condition, RingMotion, Spindle
+from thermospindle.model.machine import MOVES, Body, Condition, RingMotion, Spindle
 from thermospindle.model.rotor.chain import RotorBase
 from thermospindle.model.tolerance import scaled_preload
 from thermospindle.model.types import Array
@@ -25,7 +25,7 @@ from thermospindle.model.units import RPM
 from thermospindle.sim.effects import CATALOGUE, by_name
 from thermospindle.sim.effects.effect import HOOKS, Effect, Parameter, Values, fitted_to, refusal
 
-STIFFNESS_WIDTH, DAMPING_WIDTH, PRELOAD_WIDTH = 3.0, 20.0, 5.0  # %
+STIFFNESS_WIDTH, DAMPING_WIDTH, PRELOAD_WIDTH, MASS_WIDTH = 3.0, 20.0, 5.0, 3.0  # %
 RING_WIDTH = 0.2  # um
 ALIKE = 2e-4  # of the squares of what an effect moves, that a free form which is its own change may leave
 NEARLY = 0.1  # of them, likewise, where a fit of the effect may start from what the free form says
@@ -46,6 +46,10 @@ def free_forms(spindle: Spindle) -> list[Mechanism]:
         for label, moves in groups:
             found.append(_form(f"{name} {label} stiffness", "%", STIFFNESS_WIDTH, chain=_scaled(elements, moves, damping_too=True)))
         found.append(_form(f"{name} damping", "%", DAMPING_WIDTH, chain=_scaled(elements, range(0), damping_too=True, damping_only=True)))
+    for name, bodies in [(s.name, s.bodies) for s in shafts if s.turns] + [(b, (b,)) for b in _turning_alone(spindle)]:
+        found.append(_form(f"{name} mass", "%", MASS_WIDTH, chain=_heavier(bodies, whole=True)))
+        if len(bodies) == 1:
+            found.append(_form(f"{name} transverse inertia", "%", MASS_WIDTH, chain=_heavier(bodies, whole=False)))
     names = [b.name for b in spindle.bearings]
     sets = [("bearings", names), *([(name, [name]) for name in names] if len(names) > 1 else [])]
     for label, own in sets:
@@ -100,6 +104,27 @@ def _scaled(names: Sequence[str], moves, damping_too: bool, damping_only: bool =
                 e = replace(e, stiffness=_congruent(e.stiffness, moves, f), damping=_congruent(e.damping, moves, f) if damping_too else e.damping)
             elements.append(e)
         return replace(chain, elements=tuple(elements))
+
+    return chain
+
+
+def _turning_alone(spindle: Spindle) -> list[str]:
+    """The bodies that turn and are no shaft's nodes."""
+    nodes = {name for s in spindle.structure.shafts for name in s.bodies}
+    return [b.name for b in spindle.structure.bodies if b.turns and b.name not in nodes]
+
+
+def _heavier(names: Sequence[str], whole: bool):
+    """Mass and moments of inertia of bodies times the factor, or their transverse moments alone."""
+
+    def chain(spindle: Spindle, condition: Condition, values: Values, chain: RotorBase) -> RotorBase:
+        f = _factor(values)
+
+        def changed(b: Body) -> Body:
+            x, y, z = b.inertia
+            return replace(b, mass=f * b.mass if whole else b.mass, inertia=(f * x, f * y, f * z if whole else z))
+
+        return replace(chain, bodies=tuple(changed(b) if b.name in names else b for b in chain.bodies))
 
     return chain
 
@@ -207,6 +232,8 @@ def drifting(
     alike: tuple[str, ...] = ("grease_damping",) if "damping" in element else ("mount_compliance", "modulus_softening")
     if any(word in element for word in ("rings", "preload", "bearings")):
         alike = ("preload_loss", "bond_softening")
+    if element.endswith(("mass", "inertia")):
+        alike = ("added_disk", "sensor_mass")
     if known is not None:
         alike = (known.name, *known.resembles)
     hooks: dict[str, Any] = {key: hook(key) for key in HOOKS if known is None or getattr(known, key)}

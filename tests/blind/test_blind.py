@@ -1,5 +1,7 @@
 """The blind study's own world: nothing of its own switched on it is the product's model, every hidden mechanism is seen, seeds repeat."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rich.console import Console
@@ -133,6 +135,17 @@ def test_what_is_hidden_has_right_answers_of_the_catalogue_or_none():
 def _visible(drawn, hidden):
     made = campaign(drawn.spindle, drawn.tests, [hidden], 5)
     return visibility(made, drawn.spindle, seen(made, drawn.spindle, 40))[0]
+
+
+def test_visibility_beside_a_weak_mode_is_what_it_is_without():
+    """An oscillator of 0.1 g on the base, which the modal errors of the drawing do not have."""
+    drawn = draw(2)
+    made = campaign(drawn.spindle, drawn.tests, [next(m for m in mechanisms(drawn.spindle, ()) if m.name == "bearing damping").of_size(1.0)], 5)
+    seen_by = [
+        visibility(of, drawn.spindle, seen(of, drawn.spindle, 40))[0]
+        for of in (replace(made, world=replace(made.world, stiffness_error=1e-3, weak_mode=weak)) for weak in (None, (1e-4, 1500.0, 0.02)))
+    ]
+    assert seen_by[1] == pytest.approx(seen_by[0], rel=0.05)
 
 
 def test_visibility_grows_with_size_and_gains_hide_a_gain():

@@ -112,6 +112,7 @@ def _modal_columns(made: Made, column, frequency: Array, plain: World, spindle: 
     found = []
     for kind, v in enumerate(modal_errors(spindle, made.world)[:2]):
         v = v[:, np.abs(v).max(axis=0) > 1e-9 * np.abs(v).max()]  # not a rigid motion, which has neither stiffness nor damping
+        v = np.pad(v, ((0, len(answers[0].linear.mass) - len(v)), (0, 0)))  # a weak mode comes after the drawing's
         one, two = np.triu_indices(v.shape[1], 1)
         moved = []
         for at in answers:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from tests.conftest import ROOT
 from tests.virtual_campaign import mode_campaign, model_of, virtual_campaign
 from thermospindle.diagnosis.forward.mechanism import Mechanism, likeness, size_covariance, strongest, variants, with_own_laws
 from thermospindle.diagnosis.forward.nuisance import RECORD
@@ -12,8 +15,10 @@ from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.inference.freeform import alike, as_told_by, free_forms
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.model.machine import Condition
+from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
 from thermospindle.sim.effects import usable
+from thermospindle.sim.operating import operating_point
 
 CONDITIONS = [Condition(20.0), Condition(20.0), Condition(40.0, 7200 * RPM), Condition(60.0), Condition(60.0, 0.0, 100.0), Condition(60.0, 0.0, 1.0, 60.0)]
 
@@ -140,6 +145,23 @@ def test_an_element_that_drifts_whole_is_the_sum_of_its_directions(spindle, mode
 
     parts = sum(column(f"flange {direction} stiffness") for direction in ("axial", "lateral", "tilt"))
     assert column("flange stiffness") == pytest.approx(parts, abs=1e-3 * np.abs(parts).max())
+
+
+@pytest.mark.parametrize(("form", "kept"), [("hub mass", ()), ("hub transverse inertia", ("mass", "polar"))])
+def test_what_turns_that_drifts_is_a_drawing_of_another_mass(spindle, form, kept):
+    """By a tenth (of ln), at speed: the poles of a drawing whose hub weighs so much more, or is only harder to tilt."""
+    m, f = next(m for m in free_forms(spindle) if m.name == form), np.exp(0.1)
+    hub = spindle.turning
+    x, y, z = hub.inertia
+    other = replace(hub, mass=hub.mass * (1 if "mass" in kept else f), inertia=(f * x, f * y, z * (1 if "polar" in kept else f)))
+    bodies = tuple(other if b is hub else b for b in spindle.structure.bodies)
+    drawn = operating_point(replace(spindle, structure=replace(spindle.structure, bodies=bodies)), CONDITIONS[2], ())
+    drifted = operating_point(spindle, CONDITIONS[2], [(m.effect, m.values(10.0, []))])
+    assert [m.frequency for m in drifted.modes] == pytest.approx([m.frequency for m in drawn.modes], rel=1e-9)
+
+
+def test_of_a_flexible_shaft_the_whole_drifts():
+    assert [m.name for m in free_forms(load(ROOT / "scenes" / "five_bearing")) if "mass" in m.name or "inertia" in m.name] == ["spindle mass"]
 
 
 @pytest.mark.parametrize("name", ["preload_loss", "lubricant_film", "thermal_gradient"])
