@@ -89,12 +89,11 @@ def warm_up(
     air: float | None = None,
     duration: float | None = None,
     tolerance: float = TOLERANCE,
-    highest: float | None = None,
     progress: Callable[[str], None] = lambda done: None,
 ) -> Warmup:
     """From a uniform temperature `start` (C) at `speed` (rad/s) in `air` (C, as the start by default) for `duration` (s).
 
-    `duration` is `TIME_CONSTANTS` slowest decays by default; modes up to `highest` (Hz, the scene's band by default) are followed.
+    `duration` is `TIME_CONSTANTS` slowest decays by default; modes in the hammer's band are followed.
     BadInput for a spindle without convection or a duration that is not positive; OutsideRange where a law does not reach; NoEquilibrium
     where preload and friction drive each other up without end.
     """
@@ -137,8 +136,7 @@ def warm_up(
     progress(f"temperatures in {len(history.times) - 1} steps")
     moments = tuple(machine.moment(nodal) for nodal in history.nodal)
     steady = machine.moment(final)
-    top = spindle.hammer.band[1] if highest is None else highest
-    first = tuple(modes(moments[0].point.chain, highest=top))
+    first = tuple(modes(moments[0].point.chain, highest=spindle.hammer.band[1]))
     followed = _followed(first, [*moments, steady])
     progress("natural frequencies")
     return Warmup(spindle, start, air, speed, history, moments, first, followed[:-1], steady, followed[-1], constant, left_out, back)

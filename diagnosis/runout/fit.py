@@ -188,9 +188,9 @@ def merged(parts: Sequence[Family]) -> Family:
 # ---------------------------------------------------------------- fitting
 
 
-def fit_family(f: Family, effects: Sequence[ComplexArray] = (), priors: Sequence[float] = (), seed: int = 0) -> FamilyFit:
+def fit_family(f: Family, effects: Sequence[ComplexArray] = (), priors: Sequence[float] = ()) -> FamilyFit:
     """The best fit of a family with effects whose sources are b (Q,) a unit of size, and sizes believed to be within `priors` of zero."""
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(0)
     problem = _Problem(f, np.array(effects, complex).reshape(len(effects), len(f.likely)), np.array(priors, float))
     phased = bool(f.phased.all())
     best = problem.least(problem.start(0, random))

@@ -124,16 +124,13 @@ def eased(clearance: float, constant: float, give: float) -> float:
     return float(scipy.optimize.brentq(lambda c: c - clearance - give * constant * (-c / 2) ** EXPONENT, clearance, 0.0, xtol=1e-15, rtol=1e-12))
 
 
-def roller_state(
-    spindle: Spindle, b: RollerBearing, motion: RingMotion | None, temperature: float, displacement: Array | None = None
-) -> RollerState:
-    """What a roller bearing is at a condition, centred or at a displacement (5,) of its outer ring against its inner one."""
-    row = roller_row(spindle, b, motion, temperature)
-    return state_at(spindle, b, row, displacement)
+def roller_state(spindle: Spindle, b: RollerBearing, motion: RingMotion | None, temperature: float) -> RollerState:
+    """What a roller bearing is at a condition, centred."""
+    return state_at(spindle, b, roller_row(spindle, b, motion, temperature))
 
 
 def state_at(spindle: Spindle, b: RollerBearing, row: RollerRow, displacement: Array | None = None) -> RollerState:
-    """As `roller_state`, of rollers that are known."""
+    """What a bearing with these rollers is, centred or at a displacement (5,) of its outer ring against its inner one."""
     answer = respond(row, displacement)
     damping = 2 * b.damping_ratio / (2 * np.pi * spindle.structure.damping_frequency) * answer.tangent
     loads = answer.roller_force

@@ -202,11 +202,15 @@ def spin_dofs(model: mujoco.MjModel) -> list[int]:
     return [i for i in range(model.nv) if model.joint(model.dof_jntid[i]).name.endswith(".spin")]
 
 
-def linearise(model: mujoco.MjModel, step: float = 2e-9) -> Matrices:
+STEP = 2e-9
+"""m for slides, and the same at 1 cm for hinges: of the differences of `linearise`."""
+
+
+def linearise(model: mujoco.MjModel) -> Matrices:
     """M, C + G, K about the keyframe "loaded", by central differences of MuJoCo's accelerations; spin is left out.
 
-    `step`: m for slides, and the same at 1 cm for hinges. For linear elements the result is exact to rounding. The force of a ball goes with the
-    power 1.5 of its deformation d, and a central difference by a step h is off by (h / d)^2 / 24: of those by `step` and by twice as
+    For linear elements the result is exact to rounding. The force of a ball goes with the
+    power 1.5 of its deformation d, and a central difference by a step h is off by (h / d)^2 / 24: of those by `STEP` and by twice as
     much the extrapolated limit is taken (Richardson), which is off by some (h / d)^4, 1e-7 where a ball has all but lost contact, at 0.1 um.
     """
     data = mujoco.MjData(model)
@@ -218,7 +222,7 @@ def linearise(model: mujoco.MjModel, step: float = 2e-9) -> Matrices:
     by_position, by_velocity = np.empty((model.nv, model.nv)), np.empty((model.nv, model.nv))
     for i in free:
         slides = model.jnt_type[model.dof_jntid[i]] == mujoco.mjtJoint.mjJNT_SLIDE
-        h = step if slides else 100 * step
+        h = STEP if slides else 100 * STEP
         for state, speed_up, result in ((data.qpos, 1.0, by_position), (data.qvel, 1e4, by_velocity)):
             kept, slopes = state[i], []
             for times in (1.0, 2.0):

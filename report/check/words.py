@@ -10,7 +10,7 @@ from rich.console import Console
 from thermospindle.report.text.grid import show_grid
 
 
-def show_check(console: Console, values: Mapping[str, Any], verbose: bool = False) -> None:
+def show_check(console: Console, values: Mapping[str, Any]) -> None:
     """The answer of `check` for a person: sentences, then tables of bearings, shafts and points, then what is assumed and what is odd."""
     console.print(values["title"], style="bold", markup=False, highlight=False)
     for sentence in sentences(values):

@@ -57,9 +57,9 @@ class Refused(RequestHandler):
         self.finish(REFUSAL)
 
 
-def server(bench: Bench, out: Path, known: Explanations | None = None, port: int = 0, token: str | None = None) -> tuple[Server, str]:
-    """A server that is ready to start, and the address of its page; a free port where none is named. `BadInput` for a port that is taken."""
-    secret = token or secrets.token_hex(24)
+def server(bench: Bench, out: Path, known: Explanations | None, port: int) -> tuple[Server, str]:
+    """A server that is ready to start, and the address of its page; a free port where that is 0. `BadInput` for a port that is taken."""
+    secret = secrets.token_hex(24)
     chosen = port or free_port()
     try:
         made = Server(

@@ -153,7 +153,7 @@ def _read_modes(file: Path, tests: list[str]) -> list[ModeRow]:
 # ---------------------------------------------------------------- writing
 
 
-def write_campaign(campaign: Campaign, folder: Path, replace: bool = False, limits: Limits = LIMITS) -> None:
+def write_campaign(campaign: Campaign, folder: Path, replace: bool = False) -> None:
     """Write the folder of a campaign, whole or not at all: beside its place first, then moved there.
 
     Each test's FRFs go to `<id>.uff`, its runout to `<id>_runout.csv`, all modes to `modes.csv`. Raises `BadInput` for what `read_campaign` would refuse, and for a
@@ -167,10 +167,10 @@ def write_campaign(campaign: Campaign, folder: Path, replace: bool = False, limi
     checked(folder / "campaign.toml", tomllib.loads(text))
     folder.parent.mkdir(parents=True, exist_ok=True)
     with whole(folder) as partial:
-        _write_files(campaign, partial, text, limits)
+        _write_files(campaign, partial, text)
 
 
-def _write_files(campaign: Campaign, folder: Path, text: str, limits: Limits) -> None:
+def _write_files(campaign: Campaign, folder: Path, text: str) -> None:
     """Make the folder of a campaign, `text` its campaign.toml, and read it back: what would not come back the same is refused."""
     folder.mkdir()
     (folder / "campaign.toml").write_text(text, encoding="utf-8")
@@ -183,7 +183,7 @@ def _write_files(campaign: Campaign, folder: Path, text: str, limits: Limits) ->
             write_frf(folder / f"{test.id}.uff", test.frf, campaign.points, campaign.title, test.id)
         if test.runout is not None:
             write_runout(folder / f"{test.id}_runout.csv", test.runout)
-    again = read_campaign(folder, limits)
+    again = read_campaign(folder)
     if not all(same(a.runout, b.runout) for a, b in zip(again.tests, campaign.tests, strict=True)):
         raise BadInput(f"{folder}: a runout record would not read back; it needs finite numbers at even steps")
     if _exact(again) != _exact(campaign):

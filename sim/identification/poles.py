@@ -37,6 +37,8 @@ ROUNDING = 1e-9
 """Part of its own weight by which a column must differ from the others to count: the square of what normal equations resolve."""
 TRIAL = 0.02
 """Damping ratio of trial poles and their distance as a fraction of their frequency."""
+MOST_STEPS = 40
+"""Of a refinement."""
 APART = 5
 """Trial poles put at once are further apart than this many distances, not to fit the same peak."""
 
@@ -154,12 +156,12 @@ def varied(fit: Fit) -> NDArray[np.intp]:
     return np.setdiff1d(np.arange(before + fit.participation.size), held)
 
 
-def refine(lines: Lines, fit: Fit, tolerance: float = 1.0, limit: int = 40) -> Fit:
+def refine(lines: Lines, fit: Fit, tolerance: float = 1.0) -> Fit:
     """Levenberg-Marquardt until the expected fall of chi-square is below `tolerance` (in units of `fit.scale()`)."""
     if not len(fit.poles):
         return fit
     relax, (matrix, gradient) = 1e-6, information(lines, fit)
-    for _ in range(limit):
+    for _ in range(MOST_STEPS):
         size = np.sqrt(np.maximum(np.diag(matrix), 1e-20 * np.diag(matrix).max()))
         step = np.linalg.solve(matrix / size / size[:, None] + relax * np.eye(len(size)), gradient / size) / size
         if step @ gradient < tolerance * fit.scale():

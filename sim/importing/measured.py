@@ -95,10 +95,10 @@ class Content:
     questions: tuple[Question, ...] = ()
 
 
-def words_of(question: Question, every: Mapping[str, Sequence[str]] | None = None) -> str:
+def words_of(question: Question, every: Mapping[str, Sequence[str]]) -> str:
     """A question as a person reads it; `every` file and test there is stand as such."""
     about = question.about.split(", ")
-    all_ = next((f"all {len(about)} {what}" for what, names in (every or {}).items() if len(about) > 2 and {*about} == {*names}), None)
+    all_ = next((f"all {len(about)} {what}" for what, names in every.items() if len(about) > 2 and {*about} == {*names}), None)
     return f"{all_ or listed(about, 3)}: {question.key}: {question.text}"
 
 
