@@ -274,6 +274,11 @@ def _running(found: Looked) -> Iterator[str]:
     own = spindle.imperfections
     if any(b.turns for b in spindle.structure.bodies) and not (own.unbalance or own.couple_unbalance or own.bearings):
         yield "no imperfections are told, so that the turning spindle has no runout; imperfections.seed and grade draw plausible ones"
+    turning = {b.name for b in spindle.structure.bodies if b.turns}
+    for joint in spindle.structure.joints:
+        for one, other in (joint.bodies, joint.bodies[::-1]):
+            if one in turning and other not in turning:
+                yield f"joint {joint.name}: {one!r} turns and {other!r} does not, so that what hangs on it has no gyroscopic moment"
     if spindle.regions and spindle.bearings and not spindle.thermal.sources and not spindle.thermal.convections:
         yield "nothing cools the section"
 
