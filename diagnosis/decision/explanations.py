@@ -16,7 +16,7 @@ from math import comb
 import numpy as np
 
 from thermospindle.diagnosis.forward import nuisance as kinds_of
-from thermospindle.diagnosis.inference.gaussian import impossible
+from thermospindle.diagnosis.inference.gaussian import impossible, opposite
 from thermospindle.diagnosis.inference.hypothesis import LITTLE, STRAIN, Hypothesis
 from thermospindle.diagnosis.inference.search import Search
 
@@ -112,8 +112,11 @@ def _by_other_laws(h: Hypothesis, every: Sequence[Hypothesis]) -> float:
 
 
 def _can_be(h: Hypothesis) -> bool:
-    """Whether it is weighed: a law of the data's own may be any, but of no size that the effect cannot have."""
-    return not (any(m.own_law for m in h.mechanisms) and beyond_limits(h))
+    """Whether it is weighed: a law of the data's own may be any, but of no size that the effect cannot have; and what would have to be of the opposite sign in
+    every test is not there, whatever it gains."""
+    return not (
+        (any(m.own_law for m in h.mechanisms) and beyond_limits(h)) or any(map(opposite, h.mechanisms, h.evidence.sizes, h.evidence.size_covariance))
+    )
 
 
 def _is_named(h: Hypothesis, every: Sequence[Hypothesis], alike: Mapping[str, frozenset[str]], little: float) -> bool:

@@ -143,3 +143,9 @@ def impossible(m: Mechanism, sizes: Array, covariance: Array) -> bool:
     """Whether a mechanism would need a size (tests,) that it cannot have, by more than twice its standard error."""
     sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     return bool(np.any((sizes < m.size.limits[0] - 2 * sd) | (sizes > m.size.limits[1] + 2 * sd)))
+
+
+def opposite(m: Mechanism, sizes: Array, covariance: Array) -> bool:
+    """Whether a mechanism would need the sign that it cannot have in every test (tests,), by more than twice its standard error."""
+    sd, (low, high) = np.sqrt(np.maximum(np.diag(covariance), 0.0)), m.size.limits
+    return bool((low >= m.size.neutral and np.all(sizes < low - 2 * sd)) or (high <= m.size.neutral and np.all(sizes > high + 2 * sd)))

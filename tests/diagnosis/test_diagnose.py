@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from tests.conftest import DATA
+from tests.conftest import DATA, SCENE
 from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.verdict import diagnose
 from thermospindle.model.machine import Condition
@@ -36,6 +36,14 @@ def test_nothing_is_named_where_nothing_is_hidden(nothing_missing):
     assert verdict.accepted is nothing_missing.search.base
     assert nothing_missing.tests == ()
     assert verdict.losses["none"] == min(verdict.losses.values())
+
+
+@pytest.mark.slow
+def test_nothing_is_named_in_the_scenes_own_virtual_tests(spindle):
+    """A compliance of the hub that is negative in both tests gained 25 in ln evidence there, and was named."""
+    effects = tuple(by_name(n) for n in ("soak_lag", "hub_flexibility"))
+    verdict = diagnose(spindle, read_campaign(SCENE / "virtual" / "soak_20_60"), effects).verdict
+    assert (verdict.word, verdict.effects) == ("none", ())
 
 
 def test_probabilities_add_up_to_one(nothing_missing):

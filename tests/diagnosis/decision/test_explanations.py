@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.hand_made_search import by_departing, made, mechanism, total
+from tests.hand_made_search import SIZE, by_departing, made, mechanism, total
 from thermospindle.diagnosis.decision.explanations import COARSE, OWN_LAW, coarsening
 from thermospindle.diagnosis.decision.verdict import decide
 from thermospindle.diagnosis.forward.nuisance import DAMPING, STIFFNESS
@@ -118,6 +118,22 @@ def test_a_size_that_cannot_be_is_no_law_of_its_own():
     v = decide(replace(found, hypotheses=negative, alike={"~x": frozenset({"a", "b"})}))
     assert v.word == "unexplained"
     assert "which a would do at a size that it cannot have" in v.reason
+
+
+@pytest.mark.parametrize(("sizes", "word"), [((-3.0, -4.0), "none"), ((-3.0, 4.0), "identified"), ((-0.1, -0.1), "identified"), ((3.0, 4.0), "identified")])
+def test_what_would_have_to_be_of_the_opposite_sign_everywhere_is_not_there(sizes, word):
+    """A compliance that would be negative in every test, by thirty standard errors, gains by what is wrong with the model; not so one that departs in one test."""
+    found = made({"a": 40.0})
+    size = replace(SIZE, limits=(0.0, 9.0))
+
+    def fitted(h: Hypothesis) -> Hypothesis:
+        if not h.mechanisms:
+            return h
+        m = replace(h.mechanisms[0], effect=replace(h.mechanisms[0].effect, parameters=(size,)))
+        own = replace(h.evidence, sizes=np.array([sizes]), size_covariance=0.01 * np.eye(2)[None])
+        return Hypothesis(replace(h.fit, mechanisms=(m,)), own)
+
+    assert decide(replace(found, hypotheses=tuple(map(fitted, found.hypotheses)))).word == word
 
 
 @pytest.mark.parametrize(("named", "alike", "word"), [(64.5, {"a"}, "identified"), (60.0, {"a"}, "unexplained"), (64.5, {"b"}, "unexplained")])
