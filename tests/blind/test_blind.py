@@ -137,6 +137,14 @@ def _visible(drawn, hidden):
     return visibility(made, drawn.spindle, seen(made, drawn.spindle, 40))[0]
 
 
+def test_what_a_tolerance_does_is_not_visible():
+    """A mount softer by one standard deviation of its tolerance in every test: the very change of one column, of 3000 standard errors; not quite its length, for
+    the tolerance is of a logarithm and has its own prior."""
+    drawn = draw(2)
+    softer = next(m for m in mechanisms(drawn.spindle, ()) if m.name == "mount softens").of_size(0.0, lambda place: 1.0)
+    assert _visible(drawn, replace(softer, size=100 * drawn.spindle.tolerances.structure)) < 1.5
+
+
 def test_visibility_beside_a_weak_mode_is_what_it_is_without():
     """An oscillator of 0.1 g on the base, which the modal errors of the drawing do not have."""
     drawn = draw(2)

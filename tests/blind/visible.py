@@ -15,7 +15,7 @@ from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.tolerance import toleranced
 from thermospindle.model.types import Array, ComplexArray
 
-SMALL = 0.01  # share of a size, at which its change is taken for linear
+SMALL = 1e-4  # share of a size, and of a tolerance, at which its change is taken for linear
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,18 +60,19 @@ def seen(made: Made, spindle: Spindle, lines: int = 160) -> Seen:
         sd.append(made.record.times * np.sqrt((of_value * np.abs(v)) ** 2 + (hammer.noise_of_largest * largest) ** 2) / np.sqrt(dense))
     found = Seen(frequency, tuple(sd), np.zeros((0, 0)))
 
-    def column(values: Sequence[ComplexArray]) -> Array:
-        return found.whitened([v - b for v, b in zip(values, base, strict=True)])
+    def column(values: Sequence[ComplexArray], other: Sequence[ComplexArray] = base) -> Array:
+        return found.whitened([v - o for v, o in zip(values, other, strict=True)])
 
+    # differences to either side: of columns that nearly cancel, what one side has of curvature would be left and be taken for visible
     columns = []
     for parameter in toleranced(spindle):
-        small = parameter.sd / 10
-        columns.append(column(all_tests(parameter.apply(made.built, small))) * 10)
-    warm = all_tests(made.built, 0.02)
+        more, less = (all_tests(parameter.apply(made.built, step * parameter.sd)) for step in (SMALL, -SMALL))
+        columns.append(column(more, less) / (2 * SMALL))
+    step = SMALL * spindle.tolerances.temperature
+    warmer, colder = all_tests(made.built, step), all_tests(made.built, -step)
     for k in range(len(base)):
-        columns.append(
-            column([w if i == k else b for i, (w, b) in enumerate(zip(warm, base, strict=True))]) * spindle.tolerances.temperature / 0.02
-        )
+        only = [[v if i == k else b for i, (v, b) in enumerate(zip(side, base, strict=True))] for side in (warmer, colder)]
+        columns.append(column(*only) / (2 * SMALL))
     for i in range(len(spindle.points)):
         pick = (np.arange(len(spindle.points)) == i)[:, None, None]
         columns.append(column([b * (1 + spindle.tolerances.gain * pick) for b in base]))
@@ -95,7 +96,7 @@ def change(made: Made, spindle: Spindle, of: Seen, h: Hidden, share: float, worl
 
 def visibility(made: Made, spindle: Spindle, of: Seen) -> list[float]:
     """Of every hidden piece: its change of the FRFs in standard errors, after all that else may take of it; sqrt(10) is worth 5 in ln evidence.
-    Of the piece itself and of a hundredth of it times a hundred the smaller: what moves peaks by many widths is no longer what small
+    Of the piece itself and of a little of it over its share the smaller: what moves peaks by many widths is no longer what small
     tolerances do, but a larger tolerance may do the same."""
     plain = replace(made.world, stiffness_error=0.0, damping_error=0.0)
     found = []
