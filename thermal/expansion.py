@@ -25,7 +25,7 @@ def expand(spindle: Spindle, temperature: Temperature, tolerance: float = TOLERA
     """Motion of the rings of every bearing, by its name, from the reference temperature to `temperature`.
 
     Balls and grooves have the mean temperature of their two rings, or of their own ring: of the whole region, also where bearings share
-    one. ValueError for region temperatures
+    one. Where every region has the reference temperature nothing moves, and no finite elements are asked. ValueError for region temperatures
     that do not match the spindle's regions; OutsideRange where a material law does not reach.
     """
     means = region_temperatures(spindle, temperature)
@@ -34,6 +34,8 @@ def expand(spindle: Spindle, temperature: Temperature, tolerance: float = TOLERA
         for response in influence(spindle, tolerance, means).responses.values():
             strains = _strain_field(spindle, Solid(response.section, elasticity(spindle, means)), temperature)
             moves |= _by_race(response.races, np.einsum("ieq,eq->i", response.density, strains))
+    elif not _region_strains(spindle, list(means), means).any():
+        moves = {race: (0.0, 0.0) for b in spindle.ringed for race in raceways(spindle, b)}
     else:
         for gain in gains(spindle, tolerance, means):
             moves |= _by_race(gain.races, gain.value @ _region_strains(spindle, gain.regions, means))

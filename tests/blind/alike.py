@@ -28,7 +28,6 @@ from thermospindle.sim.operating import operating_point
 SAME = np.sqrt(10.0)  # standard errors, up to which what is left of a change cannot be told from nothing: 5 in ln evidence
 MOSTLY, NEARLY = 0.3, 0.1  # of a change, that a right answer may leave, and that any may which so is right
 TURNS = (-2.0, -1.0, 1.0, 2.0)  # prior standard deviations by which shape parameters are turned
-STEP = 0.02  # prior standard deviations of a size
 
 
 def right(made: Made, spindle: Spindle, of: Seen, catalogue: Sequence[Effect] = CATALOGUE) -> list[list[str]]:
@@ -78,8 +77,8 @@ def _by_size(
     built: Spindle, m: Mechanism, shape: list[float], conditions: Sequence[Condition], base: Sequence[ComplexArray], of: Seen
 ) -> tuple[Array, Array, Array]:
     """Changes (N, k) by one prior standard deviation of the size in each test, or in all at once of what lasts, and the limits (k,) of these."""
-    up = m.size.neutral + STEP * m.size.prior_sd <= m.size.limits[1]
-    step = STEP if up else -STEP
+    up = m.size.neutral + SMALL * m.size.prior_sd <= m.size.limits[1]
+    step = SMALL if up else -SMALL
     values = m.values(m.size.neutral + step * m.size.prior_sd, shape)
     moved = []
     for t, (condition, before) in enumerate(zip(conditions, base, strict=True)):

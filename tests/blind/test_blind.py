@@ -103,12 +103,12 @@ def test_laws_are_one_at_their_largest_and_nothing_at_the_reference():
         assert values[0] == pytest.approx(0.0, abs=1e-12)
 
 
-@pytest.mark.parametrize("seed", [1, 4])
-def test_a_seed_is_a_campaign(seed):
+@pytest.mark.parametrize(("seed", "another"), [(9, 20), pytest.param(4, 5, marks=pytest.mark.slow), pytest.param(1, 2, marks=pytest.mark.slow)])
+def test_a_seed_is_a_campaign(seed, another):
     one, two = (draw(seed).made().campaign for _ in range(2))
     assert [t.id for t in one.tests] == [t.id for t in two.tests]
     assert all(a.frf == b.frf for a, b in zip(one.tests, two.tests, strict=True))
-    other = draw(seed + 1).made().campaign
+    other = draw(another).made().campaign
     assert one.tests[0].frf != other.tests[0].frf
 
 
@@ -173,8 +173,7 @@ def test_right_answers_are_what_effects_do():
     made = campaign(drawn.spindle, drawn.tests, pieces, 5)
     effects = [e for e in CATALOGUE if e.name in ("clearance_opening", "lubricant_film", "bond_softening", "plate_prestress")]
     rings, whirl = right(made, drawn.spindle, seen(made, drawn.spindle, 40), effects)
-    assert "clearance_opening" in rings
-    assert not {"lubricant_film", "plate_prestress"} & set(rings)
+    assert rings == ["clearance_opening"]
     assert whirl == []
 
 

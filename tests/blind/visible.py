@@ -15,7 +15,7 @@ from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.tolerance import toleranced
 from thermospindle.model.types import Array, ComplexArray
 
-SMALL = 1e-4  # share of a size, and of a tolerance, at which its change is taken for linear
+SMALL = 1e-4  # share of a size, of a tolerance and of a prior width, at which its change is taken for linear
 
 
 @dataclass(frozen=True, eq=False)

@@ -63,7 +63,7 @@ def test_json_says_what_could_have_been_shown(nothing_missing):
     answer = json.loads(json.dumps(diagnosis_json(nothing_missing), allow_nan=False))
     assert answer["verdict"] == "none"
     assert set(answer["detectable"]) <= {"soak_lag", "channel_delay"}
-    assert 0 < answer["detectable"]["soak_lag"] < 0.2  # FRFs of five tests show a hub that lags by a fifth
+    assert 0 < answer["detectable"]["soak_lag"] < 0.2  # FRFs of three tests show a hub that lags by a fifth
     assert answer["misfit"]["rejected"] is False
     assert sum(s["count"] for s in answer["misfit"]["shares"]["test"]) == answer["misfit"]["count"]
     assert answer["error"]["before"] == answer["error"]["after"] < 1.5

@@ -47,6 +47,15 @@ def test_ring_motions_at_60_are_good_to_half_a_nanometre(spindle, fine):
     assert np.abs(values(expand(spindle, 60.0)) - values(expand(spindle, 60.0, tolerance=FINE))).max() < 0.5e-9
 
 
+def test_at_the_reference_temperature_nothing_moves_and_no_finite_elements_are_asked(spindle, monkeypatch):
+    monkeypatch.setattr("thermospindle.thermal.expansion.gains", lambda *asked: pytest.fail("finite elements"))
+    for temperature in (20.0, {g.name: 20.0 for g in spindle.regions}):
+        found = expand(spindle, temperature)
+        assert list(found) == [b.name for b in spindle.bearings]
+        assert not values(found).any()
+        assert {m.temperature for m in found.values()} == {20.0}
+
+
 def test_uniform_refinement_is_slow_and_self_refinement_fast(spindle, fine):
     """Reentrant corners of the hub (270 degrees) allow stresses as r^(0.544 - 1) (Williams 1952): on uniform meshes the error of
     a motion falls as size^1.09. Refined by itself it falls as unknowns^-2, as size^4 would without corners."""
