@@ -66,6 +66,7 @@ def test_import_answers_so_too(capsys, tmp_path):
     assert set(json.loads(capsys.readouterr().out)) == {*ANSWERS["import"], "warnings"}
 
 
+@pytest.mark.slow
 def test_every_effect_has_a_picture_of_what_it_does(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(SITE)
     page = generated.effects(tmp_path)

@@ -57,7 +57,7 @@ HIDDEN = {
 }
 
 
-@pytest.mark.parametrize("name", HIDDEN)
+@pytest.mark.parametrize("name", ["ball_size", "cage_unbalance", *(pytest.param(n, marks=pytest.mark.slow) for n in ("unbalance", "race_waviness", "ball_waviness"))])
 def test_a_hidden_imperfection_is_named_with_its_size_and_place(spindle, name) -> None:
     values = HIDDEN[name]
     d = found(spindle, {name: values})
