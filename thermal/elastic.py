@@ -7,13 +7,13 @@ Nothing but temperature loads a part: it is free, u_r = 0 on the axis, and its m
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import SuperLU, splu
 from skfem import Basis, ElementVector, FacetBasis, LinearForm
 
 from thermospindle.thermal.mesh import PartMesh, element
@@ -120,21 +120,24 @@ class Solid:
         return other
 
     @cached_property
-    def _solve(self) -> Callable[[np.ndarray], np.ndarray]:
-        matrix = self.stiffness().tocsc()
+    def _free(self) -> np.ndarray:
+        """Degrees of freedom that are not held."""
         held = np.zeros(self.basis.N, dtype=bool)
         held[0::2] = self.nodes[:, 0] == 0.0
         held[1] = True  # loads are in axial balance, so this node takes no force
-        free = np.flatnonzero(~held)
-        factors = splu(matrix[free][:, free], permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        return np.flatnonzero(~held)
 
-        def solve(loads: np.ndarray) -> np.ndarray:
-            answer = np.zeros_like(loads)
-            answer[free] = factors.solve(np.ascontiguousarray(loads[free]))
-            answer[1::2] -= self.axial_mean @ answer[1::2]
-            return answer
+    @cached_property
+    def _factors(self) -> SuperLU:
+        matrix = self.stiffness().tocsc()[self._free][:, self._free]
+        return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
-        return solve
+    def _solve(self, loads: np.ndarray) -> np.ndarray:
+        """Displacements (dofs, k) under `loads` (dofs, k)."""
+        answer = np.zeros_like(loads)
+        answer[self._free] = self._factors.solve(np.ascontiguousarray(loads[self._free]))
+        answer[1::2] -= self.axial_mean @ answer[1::2]
+        return answer
 
     @cached_property
     def axial_mean(self) -> np.ndarray:

@@ -46,7 +46,7 @@ def free_forms(spindle: Spindle) -> list[Mechanism]:
         for label, moves in groups:
             found.append(_form(f"{name} {label} stiffness", "%", STIFFNESS_WIDTH, chain=_scaled(elements, moves, damping_too=True)))
         found.append(_form(f"{name} damping", "%", DAMPING_WIDTH, chain=_scaled(elements, range(0), damping_too=True, damping_only=True)))
-    for name, bodies in [(s.name, s.bodies) for s in shafts if s.turns] + [(b, (b,)) for b in _turning_alone(spindle)]:
+    for name, bodies in [(s.name, s.bodies) for s in shafts if s.turns] + [(b.name, (b.name,)) for b in spindle.structure.rigid_bodies if b.turns]:
         found.append(_form(f"{name} mass", "%", MASS_WIDTH, chain=_heavier(bodies, whole=True)))
         if len(bodies) == 1:
             found.append(_form(f"{name} transverse inertia", "%", MASS_WIDTH, chain=_heavier(bodies, whole=False)))
@@ -106,12 +106,6 @@ def _scaled(names: Sequence[str], moves, damping_too: bool, damping_only: bool =
         return replace(chain, elements=tuple(elements))
 
     return chain
-
-
-def _turning_alone(spindle: Spindle) -> list[str]:
-    """The bodies that turn and are no shaft's nodes."""
-    nodes = {name for s in spindle.structure.shafts for name in s.bodies}
-    return [b.name for b in spindle.structure.bodies if b.turns and b.name not in nodes]
 
 
 def _heavier(names: Sequence[str], whole: bool):
