@@ -138,7 +138,7 @@ def _visible(drawn, hidden):
 
 
 def test_what_a_tolerance_does_is_not_visible():
-    """A mount softer by one standard deviation of its tolerance in every test: the very change of one column, of 3000 standard errors; not quite its length, for
+    """A mount softer by one standard deviation of its tolerance in every test: the very change of one column, of 36,000 standard errors; not quite its length, for
     the tolerance is of a logarithm and has its own prior."""
     drawn = draw(2)
     softer = next(m for m in mechanisms(drawn.spindle, ()) if m.name == "mount softens").of_size(0.0, lambda place: 1.0)
