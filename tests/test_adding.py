@@ -97,7 +97,7 @@ def test_add_takes_fitted_values_from_the_first_candidate_with_the_effect(capsys
     arguments = ("add", SCENE, "bond_softening", "--from", diagnosis, "--set", "width=3", "--out", tmp_path / "b", "--json")
     found = answer(capsys, *arguments)
     chosen = {"hot_compliance": 11.0, "transition": 47.0, "width": 3.0}  # the rest is typical
-    assert found["added"][0]["values"] == {"hot_compliance": 11.0, "cold_ratio": 4.75, "loss_factor": 0.04} | chosen
+    assert found["added"][0]["values"] == {"hot_compliance": 11.0, "cold_ratio": 4.75, "loss_factor": 0.04, "bearing": -1.0} | chosen
     said = load(tmp_path / "b").provenance["effects.bond_softening.values.transition"]
     assert said.origin == "calibrated"
     assert "diagnosis.json: hot_compliance, transition; set by hand: width" in said.source
@@ -111,6 +111,8 @@ NOT_ADDED = [
     (["magic"], "'magic' is unknown; allowed are"),
     (["bond_softening", "--set", "warmth=3"], "warmth: unknown parameter; allowed are hot_compliance"),
     (["bond_softening", "--set", "transition=500"], "transition = 500 C: allowed is -40 to 200"),
+    (["bond_softening", "--set", "bearing=2"], "bearing = 2: allowed is -1 to 1"),
+    (["bond_softening", "--set", "bearing=0.5"], "bearing = 0.5: it counts or chooses; allowed are whole numbers from -1 to 1"),
     (["bond_softening", "--set", "transition"], "not of the form name=value"),
     (["bond_softening", "--set", "transition=hot"], "'hot' is not a number"),
     (["bond_softening", "--set", "transition=nan"], "nan"),

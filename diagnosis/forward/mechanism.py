@@ -62,14 +62,14 @@ class Mechanism:
 
 def variants(effect: Effect) -> list[Mechanism]:
     """One mechanism for every combination of what an effect has to choose from; and, of each share between two ideal cases, both of these beside
-    what lies between: a law that is all constant, or all thermal, has nothing to choose."""
+    what lies between, for the first combination: a law that is all constant, or all thermal, has nothing to choose."""
     chosen = [p for p in effect.parameters[1:] if p.choices]
     shape = tuple(p for p in effect.parameters[1:] if not p.choices and p.prior_sd > 0)
     found = []
     for row in product(*[p.choices for p in chosen]):
         choices = dict(zip([p.name for p in chosen], row, strict=True))
         found.append(Mechanism(effect, choices, shape))
-        for share in [p for p in shape if p.limits == (0.0, 1.0)] if len(chosen) == 0 else []:
+        for share in [p for p in shape if p.limits == (0.0, 1.0)] if len(found) == 1 else []:
             others = tuple(p for p in shape if p is not share)
             found += [Mechanism(effect, choices | {share.name: end}, others) for end in (0.0, 1.0)]
     return found

@@ -16,7 +16,7 @@ import numpy as np
 from thermospindle.diagnosis.forward.mechanism import Mechanism, asked_at
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.problem import Problem
-from thermospindle.model.bearing.pair import PairState
+from thermospindle.model.bearing.pair import BearingState, PairState
 from thermospindle.model.machine import MOVES, Body, Condition, RingMotion, Spindle
 from thermospindle.model.rotor.chain import RotorBase
 from thermospindle.model.tolerance import scaled_preload
@@ -26,11 +26,17 @@ from thermospindle.sim.effects import CATALOGUE, by_name
 from thermospindle.sim.effects.effect import HOOKS, Effect, Parameter, Values, fitted_to, refusal
 
 STIFFNESS_WIDTH, DAMPING_WIDTH, PRELOAD_WIDTH, MASS_WIDTH = 3.0, 20.0, 5.0, 3.0  # %
+CROSS_WIDTH = 1.0  # % of the radial stiffness; where k_xy = -k_yx is as large a share of it as the loss factor, a whirl is at its limit of stability
 RING_WIDTH = 0.2  # um
 ALIKE = 2e-4  # of the squares of what an effect moves, that a free form which is its own change may leave
 NEARLY = 0.1  # of them, likewise, where a fit of the effect may start from what the free form says
 OF_BEAMS: list[tuple[str, tuple[int, ...]]] = [("axial", (2,)), ("shear", (0, 1)), ("bending", (3, 4))]
 """What each stiffness of a beam element resists, as its moves are told in `model.rotor.beam`."""
+OF_BEARINGS: list[tuple[str, tuple[int, ...]]] = [("radial", (0, 1)), ("x", (0,)), ("y", (1,)), ("axial", (2,)), ("tilt", (3, 4))]
+
+
+SKEW = np.zeros((5, 5))
+SKEW[0, 1], SKEW[1, 0] = 1.0, -1.0
 
 
 def free_forms(spindle: Spindle) -> list[Mechanism]:
@@ -55,11 +61,13 @@ def free_forms(spindle: Spindle) -> list[Mechanism]:
     for label, own in sets:
         found.append(_form(f"{label} stiffness", "%", STIFFNESS_WIDTH, pair=_stiffened(own, range(5))))
         found.append(_form(f"{label} rings apart radially", "um", RING_WIDTH, motions=_moved(own, "outer_r")))
-    found.append(_form("bearings radial stiffness", "%", STIFFNESS_WIDTH, pair=_stiffened(names, (0, 1))))
-    found.append(_form("bearings axial stiffness", "%", STIFFNESS_WIDTH, pair=_stiffened(names, (2,))))
-    found.append(_form("bearings tilt stiffness", "%", STIFFNESS_WIDTH, pair=_stiffened(names, (3, 4))))
+    for label, moves in OF_BEARINGS:
+        found.append(_form(f"bearings {label} stiffness", "%", STIFFNESS_WIDTH, pair=_stiffened(names, moves)))
+    found.append(_form("bearings cross-coupled stiffness", "%", CROSS_WIDTH, pair=_crossed(names)))
     found.append(_form("bearings damping", "%", DAMPING_WIDTH, pair=_damped(names)))
-    found.append(_form("preload", "%", PRELOAD_WIDTH, spindle=_preloaded))
+    of_sets = [s.name for s in spindle.sets]
+    for label, own in [("preload", of_sets), *([(f"{name} preload", [name]) for name in of_sets] if len(of_sets) > 1 else [])]:
+        found.append(_form(label, "%", PRELOAD_WIDTH, spindle=_preloaded(own)))
     return found
 
 
@@ -70,14 +78,14 @@ def _form(name: str, unit: str, width: float, **hooks: Any) -> Mechanism:
 
 
 def _groups(stiffness: tuple[float, ...]) -> list[tuple[str, tuple[int, ...]]]:
-    """Moves that share a stiffness, as tolerances have them."""
+    """Moves that share a stiffness, as tolerances have them, and each of two by itself: what loosens, cracks or wears does so on one side."""
     found: list[tuple[str, tuple[int, ...]]] = []
     for label, moves in (("axial", (2,)), ("lateral", (0, 1)), ("tilt", (3, 4))):
         if not stiffness[moves[0]]:
             continue
         if len({stiffness[m] for m in moves}) == 1:
             found.append((label, moves))
-        else:
+        if len(moves) > 1:
             found += [(MOVES[m].replace("_", " "), (m,)) for m in moves]
     return found
 
@@ -135,6 +143,20 @@ def _stiffened(names: list[str], moves):
     return pair
 
 
+def _crossed(names: list[str]):
+    """k_xy = -k_yx, told as a change of the radial stiffness would be: what films and seals have, and feeds one whirl while it damps the other (Friswell and others, *Dynamics of
+    Rotating Machines*, 2010, 7.3)."""
+
+    def pair(spindle: Spindle, condition: Condition, values: Values, state: PairState) -> PairState:
+        def crossed(b: BearingState) -> BearingState:
+            cross = (_factor(values) - 1) * (b.stiffness[0, 0] + b.stiffness[1, 1]) / 2
+            return replace(b, stiffness=b.stiffness + cross * SKEW)
+
+        return replace(state, bearings=tuple(crossed(b) if b.name in names else b for b in state.bearings))
+
+    return pair
+
+
 def _damped(names: list[str]):
     def pair(spindle: Spindle, condition: Condition, values: Values, state: PairState) -> PairState:
         f = _factor(values)
@@ -151,8 +173,11 @@ def _moved(names: list[str], coordinate: str):
     return motions
 
 
-def _preloaded(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
-    return scaled_preload(spindle, _factor(values))
+def _preloaded(sets: list[str]):
+    def changed(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
+        return scaled_preload(spindle, _factor(values), sets)
+
+    return changed
 
 
 def alike(model: CampaignModel, x: Array, free: Mechanism, named: Mechanism, shape: Sequence[float] | None = None) -> bool:

@@ -129,14 +129,17 @@ def usable(spindle: Spindle, catalogue: Sequence[Effect] = CATALOGUE) -> tuple[E
 
 
 def checked(effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
-    """All parameter values of an effect, neutral where not given; `BadInput` for unknown names and values beyond the limits."""
+    """All parameter values of an effect, neutral where not given; `BadInput` for unknown names, values beyond the limits, and fractions of what is counted."""
     known = {p.name: p for p in effect.parameters}
     for name, value in values.items():
         if name not in known:
             raise BadInput(f"effect {effect.name}: {name}: unknown parameter; {instead(name, known)}")
         low, high = known[name].limits
+        unit = "" if known[name].unit == "1" else f" {known[name].unit}"
         if not low <= value <= high:
-            raise BadInput(f"effect {effect.name}: {name} = {value:g} {known[name].unit}: allowed is {low:g} to {high:g}")
+            raise BadInput(f"effect {effect.name}: {name} = {value:g}{unit}: allowed is {low:g} to {high:g}")
+        if known[name].choices and value != round(value):
+            raise BadInput(f"effect {effect.name}: {name} = {value:g}: it counts or chooses; allowed are whole numbers from {low:g} to {high:g}")
     return effect.neutral() | dict(values)
 
 

@@ -7,7 +7,7 @@ knows an effect by name: where it seemed to need to, the state would lack a fiel
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from thermospindle.model.bearing.pair import PairState
@@ -39,8 +39,13 @@ class Parameter:
     meaning: str
     source: str
     choices: tuple[float, ...] = ()
-    counts: str = ""  # "bearings": its choices are the numbers of a spindle's ball bearings, from 0; "all bearings": of any kind
+    counts: str = ""
+    """What its choices are the numbers of, from 0: "bearings" a spindle's ball bearings, "all bearings" those of any kind, "sets" what shares a preload.
+    One that is -1 where neutral stands for all of them there."""
 
+
+ALL = -1.0
+"""Of a parameter that numbers things: every one of them."""
 
 REFERENCE_HUB = 0.0259
 """kg, the turning mass of the spindle for which absolute sizes in the catalogue are written; a spindle twice as long has eight times it."""
@@ -69,7 +74,7 @@ def fitted_to(effect: Effect, spindle: Spindle) -> Effect:
     if refusal(effect, spindle) is not None:
         return effect
     factors = effect.sized(spindle) if effect.sized else {}
-    counts = {"bearings": len(spindle.bearings), "all bearings": len(spindle.all_bearings)}
+    counts = {"bearings": len(spindle.bearings), "all bearings": len(spindle.all_bearings), "sets": len(spindle.sets)}
     rows = tuple(_fitted(p, factors.get(p.name, 1.0), counts) for p in effect.parameters)
     return effect if rows == effect.parameters else replace(effect, parameters=rows, sized=None)
 
@@ -78,6 +83,8 @@ def _fitted(p: Parameter, factor: float, counts: Mapping[str, int]) -> Parameter
     """The whole of a value goes with the machine, what is neutral too: a radius twice as large is so where it changes nothing."""
     if p.counts:
         numbers = tuple(float(k) for k in range(counts[p.counts]))
+        if p.neutral == ALL:  # of one alone that is the same as all of them
+            return replace(p, choices=(ALL, *numbers) if len(numbers) > 1 else (ALL,), limits=(ALL, max((0.0, *numbers))))
         return replace(p, choices=numbers, limits=(0.0, max(numbers[-1], 1.0)), typical=min(p.typical, numbers[-1]))
     if float(f"{factor:.1e}") == 1.0:
         return p
@@ -116,6 +123,17 @@ def bearing_parameter(source: str) -> Parameter:
     """Which bearing holds an imperfection."""
     meaning = "0 the first bearing of the scene (the lowest one), 1 the second, and so on"
     return Parameter("bearing", "1", 0.0, 1.0, 1.0, (0.0, 1.0), meaning, source, choices=(0.0, 1.0), counts="bearings")
+
+
+def which_parameter(name: str, counts: str, here: int, meaning: str, source: str) -> Parameter:
+    """Which of what `counts` is meant: all of them, or one; the reference spindle has `here` of them."""
+    says = f"{meaning}: -1 all, 0 the first of the scene, and so on"
+    return _fitted(Parameter(name, "1", ALL, ALL, 1.0, (ALL, 1.0), says, source, (ALL,), counts), 1.0, {counts: here})
+
+
+def chosen(number: float, names: Sequence[str]) -> tuple[str, ...]:
+    """Those that a value of `which_parameter` means."""
+    return tuple(names) if number == ALL else (names[int(number)],)
 
 
 def channel_parameter(meaning: str) -> Parameter:

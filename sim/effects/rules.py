@@ -145,7 +145,7 @@ def elsewhere(p: Parameter) -> float:
 
 def every_parameter_moves_something(t: Trial) -> None:
     """With the effect at its typical size: each parameter elsewhere than neutral against neutral, at some condition."""
-    for p in t.effect.parameters:
+    for p in (p for p in t.effect.parameters if len(p.choices) != 1):  # of one alone there is nothing to choose
         ends = [t.seen(t.effect.typical() | {p.name: x}) for x in (p.neutral, elsewhere(p))]
         change = max(moved(a, b) for a, b in zip(*ends, strict=True))
         if change <= SEEN:

@@ -10,7 +10,7 @@ import numpy as np
 from thermospindle.model.bearing.pair import PairState
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array
-from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values
+from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values, chosen, which_parameter
 
 HELD = np.array([1.0, 1.0, 1.0, 0.0, 0.0])
 """Motions in which the bond gives, in the order of MOVES: the ring's length in its seat keeps it from tilting."""
@@ -21,8 +21,11 @@ def pair(spindle: Spindle, condition: Condition, values: Values, state: PairStat
     if give == 0.0:
         return state
     omega = 2 * np.pi * spindle.structure.damping_frequency
-    bearings = []
+    bearings, bonded = [], chosen(values["bearing"], [b.name for b in spindle.bearings])
     for b in state.bearings:
+        if b.name not in bonded:
+            bearings.append(b)
+            continue
         stiffness, damping = in_series(b.stiffness, b.damping, give * HELD, values["loss_factor"], omega)
         bearings.append(replace(b, stiffness=stiffness, damping=damping))
     return replace(state, bearings=tuple(bearings))
@@ -113,6 +116,7 @@ EFFECT = Effect(
             meaning="loss factor of the bond, its dissipation over its elastic force; 0.04 is the bearings' own, twice 0.020",
             source="0.02 glassy to above 0.5 in the transition (Nashif, Jones, Henderson, Vibration Damping, 1985)",
         ),
+        which_parameter("bearing", "bearings", 2, "whose bond softens", "unknown before looking: one batch of adhesive holds all, or one ring is poorly wetted"),
     ),
     sees=(
         "rocking modes fall more than axial ones and mostly within a few kelvin about the transition, at any speed alike; damping "

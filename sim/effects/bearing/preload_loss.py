@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.tolerance import scaled_preload
-from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values
+from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values, chosen, which_parameter
 
 RISE = 40.0
 """Temperature rise (K) at which `loss` is told."""
@@ -13,7 +13,7 @@ RISE = 40.0
 def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
     if values["loss"] == 0.0:
         return spindle
-    return scaled_preload(spindle, remaining(spindle, condition, values))
+    return scaled_preload(spindle, remaining(spindle, condition, values), chosen(values["set"], [s.name for s in spindle.sets]))
 
 
 def remaining(spindle: Spindle, condition: Condition, values: Values) -> float:
@@ -50,6 +50,7 @@ EFFECT = Effect(
             meaning="share of the loss that comes with temperature; 0 lost at assembly, 1 nothing lost at the reference",
             source="assumed: assembly until a test says else",
         ),
+        which_parameter("set", "sets", 1, "which set lost it", "unknown before looking"),
     ),
     sees="bearing modes lower at every temperature (thermal_share 0) or falling more (1); damping of the rocking modes changes little",
     resembles=("clearance_opening", "expansion_mismatch", "bond_softening", "hertz_amplitude"),

@@ -52,7 +52,7 @@ def test_a_variant_for_every_choice(spindle):
     for e in usable(spindle):
         found = variants(e)
         chosen = [p for p in e.parameters[1:] if p.choices]
-        shares = 0 if chosen else sum(p.limits == (0.0, 1.0) and p.prior_sd > 0 for p in e.parameters[1:])
+        shares = sum(p.limits == (0.0, 1.0) and p.prior_sd > 0 and p not in chosen for p in e.parameters[1:])
         assert len(found) == np.prod([len(p.choices) for p in chosen], dtype=int) + 2 * shares  # and each share at either end
         assert len({tuple(m.choices.items()) for m in found}) == len(found)
         for m in found:
@@ -143,8 +143,37 @@ def test_an_element_that_drifts_whole_is_the_sum_of_its_directions(spindle, mode
         m = found[name]
         return Problem(model, (m,)).by_size(1, x, [(m.effect, m.values(0.0, []))], 0)
 
-    parts = sum(column(f"flange {direction} stiffness") for direction in ("axial", "lateral", "tilt"))
-    assert column("flange stiffness") == pytest.approx(parts, abs=1e-3 * np.abs(parts).max())
+    for element, whole, directions in [
+        ("flange ", "", ("axial ", "lateral ", "tilt ")), ("flange ", "lateral ", ("x ", "y ")), ("flange ", "tilt ", ("tilt x ", "tilt y ")),
+        ("bearings ", "", ("radial ", "axial ", "tilt ")), ("bearings ", "radial ", ("x ", "y ")),
+    ]:  # fmt: skip
+        parts = sum(column(f"{element}{direction}stiffness") for direction in directions)
+        assert column(f"{element}{whole}stiffness") == pytest.approx(parts, abs=1e-3 * np.abs(parts).max()), (element, whole)
+
+
+def test_cross_coupled_stiffness_feeds_one_whirl_and_damps_the_other():
+    """Of a pair of modes that coincides (symmetric scene, at rest) one whirl loses the damping that the other gains, s -> s -+ i k_xy phi^2 / (2 i omega) to
+    first order, and their mean frequency stays (Friswell and others, 2010, 7.3); what is exact of the residual's derivative is its difference."""
+    scene = load(ROOT / "tests" / "scenes" / "symmetric")
+    m = next(m for m in free_forms(scene) if m.name == "bearings cross-coupled stiffness")
+    campaign = virtual_campaign(scene, [Condition(20.0)], 1, frequency=np.arange(400.0, 6000.1, 80.0))
+    model, plain = model_of(scene, campaign), operating_point(scene, Condition(20.0))
+    crossed = operating_point(scene, Condition(20.0), [(m.effect, m.values(0.2, []))])
+    for before, after in zip(plain.state.bearings, crossed.state.bearings, strict=True):
+        assert after.stiffness[0, 1] - before.stiffness[0, 1] == pytest.approx(np.expm1(2e-3) * before.stiffness[0, 0], rel=1e-9)
+        assert after.stiffness[1, 0] - before.stiffness[1, 0] == pytest.approx(-np.expm1(2e-3) * before.stiffness[0, 0], rel=1e-9)
+    lateral = [i for i, mode in enumerate(plain.modes) if mode.kind in ("rocking", "lateral")]
+    pairs = [(i, i + 1) for i in lateral[::2]]
+    moved = [[crossed.modes[i].damping_ratio - plain.modes[i].damping_ratio for i in pair] for pair in pairs]
+    assert max(abs(a - b) for a, b in moved) > 1e-4  # of some pair the bearings hold enough
+    for pair, (a, b) in zip(pairs, moved, strict=True):
+        assert a + b == pytest.approx(0.0, abs=2e-3 * max(abs(a), 1e-6))
+        rise = [crossed.modes[i].frequency / plain.modes[i].frequency - 1 for i in pair]
+        assert sum(rise) == pytest.approx(0.0, abs=3e-6)  # second order
+    x = np.zeros(len(model.parameters))
+    by_size = Problem(model, (m,)).by_size(0, x, [(m.effect, m.values(0.0, []))], 0)
+    ends = [model.residual(0, x, [(m.effect, m.values(size, []))]) for size in (-1e-4, 1e-4)]
+    assert by_size == pytest.approx((ends[1] - ends[0]) / 2e-4, abs=1e-4 * np.abs(by_size).max())
 
 
 @pytest.mark.parametrize(("form", "kept"), [("hub mass", ()), ("hub transverse inertia", ("mass", "polar"))])

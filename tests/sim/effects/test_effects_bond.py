@@ -68,3 +68,13 @@ def test_bond_damping_against_complex_stiffness(hot, loss_factor):
     assert stiffness / scale == pytest.approx(exact.real / scale, abs=(loss_factor + 0.04) ** 2)
     assert omega * damping / scale == pytest.approx(exact.imag / scale, abs=0.2 * (loss_factor + 0.04) ** 2)
     assert np.linalg.eigvalsh(damping * np.outer([1, 1, 1, 100, 100], [1, 1, 1, 100, 100])).min() > 0
+
+
+@pytest.mark.parametrize(("which", "softer"), [(-1.0, [True, True]), (0.0, [True, False]), (1.0, [False, True])])
+def test_the_bond_of_one_ring_softens_alone(spindle, which, softer):
+    """A ring whose bond holds is as if there were no bond; the other has two springs in series along the axis."""
+    bonded = at(spindle, Condition(60.0), bond_softening, bearing=which).state.bearings
+    for b, held, soft in zip(bonded, operating_point(spindle, Condition(60.0)).state.bearings, softer, strict=True):
+        compliance = bond_softening.compliance(60.0, bond_softening.EFFECT.typical()) if soft else 0.0
+        expected = np.linalg.inv(np.linalg.inv(held.stiffness) + np.diag([compliance] * 3 + [0.0] * 2))  # two in series, whole matrices
+        assert b.stiffness == pytest.approx(expected, rel=1e-6, abs=1e-9 * np.abs(expected).max())

@@ -3,10 +3,13 @@
 import numpy as np
 import pytest
 
+from tests.conftest import ROOT
 from tests.effect_points import at
 from thermospindle.model.bearing.pair import reference_motion, solve
 from thermospindle.model.machine import Condition
+from thermospindle.model.scene.reading import load
 from thermospindle.sim.effects.bearing import clearance_opening, constant_force_preload, preload_loss
+from thermospindle.sim.operating import operating_point
 
 
 @pytest.mark.parametrize(("loss", "share", "temperature", "left"), [
@@ -18,6 +21,21 @@ def test_lost_preload_against_hertz(spindle, loss, share, temperature, left):
     for b in state.bearings:
         assert b.preload == pytest.approx(16.0 * left, rel=1e-8)
         assert 10 * 3.5632e9 * b.deformation**1.5 * np.sin(b.contact_angle) == pytest.approx(16.0 * left, rel=1e-3)
+
+
+@pytest.mark.parametrize(("which", "left"), [(-1.0, {"front": 0.8, "rear": 0.8}), (0.0, {"front": 0.8, "rear": 1.0}), (1.0, {"front": 1.0, "rear": 0.8})])
+def test_one_set_of_several_loses_its_preload(which, left):
+    """Each row of a machine tool's two sets carries what is left of its own set's force, and the rest all of theirs."""
+    machine = load(ROOT / "scenes" / "five_bearing")
+    cold = Condition(machine.reference_temperature)
+    before, after = ({b.name: b.preload for b in operating_point(machine, cold, e).state.bearings} for e in ((), lost(machine, which)))
+    for s in machine.sets:
+        for name in s.bearings:
+            assert after[name] == pytest.approx(left[s.name] * before[name], rel=1e-6), name
+
+
+def lost(machine, which):
+    return [(preload_loss.EFFECT, {"loss": 0.2, "thermal_share": 0.0, "set": which})]
 
 
 def test_thermal_loss_is_whole_at_40_K(spindle):
