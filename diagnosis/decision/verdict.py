@@ -27,7 +27,8 @@ SURE = 5.0  # standard deviations of chi2 by chance, beyond which something is l
 class Verdict:
     """`word` is none, identified, ambiguous, two effects or unexplained; `effects` what it names; `losses` the expected loss of every answer
     weighed. `candidates` of the catalogue and `free` ones with the most probable first. `held_out_before` and `held_out_after` are rms residuals, in standard
-    errors, of conditions predicted from all others, without effects and as `accepted`; `held_out_gain` what their ln probability density gains."""
+    errors, of conditions predicted from all others, without effects and as `accepted`; `held_out_gain` what their ln probability density gains. `told` is what says how
+    far drawing, thermometers and sensors are off: as `accepted`, or the likeliest where nothing is, for without what drifts these stand in for it."""
 
     word: str
     effects: Names
@@ -41,6 +42,7 @@ class Verdict:
     held_out_after: float
     held_out_gain: float
     accepted: Hypothesis
+    told: Hypothesis
 
 
 def decide(found: Search) -> Verdict:
@@ -56,8 +58,9 @@ def decide(found: Search) -> Verdict:
     (before, plain), (after, density) = (left_out(found.model, h.fit, h.evidence, groups) for h in (found.base, accepted))
     why = reason.of_verdict(found, word, effects, candidates, free, none, before, after, density - plain)
     why += reason.of_resonances(found.model, best) + reason.of_what_is_left(best, same)
-    why += reason.of_tolerances(found.model, accepted)
-    return Verdict(word, effects, why, candidates, free, none, unknown, losses, before, after, density - plain, accepted)
+    told = best if word == "unexplained" else accepted
+    why += reason.of_tolerances(found.model, told)
+    return Verdict(word, effects, why, candidates, free, none, unknown, losses, before, after, density - plain, accepted, told)
 
 
 def _unheld(

@@ -14,6 +14,7 @@ from thermospindle.diagnosis.forward.nuisance import Resonance
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit
 from thermospindle.diagnosis.inference.hypothesis import EARLY, PLENTY, STRAIN, Hypothesis, settled
+from thermospindle.diagnosis.inference.prior import DRIFTING
 from thermospindle.diagnosis.inference.remainder import LOOKED, light_resonance, overlap
 from thermospindle.model.parallel import in_parallel
 from thermospindle.model.types import Array
@@ -27,7 +28,8 @@ CENTRED = 2  # times that a light resonance's parameters are counted anew from w
 
 def with_resonance(model: CampaignModel, h: Hypothesis, workers: int | None = None) -> tuple[CampaignModel, Hypothesis] | None:
     """The model with the light resonance that an explanation leaves unexplained in every test, and the explanation fitted in it; None where it
-    leaves none, or it clears too little. Where discrepancies stand in for it, no misfit is left, and its evidence alone tells."""
+    leaves none, or it clears too little. Where discrepancies stand in for it, no misfit is left, and its evidence tells; without effects not even that where
+    modes still drift beside it, for what changes from test to test is no resonance, and one that is taken for it then stands in the effect's way."""
     hidden = h.evidence.learned.errors <= STRAIN
     if len(model.resonances) == RESONANCES or (h.excess > SLIGHT and overlap(model, h.fit).tests < LOOKED):
         return None
@@ -53,7 +55,9 @@ def with_resonance(model: CampaignModel, h: Hypothesis, workers: int | None = No
     except FAILED:
         return None
     clear = max(CLEARED * h.excess, CHANCE * np.sqrt(2 / h.fit.count))
-    asked = found.evidence.ln > h.evidence.ln + PLENTY and (hidden or found.excess < clear)
+    drift = any(found.evidence.learned.sizes.get(kind, 0.0) > 0 for kind in DRIFTING)
+    settles = found.excess < clear if not hidden else bool(h.mechanisms) or not drift
+    asked = found.evidence.ln > h.evidence.ln + PLENTY and settles
     return (wider, found) if asked else None
 
 

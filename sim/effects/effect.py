@@ -131,8 +131,9 @@ def which_parameter(name: str, counts: str, here: int, meaning: str, source: str
     return _fitted(Parameter(name, "1", ALL, ALL, 1.0, (ALL, 1.0), says, source, (ALL,), counts), 1.0, {counts: here})
 
 
-def chosen(number: float, names: Sequence[str]) -> tuple[str, ...]:
-    """Those that a value of `which_parameter` means."""
+def chosen(values: Values, name: str, names: Sequence[str]) -> tuple[str, ...]:
+    """Those that the value of a `which_parameter` means; all of them where there is none, as in scripts from before there was such a choice."""
+    number = values.get(name, ALL)
     return tuple(names) if number == ALL else (names[int(number)],)
 
 

@@ -25,8 +25,7 @@ def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
     """Everything as one object; keys carry units where values have them."""
     v, base = d.verdict, d.search.base
     n = base.fit.count
-    accepted = v.accepted
-    before, after = (float(np.sqrt(h.evidence.chi2 / n)) for h in (base, accepted))
+    before, after = (float(np.sqrt(h.evidence.chi2 / n)) for h in (base, v.accepted))
     return {
         "verdict": v.word,
         "effects": list(v.effects),
@@ -62,10 +61,10 @@ def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
         "tolerances": {
             p.name: {"value": float(m * p.sd), "sd": float(s * p.sd), "prior_sd": p.sd, "kind": p.kind}
             | ({"test": d.search.model.tests[p.test].test.id} if p.kind == kinds_of.TEMPERATURE and p.test is not None else {})
-            for p, m, s in zip(d.search.model.parameters, accepted.evidence.mean, _sd(accepted.evidence), strict=False)
+            for p, m, s in zip(d.search.model.parameters, v.told.evidence.mean, _sd(v.told.evidence), strict=False)
             if p.kind in (kinds_of.BUILD, kinds_of.TEMPERATURE, kinds_of.GAIN)
         },
-        "learned": _learned(accepted.evidence),
+        "learned": _learned(v.told.evidence),
         "light_resonances": [{"frequency_Hz": r.frequency, "damping_ratio": r.damping} for r in shown(d.search.model, d.search.hypotheses[0])],
         "noise": {data.test.id: getattr(data, "noise_from", "the table of modes") for data in d.search.model.tests},
     }

@@ -21,7 +21,7 @@ def pair(spindle: Spindle, condition: Condition, values: Values, state: PairStat
     if give == 0.0:
         return state
     omega = 2 * np.pi * spindle.structure.damping_frequency
-    bearings, bonded = [], chosen(values["bearing"], [b.name for b in spindle.bearings])
+    bearings, bonded = [], chosen(values, "bearing", [b.name for b in spindle.bearings])
     for b in state.bearings:
         if b.name not in bonded:
             bearings.append(b)

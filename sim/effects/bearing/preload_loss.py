@@ -13,7 +13,7 @@ RISE = 40.0
 def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
     if values["loss"] == 0.0:
         return spindle
-    return scaled_preload(spindle, remaining(spindle, condition, values), chosen(values["set"], [s.name for s in spindle.sets]))
+    return scaled_preload(spindle, remaining(spindle, condition, values), chosen(values, "set", [s.name for s in spindle.sets]))
 
 
 def remaining(spindle: Spindle, condition: Condition, values: Values) -> float:

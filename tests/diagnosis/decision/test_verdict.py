@@ -44,6 +44,9 @@ def test_words(case):
     assert total(v) == pytest.approx(1.0, abs=1e-9)
     assert v.losses[min(v.losses, key=lambda k: v.losses[k])] == min(v.losses.values())
     assert v.reason
+    likeliest = max(gains, key=lambda names: gains[names], default=None)
+    likeliest = (likeliest,) if isinstance(likeliest, str) else likeliest
+    assert v.told.names == (likeliest if word == "unexplained" else v.accepted.names)  # without what drifts the drawing would be said to be off
 
 
 def test_a_false_alarm_costs_what_is_stated():

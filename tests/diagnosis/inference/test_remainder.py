@@ -9,7 +9,7 @@ import pytest
 
 from tests.blind.hidden_structure import on_spring
 from tests.virtual_campaign import drawn, effect, model_of, virtual_campaign
-from thermospindle.diagnosis.forward.nuisance import RESONANCE, Resonance
+from thermospindle.diagnosis.forward.nuisance import RESONANCE, STIFFNESS_DRIFT, Resonance
 from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
@@ -17,6 +17,7 @@ from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
 from thermospindle.diagnosis.inference.resonance import shown, with_resonance
 from thermospindle.diagnosis.verdict import diagnose
 from thermospindle.model.machine import Condition
+from thermospindle.model.units import RPM
 from thermospindle.sim.effects.effect import Effect, Parameter
 
 TESTS = (Condition(20.0), Condition(40.0), Condition(60.0))
@@ -105,6 +106,26 @@ def test_derivatives_by_its_parameters(model):
         down[i] -= 1e-4
         wanted = (wider.residual(1, up, []) - wider.residual(1, down, [])) / 2e-4
         assert jacobian[list(numbers).index(i)] == pytest.approx(wanted, abs=1e-5 * np.abs(wanted).max())
+
+
+@pytest.mark.slow
+def test_none_is_taken_for_what_changes_from_test_to_test(spindle):
+    """A flange that gives in one direction, more and more when warm: two resonances were taken up beside the modes that drifted for it (here at 6916 Hz, +33 in
+    ln evidence), and with them in its way the flange was left 211 in ln evidence short of what it reaches, its drawing said to be 43 % off."""
+
+    def chain(spindle, condition, values, chain):
+        d = np.diag([1.0, np.exp(values["mass"] / 2 / (1 + np.exp((42 - condition.temperature) / 5))), 1.0, 1.0, 1.0])
+        elements = (replace(e, stiffness=d @ e.stiffness @ d, damping=d @ e.damping @ d) if e.name == "flange" else e for e in chain.elements)
+        return replace(chain, elements=tuple(elements))
+
+    conditions = [*(Condition(t) for t in (20.0, 30.0, 40.0, 50.0, 60.0)), *(Condition(t, 7200 * RPM) for t in (25.0, 55.0))]
+    hidden = [(replace(table(), chain=chain), {"mass": -0.15})]
+    made = virtual_campaign(spindle, conditions, 5, hidden, drawn(spindle, 7, 5), frequency=np.arange(400.0, 6000.1, 16.0))
+    model = model_of(spindle, made)
+    first = fit(model)
+    none = settled(model, Hypothesis(first, evidence(model, first)))
+    assert none.evidence.learned.sizes[STIFFNESS_DRIFT] > 0
+    assert with_resonance(model, none) is None
 
 
 @pytest.mark.slow
