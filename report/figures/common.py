@@ -65,7 +65,8 @@ STYLE: dict[Any, Any] = {
     "axes.facecolor": "none",
     **{key: INK for key in ("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color")},
 }
-
+DRAWN: dict[Any, Any] = STYLE | {"figure.constrained_layout.use": False}
+"""The style of figures that are `laid_out`: where it asks for a layout, each time a figure is saved makes one anew."""
 
 SVG = "{http://www.w3.org/2000/svg}"
 REFERENCE = re.compile(r"#([a-zA-Z][\w.-]*)(?=\)|$)")  # of url(#id) and #id; also a colour, which is no element's id
@@ -79,9 +80,18 @@ def colour(temperature: float, every: Sequence[float]) -> str:
     return to_hex(TEMPERATURES((temperature - low) / (high - low) if high > low else 0.0))
 
 
+def laid_out(figure: Figure) -> Figure:
+    """The figure with its axes where its layout puts them: worked out once, however often it is drawn then, in `DRAWN`."""
+    if (layout := figure.get_layout_engine()) is not None:
+        layout.execute(figure)
+        figure.set_layout_engine(None)
+    return figure
+
+
 def save(figure: Figure, folder: Path, name: str, dpi: float = 150) -> None:
     """`name`.png and `name`.svg in a folder that exists: files of their own, on white; the same figure gives the same SVG."""
-    with rc_context(STYLE):
+    with rc_context(DRAWN):
+        laid_out(figure)
         figure.savefig(folder / f"{name}.png", dpi=dpi, facecolor="white")
         figure.savefig(folder / f"{name}.svg", dpi=dpi, facecolor="white", metadata={"Date": None})
 
@@ -92,7 +102,7 @@ def save_all(figures: Mapping[str, Figure], folder: Path, dpi: float = 150) -> N
         save(figure, folder, name, dpi)
 
 
-@rc_context(STYLE)
+@rc_context(DRAWN)
 def svg(figure: Figure, key: str, description: str) -> str:
     """The figure as an SVG element for the inside of a page; `key` keeps its ids apart from those of other figures.
 
@@ -100,7 +110,7 @@ def svg(figure: Figure, key: str, description: str) -> str:
     solver leaves to chance.
     """
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="svg", dpi=170, metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
+    laid_out(figure).savefig(buffer, format="svg", dpi=170, metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
     root = ElementTree.fromstring(buffer.getvalue())  # without comments
     for metadata in root.findall(f"{SVG}metadata"):
         root.remove(metadata)

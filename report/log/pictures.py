@@ -16,7 +16,7 @@ from matplotlib.image import imsave
 from numpy.typing import NDArray
 
 from thermospindle.model.types import Array
-from thermospindle.report.figures.common import STYLE
+from thermospindle.report.figures.common import DRAWN, laid_out
 from thermospindle.report.log.views import DARK
 
 DOTS = 180  # per inch: of a figure that is an inch for every 90 points of its view, sharp where a point has two dots
@@ -26,10 +26,10 @@ Pixels = NDArray[np.uint8]
 
 def pixels(figure: Figure) -> Pixels:
     """The figure (height, width, 3) with light and dark exchanged and hues kept: white becomes `DARK`."""
-    with rc_context(STYLE):
+    with rc_context(DRAWN):
         figure.set_dpi(DOTS)
         figure.patch.set_facecolor("white")
-        canvas = FigureCanvasAgg(figure)
+        canvas = FigureCanvasAgg(laid_out(figure))
         canvas.draw()
     light = np.asarray(canvas.buffer_rgba())[..., :3]
     # in HSL, lightness l = (max + min) / 2 becomes 1 - l when every channel moves by 1 - 2 l: by 255 - max - min, and none leaves its byte

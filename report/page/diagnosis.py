@@ -59,7 +59,6 @@ def write_diagnosis(
     count = (len(d.search.model.tests) if d else 0) + (len(turning.seen) if turning else 0)
     write_page(folder, spindle, count, answer["campaign"], every, "Diagnosis")
     for name, one in (modal | runout).items():
-        one.set_layout_engine("none")  # laid out for the page already
         save(one, folder, name, 130)
 
 
