@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -321,7 +322,11 @@ class Spindle:
         return max(region.z[0], bearing.z - width / 2), min(region.z[1], bearing.z + width / 2)
 
     def region(self, name: str) -> Region:
-        return next(r for r in self.regions if r.name == name)
+        return self._regions[name]
+
+    @cached_property
+    def _regions(self) -> dict[str, Region]:
+        return {r.name: r for r in self.regions}
 
     def point(self, node: int) -> Point:
         return next(p for p in self.points if p.node == node)

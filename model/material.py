@@ -23,7 +23,8 @@ class Law:
     def __call__(self, temperature: float) -> float:
         if len(self.value) == 1:
             return self.value[0]
-        self.check(temperature)
+        if not self.temperature[0] - BEYOND <= temperature <= self.temperature[-1] + BEYOND:
+            self.check(temperature)
         k = min(max(bisect_right(self.temperature, temperature), 1), len(self.value) - 1)
         (start, end), (first, last) = self.temperature[k - 1 : k + 1], self.value[k - 1 : k + 1]
         return first + (temperature - start) / (end - start) * (last - first)

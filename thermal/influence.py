@@ -8,13 +8,13 @@ It is kept in the process, and on disk (`model.files.kept`) under a hash of all 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import lru_cache
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache, partial
 
 import numpy as np
 
-from thermospindle.model.machine import Bearing, Region, RollerBearing, Spindle
+from thermospindle.model.machine import Bearing, Material, Region, RollerBearing, Spindle
 from thermospindle.thermal import store
 from thermospindle.thermal.elastic import Elasticity, Race, Response
 from thermospindle.thermal.mesh import PartMesh, tiled
@@ -91,16 +91,42 @@ class Gain:
 
 def gains(spindle: Spindle, tolerance: float, temperatures: Mapping[str, float]) -> tuple[Gain, ...]:
     """The gains of `influence` at temperatures (C, by region), part by part, without what only fields of temperature need."""
+    of = _Of(spindle.regions, tuple(spindle.materials.items()), spindle.ringed, spindle.reference_temperature, spindle)
+    return tuple(gain_at(temperatures) for gain_at in _gains(of, tolerance))
+
+
+@dataclass(frozen=True)
+class _Of:
+    """What of a spindle its influence depends on."""
+
+    regions: tuple[Region, ...]
+    materials: tuple[tuple[str, Material], ...]
+    ringed: tuple[Bearing | RollerBearing, ...]
+    reference_temperature: float
+    spindle: Spindle = field(compare=False)
+
+
+@lru_cache(maxsize=64)
+def _gains(of: _Of, tolerance: float) -> tuple[Callable[[Mapping[str, float]], Gain], ...]:
+    """The gain of every part as a function of its regions' temperatures."""
     found = []
-    for part in dict.fromkeys(g.part for g in spindle.regions):
-        moduli = _softened(spindle, part, temperatures)
-        if moduli is None:
-            response = _kept(_question(spindle, part, tolerance, None))[0]
-            found.append(Gain(response.races, response.section.regions, response.gain))
+    for part in dict.fromkeys(g.part for g in of.regions):
+        family = _family(of.spindle, part, tolerance)
+        if all(len(region.youngs_modulus.value) == 1 for region in family.regions):
+            response = _kept(family.reference)[0]
+            found.append(partial(_constant, Gain(response.races, response.section.regions, response.gain)))
         else:
-            space = _space(_family(spindle, part, tolerance))
-            found.append(Gain(space.races, space.section.regions, space.solution(_ordered(space, moduli))[0]))
+            found.append(partial(_softening, _space(family)))
     return tuple(found)
+
+
+def _constant(gain: Gain, temperatures: Mapping[str, float]) -> Gain:
+    return gain
+
+
+def _softening(space: Reduced, temperatures: Mapping[str, float]) -> Gain:
+    moduli = np.array([region.youngs_modulus(temperatures[region.name]) for region in space.regions])
+    return Gain(space.races, space.section.regions, space.solution(moduli)[0])
 
 
 def _softened(spindle: Spindle, part: str, temperatures: Mapping[str, float] | None) -> tuple[tuple[str, float], ...] | None:
@@ -143,11 +169,6 @@ def _space(family: Family) -> Reduced:
 @lru_cache(maxsize=16)
 def _response(family: Family, moduli: tuple[tuple[str, float], ...]) -> Response:
     return _space(family).response(dict(moduli))
-
-
-def _ordered(space: Reduced, moduli: tuple[tuple[str, float], ...]) -> np.ndarray:
-    by_name = dict(moduli)
-    return np.array([by_name[r.name] for r in space.regions])
 
 
 def elasticity(spindle: Spindle, temperatures: Mapping[str, float] | None = None) -> dict[str, Elasticity]:
@@ -199,3 +220,4 @@ def _answer(question: Elastic, start: PartMesh) -> tuple[Response, Convergence]:
 def forget() -> None:
     """Drop what this process has kept, so that it reads from disk or computes again as a new one would."""
     _kept.cache_clear()
+    _gains.cache_clear()

@@ -227,9 +227,9 @@ def _fitted(record: RunoutRecord, frequency: Array) -> tuple[ComplexArray, Array
 
 def _floor(square: Array, bins: Array, f: float, fitted: Array, length: float) -> Array:
     """Mean squared amplitude (probes,) of the bins around f that hold no fitted line: their median over ln 2."""
-    near = np.abs(bins - f) < AROUND / length
-    free = near & (np.abs(bins[:, None] - fitted).min(axis=1) > 0.6 / length)
-    chosen = free if free.sum() >= 5 else near
+    near = np.flatnonzero(np.abs(bins - f) < AROUND / length)
+    free = near[np.abs(bins[near, None] - fitted).min(axis=1) > 0.6 / length]
+    chosen = free if len(free) >= 5 else near
     return np.asarray(np.median(square[:, chosen], axis=1) / np.log(2))
 
 
@@ -253,7 +253,7 @@ def _unexplained(
         near = any(abs(g.frequency - frequency[i]) < 4 / length for g in found)
         if amplitude[probe, i] < STRONG * strongest[probe]:
             break
-        if not near and amplitude[probe, i] ** 2 > STANDS_OUT * float(np.median(around)) ** 2:
+        if not near and amplitude[probe, i] ** 2 > STANDS_OUT * _median(around) ** 2:
             order = float(frequency[i]) / turning
             found.append(UnexplainedLine(test.id, float(frequency[i]), order, float(amplitude[probe, i]), record.nodes[probe]))
     return tuple(found)
@@ -281,3 +281,9 @@ def _summed(record: RunoutRecord, frequency: Array) -> tuple[ComplexArray, Array
         phasor[:, k] = np.sqrt(total) * np.exp(1j * np.angle(record.value[:, top]))
         sd[:, k] = np.sqrt(floor * (high - low) / bandwidth)
     return phasor, sd
+
+
+def _median(values: Array) -> float:
+    """As numpy's of so few numbers, which takes thirty times as long over its cases."""
+    ordered, n = np.sort(values), len(values)
+    return float(ordered[(n - 1) // 2] + ordered[n // 2]) / 2

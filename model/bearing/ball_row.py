@@ -11,7 +11,7 @@ With ball inertia the ball centre is an unknown of its own (`model.bearing.heavy
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import hypot, sqrt
 
 import numpy as np
@@ -58,7 +58,12 @@ class BallRow:
 
     @property
     def azimuths(self) -> Array:
-        return 2 * np.pi * np.arange(self.balls) / self.balls
+        return azimuths(self.balls)
+
+
+def azimuths(balls: int) -> Array:
+    """Angles (balls,) about the axis (rad) at which the balls of a row stand."""
+    return 2 * np.pi * np.arange(balls) / balls
 
 
 @dataclass(frozen=True)
@@ -79,10 +84,17 @@ class RowForce:
 
 
 def kinematics(row: BallRow) -> Array:
-    """Rows (balls, 2, 5) that take the outer ring's displacement to (u_r, u_z) at each ball."""
-    c, s = np.cos(row.azimuths), np.sin(row.azimuths)
+    """Rows (balls, 2, 5) that take the outer ring's displacement to (u_r, u_z) at each ball; read only."""
+    return _kinematics(row.balls, row.arm)
+
+
+@lru_cache(maxsize=1024)
+def _kinematics(balls: int, arm: float) -> Array:
+    c, s = np.cos(azimuths(balls)), np.sin(azimuths(balls))
     o, i = np.zeros_like(c), np.ones_like(c)
-    return np.stack([np.stack([c, s, o, o, o], -1), np.stack([o, o, i, row.arm * s, -row.arm * c], -1)], 1)
+    rows = np.stack([np.stack([c, s, o, o, o], -1), np.stack([o, o, i, arm * s, -arm * c], -1)], 1)
+    rows.flags.writeable = False
+    return rows
 
 
 def centre_line(row: BallRow, displacement: Array) -> Array:
@@ -103,9 +115,10 @@ def respond(row: BallRow, displacement: Array | None = None) -> RowForce:
     local = _with_inertia(row, line) if _heavy(row) else _massless(row, line)
     force, stiffness, inner, outer, inner_angle, outer_angle, deformation = local
     b = kinematics(row)
+    flat = b.reshape(-1, 5)
     return RowForce(
-        np.einsum("jik,ji->k", b, force),
-        np.einsum("jik,jil,jlm->km", b, stiffness, b),
+        force.ravel() @ flat,
+        flat.T @ (stiffness @ b).reshape(-1, 5),
         inner,
         outer,
         inner_angle,

@@ -17,7 +17,7 @@ import numpy as np
 from thermospindle.model.bearing.pair import BearingState, LinearState, PairState
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import MOVES, Body, Point, Spindle, Structure
-from thermospindle.model.types import Array
+from thermospindle.model.types import Array, Integers
 
 
 @dataclass(frozen=True)
@@ -170,11 +170,8 @@ def matrices(chain: RotorBase) -> Matrices:
     """M, C + G, K assembled element by element (independent of MuJoCo)."""
     n = len(chain.dofs)
     mass, damping, stiffness = np.zeros(n), np.zeros((n, n)), np.zeros((n, n))
-    start: dict[str, int] = {"ground": 0}
-    width = {"ground": 0}
     at = 0
     for body in chain.bodies:
-        start[body.name], width[body.name] = at, len(body.moves)
         inertia = dict(zip(MOVES, (body.mass, body.mass, body.mass, *body.inertia[:2]), strict=True))
         mass[at : at + len(body.moves)] = [inertia[move] for move in body.moves]
         if body.turns:
@@ -182,10 +179,29 @@ def matrices(chain: RotorBase) -> Matrices:
             damping[i, j] += body.inertia[2] * chain.speed * body.speed_ratio
             damping[j, i] -= body.inertia[2] * chain.speed * body.speed_ratio
         at += len(body.moves)
-    for element in chain.elements:
-        ends = [name for name in (element.a, element.b, element.slides) if name]
-        own = np.concatenate([np.arange(start[name], start[name] + width[name]) for name in ends])
-        rows = element_rows(chain, element)[:, own]
-        damping[np.ix_(own, own)] += rows.T @ element.damping @ rows
-        stiffness[np.ix_(own, own)] += rows.T @ element.stiffness @ rows
+    if chain.elements:
+        rows, place = _places(chain.layout, tuple((e.a, e.b, e.z, e.slides) for e in chain.elements))
+        for whole, of_elements in (
+            (damping, [e.damping for e in chain.elements]),
+            (stiffness, [e.stiffness for e in chain.elements]),
+        ):
+            felt = rows.transpose(0, 2, 1) @ np.array(of_elements) @ rows
+            whole += np.bincount(place, felt.ravel(), n * n).reshape(n, n)
     return Matrices(np.diag(mass), damping, stiffness, chain.dofs)
+
+
+@lru_cache(maxsize=64)
+def _places(layout: Layout, elements: tuple[tuple[str, str, float, str], ...]) -> tuple[Array, Integers]:
+    """Rows (elements, 5, w) of the relative motion that each element (a, b, z, slides) resists, over the w degrees of freedom of its ends, and the place
+    (elements w w,) of each of its terms in a whole matrix; fewer than w are filled up with zeros at place 0."""
+    first, at = {"ground": range(0)}, 0
+    for name, _, moves in layout:
+        first[name] = range(at, at + len(moves))
+        at += len(moves)
+    own = [[i for name in (a, b, slides) if name for i in first[name]] for a, b, _, slides in elements]
+    width = max(len(numbers) for numbers in own)
+    rows, number = np.zeros((len(elements), 5, width)), np.zeros((len(elements), width), int)
+    for k, ((a, b, z, slides), numbers) in enumerate(zip(elements, own, strict=True)):
+        rows[k, :, : len(numbers)] = _element_rows(layout, a, b, z, slides)[:, numbers]
+        number[k, : len(numbers)] = numbers
+    return rows, (number[:, :, None] * at + number[:, None, :]).ravel()

@@ -142,10 +142,11 @@ def excitation(point: OperatingPoint, imperfections: Imperfections | None = None
         to_element[0, 4], to_element[1, 3] = element.z - bearing.z, bearing.z - element.z
         rollers = point.state.rollers.get(name)
         displaced = free_displacements(point.state.bearing(name), kin, own) if rollers is None else rollers_displaced(rollers, kin, own)
-        for line, free in displaced:
-            free = to_element @ free
-            add(line, 0, free @ element.stiffness @ rows)
-            add(line, 1, free @ element.damping @ rows)
+        free = np.array([moved for _, moved in displaced]).reshape(-1, 5) @ to_element.T
+        by_stiffness, by_damping = (free @ (matrix @ rows) for matrix in (element.stiffness, element.damping))
+        for k, (line, _) in enumerate(displaced):
+            add(line, 0, by_stiffness[k])
+            add(line, 1, by_damping[k])
     found = sorted(parts, key=lambda line: line.frequency)
     forces = np.array([parts[line] for line in found]).reshape(len(found), 3, n)
     return Excitation(tuple(found), forces[:, 0], forces[:, 1], forces[:, 2])
@@ -179,8 +180,13 @@ class Felt:
 
 
 def free_displacements(bearing: BearingState, kin: Kinematics, own: RowImperfections) -> list[tuple[Line, ComplexArray]]:
-    """Free displacements (5,) m, rad of the outer ring against the inner one: phasors, with the line of each."""
-    felt = list(_felt(bearing, kin, own)) if bearing.in_contact else []
+    """Free displacements (5,) m, rad of the outer ring against the inner one: phasors, read only, with the line of each."""
+    return _free_displacements(bearing.name, bearing.row, kin, own) if bearing.in_contact else []
+
+
+@lru_cache(maxsize=128)
+def _free_displacements(name: str, row: BallRow, kin: Kinematics, own: RowImperfections) -> list[tuple[Line, ComplexArray]]:
+    felt = list(_felt(name, row, kin, own))
     if not felt:
         return []
     place = np.exp(2j * np.pi * np.arange(kin.balls) / kin.balls)
@@ -195,35 +201,36 @@ def free_displacements(bearing: BearingState, kin: Kinematics, own: RowImperfect
         for side, across in ((1, plus[n]), (-1, minus[n])):
             if abs(across) > limit[n]:
                 speed = kin.cage + side * f.rate
-                force, moment = whirling(f.pull[0] * across, speed), whirling(-1j * bearing.row.arm * f.pull[1] * across, speed)
+                force, moment = whirling(f.pull[0] * across, speed), whirling(-1j * row.arm * f.pull[1] * across, speed)
                 found.append((f.line("radial", side), np.array([*force, 0, *moment])))
-    compliance = np.linalg.inv(respond(bearing.row).tangent)
-    return [(line, -compliance @ force) for line, force in found]
+    displaced = -np.array([force for _, force in found]).reshape(-1, 5) @ np.linalg.inv(respond(row).tangent).T
+    displaced.flags.writeable = False
+    return [(line, moved) for (line, _), moved in zip(found, displaced, strict=True)]
 
 
-def _felt(bearing: BearingState, kin: Kinematics, own: RowImperfections) -> Iterator[Felt]:
+def _felt(name: str, row: BallRow, kin: Kinematics, own: RowImperfections) -> Iterator[Felt]:
     ball = np.arange(kin.balls)
     place = np.exp(2j * np.pi * ball / kin.balls)
-    local = respond(replace(bearing.row, balls=1)).tangent[np.ix_([0, 2], [0, 2])]
+    local = respond(replace(row, balls=1)).tangent[np.ix_([0, 2], [0, 2])]
     for ring, sign, radial, axial in (("inner", -1, own.inner_radial, own.inner_axial), ("outer", 1, own.outer_radial, own.outer_axial)):
         for pull, waves in zip(sign * local.T, (radial, axial), strict=True):
             for wave in waves:
                 amplitude = cmath.rect(wave.amplitude, wave.phase) * place[wave.order * ball % kin.balls]
                 rate = wave.order * (kin.cage - kin.ring(ring))
-                yield Felt(amplitude, rate, pull, _race_namer(bearing.name, kin, ring, wave.order))
+                yield Felt(amplitude, rate, pull, _race_namer(name, kin, ring, wave.order))
     if not own.ball_diameter and not own.ball_waves:
         return
-    inner_push, outer_push = contact_pushes(bearing.row)
+    inner_push, outer_push = contact_pushes(row)
     if own.ball_diameter:  # half of it at either contact; a common deviation is a preload
         size = np.array(own.ball_diameter, complex)
-        line = cage_line(bearing.name, kin, "ball size")
+        line = cage_line(name, kin, "ball size")
         yield Felt(size - size.mean(), 0.0, (inner_push + outer_push) / 2, lambda direction, side: line)
     for order in sorted({wave.order for waves in own.ball_waves for wave in waves}):
         pull = inner_push + (-1) ** order * outer_push  # the outer contact lies opposite the inner one
         if np.abs(pull).max() > CANCELLED * np.abs(inner_push).max():
             amplitude = np.array([_amplitude(waves, order) for waves in own.ball_waves])
             rate = order * kin.spin * np.sign(kin.turning)
-            yield Felt(amplitude, float(rate), pull, _ball_namer(bearing.name, kin, order))
+            yield Felt(amplitude, float(rate), pull, _ball_namer(name, kin, order))
 
 
 @lru_cache(maxsize=256)
