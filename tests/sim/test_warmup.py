@@ -19,7 +19,7 @@ from thermospindle.report.text.warmup import rows, warmup_json, warmup_section
 from thermospindle.sim import warmup as module
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.warmup import energy, warm_up
-from thermospindle.thermal import conduction, heat
+from thermospindle.thermal import conduction, heat, readout
 from thermospindle.thermal.expansion import expand, influence
 from thermospindle.thermal.readout import reading
 
@@ -30,6 +30,13 @@ SCENE = Path(__file__).parents[2] / "scenes" / "hdd_2003"
 @pytest.fixture(scope="module")
 def warm(spindle):
     return warm_up(spindle, SPEED, 20.0)
+
+
+@pytest.fixture
+def coarse(monkeypatch):
+    """Meshes of few elements, for what holds on any."""
+    for asking in (module, readout):
+        monkeypatch.setattr(asking, "influence", lambda spindle, temperatures=None: influence(spindle, 2e-2, temperatures))
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +81,7 @@ def test_reading_where_the_modulus_falls(spindle, model, monkeypatch):
     assert found["upper"].outer_z != pytest.approx(hard["upper"].outer_z, rel=1e-4)
 
 
-def test_a_law_that_begins_where_the_warm_up_does(spindle):
+def test_a_law_that_begins_where_the_warm_up_does(spindle, coarse):
     """Steel given from 20 to 100 C: the steady state is sought from the start, not from 0 C, and what rounding puts below 20 C is 20 C."""
     found = []
     for low in (20.0, 0.0):
@@ -156,7 +163,7 @@ def test_halving_the_steps_quarters_the_change(spindle, warm, model):
     assert (preload[0] - preload[1]) / (preload[1] - preload[2]) == pytest.approx(4.0, abs=1.0)
 
 
-def test_preload_drives_friction(spindle):
+def test_preload_drives_friction(spindle, coarse):
     """With friction from load alone, each moment's heat is f1 P d_m omega of its own preload, and the preload moves by a tenth."""
     loaded = replace(spindle.thermal.friction, f0=0.0, f1=0.01)
     own = replace(spindle, thermal=replace(spindle.thermal, friction=loaded))
@@ -180,7 +187,7 @@ def test_preload_falls_and_modes_with_it(warm):
     assert np.isfinite(warm.frequencies).all()
 
 
-def test_soak_of_a_good_conductor_is_newtons_law(spindle):
+def test_soak_of_a_good_conductor_is_newtons_law(spindle, coarse):
     """Conductivity a million times higher and bearings that pass any heat: one lump, T = air + (T0 - air) exp(-hA t / C)."""
     materials = {name: replace(m, conductivity=1e6) for name, m in spindle.materials.items()}
     perfect = replace(spindle.thermal.friction, conductance=1e5)
@@ -214,7 +221,7 @@ def test_a_spindle_that_cannot_cool_is_refused(spindle):
             warm_up(spindle, SPEED, 20.0, duration=none)
 
 
-def test_thermal_runaway_is_told(spindle):
+def test_thermal_runaway_is_told(spindle, coarse):
     """A hub of steel under a load friction ten thousand times too high: warmer inner rings load the pair, which warms them."""
     hot = Friction(0.0, 0.3, Law((20.0,), (1e-5,)), spindle.thermal.friction.conductance)
     steel = {name: replace(m, thermal_expansion=spindle.materials["steel"].thermal_expansion) for name, m in spindle.materials.items()}
