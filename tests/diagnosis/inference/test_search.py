@@ -147,8 +147,7 @@ def test_an_effect_is_found_where_its_law_gives_nothing(spindle):
         return rings.temperatures(spindle, condition, neutral | {"scale": values["scale"] * (condition.temperature - 20) / 40}, by_region)
 
     model = model_of(spindle, mode_campaign(spindle, conditions, 3, [(replace(rings, temperatures=warmer), {"scale": 4.0})]))
-    named = [m for name in ("thermal_gradient", "mount_compliance") for m in variants(effect(name))]
-    found = search(model, named, [f for f in free_forms(spindle) if f.name == "preload"], workers=1)
+    found = search(model, variants(effect("thermal_gradient")), [f for f in free_forms(spindle) if f.name == "preload"], workers=1)
     by_law = max((h.evidence.ln for h in found.hypotheses if h.names == ("thermal_gradient",) and not h.mechanisms[0].own_law), default=-np.inf)
     v = decide(found)
     assert (v.word, v.effects) == ("identified", ("thermal_gradient",))

@@ -223,8 +223,11 @@ def test_many_crossings_are_told_by_the_strongest_and_a_number(met):
 # ------------------------------------------------------------------ log and command line
 
 
-def test_log_gives_the_map_back(met, tmp_path):
+def test_log_gives_the_map_back(light, tmp_path):
     """Grid and natural frequencies bit for bit, coincidences as told; a timeline for each axis, and a blueprint."""
+    met = resonance_map(light, [20.0, 58.5], np.array([6000, 8400]) * RPM, NOMINAL)
+    assert (len(met.temperatures), len(met.speeds)) == (2, 3)
+    assert len(met.coincidences) > 10
     write_map_log(met, tmp_path / "map.rrd")
     read = read_log(tmp_path / "map.rrd")
     assert read.kind == "map"
