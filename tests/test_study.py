@@ -29,6 +29,13 @@ from thermospindle.sim.study.variants import combination
 DRAWN = 'title = "t"\nkind = "monte-carlo"\nscene = "hdd_2003"\ntemperatures_C = [20, 60]\n'
 
 
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Studies without their figures, for tests of their numbers; others have them drawn."""
+    for kind in ("monte_carlo", "sweep"):
+        monkeypatch.setattr(f"thermospindle.report.figures.study.{kind}", lambda *_: {})
+
+
 def study(folder, text, *options):
     """The answer of a study file, and its rows."""
     file = folder / "study.toml"
@@ -43,7 +50,7 @@ def files(folder):
     return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file() and p.suffix != ".rrd"}
 
 
-def test_the_log_gives_back_the_numbers(tmp_path, capsys):
+def test_the_log_gives_back_the_numbers(tmp_path, capsys, undrawn):
     out, rows = study(tmp_path, TURNING + "draws = 3\n")
     capsys.readouterr()
     assert main(["inspect", str(out / "study.rrd"), "--json"]) == 0
@@ -78,7 +85,7 @@ def test_a_sweep_has_the_modes_of_every_condition(tmp_path, capsys):
     assert found[8.0, 0.0, 20.0, 0.0]["preload_N.upper"] == pytest.approx(8.0, rel=1e-9)
 
 
-def test_a_case_without_an_answer_says_why_in_its_row(tmp_path, capsys):
+def test_a_case_without_an_answer_says_why_in_its_row(tmp_path, capsys, undrawn):
     text = 'title = "t"\nkind = "sweep"\nscene = "hdd_2003"\ntemperatures_C = [20]\n[vary]\n"ball_rows.hdd.ball_diameter_mm" = [1.588, 1.75]\n'
     _, rows = study(tmp_path, text)
     assert rows[0]["error"] is None
@@ -115,7 +122,7 @@ def test_draws_scatter_as_the_tolerances_say(tmp_path, capsys):
 TURNING = DRAWN.replace("temperatures_C = [20, 60]", "temperatures_C = [20]\nspeeds_rpm = [0, 7200]\nrunout = true")
 
 
-def test_runout_of_spindles_as_they_are_built(tmp_path, capsys):
+def test_runout_of_spindles_as_they_are_built(tmp_path, capsys, undrawn):
     """With a grade every draw has imperfections of its own; without, those of the scene, which the tolerances hardly move."""
     from thermospindle.sim.running.steady import steady_runout
 
@@ -216,7 +223,7 @@ def test_killed_and_gone_on_with_is_the_same_to_the_last_bit(tmp_path, capsys):
     assert files(killed) == files(whole)
 
 
-def test_a_folder_is_gone_on_with_only_by_its_own_study(tmp_path, capsys):
+def test_a_folder_is_gone_on_with_only_by_its_own_study(tmp_path, capsys, undrawn):
     out, _ = study(tmp_path, DRAWN + "draws = 3\n")
     before = files(out)
     for text in (DRAWN + "draws = 4\n", DRAWN + "draws = 3\nseed = 1\n"):
@@ -241,7 +248,7 @@ def test_a_folder_is_gone_on_with_only_by_its_own_study(tmp_path, capsys):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="folders have no locks on Windows")
-def test_two_runs_do_not_write_into_one_folder(tmp_path, capsys):
+def test_two_runs_do_not_write_into_one_folder(tmp_path, capsys, undrawn):
     from thermospindle.model.whole import alone
 
     out, _ = study(tmp_path, DRAWN + "draws = 2\n")
