@@ -7,7 +7,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does, 
 if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("LOKY_MAX_CPU_COUNT", "1")  # pytest's own workers take the cores: each does its work by itself
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
@@ -20,10 +21,12 @@ from thermospindle.diagnosis.verdict import Diagnosis, diagnose
 from thermospindle.model.bearing.pair import reference_motion, solve
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.scene.reading import load
+from thermospindle.sim import warmup
 from thermospindle.sim.campaign.campaign import read_campaign
 from thermospindle.sim.effects import by_name
 from thermospindle.sim.run import Run, measured_campaigns
-from thermospindle.thermal.expansion import expand
+from thermospindle.thermal import readout
+from thermospindle.thermal.expansion import expand, influence
 
 ROOT = Path(__file__).parents[1]
 SCENE = ROOT / "scenes" / "hdd_2003"
@@ -68,6 +71,15 @@ def nothing_missing(spindle, tmp_path_factory) -> Diagnosis:
     campaign = read_campaign(DATA / "foreign_none")
     campaign = replace(campaign, tests=tuple(t for t in campaign.tests if t.id in ("T20_n0", "T40_n0", "T60_n7200")))
     return made_once(tmp_path_factory, "nothing_missing", lambda: diagnose(spindle, campaign, effects))
+
+
+@contextmanager
+def coarse_warmups() -> Iterator[None]:
+    """Warm-ups on meshes of few elements, for what holds on any."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (warmup, readout):
+            patch.setattr(module, "influence", lambda spindle, temperatures=None: influence(spindle, 2e-2, temperatures))
+        yield
 
 
 def made_once(folders: pytest.TempPathFactory, name: str, make: Callable[[], Made]) -> Made:

@@ -10,6 +10,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 import thermospindle as ts
+from tests.conftest import coarse_warmups
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Spindle
 from thermospindle.model.units import RPM
@@ -22,7 +23,8 @@ from thermospindle.sim.warmup import Warmup, warm_up
 
 @pytest.fixture(scope="module")
 def warm(spindle: Spindle) -> Warmup:
-    return warm_up(spindle, 7200 * RPM, 20.0, duration=200.0)
+    with coarse_warmups():
+        return warm_up(spindle, 7200 * RPM, 20.0, duration=200.0)
 
 
 @pytest.fixture(scope="module")

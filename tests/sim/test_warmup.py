@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.conftest import coarse_warmups
 from thermospindle.cli import main
 from thermospindle.model.bearing.pair import solve
 from thermospindle.model.errors import BadInput
@@ -19,7 +20,7 @@ from thermospindle.report.text.warmup import rows, warmup_json, warmup_section
 from thermospindle.sim import warmup as module
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.warmup import energy, warm_up
-from thermospindle.thermal import conduction, heat, readout
+from thermospindle.thermal import conduction, heat
 from thermospindle.thermal.expansion import expand, influence
 from thermospindle.thermal.readout import reading
 
@@ -33,10 +34,9 @@ def warm(spindle):
 
 
 @pytest.fixture
-def coarse(monkeypatch):
-    """Meshes of few elements, for what holds on any."""
-    for asking in (module, readout):
-        monkeypatch.setattr(asking, "influence", lambda spindle, temperatures=None: influence(spindle, 2e-2, temperatures))
+def coarse():
+    with coarse_warmups():
+        yield
 
 
 @pytest.fixture(scope="module")
