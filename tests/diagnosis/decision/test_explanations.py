@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.hand_made_search import SIZE, by_departing, made, mechanism, total
-from thermospindle.diagnosis.decision.explanations import COARSE, OWN_LAW, coarsening
+from thermospindle.diagnosis.decision.explanations import COARSE, OWN_LAW, PRIOR, coarsening
 from thermospindle.diagnosis.decision.verdict import decide
 from thermospindle.diagnosis.forward.nuisance import DAMPING, STIFFNESS
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
@@ -17,12 +17,12 @@ from thermospindle.diagnosis.inference.screening import Screened
 
 
 def test_probabilities_are_bayes():
-    """Even odds of nothing; 0.33 over thirty effects, 0.05 over twenty forms, 0.08 over 435 pairs, times the evidence."""
+    """Even odds of nothing; 0.32 over thirty effects, 0.05 over twenty forms, 0.08 over 435 pairs, times the evidence."""
     v = decide(made({"a": 3.0, "b": 1.0, "~x": 4.0, ("a", "b"): 6.0}))
     weight = {
         "": 0.5,
-        "a": 0.33 / 30 * np.exp(3),
-        "b": 0.33 / 30 * np.exp(1),
+        "a": 0.32 / 30 * np.exp(3),
+        "b": 0.32 / 30 * np.exp(1),
         "~x": 0.05 / 20 * np.exp(4),
         "ab": 0.08 / 435 * np.exp(6),
     }
@@ -147,9 +147,9 @@ def test_a_free_form_that_changes_the_same_as_an_effect_is_that_effect(named, al
 
 
 def test_odds_of_a_law_of_its_own():
-    """0.33 over thirty effects and two laws, against 0.05 over twenty forms."""
+    """0.32 over thirty effects and two laws, against 0.05 over twenty forms."""
     v = decide(made({"a": 60.0, "a'": 66.0, "~x": 66.0}))
-    of_effect, of_form = 0.33 / 30 / (1 + OWN_LAW) * (np.exp(-6) + OWN_LAW), 0.05 / 20
+    of_effect, of_form = 0.32 / 30 / (1 + OWN_LAW) * (np.exp(-6) + OWN_LAW), 0.05 / 20
     assert v.probability_unknown == pytest.approx(of_form / (of_effect + of_form), rel=1e-6)
 
 
@@ -175,3 +175,7 @@ def test_enormous_evidence_is_still_finite():
     assert v.word == "identified"
     assert total(v) == pytest.approx(1.0)
     assert np.isfinite(list(v.losses.values())).all()
+
+
+def test_prior_probabilities_are_of_one_whole():
+    assert sum(PRIOR.values()) == pytest.approx(1.0, abs=1e-12)
