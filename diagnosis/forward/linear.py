@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -14,16 +15,29 @@ from thermospindle.sim.effects.effect import Measurement
 
 Dofs = tuple[tuple[str, str], ...]
 
+CHAIN = ("response_rows", "reference_rows", "gain", "delay", "decay")
 EXACT = 1e-11  # of the largest singular value of a change: products that are left out
 
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """One test's linear model: matrices with dofs, and its measuring chain (None for a table of modes)."""
+    """One test's linear model: matrices with dofs, and its measuring chain."""
 
     matrices: Matrices
     chain: Measurement
     layout: tuple
+
+    def moved(self, first: Linear, second: Linear, times: float) -> Linear:
+        """With `times` the difference of two others added, in all that may differ; the same where these have other degrees of freedom."""
+        if first.matrices.dofs != second.matrices.dofs:
+            return self
+
+        def on(own: Any, one: Any, other: Any, names: Sequence[str]) -> Any:
+            return replace(own, **{name: getattr(own, name) + times * (getattr(other, name) - getattr(one, name)) for name in names})
+
+        matrices = on(self.matrices, first.matrices, second.matrices, ("mass", "damping", "stiffness"))
+        chain = self.chain if same_chain(first.chain, second.chain) else on(self.chain, first.chain, second.chain, CHAIN)
+        return replace(self, matrices=matrices, chain=chain)
 
 
 @dataclass(frozen=True, eq=False)

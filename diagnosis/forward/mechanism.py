@@ -4,7 +4,8 @@ The size of an effect is its first parameter. Its law is what the effect's formu
 not a gospel: the size that acts in test t is a_t = a (1 + r_t), with departures r that are continuous over the conditions (an
 exponential covariance, Rasmussen & Williams, *Gaussian Processes*, 2006, Eq. 4.18) and whose size is learned. Where a law gives nothing it
 goes on giving nothing; with a law of the data's own the same mechanism acts in every test as its formula has it where it does most, and its
-size alone says how much. Beyond a limit of its size an effect continues in a straight line, so that sizes may scatter about zero.
+size alone says how much. Beyond a limit of its size the matrices of an effect continue in a straight line, so that sizes may
+scatter about zero.
 """
 
 from __future__ import annotations

@@ -32,6 +32,7 @@ from thermospindle.sim.operating import OperatingPoint, operating_point
 TestData = LineData | ModeData
 Discrepancies = tuple[Integers, Integers, Integers, Array]
 
+STEP = 0.02  # of a size's prior standard deviation, inward from its limit, for what lies beyond
 THIN, ENOUGH_LINES = 4, 30  # lines left out of a thinned model, and how many of a test it keeps at least
 MEASURING = frozenset(HOOKS) - {"measurement"}
 FAILED = (NoEquilibrium, OutsideRange, ValueError, RuntimeError, ZeroDivisionError, FloatingPointError, np.linalg.LinAlgError)
@@ -163,6 +164,20 @@ class CampaignModel:
         return {}
 
     def linear(self, t: int, x: Array, effects: Applied) -> Linear:
+        """The linear model of test `t`; where the size of an effect lies beyond its limits, the one at the limit and straight on from there: matrices, rows and gains
+        by their derivatives inside."""
+        sizes = [(e.parameters[0], v[e.parameters[0].name]) for e, v in effects]
+        within = [(e, v if q.limits[0] <= size <= q.limits[1] else {**v, q.name: float(np.clip(size, *q.limits))}) for (e, v), (q, size) in zip(effects, sizes, strict=True)]
+        at = found = self._within(t, x, within)
+        for k, (q, size) in enumerate(sizes):
+            effect, values = within[k]
+            if over := size - values[q.name]:
+                inward = -np.copysign(min(STEP * q.prior_sd, q.limits[1] - q.limits[0]), over)
+                stepped = [*within[:k], (effect, {**values, q.name: values[q.name] + inward}), *within[k + 1 :]]
+                found = found.moved(at, self._within(t, x, stepped), over / inward)
+        return found
+
+    def _within(self, t: int, x: Array, effects: Applied) -> Linear:
         point = self.operating(t, x, effects)
         bare = point.__dict__.get("_bare")
         if bare is None:

@@ -197,7 +197,7 @@ def _moved(problem: Problem, p: Array) -> Array:
     for t in range(problem.tests):
         plain = model.linear(t, x, []).matrices
         shape = np.linalg.solve(plain.mass, model.reference.over(plain.dofs)[:, : len(omega)])
-        for k, (mechanism, (effect, values)) in enumerate(zip(problem.mechanisms, problem.applied(t, sizes, shapes)[0], strict=True)):
+        for k, (mechanism, (effect, values)) in enumerate(zip(problem.mechanisms, problem.applied(t, sizes, shapes), strict=True)):
             if values[mechanism.size.name] == mechanism.size.neutral:
                 continue
             acting = model.linear(t, x, [(effect, values)]).matrices

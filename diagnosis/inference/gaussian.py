@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
+from scipy.optimize import lsq_linear
 from scipy.special import log_ndtr, ndtr
 
 from thermospindle.diagnosis.forward.mechanism import Mechanism, size_covariance
@@ -16,6 +17,9 @@ from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.fit import Fit
 from thermospindle.diagnosis.inference.prior import Root
 from thermospindle.model.types import Array
+
+CANNOT = 3.0  # standard errors, from which a mechanism would need what it cannot have
+TINY = 1e-10  # of the sum of variances, which one has at least
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,9 +145,11 @@ def one_sided(model: CampaignModel, mechanism: Mechanism, own: tuple[float, floa
 
 
 def impossible(m: Mechanism, sizes: Array, covariance: Array) -> bool:
-    """Whether a mechanism would need a size (tests,) that it cannot have, by more than twice its standard error."""
-    below, above = _beyond(m, sizes, covariance)
-    return bool(np.any(below | above))
+    """Whether a mechanism would need sizes (tests,) that it cannot have: whether those that it can lie more than `CANNOT` standard errors from them, all tests taken
+    together. What is alike in all tests may be a build tolerance's as well, and a size that is off by that is not told by one test's standard error."""
+    spread = np.linalg.cholesky(covariance + TINY * max(float(np.trace(covariance)), 1e-300) * np.eye(len(sizes)))
+    nearest = lsq_linear(np.linalg.inv(spread), np.linalg.solve(spread, sizes), m.size.limits)
+    return bool(2 * nearest.cost > CANNOT**2)
 
 
 def opposite(m: Mechanism, sizes: Array, covariance: Array) -> bool:

@@ -106,14 +106,14 @@ class Problem:
         not start a fit with narrow ones from a wall."""
         return np.asarray(np.linalg.solve(self.precision + NARROW * np.eye(self.length), NARROW * p))
 
-    def applied(self, t: int, sizes: Array, shapes: Sequence[Array]) -> tuple[list, list[float]]:
-        """The effects that act in test `t`, and how far each size lies beyond its limit."""
-        effects, beyond = [], []
-        for m, size, shape in zip(self.mechanisms, sizes[:, t], shapes, strict=True):
-            within = float(np.clip(size, *m.size.limits))
-            effects.append((m.effect, m.values(within, shape.tolist())))
-            beyond.append(float(size) - within)
-        return effects, beyond
+    def continued(self, t: int, sizes: Array, shapes: Sequence[Array]) -> list:
+        """The effects that act in test `t`, with sizes beyond their limits too, where `CampaignModel.linear` goes straight on."""
+        return [(m.effect, m.values(float(size), shape.tolist())) for m, size, shape in zip(self.mechanisms, sizes[:, t], shapes, strict=True)]
+
+    def applied(self, t: int, sizes: Array, shapes: Sequence[Array]) -> list:
+        """The effects that act in test `t`, with sizes within their limits."""
+        limits = np.array([m.size.limits for m in self.mechanisms]).reshape(-1, 2).T
+        return self.continued(t, np.clip(sizes.T, *limits).T, shapes)
 
     def acting(self, effects: Applied) -> list:
         """Without those of no size, which change nothing: what was worked out without them serves."""
@@ -121,23 +121,20 @@ class Problem:
 
     def residual(self, t: int, p: Array) -> Array:
         x, sizes, shapes = self.parts(p)
-        effects, beyond = self.applied(t, sizes, shapes)
-        r = self.model.residual(t, x, self.acting(effects))
-        for k, over in enumerate(beyond):
-            if over:
-                r = r + over * self.by_size(t, x, effects, k)
-        return r
+        return self.model.residual(t, x, self.acting(self.continued(t, sizes, shapes)))
 
     def by_size(self, t: int, x: Array, effects: Applied, k: int) -> Array:
         m = self.mechanisms[k]
         return self._by_value(t, x, effects, k, m.size)
 
     def _by_value(self, t: int, x: Array, effects: Applied, k: int, q) -> Array:
-        """Derivative (N,) of the residual of test `t` by parameter `q` of mechanism `k`, from inside its limits."""
+        """Derivative (N,) of the residual of test `t` by parameter `q` of mechanism `k`, from inside its limits, or beyond those of a size."""
         effect, values = effects[k]
         step = SIZE_STEP * q.prior_sd
+        low, high = q.limits
         for h in (step, -step):
-            if q.limits[0] <= values[q.name] + h <= q.limits[1]:
+            beyond = not low <= values[q.name] <= high
+            if beyond or low <= values[q.name] + h <= high:
                 moved = list(effects)
                 moved[k] = (effect, {**values, q.name: values[q.name] + h})
                 try:
@@ -149,15 +146,13 @@ class Problem:
     def linearised(self, t: int, p: Array, rates: Rates) -> tuple[Array, Array, Integers]:
         """Residual (N,), derivatives (k, N) and the numbers (k,) of the parameters of p they belong to."""
         x, sizes, shapes = self.parts(p)
-        effects, beyond = self.applied(t, sizes, shapes)
+        effects = self.continued(t, sizes, shapes)
         more = sum(t + 1 + len(m.shape) for m in self.mechanisms)
         r, jacobian, numbers = self.model.jacobian(t, x, self.acting(effects), rates, more)
         own: list[int] = []
         row, at = len(numbers), self.nuisances
         for k, (m, root) in enumerate(zip(self.mechanisms, self.roots, strict=True)):
             by_size = self.by_size(t, x, effects, k)
-            if beyond[k]:
-                r = r + beyond[k] * by_size
             np.multiply(root[t, : t + 1, None], by_size, out=jacobian[row : row + t + 1])
             own += range(at, at + t + 1)
             row, at = row + t + 1, at + self.tests
@@ -169,7 +164,7 @@ class Problem:
 
     def effects_of(self, p: Array) -> list[list]:
         _, sizes, shapes = self.parts(p)
-        return [self.acting(self.applied(t, sizes, shapes)[0]) for t in range(self.tests)]
+        return [self.acting(self.applied(t, sizes, shapes)) for t in range(self.tests)]
 
     def linearisation(self, p: Array, rates: Rates, held: Integers = NONE) -> Linearisation:
         """Of all tests, without the parameters that are `held` where they are; with rates of its own where a mechanism that has gone, or come, took degrees of

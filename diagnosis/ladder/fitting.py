@@ -93,7 +93,7 @@ class Settled:
         """The effects as fitted to test `t`."""
         problem = Problem(self.model, self.mechanisms)
         _, sizes, shapes = problem.parts(self.fit.point)
-        return problem.acting(problem.applied(t, sizes, shapes)[0])
+        return problem.acting(problem.applied(t, sizes, shapes))
 
     def determined(self) -> float:
         """How many combinations of parameters the data, not the priors, decide: trace of the resolution matrix, at most the data's number."""

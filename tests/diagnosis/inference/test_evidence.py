@@ -10,7 +10,8 @@ import pytest
 from scipy.integrate import trapezoid
 from scipy.stats import multivariate_normal, norm
 
-from thermospindle.diagnosis.forward.mechanism import REFERENCE_DEPARTURE, REFERENCE_WIDTH, Mechanism, size_covariance
+from tests.virtual_campaign import effect
+from thermospindle.diagnosis.forward.mechanism import REFERENCE_DEPARTURE, REFERENCE_WIDTH, Mechanism, size_covariance, variants
 from thermospindle.diagnosis.forward.nuisance import (
     BUILD,
     DAMPING,
@@ -28,7 +29,7 @@ from thermospindle.diagnosis.forward.nuisance import (
 )
 from thermospindle.diagnosis.inference.evidence import WIDER, WIDTHS, Learned, amplitudes_apart, evidence, left_out
 from thermospindle.diagnosis.inference.fit import Fit, Held
-from thermospindle.diagnosis.inference.gaussian import Quadratic, marginal
+from thermospindle.diagnosis.inference.gaussian import Quadratic, impossible, marginal
 from thermospindle.diagnosis.inference.prior import ACTION, Root, misjudged, nuisance_variances, precision_and_variances, whole_root
 from thermospindle.model.machine import Condition
 from thermospindle.sim.effects.effect import Effect, Parameter
@@ -327,3 +328,16 @@ def test_what_is_left_out_is_predicted_from_the_rest(hidden):
         density += made.ln(prior, learned.errors) - without.ln(prior, learned.errors)
     assert left_out(made.model, made.fit, found, groups) == pytest.approx((np.sqrt(total / made.fit.count), density), rel=1e-4)
     assert np.isnan(left_out(made.model, made.fit, found, [[0, 1, 2]])).all()
+
+
+@pytest.mark.parametrize(("count", "off", "alike", "cannot"), [(4, 1.2, 0.0, False), (8, 1.2, 0.0, True), (4, 2.4, 0.99, False), (4, 2.4, 0.0, True), (1, 2.9, 0.0, False), (1, 3.1, 0.0, True)])
+def test_what_a_size_cannot_be_is_asked_of_all_tests_together(count, off, alike, cannot):
+    """Sizes `off` standard errors below what they can be, in each of so many tests: independent errors make root-n as much of it, what is alike in all tests
+    hardly more than once. One that is well within makes no difference."""
+    m = variants(effect("preload_loss"))[0]
+    sd, low = 0.05, m.size.limits[0]
+    covariance = sd**2 * (alike * np.ones((count, count)) + (1 - alike) * np.eye(count))
+    assert impossible(m, np.full(count, low - off * sd), covariance) == cannot
+    well = np.block([[covariance, np.zeros((count, 1))], [np.zeros((1, count)), np.array([[sd**2]])]])
+    assert impossible(m, np.append(np.full(count, low - off * sd), 0.1), well) == cannot
+    assert not impossible(m, np.full(count, 0.1), covariance)
