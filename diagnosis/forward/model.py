@@ -26,7 +26,7 @@ from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import Matrices, matrices
 from thermospindle.model.tolerance import Toleranced
 from thermospindle.model.types import Array, ComplexArray, Integers
-from thermospindle.sim.effects.effect import HOOKS
+from thermospindle.sim.effects.effect import HOOKS, Effect, Values
 from thermospindle.sim.operating import OperatingPoint, operating_point
 
 TestData = LineData | ModeData
@@ -137,7 +137,8 @@ class CampaignModel:
         return [np.array([number[node] for node in own], int) for own in nodes]
 
     def operating(self, t: int, x: Array, effects: Applied) -> OperatingPoint:
-        """The operating point of test `t`; what differs in the measuring chain alone is not worked out again."""
+        """The operating point of test `t`, sizes within their limits; what differs in the measuring chain alone is not worked out again."""
+        effects = within_limits(effects)
         acting = tuple((id(e), *v.values()) for e, v in effects if any(getattr(e, hook) for hook in MEASURING))
         key = (t, x[: len(self.build)].tobytes(), float(x[self.temperature[t]]), x[self.expansion].tobytes(), acting)
         late = self._points.get(key)
@@ -166,18 +167,17 @@ class CampaignModel:
     def linear(self, t: int, x: Array, effects: Applied) -> Linear:
         """The linear model of test `t`; where the size of an effect lies beyond its limits, the one at the limit and straight on from there: matrices, rows and gains
         by their derivatives inside."""
-        sizes = [(e.parameters[0], v[e.parameters[0].name]) for e, v in effects]
-        within = [(e, v if q.limits[0] <= size <= q.limits[1] else {**v, q.name: float(np.clip(size, *q.limits))}) for (e, v), (q, size) in zip(effects, sizes, strict=True)]
-        at = found = self._within(t, x, within)
-        for k, (q, size) in enumerate(sizes):
-            effect, values = within[k]
-            if over := size - values[q.name]:
+        inside = within_limits(effects)
+        at = found = self._linear(t, x, inside)
+        for k, ((effect, values), (_, wanted)) in enumerate(zip(inside, effects, strict=True)):
+            q = effect.parameters[0]
+            if over := wanted[q.name] - values[q.name]:
                 inward = -np.copysign(min(STEP * q.prior_sd, q.limits[1] - q.limits[0]), over)
-                stepped = [*within[:k], (effect, {**values, q.name: values[q.name] + inward}), *within[k + 1 :]]
-                found = found.moved(at, self._within(t, x, stepped), over / inward)
+                stepped = [*inside[:k], (effect, {**values, q.name: values[q.name] + inward}), *inside[k + 1 :]]
+                found = found.moved(at, self._linear(t, x, stepped), over / inward)
         return found
 
-    def _within(self, t: int, x: Array, effects: Applied) -> Linear:
+    def _linear(self, t: int, x: Array, effects: Applied) -> Linear:
         point = self.operating(t, x, effects)
         bare = point.__dict__.get("_bare")
         if bare is None:
@@ -345,6 +345,15 @@ class CampaignModel:
         """Which build tolerances leave the bearings alone."""
         ends = [p.apply(self.spindle, 0.01) for p in self.build]
         return [end.bearings is self.spindle.bearings and end.sets is self.spindle.sets for end in ends]
+
+
+def within_limits(effects: Applied) -> list[tuple[Effect, Values]]:
+    """The same with sizes within their limits."""
+    sizes = [(e.parameters[0], v[e.parameters[0].name]) for e, v in effects]
+    return [
+        (e, v if q.limits[0] <= size <= q.limits[1] else {**v, q.name: float(np.clip(size, *q.limits))})
+        for (e, v), (q, size) in zip(effects, sizes, strict=True)
+    ]
 
 
 def _thin(data: LineData) -> LineData:

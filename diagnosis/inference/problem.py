@@ -106,14 +106,9 @@ class Problem:
         not start a fit with narrow ones from a wall."""
         return np.asarray(np.linalg.solve(self.precision + NARROW * np.eye(self.length), NARROW * p))
 
-    def continued(self, t: int, sizes: Array, shapes: Sequence[Array]) -> list:
-        """The effects that act in test `t`, with sizes beyond their limits too, where `CampaignModel.linear` goes straight on."""
-        return [(m.effect, m.values(float(size), shape.tolist())) for m, size, shape in zip(self.mechanisms, sizes[:, t], shapes, strict=True)]
-
     def applied(self, t: int, sizes: Array, shapes: Sequence[Array]) -> list:
-        """The effects that act in test `t`, with sizes within their limits."""
-        limits = np.array([m.size.limits for m in self.mechanisms]).reshape(-1, 2).T
-        return self.continued(t, np.clip(sizes.T, *limits).T, shapes)
+        """The effects that act in test `t`; of sizes beyond their limits `CampaignModel.linear` makes what it can."""
+        return [(m.effect, m.values(float(size), shape.tolist())) for m, size, shape in zip(self.mechanisms, sizes[:, t], shapes, strict=True)]
 
     def acting(self, effects: Applied) -> list:
         """Without those of no size, which change nothing: what was worked out without them serves."""
@@ -121,7 +116,7 @@ class Problem:
 
     def residual(self, t: int, p: Array) -> Array:
         x, sizes, shapes = self.parts(p)
-        return self.model.residual(t, x, self.acting(self.continued(t, sizes, shapes)))
+        return self.model.residual(t, x, self.acting(self.applied(t, sizes, shapes)))
 
     def by_size(self, t: int, x: Array, effects: Applied, k: int) -> Array:
         m = self.mechanisms[k]
@@ -146,7 +141,7 @@ class Problem:
     def linearised(self, t: int, p: Array, rates: Rates) -> tuple[Array, Array, Integers]:
         """Residual (N,), derivatives (k, N) and the numbers (k,) of the parameters of p they belong to."""
         x, sizes, shapes = self.parts(p)
-        effects = self.continued(t, sizes, shapes)
+        effects = self.applied(t, sizes, shapes)
         more = sum(t + 1 + len(m.shape) for m in self.mechanisms)
         r, jacobian, numbers = self.model.jacobian(t, x, self.acting(effects), rates, more)
         own: list[int] = []

@@ -108,7 +108,7 @@ def _promised(problem: Problem, beside: _Beside, shape: Array) -> Screened:
     gradient[:first], information[:first, :first] = at.gradient, at.information
     typical, square = np.zeros(first), 0.0  # of one size in all tests
     for t, (residual, derivatives, numbers) in enumerate(at.rows):
-        effects = problem.continued(t, own_sizes, shapes)
+        effects = problem.applied(t, own_sizes, shapes)
         try:
             column = problem.by_size(t, x, effects, len(about.mechanisms))
         except FAILED:

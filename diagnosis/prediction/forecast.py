@@ -131,9 +131,9 @@ def _acting(there: CampaignModel, problem: Problem, p: Array, amounts: Array) ->
     """Nuisance values (P,) of parameters `p` (n,), without those of any one test, and the effects in the one to be made, of `amounts` (`_continued`)."""
     x, at, effects = p[: problem.nuisances], 0, []
     for m in problem.mechanisms:
-        values = [float(np.clip(q.neutral + q.prior_sd * v, *q.limits)) for q, v in zip((m.size, *m.shape), amounts[at:], strict=False)]
-        effects.append((m.effect, m.values(values[0], values[1:])))
-        at += len(values)
+        shape = [float(np.clip(q.neutral + q.prior_sd * v, *q.limits)) for q, v in zip(m.shape, amounts[at + 1 :], strict=False)]
+        effects.append((m.effect, m.values(float(m.size.neutral + m.size.prior_sd * amounts[at]), shape)))
+        at += 1 + len(shape)
     return np.where([q.test is not None for q in there.parameters], 0.0, x), effects
 
 
