@@ -20,7 +20,7 @@ def test_an_effect_comes_with_typical_values_and_its_size_to_be_fitted():
 
 def test_given_values_are_kept_within_the_limits():
     s = state.add_effect(Setting(), LOSS, {"loss": 7.0})
-    assert s.effects["preload_loss"] == {"loss": 0.8, "thermal_share": 0.5}
+    assert s.effects["preload_loss"] == {"loss": 0.8, "thermal_share": 0.5, "set": -1.0}
 
 
 def test_an_action_leaves_the_setting_before_it_as_it_was():
