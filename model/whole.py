@@ -81,15 +81,24 @@ def _work_folder(path: Path) -> tuple[Path, int | None]:
             os.close(lock)
 
 
+def tidy(folder: Path) -> None:
+    """Remove what killed runs left of anything in a folder, and put back what they had moved away: of what is never written again too."""
+    _clear(folder, ".*.spindle-*")
+
+
 def _tidy(path: Path) -> None:
+    _clear(path.parent, f"{escape(_prefix(path))}*")
+
+
+def _clear(folder: Path, pattern: str) -> None:
     """Put back what killed runs had moved away, and remove their work folders."""
-    for work in path.parent.glob(f"{escape(_prefix(path))}*"):
+    for work in folder.glob(pattern):
         lock = _lock(work)
         if lock is None:
             continue  # another process is writing there
         try:
             for old in (work / OLD).glob("*"):
-                if not (place := path.parent / old.name).exists():
+                if not (place := folder / old.name).exists():
                     os.replace(old, place)
             shutil.rmtree(work, ignore_errors=True)
         finally:

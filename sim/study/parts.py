@@ -91,6 +91,8 @@ def opened(path: Path, key: Mapping[str, Any], cases: int, chunk: int, schema: p
             if begun.get(name) != told.get(name):
                 raise BadInput(f"--out {path}: was begun with another {_short(name)} ({_short(begun.get(name))}, now {_short(told.get(name))}); name a new folder to begin anew")
         (path / PARTS).mkdir(exist_ok=True)
+        for folder in (path, path / PARTS):  # a part that stands is not written again, and what a run killed just then left of it would stay
+            whole.tidy(folder)
         yield Folder(path, cases, chunk, schema)
 
 

@@ -5,10 +5,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pyarrow as pa
 import pytest
 
 from thermospindle.model.errors import BadInput
 from thermospindle.model.whole import whole
+from thermospindle.sim.study.parts import opened, write_table
 
 ROOT = Path(__file__).parents[2]
 
@@ -83,3 +85,16 @@ def test_names_that_are_patterns_or_long(tmp_path):
             write(tmp_path / name, text)
         assert (tmp_path / name / "text").read_text() == "new"
     assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_what_killed_runs_left_of_a_study_goes_when_it_is_gone_on_with(tmp_path):
+    """A run killed after its part stood and before its work folder was gone: that part is not written again, and the folder stayed for good."""
+    for _ in range(2):
+        with opened(tmp_path / "study", {"study": "a"}, 4, 2, pa.schema({})) as folder:
+            write_table(pa.table({}), folder.part(0))
+            left = [tmp_path / "study" / "parts" / ".part-000000.parquet.spindle-killed" / "new", tmp_path / "study" / ".study.json.spindle-killed" / "old"]
+            for place in left:
+                place.mkdir(parents=True)
+    with opened(tmp_path / "study", {"study": "a"}, 4, 2, pa.schema({})) as folder:
+        assert not any(place.parent.exists() for place in left)
+        assert folder.part(0).exists()
