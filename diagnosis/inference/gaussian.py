@@ -19,7 +19,7 @@ from thermospindle.diagnosis.inference.prior import Root
 from thermospindle.model.types import Array
 
 CANNOT = 3.0  # standard errors, from which a mechanism would need what it cannot have
-TINY = 1e-10  # of the sum of variances, which one has at least
+TINY = 1e-6  # of the sum of variances, which one has at least; and of a prior's standard deviation, to which a size is known at best
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,8 +147,10 @@ def one_sided(model: CampaignModel, mechanism: Mechanism, own: tuple[float, floa
 def impossible(m: Mechanism, sizes: Array, covariance: Array) -> bool:
     """Whether a mechanism would need sizes (tests,) that it cannot have: whether those that it can lie more than `CANNOT` standard errors from them, all tests taken
     together. What is alike in all tests may be a build tolerance's as well, and a size that is off by that is not told by one test's standard error."""
-    spread = np.linalg.cholesky(covariance + TINY * max(float(np.trace(covariance)), 1e-300) * np.eye(len(sizes)))
-    nearest = lsq_linear(np.linalg.inv(spread), np.linalg.solve(spread, sizes), m.size.limits)
+    variance, along = np.linalg.eigh(covariance)
+    known = (TINY * m.size.prior_sd) ** 2  # rounding may leave a variance below nothing
+    whitened = along.T / np.sqrt(np.maximum(variance, max(TINY * float(variance.sum()), known)))[:, None]
+    nearest = lsq_linear(whitened, whitened @ sizes, m.size.limits)
     return bool(2 * nearest.cost > CANNOT**2)
 
 

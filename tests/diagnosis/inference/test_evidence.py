@@ -341,3 +341,5 @@ def test_what_a_size_cannot_be_is_asked_of_all_tests_together(count, off, alike,
     well = np.block([[covariance, np.zeros((count, 1))], [np.zeros((1, count)), np.array([[sd**2]])]])
     assert impossible(m, np.append(np.full(count, low - off * sd), 0.1), well) == cannot
     assert not impossible(m, np.full(count, 0.1), covariance)
+    assert not impossible(m, np.full(count, 0.1), np.zeros((count, count)))
+    assert impossible(m, np.full(count, low - 0.01), -1e-18 * np.eye(count))  # rounding of what is known
