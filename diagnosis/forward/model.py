@@ -32,7 +32,7 @@ from thermospindle.sim.operating import OperatingPoint, operating_point
 TestData = LineData | ModeData
 Discrepancies = tuple[Integers, Integers, Integers, Array]
 
-STEP = 0.02  # of a size's prior standard deviation, inward from its limit, for what lies beyond
+SIZE_STEP = 0.02  # of a size's or shape parameter's prior standard deviation, for differences
 THIN, ENOUGH_LINES = 4, 30  # lines left out of a thinned model, and how many of a test it keeps at least
 MEASURING = frozenset(HOOKS) - {"measurement"}
 FAILED = (NoEquilibrium, OutsideRange, ValueError, RuntimeError, ZeroDivisionError, FloatingPointError, np.linalg.LinAlgError)
@@ -172,7 +172,7 @@ class CampaignModel:
         for k, ((effect, values), (_, wanted)) in enumerate(zip(inside, effects, strict=True)):
             q = effect.parameters[0]
             if over := wanted[q.name] - values[q.name]:
-                inward = -np.copysign(min(STEP * q.prior_sd, q.limits[1] - q.limits[0]), over)
+                inward = -np.copysign(min(SIZE_STEP * q.prior_sd, q.limits[1] - q.limits[0]), over)
                 stepped = [*inside[:k], (effect, {**values, q.name: values[q.name] + inward}), *inside[k + 1 :]]
                 found = found.moved(at, self._linear(t, x, stepped), over / inward)
         return found

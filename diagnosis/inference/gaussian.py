@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import lsq_linear
 from scipy.special import log_ndtr, ndtr
@@ -156,13 +155,5 @@ def impossible(m: Mechanism, sizes: Array, covariance: Array) -> bool:
 
 def opposite(m: Mechanism, sizes: Array, covariance: Array) -> bool:
     """Whether a mechanism would need the sign that it cannot have in every test (tests,), by more than twice its standard error."""
-    below, above = _beyond(m, sizes, covariance)
-    low, high = m.size.limits
-    return bool((low >= m.size.neutral and np.all(below)) or (high <= m.size.neutral and np.all(above)))
-
-
-def _beyond(m: Mechanism, sizes: Array, covariance: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """In which tests (tests,) a size lies below its lower limit, and above its upper one, by more than twice its standard error."""
-    twice = 2 * np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    low, high = m.size.limits
-    return sizes < low - twice, sizes > high + twice
+    twice, (low, high) = 2 * np.sqrt(np.maximum(np.diag(covariance), 0.0)), m.size.limits
+    return bool((low >= m.size.neutral and np.all(sizes < low - twice)) or (high <= m.size.neutral and np.all(sizes > high + twice)))

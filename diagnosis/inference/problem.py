@@ -12,7 +12,7 @@ from scipy.optimize import lsq_linear
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.linear import Rates
 from thermospindle.diagnosis.forward.mechanism import Mechanism
-from thermospindle.diagnosis.forward.model import FAILED, Applied, CampaignModel
+from thermospindle.diagnosis.forward.model import FAILED, SIZE_STEP, Applied, CampaignModel
 from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.inference.prior import UNMOVED, Learned, precision_and_variances, roots_of
 from thermospindle.model.types import Array, Integers
@@ -20,7 +20,6 @@ from thermospindle.model.types import Array, Integers
 NONE: Integers = np.zeros(0, int)
 LONGEST = 3.0  # prior standard deviations in one step
 NARROW = 1e4  # precision in reference widths, between those of what may be and of next to nothing
-SIZE_STEP = 0.02  # of a size's or shape parameter's prior standard deviation, for differences
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,13 +28,13 @@ def test_one_set_of_several_loses_its_preload(which, left):
     """Each row of a machine tool's two sets carries what is left of its own set's force, and the rest all of theirs."""
     machine = load(ROOT / "scenes" / "five_bearing")
     cold = Condition(machine.reference_temperature)
-    before, after = ({b.name: b.preload for b in operating_point(machine, cold, e).state.bearings} for e in ((), lost(machine, which)))
+    before, after = ({b.name: b.preload for b in operating_point(machine, cold, e).state.bearings} for e in ((), lost(which)))
     for s in machine.sets:
         for name in s.bearings:
             assert after[name] == pytest.approx(left[s.name] * before[name], rel=1e-6), name
 
 
-def lost(machine, which):
+def lost(which):
     return [(preload_loss.EFFECT, {"loss": 0.2, "thermal_share": 0.0, "set": which})]
 
 
