@@ -8,12 +8,13 @@ effects of the catalogue, but nothing of the diagnosis.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import product
 from typing import Any
 
 import numpy as np
-from scipy.optimize import lsq_linear
+from scipy.optimize import lsq_linear, minimize
 
 from tests.blind.campaigns import Made
 from tests.blind.visible import SMALL, Seen, change
@@ -26,14 +27,15 @@ from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.operating import operating_point
 
 SAME = np.sqrt(10.0)  # standard errors, up to which what is left of a change cannot be told from nothing: 5 in ln evidence
-MOSTLY, NEARLY = 0.3, 0.1  # of a change, that a right answer may leave, and that any may which so is right
+MOSTLY, NEARLY = 0.3, 0.01  # of a change, that a right answer may leave, and that any may which so is right: by as much an honest model may be wrong
 TURNS = (-2.0, -1.0, 1.0, 2.0)  # prior standard deviations by which shape parameters are turned
+SOUGHT = 60  # shapes between these, at most, where none of them leaves nothing
 
 
 def right(made: Made, spindle: Spindle, of: Seen, catalogue: Sequence[Effect] = CATALOGUE) -> list[list[str]]:
     """Of every hidden piece the effects of the catalogue that are a right answer."""
     changes = [change(made, spindle, of, h, SMALL, World()) for h in made.hidden]
-    wholes = [np.sqrt(of.inner(d[:, None], d[:, None])[0, 0]) for d in changes]
+    wholes = [_whole(of, d) for d in changes]
     return [right_names(h.names, row, whole) for h, row, whole in zip(made.hidden, left(made, spindle, of, changes, catalogue), wholes, strict=True)]
 
 
@@ -42,15 +44,39 @@ def left(made: Made, spindle: Spindle, of: Seen, changes: Sequence[Array], catal
     found: list[dict[str, float]] = [{} for _ in changes]
     conditions = [Condition(p.temperature, p.speed) for p in made.plans]
     base = [_frf(made.built, c, [], of) for c in conditions]
+
+    def rest_of(m: Mechanism, d: Array, shape: list[float]) -> float:
+        return _least(of, d, *_by_size(made.built, m, shape, conditions, base, of))
+
     named = [v for e in usable(spindle, tuple(catalogue)) for v in variants(e)]
     for m in [*named, *with_own_laws(named, spindle, strongest(spindle, conditions))]:
         if not any(getattr(m.effect, hook) for hook in ("spindle", "temperatures", "motions", "pair", "chain", "measurement")):
             continue
-        for shape in _shapes(m):
-            by_size, low, high = _by_size(made.built, m, shape, conditions, base, of)
-            for d, row in zip(changes, found, strict=True):
-                row[m.name] = min(row.get(m.name, np.inf), _least(of, d, by_size, low, high))
+        tried = [(shape, _by_size(made.built, m, shape, conditions, base, of)) for shape in _shapes(m)]
+        for d, row in zip(changes, found, strict=True):
+            rest, shape = min((_least(of, d, *columns), shape) for shape, columns in tried)
+            if m.shape and SAME < rest < _whole(of, d) * (1 - MOSTLY):
+                rest = min(rest, _between(m, shape, partial(rest_of, m, d)))
+            row[m.name] = min(row.get(m.name, np.inf), rest)
     return found
+
+
+def _whole(of: Seen, d: Array) -> float:
+    """Standard errors of a change `d` (N,)."""
+    return float(np.sqrt(max(of.inner(d[:, None], d[:, None])[0, 0], 0.0)))
+
+
+def _between(m: Mechanism, start: Sequence[float], rest: Callable[[list[float]], float]) -> float:
+    """The least `rest` over shape parameters within their limits, from a `start` on, each counted in its prior standard deviation."""
+    neutral, unit = np.array([q.neutral for q in m.shape]), np.array([q.prior_sd for q in m.shape])
+    ends = (np.array([q.limits for q in m.shape]).T - neutral) / unit
+    first = (np.array(start) - neutral) / unit
+    away = np.where(first + 0.5 <= ends[1], 0.5, -0.5)
+    simplex = np.clip(np.vstack([first, first + np.diag(away)]), *ends)
+    found = minimize(
+        lambda z: rest((neutral + unit * z).tolist()), first, method="Nelder-Mead", bounds=ends.T, options={"initial_simplex": simplex, "maxfev": SOUGHT, "fatol": 0.1}
+    )
+    return float(found.fun)
 
 
 def right_names(intended: Sequence[str], left_by: dict[str, float], whole: float) -> list[str]:
