@@ -58,7 +58,7 @@ def explanations(found: Search, inflation: float) -> tuple[tuple[Candidate, ...]
         len({s.mechanism.name for s in found.screened if s.mechanism.free == free and s.visibility > 0}) or 1 for free in (True, False)
     )
     base = found.base.evidence.ln
-    worth = inflation * coarsening(likeliest(found))
+    worth = inflation * coarsening(likeliest(found), inflation)
     known = [h for h in found.hypotheses if _can_be(h)]
     either = frozenset(m.name for h in known for m in h.mechanisms if m.own_law)
     twins = [h for h in known if _is_named(h, known, found.alike, LITTLE * worth)]
@@ -79,15 +79,15 @@ def likeliest(found: Search) -> Hypothesis:
     return next(h for h in found.hypotheses if _can_be(h))
 
 
-def coarsening(best: Hypothesis) -> float:
-    """What ln evidence is divided by where the best explanation itself shows the model to be a little wrong: `COARSE`, or one.
+def coarsening(best: Hypothesis, inflation: float) -> float:
+    """What ln evidence is divided by where what the best explanation leaves shows the model to be wrong: `COARSE`, or one.
 
-    A model that is constantly wrong somewhere is wrong, too, in what an effect does; evidence that counts lines as if it were not is too sure
-    (Miller & Dunson, *J. Am. Statist. Assoc.* 114 (2019) 1113: the coarsened posterior is a power of the likelihood).
+    Residuals that are too large, or say the same over lines or tests (an `inflation` beyond one), and a drawing beyond its tolerances tell of something that is
+    not in the model, and evidence that counts lines as if nothing were missing is too sure (Miller & Dunson, *J. Am. Statist. Assoc.* 114 (2019) 1113: the coarsened
+    posterior is a power of the likelihood). Constant errors of modes that are learned are in the model, with what they make wrong in an effect (`ACTION`).
     """
     learned = best.evidence.learned
-    constant = any(learned.sizes.get(kind, 0.0) > 0.0 for kind in (kinds_of.STIFFNESS, kinds_of.DAMPING)) or learned.sizes.get(kinds_of.BUILD, 1.0) > 1.0
-    wrong = learned.errors > STRAIN or constant
+    wrong = learned.errors > STRAIN or inflation > 1.0 or learned.sizes.get(kinds_of.BUILD, 1.0) > 1.0
     return COARSE if wrong else 1.0
 
 

@@ -149,6 +149,7 @@ def weighed(found: Diagnosis) -> dict[str, Any]:
     whether it is coarsened."""
     search, base = found.search, found.search.base.evidence.ln
     best = likeliest(search)
+    inflation = overlap(search.model, best.fit).inflation
     return {
         "explanations": [
             [
@@ -160,8 +161,8 @@ def weighed(found: Diagnosis) -> dict[str, Any]:
             ]
             for h in search.hypotheses
         ],
-        "inflation": overlap(search.model, best.fit).inflation,
-        "coarse": coarsening(best),
+        "inflation": inflation,
+        "coarse": coarsening(best, inflation),
         "screened": [
             len({s.mechanism.name for s in search.screened if s.mechanism.free == free and s.visibility > 0}) for free in (False, True)
         ],

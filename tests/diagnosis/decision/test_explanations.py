@@ -10,7 +10,7 @@ import pytest
 from tests.hand_made_search import SIZE, by_departing, made, mechanism, total
 from thermospindle.diagnosis.decision.explanations import COARSE, OWN_LAW, PRIOR, coarsening
 from thermospindle.diagnosis.decision.verdict import decide
-from thermospindle.diagnosis.forward.nuisance import DAMPING, STIFFNESS
+from thermospindle.diagnosis.forward.nuisance import BUILD, DAMPING, STIFFNESS
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.remainder import between_tests
 from thermospindle.diagnosis.inference.screening import Screened
@@ -42,15 +42,19 @@ def test_of_many_ways_in_which_an_effect_may_act_one_was_fitted():
     assert b / a == pytest.approx(8.0)
 
 
-@pytest.mark.parametrize(("sizes", "errors", "worth"), [({}, 1.0, 1.0), ({STIFFNESS: 1e-3}, 1.0, COARSE), ({DAMPING: 0.0}, 1.0, 1.0), ({}, 1.1, COARSE)])
-def test_evidence_is_worth_less_where_the_model_is_a_little_wrong(sizes, errors, worth):
-    """A lead of six is a lead of six in a model that is right, and of a quarter of it in one that has an error everywhere."""
+WRONG = [({}, 1.0, 1.0), ({STIFFNESS: 1e-3, DAMPING: 0.01}, 1.0, 1.0), ({BUILD: 1.0}, 1.0, 1.0), ({BUILD: 4.0}, 1.0, COARSE), ({}, 1.1, COARSE)]
+
+
+@pytest.mark.parametrize(("sizes", "errors", "worth"), WRONG)
+def test_evidence_is_worth_less_where_the_model_is_seen_to_be_wrong(sizes, errors, worth):
+    """A lead of six is a lead of six where constant errors of modes are all that is wrong, and of a quarter of it where errors or tolerances are too small."""
     found = made({"a": 30.0, "b": 24.0})
     wrong = [replace(h, evidence=replace(h.evidence, learned=replace(h.evidence.learned, sizes=sizes, errors=errors))) for h in found.hypotheses]
     v = decide(replace(found, hypotheses=tuple(wrong), base=wrong[-1]))
-    first, second = (next(c for c in v.candidates if c.names == (k,)).probability for k in "ab")
+    first, second = (next(c.probability for c in v.candidates if c.names == (k,)) for k in "ab")
     assert np.log(first / second) == pytest.approx(6.0 / worth)
-    assert coarsening(wrong[0]) == worth
+    assert coarsening(wrong[0], 1.0) == worth
+    assert coarsening(wrong[0], 1.2) == COARSE
 
 
 @pytest.mark.parametrize("share", [0.0, 0.6, 0.95])
