@@ -311,7 +311,8 @@ class CampaignModel:
         at = fill(0, response.moved(rates.products[t]))
         w = response.over(self.reference.over(linear.matrices.dofs))
         for power, (_, i, j, size) in enumerate(discrepancies):
-            at = fill(at, response.moved_together(w, power, i, j, size * np.where(i == j, 0.5, 1.0)))
+            for moved in response.moved_together(w, power, i, j, size * np.where(i == j, 0.5, 1.0)):
+                at = fill(at, moved)
         for k, c in enumerate(channel):
             for row in np.flatnonzero(self._channel_of[t][:n_resp] == c):
                 gain = response.value[row] * weight[row] * self.parameters[own[k]].sd

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.campaign.beside import POWER
 
 SILENT = 1e-6  # of a mode's answer, left at the end of a record
+TOGETHER = 8  # derivatives at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +73,7 @@ class Response:
         receptance = rows @ self.right  # (L, n_resp, n_ref)
         self.value: ComplexArray = receptance.transpose(1, 2, 0) * self.factor[:, None, :]
         self._of, self._cut = (linear, data), cut
+        self._by_power: dict[int, ComplexArray] = {}
         if cut:
             self.value = self.value + cut * self.cut_off
 
@@ -150,23 +153,40 @@ class Response:
         found: ComplexArray = np.zeros((by.count, n_resp, n_ref, lines), complex)
         if len(by.of):
             left, right = self.over(by.left), self.over(by.right)
-            read, driven = self.read(left), self.driven(right, by.power)
-            for k, rows in zip(by.of, map(slice, by.first, [*by.first[1:], len(by.power)]), strict=True):
-                np.einsum("kil,kjl->ijl", read[rows], driven[rows], out=found[k])
+            own = [slice(a, b) for a, b in pairwise([*by.first, len(by.power)])]
+            few = np.concatenate([np.full(rows.stop - rows.start, rows.stop - rows.start <= len(left)) for rows in own])
+            at = np.cumsum(few) - 1
+            read, driven = self.read(left[:, few]), self.driven(right[:, few], by.power[few])
+            for k, rows in zip(by.of, own, strict=True):
+                if few[rows.start]:
+                    of_it = slice(at[rows.start], at[rows.start] + rows.stop - rows.start)
+                    np.einsum("kil,kjl->ijl", read[of_it], driven[of_it], out=found[k])
+                else:  # more products than degrees of freedom: their sum acts on these
+                    np.einsum("kil,kjl->ijl", self._read, self._felt(left[:, rows], right[:, rows], by.power[rows]), out=found[k])
             if (end := self._late) is not None:
                 found[by.of] += self._cut * end.moved(np.add.reduceat(end.kicked(left, right, by.power), by.first, axis=0))
         return found
 
-    def moved_together(self, columns: Array, power: int, i: Integers, j: Integers, size: Array) -> ComplexArray:
-        """Derivatives (k, n_resp, n_ref, L) by factors of `size` (k,) s^`power` (u_i u_j^T + u_j u_i^T) in the dynamic stiffness, u the `columns` (r, m)."""
-        left, right = self.read(columns), self.driven(columns, np.full(columns.shape[1], power))
-        found = (size[:, None, None] * left[i])[:, :, None] * right[j][:, None]
-        found += (size[:, None, None] * left[j])[:, :, None] * right[i][:, None]
-        if (end := self._late) is not None:
-            powers = np.full(len(i), power)
-            kicked = [end.kicked(columns[:, a] * size, columns[:, b], powers) for a, b in ((i, j), (j, i))]
-            found += self._cut * end.moved(kicked[0] + kicked[1])
+    def _felt(self, left: Array, right: Array, power: Integers) -> ComplexArray:
+        """The force (r, n_ref, L) on each degree of freedom that products (r, m) in the dynamic stiffness make together."""
+        found = np.zeros_like(self._driven)
+        for p in np.unique(power):
+            found += _over(right[:, power == p] @ left[:, power == p].T, self._forced(int(p)))
         return found
+
+    def moved_together(self, columns: Array, power: int, i: Integers, j: Integers, size: Array) -> Iterator[ComplexArray]:
+        """Derivatives (k, n_resp, n_ref, L) by factors of `size` (k,) s^`power` (u_i u_j^T + u_j u_i^T) in the dynamic stiffness, u the `columns` (r, m): a few at
+        a time, for they fill memory rather than a cache."""
+        read, driven = self.read(columns), self.driven(columns, np.full(columns.shape[1], power))
+        for at in range(0, len(i), TOGETHER):
+            a, b, times = i[at : at + TOGETHER], j[at : at + TOGETHER], size[at : at + TOGETHER]
+            found = (times[:, None, None] * read[a])[:, :, None] * driven[b][:, None]
+            found += (times[:, None, None] * read[b])[:, :, None] * driven[a][:, None]
+            if (end := self._late) is not None:
+                powers = np.full(len(a), power)
+                kicked = [end.kicked(columns[:, one] * times, columns[:, other], powers) for one, other in ((a, b), (b, a))]
+                found += self._cut * end.moved(kicked[0] + kicked[1])
+            yield found
 
     def read(self, columns: Array) -> ComplexArray:
         """What responses read of a force on `columns` (r, m), in the measured quantity: (m, n_resp, L)."""
@@ -175,9 +195,19 @@ class Response:
     def driven(self, columns: Array, power: Integers) -> ComplexArray:
         """The force (m, n_ref, L) that appears on one vector where s^`power` times it and `columns` (r, m) is added to the dynamic stiffness, less what
         of it comes after the records' end."""
-        found = _over(columns, self._driven)
-        found *= -(self.s[None, :] ** power[:, None])[:, None, :]
-        return found if (end := self._late) is None else found + self._cut * end.tail(columns, power)
+        found = np.empty((len(power), *self._driven.shape[1:]), complex)
+        for p in np.unique(power):
+            found[power == p] = _over(columns[:, power == p], self._forced(int(p)))
+        return found
+
+    def _forced(self, power: int) -> ComplexArray:
+        """The same (r, n_ref, L) of each degree of freedom by itself."""
+        if power not in self._by_power:
+            forced = -(self.s**power) * self._driven
+            if (end := self._late) is not None:
+                forced += self._cut * end.tail(np.eye(len(forced)), np.full(len(forced), power))
+            self._by_power[power] = forced
+        return self._by_power[power]
 
 
 def _over(columns: Array, each: ComplexArray) -> ComplexArray:

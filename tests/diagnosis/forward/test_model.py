@@ -156,10 +156,28 @@ def test_derivatives_of_records_that_end_early(scene):
         by_pair = [np.outer(vectors[:, a], vectors[:, b]) + np.outer(vectors[:, b], vectors[:, a]) for a, b in zip(i, j, strict=True)]
         zero = np.zeros((n, n))
         power = {"mass": 2, "damping": 1, "stiffness": 0}[which]
-        at_once = at(1.0, 0.0).moved_together(vectors, power, i, j, np.ones(2))
+        at_once = np.concatenate(list(at(1.0, 0.0).moved_together(vectors, power, i, j, np.ones(2))))
         by_each = [products(*[pair if k == which else zero for k in ("mass", "damping", "stiffness")]) for pair in by_pair]
         apart = at(1.0, 0.0).moved(together(by_each))
         assert np.abs(at_once - apart).max() < 1e-9 * np.abs(apart).max()
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_a_change_of_more_products_than_degrees_of_freedom(scene, share):
+    """Of all elements of all three matrices at once: the sum of what each does, beside one of few products."""
+    model, x = made(scene, window_decay=15.0)
+    data, linear = model.tests[0], model.linear(0, x, [])
+    m, zero = linear.matrices, np.zeros_like(linear.matrices.mass)
+    random = np.random.default_rng(4)
+    changes = [own * np.outer(*[random.uniform(0.5, 1.0, len(own))] * 2) for own in (m.mass, m.damping, m.stiffness)]
+    at = Response(linear, data, np.ones(len(linear.chain.gain)), share)
+    few = products(zero, zero, np.diag(np.eye(len(zero))[0]) * m.stiffness[0, 0])
+    every = products(*changes)
+    assert len(every.power) > len(zero)
+    apart = [products(*[change if k == which else zero for k in range(3)]) for which, change in enumerate(changes)]
+    found, of_few = at.moved(together([every, few]))
+    assert found == pytest.approx(sum(at.moved(by)[0] for by in apart), abs=1e-10 * np.abs(found).max())
+    assert of_few == pytest.approx(at.moved(few)[0], abs=1e-10 * np.abs(of_few).max())
 
 
 def test_parameters_of_other_tests_do_not_move_a_test(scene):
