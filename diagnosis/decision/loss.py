@@ -37,7 +37,7 @@ def least_loss(
         loss = FALSE_ALARM * none + missed(own, WRONG)
         for c in (*candidates, *beside):
             of_it = set(named_part(c))
-            whole = 0.0 if not c.free else SET / 2 if _mostly_named(c, alone) else HALF
+            whole = 0.0 if not c.free else SET / 2 if mostly_named(c, alone) else HALF
             loss += c.probability * (whole if own == of_it else HALF if own < of_it else WRONG)
         return loss
 
@@ -67,7 +67,7 @@ def least_loss(
     return *answers[best], losses
 
 
-def _mostly_named(c: Candidate, alone: Mapping[frozenset[str], float]) -> bool:
+def mostly_named(c: Candidate, alone: Mapping[frozenset[str], float]) -> bool:
     """Whether the effects of the catalogue, by themselves or some of them, reach most of what an explanation gains with free drift beside them."""
     own = frozenset(named_part(c))
     return max((gain for names, gain in alone.items() if names <= own), default=float("-inf")) > MOSTLY * c.delta_evidence

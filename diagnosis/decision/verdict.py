@@ -10,7 +10,7 @@ import numpy as np
 from thermospindle.diagnosis.decision import reason
 from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.decision.explanations import Candidate, Names, explanations, likeliest, named_part
-from thermospindle.diagnosis.decision.loss import MOSTLY, least_loss
+from thermospindle.diagnosis.decision.loss import MOSTLY, least_loss, mostly_named
 from thermospindle.diagnosis.decision.reason import LEFT, NUMERICS, UNTOLD
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.inference.evidence import left_out
@@ -26,7 +26,7 @@ SURE = 5.0  # standard deviations of chi2 by chance, beyond which something is l
 @dataclass(frozen=True, eq=False)
 class Verdict:
     """`word` is none, identified, ambiguous, two effects or unexplained; `effects` what it names; `losses` the expected loss of every answer
-    weighed. `candidates` of the catalogue and `free` ones with the most probable first. `held_out_before` and `held_out_after` are rms residuals, in standard
+    weighed. `candidates` of the catalogue, each also with a little free drift beside it, and `free` ones with the most probable first. `held_out_before` and `held_out_after` are rms residuals, in standard
     errors, of conditions predicted from all others, without effects and as `accepted`; `held_out_gain` what their ln probability density gains. `told` is what says how
     far drawing, thermometers and sensors are off: as `accepted`, or the likeliest where nothing is, for without what drifts these stand in for it."""
 
@@ -51,7 +51,6 @@ def decide(found: Search) -> Verdict:
     same = overlap(found.model, best.fit)
     candidates, free, none = explanations(found, same.inflation)
     candidates, free, none = _unheld(found, best, same, candidates, free, none)
-    unknown = sum(c.probability for c in free)
     word, effects, losses = least_loss(candidates, none, free, found.alike)
     accepted = _accepted(found, word, effects, candidates, free)
     groups = conditions_of(found.model.spindle, found.model.tests)
@@ -60,6 +59,8 @@ def decide(found: Search) -> Verdict:
     why += reason.of_resonances(found.model, best) + reason.of_what_is_left(best, same)
     told = best if word == "unexplained" else accepted
     why += reason.of_tolerances(found.model, told)
+    candidates, free = with_drift_beside(candidates, free)
+    unknown = sum(c.probability for c in free)
     return Verdict(word, effects, why, candidates, free, none, unknown, losses, before, after, density - plain, accepted, told)
 
 
@@ -94,9 +95,23 @@ def _adrift(h: Hypothesis) -> bool:
     return sizes.get(kinds_of.STIFFNESS_DRIFT, 0.0) > NUMERICS[0] or sizes.get(kinds_of.DAMPING_DRIFT, 0.0) > NUMERICS[1]
 
 
+def with_drift_beside(candidates: Sequence[Candidate], free: Sequence[Candidate]) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...]]:
+    """Probabilities as they are told: what is most of an explanation in which something drifts a little beside it has that explanation's, too."""
+    alone = {frozenset(c.names): c.delta_evidence for c in candidates}
+    beside = [c for c in free if frozenset(named_part(c)) in alone and mostly_named(c, alone)]
+
+    def whole(c: Candidate) -> float:
+        return c.probability + sum(o.probability for o in beside if set(named_part(o)) == set(c.names))
+
+    named = (replace(c, probability=whole(c)) for c in candidates)
+    left = (replace(c, probability=0.0) if c in beside else c for c in free)
+    return tuple(sorted(named, key=lambda c: (-c.probability, -c.delta_evidence))), tuple(sorted(left, key=lambda c: (-c.probability, -c.delta_evidence)))
+
+
 def _accepted(found: Search, word: str, effects: Names, candidates: Sequence[Candidate], free: Sequence[Candidate]) -> Hypothesis:
     """The hypothesis by which errors after the verdict are told: the likeliest that holds all that it names, or of a set the likeliest in it."""
     if word in ("none", "unexplained"):
         return found.base
-    whole = (c.hypothesis for c in (*candidates, *free) if set(named_part(c)) == set(effects))
-    return next(whole) if word != "ambiguous" else next(c.hypothesis for c in candidates if set(c.names) <= set(effects))
+    if word == "ambiguous":
+        return next(c.hypothesis for c in candidates if set(c.names) <= set(effects))
+    return max((c for c in (*candidates, *free) if set(named_part(c)) == set(effects)), key=lambda c: c.probability).hypothesis

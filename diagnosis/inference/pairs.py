@@ -72,6 +72,21 @@ def joined_early(
     return fitted_in_steps(model, chosen, (), tried.early[0].fit, tried.most, tried.expected, workers)[0]
 
 
+def without_one(model: CampaignModel, found: Sequence[Hypothesis], most: float, expected: Learned, workers) -> list[Hypothesis]:
+    """The best explanation of several mechanisms without each of them, as far as the rest was not fitted together: it came to be one by one, and what came first
+    may be what the others do without (backward elimination: Draper & Smith, *Applied Regression Analysis*, 3rd ed. 1998, 15.3)."""
+    best = max(found, key=lambda h: h.evidence.ln, default=None)
+    if best is None:
+        return []
+    known, tasks, at = {with_laws(h.mechanisms) for h in found}, [], len(model.parameters)
+    for k, m in enumerate(best.mechanisms):
+        rest, own = (*best.mechanisms[:k], *best.mechanisms[k + 1 :]), len(model.tests) + len(m.shape)
+        if rest and with_laws(rest) not in known:
+            tasks.append(Task(rest, (np.delete(best.fit.point, slice(at, at + own)),), -np.inf))
+        at += own
+    return fitted(model, tasks, TEMPERS[-2:], best.fit, most, expected, workers) if tasks else []
+
+
 def _beside(model, leads: Sequence[Hypothesis], mechanisms: Sequence[Mechanism], most: float, expected: Learned, workers) -> list[Hypothesis]:
     """One mechanism more, beside each of the `leads`: of the catalogue, and free beside what is not."""
     tasks, done = [], set()

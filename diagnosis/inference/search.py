@@ -12,7 +12,7 @@ from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.freeform import alike
 from thermospindle.diagnosis.inference.hypothesis import STRAIN, Hypothesis, settled, widened
-from thermospindle.diagnosis.inference.pairs import joined, joined_early
+from thermospindle.diagnosis.inference.pairs import joined, joined_early, without_one
 from thermospindle.diagnosis.inference.resonance import with_resonance
 from thermospindle.diagnosis.inference.screening import Screened
 from thermospindle.diagnosis.inference.singles import better, by_own_laws, carried_over, fit_singles, of_each_name
@@ -60,11 +60,12 @@ def search(
     singles = tried.singles
     pairs = joined(model, none, singles, every, tried.most, tried.expected, workers)
     pairs = better([*pairs, *joined_early(model, none, tried, pairs, every, workers)])
+    found = better([*singles, *pairs, *without_one(model, [*singles, *pairs], tried.most, tried.expected, workers)])
     progress("pairs fitted")
-    finalists = _finalists([*singles, *pairs])
+    finalists = _finalists(found)
     anew = dict(zip(map(id, finalists), in_parallel(partial(_at_the_end, model), finalists, workers), strict=True))
     none = widened(model, none)
-    ranked = [replace(anew[id(h)], fit=replace(anew[id(h)].fit, mechanisms=h.mechanisms)) if id(h) in anew else h for h in [*singles, *pairs]]
+    ranked = [replace(anew[id(h)], fit=replace(anew[id(h)].fit, mechanisms=h.mechanisms)) if id(h) in anew else h for h in found]
     progress("the best fitted anew")
     hypotheses = tuple(sorted([none, *ranked], key=lambda h: -h.evidence.ln))
     return Search(model, none, hypotheses, tried.screened, _alike(model, none.fit.nuisance, hypotheses))

@@ -49,6 +49,19 @@ def test_words(case):
     assert v.told.names == (likeliest if word == "unexplained" else v.accepted.names)  # without what drifts the drawing would be said to be off
 
 
+def test_a_name_beside_which_something_drifts_is_as_probable_as_it_is_told():
+    """Most of what is gained is the name's own: what it and a little drift have together is told as its probability, and errors are told with both. Where drift
+    is most of it, that is something unknown."""
+    little, mostly = (decide(made(CASES[case][0])) for case in ("a little drift beside one", "mostly drift, with a name beside"))
+    assert little.candidates[0].names == ("a",)
+    assert little.candidates[0].probability > 0.95
+    assert little.probability_unknown < 0.01
+    assert little.accepted.names == ("a", "~x")
+    assert "all else together is less probable than 1 in 1000; beside it ~x drifts a little" in little.reason
+    assert mostly.probability_unknown > 0.95
+    assert max(c.probability for c in mostly.candidates) < 0.01
+
+
 def test_a_false_alarm_costs_what_is_stated():
     """One effect against nothing: named from where MISSED P(something) exceeds FALSE_ALARM P(nothing), found by bisection."""
     low, high = 0.0, 30.0

@@ -13,10 +13,10 @@ from thermospindle.diagnosis.forward.mechanism import asked_at, variants
 from thermospindle.diagnosis.forward.nuisance import BUILD, STIFFNESS
 from thermospindle.diagnosis.inference import hypothesis
 from thermospindle.diagnosis.inference.evidence import evidence
-from thermospindle.diagnosis.inference.fit import fit
+from thermospindle.diagnosis.inference.fit import TEMPERS, fit
 from thermospindle.diagnosis.inference.freeform import free_forms
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
-from thermospindle.diagnosis.inference.pairs import joined_early
+from thermospindle.diagnosis.inference.pairs import joined_early, without_one
 from thermospindle.diagnosis.inference.prior import DRIFTING, steady, undrifted
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.inference.screening import linearised, screen
@@ -121,6 +121,28 @@ def test_two_constant_causes_of_which_neither_is_found_alone(spindle, tests):
     sizes = dict(zip(found.names, found.evidence.sizes, strict=True))
     assert sizes["added_disk"] == pytest.approx(3.0, abs=0.3)
     assert sizes["mount_compliance"] == pytest.approx(0.3, abs=0.03)
+
+
+def test_what_came_first_is_tried_without(spindle):
+    """A bond that softens and a weaker preload, and a third mechanism that came before the preload: of the rest, which nobody fitted, each two are, and those that
+    are known are not again."""
+    names = ("bond_softening", "preload_loss", "modulus_softening")
+    mechanisms = bond, preload, modulus = [variants(effect(name))[0] for name in names]
+    hidden = [(m.effect, m.values(m.size.typical, [q.neutral for q in m.shape])) for m in (bond, preload)]
+    model = model_of(spindle, mode_campaign(spindle, TESTS, 3, hidden))
+
+    def fitted_with(of):
+        found = fit(model, of, tempers=TEMPERS[-2:])
+        return Hypothesis(found, evidence(model, found))
+
+    found = [fitted_with(of) for of in ([bond], [bond, modulus], mechanisms)]
+    prior = steady(found[0].evidence.learned)
+    best = max(found, key=lambda h: h.evidence.ln)
+    best = replace(found[2], evidence=replace(found[2].evidence, ln=best.evidence.ln + 1))  # as one that leads
+    more = {h.names: h.evidence.ln for h in without_one(model, [*found[:2], best], np.inf, prior, 1)}
+    assert set(more) == {("bond_softening", "preload_loss"), ("preload_loss", "modulus_softening")}
+    assert more["bond_softening", "preload_loss"] > max(h.evidence.ln for h in found) - 1
+    assert more["bond_softening", "preload_loss"] > more["preload_loss", "modulus_softening"] + 10
 
 
 def test_a_drawing_that_is_off_is_no_missing_effect(spindle):
