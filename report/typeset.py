@@ -53,10 +53,11 @@ def with_error(pair: tuple[float, float] | None, sign: bool = False, digits: int
     if pair is None:
         return Markup("–")
     value, error = pair
-    if not 0 < error < np.inf:
-        return Markup(minus(f"{value:{'+' if sign else ''}.{digits}f}"))
-    digits = int(np.clip(-np.floor(np.log10(error / 2)), 0, 5))
-    return Markup(minus(f"{value:{'+' if sign else ''}.{digits}f}") + f" <small>± {error:.{digits}f}</small>")
+    of_error = ""
+    if 0 < error < np.inf:
+        digits = int(np.clip(-np.floor(np.log10(error / 2)), 0, 5))
+        of_error = f" <small>± {error:.{digits}f}</small>"
+    return Markup(minus(f"{round(value, digits) + 0.0:{'+' if sign else ''}.{digits}f}") + of_error)
 
 
 def signed_short(value: float) -> str:

@@ -144,7 +144,7 @@ def lost_contact(warmup: Warmup) -> str:
     lost = [(t, m) for t, m in zip(warmup.times, warmup.moments, strict=True) if not _all_loaded(m)]
     if lost:
         time, moment = lost[0]
-        return f"from {time / MINUTE:.3g} min on the {moment.point.state.status}: they carry no preload then, and frequencies are of a loose spindle"
+        return f"the {moment.point.state.status} at {time / MINUTE:.3g} min: no preload from there on, and frequencies are of a loose spindle"
     if not _all_loaded(warmup.steady):
         return f"in the steady state, after the times computed, the {warmup.steady.point.state.status}"
     return ""

@@ -115,3 +115,16 @@ def test_names_of_many_bearings_stand_above_their_curves(count, monkeypatch):
 def test_numbers_of_close_modes_share_a_label(frequencies, labels):
     peaks = plots.Peaks("computed", "computed", 20.0, {k: (f, np.nan) for k, f in enumerate(frequencies, 1)})
     assert [name for name, _ in plots.grouped(peaks, 0.011 * 5600)] == labels
+
+
+@pytest.mark.parametrize(("largest", "ends"), [(4.0, ("-10", "10")), (900.0, ("-100", "100")), (2e6, ("-1e+06", "1e+06"))])
+def test_ticks_of_residuals_are_plain_numbers_on_both_sides(largest, ends):
+    figure = Figure()
+    axes = figure.add_subplot()
+    common.residual_bar(figure, common.residual_norm(largest), axes)
+    figure.canvas.draw()
+    told = [t.get_text().replace("\N{MINUS SIGN}", "-") for t in figure.axes[1].get_yticklabels()]
+    assert (told[0], told[-1]) == ends
+    values = [float(t) for t in told]
+    assert values == sorted(values) == [-v for v in reversed(values)]
+    assert 0.0 in values

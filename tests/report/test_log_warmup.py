@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
 import pytest
 from rerun.chunk import RrdReader
+from rich.console import Console
 
 import thermospindle as ts
 from tests.conftest import coarse_warmups
+from thermospindle.model.bearing.pair import contact_status
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Spindle
-from thermospindle.model.units import RPM
+from thermospindle.model.units import MINUTE, RPM
 from thermospindle.report.log import told
 from thermospindle.report.log.drawing import HEAT
 from thermospindle.report.log.turning import warmup as log
-from thermospindle.report.text.warmup import rows, warmup_json
+from thermospindle.report.text.warmup import lost_contact, rows, show_warmup, warmup_json
 from thermospindle.sim.warmup import Warmup, warm_up
 
 
@@ -99,6 +103,20 @@ def test_json_and_words(warm: Warmup, file: Path) -> None:
     first, last = warm.moments[0], warm.moments[-1]
     assert "warm-up from 20 C in air of 20 C at 7200 rpm" in words
     assert f"preload of lower bearing_N: {first.preload['lower']:.6g} to {last.preload['lower']:.6g}" in words
+
+
+def test_a_lost_contact_is_said_before_anything_else(warm: Warmup) -> None:
+    """Before the table, which has no other sign of it than frequencies of a loose spindle; from the first moment without contact on."""
+    state = warm.moments[2].point.state
+    bearings = tuple(replace(b, in_contact=b.name != "upper") for b in state.bearings)
+    loose = replace(state, bearings=bearings, status=contact_status(bearings))
+    moment = replace(warm.moments[2], point=replace(warm.moments[2].point, state=loose))
+    assert lost_contact(warm) == ""
+    console = Console(width=200, record=True, file=StringIO())
+    show_warmup(console, replace(warm, moments=(*warm.moments[:2], moment, *warm.moments[3:])))
+    words = console.export_text()
+    assert words.startswith(f"The upper bearing lost contact at {warm.times[2] / MINUTE:.3g} min: no preload from there on")
+    assert words.index("lost contact") < words.index("Warm-up of")
 
 
 def test_the_summary_says_start_end_and_steady(warm: Warmup) -> None:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from thermospindle.report.typeset import plain_error, prose, signed
+from thermospindle.report.typeset import plain_error, prose, signed, with_error
 
 ROWS = [
     pytest.param("moves -27.0 +- 1.4 Hz", "moves −27.0 ± 1.4\u00a0Hz", id="signs and units"),
@@ -37,3 +37,17 @@ def test_no_negative_zero():
 )
 def test_a_number_has_the_digits_that_its_error_leaves(value, error, told):
     assert plain_error(value, error) == told
+
+
+@pytest.mark.parametrize(
+    ("pair", "told"),
+    [
+        ((-0.004, 0.5), "0.0 <small>± 0.5</small>"),
+        ((-27.04, 1.4), "−27.0 <small>± 1.4</small>"),
+        ((1234.5, 30.0), "1234 <small>± 30</small>"),
+        ((-0.01, 0.0), "0.0"),
+        (None, "–"),
+    ],
+)
+def test_a_number_of_a_page_has_the_digits_that_its_error_leaves(pair, told):
+    assert str(with_error(pair)) == told
