@@ -18,6 +18,7 @@ from thermospindle.diagnosis.runout.sources import phasors, scatter
 from thermospindle.model.bearing.kinematics import Line
 from thermospindle.model.machine import Point, Spindle
 from thermospindle.model.types import Array
+from thermospindle.sim.campaign.beside import on_nodes
 from thermospindle.sim.campaign.campaign import Campaign, Test
 from thermospindle.sim.campaign.simulated import set_down
 from thermospindle.sim.operating import operating_point
@@ -85,7 +86,7 @@ def rms_residual(found: Sequence[RunoutBeside]) -> float | None:
 
 def _beside(spindle: Spindle, seen: Seen, points: tuple[Point, ...]) -> RunoutBeside:
     point = operating_point(spindle, seen.condition)
-    by_node = {p.node: p for p in points}
+    by_node = {p.node: p for p in on_nodes(spindle, points)}
     own = phasors(point, point.imperfections, [by_node[n] for n in seen.nodes])
     turning = abs(seen.condition.speed) / (2 * np.pi)
     balls = {b.name: b.balls for b in point.spindle.rolling}

@@ -20,6 +20,7 @@ from thermospindle.model.machine import Point, Spindle
 from thermospindle.model.rotor.chain import motion_rows
 from thermospindle.model.tolerance import toleranced
 from thermospindle.model.types import Array, ComplexArray
+from thermospindle.sim.campaign.beside import on_nodes
 from thermospindle.sim.effects.effect import Effect, Values
 from thermospindle.sim.operating import OperatingPoint, operating_point
 from thermospindle.sim.running.excitation import at_speed, chain_response, excitation
@@ -49,7 +50,7 @@ class Sources:
 
 def sources(spindle: Spindle, seen: Sequence[Seen], points: Sequence[Point]) -> Sources:
     """All sources of a spindle in runout tests whose probes are among `points`."""
-    by_node = {p.node: p for p in points}
+    by_node = {p.node: p for p in on_nodes(spindle, points)}
     probes = [tuple(by_node[n] for n in s.nodes) for s in seen]
     width = max(len(p) for p in probes)
     nominal = [operating_point(spindle, s.condition) for s in seen]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition, Point, Spindle
+from thermospindle.model.shaft import SAME_HEIGHT, Shaft
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.campaign.campaign import Campaign, Test
 from thermospindle.sim.identification.frf import Frf, out_of, without
@@ -36,17 +38,33 @@ class Beside:
 
 
 def check_points(spindle: Spindle, campaign: Campaign) -> None:
-    """Raises `BadInput` for a campaign with a point on a body that the scene has not."""
-    bodies = {b.name for b in spindle.structure.bodies}
+    """Raises `BadInput` for a campaign with a point on a body that the scene has not, or beyond the ends of a shaft."""
+    bodies = {b.name for b in spindle.structure.rigid_bodies}
     for point in campaign.points:
-        if point.body not in bodies:
-            shafts = spindle.structure.shafts
-            whole = sorted(bodies - {name for s in shafts for name in s.bodies})
-            allowed = [*whole, *(f"{s.bodies[0]} to {len(s.bodies) - 1}" for s in shafts)]
+        where, shaft = f"{campaign.folder or campaign.title}: points.{point.node}", _shaft_of(spindle, point)
+        if shaft is None and point.body not in bodies:
+            allowed = [*sorted(bodies), *(s.name for s in spindle.structure.shafts)]
+            raise BadInput(f"{where}.body = {point.body!r}: no body of scene {spindle.name}; allowed are {', '.join(allowed)}")
+        if shaft is not None and not shaft.nodes[0] - SAME_HEIGHT <= point.position[2] <= shaft.nodes[-1] + SAME_HEIGHT:
+            low, high = (1e3 * z for z in (shaft.nodes[0], shaft.nodes[-1]))
             raise BadInput(
-                f"{campaign.folder or campaign.title}: points.{point.node}.body = {point.body!r}: "
-                f"no body of scene {spindle.name}; allowed are {', '.join(allowed)}"
+                f"{where}: at z_mm = {point.position[2] * 1e3:g} beyond the shaft {shaft.name!r} of scene {spindle.name}, which spans {low:g} to {high:g}"
             )
+
+
+def on_nodes(spindle: Spindle, points: Sequence[Point]) -> tuple[Point, ...]:
+    """A campaign's points on the nodes that the scene's shafts have: a mesh that was made finer, or that a bearing more divides, has them in other
+    places than when the campaign was written, and height alone says where a point is."""
+    shafts = [_shaft_of(spindle, p) for p in points]
+    return tuple(p if shaft is None else replace(p, body=shaft.node_at(p.position[2])) for p, shaft in zip(points, shafts, strict=True))
+
+
+def _shaft_of(spindle: Spindle, point: Point) -> Shaft | None:
+    """The shaft that a point is on, by its name or that of a node of some mesh of it."""
+    if any(b.name == point.body for b in spindle.structure.rigid_bodies):
+        return None
+    name, _, number = point.body.rpartition(" ")
+    return next((s for s in spindle.structure.shafts if s.name == point.body or (s.name == name and number.isdecimal())), None)
 
 
 def measured_at(spindle: Spindle, points: tuple[Point, ...], frf: Frf | None) -> Spindle:
@@ -54,7 +72,7 @@ def measured_at(spindle: Spindle, points: tuple[Point, ...], frf: Frf | None) ->
     if frf is None:
         return spindle
     nodes = (*frf.response_nodes, *(n for n in frf.reference_nodes if n not in frf.response_nodes))
-    by_node = {p.node: p for p in points}
+    by_node = {p.node: p for p in on_nodes(spindle, points)}
     hammer = replace(spindle.hammer, hammer_nodes=frf.reference_nodes)
     return replace(spindle, points=tuple(by_node[n] for n in nodes), hammer=hammer)
 

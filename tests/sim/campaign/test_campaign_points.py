@@ -1,18 +1,62 @@
-"""Campaigns of another spindle: their points are on bodies that the scene has not."""
+"""A campaign's points on the bodies of a scene: of another spindle, and of the same one with another mesh."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from tests.conftest import ROOT
 from thermospindle.diagnosis.compare.compare import compare
 from thermospindle.diagnosis.verdict import diagnose
 from thermospindle.model.errors import BadInput
+from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
-from thermospindle.sim.campaign.campaign import read_campaign
+from thermospindle.sim.campaign.beside import beside, check_points
+from thermospindle.sim.campaign.campaign import Campaign, Test, read_campaign
+from thermospindle.sim.identification.frf import Frf
 
 FOREIGN = ROOT / "tests" / "data" / "foreign_bond"
 
 
 @pytest.mark.parametrize("verb", [compare, diagnose])
 def test_a_foreign_campaign_is_refused_without_naming_every_segment(verb):
-    with pytest.raises(BadInput, match=r"points\.1\.body = 'hub': no body of scene five_bearing; allowed are housing, spindle 0 to 23$"):
+    with pytest.raises(BadInput, match=r"points\.1\.body = 'hub': no body of scene five_bearing; allowed are housing, spindle$"):
         verb(load(ROOT / "scenes" / "five_bearing"), read_campaign(FOREIGN))
+
+
+def written(spindle):
+    """A campaign of two lines at rest, its points those of a spindle's scene as its files have them."""
+    nodes = tuple(p.node for p in spindle.points)
+    frf = Frf(np.array([800.0, 1200.0]), np.ones((len(nodes), 1, 2), complex), nodes, nodes[:1], "mobility")
+    return Campaign("two lines", spindle.name, "mobility", spindle.points, (Test("cold", 20.0, 0.0, frf=frf),))
+
+
+def made(tmp_path, *changes):
+    """The scene that `spindle new --like rotor` writes, with `changes` of its text."""
+    text = (ROOT / "scenes" / "templates" / "rotor.toml").read_text(encoding="utf-8")
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    scene = tmp_path / str(len(list(tmp_path.iterdir())))
+    scene.mkdir()
+    (scene / "spindle.toml").write_text(text, encoding="utf-8")
+    return load(scene)
+
+
+def test_points_stay_where_they_are_on_a_shaft_that_is_divided_otherwise(tmp_path):
+    """Nodes are numbered by the mesh: with elements a third as long, `shaft 11` of the campaign's file is another place."""
+    coarse, fine = made(tmp_path), made(tmp_path, ("longest_element_mm = 65.0", "longest_element_mm = 20.0"))
+    campaign = written(coarse)
+    check_points(fine, campaign)
+    by_name = [replace(p, body=p.body.split()[0]) for p in campaign.points]  # as one would write it by hand
+    at, frequency = Condition(20.0, 0.0), np.array([60.0, 400.0, 900.0])
+    rows = (coarse, campaign.points), (fine, campaign.points), (fine, tuple(by_name))
+    first, *others = (beside(spindle, points, campaign.tests[0], at).computed(frequency) for spindle, points in rows)
+    for other in others:
+        assert other == pytest.approx(first, rel=0.02, abs=0.002 * np.abs(first).max())
+
+
+def test_a_point_beyond_a_shaft_that_was_shortened_is_refused(tmp_path):
+    shorter = made(tmp_path, ("[[30, 600]]", "[[30, 580]]"), ("[0.0, 0.0, 600.0]", "[0.0, 0.0, 580.0]"))
+    with pytest.raises(BadInput, match=r"points\.4: at z_mm = 600 beyond the shaft 'shaft' of scene \S+, which spans 0 to 580$"):
+        check_points(shorter, written(made(tmp_path)))
