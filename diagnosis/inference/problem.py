@@ -198,12 +198,18 @@ class Linearisation:
     def __init__(self, length: int, rows: Sequence[tuple[Array, Array, Integers]]) -> None:
         self.length, self.rows = length, rows
         self.residuals = [r for r, _, _ in rows]
-        self.by_test = []
-        for _, jacobian, numbers in rows:
-            information = np.zeros((length, length))
-            information[np.ix_(numbers, numbers)] = jacobian @ jacobian.T
-            self.by_test.append(information)
-        self.information: Array = np.sum(self.by_test, axis=0)
+        self.information: Array = np.zeros((length, length))
+        self._own = [jacobian @ jacobian.T for _, jacobian, _ in rows]
+        for own, (_, _, numbers) in zip(self._own, rows, strict=True):
+            self.information[np.ix_(numbers, numbers)] += own
+
+    @property
+    def by_test(self) -> list[Array]:
+        """The information (n, n) of each test."""
+        found = [np.zeros_like(self.information) for _ in self.rows]
+        for information, own, (_, _, numbers) in zip(found, self._own, self.rows, strict=True):
+            information[np.ix_(numbers, numbers)] = own
+        return found
 
     def without(self, held: Integers) -> Linearisation:
         """The same with some parameters held where they are."""
