@@ -27,6 +27,7 @@ OUTCOMES = ("right", "in the set", "half", "unexplained", "missed", "wrong", "fa
 SHOWS = np.sqrt(10.0)
 VISIBLE = 2 * SHOWS
 LEAST = 1e-3
+MUCH = 0.3  # of the largest amount of what is hidden
 BINS = (0.0, 0.2, 0.5, 0.8, 0.95, 0.99, 1.0)
 DOCS = ROOT / "docs" / "blind.txt"
 
@@ -77,6 +78,21 @@ def element_found(row: Row) -> bool:
         return False
     told = row["drifts"][0][0]
     return any(e.split()[0] in told or told.split()[0] in e for e in row["elements"])
+
+
+def halved(row: Row) -> bool:
+    """Whether the effect that `draft` writes halves the error of temperatures predicted from all others."""
+    before, after = row["drafted"]
+    return bool(after < before / 2)
+
+
+def told_elsewhere(row: Row) -> bool:
+    """Whether tests of more than one temperature have much of what is hidden: of one alone no law tells the others."""
+    for amounts in row["amounts"]:
+        most = max(map(abs, amounts))
+        if len({t for (t, _), amount in zip(row["tests"], amounts, strict=True) if abs(amount) > MUCH * most}) > 1:
+            return True
+    return False
 
 
 def truth_probability(row: Row) -> float:
@@ -188,7 +204,8 @@ def show(console: Console, rows: Sequence[Row]) -> None:
     console.print(f"unexplained, outside and visible: {share(outside, lambda r: outcome(r) == 'right')}")
     console.print(f"  and the right element first: {share(outside, lambda r: outcome(r) == 'right' and element_found(r))}")
     drafts = [r for r in outside if r.get("drafted")]
-    console.print(f"  and the error left out halved by what draft writes: {share(drafts, lambda r: r['drafted'][1] < r['drafted'][0] / 2)}")
+    console.print(f"  and the error left out halved by what draft writes: {share(drafts, halved)}")
+    console.print(f"    where more than one temperature shows it: {share([r for r in drafts if told_elsewhere(r)], halved)}")
     named = [r for r in told if nameless(r) and r["kind"] != "outside"]
     console.print(
         f"of these drawn with an effect in mind that cannot be it: {len(named)}; another effect than those in mind is right, too: "

@@ -10,7 +10,7 @@ from tests.blind.alike import left, right, right_names
 from tests.blind.campaigns import campaign, in_contact
 from tests.blind.laws import law
 from tests.blind.mechanisms import mechanisms
-from tests.blind.score import element_found, interval, most_probable, outcome, show, truth_probability
+from tests.blind.score import element_found, halved, interval, most_probable, outcome, show, told_elsewhere, truth_probability
 from tests.blind.study import FURTHER, FURTHER_FROM, FURTHER_SHARE, SCENES, draw
 from tests.blind.visible import change, seen, visibility
 from tests.blind.world import Record, World, answer
@@ -196,6 +196,14 @@ def test_right_names():
     assert right_names((), left_by, 200.0) == ["same"]
     assert right_names((), left_by, 4.0) == []
     assert right_names(("off",), left_by, 2.0) == ["off"]  # too little to be told
+
+
+def test_what_one_temperature_alone_shows_no_law_tells():
+    tests = [[20.0, 0], [40.0, 0], [60.0, 0], [60.0, 7200]]
+    assert not told_elsewhere({"tests": tests, "amounts": [[0.0, 0.2, 1.0, 1.0]]})
+    assert told_elsewhere({"tests": tests, "amounts": [[0.0, -0.4, 1.0, 1.0]]})
+    assert halved({"drafted": [10.0, 4.9]})
+    assert not halved({"drafted": [10.0, 5.1]})
 
 
 def row(kind, verdict, effects=(), truth=(), none=0.0, unknown=0.0, candidates=(), drifts=(), elements=()):
