@@ -18,7 +18,7 @@ from thermospindle.diagnosis.data.mode_table import ModeData
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.linear import Linear, Products, Rates, pairs, products, same_chain, together
 from thermospindle.diagnosis.forward.nuisance import Nuisance, ReferenceModes, Resonance
-from thermospindle.diagnosis.forward.points import Applied, replace_measuring, stretched
+from thermospindle.diagnosis.forward.points import Applied, apart, replace_measuring, stretched
 from thermospindle.diagnosis.forward.response import Light, Response
 from thermospindle.diagnosis.forward.table import Table
 from thermospindle.model.errors import NoEquilibrium, OutsideRange
@@ -93,6 +93,11 @@ class CampaignModel:
         return [i for i, p in enumerate(self.parameters) if p.kind == kinds_of.EXPANSION]
 
     @cached_property
+    def apart(self) -> list[int]:
+        """Numbers of the parameters by which bearings differ among themselves."""
+        return [i for i, p in enumerate(self.parameters) if p.kind in kinds_of.APART]
+
+    @cached_property
     def temperature(self) -> list[int]:
         """For every test the number of its thermometer's parameter."""
         return [next(i for i, p in enumerate(self.parameters) if p.kind == kinds_of.TEMPERATURE and p.test == t) for t in range(len(self.tests))]
@@ -140,7 +145,7 @@ class CampaignModel:
         """The operating point of test `t`, sizes within their limits; what differs in the measuring chain alone is not worked out again."""
         effects = within_limits(effects)
         acting = tuple((id(e), *v.values()) for e, v in effects if any(getattr(e, hook) for hook in MEASURING))
-        key = (t, x[: len(self.build)].tobytes(), float(x[self.temperature[t]]), x[self.expansion].tobytes(), acting)
+        key = (t, x[: len(self.build)].tobytes(), float(x[self.temperature[t]]), x[self.expansion].tobytes(), x[self.apart].tobytes(), acting)
         late = self._points.get(key)
         if late is None:
             if len(self._points) > 6 * len(self.tests):
@@ -148,8 +153,12 @@ class CampaignModel:
             test = self.tests[t]
             warmer = float(x[self.temperature[t]]) * self.parameters[self.temperature[t]].sd
             condition = replace(test.condition, temperature=test.condition.temperature + warmer)
-            stretch = [1 + float(x[i]) * self.parameters[i].sd for i in self.expansion]
-            every = [stretched(*stretch), *self.present, *effects] if x[self.expansion].any() else [*self.present, *effects]
+            every = [*self.present, *effects]
+            if x[self.apart].any():
+                names, own = [b.name for b in self.spindle.all_bearings], [(self.parameters[i], float(x[i])) for i in self.apart]
+                every = [apart(*({names[p.index]: v * p.sd for p, v in own if p.kind == kind} for kind in kinds_of.APART)), *every]
+            if x[self.expansion].any():
+                every = [stretched(*(1 + float(x[i]) * self.parameters[i].sd for i in self.expansion)), *every]
             late = self._points[key] = operating_point(self._built(t, x), condition, every)
             late.chain  # noqa: B018 - worked out here, so that errors come here
             return late

@@ -8,6 +8,9 @@ K + sum_ij e_ij w_i w_j (M f_i)(M f_j)^T with mass-normalised modes f of the ref
 frequencies and mixes shapes, never their changes, and it is smooth where modes coincide. A drifting discrepancy is a much smaller one of each
 mode in each test: what laws that hold only nearly leave. The size of each is learned from the data.
 
+Bearings differ among themselves: each has a stiffness and a damping of its own about those that all share with the drawing, within the scene's tolerances. A
+constant discrepancy of modes cannot stand in for that: bearings soften with speed, and what one of two is off by with them.
+
 A light resonance is one that the drawing lacks, of the table, a fixture or a cable: an oscillator on some point of the machine, wherever that is, and so
 given by how much of it each reference mode carries along. It is looked for where the data show the same misfit in every test.
 """
@@ -26,6 +29,7 @@ from thermospindle.model.tolerance import Toleranced
 from thermospindle.model.types import Array
 
 BUILD, TEMPERATURE, GAIN, DRIFT, EXPANSION = "build", "temperature", "gain", "gain drift", "thermal expansion"
+APART = "stiffness apart", "damping apart"  # of bearings
 RECORD = "end of records"
 RESONANCE = "light resonance"
 STIFFNESS, DAMPING = "stiffness discrepancy", "damping discrepancy"
@@ -48,7 +52,7 @@ in whether a groove grows with its ring's free strain or follows its face."""
 class Nuisance:
     """One nuisance parameter; `sd` is one prior standard deviation in its own unit (relative or K).
 
-    `index` is the number of the toleranced parameter (build), the channel (gain: sensors in the order in which tests first have them), or unused; `modes` the pair of a discrepancy.
+    `index` is the number of the toleranced parameter (build), of the bearing (apart), the channel (gain: sensors in the order in which tests first have them), or unused; `modes` the pair of a discrepancy.
     """
 
     kind: str
@@ -121,6 +125,10 @@ def nuisances(
     t = spindle.tolerances
     found = [Nuisance(BUILD, p.name, p.sd, index=i) for i, p in enumerate(build)]
     found += [Nuisance(EXPANSION, name, sd, index=i) for i, (name, sd) in enumerate(EXPANSION_SD.items())]
+    every = [b.name for b in spindle.all_bearings]
+    for kind, own, sd in zip(APART, ([b.name for b in spindle.rolling], every), (t.structure, t.damping), strict=True):  # given ones have stiffnesses of their own
+        if len(own) > 1:
+            found += [Nuisance(kind, f"{kind.removesuffix(' apart')} of {b} beside the others", sd, index=every.index(b)) for b in own]
     found += [Nuisance(TEMPERATURE, f"temperature of {name}", t.temperature, test=k) for k, name in enumerate(tests)]
     for i in range(modes.seen):
         for j in range(i, len(modes.omega) if with_lines else i + 1):

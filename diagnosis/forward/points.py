@@ -1,10 +1,11 @@
-"""Operating points that differ in little from those that are there: in the measuring chain, or in how far the rings expand."""
+"""Operating points that differ in little from those that are there: in the measuring chain, in how far the rings expand, or in how bearings differ."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from thermospindle.model.bearing.pair import PairState
 from thermospindle.model.machine import Condition, RingMotion, Spindle
 from thermospindle.sim.effects.effect import Effect, Values
 from thermospindle.sim.operating import OperatingPoint
@@ -31,3 +32,18 @@ def stretched(radial: float, axial: float, grooves: float) -> tuple[Effect, Valu
         return {b: replace(m, **{k: f * getattr(m, k) for k, f in factors.items()}) for b, m in by_bearing.items()}
 
     return Effect("expansion", "", "", (), "", (), "", motions=motions), {}
+
+
+def apart(stiffness: Mapping[str, float], damping: Mapping[str, float]) -> tuple[Effect, Values]:
+    """Stiffness and damping of bearings, by name, off by these shares less their mean: what all have in common is a tolerance of the preload and of the damping."""
+    stiffer, lossier = ({b: 1 + share - sum(own.values()) / len(own) for b, share in own.items()} for own in (stiffness, damping))
+
+    def of(name: str) -> tuple[float, float]:
+        return stiffer.get(name, 1.0), stiffer.get(name, 1.0) * lossier.get(name, 1.0)
+
+    def pair(spindle: Spindle, condition: Condition, values: Values, state: PairState) -> PairState:
+        bearings = tuple(replace(b, stiffness=k * b.stiffness, damping=c * b.damping) for b in state.bearings for k, c in [of(b.name)])
+        linear = tuple(replace(b, stiffness=k * b.stiffness, damping=c * b.damping) for b in state.linear for k, c in [of(b.name)])
+        return replace(state, bearings=bearings, linear=linear)
+
+    return Effect("apart", "", "", (), "", (), "", pair=pair), {}

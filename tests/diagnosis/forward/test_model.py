@@ -11,7 +11,18 @@ from tests.conftest import ROOT
 from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, truth, virtual_campaign
 from thermospindle.diagnosis.forward.linear import products, together
 from thermospindle.diagnosis.forward.making import BEYOND, IN_BAND, MOST_MODES
-from thermospindle.diagnosis.forward.nuisance import BUILD, DAMPING, DRIFT, EXPANSION, GAIN, RECORD, STIFFNESS, TEMPERATURE, reference_modes
+from thermospindle.diagnosis.forward.nuisance import (
+    APART,
+    BUILD,
+    DAMPING,
+    DRIFT,
+    EXPANSION,
+    GAIN,
+    RECORD,
+    STIFFNESS,
+    TEMPERATURE,
+    reference_modes,
+)
 from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.forward.response import Response
 from thermospindle.diagnosis.ladder.fitting import unseen
@@ -26,7 +37,7 @@ from thermospindle.sim.operating import operating_point
 NOISELESS = Noise(0.0, 0.0)
 CONDITIONS = (Condition(20.0), Condition(45.0, 7200 * RPM))
 FREQUENCY = np.arange(400.0, 6000.1, 40.0)
-KINDS = (BUILD, EXPANSION, TEMPERATURE, GAIN, DRIFT, STIFFNESS, DAMPING, RECORD)
+KINDS = (BUILD, EXPANSION, *APART, TEMPERATURE, GAIN, DRIFT, STIFFNESS, DAMPING, RECORD)
 SCENES = {"reference": ROOT / "scenes" / "hdd_2003", "symmetric": ROOT / "tests" / "scenes" / "symmetric"}
 
 
@@ -76,7 +87,7 @@ def test_derivatives_of_lines(scene, quantity, decay):
     assert set(worst) == set(KINDS)
     for kind in (GAIN, DRIFT, STIFFNESS, DAMPING, RECORD):
         assert worst[kind] < 1e-4, kind
-    for kind in (BUILD, EXPANSION, TEMPERATURE):
+    for kind in (BUILD, EXPANSION, *APART, TEMPERATURE):
         assert worst[kind] < 5e-3, kind
 
 
@@ -109,7 +120,7 @@ def test_derivatives_of_a_flexible_shaft():
     worst = worst_by_kind(model, 1, x)
     for kind in (GAIN, DRIFT, STIFFNESS, DAMPING, RECORD):
         assert worst[kind] < 3e-3, kind
-    for kind in (BUILD, EXPANSION, TEMPERATURE):
+    for kind in (BUILD, EXPANSION, *APART, TEMPERATURE):
         assert worst[kind] < 1e-2, kind
 
 

@@ -12,7 +12,7 @@ from tests.conftest import ROOT
 from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, truth, virtual_campaign
 from thermospindle.diagnosis.forward.mechanism import asked_at, variants, with_own_laws
 from thermospindle.diagnosis.forward.model import CampaignModel
-from thermospindle.diagnosis.forward.nuisance import BUILD, DRIFT, GAIN, STIFFNESS, TEMPERATURE
+from thermospindle.diagnosis.forward.nuisance import APART, BUILD, DAMPING, DRIFT, GAIN, STIFFNESS, TEMPERATURE
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.hypothesis import scan
@@ -21,6 +21,7 @@ from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
+from thermospindle.sim.campaign.campaign import Noise
 from thermospindle.sim.operating import operating_point
 
 COLD_AND_WARM = (Condition(20.0), Condition(55.0, 7200 * RPM))
@@ -61,6 +62,21 @@ def test_errors_come_true(spindle, seed):
     assert (learned.sizes[STIFFNESS], learned.sizes[DRIFT], learned.errors) == (0.0, 0.0, 1.0)
     z = standardised(model, done, errors)
     assert stats.chi2.sf(z @ z, len(z)) > 1e-3
+
+
+def test_bearings_that_differ_are_no_discrepancy_of_modes(spindle):
+    """One bearing damps a tenth more than drawn and the other a tenth less: that is found, and the modes' constant errors are none."""
+    shares = {b.name: sign * 0.1 for b, sign in zip(spindle.all_bearings, (1, -1), strict=True)}
+    true = replace(spindle, bearings=tuple(replace(b, damping_ratio=(1 + shares[b.name]) * b.damping_ratio) for b in spindle.bearings))
+    campaign = virtual_campaign(true, COLD_AND_WARM, 4, noise=Noise(1e-3, 1e-4))
+    model = model_of(spindle, campaign)
+    found = evidence(model, fit(model))
+    assert found.learned.sizes[STIFFNESS] == found.learned.sizes[DAMPING] == 0.0
+    for name, share in shares.items():
+        i = next(i for i, p in enumerate(model.parameters) if p.name == f"damping of {name} beside the others")
+        others = [j for j, p in enumerate(model.parameters) if p.kind == APART[1] and j != i]
+        apart = (found.mean[i] - found.mean[others].mean()) / 2 * model.parameters[i].sd
+        assert apart == pytest.approx(share, abs=0.02)
 
 
 def test_a_fit_rests(spindle):

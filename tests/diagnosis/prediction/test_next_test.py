@@ -39,7 +39,7 @@ def test_no_test_is_proposed_where_bearings_have_lost_contact(spindle):
 def one_test(spindle):
     """A campaign of one test with a lost preload, its model, and the fits of what was lost and of a rival, as a search has them before the best are settled."""
     loss = effect("preload_loss")
-    campaign = mode_campaign(spindle, [TESTED], 1, [(loss, {**loss.neutral(), "loss": 0.25})], errors=drawn(spindle, 1, 1))
+    campaign = mode_campaign(spindle, [TESTED], 1, [(loss, {**loss.neutral(), "loss": 0.4})], errors=drawn(spindle, 1, 1))
     model = model_of(spindle, campaign)
     found = []
     for name in ("preload_loss", "clearance_opening"):
