@@ -67,6 +67,14 @@ def least_loss(
     return *answers[best], losses
 
 
+def in_all(effects: Sequence[str], explanations: Sequence[tuple[Sequence[str], float]]) -> Names:
+    """Those of a set of `effects`, but not all, that its explanations hold, names and probability of each, but for so little that a set could be told without
+    it."""
+    own = [(names, p) for names, p in explanations if set(names) <= set(effects)]
+    found = tuple(e for e in effects if sum(p for names, p in own if e in names) > ENOUGH * sum(p for _, p in own))
+    return found if len(found) < len(effects) else ()
+
+
 def mostly_named(c: Candidate, alone: Mapping[frozenset[str], float]) -> bool:
     """Whether the effects of the catalogue, by themselves or some of them, reach most of what an explanation gains with free drift beside them."""
     own = frozenset(named_part(c))

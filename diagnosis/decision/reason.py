@@ -6,7 +6,7 @@ import numpy as np
 
 from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.decision.explanations import Names, beyond_limits, likeliest, named_part
-from thermospindle.diagnosis.decision.loss import NEGLIGIBLE
+from thermospindle.diagnosis.decision.loss import NEGLIGIBLE, in_all
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.hypothesis import LITTLE, STRAIN, Hypothesis
@@ -56,6 +56,11 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
     if word == "ambiguous":
         rows = [c for c in candidates if set(c.names) <= set(effects)]
         share = sum(c.probability for c in rows)
+        if always := in_all(effects, [(c.names, c.probability) for c in rows]):
+            others = [name for name in effects if name not in always]
+            more = sum(c.probability for c in rows if set(c.names) - set(always)) / share
+            which = f"with a probability of {more:.0%} {' or '.join(others)} acts beside {'it' if len(always) == 1 else 'them'}, and which, if any, cannot be told"
+            return f"{' and '.join(always)} {'is' if len(always) == 1 else 'are'} in all that explains the data (together {share:.0%} probable); {which}{checked}."
         several = ", or several of them together," if any(len(c.names) > 1 and c.probability > NEGLIGIBLE for c in rows) else ""
         return f"One of {', '.join(effects)}{several} explains the data (together {share:.0%} probable); no one of them is probable enough to be named{checked}."
     told = [c for c in (*candidates, *free) if set(named_part(c)) == set(effects)]

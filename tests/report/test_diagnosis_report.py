@@ -126,6 +126,20 @@ def test_the_terminal_tells_drifts_only_where_something_is_missing(told, nothing
     assert "Smallest size these data would have shown" in text
 
 
+@pytest.mark.parametrize(
+    ("odds", "sentence"),
+    [
+        ({("a",): 0.5, ("a", "b"): 0.3, ("a", "c"): 0.2}, "Missing: a, and perhaps one more: b, c."),
+        ({("a",): 0.5, ("b",): 0.3, ("a", "c"): 0.2}, "Missing is one of: a, b, c."),
+    ],
+)
+def test_of_a_set_what_all_explanations_hold_is_missing(told, capsys, odds, sentence):
+    rows = [told[1]["candidates"][0] | {"effects": list(names), "probability": p} for names, p in odds.items()]
+    effects = ["a", "b", "c"]
+    show_diagnosis(Console(width=200), told[1] | {"verdict": "ambiguous", "effects": effects, "candidates": rows}, verbose=False)
+    assert capsys.readouterr().out.startswith(f"ambiguous: {sentence}")
+
+
 def test_without_verbose_the_verdict_is_told_in_few_lines(told, nothing_missing, capsys):
     console = Console(width=80)
     for answer in (told[1], diagnosis_json(nothing_missing)):

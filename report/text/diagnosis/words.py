@@ -8,6 +8,7 @@ import numpy as np
 from rich.console import Console
 
 from thermospindle.diagnosis.decision.explanations import beyond_limits
+from thermospindle.diagnosis.decision.loss import in_all
 from thermospindle.diagnosis.verdict import Diagnosis, Drift
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
@@ -111,10 +112,18 @@ def plan_words(condition: dict[str, Any]) -> str:
     return words + (f", after {condition['soak_time_min']:g} min in the chamber" if "soak_time_min" in condition else "")
 
 
+def _sentence(answer: dict[str, Any]) -> str:
+    """The verdict; of a set what all of its explanations hold comes first."""
+    word, effects = answer["verdict"], answer["effects"]
+    sure = in_all(effects, [(c["effects"], c["probability"]) for c in answer["candidates"]]) if word == "ambiguous" else ()
+    if sure:
+        return f"Missing: {' and '.join(sure)}, and perhaps one more: {', '.join(e for e in effects if e not in sure)}."
+    return SENTENCES[word].format((" and " if word == "two effects" else ", ").join(effects))
+
+
 def show_diagnosis(console: Console, answer: dict[str, Any], verbose: bool = True) -> None:
     """The verdict in one sentence and why; with `verbose` every explanation, drift and next test, and what would have been seen."""
-    joined = (" and " if answer["verdict"] == "two effects" else ", ").join(answer["effects"])
-    console.print(f"{answer['verdict']}: {SENTENCES[answer['verdict']].format(joined)}", style="bold")
+    console.print(f"{answer['verdict']}: {_sentence(answer)}", style="bold")
     console.print(answer["reason"])
     for sentence in answer["law_departs"]:
         console.print(sentence)

@@ -103,6 +103,10 @@ def test_a_set_holds_only_what_is_probable():
     v = decide(made({("left", "right"): 58.0, "left": 53.5, ("left", "~drift"): 56.0, "behind": 5.0, "far": -40.0}))
     assert 0.5 < max(c.probability for c in v.candidates) < 0.95
     assert (v.word, set(v.effects)) == ("ambiguous", {"left", "right"})
+    more = next(c.probability for c in v.candidates if c.names == ("left", "right")) / sum(c.probability for c in v.candidates[:2])
+    assert v.reason.startswith("left is in all that explains the data (together ")
+    assert 0.05 < more < 0.95
+    assert "right acts beside it, and which, if any, cannot be told" in v.reason
 
 
 @pytest.mark.parametrize(("leaves", "word"), [(46.0, "unexplained"), (21.0, "unexplained"), (4.0, "identified"), (1.0, "identified")])
