@@ -140,6 +140,7 @@ BAD = [
     (["fly", SCENE], "fly"),
     (["compare", SCENE, SCENE], "no campaign there"),
     (["effects", "magic"], "'magic' is unknown; allowed are"),
+    (["effects", str(SCENE)], f"of the scene in that folder: spindle effects --scene {SCENE}"),
     (["add", SCENE, "ring_growth"], "needs the folder"),
     (["add", SCENE, "ring_growth", "--out", SCENE / "more"], "may neither be, hold nor lie inside"),
     (["add", SCENE, "ring_growth", "--out", SCENE.parent], "may neither be, hold nor lie inside"),

@@ -36,14 +36,20 @@ class Reduced:
 
 
 def reduced(linear: Matrices, rows: Array, highest: float, beyond: float = BEYOND, small: float = SMALL) -> Reduced:
-    """The reduced model of a chain with lumped (diagonal) mass for forces and responses along `rows` (m, n), up to `highest` (rad/s)."""
+    """The reduced model of a chain with lumped (diagonal) mass for forces and responses along `rows` (m, n), up to `highest` (rad/s).
+
+    Raises `ValueError` where a mass is not positive.
+    """
     q, stiffest = _basis(linear, rows, highest, beyond, small)
     return Reduced(q, q.T @ linear.mass @ q, q.T @ linear.damping @ q, q.T @ linear.stiffness @ q, stiffest)
 
 
 def _basis(linear: Matrices, rows: Array, highest: float, beyond: float, small: float) -> tuple[Array, float]:
     """The basis (n, r) of `reduced`, with Q^T M Q = 1, and the highest undamped frequency (rad/s)."""
-    root = np.sqrt(np.diag(linear.mass))
+    masses = np.diag(linear.mass)
+    if not np.all(masses > 0):  # of an effect that is fitted beyond its limit
+        raise ValueError("a mass of nothing, or less, has no modes")
+    root = np.sqrt(masses)
     squares, vectors = np.linalg.eigh((linear.stiffness + linear.stiffness.T) / 2 / np.outer(root, root))
     kept, stiffest = squares < (beyond * highest) ** 2, float(np.sqrt(squares[-1]))
     kept[0] = True  # where there is none in the band and no force, something is left

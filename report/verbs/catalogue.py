@@ -30,6 +30,8 @@ def effects(
     if name is None:
         values: dict[str, Any] = {"effects": [summary(e) for e in known]} | ({} if scene is None else {"refused": refused})
         return answered(values, lambda console: show_effects(console, known, refused), out, asked, write_json("effects.json"))
+    if Path(name).is_dir() and name not in {e.name for e in known}:
+        raise BadInput(f"effect {name!r} is unknown; of the scene in that folder: spindle effects --scene {name}")
     effect = by_name(name, known)
     values = {k: getattr(effect, k) for k in ("name", "title", "equation", "sees", "valid")}
     values |= {"resembles": list(effect.resembles), "parameters": [asdict(p) for p in effect.parameters]}

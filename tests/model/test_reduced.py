@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -75,3 +77,12 @@ def test_modes_of_the_band_are_those_of_the_whole_model(scene: str, rpm: float):
         left = mode.shape - alike @ np.linalg.lstsq(alike, mode.shape, rcond=None)[0]
         assert np.linalg.norm(left) < 1e-4 * np.linalg.norm(mode.shape)
         assert sum(mode.energy.values()) == pytest.approx(1.0)
+
+
+def test_a_mass_of_nothing_is_refused_in_words():
+    """Where a fit takes mass away beyond what is there: no warning of numpy's, and nothing that is not a number."""
+    _, whole, chain, _ = _both("mk7702", 0.0)
+    mass = whole.mass.copy()
+    mass[3, 3] = -1e-6
+    with pytest.raises(ValueError, match="a mass of nothing"):
+        reduced(replace(whole, mass=mass), chain.response_rows, 1e4)
