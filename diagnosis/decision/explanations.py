@@ -8,7 +8,7 @@ as well is that effect.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import permutations
 from math import comb
@@ -69,9 +69,13 @@ def explanations(found: Search, inflation: float) -> tuple[tuple[Candidate, ...]
     total = np.log(sum(np.exp(w - top) for _, w in rows)) + top
     every = [_candidate(same_names, base, float(total)) for same_names in _by_names(rows)]
     every += [Candidate(h, h.names, True, h.evidence.ln - base, 0.0) for h in twins]
-    every.sort(key=lambda c: (-c.probability, -c.delta_evidence))
     none = float(np.exp(next(w for h, w in rows if not h.mechanisms) - total))
-    return tuple(c for c in every if not c.free), tuple(c for c in every if c.free), none
+    return likelier_first(c for c in every if not c.free), likelier_first(c for c in every if c.free), none
+
+
+def likelier_first(candidates: Iterable[Candidate]) -> tuple[Candidate, ...]:
+    """By probability, and those of none by their evidence."""
+    return tuple(sorted(candidates, key=lambda c: (-c.probability, -c.delta_evidence)))
 
 
 def likeliest(found: Search) -> Hypothesis:

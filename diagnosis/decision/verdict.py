@@ -9,7 +9,7 @@ import numpy as np
 
 from thermospindle.diagnosis.decision import reason
 from thermospindle.diagnosis.decision.conditions import conditions_of
-from thermospindle.diagnosis.decision.explanations import Candidate, Names, explanations, likeliest, named_part
+from thermospindle.diagnosis.decision.explanations import Candidate, Names, explanations, likelier_first, likeliest, named_part
 from thermospindle.diagnosis.decision.loss import MOSTLY, least_loss, mostly_named
 from thermospindle.diagnosis.decision.reason import LEFT, NUMERICS, UNTOLD
 from thermospindle.diagnosis.forward import nuisance as kinds_of
@@ -59,7 +59,7 @@ def decide(found: Search) -> Verdict:
     why += reason.of_resonances(found.model, best) + reason.of_what_is_left(best, same)
     told = best if word == "unexplained" else accepted
     why += reason.of_tolerances(found.model, told)
-    candidates, free = with_drift_beside(candidates, free)
+    candidates, free = _with_drift_beside(candidates, free)
     unknown = sum(c.probability for c in free)
     return Verdict(word, effects, why, candidates, free, none, unknown, losses, before, after, density - plain, accepted, told)
 
@@ -95,7 +95,7 @@ def _adrift(h: Hypothesis) -> bool:
     return sizes.get(kinds_of.STIFFNESS_DRIFT, 0.0) > NUMERICS[0] or sizes.get(kinds_of.DAMPING_DRIFT, 0.0) > NUMERICS[1]
 
 
-def with_drift_beside(candidates: Sequence[Candidate], free: Sequence[Candidate]) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...]]:
+def _with_drift_beside(candidates: Sequence[Candidate], free: Sequence[Candidate]) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...]]:
     """Probabilities as they are told: what is most of an explanation in which something drifts a little beside it has that explanation's, too."""
     alone = {frozenset(c.names): c.delta_evidence for c in candidates}
     beside = [c for c in free if frozenset(named_part(c)) in alone and mostly_named(c, alone)]
@@ -105,7 +105,7 @@ def with_drift_beside(candidates: Sequence[Candidate], free: Sequence[Candidate]
 
     named = (replace(c, probability=whole(c)) for c in candidates)
     left = (replace(c, probability=0.0) if c in beside else c for c in free)
-    return tuple(sorted(named, key=lambda c: (-c.probability, -c.delta_evidence))), tuple(sorted(left, key=lambda c: (-c.probability, -c.delta_evidence)))
+    return likelier_first(named), likelier_first(left)
 
 
 def _accepted(found: Search, word: str, effects: Names, candidates: Sequence[Candidate], free: Sequence[Candidate]) -> Hypothesis:

@@ -11,6 +11,7 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition, Point, Spindle
 from thermospindle.model.shaft import SAME_HEIGHT, Shaft
 from thermospindle.model.types import Array, ComplexArray
+from thermospindle.model.units import MM
 from thermospindle.sim.campaign.campaign import Campaign, Test
 from thermospindle.sim.identification.frf import Frf, out_of, without
 from thermospindle.sim.operating import OperatingPoint, operating_point
@@ -46,9 +47,9 @@ def check_points(spindle: Spindle, campaign: Campaign) -> None:
             allowed = [*sorted(bodies), *(s.name for s in spindle.structure.shafts)]
             raise BadInput(f"{where}.body = {point.body!r}: no body of scene {spindle.name}; allowed are {', '.join(allowed)}")
         if shaft is not None and not shaft.nodes[0] - SAME_HEIGHT <= point.position[2] <= shaft.nodes[-1] + SAME_HEIGHT:
-            low, high = (1e3 * z for z in (shaft.nodes[0], shaft.nodes[-1]))
+            low, high = (z / MM for z in (shaft.nodes[0], shaft.nodes[-1]))
             raise BadInput(
-                f"{where}: at z_mm = {point.position[2] * 1e3:g} beyond the shaft {shaft.name!r} of scene {spindle.name}, which spans {low:g} to {high:g}"
+                f"{where}: at z_mm = {point.position[2] / MM:g} beyond the shaft {shaft.name!r} of scene {spindle.name}, which spans {low:g} to {high:g}"
             )
 
 
