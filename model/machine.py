@@ -79,10 +79,19 @@ class Structure:
 
     def carrier(self, body: str) -> str:
         """What a body is axially rigid with: its shaft, or itself."""
-        return next((s.name for s in self.shafts if body in s.bodies), body)
+        return self._shaft_of.get(body, body)
 
     def body(self, name: str) -> Body:
-        return next(b for b in self.bodies if b.name == name)
+        return self._bodies[name]
+
+    @cached_property
+    def _bodies(self) -> dict[str, Body]:
+        return {b.name: b for b in self.bodies}
+
+    @cached_property
+    def _shaft_of(self) -> dict[str, str]:
+        """For every node's body the name of its shaft."""
+        return {node: s.name for s in self.shafts for node in s.bodies}
 
     @property
     def rigid_bodies(self) -> list[Body]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 SAME_HEIGHT = 1e-6  # m, within which two heights are one node
 THEORIES = {"euler-bernoulli": (0.0, 0.0), "rayleigh": (0.0, 1.0), "timoshenko": (1.0, 1.0)}
@@ -43,12 +44,12 @@ class Shaft:
     rotary: float = 1.0
     moves: tuple[str, ...] = ("x", "y", "z", "tilt_x", "tilt_y")  # of its nodes, in the order of `machine.MOVES`
 
-    @property
+    @cached_property
     def bodies(self) -> tuple[str, ...]:
         """Names of its nodes' bodies, lowest first."""
         return tuple(f"{self.name} {i}" for i in range(len(self.nodes)))
 
-    @property
+    @cached_property
     def elements(self) -> tuple[str, ...]:
         """Names of the beam elements between its nodes."""
         return tuple(f"{self.name} {i}-{i + 1}" for i in range(len(self.nodes) - 1))

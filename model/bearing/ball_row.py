@@ -10,6 +10,7 @@ With ball inertia the ball centre is an unknown of its own (`model.bearing.heavy
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from math import hypot, sqrt
@@ -18,11 +19,13 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from thermospindle.model.bearing.heavy_ball import LEAST_STRETCH, Balance, BallInertia, HeavyBall, settled
+from thermospindle.model.bearing.heavy_ball import LEAST_STRETCH, Balance, BallInertia, HeavyBall, Vector, settled
 from thermospindle.model.bearing.hertz import in_series
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.types import Array
 
+Centres = dict["BallRow", Vector]
+"""Where the balls of rows with centred rings settled last."""
 ROUNDED = 4 * 2.0**-52
 """Of a distance of groove centres, what rounding may change of the two that a ball's centre divides it into."""
 
@@ -108,11 +111,14 @@ def energy(row: BallRow, displacement: Array) -> float:
     return float(0.4 * row.constant * np.sum(np.maximum(stretch, 0.0) ** 2.5))
 
 
-def respond(row: BallRow, displacement: Array | None = None) -> RowForce:
-    """Force and tangent stiffness at a displacement (5,) of the outer ring relative to the inner; centred rings by default."""
+def respond(row: BallRow, displacement: Array | None = None, centre: Vector | None = None) -> RowForce:
+    """Force and tangent stiffness at a displacement (5,) of the outer ring relative to the inner; centred rings by default.
+
+    `centre` is where balls with inertia may settle, as far as one knows.
+    """
     u = np.zeros(5) if displacement is None else np.asarray(displacement, float)
     line = centre_line(row, u)
-    local = _with_inertia(row, line) if _heavy(row) else _massless(row, line)
+    local = _with_inertia(row, line, centre) if _heavy(row) else _massless(row, line)
     force, stiffness, inner, outer, inner_angle, outer_angle, deformation = local
     b = kinematics(row)
     flat = b.reshape(-1, 5)
@@ -127,11 +133,17 @@ def respond(row: BallRow, displacement: Array | None = None) -> RowForce:
     )
 
 
-def centred_axial_force(row: BallRow, movement: float = 0.0) -> float:
-    """Axial force (N) needed on the outer ring of a row with centred rings when it has moved by `movement` (m), as `respond` has it."""
+def centred_axial_force(row: BallRow, movement: float = 0.0, centres: Centres | None = None) -> float:
+    """Axial force (N) needed on the outer ring of a row with centred rings when it has moved by `movement` (m), as `respond` has it.
+
+    Of rows that are asked at many places near each other `centres` keeps where their balls have settled.
+    """
     axial = row.axial + movement
     if _heavy(row):
-        return row.balls * _settled(row, np.array([[-row.radial, axial]]))[0].on_outer[1]
+        centres = {} if centres is None else centres
+        found = _settled(row, [(-row.radial, axial)], centres.get(row))[0]
+        centres[row] = found.centre
+        return row.balls * found.on_outer[1]
     length = hypot(row.radial, axial)
     deformation = max(length - row.unloaded_distance, 0.0)
     return row.balls * row.constant * deformation**1.5 * axial / length
@@ -155,19 +167,18 @@ def _massless(row: BallRow, line: Array) -> tuple[Array, ...]:
     return force[:, None] * e, stiffness, force, force, angle, angle, deformation
 
 
-def _with_inertia(row: BallRow, line: Array) -> tuple[Array, ...]:
+def _with_inertia(row: BallRow, line: Array, centre: Vector | None) -> tuple[Array, ...]:
     """As `_massless`, with the centre of every ball an unknown of its own; balls on the same line, as of centred rings, are one."""
-    balances = _settled(row, line)
-    stiffness = {id(b): np.reshape(b.stiffness(), (2, 2)) for b in balances}
+    balances = _settled(row, [(r, z) for r, z in line.tolist()], centre)
+    stiffness = {id(b): np.reshape(b.stiffness(), (2, 2)) for b in {id(b): b for b in balances}.values()}
     told = np.array([(*b.on_outer, b.inner, b.outer, b.inner_angle, b.outer_angle, b.deformation) for b in balances]).T
     return told[:2].T, np.array([stiffness[id(b)] for b in balances]), *told[2:]
 
 
-def _settled(row: BallRow, line: Array) -> list[Balance]:
-    """The balance of every ball, (balls,), at `line` (balls, 2)."""
+def _settled(row: BallRow, lines: Sequence[Vector], centre: Vector | None = None) -> list[Balance]:
+    """The balance of every ball, (balls,), at `lines` (balls, 2) between the groove centres."""
     assert row.inertia is not None
     ball = HeavyBall(row.inner_length, row.outer_length, row.inner_constant, row.outer_constant, row.inertia)
-    lines = [(r, z) for r, z in line.tolist()]
     different = dict.fromkeys(lines)
     stretch = max(LEAST_STRETCH, max(hypot(r, z) for r, z in different) - row.unloaded_distance)
     contact, flung = row.constant * stretch**1.5, row.inertia.loads(1.0, 0.0)[0]
@@ -175,7 +186,7 @@ def _settled(row: BallRow, line: Array) -> list[Balance]:
     # a groove distance is rounded to some of its last bits, which the stiffer race turns into force: 1.5 K^(2/3) F^(1/3) of it
     stiffest = 1.5 * max(row.inner_constant, row.outer_constant) ** (2 / 3) * max(contact, flung) ** (1 / 3)
     tolerance += ROUNDED * row.unloaded_distance * stiffest
-    found = {at: settled(ball, at, tolerance, least) for at in different}
+    found = {at: settled(ball, at, tolerance, least, centre) for at in different}
     return [found[at] for at in lines]
 
 

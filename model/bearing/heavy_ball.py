@@ -27,7 +27,7 @@ Vector = tuple[float, float]
 Matrix = tuple[float, float, float, float]
 """(rr, rz, zr, zz)."""
 
-STEPS = 100
+STEPS, FEW = 100, 6  # from where a ball may be, and from where it was
 HALVINGS = 30
 LONGEST = 0.05  # of the distance between the groove centres, in one step
 LEAST_STRETCH = 0.02e-6  # m, pressed into the races at the start
@@ -80,8 +80,9 @@ class HeavyBall:
 
 
 class Balance(NamedTuple):
-    """Forces on a ball at one place of its centre, (r, z) components (N), and their derivatives (N/m): S_i, J and G above."""
+    """Forces on a ball at one place of its `centre` (m), (r, z) components (N), and their derivatives (N/m): S_i, J and G above."""
 
+    centre: Vector
     resultant: Vector
     on_outer: Vector
     inner: float
@@ -105,17 +106,27 @@ class Balance(NamedTuple):
         return _product(j, _product(inverse, s))
 
 
-def settled(ball: HeavyBall, line: Vector, tolerance: float, least: float) -> Balance:
+def settled(ball: HeavyBall, line: Vector, tolerance: float, least: float, start: Vector | None = None) -> Balance:
     """The balance of a ball at rest, its resultant below `tolerance` (N), for the outer groove's centre at `line` (m).
 
     The energy of the two contacts less the work of the centrifugal force is convex, so a Newton step that is halved until the
     resultant falls finds its minimum; the gyroscopic friction is a small addition. `least` (N/m) is added to the stiffness of the
-    step, for a ball that touches nothing. Raises `NoEquilibrium`.
+    step, for a ball that touches nothing. `start` is where its centre may be, as it was for a `line` near this one. Raises `NoEquilibrium`.
     """
+    here = None if start is None else _approached(ball, line, tolerance, least, start, FEW)
+    if here is None or here.off >= tolerance:
+        here = _approached(ball, line, tolerance, least, _start(ball, line), STEPS)
+    if here.off >= tolerance:
+        raise NoEquilibrium(f"ball centres did not settle; the largest residual is {here.off:.2g} N")
+    return here
+
+
+def _approached(ball: HeavyBall, line: Vector, tolerance: float, least: float, start: Vector, steps: int) -> Balance:
+    """What so many of Newton's steps from `start` come to."""
     longest = LONGEST * hypot(*line)
-    r, z = _start(ball, line)
-    here = balance(ball, (r, z), line)
-    for _ in range(STEPS):
+    r, z = start
+    here = balance(ball, start, line)
+    for _ in range(steps):
         off = here.off
         if off < tolerance:
             return here
@@ -131,7 +142,7 @@ def settled(ball: HeavyBall, line: Vector, tolerance: float, least: float) -> Ba
                 break
             factor /= 2
         r, z = trial
-    raise NoEquilibrium(f"ball centres did not settle; the largest residual is {here.off:.2g} N")
+    return here
 
 
 def _start(ball: HeavyBall, line: Vector) -> Vector:
@@ -175,6 +186,7 @@ def balance(ball: HeavyBall, centre: Vector, line: Vector) -> Balance:
     spring = _spring((er, ez), outer_along, outer / outer_length)
     by_outer = (spring[0] + turn_r * angle_r, spring[1] + turn_r * angle_z, spring[2] + turn_z * angle_r, spring[3] + turn_z * angle_z)
     return Balance(
+        centre,
         (on_outer[0] - inner * ir + centrifugal, on_outer[1] - inner * iz),
         on_outer,
         inner,

@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from thermospindle.model.bearing.ball_row import BallInertia, BallRow, RowForce, centred_axial_force, respond
+from thermospindle.model.bearing.ball_row import BallInertia, BallRow, Centres, RowForce, centred_axial_force, respond
+from thermospindle.model.bearing.heavy_ball import Vector
 from thermospindle.model.bearing.hertz import in_series, race_contact
 from thermospindle.model.bearing.movement import balanced
 from thermospindle.model.bearing.roller import RollerState, roller_state
@@ -118,12 +119,14 @@ def solve(spindle: Spindle, condition: Condition, motions: Mapping[str, RingMoti
     """
     rows = {b.name: row_at(spindle, b, b.sense, motions[b.name], condition.speed) for b in spindle.bearings}
     moved: dict[str, float] = {}
+    centres: Centres = {}
     for group in joined(spindle):
-        moved |= _positions(spindle, {b.name: rows[b.name] for b in group}, group)
-    states = [
-        replace(bearing_state(spindle, b, replace(rows[b.name], axial=rows[b.name].axial + moved[b.name])), movement=moved[b.name])
-        for b in spindle.bearings
-    ]
+        moved |= _positions(spindle, {b.name: rows[b.name] for b in group}, group, centres)
+    states = []
+    for b in spindle.bearings:
+        row = rows[b.name]
+        own = bearing_state(spindle, b, replace(row, axial=row.axial + moved[b.name]), centres.get(row))
+        states.append(replace(own, movement=moved[b.name]))
     sliding = {name for s in spindle.sets if s.spring is not None for name in s.spring.rings_of}
     hub = next((moved[b.name] for b in spindle.bearings if b.name not in sliding), 0.0)
     linear: tuple[LinearState, ...] = tuple(linear_state(spindle, b, condition) for b in spindle.linear_bearings)
@@ -157,7 +160,7 @@ class _Sleeve:
     rate: float
 
 
-def _positions(spindle: Spindle, rows: Mapping[str, BallRow], group: Sequence[Bearing]) -> dict[str, float]:
+def _positions(spindle: Spindle, rows: Mapping[str, BallRow], group: Sequence[Bearing], centres: Centres) -> dict[str, float]:
     """Movement (m) of every row's outer ring against its inner one, for one group of rows that share carriers."""
     of = {b.name: _carriers(spindle, b) for b in group}
     carriers = list(dict.fromkeys(c for pair in of.values() for c in pair))
@@ -179,15 +182,15 @@ def _positions(spindle: Spindle, rows: Mapping[str, BallRow], group: Sequence[Be
     def slid(at: Mapping[str, BallRow], sleeve: _Sleeve, hub: float) -> float:
         """Movement of the rings on a sleeve: they carry f(R) = push - rate (R - H), which rises with R."""
         own = [at[name] for name in sleeve.rows]
-        return balanced(own, lambda rows, r: sum(centred_axial_force(row, r) for row in rows) + sleeve.rate * (r - towards[sleeve.rows[0]] * hub) - sleeve.push)
+        return balanced(own, lambda rows, r: sum(centred_axial_force(row, r, centres) for row in rows) + sleeve.rate * (r - towards[sleeve.rows[0]] * hub) - sleeve.push)
 
     def imbalance(at: Sequence[BallRow], hub: float) -> float:
         by_name = dict(zip(rows, at, strict=True))
-        found = sum(towards[name] * centred_axial_force(by_name[name], towards[name] * hub) for name in fixed)
+        found = sum(towards[name] * centred_axial_force(by_name[name], towards[name] * hub, centres) for name in fixed)
         for sleeve in sleeves:
             if sleeve.rate:
                 moved = slid(by_name, sleeve, hub)
-                found += towards[sleeve.rows[0]] * sum(centred_axial_force(by_name[name], moved) for name in sleeve.rows)
+                found += towards[sleeve.rows[0]] * sum(centred_axial_force(by_name[name], moved, centres) for name in sleeve.rows)
             else:  # whatever its rings do, their force is the push
                 found += towards[sleeve.rows[0]] * sleeve.push
         return found - load
@@ -317,9 +320,9 @@ def damping_time(spindle: Spindle, b: Bearing) -> float:
     return 2 * b.damping_ratio / (2 * np.pi * spindle.structure.damping_frequency)
 
 
-def bearing_state(spindle: Spindle, b: Bearing, row: BallRow) -> BearingState:
-    """What bearing `b` is with its balls as in `row`, centred rings at their loaded position."""
-    answer: RowForce = respond(row)
+def bearing_state(spindle: Spindle, b: Bearing, row: BallRow, centre: Vector | None = None) -> BearingState:
+    """What bearing `b` is with its balls as in `row`, centred rings at their loaded position; its balls settle at or near `centre`, where one knows."""
+    answer: RowForce = respond(row, centre=centre)
     deformation = float(answer.deformation[0])
     # where rings are free to move between their balls, the equilibrium that is found lies at an end of that play, a rounding error within contact
     felt = TOUCHING * b.preload / (b.balls * np.sin(b.contact_angle))

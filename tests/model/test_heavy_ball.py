@@ -116,3 +116,11 @@ def test_a_ball_settles_wherever_its_rings_are(scene, name, rpm):
     force = [own.sense * centred_axial_force(replace(state.row, inertia=inertia), x) for x in own.sense * np.linspace(-20e-6, 20e-6, 81)]
     assert (np.diff(force) > -1e-9 * force[-1]).all()
     assert force[-1] > 2 * abs(force[0])  # loose at one end, but for balls that are flung, pressed at the other
+
+
+def test_a_ball_settles_where_it_does_from_wherever_it_is_asked():
+    """From near, from the other side of the race, and from where it touches nothing: a start is a start."""
+    cold = settled(BALL, LINE, 1e-10, 1.0)
+    r, z = cold.centre
+    for start in ((r, z), (r + 1e-6, z - 1e-6), (0.5 * r, 2.0 * z), (1e-9, 1e-9)):
+        assert settled(BALL, LINE, 1e-10, 1.0, start).centre == pytest.approx((r, z), rel=1e-9)
