@@ -21,11 +21,13 @@ EXACT = 1e-11  # of the largest singular value of a change: products that are le
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """One test's linear model: matrices with dofs, and its measuring chain."""
+    """One test's linear model: matrices with dofs, and its measuring chain; `between` is what the mass between nodes of shafts adds to M, the N beside it, and what
+    it adds to C + G (`model.rotor.distributed`), None without shafts."""
 
     matrices: Matrices
     chain: Measurement
     layout: tuple
+    between: tuple[Array, Array, Array] | None = None
 
     def moved(self, first: Linear, second: Linear, times: float) -> Linear:
         """With `times` the difference of two others added, in all that may differ; the same where these have other degrees of freedom."""

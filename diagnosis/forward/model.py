@@ -1,6 +1,6 @@
 """The model of a campaign: residuals of every test in standard errors, and their derivatives, for any nuisance values and effects.
 
-The receptance between hammers B and points A is A D(s)^-1 B^T with D = s^2 M + s C + K. Everything that moves matrices alone has the exact
+The receptance between hammers B and points A is A D(s)^-1 B^T with D = s^2 M + s C + K, and - s^4 N of shafts whose mass is spread. Everything that moves matrices alone has the exact
 derivative -A D^-1 (s^2 dM + s dC + dK) D^-1 B^T, so that one factorisation a line serves all parameters; what also moves rows, gains or
 delays is differenced. Structure enters K, C and M in proportion: these derivatives are taken once.
 """
@@ -24,6 +24,7 @@ from thermospindle.diagnosis.forward.table import Table
 from thermospindle.model.errors import NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import Matrices, matrices
+from thermospindle.model.rotor.distributed import spread
 from thermospindle.model.tolerance import Toleranced
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.effects.effect import HOOKS, Effect, Values
@@ -188,13 +189,22 @@ class CampaignModel:
 
     def _linear(self, t: int, x: Array, effects: Applied) -> Linear:
         point = self.operating(t, x, effects)
-        bare = point.__dict__.get("_bare")
-        if bare is None:
-            bare = matrices(point.chain)
-            object.__setattr__(point, "_bare", bare)
+        worked_out = point.__dict__.get("_bare")
+        if worked_out is None:
+            worked_out = matrices(point.chain), self._between(point)
+            object.__setattr__(point, "_bare", worked_out)
+        bare, between = worked_out
         stiffness, damping = self._discrepancy(t, bare, x)
         whole = Matrices(bare.mass, bare.damping + damping, bare.stiffness + stiffness, bare.dofs)
-        return Linear(whole, point.measurement, point.chain.layout)
+        return Linear(whole, point.measurement, point.chain.layout, between)
+
+    def _between(self, point: OperatingPoint) -> tuple[Array, Array, Array] | None:
+        """What the mass between the nodes of shafts adds, of the drawing's materials: how little of it an effect moves is left out."""
+        structure = point.spindle.structure
+        if not structure.shafts:
+            return None
+        mass, quartic, gyroscopic = spread(structure, self.spindle.materials, self.spindle.reference_temperature, point.chain.layout)
+        return mass, quartic, point.chain.speed * gyroscopic
 
     def _discrepancy(self, t: int, linear: Matrices, x: Array) -> tuple[Array, Array]:
         w = self.reference.over(linear.dofs)

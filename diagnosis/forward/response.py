@@ -45,7 +45,7 @@ class Response:
     """FRFs of one test's linear model at its lines, in the measured quantity.
 
     `cut` is the share in which records end before the answer has died away: 0 for FRFs of an infinite record. A flexible shaft answers through
-    its reduced model (`model.rotor.reduced`), which is off by 1e-5 of the largest response at most.
+    its reduced model (`model.rotor.reduced`), which is off by 1e-5 of the largest response at most, with its mass where it is and not at nodes.
     """
 
     def __init__(self, linear: Linear, data: LineData, gain: Array, cut: float = 0.0, lights: Sequence[Light] = ()) -> None:
@@ -57,12 +57,16 @@ class Response:
         rows, references = chain.response_rows[:n_resp], chain.reference_rows
         self._basis: Array | None = None
         self._lights = lights
-        self._matrices = m.mass, m.damping, m.stiffness
+        self._matrices, between = (m.mass, m.damping, m.stiffness), linear.between
         if len(m.mass) > LARGE and len(omega):
             small = reduced(m, np.concatenate([rows, references]), float(omega.max()))
             self._basis = small.basis
             self._matrices = small.mass, small.damping, small.stiffness
             rows, references = rows @ small.basis, references @ small.basis
+        self._quartic: Array | None = None
+        if between is not None:
+            mass, self._quartic, gyroscopic = (self._onto(added) for added in between)
+            self._matrices = self._matrices[0] + mass, self._matrices[1] + gyroscopic, self._matrices[2]
         self._rows, self._references = rows, references.T
         self.right: ComplexArray = np.asarray(np.linalg.solve(self._dynamic(), references.T), complex)  # (L, r, n_ref)
         self.factor: ComplexArray = (
@@ -82,6 +86,8 @@ class Response:
         mass, damping, stiffness = self._matrices
         s = self.s[:, None, None]
         whole = np.asarray(s**2 * mass + s * damping + stiffness, complex)
+        if self._quartic is not None:
+            whole -= s**4 * self._quartic
         for light in self._lights:
             b = self.over(light.columns) @ light.shares
             whole += light.felt(self.s)[0][:, None, None] * np.outer(b, b)
@@ -122,6 +128,10 @@ class Response:
     def _late(self) -> RecordEnd | None:
         """The end of records, where a share of it is taken away."""
         return self._end if self._cut else None
+
+    def _onto(self, matrix: Array) -> Array:
+        """A matrix (n, n) in the coordinates (r,) of the model that answers."""
+        return matrix if self._basis is None else self._basis.T @ matrix @ self._basis
 
     def over(self, columns: Array) -> Array:
         """Columns (n, m) of generalised forces in the coordinates (r,) of the model that answers."""

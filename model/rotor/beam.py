@@ -116,7 +116,7 @@ def _flexibilities(
         for segment, z, dz in _slices(segments, low, high):
             used += [segment.material] if segment.material not in used else []
             modulus, poisson = properties[segment.material]
-            outer, bore = _radii(segment, segment.outer, z), _radii(segment, segment.bore, z)
+            outer, bore = radii(segment, segment.outer, z), radii(segment, segment.bore, z)
             area, moment = np.pi * (outer**2 - bore**2), np.pi / 4 * (outer**4 - bore**4)
             factor = shear_factor(bore / outer, poisson)
             bent += float(np.sum(dz / (modulus * moment)))
@@ -149,7 +149,7 @@ def _lumps(
     for i, (low, high) in enumerate(pairwise(heights)):
         length = high - low
         for segment, z, dz in _slices(segments, low, high):
-            outer, bore = _radii(segment, segment.mass_outer, z), _radii(segment, segment.bore, z)
+            outer, bore = radii(segment, segment.mass_outer, z), radii(segment, segment.bore, z)
             rho, x = density[segment.material], (z - low) / length
             line = rho * np.pi * (outer**2 - bore**2) * dz
             inertia = rho * np.pi / 4 * (outer**4 - bore**4) * dz
@@ -171,6 +171,6 @@ def _slices(segments: Sequence[Segment], low: float, high: float) -> Iterator[tu
             yield segment, (a + b) / 2 + (b - a) / 2 * PLACES, (b - a) / 2 * WEIGHTS
 
 
-def _radii(segment: Segment, ends: tuple[float, float], z: Array) -> Array:
+def radii(segment: Segment, ends: tuple[float, float], z: Array) -> Array:
     """Radii (m) of a segment at heights."""
     return ends[0] + (ends[1] - ends[0]) * (z - segment.z[0]) / (segment.z[1] - segment.z[0])

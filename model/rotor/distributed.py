@@ -1,0 +1,126 @@
+"""The mass of flexible shafts where it is: what lumps at nodes leave out, for those who measure more finely than a mesh.
+
+A chain's masses sit at its nodes (`beam`), which MuJoCo steps. Between nodes a beam moves by its static shapes, with which the mass that is spread along
+an element makes the consistent matrix M (Archer, *AIAA J.* 3 (1965) 1910), and by what its own inertia bends and shears it between them, which makes the next
+term of the dynamic stiffness K + s^2 M - s^4 N (Przemieniecki, *Theory of Matrix Structural Analysis*, 1968, 11.5). Lumps are right to the second order
+in an element's length where forces act on a shaft that shears, as those of bearings do, and this to the fourth. Moduli, of several materials, are those at
+one temperature: only their ratios count.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+
+from thermospindle.model.machine import Material, Structure
+from thermospindle.model.rotor.beam import nodes, radii, shear_factor
+from thermospindle.model.rotor.chain import Layout
+from thermospindle.model.shaft import Shaft
+from thermospindle.model.types import Array
+
+PIECES = 128  # of a segment within an element, over which shapes and masses are integrated by midpoints
+PLANES = (("x", "tilt_y", 1.0), ("y", "tilt_x", -1.0))
+"""Moves of each plane, and the sign by which its tilt is the slope of the deflection."""
+
+
+def spread(structure: Structure, materials: Mapping[str, Material], temperature: float, layout: Layout) -> tuple[Array, Array, Array]:
+    """What to add to a chain's mass matrix, the matrix N, and, for each rad/s of spindle speed, what to add to the damping matrix with gyroscopic terms, (n, n)
+    each over the degrees of freedom of `layout`, for the masses of the shafts to be where they are; moduli are those at `temperature` (C). Read only."""
+    used = {segment.material: materials[segment.material] for shaft in structure.shafts for segment in shaft.segments}
+    told = tuple((name, m.youngs_modulus(temperature), m.poisson_ratio, m.density) for name, m in used.items())
+    lumps = {body.name: (body.mass, body.inertia[0], body.z) for shaft in structure.shafts for body in nodes(shaft, materials)}
+    return _spread(structure.shafts, told, tuple(lumps.items()), layout)
+
+
+@lru_cache(maxsize=16)
+def _spread(
+    shafts: tuple[Shaft, ...], materials: tuple[tuple[str, float, float, float], ...], lumps: tuple[tuple[str, tuple[float, float, float]], ...], layout: Layout
+) -> tuple[Array, Array, Array]:
+    place = {dof: i for i, dof in enumerate((name, move) for name, _, moves in layout for move in moves)}
+    mass, quartic, gyroscopic = np.zeros((3, len(place), len(place)))
+    centres = {name: z for name, z, _ in layout}
+    of_node = dict(lumps)
+    properties = {name: row for name, *row in materials}
+    for shaft in shafts:
+        for (a, b), (low, high) in zip(pairwise(shaft.bodies), pairwise(shaft.nodes), strict=True):
+            bent, turned, more, drawn, drawn_more = _element(shaft, low, high, properties)
+            levers = np.eye(4)  # from the motion of the nodes' centres of mass to that of the nodes
+            levers[0, 1], levers[2, 3] = low - centres[a], high - centres[b]
+            turned = levers.T @ turned @ levers
+            across, more = levers.T @ bent @ levers + turned, levers.T @ more @ levers
+            numbers: list[tuple[list[int], Array]] = []
+            for shift, tilt, sign in PLANES:
+                own = [(name, move) for name in (a, b) for move in (shift, tilt)]
+                if shift in shaft.moves:
+                    at, signs = [place[dof] for dof in own], np.array([1.0, sign, 1.0, sign])
+                    numbers.append((at, signs))
+                    mass[np.ix_(at, at)] += across * np.outer(signs, signs)
+                    quartic[np.ix_(at, at)] += more * np.outer(signs, signs)
+            if "z" in shaft.moves:
+                at = [place[a, "z"], place[b, "z"]]
+                mass[np.ix_(at, at)] += drawn
+                quartic[np.ix_(at, at)] += drawn_more
+            if shaft.turns:  # the moment about x that a tilt about y makes, and the other way round
+                (x, of_x), (y, of_y) = numbers
+                felt = -2 * shaft.speed_ratio * turned * np.outer(of_y, of_x)
+                gyroscopic[np.ix_(y, x)] += felt
+                gyroscopic[np.ix_(x, y)] -= felt.T
+        for node in shaft.bodies:
+            own_mass, inertia, _ = of_node[node]
+            for move in shaft.moves:
+                mass[place[node, move], place[node, move]] -= inertia if move.startswith("tilt") else own_mass
+            if shaft.turns:
+                i, j = place[node, "tilt_x"], place[node, "tilt_y"]
+                gyroscopic[i, j] -= 2 * inertia * shaft.speed_ratio
+                gyroscopic[j, i] += 2 * inertia * shaft.speed_ratio
+    for matrix in (mass, quartic, gyroscopic):
+        matrix.flags.writeable = False
+    return mass, quartic, gyroscopic
+
+
+def _element(shaft: Shaft, low: float, high: float, properties: Mapping[str, list[float]]) -> tuple[Array, ...]:
+    """Consistent mass (4, 4) of the deflections and slopes (w, w', ...) of both ends in one plane, rotary inertia alike, and N of both; mass (2, 2)
+    along the axis, and N of it.
+
+    Between its ends a beam without load has the shear force Q and the moment M - Q x, and EI slope' is the moment, w' = slope + shear force / (kappa G A).
+    """
+    rows = []
+    for segment in shaft.segments:
+        a, b = max(low, segment.z[0]), min(high, segment.z[1])
+        if b - a > 1e-12:
+            z = a + (b - a) * (np.arange(PIECES) + 0.5) / PIECES
+            outer, heavy, bore = (radii(segment, ends, z) for ends in (segment.outer, segment.mass_outer, segment.bore))
+            modulus, poisson, density = properties[segment.material]
+            area, moment = np.pi * (outer**2 - bore**2), np.pi / 4 * (outer**4 - bore**4)
+            sheared = shaft.shear / (shear_factor(bore / outer, poisson) * modulus / (2 * (1 + poisson)) * area)
+            line, rotary = density * np.pi * (heavy**2 - bore**2), density * np.pi / 4 * (heavy**4 - bore**4)
+            rows.append(np.array([z - low, np.full(PIECES, (b - a) / PIECES), 1 / (modulus * moment), sheared, 1 / (modulus * area), line, shaft.rotary * rotary]))
+    x, dz, bent, sheared, drawn, line, rotary = np.concatenate(rows, axis=1)
+
+    def up_to(f: Array) -> Array:
+        return np.asarray(np.cumsum(f * dz, axis=-1) - f * dz / 2)
+
+    slope = np.stack([up_to(bent), -up_to(x * bent)])  # for a unit of M and of Q
+    shape = np.stack([up_to(slope[0]), up_to(slope[1] + sheared)])
+    ends = np.array([[(slope[0] * dz).sum(), ((slope[1] + sheared) * dz).sum()], [(bent * dz).sum(), -(x * bent * dz).sum()]])
+    length = high - low
+    forces = np.linalg.solve(ends, np.array([[-1.0, -length, 1.0, 0.0], [0.0, -1.0, 0.0, 1.0]]))
+    one, none = np.ones_like(x), np.zeros_like(x)
+    deflection = np.stack([one, x, none, none]) + forces.T @ shape
+    turning = np.stack([none, one, none, none]) + forces.T @ slope
+    push = -up_to(deflection * line)  # shear force and moment of the inertia of each shape
+    moment = -up_to(push) - up_to(turning * rotary)
+    tilted = up_to(moment * bent)
+    leaning = tilted + push * sheared
+    held = np.linalg.solve(ends, -np.stack([(leaning * dz).sum(axis=1), (moment * bent * dz).sum(axis=1)]))
+    between, tilted = up_to(leaning) + held.T @ shape, tilted + held.T @ slope
+    along = up_to(drawn) / (drawn * dz).sum()
+    stretch = np.stack([1 - along, along])
+    pushed = up_to(up_to(stretch * line) * drawn)
+    crept = along * (up_to(stretch * line) * drawn * dz).sum(axis=1)[:, None] - pushed
+    mass, inertia = line * dz, rotary * dz
+    bent_mass, turned = (deflection * mass) @ deflection.T, (turning * inertia) @ turning.T
+    return bent_mass, turned, (deflection * mass) @ between.T + (turning * inertia) @ tilted.T, (stretch * mass) @ stretch.T, (stretch * mass) @ crept.T
