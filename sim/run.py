@@ -83,7 +83,7 @@ def as_campaign(run: Run, title: str) -> Campaign:
         )
         for step in run.steps
     )
-    return Campaign(title, run.spindle.name, "mobility", run.spindle.points, tests)
+    return Campaign(title, run.spindle.name, "mobility", run.spindle.points, tests, lumped_shafts=bool(run.spindle.structure.shafts))
 
 
 def _as_measured(frf: Frf) -> Frf:

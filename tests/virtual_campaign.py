@@ -85,7 +85,7 @@ def virtual_campaign(
             exact = exact * np.exp(errors.gain[: len(responses)])[:, None, None]
         frf = Frf(frequency, noisy(exact, random, noise), responses, references, quantity)
         tests.append(Test(f"test_{t}", condition.temperature, condition.speed, frf=frf, window_decay=window_decay))
-    return Campaign("virtual", spindle.name, quantity, spindle.points, tuple(tests), noise)
+    return Campaign("virtual", spindle.name, quantity, spindle.points, tuple(tests), noise, lumped_shafts=bool(spindle.structure.shafts))
 
 
 def mode_campaign(

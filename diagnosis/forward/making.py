@@ -33,7 +33,7 @@ def campaign_model(spindle: Spindle, campaign: Campaign, tests: Sequence[TestDat
     channels = len({node for d in lines for node in d.sensors})
     names = [d.test.id for d in tests]
     parameters = nuisances(spindle, build, names, bool(lines), channels, modes)
-    return CampaignModel(spindle, tuple(tests), scenes, build, parameters, modes, present)
+    return CampaignModel(spindle, tuple(tests), scenes, build, parameters, modes, present, lumped=campaign.lumped_shafts)
 
 
 def expected_noise(spindle: Spindle) -> Noise:

@@ -52,6 +52,7 @@ class CampaignModel:
     reference: ReferenceModes
     present: Applied
     resonances: tuple[Resonance, ...] = ()  # whose parameters are the last
+    lumped: bool = False  # of tests of a spindle whose shafts have their masses at nodes
 
     def __getstate__(self) -> dict:
         """Without what was worked out: it is on its way to another process."""
@@ -201,7 +202,7 @@ class CampaignModel:
     def _between(self, point: OperatingPoint) -> tuple[Array, Array, Array] | None:
         """What the mass between the nodes of shafts adds, of the drawing's materials: how little of it an effect moves is left out."""
         structure = point.spindle.structure
-        if not structure.shafts:
+        if self.lumped or not structure.shafts:
             return None
         mass, quartic, gyroscopic = spread(structure, self.spindle.materials, self.spindle.reference_temperature, point.chain.layout)
         return mass, quartic, point.chain.speed * gyroscopic

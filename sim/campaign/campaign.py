@@ -79,6 +79,7 @@ class Campaign:
     tests: tuple[Test, ...]
     noise: Noise | None = None
     note: str = ""
+    lumped_shafts: bool = False  # of this program's virtual tests, whose flexible shafts have their masses at nodes
     folder: Path | None = field(default=None, compare=False)
 
 
@@ -110,7 +111,7 @@ def read_campaign(folder: Path, limits: Limits = LIMITS) -> Campaign:
             Test(t.id, t.temperature_C, speed, t.hammer_level_N, soak, t.repeat, t.conditions, frf, modes, t.window_decay_1_per_s, runout)
         )
     noise = Noise(table.noise.of_value, table.noise.of_largest) if table.noise else None
-    return Campaign(table.title, table.spindle, table.quantity, points, tuple(tests), noise, table.note, folder)
+    return Campaign(table.title, table.spindle, table.quantity, points, tuple(tests), noise, table.note, table.lumped_shafts, folder)
 
 
 def _check_size(file: Path, frf: Frf) -> None:
@@ -215,6 +216,7 @@ def _toml_text(campaign: Campaign) -> str:
         "spindle": campaign.spindle,
         "quantity": campaign.quantity,
         "note": campaign.note,
+        "lumped_shafts": campaign.lumped_shafts or None,
         "modes": modes,
     }
     noise = [] if campaign.noise is None else [("[noise]", asdict(campaign.noise))]

@@ -60,6 +60,7 @@ class CampaignTable(Table):
     spindle: Name
     quantity: Literal["receptance", "mobility", "accelerance", "displacement"]
     note: str = ""
+    lumped_shafts: bool = False
     modes: PlainName | None = None
     noise: NoiseTable | None = None
     points: list[PointTable] = []

@@ -99,7 +99,7 @@ def campaign(
         name = f"T{plan.temperature:g}_n{plan.speed * 30 / np.pi:.0f}_{k}"
         made.append(Test(name, plan.temperature, plan.speed, frf=frf, window_decay=record.decay))
     stated = Noise(spindle.hammer.noise_of_value, spindle.hammer.noise_of_largest) if record.told == "noise" else None
-    found = Campaign(f"blind {seed}", spindle.name, "mobility", spindle.points, tuple(made), stated)
+    found = Campaign(f"blind {seed}", spindle.name, "mobility", spindle.points, tuple(made), stated, lumped_shafts=bool(spindle.structure.shafts))
     return Made(found, built, world, record, tuple(tests), tuple(hidden))
 
 

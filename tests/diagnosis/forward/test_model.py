@@ -311,7 +311,8 @@ def test_a_coarse_mesh_answers_as_a_fine_one_does():
     raw = tomllib.loads(file.read_text(encoding="utf-8"))
     coarse, fine = (build({**raw, "shafts": [s | {"longest_element_mm": longest} for s in raw["shafts"]]}, file) for longest in (27.0, 6.75))
     condition, frequency = Condition(40.0, 8000 * RPM), np.arange(300.0, 3000.0, 40.0)
-    model = model_of(coarse, virtual_campaign(coarse, (condition,), 1, noise=NOISELESS, frequency=frequency))
+    of_a_machine = replace(virtual_campaign(coarse, (condition,), 1, noise=NOISELESS, frequency=frequency), lumped_shafts=False)
+    model = model_of(coarse, of_a_machine)
     expected = operating_point(fine, condition).frf(frequency)
     scale = np.abs(expected).max(axis=-1, keepdims=True)
     spread = np.abs(model.response(0, np.zeros(len(model.parameters)), [], frequency) - expected) / scale
@@ -319,3 +320,5 @@ def test_a_coarse_mesh_answers_as_a_fine_one_does():
     assert spread.max() < at_nodes.max() / 6
     assert np.median(spread) < np.median(at_nodes) / 6
     assert np.median(at_nodes) > 1e-5  # there is something to tell
+    of_its_own = model_of(coarse, replace(of_a_machine, lumped_shafts=True))
+    assert of_its_own.response(0, np.zeros(len(model.parameters)), [], frequency) == pytest.approx(operating_point(coarse, condition).frf(frequency), rel=1e-3, abs=2e-5 * scale.max())

@@ -12,11 +12,13 @@ import pytest
 
 from tests.made_campaign import FREQUENCY, POINTS, campaign, rotor_frf
 from thermospindle.model.errors import BadInput
+from thermospindle.model.scene.reading import SCENES, load
 from thermospindle.model.units import RPM
 from thermospindle.model.whole import NEW
 from thermospindle.sim.campaign.campaign import Campaign, Test, read_campaign, write_campaign
 from thermospindle.sim.campaign.form import in_unit
 from thermospindle.sim.campaign.uff import read_frf, write_frf
+from thermospindle.sim.run import Run, as_campaign
 
 
 def test_campaign_reads_back_bit_for_bit(folder: Path) -> None:
@@ -145,3 +147,13 @@ def test_old_campaign_comes_back_when_the_new_one_cannot_be_moved(folder: Path, 
         write_campaign(campaign(title="other"), folder, replace=True)
     assert read_campaign(folder) == campaign()
     assert [f.name for f in folder.parent.iterdir()] == ["c"]
+
+
+def test_a_virtual_test_says_where_its_shafts_have_their_masses(tmp_path: Path) -> None:
+    """As the program stepped it, at nodes, if there are shafts; of a machine nothing is said."""
+    for k, lumped in enumerate((True, False)):
+        write_campaign(replace(campaign(), lumped_shafts=lumped), tmp_path / str(k))
+        assert read_campaign(tmp_path / str(k)).lumped_shafts == lumped
+        assert ("lumped_shafts = true" in (tmp_path / str(k) / "campaign.toml").read_text(encoding="utf-8")) == lumped
+    for scene, lumped in (("five_bearing", True), ("hdd_2003", False)):
+        assert as_campaign(Run(load(SCENES / scene), (), ()), "virtual").lumped_shafts == lumped
