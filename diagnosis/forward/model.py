@@ -200,7 +200,7 @@ class CampaignModel:
         return Linear(whole, point.measurement, point.chain.layout, between)
 
     def _between(self, point: OperatingPoint) -> tuple[Array, Array, Array] | None:
-        """What the mass between the nodes of shafts adds, of the drawing's materials: how little of it an effect moves is left out."""
+        """What the mass between the nodes of shafts adds, with the drawing's materials at the reference temperature; what an effect changes of so little is left out."""
         structure = point.spindle.structure
         if self.lumped or not structure.shafts:
             return None

@@ -3,8 +3,8 @@
 A chain's masses sit at its nodes (`beam`), which MuJoCo steps. Between nodes a beam moves by its static shapes, with which the mass that is spread along
 an element makes the consistent matrix M (Archer, *AIAA J.* 3 (1965) 1910), and by what its own inertia bends and shears it between them, which makes the next
 term of the dynamic stiffness K + s^2 M - s^4 N (Przemieniecki, *Theory of Matrix Structural Analysis*, 1968, 11.5). Lumps are right to the second order
-in an element's length where forces act on a shaft that shears, as those of bearings do, and this to the fourth. Moduli, of several materials, are those at
-one temperature: only their ratios count.
+in an element's length where forces act on a shaft that shears, as those of bearings do, and this to the fourth. Moduli are those
+at one temperature: M knows only their ratios, and N, itself of the fourth order, goes with their inverse.
 """
 
 from __future__ import annotations
