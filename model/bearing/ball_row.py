@@ -170,7 +170,8 @@ def _massless(row: BallRow, line: Array) -> tuple[Array, ...]:
 def _with_inertia(row: BallRow, line: Array, centre: Vector | None) -> tuple[Array, ...]:
     """As `_massless`, with the centre of every ball an unknown of its own; balls on the same line, as of centred rings, are one."""
     balances = _settled(row, [(r, z) for r, z in line.tolist()], centre)
-    stiffness = {id(b): np.reshape(b.stiffness(), (2, 2)) for b in {id(b): b for b in balances}.values()}
+    different = {id(b): b for b in balances}
+    stiffness = {key: np.reshape(b.stiffness(), (2, 2)) for key, b in different.items()}
     told = np.array([(*b.on_outer, b.inner, b.outer, b.inner_angle, b.outer_angle, b.deformation) for b in balances]).T
     return told[:2].T, np.array([stiffness[id(b)] for b in balances]), *told[2:]
 

@@ -30,23 +30,20 @@ def spread(structure: Structure, materials: Mapping[str, Material], temperature:
     """What to add to a chain's mass matrix, the matrix N, and, for each rad/s of spindle speed, what to add to the damping matrix with gyroscopic terms, (n, n)
     each over the degrees of freedom of `layout`, for the masses of the shafts to be where they are; moduli are those at `temperature` (C). Read only."""
     used = {segment.material: materials[segment.material] for shaft in structure.shafts for segment in shaft.segments}
-    told = tuple((name, m.youngs_modulus(temperature), m.poisson_ratio, m.density) for name, m in used.items())
-    lumps = {body.name: (body.mass, body.inertia[0], body.z) for shaft in structure.shafts for body in nodes(shaft, materials)}
-    return _spread(structure.shafts, told, tuple(lumps.items()), layout)
+    return _spread(structure.shafts, tuple(used.items()), temperature, layout)
 
 
 @lru_cache(maxsize=16)
 def _spread(
-    shafts: tuple[Shaft, ...], materials: tuple[tuple[str, float, float, float], ...], lumps: tuple[tuple[str, tuple[float, float, float]], ...], layout: Layout
+    shafts: tuple[Shaft, ...], materials: tuple[tuple[str, Material], ...], temperature: float, layout: Layout
 ) -> tuple[Array, Array, Array]:
     place = {dof: i for i, dof in enumerate((name, move) for name, _, moves in layout for move in moves)}
     mass, quartic, gyroscopic = np.zeros((3, len(place), len(place)))
     centres = {name: z for name, z, _ in layout}
-    of_node = dict(lumps)
-    properties = {name: row for name, *row in materials}
+    used = dict(materials)
     for shaft in shafts:
         for (a, b), (low, high) in zip(pairwise(shaft.bodies), pairwise(shaft.nodes), strict=True):
-            bent, turned, more, drawn, drawn_more = _element(shaft, low, high, properties)
+            bent, turned, more, drawn, drawn_more = _element(shaft, low, high, used, temperature)
             levers = np.eye(4)  # from the motion of the nodes' centres of mass to that of the nodes
             levers[0, 1], levers[2, 3] = low - centres[a], high - centres[b]
             turned = levers.T @ turned @ levers
@@ -68,20 +65,20 @@ def _spread(
                 felt = -2 * shaft.speed_ratio * turned * np.outer(of_y, of_x)
                 gyroscopic[np.ix_(y, x)] += felt
                 gyroscopic[np.ix_(x, y)] -= felt.T
-        for node in shaft.bodies:
-            own_mass, inertia, _ = of_node[node]
+        for lump in nodes(shaft, used):
             for move in shaft.moves:
-                mass[place[node, move], place[node, move]] -= inertia if move.startswith("tilt") else own_mass
+                i = place[lump.name, move]
+                mass[i, i] -= lump.inertia[0] if move.startswith("tilt") else lump.mass
             if shaft.turns:
-                i, j = place[node, "tilt_x"], place[node, "tilt_y"]
-                gyroscopic[i, j] -= 2 * inertia * shaft.speed_ratio
-                gyroscopic[j, i] += 2 * inertia * shaft.speed_ratio
+                i, j = place[lump.name, "tilt_x"], place[lump.name, "tilt_y"]
+                gyroscopic[i, j] -= lump.inertia[2] * shaft.speed_ratio
+                gyroscopic[j, i] += lump.inertia[2] * shaft.speed_ratio
     for matrix in (mass, quartic, gyroscopic):
         matrix.flags.writeable = False
     return mass, quartic, gyroscopic
 
 
-def _element(shaft: Shaft, low: float, high: float, properties: Mapping[str, list[float]]) -> tuple[Array, ...]:
+def _element(shaft: Shaft, low: float, high: float, materials: Mapping[str, Material], temperature: float) -> tuple[Array, ...]:
     """Consistent mass (4, 4) of the deflections and slopes (w, w', ...) of both ends in one plane, rotary inertia alike, and N of both; mass (2, 2)
     along the axis, and N of it.
 
@@ -93,7 +90,8 @@ def _element(shaft: Shaft, low: float, high: float, properties: Mapping[str, lis
         if b - a > 1e-12:
             z = a + (b - a) * (np.arange(PIECES) + 0.5) / PIECES
             outer, heavy, bore = (radii(segment, ends, z) for ends in (segment.outer, segment.mass_outer, segment.bore))
-            modulus, poisson, density = properties[segment.material]
+            material = materials[segment.material]
+            modulus, poisson, density = material.youngs_modulus(temperature), material.poisson_ratio, material.density
             area, moment = np.pi * (outer**2 - bore**2), np.pi / 4 * (outer**4 - bore**4)
             sheared = shaft.shear / (shear_factor(bore / outer, poisson) * modulus / (2 * (1 + poisson)) * area)
             line, rotary = density * np.pi * (heavy**2 - bore**2), density * np.pi / 4 * (heavy**4 - bore**4)
