@@ -27,6 +27,7 @@ from thermospindle.diagnosis.inference.gaussian import Quadratic, ln_integral, l
 from thermospindle.diagnosis.inference.prior import Learned, nuisance_root, whitened_covariance, whole_root
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
+from thermospindle.sim.effects.effect import Effect
 
 GRIDS = {
     kinds_of.STIFFNESS: (0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2),  # relative error of a frequency
@@ -70,7 +71,7 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
     p = len(fit.nuisance)
     kinds = {q.kind for q in model.parameters}
     grids = {kind: grid for kind, grid in GRIDS.items() if kind in kinds} | ({kinds_of.BUILD: tuple(WIDER)} if wide else {})  # last: modes may be off instead
-    own_grids = [_own_grid(m.free or m.own_law, m.effect.lasting) for m in fit.mechanisms]  # (width, departure) of every mechanism
+    own_grids = [_own_grid(m.free or m.own_law, _departures(m.effect)) for m in fit.mechanisms]  # (width, departure) of every mechanism
     conditions = tuple(d.condition for d in model.tests)
     roots = [_roots(conditions, grid, len(m.shape)) for m, grid in zip(fit.mechanisms, own_grids, strict=True)]
 
@@ -160,10 +161,15 @@ def _error_scales(whole: Quadratic, count: int) -> Array:
     return np.array([1.0]) if centre < 1.02 else np.unique(np.concatenate([[1.0], np.maximum(centre * np.array([0.95, 1.0, 1.05, 1.2]), 1.0)]))
 
 
+def _departures(effect: Effect) -> tuple[float, ...]:
+    """From its law, of the size of an effect."""
+    return DEPARTURES[:1] if effect.lasting else DEPARTURES[:2] if effect.exact else DEPARTURES
+
+
 @cache
-def _own_grid(lawless: bool, lasting: bool) -> tuple[tuple[float, float], ...]:
+def _own_grid(lawless: bool, departures: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
     """(width, departure) that one mechanism may have."""
-    return tuple(product(FREE_WIDTHS if lawless else WIDTHS, DEPARTURES[:1] if lasting else DEPARTURES))
+    return tuple(product(FREE_WIDTHS if lawless else WIDTHS, departures))
 
 
 @lru_cache(maxsize=64)

@@ -1,4 +1,5 @@
-"""What would have to drift, where nobody names a cause: every element's stiffness and damping, the rings' positions, the preload, and the mass of what turns.
+"""What would have to drift, where nobody names a cause: every element's stiffness and damping, the rings' positions, the preload, the mass of what turns, and a
+spring that holds it from outside.
 
 Free-form models compete with the named effects by the same evidence. They have no law: how much they change in each test is free, only
 continuous over the conditions, and its width is learned. So a named effect whose law holds beats them, for it has less to choose; one
@@ -18,16 +19,17 @@ from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.model.bearing.pair import BearingState, PairState
 from thermospindle.model.machine import MOVES, Body, Condition, RingMotion, Spindle
-from thermospindle.model.rotor.chain import RotorBase
+from thermospindle.model.rotor.chain import Element, RotorBase
 from thermospindle.model.tolerance import scaled_preload
 from thermospindle.model.types import Array
-from thermospindle.model.units import RPM
+from thermospindle.model.units import HERTZ, RPM, TO_UM
 from thermospindle.sim.effects import CATALOGUE, by_name
 from thermospindle.sim.effects.effect import HOOKS, Effect, Parameter, Values, fitted_to, refusal
 
 STIFFNESS_WIDTH, DAMPING_WIDTH, PRELOAD_WIDTH, MASS_WIDTH = 3.0, 20.0, 5.0, 3.0  # %
 CROSS_WIDTH = 1.0  # % of the radial stiffness; where k_xy = -k_yx is as large a share of it as the loss factor, a whirl is at its limit of stability
 RING_WIDTH = 0.2  # um
+TIE_WIDTH = 2e-3  # of the stiffness at which what turns would swing in the middle of the band: a thousandth of a frequency there
 ALIKE = 2e-4  # of the squares of what an effect moves, that a free form which is its own change may leave
 NEARLY = 0.1  # of them, likewise, where a fit of the effect may start from what the free form says
 OF_BEAMS: list[tuple[str, tuple[int, ...]]] = [("axial", (2,)), ("shear", (0, 1)), ("bending", (3, 4))]
@@ -56,6 +58,7 @@ def free_forms(spindle: Spindle) -> list[Mechanism]:
         found.append(_form(f"{name} mass", "%", MASS_WIDTH, chain=_heavier(bodies, whole=True)))
         if len(bodies) == 1:
             found.append(_form(f"{name} transverse inertia", "%", MASS_WIDTH, chain=_heavier(bodies, whole=False)))
+    found += _tied(spindle)
     names = [b.name for b in spindle.bearings]
     sets = [("bearings", names), *([(name, [name]) for name in names] if len(names) > 1 else [])]
     for label, own in sets:
@@ -71,8 +74,21 @@ def free_forms(spindle: Spindle) -> list[Mechanism]:
     return found
 
 
+def _tied(spindle: Spindle) -> list[Mechanism]:
+    """A spring between the ground and what turns: a seal that rubs, a hose, a tool that touches; one that pushes away is a magnet's (Earnshaw)."""
+    if not any(b.turns for b in spindle.structure.bodies):
+        return []
+    low, high = spindle.hammer.band
+    rotor = spindle.turning
+    name = next((s.name for s in spindle.structure.shafts if rotor.name in s.bodies), rotor.name)
+    width = TIE_WIDTH * spindle.turning_mass * HERTZ**2 * low * high / TO_UM
+    ways = (("", (0, 1, 2)), (" across the axis", (0, 1)), (" along the axis", (2,)))
+    return [_form(f"spring from {name} to ground{label}", "N/um", width, chain=_tie(rotor, moves)) for label, moves in ways]
+
+
 def _form(name: str, unit: str, width: float, **hooks: Any) -> Mechanism:
-    size = Parameter("change", unit, 0.0, width, width, (-400.0, 400.0) if unit == "%" else (-20.0, 20.0), f"change of {name}", "free")
+    reach = {"%": 400.0, "um": 20.0}.get(unit, 1e3 * width)
+    size = Parameter("change", unit, 0.0, width, width, (-reach, reach), f"change of {name}", "free")
     effect = Effect(name, f"{name} drifts freely", "", (size,), "", (), "", **hooks)
     return Mechanism(effect, {}, (), free=True)
 
@@ -127,6 +143,16 @@ def _heavier(names: Sequence[str], whole: bool):
             return replace(b, mass=f * b.mass if whole else b.mass, inertia=(f * x, f * y, f * z if whole else z))
 
         return replace(chain, bodies=tuple(changed(b) if b.name in names else b for b in chain.bodies))
+
+    return chain
+
+
+def _tie(rotor: Body, moves: Sequence[int]):
+    along = np.diag([float(m in moves) for m in range(5)])
+
+    def chain(spindle: Spindle, condition: Condition, values: Values, chain: RotorBase) -> RotorBase:
+        tie = Element("tie", "tie", "ground", rotor.name, rotor.z, values["change"] * TO_UM * along, 0 * along)
+        return replace(chain, elements=(*chain.elements, tie))
 
     return chain
 

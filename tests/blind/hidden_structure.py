@@ -45,7 +45,7 @@ def of_structure(spindle: Spindle) -> list[Mechanism]:
         Mechanism("mass at a sensor", "g", 0.02 * heavier**0.5, 2.0 * heavier**0.5, ("sensor_mass",), standing, {"chain": _sensor}, sign=1, laws="constant"),
         Mechanism(f"{turning} loses inertia", "%", 0.5, 8.0, (), turning, {"chain": _lighter}, sign=1),
         Mechanism("a cable on the base", "g", 0.05 * heavier, 3.0 * heavier, (), every[0], {"chain": _cable}, sign=1),
-        Mechanism("a spring from rotor to ground", "% of a bearing's radial", 0.001, 0.1, (), every[0], {"chain": _tether}, sign=1),
+        Mechanism("a spring from rotor to ground", "% of a bearing's radial", 0.001, 0.1, (), "spring", {"chain": _tether}, sign=1),
     ]
     return found
 

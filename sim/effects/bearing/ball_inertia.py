@@ -44,4 +44,5 @@ EFFECT = Effect(
     spindle=spindle,
     acts_on=(ROWS,),
     idle=idle,
+    exact=True,
 )

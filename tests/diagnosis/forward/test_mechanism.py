@@ -15,6 +15,7 @@ from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.inference.freeform import alike, as_told_by, free_forms
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.model.machine import Condition
+from thermospindle.model.rotor.chain import motion_rows
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
 from thermospindle.sim.effects import usable
@@ -70,6 +71,8 @@ def test_laws_of_the_datas_own_act_in_every_test_as_where_they_do_most(spindle):
     names = [m.name for m in own]
     assert {"thermal_gradient", "grease_damping", "bond_softening", "soak_lag", "clearance_opening", "mount_compliance"} <= set(names)
     assert not {"added_disk", "sensor_mass", "support_anisotropy", "ball_material", "sensor_gain"} & set(names)
+    assert "ball_inertia" in {m.name for m in named}
+    assert "ball_inertia" not in names  # the balls' inertia goes with the square of the speed, whatever the data would like
     assert names.count("thermal_gradient") == 1
     assert all(m.kind == "own law" for m in own)
     of = {m.name: m for m in own}
@@ -189,7 +192,21 @@ def test_what_turns_that_drifts_is_a_drawing_of_another_mass(spindle, form, kept
     assert [m.frequency for m in drifted.modes] == pytest.approx([m.frequency for m in drawn.modes], rel=1e-9)
 
 
+@pytest.mark.parametrize(("label", "moves"), [("", (1, 1, 1)), (" across the axis", (1, 1, 0)), (" along the axis", (0, 0, 1))])
+def test_what_turns_may_be_held_from_outside(spindle, label, moves):
+    """By so many N/um at the hub's centre, either way: what the motion of the hub's centre makes of K, and nothing else; no effect changes the same."""
+    m = next(m for m in free_forms(spindle) if m.name == f"spring from hub to ground{label}")
+    plain = operating_point(spindle, CONDITIONS[2], ())
+    rows = motion_rows(plain.chain, "hub", [0.0, 0.0, spindle.turning.z])[:3]
+    for change in (0.25, -0.25):
+        held = operating_point(spindle, CONDITIONS[2], [(m.effect, m.values(change, []))])
+        expected = 1e6 * change * rows.T @ np.diag(moves) @ rows
+        assert held.linear.stiffness - plain.linear.stiffness == pytest.approx(expected, abs=1e-9 * np.abs(plain.linear.stiffness).max())
+        assert np.array_equal(held.linear.damping, plain.linear.damping)
+
+
 def test_of_a_flexible_shaft_the_whole_drifts():
+    assert "spring from spindle to ground" in [m.name for m in free_forms(load(ROOT / "scenes" / "five_bearing"))]
     assert [m.name for m in free_forms(load(ROOT / "scenes" / "five_bearing")) if "mass" in m.name or "inertia" in m.name] == ["spindle mass"]
 
 

@@ -248,17 +248,27 @@ def test_what_departures_gain_is_told(hidden, much, monkeypatch):
     """By how much the evidence is larger than that of the same sizes held to their law; less than nothing where the law holds."""
     made = toy(3, 0.0, hidden=hidden, rows=200)
     found = evidence(made.model, made.fit)
-    monkeypatch.setattr("thermospindle.diagnosis.inference.evidence._own_grid", lambda lawless, lasting: tuple((w, 0.0) for w in WIDTHS))
+    monkeypatch.setattr("thermospindle.diagnosis.inference.evidence._own_grid", lambda lawless, departures: tuple((w, 0.0) for w in WIDTHS))
     held = evidence(made.model, made.fit, [found.learned])
     assert found.by_departing == pytest.approx(found.ln - held.ln, abs=1e-6)
     assert found.by_departing > 20.0 if much else -2.0 < found.by_departing < 0.0
+
+
+def test_a_law_that_mechanics_gives_is_followed():
+    """Sizes that have nothing of their law are evidence for an effect whose law is assumed, and not for one whose law is exact, by more than e^5; where they
+    follow it the exact one has the more of it, for it had less to choose."""
+    for hidden, exact_gains in (((1.2, 4.0, 1.1), False), (2.0, True)):
+        made = toy(3, 0.0, hidden=hidden, rows=200)
+        mechanism = replace(made.mechanisms[0], effect=replace(made.mechanisms[0].effect, exact=True))
+        gain = evidence(made.model, replace(made.fit, mechanisms=(mechanism,))).ln - evidence(made.model, made.fit).ln
+        assert gain > 0.1 if exact_gains else gain < -5.0
 
 
 @pytest.mark.parametrize("held", [False, True])
 def test_a_shape_within_limits_is_the_integral_over_these(held, monkeypatch):
     """A share from nothing to one, neutral at nothing: the integral over it alone, by quadrature; held at nothing where the data would have it less."""
     own, plain, random = (1.0, 0.0), toy(3, 0.0, hidden=2.0), np.random.default_rng(8)
-    monkeypatch.setattr("thermospindle.diagnosis.inference.evidence._own_grid", lambda lawless, lasting: (own,))
+    monkeypatch.setattr("thermospindle.diagnosis.inference.evidence._own_grid", lambda lawless, departures: (own,))
     jacobians = [np.column_stack([j, random.standard_normal(len(j))]) for j in plain.jacobians]
     y = [v + (-0.4 if held else 0.6) * j[:, -1] for v, j in zip(plain.y, jacobians, strict=True)]
     prior = plain.prior(0.0, 0.0, 0.0, [own])
