@@ -80,17 +80,21 @@ def fit(
 
     Raises what the model raises where even the start cannot be built.
     """
-    problem = Problem(model, mechanisms, learned, moved)
+    def at(temper: float) -> Problem:
+        return Problem(model if temper == 1.0 else model.thinned, mechanisms, learned, moved)
+
+    problem = at(tempers[0])
     if start is None:
         p = np.zeros(problem.length)
     elif isinstance(start, np.ndarray):
         p = start.copy()
     else:
-        p = min(start, key=lambda at: problem.cost(at, tempers[0])).copy()
+        p = min(start, key=lambda start: problem.cost(start, tempers[0])).copy()
     p = problem.within_limits(p)
     for temper in tempers:
-        problem = Problem(model if temper == 1.0 else model.thinned, mechanisms, learned, moved)
-        rates = rates_of(problem.model, problem.parts(p)[0], problem.effects_of(p), rates)
+        problem = at(temper)
+        if rates is None or temper == 1.0:  # with errors enlarged those from elsewhere lead as far
+            rates = rates_of(problem.model, problem.parts(p)[0], problem.effects_of(p), rates)
         p, lines, residuals = _settled(problem, p, rates, temper)
         done = problem, p, rates, temper, lines, residuals
     return _finished(*done)

@@ -68,15 +68,15 @@ def fitted(model, tasks, tempers, about: Fit, most: float, expected: Learned, wo
 
 
 def _fit_one(model: CampaignModel, rates, tempers, most: float, expected: Learned, afresh: bool, task: Task) -> Hypothesis | None:
-    """A fit; with `afresh` also from the best of a `scan` through all tempers before, the better of both. Once more with errors enlarged where it did not
+    """A fit; with `afresh` from where a `scan` leads while errors are larger still, if that costs less. Once more with errors enlarged where it did not
     reach `most`, the cost of a model that it contains, or the evidence that screening `hoped` for: then it had stalled."""
-    mechanisms = task.mechanisms
+    mechanisms, starts = task.mechanisms, task.starts
     prior = steady(expected, mechanisms)
     try:
-        found = fit(model, mechanisms, task.starts, rates, tempers, learned=prior)
         if afresh:
-            before = TEMPERS[: TEMPERS.index(tempers[0])]
-            found = min(found, fit(model, mechanisms, scan(model, mechanisms), rates, (*before, *tempers), learned=prior), key=lambda f: f.cost)
+            before = TEMPERS[1 : TEMPERS.index(tempers[0])]
+            starts = (*starts, fit(model, mechanisms, scan(model, mechanisms), rates, before, learned=prior).point)
+        found = fit(model, mechanisms, starts, rates, tempers, learned=prior)
         reached = Hypothesis(found, evidence(model, found))
         if found.temper == 1.0 and (found.cost > most + LITTLE or reached.evidence.ln < task.hoped - LITTLE):
             loose = np.concatenate([np.zeros(len(model.parameters)), task.starts[0][len(model.parameters) :]])
