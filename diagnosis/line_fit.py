@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
+from thermospindle.model.built.tolerance import Toleranced
 from thermospindle.model.machine import Condition, HammerTest, Spindle
-from thermospindle.model.tolerance import Toleranced
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.campaign.beside import POWER
 from thermospindle.sim.identification.frf import Frf

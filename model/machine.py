@@ -1,7 +1,7 @@
 """What a spindle is: frozen definitions in SI units, made by `model.scene.reading.load`.
 
-Temperatures are in degrees Celsius (only differences enter the physics), angles in radians, everything else SI. What a bearing and what a material
-is stands in `model.bearing.definitions` and `model.material`.
+Temperatures are in degrees Celsius (only differences enter the physics), angles in radians, everything else SI. What a bearing, a material
+and a structure is stands in `model.bearing.definitions`, `model.material` and `model.structure`.
 """
 
 from __future__ import annotations
@@ -15,16 +15,14 @@ from typing import Any
 import numpy as np
 
 from thermospindle.model.bearing.definitions import Bearing, BearingSet, LinearBearing, RollerBearing
+from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.errors import BadInput
-from thermospindle.model.imperfections import Imperfections
 from thermospindle.model.material import Law, Material
-from thermospindle.model.shaft import Shaft
+from thermospindle.model.structure import Body, Structure
 
 PARTS = ("stationary", "rotating")
 RACEWAY_WIDTH = 1.9
 """Width of a bearing over its ball diameter where none is told and rings share a tube: 1.7 to 2.1 in series 70, 719 and miniature ones."""
-MOVES = ("x", "y", "z", "tilt_x", "tilt_y")
-"""Degrees of freedom of a body on the spindle axis, in the order of every 5-vector and 5x5 matrix of the project."""
 
 
 @dataclass(frozen=True)
@@ -37,76 +35,6 @@ class Region:
     r: tuple[float, float]
     z: tuple[float, float]
     role: str = ""  # shaft, hub, insert or support: what effects know it by; empty for none of these
-
-
-@dataclass(frozen=True)
-class Body:
-    """A rigid body of the rotor-base chain: centre of mass on the axis at `z`, moving in `moves`."""
-
-    name: str
-    mass: float  # kg
-    inertia: tuple[float, float, float]  # about x, y (through the centre of mass) and z, kg m2
-    z: float
-    moves: tuple[str, ...]
-    turns: bool
-    regions: tuple[str, ...]  # the section regions it is made of; empty for a body given by numbers
-    role: str = ""  # base, seat, shaft, hub or housing: what effects know it by; empty for none of these
-    speed_ratio: float = 1.0  # of its speed to the spindle's, where it turns
-
-
-@dataclass(frozen=True)
-class Joint:
-    """A compliant joint between two bodies at height `z`: a diagonal stiffness (N/m, N m/rad) in the order of MOVES."""
-
-    name: str
-    group: str
-    bodies: tuple[str, str]
-    z: float
-    stiffness: tuple[float, float, float, float, float]
-    damping_ratio: float
-    role: str = ""  # mount, plate or flange: what effects know it by; empty for none of these
-    material: str = ""  # whose elastic modulus its stiffness follows; empty for none
-
-
-@dataclass(frozen=True)
-class Structure:
-    bodies: tuple[Body, ...]
-    joints: tuple[Joint, ...]
-    damping_frequency: float  # Hz; damping = 2 zeta stiffness / (2 pi this)
-    inner_body: str = ""  # the bodies that carry the rings of bearings that name none of their own
-    outer_body: str = ""
-    shafts: tuple[Shaft, ...] = ()  # those whose nodes and elements are among `bodies` and `joints`
-
-    def carrier(self, body: str) -> str:
-        """What a body is axially rigid with: its shaft, or itself."""
-        return self._shaft_of.get(body, body)
-
-    def body(self, name: str) -> Body:
-        return self._bodies[name]
-
-    @cached_property
-    def _bodies(self) -> dict[str, Body]:
-        return {b.name: b for b in self.bodies}
-
-    @cached_property
-    def _shaft_of(self) -> dict[str, str]:
-        """For every node's body the name of its shaft."""
-        return {node: s.name for s in self.shafts for node in s.bodies}
-
-    @property
-    def rigid_bodies(self) -> list[Body]:
-        """Those that are no node of a shaft."""
-        return [b for b in self.bodies if self.carrier(b.name) == b.name]
-
-    @property
-    def parts(self) -> list[str]:
-        """Names of what is axially rigid: of bodies, and of shafts in place of their nodes."""
-        return [*(b.name for b in self.rigid_bodies), *(s.name for s in self.shafts)]
-
-    @property
-    def own_joints(self) -> list[Joint]:
-        """Those that are no element of a shaft."""
-        return [j for j in self.joints if not any(j.name in s.elements for s in self.shafts)]
 
 
 @dataclass(frozen=True)
@@ -230,7 +158,7 @@ class Addition:
 class Build:
     """How a built spindle differs from its drawing, fitted to tests; the numbers of the spindle that holds it are the built ones.
 
-    `deviations` are relative, by name of the toleranced parameter (`model.tolerance`); `tests` the ids of the tests they were fitted to.
+    `deviations` are relative, by name of the toleranced parameter (`model.built.tolerance`); `tests` the ids of the tests they were fitted to.
     """
 
     deviations: Mapping[str, float]

@@ -42,7 +42,7 @@ class Shaft:
     role: str = ""
     shear: float = 1.0
     rotary: float = 1.0
-    moves: tuple[str, ...] = ("x", "y", "z", "tilt_x", "tilt_y")  # of its nodes, in the order of `machine.MOVES`
+    moves: tuple[str, ...] = ("x", "y", "z", "tilt_x", "tilt_y")  # of its nodes, in the order of `structure.MOVES`
 
     @cached_property
     def bodies(self) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from thermospindle.model.errors import BadInput
-from thermospindle.model.whole import whole
+from thermospindle.model.files.whole import whole
 
 MARK = "made-by-spindle.json"
 """File that every output folder holds: how it was made, its answer, and a digest of every file that was written beside it."""

@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 
 from thermospindle.model.bearing.pair import PairState, solve
 from thermospindle.model.bearing.stiffness_table import StiffnessTable, tabulate
-from thermospindle.model.imperfections import Imperfections
+from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.machine import Condition, RingMotion, Spindle
 from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.chain import Matrices, RotorBase, matrices, rotor_base

@@ -23,9 +23,9 @@ import numpy as np
 from mujoco import sysid
 
 from thermospindle.diagnosis.line_fit import fit_lines
+from thermospindle.model.built.tolerance import Toleranced, toleranced
 from thermospindle.model.machine import Condition, HammerTest, Spindle
 from thermospindle.model.scene.reading import load
-from thermospindle.model.tolerance import Toleranced, toleranced
 from thermospindle.model.types import Array
 from thermospindle.sim.hammer.test import ImpactTest, estimate_of, impact_tests, loaded_state, sampling
 from thermospindle.sim.operating import operating_point

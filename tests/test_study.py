@@ -17,9 +17,9 @@ import pytest
 
 from tests.conftest import ROOT, SCENE
 from thermospindle.cli import main
+from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
-from thermospindle.model.tolerance import toleranced
 from thermospindle.model.units import RPM
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.study.form import Steps
@@ -249,7 +249,7 @@ def test_a_folder_is_gone_on_with_only_by_its_own_study(tmp_path, capsys, undraw
 
 @pytest.mark.skipif(os.name == "nt", reason="folders have no locks on Windows")
 def test_two_runs_do_not_write_into_one_folder(tmp_path, capsys, undrawn):
-    from thermospindle.model.whole import alone
+    from thermospindle.model.files.whole import alone
 
     out, _ = study(tmp_path, DRAWN + "draws = 2\n")
     with alone(out):

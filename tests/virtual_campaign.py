@@ -13,8 +13,8 @@ from thermospindle.diagnosis.data.observe import condition_of
 from thermospindle.diagnosis.forward import nuisance
 from thermospindle.diagnosis.forward.making import campaign_model, expected_noise
 from thermospindle.diagnosis.forward.model import CampaignModel
+from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition, Spindle
-from thermospindle.model.tolerance import toleranced
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.campaign.beside import POWER
 from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Noise, Test

@@ -18,11 +18,11 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
+from thermospindle.model.built.tolerance import deviated
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Addition, Condition, Spindle
 from thermospindle.model.rotor.modes import Mode
 from thermospindle.model.scene.reading import load as load_scene
-from thermospindle.model.tolerance import deviated
 from thermospindle.model.units import RPM
 from thermospindle.sim.campaign.beside import POWER
 from thermospindle.sim.campaign.campaign import Campaign, read_campaign

@@ -9,9 +9,9 @@ import numpy as np
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.forward.model import CampaignModel, TestData
 from thermospindle.diagnosis.forward.nuisance import nuisances, reference_modes
+from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import matrices
-from thermospindle.model.tolerance import toleranced
 from thermospindle.sim.campaign.beside import measured_at
 from thermospindle.sim.campaign.campaign import Campaign, Noise
 from thermospindle.sim.effects import of_scene

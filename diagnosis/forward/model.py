@@ -21,11 +21,11 @@ from thermospindle.diagnosis.forward.nuisance import Nuisance, ReferenceModes, R
 from thermospindle.diagnosis.forward.points import Applied, apart, replace_measuring, stretched
 from thermospindle.diagnosis.forward.response import Light, Response
 from thermospindle.diagnosis.forward.table import Table
+from thermospindle.model.built.tolerance import Toleranced
 from thermospindle.model.errors import NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import Matrices, matrices
 from thermospindle.model.rotor.distributed import spread
-from thermospindle.model.tolerance import Toleranced
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.effects.effect import HOOKS, Effect, Values
 from thermospindle.sim.operating import OperatingPoint, operating_point

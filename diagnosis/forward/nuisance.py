@@ -23,9 +23,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import eigh
 
+from thermospindle.model.built.tolerance import Toleranced
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import Matrices
-from thermospindle.model.tolerance import Toleranced
 from thermospindle.model.types import Array
 
 BUILD, TEMPERATURE, GAIN, DRIFT, EXPANSION = "build", "temperature", "gain", "gain drift", "thermal expansion"

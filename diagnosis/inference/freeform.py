@@ -18,9 +18,10 @@ from thermospindle.diagnosis.forward.mechanism import Mechanism, asked_at
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.model.bearing.pair import BearingState, PairState
-from thermospindle.model.machine import MOVES, Body, Condition, RingMotion, Spindle
+from thermospindle.model.built.tolerance import scaled_preload
+from thermospindle.model.machine import Condition, RingMotion, Spindle
 from thermospindle.model.rotor.chain import Element, RotorBase
-from thermospindle.model.tolerance import scaled_preload
+from thermospindle.model.structure import MOVES, Body
 from thermospindle.model.types import Array
 from thermospindle.model.units import HERTZ, RPM, TO_UM
 from thermospindle.sim.effects import CATALOGUE, by_name

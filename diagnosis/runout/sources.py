@@ -3,7 +3,7 @@
 A *source* is one kind of imperfection seen in one line: an unbalance, a wave of one order on one race, radial or axial, the sizes of the balls
 of a row, their waves, a cage. What a source shows is linear in its complex amplitude. That amplitude is unknown: a scene's imperfections are
 one draw, of which another spindle of the drawing has only the size. Its likely size (rms) is the scene's own, pooled over rings, bearings and orders,
-races falling as 1/order and balls as 1/order^2 as in `model.imperfections.drawn`; where a scene has none of a kind, that of its grade "high precision".
+races falling as 1/order and balls as 1/order^2 as in `model.built.drawn`; where a scene has none of a kind, that of its grade "high precision".
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from thermospindle.diagnosis.runout.lines import MULTIPLE, Key, Seen, key_of
-from thermospindle.model.drawn import GRADES
-from thermospindle.model.imperfections import Imperfections, RowImperfections, Wave
+from thermospindle.model.built.drawn import GRADES
+from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
+from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Point, Spindle
 from thermospindle.model.rotor.chain import motion_rows
-from thermospindle.model.tolerance import toleranced
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.campaign.beside import on_nodes
 from thermospindle.sim.effects.effect import Effect, Values

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import thermospindle as ts
-from thermospindle.model.imperfections import Imperfections
+from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import matrices
 from thermospindle.model.units import RPM

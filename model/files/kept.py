@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from thermospindle.model.whole import whole
+from thermospindle.model.files.whole import whole
 
 MOST_BYTES = 256 << 20
 KINDS = ("influence", "modes")  # how files begin that may be removed

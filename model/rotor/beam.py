@@ -28,8 +28,9 @@ from typing import TypeVar
 
 import numpy as np
 
-from thermospindle.model.machine import Body, Joint, Material, Structure
+from thermospindle.model.machine import Material
 from thermospindle.model.shaft import Segment, Shaft
+from thermospindle.model.structure import Body, Joint, Structure
 from thermospindle.model.types import Array
 
 T = TypeVar("T", float, Array)

@@ -16,7 +16,8 @@ import numpy as np
 
 from thermospindle.model.bearing.pair import BearingState, LinearState, PairState
 from thermospindle.model.errors import BadInput
-from thermospindle.model.machine import MOVES, Body, Point, Spindle, Structure
+from thermospindle.model.machine import Point, Spindle
+from thermospindle.model.structure import MOVES, Body, Structure
 from thermospindle.model.types import Array, Integers
 
 

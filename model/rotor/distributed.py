@@ -15,10 +15,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from thermospindle.model.machine import Material, Structure
+from thermospindle.model.machine import Material
 from thermospindle.model.rotor.beam import nodes, radii, shear_factor
 from thermospindle.model.rotor.chain import Layout
 from thermospindle.model.shaft import Shaft
+from thermospindle.model.structure import Structure
 from thermospindle.model.types import Array
 
 PIECES = 128  # of a segment within an element, over which shapes and masses are integrated by midpoints

@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 
 from thermospindle.model.bearing.pair import BearingState, PairState
 from thermospindle.model.bearing.springs import ball_springs
-from thermospindle.model.machine import PARTS, Body, Region, Spindle
+from thermospindle.model.machine import PARTS, Region, Spindle
 from thermospindle.model.rotor.section import Cell, cells
 from thermospindle.model.rotor.shaft_look import drawn_by_shaft, extent, host, slices
+from thermospindle.model.structure import Body
 from thermospindle.model.types import Array
 
 MjSpec = Any  # mujoco.MjSpec

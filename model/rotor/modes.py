@@ -14,9 +14,10 @@ from functools import cached_property
 import numpy as np
 import scipy
 
-from thermospindle.model.machine import MOVES, Spindle
+from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import Matrices, RotorBase, element_rows, matrices, motion_rows, point_row
 from thermospindle.model.rotor.reduced import FINE, reduced
+from thermospindle.model.structure import MOVES
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.model.units import HERTZ
 

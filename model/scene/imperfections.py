@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from thermospindle.model import imperfections as i
+from thermospindle.model.built import imperfections as i
 from thermospindle.model.scene.fields import Finite, NotNegative, Table
 from thermospindle.model.units import DEGREE, MM, NM
 

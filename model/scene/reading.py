@@ -20,7 +20,8 @@ from pydantic import ValidationError
 
 from thermospindle.model.bearing.catalogue import derived
 from thermospindle.model.bearing.pair import reference_motion, solve
-from thermospindle.model.drawn import GRADES, drawn
+from thermospindle.model.built.drawn import GRADES, drawn
+from thermospindle.model.built.tolerance import deviated
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.formats import KEY, SCENE, migrated
 from thermospindle.model.machine import Bearing, Condition, Provenance, Spindle
@@ -32,7 +33,6 @@ from thermospindle.model.scene import form as scene_file
 from thermospindle.model.scene.checks import check_bearings, check_raceways, check_rollers, check_section, check_structure, constant
 from thermospindle.model.scene.fields import read_file
 from thermospindle.model.shaft import SAME_HEIGHT
-from thermospindle.model.tolerance import deviated
 
 ROW_KINDS = ("ball_rows", "roller_rows")
 SCENES = Path(__file__).parents[2] / "scenes"

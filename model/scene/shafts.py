@@ -8,9 +8,9 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, Strict, model_validator
 
-from thermospindle.model import machine as m
 from thermospindle.model.scene.fields import Name, NotNegative, Place, Positive, Share, Table
 from thermospindle.model.shaft import THEORIES, Segment, Shaft, mesh
+from thermospindle.model.structure import MOVES
 from thermospindle.model.units import MM
 
 
@@ -67,7 +67,7 @@ class ShaftForm(Table):
                         f"bore_mm: at z_mm = {segment.z[k] / MM:g} the bore of {2 * segment.bore[k] / MM:g} mm leaves nothing of a diameter of "
                         f"{2 * min(segment.outer[k], segment.mass_outer[k]) / MM:g} mm"
                     )
-        if self.turns and set(self.moves) != set(m.MOVES):
+        if self.turns and set(self.moves) != set(MOVES):
             raise ValueError("a shaft that turns must move in x, y, z, tilt_x and tilt_y")
         if ("x" in self.moves) != ("tilt_y" in self.moves) or ("y" in self.moves) != ("tilt_x" in self.moves):
             raise ValueError("a shaft bends in a plane: x goes with tilt_y, and y with tilt_x")
@@ -109,7 +109,7 @@ class ShaftForm(Table):
             role=self.role or "",
             shear=shear,
             rotary=rotary,
-            moves=tuple(name for name in m.MOVES if name in self.moves),
+            moves=tuple(name for name in MOVES if name in self.moves),
         )
 
 

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, Strict, model_validator
 
-from thermospindle.model import machine as m
+from thermospindle.model import structure as m
 from thermospindle.model.scene.fields import Both, Name, NotNegative, Place, Positive, Share, Table, TwoNames
 from thermospindle.model.shaft import Shaft
 from thermospindle.model.units import MM

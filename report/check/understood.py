@@ -10,8 +10,9 @@ import numpy as np
 
 from thermospindle.model.bearing.pair import BearingState
 from thermospindle.model.bearing.roller import RollerState
-from thermospindle.model.machine import Bearing, Body, LinearBearing, RollerBearing, Spindle
+from thermospindle.model.machine import Bearing, LinearBearing, RollerBearing, Spindle
 from thermospindle.model.shaft import THEORIES, Shaft
+from thermospindle.model.structure import Body
 from thermospindle.model.units import RPM
 from thermospindle.sim.effects.effect import Effect, refusal
 from thermospindle.sim.hammer.pulse import pulse_duration

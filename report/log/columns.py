@@ -12,10 +12,10 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from thermospindle.model.errors import BadInput
+from thermospindle.model.files.whole import whole
 from thermospindle.model.rotor.look import RegionMesh
 from thermospindle.model.types import Array
 from thermospindle.model.units import TO_MM
-from thermospindle.model.whole import whole
 from thermospindle.report.log.content import Peak
 from thermospindle.report.log.read import APPLICATION
 from thermospindle.report.log.views import at

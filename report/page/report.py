@@ -18,11 +18,11 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 
+from thermospindle.model.files.whole import whole
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.modes import frf, group_energy, point_rows
 from thermospindle.model.scene.reading import content_hash, load
 from thermospindle.model.units import RPM
-from thermospindle.model.whole import whole
 from thermospindle.report.figures import report as plots
 from thermospindle.report.figures.report import Curve
 from thermospindle.report.page.comparison import SAME_TEMPERATURE, compared

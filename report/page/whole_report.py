@@ -10,9 +10,9 @@ import numpy as np
 
 from thermospindle.diagnosis.ladder.ladder import ladder
 from thermospindle.diagnosis.runout.lines import modal_tests
-from thermospindle.model.drawn import drawn
+from thermospindle.model.built.drawn import drawn
+from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.errors import BadInput, NoEquilibrium, OutsideRange
-from thermospindle.model.imperfections import Imperfections
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.report.page import ladder as ladder_report
 from thermospindle.report.page.report import Section

@@ -18,9 +18,9 @@ from thermospindle.diagnosis.runout.lines import modal_tests
 from thermospindle.diagnosis.runout.verdict import RunoutDiagnosis, diagnose_runout
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.formats import CURRENT, DIAGNOSIS, KEY
+from thermospindle.model.files.whole import whole
 from thermospindle.model.machine import Spindle
 from thermospindle.model.scene.reading import content_hash
-from thermospindle.model.whole import whole
 from thermospindle.report.text.diagnosis.answer import diagnosis_json
 from thermospindle.report.text.diagnosis.words import show_diagnosis
 from thermospindle.report.text.runout_diagnosis import runout_diagnosis_json, show_runout_diagnosis

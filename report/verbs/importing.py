@@ -10,9 +10,9 @@ from typing import Any
 from rich.console import Console
 
 from thermospindle.model.errors import BadInput, Unanswered
+from thermospindle.model.files.whole import whole
 from thermospindle.model.machine import Spindle
 from thermospindle.model.units import RPM
-from thermospindle.model.whole import whole
 from thermospindle.report.verbs.answer import Answer, progress_bar, with_effects
 from thermospindle.sim.campaign.beside import left_out
 from thermospindle.sim.campaign.campaign import Campaign, write_campaign

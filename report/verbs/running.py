@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from thermospindle.model import sense
-from thermospindle.model.drawn import drawn
+from thermospindle.model.built.drawn import drawn
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import MINUTE, RPM

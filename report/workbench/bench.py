@@ -18,11 +18,11 @@ from thermospindle.diagnosis.compare.fit import Fitted, Free, fit
 from thermospindle.diagnosis.data.observe import Observation, condition_of, observe
 from thermospindle.diagnosis.forward.mechanism import REFERENCE_WIDTH
 from thermospindle.diagnosis.runout.lines import modal_tests
+from thermospindle.model.built.tolerance import Toleranced, deviated, toleranced
 from thermospindle.model.errors import BadInput, NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Addition, Condition, Spindle
 from thermospindle.model.rotor.modes import Mode
 from thermospindle.model.scene.reading import load, scene_path
-from thermospindle.model.tolerance import Toleranced, deviated, toleranced
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.model.units import RPM
 from thermospindle.report.workbench.state import FURTHEST, Setting, key_of, set_named

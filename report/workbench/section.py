@@ -11,12 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from thermospindle.model.machine import MOVES, PARTS, Spindle
+from thermospindle.model.machine import PARTS, Spindle
 from thermospindle.model.rotor.chain import RotorBase
 from thermospindle.model.rotor.look import PLATE, SHADES, colour, plate, region_bodies, region_colours
 from thermospindle.model.rotor.modes import Mode
 from thermospindle.model.rotor.section import Cell, cells
 from thermospindle.model.rotor.shaft_look import drawn_by_shaft, slices
+from thermospindle.model.structure import MOVES
 from thermospindle.model.types import Array, ComplexArray
 
 LARGEST = 0.07  # of the drawing's larger side, by which a mode moves at most

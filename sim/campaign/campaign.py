@@ -19,10 +19,10 @@ from pydantic import ValidationError
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.cells import cells, name_of
 from thermospindle.model.files.formats import CAMPAIGN, CURRENT, KEY
+from thermospindle.model.files.whole import whole
 from thermospindle.model.machine import Point
 from thermospindle.model.scene.fields import first_error, read_file
 from thermospindle.model.units import MINUTE, MM, RPM
-from thermospindle.model.whole import whole
 from thermospindle.sim.campaign.form import MODE_COLUMNS, ModeTable, checked, in_unit, toml
 from thermospindle.sim.campaign.runout_record import RunoutRecord, read_runout, same, write_runout
 from thermospindle.sim.campaign.uff import LARGEST, read_frf, write_frf

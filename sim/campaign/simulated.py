@@ -11,8 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.errors import BadInput
-from thermospindle.model.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.machine import Condition, Point, Spindle
 from thermospindle.model.rotor.chain import motion_rows
 from thermospindle.model.units import RPM

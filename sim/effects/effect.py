@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from thermospindle.model.bearing.pair import PairState
-from thermospindle.model.imperfections import Imperfections
+from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.machine import Condition, RingMotion, Spindle
 from thermospindle.model.rotor.chain import RotorBase
 from thermospindle.model.types import Array

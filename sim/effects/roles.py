@@ -11,8 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from thermospindle.model.machine import Body, Joint, Region, Spindle
+from thermospindle.model.machine import Region, Spindle
 from thermospindle.model.rotor.chain import Element
+from thermospindle.model.structure import Body, Joint
 from thermospindle.model.types import Array
 
 

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
+from thermospindle.model.built.tolerance import Toleranced, toleranced
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import matrices
 from thermospindle.model.rotor.modes import modes
 from thermospindle.model.scene.reading import load
 from thermospindle.model.span import inside
-from thermospindle.model.tolerance import Toleranced, toleranced
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 from thermospindle.sim.identification.pairing import follow

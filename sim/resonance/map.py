@@ -23,9 +23,9 @@ import numpy as np
 
 from thermospindle.model.bearing.kinematics import Line, lines, row_kinematics
 from thermospindle.model.bearing.pair import check_centred
-from thermospindle.model.drawn import drawn
+from thermospindle.model.built.drawn import drawn
+from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.errors import BadInput
-from thermospindle.model.imperfections import Imperfections
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import matrices
 from thermospindle.model.rotor.modes import LARGE, Mode, modes

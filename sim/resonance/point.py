@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from thermospindle.model.bearing.kinematics import Line
-from thermospindle.model.imperfections import Imperfections, RowImperfections, Wave
+from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import matrices
 from thermospindle.model.rotor.modes import Mode, Poles, poles

@@ -40,7 +40,7 @@ from thermospindle.model.bearing.kinematics import (
     unbalance_line,
 )
 from thermospindle.model.bearing.pair import BearingState, check_centred
-from thermospindle.model.imperfections import Imperfections, RowImperfections, Wave
+from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.rotor.chain import RotorBase, element_rows, matrices, motion_rows, turning_at
 from thermospindle.model.rotor.modes import LARGE, Poles, poles
 from thermospindle.model.types import Array, ComplexArray

@@ -21,7 +21,7 @@ from scipy.linalg import expm
 
 from thermospindle.model.bearing.ball_row import BallRow, respond
 from thermospindle.model.bearing.kinematics import Kinematics, row_kinematics
-from thermospindle.model.imperfections import Imperfections, RowImperfections, Wave
+from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.rotor.chain import element_rows, matrices, motion_rows, turning_at
 from thermospindle.model.types import Array
 from thermospindle.sim.operating import OperatingPoint

@@ -18,7 +18,7 @@ import numpy as np
 
 from thermospindle.model.bearing.kinematics import Kinematics, Line, ball_line, cage_line, race_line
 from thermospindle.model.bearing.roller import EXPONENT, RollerState
-from thermospindle.model.imperfections import RowImperfections
+from thermospindle.model.built.imperfections import RowImperfections
 from thermospindle.model.types import ComplexArray
 from thermospindle.sim.running.whirl import whirling
 

@@ -18,8 +18,8 @@ from functools import cached_property
 import numpy as np
 
 from thermospindle.model.bearing.kinematics import Line, lines, row_kinematics
+from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.errors import BadInput
-from thermospindle.model.imperfections import Imperfections
 from thermospindle.model.machine import Point, Spindle
 from thermospindle.model.rotor.chain import RotorBase, motion_rows
 from thermospindle.model.shaft import Shaft

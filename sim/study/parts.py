@@ -18,8 +18,8 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from thermospindle.model import whole
 from thermospindle.model.errors import BadInput
+from thermospindle.model.files import whole
 from thermospindle.sim.study.executors import Executor
 
 KEY, PARTS, RESULTS = "study.json", "parts", "results.parquet"

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from thermospindle.model.drawn import GRADES, drawn
+from thermospindle.model.built.drawn import GRADES, drawn
+from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.errors import BadInput, NoEquilibrium, NotConverged, OutsideRange
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.modes import Mode
-from thermospindle.model.tolerance import toleranced
 from thermospindle.model.units import RPM, TO_UM
 from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.identification.pairing import follow

@@ -12,8 +12,8 @@ import numpy as np
 from tests.blind.hidden import Hidden
 from tests.blind.laws import REFERENCE
 from tests.blind.world import Answer, Plan, Record, World, answer, lowest
+from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition, Spindle
-from thermospindle.model.tolerance import toleranced
 from thermospindle.model.types import Array
 from thermospindle.sim.campaign.campaign import Campaign, Noise, Test
 from thermospindle.sim.identification.frf import Frf

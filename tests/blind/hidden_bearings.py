@@ -9,9 +9,9 @@ import numpy as np
 
 from tests.blind.hidden import Mechanism
 from thermospindle.model.bearing.pair import BearingState
+from thermospindle.model.built.tolerance import scaled_preload
 from thermospindle.model.machine import RingMotion, Spindle
 from thermospindle.model.rotor.chain import Element, RotorBase
-from thermospindle.model.tolerance import scaled_preload
 from thermospindle.model.types import Array
 
 OMEGA = 2 * np.pi * 1500.0  # rad/s, at which a loss factor becomes a damper

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from tests.blind.hidden import Mechanism
-from thermospindle.model.machine import MOVES, Body, Spindle
+from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import Element, RotorBase
+from thermospindle.model.structure import MOVES, Body
 
 OMEGA = 2 * np.pi * 1500.0  # rad/s, at which a loss factor becomes a damper
 

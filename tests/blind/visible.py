@@ -11,8 +11,8 @@ import numpy as np
 from tests.blind.campaigns import Made
 from tests.blind.hidden import Hidden
 from tests.blind.world import World, answer, modal_errors
+from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition, Spindle
-from thermospindle.model.tolerance import toleranced
 from thermospindle.model.types import Array, ComplexArray
 
 SMALL = 1e-4  # share of a size, of a tolerance and of a prior width, at which its change is taken for linear

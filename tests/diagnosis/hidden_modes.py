@@ -6,8 +6,8 @@ import numpy as np
 
 from thermospindle.diagnosis.data.observe import DAMPING_FLOOR, FREQUENCY_FLOOR, Observation
 from thermospindle.diagnosis.prediction.modes import predict
+from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition
-from thermospindle.model.tolerance import toleranced
 from thermospindle.sim.campaign.campaign import Test
 
 CONDITIONS = [(20.0, 0.0), (40.0, 754.0), (60.0, 0.0)]

@@ -9,10 +9,10 @@ from tests.conftest import DATA, SCENE
 from thermospindle.cli import main
 from thermospindle.diagnosis.add import answer_of
 from thermospindle.diagnosis.compare.before_after import held_out, without
+from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import build, content_hash, load
-from thermospindle.model.tolerance import toleranced
 from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Test
 from thermospindle.sim.effects import of_scene
 from thermospindle.sim.operating import operating_point
@@ -94,7 +94,7 @@ def test_values_by_hand_go_to_their_effect(add, tmp_path):
 
 
 def test_build_tolerances_are_in_the_numbers_of_the_scene(spindle, add, tmp_path):
-    """Each toleranced parameter applied by `model.tolerance`, and looked at directly; those of tests and channels stay behind."""
+    """Each toleranced parameter applied by `model.built.tolerance`, and looked at directly; those of tests and channels stay behind."""
     add("built", "preload_loss", "added_disk")
     built, expected = load(tmp_path / "built"), spindle
     for parameter in toleranced(spindle):

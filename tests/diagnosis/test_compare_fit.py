@@ -10,8 +10,8 @@ from thermospindle.diagnosis.compare.compare import compare
 from thermospindle.diagnosis.compare.fit import Free, fit
 from thermospindle.diagnosis.data.observe import observe
 from thermospindle.diagnosis.prediction.temperature import whitened
+from thermospindle.model.built.tolerance import deviated
 from thermospindle.model.machine import Addition
-from thermospindle.model.tolerance import deviated
 from thermospindle.sim.campaign.campaign import read_campaign
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.diagnosis.test_ladder import tables
+from tests.diagnosis.mode_tables import tables
 from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.forward.nuisance import GAIN, TEMPERATURE
 from thermospindle.diagnosis.forward.rates import STEP, rates_of

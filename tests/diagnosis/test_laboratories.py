@@ -13,8 +13,8 @@ import pytest
 from tests.conftest import SCENE
 from tests.virtual_campaign import drawn, noisy
 from thermospindle.cli import main
+from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition, Spindle
-from thermospindle.model.tolerance import toleranced
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.model.units import RPM
 from thermospindle.report.verbs import diagnose as verb

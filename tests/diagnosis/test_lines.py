@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from thermospindle.diagnosis.line_fit import chain_noise, fit_lines
+from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition
-from thermospindle.model.tolerance import toleranced
 from thermospindle.sim.hammer.test import impact_tests
 from thermospindle.sim.identification.frf import Frf
 from thermospindle.sim.operating import operating_point

@@ -15,11 +15,11 @@ from thermospindle.diagnosis.runout.compare import compare_runout, rms_residual
 from thermospindle.diagnosis.runout.lines import look
 from thermospindle.diagnosis.runout.next_test import next_runout
 from thermospindle.diagnosis.runout.verdict import RunoutDiagnosis, diagnose_runout
-from thermospindle.model.drawn import drawn
+from thermospindle.model.built.drawn import drawn
+from thermospindle.model.built.imperfections import Imperfections
+from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.errors import BadInput
-from thermospindle.model.imperfections import Imperfections
 from thermospindle.model.machine import Addition, Condition, Spindle
-from thermospindle.model.tolerance import toleranced
 from thermospindle.model.units import RPM
 from thermospindle.report.text.runout_diagnosis import runout_diagnosis_json
 from thermospindle.sim.campaign.campaign import Campaign, read_campaign, write_campaign

@@ -13,11 +13,11 @@ import pytest
 from scipy.linalg import eigh
 
 from tests.literature.calculix import deck, solved
-from thermospindle.model.machine import Structure
 from thermospindle.model.rotor.beam import with_shafts
 from thermospindle.model.rotor.chain import RotorBase, joint_element, matrices
 from thermospindle.model.scene.reading import load
 from thermospindle.model.shaft import THEORIES
+from thermospindle.model.structure import Structure
 
 CCX = shutil.which("ccx")
 FINE = {  # Hz, elements of 15 and 12 mm along the shaft

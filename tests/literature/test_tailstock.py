@@ -13,11 +13,11 @@ import pytest
 from tests.conftest import ROOT
 from thermospindle.cli import main
 from thermospindle.model.bearing.roller import respond, roller_row, roller_state
+from thermospindle.model.built.tolerance import deviated, toleranced
 from thermospindle.model.errors import OutsideRange
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.static import static
 from thermospindle.model.scene.reading import load, shipped_rows
-from thermospindle.model.tolerance import deviated, toleranced
 from thermospindle.model.units import RPM
 from thermospindle.report.log.content import bearing_series
 from thermospindle.report.page.report import bearing_figures

@@ -7,11 +7,12 @@ import pytest
 from scipy.linalg import eigh
 from scipy.optimize import brentq
 
-from thermospindle.model.machine import Law, Material, Structure
+from thermospindle.model.machine import Law, Material
 from thermospindle.model.rotor.beam import elements, nodes, shear_factor, with_shafts, with_theory
 from thermospindle.model.rotor.chain import RotorBase, joint_element, matrices, motion_rows
 from thermospindle.model.rotor.static import displacement
 from thermospindle.model.shaft import Segment, Shaft, mesh
+from thermospindle.model.structure import Structure
 
 E, NU, RHO = 207e9, 0.3, 7850.0
 STEEL = {"steel": Material("steel", Law((0.0,), (E,)), NU, Law((0.0,), (1e-5,)), RHO, 46.0, 460.0)}

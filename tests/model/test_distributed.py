@@ -11,11 +11,11 @@ from scipy.linalg import eigh
 
 from tests.model.test_beam import EULER, RHO, STEEL, E, shaft
 from tests.model.test_beam import frequencies as at_nodes
-from thermospindle.model.machine import Structure
 from thermospindle.model.rotor.beam import with_shafts
 from thermospindle.model.rotor.chain import Element, RotorBase, joint_element, matrices
 from thermospindle.model.rotor.distributed import spread
 from thermospindle.model.shaft import Shaft
+from thermospindle.model.structure import Structure
 
 
 def whole(s: Shaft, spring: float = 0.0, speed: float = 0.0):

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thermospindle.model.drawn import GRADES, drawn
+from thermospindle.model.built.drawn import GRADES, drawn
+from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave, waves
 from thermospindle.model.errors import BadInput
-from thermospindle.model.imperfections import Imperfections, RowImperfections, Wave, waves
 from thermospindle.model.scene.reading import build, content_hash, load
 
 FILE = Path(__file__).parents[2] / "scenes" / "hdd_2003" / "spindle.toml"

@@ -8,12 +8,13 @@ import pytest
 
 from tests.mounting import sprung
 from thermospindle.model.bearing.pair import reference_motion, solve
-from thermospindle.model.machine import Body, Condition
+from thermospindle.model.built.tolerance import toleranced
+from thermospindle.model.machine import Condition
 from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.chain import Element, RotorBase, matrices, rotor_base
 from thermospindle.model.rotor.elements import ELEMENTS
 from thermospindle.model.rotor.modes import frf, group_energy, modes, point_rows, poles
-from thermospindle.model.tolerance import toleranced
+from thermospindle.model.structure import Body
 from thermospindle.model.units import RPM
 from thermospindle.sim.operating import operating_point
 

@@ -9,7 +9,7 @@ import pyarrow as pa
 import pytest
 
 from thermospindle.model.errors import BadInput
-from thermospindle.model.whole import whole
+from thermospindle.model.files.whole import whole
 from thermospindle.sim.study.parts import opened, write_table
 
 ROOT = Path(__file__).parents[2]
@@ -47,7 +47,7 @@ def test_the_old_or_the_new_one_can_be_had_after_a_kill(tmp_path, when):
     script = f"""
 import os, signal, sys
 from pathlib import Path
-from thermospindle.model import whole
+from thermospindle.model.files import whole
 replace, moves = os.replace, []
 def counted(*paths):
     moves.append(paths)

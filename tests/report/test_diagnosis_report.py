@@ -20,9 +20,9 @@ from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.prediction.next_test import ModePrediction, NextTest
 from thermospindle.diagnosis.runout.verdict import diagnose_runout
+from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import content_hash, load
-from thermospindle.model.tolerance import toleranced
 from thermospindle.model.units import RPM
 from thermospindle.report.figures.diagnosis import errors, explanations, law
 from thermospindle.report.page.diagnosis import sections, write_diagnosis

@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from thermospindle.cli import main
 from thermospindle.model.bearing.kinematics import row_kinematics
+from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.errors import BadInput
-from thermospindle.model.imperfections import Imperfections
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import TO_MM
 from thermospindle.report.figures.runout import RANGE, polar_figure, waterfall_figure

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import SCENE
-from thermospindle.model.imperfections import Imperfections
+from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.report.page import whole_report
 from thermospindle.report.page.whole_report import climbed, more_sections, steps, turning
 from thermospindle.sim.campaign.campaign import Test, read_campaign

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from thermospindle.model.built.tolerance import scaled_preload
 from thermospindle.model.machine import Condition, Spindle
-from thermospindle.model.tolerance import scaled_preload
 from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values, chosen, which_parameter
 
 RISE = 40.0

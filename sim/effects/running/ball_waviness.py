@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from thermospindle.model.imperfections import Imperfections, Wave
+from thermospindle.model.built.imperfections import Imperfections, Wave
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values, bearing_parameter
 from thermospindle.sim.effects.running.race_waviness import bearing

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from math import radians
 
-from thermospindle.model.imperfections import Imperfections
+from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values, bearing_parameter, phase_parameter
 from thermospindle.sim.effects.running.race_waviness import bearing

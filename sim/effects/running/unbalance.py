@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from math import radians
 
-from thermospindle.model.imperfections import Imperfections
+from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.units import RPM
 from thermospindle.sim.effects.effect import TURNING, Effect, Parameter, Values, mass_ratio, phase_parameter

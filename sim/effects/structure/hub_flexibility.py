@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from thermospindle.model.machine import Body, Condition, Spindle
+from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import Element, RotorBase
+from thermospindle.model.structure import Body
 from thermospindle.sim.effects.bearing.bond_softening import in_series
 from thermospindle.sim.effects.effect import Effect, Parameter, Values, mass_ratio
 from thermospindle.sim.effects.roles import body, lacking

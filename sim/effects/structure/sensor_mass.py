@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from thermospindle.model.machine import Body, Condition, Point, Spindle
+from thermospindle.model.machine import Condition, Point, Spindle
+from thermospindle.model.structure import Body
 from thermospindle.sim.effects.effect import Effect, Parameter, Values, mass_ratio
 from thermospindle.sim.effects.roles import with_mass
 

@@ -22,8 +22,8 @@ from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.inference.screening import linearised, screen
 from thermospindle.diagnosis.inference.search import search
 from thermospindle.diagnosis.inference.singles import HIDING, cost_of, fit_singles, lasting
+from thermospindle.model.built.tolerance import deviated
 from thermospindle.model.machine import Condition
-from thermospindle.model.tolerance import deviated
 from thermospindle.model.units import RPM
 
 TESTS = (Condition(20.0), Condition(40.0), Condition(60.0))

@@ -12,9 +12,9 @@ import pytest
 
 from tests.made_campaign import FREQUENCY, POINTS, campaign, rotor_frf
 from thermospindle.model.errors import BadInput
+from thermospindle.model.files.whole import NEW
 from thermospindle.model.scene.reading import SCENES, load
 from thermospindle.model.units import RPM
-from thermospindle.model.whole import NEW
 from thermospindle.sim.campaign.campaign import Campaign, Test, read_campaign, write_campaign
 from thermospindle.sim.campaign.form import in_unit
 from thermospindle.sim.campaign.uff import read_frf, write_frf
@@ -142,7 +142,7 @@ def test_old_campaign_comes_back_when_the_new_one_cannot_be_moved(folder: Path, 
             raise OSError("moving is refused")
         move(path, target)
 
-    monkeypatch.setattr("thermospindle.model.whole.os.replace", refuse_new)
+    monkeypatch.setattr("thermospindle.model.files.whole.os.replace", refuse_new)
     with pytest.raises(OSError, match="moving"):
         write_campaign(campaign(title="other"), folder, replace=True)
     assert read_campaign(folder) == campaign()

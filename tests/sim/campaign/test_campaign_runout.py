@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import pyuff
 
+from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.errors import BadInput
-from thermospindle.model.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.machine import Condition, Point
 from thermospindle.model.units import RPM
 from thermospindle.sim.campaign.campaign import Campaign, Test, read_campaign, write_campaign

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from tests.effect_points import REST, RUNNING, at
-from thermospindle.model.machine import Body, Condition
+from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.chain import Element, RotorBase, matrices, motion_rows
 from thermospindle.model.rotor.modes import modes, poles
+from thermospindle.model.structure import Body
 from thermospindle.model.units import RPM
 from thermospindle.sim.effects.structure import added_disk, hub_flexibility, sensor_mass
 from thermospindle.sim.operating import operating_point

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from thermospindle.model.bearing.kinematics import row_kinematics
-from thermospindle.model.imperfections import Imperfections
+from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.chain import motion_rows
 from thermospindle.model.units import RPM

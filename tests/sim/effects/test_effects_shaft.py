@@ -8,9 +8,10 @@ import pytest
 from scipy.integrate import quad
 
 from tests.effect_points import REST, RUNNING, at
-from thermospindle.model.machine import Body, Condition
+from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.chain import Element, RotorBase, matrices
 from thermospindle.model.rotor.modes import modes, poles
+from thermospindle.model.structure import Body
 from thermospindle.sim.effects.roles import in_series
 from thermospindle.sim.effects.structure import added_disk, shaft_bending, support_anisotropy
 from thermospindle.sim.effects.structure.shaft_bending import Piece

@@ -8,9 +8,10 @@ from scipy.special import jn_zeros
 
 from tests.effect_points import REST, at
 from thermospindle.model.bearing.pair import contact_constants
-from thermospindle.model.machine import Body, Condition, Law
+from thermospindle.model.machine import Condition, Law
 from thermospindle.model.rotor.chain import Element, RotorBase, matrices
 from thermospindle.model.rotor.modes import modes, poles
+from thermospindle.model.structure import Body
 from thermospindle.sim.effects.structure import (
     added_disk,
     flange_fit_loosening,

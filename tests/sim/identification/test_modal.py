@@ -23,9 +23,9 @@ from tests.sim.identification.matrices import (
     sensors,
     spindle,
 )
+from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
-from thermospindle.model.tolerance import toleranced
 from thermospindle.model.units import RPM
 from thermospindle.sim.identification.modal import extract, merge, noise_model, scatter
 from thermospindle.sim.identification.pairing import mac

@@ -175,7 +175,7 @@ def test_sense_of_a_nearly_standing_mode(spindle):
 
 
 def test_without_imperfections_a_plausible_set_is_drawn(spindle):
-    from thermospindle.model.imperfections import Imperfections
+    from thermospindle.model.built.imperfections import Imperfections
 
     plain = resonance_map(replace(spindle, imperfections=Imperfections()), [20.0, 60.0], [0.0, 14400 * RPM], NOMINAL)
     assert plain.drawn_from == 0

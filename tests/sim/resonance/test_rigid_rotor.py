@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from thermospindle.model.machine import Body, Condition
+from thermospindle.model.machine import Condition
+from thermospindle.model.structure import Body
 from thermospindle.model.units import RPM
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.resonance.map import resonance_map

@@ -8,8 +8,8 @@ import pytest
 
 from thermospindle.model.bearing.ball_row import BallInertia, displacement_under, kinematics, respond
 from thermospindle.model.bearing.kinematics import Kinematics, lines, row_kinematics
-from thermospindle.model.drawn import drawn
-from thermospindle.model.imperfections import Imperfections, RowImperfections, Wave
+from thermospindle.model.built.drawn import drawn
+from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.machine import Addition, Condition
 from thermospindle.model.rotor.chain import matrices, motion_rows
 from thermospindle.sim.effects import by_name

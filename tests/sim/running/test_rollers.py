@@ -8,7 +8,7 @@ from tests.conftest import ROOT
 from thermospindle.cli import main
 from thermospindle.model.bearing.kinematics import row_kinematics
 from thermospindle.model.bearing.roller import roller_state
-from thermospindle.model.imperfections import RowImperfections, Wave
+from thermospindle.model.built.imperfections import RowImperfections, Wave
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM

@@ -8,9 +8,9 @@ import pytest
 from scipy.signal import hilbert
 
 from tests.mounting import turning_inside
-from thermospindle.model.drawn import drawn
+from thermospindle.model.built.drawn import drawn
+from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.errors import BadInput
-from thermospindle.model.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
 from thermospindle.sim.operating import OperatingPoint, operating_point

@@ -13,9 +13,9 @@ import pytest
 from tests.mounting import turning_inside
 from thermospindle.cli import main
 from thermospindle.model.bearing.kinematics import row_kinematics
-from thermospindle.model.drawn import drawn
+from thermospindle.model.built.drawn import drawn
+from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.errors import BadInput
-from thermospindle.model.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.chain import motion_rows
 from thermospindle.model.scene.reading import load

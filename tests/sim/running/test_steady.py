@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.errors import BadInput
-from thermospindle.model.imperfections import Imperfections
 from thermospindle.model.machine import Condition
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.running.runout import hub_probes, linear, runout

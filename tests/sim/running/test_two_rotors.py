@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from thermospindle.cli import main
+from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.errors import OutsideRange
-from thermospindle.model.imperfections import Imperfections
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.mjcf import linearise
 from thermospindle.model.scene.reading import load

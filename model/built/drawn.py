@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from thermospindle.model.imperfections import Imperfections, RowImperfections, Wave
+from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.machine import Spindle
 from thermospindle.model.types import Array
 

@@ -11,8 +11,9 @@ import scipy
 from thermospindle.model.bearing.hertz import in_series
 from thermospindle.model.bearing.pair import contact_constants, reference_deformation, reference_motion
 from thermospindle.model.errors import BadInput, NoEquilibrium
-from thermospindle.model.machine import MOVES, Body, Joint, Spindle
+from thermospindle.model.machine import Spindle
 from thermospindle.model.shaft import Shaft
+from thermospindle.model.structure import MOVES, Body, Joint
 
 
 @dataclass(frozen=True)

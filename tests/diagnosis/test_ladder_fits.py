@@ -1,0 +1,76 @@
+"""The ladder's fits: forms compared, tests left out, effects that the scene has."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.diagnosis.mode_tables import tables
+from thermospindle.diagnosis.decision.conditions import conditions_of
+from thermospindle.diagnosis.ladder.fitting import FREE, predicted_squares, settled, unseen, without
+from thermospindle.diagnosis.ladder.forms import FORMS
+from thermospindle.diagnosis.ladder.ladder import CLEAR, DISCREPANCY, ladder
+from thermospindle.diagnosis.ladder.step import as_drawn
+from thermospindle.diagnosis.verdict import campaign_data
+from thermospindle.model.errors import BadInput
+from thermospindle.model.machine import Addition, Law
+from thermospindle.sim.effects import by_name
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("true", [FORMS[0], FORMS[2]], ids=lambda form: form.name)
+def test_the_form_that_made_the_data_leads(spindle, true):
+    """With all tolerances free, either way round: the comparison has no favourite."""
+    found = ladder(spindle, tables(spindle, true.applied), ())
+    ranked = sorted(found.forms, key=lambda f: -f[3])
+    assert ranked[0][0] == true.name
+    assert ranked[0][3] > ranked[1][3] + CLEAR
+    assert ranked[0][1] < 1.5
+
+
+def test_a_temperature_left_out_is_not_in_the_fit_that_predicts_it(spindle):
+    """Frequencies at 60 C wrong by a twentieth leave the fit to 20 C as it was, to the last bit, and are missed by all of it."""
+    plain = tables(spindle, ())
+    cold, hot = plain.tests
+    wrong = replace(plain, tests=(cold, replace(hot, modes=tuple(replace(m, frequency=1.05 * m.frequency) for m in hot.modes))))
+    found = []
+    for campaign in (plain, wrong):
+        model = without(campaign_data(spindle, campaign), FREE)
+        assert conditions_of(spindle, model.tests) == [[0], [1]]
+        blind = settled(unseen(model, [1]))
+        found.append((blind.fit.point, *predicted_squares(blind, model.tests, [1])))
+    assert np.array_equal(found[0][0], found[1][0])
+    assert found[0][2] == found[1][2] == 8
+    assert found[0][1] < 25
+    assert found[1][1] > 100 * 8
+
+
+def test_a_mean_where_no_spindle_can_be_built_predicts_nothing(spindle):
+    """Laws from 20 to 60 C, tests at both ends: a learned mean that has the chamber at 19.7 C is none to predict the other test from; the fit itself serves."""
+    steel = spindle.materials["steel"]
+    ending = replace(steel, thermal_expansion=Law((20.0, 60.0), (11.5e-6, 11.5e-6)))
+    measured = replace(spindle, materials={**spindle.materials, "steel": ending})
+    model = without(campaign_data(measured, tables(measured, ())), FREE)
+    blind = settled(unseen(model, [1]))
+    colder = np.where(np.arange(len(blind.fit.point)) == model.temperature[0], -1.0, blind.evidence.mean)
+    outside = replace(blind, evidence=replace(blind.evidence, mean=colder))
+    assert np.array_equal(outside.posterior[0], outside.fit.point)
+    assert predicted_squares(outside, model.tests, [1])[1] == 8
+
+
+@pytest.mark.slow
+def test_effects_of_the_scene_stand_on_every_step(spindle):
+    """A scene that has the effect already: nothing is missing, and it cannot be added again."""
+    values = {"hub_share": 0.2}
+    soak = by_name("soak_lag")
+    equipped = replace(spindle, effects=(Addition("soak_lag", soak.neutral() | values),))
+    campaign = tables(spindle, [(soak, soak.neutral() | values)])
+    found = ladder(equipped, campaign, ())
+    assert found.step("axial equilibrium").error < 2
+    assert found.step(DISCREPANCY).effects == ()
+    bare = replace(found.model, present=())
+    assert as_drawn(bare, found.measured, "without it", ()).error > 100
+    with pytest.raises(BadInput, match=r"--effects soak_lag: is in scene hdd_2003 already"):
+        ladder(equipped, campaign, [soak])
+    with pytest.raises(BadInput, match=r"--effects soak_lag: is named twice"):
+        ladder(spindle, campaign, [soak, soak])
