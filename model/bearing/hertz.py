@@ -7,10 +7,15 @@ Lubrication* (1981), ch. 3; only the ellipticity equation is solved numerically,
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
+from math import exp, expm1, isfinite, log
 
 import numpy as np
 import scipy
+
+NEARLY_ROUND = 1e-3  # of ln k, below which the quotient cancels, and ln k is proportional to the difference
+FLATTEST, KNOTS = 17.0, 60  # of ln k, which it is at most; and how many of it a first guess is made from
+MOST_STEPS, ENOUGH = 6, 1e-8  # of Newton's method, whose next step is the square of the last
 
 
 @dataclass(frozen=True)
@@ -38,16 +43,37 @@ def ellipticity(curvature_difference: float) -> float:
     if not 0 <= curvature_difference < 1:
         raise ValueError(f"curvature difference {curvature_difference:g} is outside [0, 1)")
 
-    def difference(log_k: float) -> float:
-        k2 = np.exp(2 * log_k)
-        m = -np.expm1(-2 * log_k)
-        e = scipy.special.ellipe(m)
-        return float(((k2 + 1) * e - 2 * scipy.special.ellipkm1(1 / k2)) / ((k2 - 1) * e))
+    nearly_round, _ = _difference(NEARLY_ROUND)
+    if curvature_difference <= nearly_round:
+        return exp(NEARLY_ROUND * curvature_difference / nearly_round)
+    log_k = exp(float(_guess()(log(1 - curvature_difference))))
+    if not isfinite(log_k):
+        raise ValueError(f"curvature difference {curvature_difference!r} is of a contact flatter than exp({FLATTEST:g})")
+    for _ in range(MOST_STEPS):
+        found, slope = _difference(log_k)
+        step = (curvature_difference - found) / slope
+        log_k += step
+        if abs(step) < ENOUGH * log_k:
+            break
+    return exp(log_k)
 
-    nearly_round = 1e-3  # below this the quotient cancels, and log k is proportional to the difference
-    if curvature_difference <= difference(nearly_round):
-        return float(np.exp(nearly_round * curvature_difference / difference(nearly_round)))
-    return float(np.exp(scipy.optimize.brentq(lambda log_k: difference(log_k) - curvature_difference, nearly_round, 17.0, xtol=1e-14, rtol=1e-14)))
+
+def _difference(log_k: float) -> tuple[float, float]:
+    """Curvature difference F of the ellipticity k and its derivative by ln k; those of K and E by the parameter are Abramowitz & Stegun, 17.3.29 to 30's."""
+    k2, m = exp(2 * log_k), -expm1(-2 * log_k)
+    first, second = float(scipy.special.ellipkm1(1 / k2)), float(scipy.special.ellipe(m))
+    quotient = first / second
+    found = (k2 + 1 - 2 * quotient) / (k2 - 1)
+    by_first, by_second = (second - first / k2) / m, (second - first) / (m * k2)  # by ln k
+    slope = 2 * (k2 - (by_first - quotient * by_second) / second) / (k2 - 1) - 2 * k2 * found / (k2 - 1)
+    return found, slope
+
+
+@cache
+def _guess() -> scipy.interpolate.CubicSpline:
+    """ln ln k over ln(1 - F), right to 2e-4, from where Newton's method takes two steps."""
+    log_k = np.geomspace(NEARLY_ROUND, FLATTEST, KNOTS)
+    return scipy.interpolate.CubicSpline([log(1 - _difference(float(v))[0]) for v in log_k[::-1]], np.log(log_k[::-1]), extrapolate=False)
 
 
 @lru_cache(maxsize=4096)
