@@ -258,14 +258,15 @@ class CampaignModel:
         columns = self.reference.over(dofs)[:, : len(resonance.shares)]
         return Light(columns, np.array(resonance.shares), 2 * np.pi * resonance.frequency, resonance.damping)
 
-    def by_products_of_shares(self, t: int, x: Array, effects: Applied, resonance: Resonance) -> Array:
-        """Derivatives (k, N) of the residual of test `t` by the products of two shares each of a light resonance that is not there yet."""
-        linear = self.linear(t, x, effects)
-        light = self._light(linear.matrices.dofs, resonance)
+    def by_products_of_shares(self, t: int, x: Array, effects: Applied, modes: int) -> tuple[ComplexArray, ComplexArray]:
+        """Derivatives (k, channels, L) of the FRFs of test `t`, in standard errors, by the products of two shares each, in the first reference `modes`, of a light resonance
+        that is not there yet and felt as a mass of -1 / s^2; and s (L,)."""
+        linear, data = self.linear(t, x, effects), self.tests[t]
         answer = self._standing(t, x, effects, linear)
         assert isinstance(answer, Response)
-        moved = answer.by_products_of_shares(light, *np.triu_indices(len(resonance.shares)))
-        return np.array([self.whitened(t, m, 0.0) for m in moved])
+        assert isinstance(data, LineData)
+        moved = answer.by_products_of_shares(self.reference.over(linear.matrices.dofs)[:, :modes], *np.triu_indices(modes)) * (np.sqrt(2) / data.sd)
+        return moved.reshape(len(moved), -1, moved.shape[-1]), answer.s
 
     def with_resonance(self, resonance: Resonance) -> CampaignModel:
         """With one light resonance more, whose parameters follow all others."""

@@ -139,22 +139,22 @@ class Response:
 
     def by_light(self, light: Light) -> ComplexArray:
         """Derivatives (k + 2, n_resp, n_ref, L) by the shares of a light resonance, its ln frequency and its ln damping."""
-        left, right = self._modal(light)
+        left, right = self._modal(light.columns)
         felt = -light.felt(self.s)
         own_left, own_right = np.tensordot(light.shares, left, 1), np.tensordot(light.shares, right, 1)
         shares = felt[0] * (left[:, :, None] * own_right[None, None] + own_left[None, :, None] * right[:, None])
         whole = own_left[:, None] * own_right[None]
         return np.concatenate([shares, (felt[1:, None, None] * whole)])
 
-    def by_products_of_shares(self, light: Light, rows: Integers, columns: Integers) -> ComplexArray:
-        """Derivatives (k, n_resp, n_ref, L) by products of two shares each, what they are."""
-        left, right = self._modal(light)
-        found = left[rows][:, :, None] * right[columns][:, None] + left[columns][:, :, None] * right[rows][:, None]
-        return -light.felt(self.s)[0] * np.where(rows == columns, 0.5, 1.0)[:, None, None, None] * found
+    def by_products_of_shares(self, columns: Array, rows: Integers, others: Integers) -> ComplexArray:
+        """Derivatives (k, n_resp, n_ref, L) by products of two shares each of light resonances on `columns` (n, m), for one that is felt as a mass of -1 / s^2."""
+        left, right = self._modal(columns)
+        found = left[rows][:, :, None] * right[others][:, None] + left[others][:, :, None] * right[rows][:, None]
+        return np.where(rows == others, 0.5, 1.0)[:, None, None, None] * found
 
-    def _modal(self, light: Light) -> tuple[ComplexArray, ComplexArray]:
-        """What responses read of a force on each of a light resonance's columns (k, n_resp, L), and how references move these (k, n_ref, L)."""
-        of = self.over(light.columns)
+    def _modal(self, columns: Array) -> tuple[ComplexArray, ComplexArray]:
+        """What responses read of a force on each of a light resonance's `columns` (k, n_resp, L), and how references move these (k, n_ref, L)."""
+        of = self.over(columns)
         return _over(of, self._read), _over(of, self._driven)
 
     def moved(self, by: Products) -> ComplexArray:

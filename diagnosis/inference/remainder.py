@@ -15,11 +15,12 @@ import numpy as np
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.forward.nuisance import SHARE_SD, Resonance
+from thermospindle.diagnosis.forward.response import Light
 from thermospindle.diagnosis.inference.fit import Fit
 from thermospindle.diagnosis.inference.prior import Learned
-from thermospindle.diagnosis.inference.problem import Linearisation, Problem
+from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.inference.screening import linearised
-from thermospindle.model.types import Array
+from thermospindle.model.types import Array, ComplexArray
 
 LAGS, SMALL = 12, 0.05  # lines over which residuals are compared, and the correlation that chance makes
 LOOKED = 0.2  # correlation from which a light resonance is looked for
@@ -89,14 +90,23 @@ def light_resonance(model: CampaignModel, about: Fit, learned: Learned) -> tuple
     inverse = np.asarray(np.linalg.inv(problem.precision + at.information), float)
     low, high = min(float(f.min()) for f in lines), max(float(f.max()) for f in lines)
     grid = np.geomspace(low, high, int(np.log(high / low) / SPACING) + 1)
-    rows, seen = [], model.reference.seen
-    for frequency in grid:
-        resonance = Resonance(float(frequency), DAMPING, (0.0,) * seen)
-        columns = [
-            SHARE_SD**2 * model.by_products_of_shares(t, x, effects[t], resonance) if isinstance(d, LineData) else None for t, d in enumerate(model.tests)
-        ]
-        products, gain = _promised(columns, at, inverse, gradient, learned.errors)
-        rows.append((gain, resonance.frequency, SHARE_SD**2 * products))
+    seen = model.reference.seen
+    lights = [Light(np.zeros((0, 0)), np.zeros(0), 2 * np.pi * float(f), DAMPING) for f in grid]
+    k = seen * (seen + 1) // 2
+    cross, square, slope = np.zeros((len(grid), len(inverse), k)), np.zeros((len(grid), k, k)), np.zeros((len(grid), k))
+    for t, d in enumerate(model.tests):
+        if isinstance(d, LineData):
+            residual, derivatives, numbers = at.rows[t]
+            moved, s = model.by_products_of_shares(t, x, effects[t], seen)
+            felt = np.array([-SHARE_SD**2 * light.felt(s)[0] for light in lights])
+            of_cross, of_square, of_slope = by_frequency(moved, felt, residual, derivatives)
+            cross[:, numbers] += of_cross
+            square += of_square
+            slope += of_slope
+    rows = []
+    for frequency, of_cross, of_square, of_slope in zip(grid, cross, square, slope, strict=True):
+        products, gain = _promised(of_cross, of_square, of_slope, inverse, gradient, learned.errors)
+        rows.append((gain, float(frequency), SHARE_SD**2 * products))
     gain, frequency, products = max(rows, key=lambda row: row[0])
     matrix = np.zeros((seen, seen))
     matrix[np.triu_indices(seen)] = products
@@ -106,17 +116,23 @@ def light_resonance(model: CampaignModel, about: Fit, learned: Learned) -> tuple
     return Resonance(frequency, DAMPING, tuple(shares.tolist())), gain - float(np.log(len(rows)))
 
 
-def _promised(columns: Sequence[Array | None], at: Linearisation, inverse: Array, gradient: Array, errors: float) -> tuple[Array, float]:
-    """Parameters (k,) of prior width one whose derivatives (k, N) in every test are `columns`, None where it has none; and the ln evidence that
-    they would gain."""
-    k = next(len(c) for c in columns if c is not None)
-    cross, square, slope = np.zeros((len(inverse), k)), np.zeros((k, k)), np.zeros(k)
-    for column, (residual, derivatives, numbers) in zip(columns, at.rows, strict=True):
-        if column is not None:
-            cross[numbers] += derivatives @ column.T
-            square += column @ column.T
-            slope += column @ residual
-    information = (square - cross.T @ inverse @ cross) / errors**2 + np.eye(k)
+def by_frequency(moved: ComplexArray, felt: ComplexArray, residual: Array, derivatives: Array) -> tuple[Array, Array, Array]:
+    """Of columns that are the real and imaginary parts of `moved` (k, channels, L) times each of `felt` (F, L): their products with `derivatives` (n, N), (F, n, k), among
+    themselves (F, k, k), and with the `residual` (N,), (F, k). What is felt is the same for all channels of a line, so that these are summed up once."""
+    k, channels, lines = moved.shape
+    every = np.concatenate([derivatives, residual[None]]).reshape(-1, 2, channels, lines)
+    by_line = np.moveaxis(moved, -1, 0)  # (L, k, channels)
+    turned = np.moveaxis(every[:, 0] - 1j * every[:, 1], -1, 0)  # (L, n + 1, channels)
+    with_each = (turned @ by_line.swapaxes(1, 2)).reshape(lines, -1)
+    among = (by_line @ by_line.conj().swapaxes(1, 2)).real.reshape(lines, -1)
+    found = (felt @ with_each).real.reshape(len(felt), -1, k)
+    return found[:, :-1], (np.abs(felt) ** 2 @ among).reshape(len(felt), k, k), found[:, -1]
+
+
+def _promised(cross: Array, square: Array, slope: Array, inverse: Array, gradient: Array, errors: float) -> tuple[Array, float]:
+    """Parameters (k,) of prior width one whose derivatives, over all tests, make `cross` (n, k) with those of the model's parameters, `square` (k, k) among themselves and `slope`
+    (k,) with the residual; and the ln evidence that they would gain."""
+    information = (square - cross.T @ inverse @ cross) / errors**2 + np.eye(len(slope))
     left = (slope - cross.T @ inverse @ gradient) / errors**2
     found = np.asarray(-np.linalg.solve(information, left), float)
     return found, float(-0.5 * left @ found - 0.5 * np.linalg.slogdet(information)[1])

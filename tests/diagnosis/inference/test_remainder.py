@@ -14,6 +14,7 @@ from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
+from thermospindle.diagnosis.inference.remainder import by_frequency
 from thermospindle.diagnosis.inference.resonance import shown, with_resonance
 from thermospindle.diagnosis.verdict import diagnose
 from thermospindle.model.machine import Condition
@@ -88,6 +89,18 @@ def test_where_nothing_is_left_none_is_found(spindle):
     plain = model_of(spindle, virtual_campaign(spindle, TESTS, 5, (), drawn(spindle, 3, 5), responses=(1, 3, 6), frequency=FREQUENCY))
     first = fit(plain)
     assert with_resonance(plain, Hypothesis(first, evidence(plain, first))) is None
+
+
+def test_sums_over_channels_are_those_of_whole_columns():
+    random = np.random.default_rng(4)
+    moved, felt = (random.standard_normal((*n, 2)) @ [1, 1j] for n in ((6, 4, 9), (3, 9)))
+    derivatives, residual = random.standard_normal((5, 72)), random.standard_normal(72)
+    cross, square, slope = by_frequency(moved, felt, residual, derivatives)
+    for f, *found in zip(felt, cross, square, slope, strict=True):
+        whole = (f * moved).reshape(6, -1)
+        columns = np.concatenate([whole.real, whole.imag], axis=1)
+        for one, other in zip(found, (derivatives @ columns.T, columns @ columns.T, columns @ residual), strict=True):
+            assert one == pytest.approx(other, abs=1e-12)
 
 
 def test_derivatives_by_its_parameters(model):
