@@ -1,15 +1,16 @@
 """The forward model of a campaign: what the spindle, its tolerances and effects make of every number measured, with exact derivatives.
 
-=========  ========================================================================================================
-nuisance   build tolerances, measuring errors, and the model's own constant discrepancy
-mechanism  what an effect changes, and its law as a prior over conditions
-linear     one test's linear model, and how its matrices change with parameters
-response   FRFs at the lines of a test, with what their derivatives need
-record     what records that end too early leave out of them
-table      poles and their derivatives for a table of modes
-rates      how the matrices change with tolerances, temperature and ring expansion
-points     operating points that differ in the measuring chain alone, or in how far the rings expand
-model      residuals of every test in standard errors, and their derivatives
-making     the model of a campaign made: scenes, tolerances, nuisance parameters
-=========  ========================================================================================================
+===========  ========================================================================================================
+nuisance     build tolerances, measuring errors, and the model's own constant discrepancy
+mechanism    what an effect changes, and its law as a prior over conditions
+linear       one test's linear model, and how its matrices change with parameters
+response     FRFs at the lines of a test, with what their derivatives need
+record       what records that end too early leave out of them
+table        poles and their derivatives for a table of modes
+rates        how the matrices change with tolerances, temperature and ring expansion
+points       operating points that differ in the measuring chain alone, or in how far the rings expand
+model        residuals of every test in standard errors
+derivatives  of these, by nuisance parameters, by what lists of effects differ in, by light resonances
+making       the model of a campaign made: scenes, tolerances, nuisance parameters
+===========  ========================================================================================================
 """

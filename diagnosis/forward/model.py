@@ -1,8 +1,6 @@
-"""The model of a campaign: residuals of every test in standard errors, and their derivatives, for any nuisance values and effects.
+"""The model of a campaign: residuals of every test in standard errors, for any nuisance values and effects.
 
-The receptance between hammers B and points A is A D(s)^-1 B^T with D = s^2 M + s C + K, and - s^4 N of shafts whose mass is spread. Everything that moves matrices alone has the exact
-derivative -A D^-1 (s^2 dM + s dC + dK) D^-1 B^T, so that one factorisation a line serves all parameters; what also moves rows, gains or
-delays is differenced. Structure enters K, C and M in proportion: these derivatives are taken once.
+The receptance between hammers B and points A is A D(s)^-1 B^T with D = s^2 M + s C + K, and - s^4 N of shafts whose mass is spread.
 """
 
 from __future__ import annotations
@@ -16,7 +14,7 @@ import numpy as np
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.mode_table import ModeData
 from thermospindle.diagnosis.forward import nuisance as kinds_of
-from thermospindle.diagnosis.forward.linear import Linear, Products, Rates, pairs, products, same_chain, together
+from thermospindle.diagnosis.forward.linear import Linear
 from thermospindle.diagnosis.forward.nuisance import Nuisance, ReferenceModes, Resonance
 from thermospindle.diagnosis.forward.points import Applied, apart, replace_measuring, stretched
 from thermospindle.diagnosis.forward.response import Light, Response
@@ -105,7 +103,7 @@ class CampaignModel:
         return [next(i for i, p in enumerate(self.parameters) if p.kind == kinds_of.TEMPERATURE and p.test == t) for t in range(len(self.tests))]
 
     @cached_property
-    def _discrepancies(self) -> list[tuple[Discrepancies, Discrepancies]]:
+    def discrepancies(self) -> list[tuple[Discrepancies, Discrepancies]]:
         """For every test, of stiffness and of damping: parameter numbers, first and second mode of each, and its factor in the modal matrix."""
         found = []
         omega, damping = self.reference.omega, np.sqrt(2 * self.reference.damping * self.reference.omega)
@@ -123,7 +121,7 @@ class CampaignModel:
         return found
 
     @cached_property
-    def _gains(self) -> list[tuple[Integers, Integers]]:
+    def gains(self) -> list[tuple[Integers, Integers]]:
         """For every test the numbers of gain parameters and the channel of each."""
         found = []
         for t in range(len(self.tests)):
@@ -137,7 +135,7 @@ class CampaignModel:
         return found
 
     @cached_property
-    def _channel_of(self) -> list[Integers]:
+    def channel_of(self) -> list[Integers]:
         """For every test the channel of each row: a sensor keeps its gain at whichever row it is."""
         nodes = [d.sensors if isinstance(d, LineData) else () for d in self.tests]
         number = {node: c for c, node in enumerate(dict.fromkeys(node for own in nodes for node in own))}
@@ -210,7 +208,7 @@ class CampaignModel:
     def _discrepancy(self, t: int, linear: Matrices, x: Array) -> tuple[Array, Array]:
         w = self.reference.over(linear.dofs)
         added = []
-        for number, i, j, size in self._discrepancies[t]:
+        for number, i, j, size in self.discrepancies[t]:
             modal = np.zeros((len(self.reference.omega),) * 2)
             np.add.at(modal, (i, j), size * x[number])
             modal = np.where(modal == 0, modal.T, modal)
@@ -221,9 +219,10 @@ class CampaignModel:
 
     def residual(self, t: int, x: Array, effects: Applied) -> Array:
         """Residuals (N,) of test `t`, computed less measured, in standard errors."""
-        return self._residual(t, self._standing(t, x, effects, self.linear(t, x, effects)))
+        return self.in_errors(t, self.standing(t, x, effects, self.linear(t, x, effects)))
 
-    def _residual(self, t: int, answer: Response | Table) -> Array:
+    def in_errors(self, t: int, answer: Response | Table) -> Array:
+        """Residuals (N,) of an answer, in standard errors."""
         if isinstance(answer, Table):
             return answer.residual
         data = self.tests[t]
@@ -236,12 +235,13 @@ class CampaignModel:
         assert isinstance(data, LineData)
         return self._response(t, x, self.linear(t, x, effects), replace(data, frequency=frequency)).value
 
-    def _answer(self, t: int, x: Array, linear: Linear) -> Response | Table:
+    def answer(self, t: int, x: Array, linear: Linear) -> Response | Table:
+        """What a linear model says at the lines, or of the table, of test `t`."""
         data = self.tests[t]
         return Table(linear, data) if isinstance(data, ModeData) else self._response(t, x, linear, data)
 
     def _response(self, t: int, x: Array, linear: Linear, data: LineData) -> Response:
-        cut = 0.0 if self._record is None else float(x[self._record])
+        cut = 0.0 if self.record is None else float(x[self.record])
         return Response(linear, data, self._gain(t, x), cut, [light for light, _ in self.lights(linear.matrices.dofs, x)])
 
     def lights(self, dofs: Sequence[tuple[str, str]], x: Array) -> list[tuple[Light, Integers]]:
@@ -258,26 +258,16 @@ class CampaignModel:
         columns = self.reference.over(dofs)[:, : len(resonance.shares)]
         return Light(columns, np.array(resonance.shares), 2 * np.pi * resonance.frequency, resonance.damping)
 
-    def by_products_of_shares(self, t: int, x: Array, effects: Applied, modes: int) -> tuple[ComplexArray, ComplexArray]:
-        """Derivatives (k, channels, L) of the FRFs of test `t`, in standard errors, by the products of two shares each, in the first reference `modes`, of a light resonance
-        that is not there yet and felt as a mass of -1 / s^2; and s (L,)."""
-        linear, data = self.linear(t, x, effects), self.tests[t]
-        answer = self._standing(t, x, effects, linear)
-        assert isinstance(answer, Response)
-        assert isinstance(data, LineData)
-        moved = answer.by_products_of_shares(self.reference.over(linear.matrices.dofs)[:, :modes], *np.triu_indices(modes)) * (np.sqrt(2) / data.sd)
-        return moved.reshape(len(moved), -1, moved.shape[-1]), answer.s
-
     def with_resonance(self, resonance: Resonance) -> CampaignModel:
         """With one light resonance more, whose parameters follow all others."""
         return replace(self, parameters=(*self.parameters, *resonance.nuisances), resonances=(*self.resonances, resonance))
 
-    def _standing(self, t: int, x: Array, effects: Applied, linear: Linear) -> Response | Table:
+    def standing(self, t: int, x: Array, effects: Applied, linear: Linear) -> Response | Table:
         """The answer of test `t`; the last one is kept for those who ask more of the same place."""
         key = (x.tobytes(), tuple((id(e), *v.values()) for e, v in effects))
         late = self._responses.get(t)
         if late is None or late[0] != key:
-            late = self._responses[t] = key, self._answer(t, x, linear), effects
+            late = self._responses[t] = key, self.answer(t, x, linear), effects
         return late[1]
 
     @cached_property
@@ -285,14 +275,15 @@ class CampaignModel:
         return {}
 
     @cached_property
-    def _record(self) -> int | None:
+    def record(self) -> int | None:
+        """The number of the parameter of records that end too early."""
         return next((i for i, p in enumerate(self.parameters) if p.kind == kinds_of.RECORD), None)
 
     def _gain(self, t: int, x: Array) -> Array:
-        number, channel = self._gains[t]
+        number, channel = self.gains[t]
         gain = np.zeros(self.channels)
         np.add.at(gain, channel, x[number] * np.array([self.parameters[i].sd for i in number]))
-        return np.asarray(np.exp(gain)[self._channel_of[t]])
+        return np.asarray(np.exp(gain)[self.channel_of[t]])
 
     @property
     def channels(self) -> int:
@@ -303,64 +294,6 @@ class CampaignModel:
         assert isinstance(data, LineData)
         left = ((value - measured) / data.sd * np.sqrt(2)).ravel()
         return np.concatenate([left.real, left.imag])
-
-    def jacobian(self, t: int, x: Array, effects: Applied, rates: Rates, more: int = 0) -> tuple[Array, Array, Integers]:
-        """Residuals (N,) of test `t`, their derivatives (k + more, N) by k nuisance parameters, and the numbers (k,) of these; rows `more` are
-        left zero for whoever has further parameters."""
-        data, linear = self.tests[t], self.linear(t, x, effects)
-        response = self._standing(t, x, effects, linear)
-        if isinstance(response, Table):
-            r, found = response.residual, response.moved(together([rates.products[t], *self._by_discrepancies(t, linear)]))
-            numbers = np.concatenate([rates.numbers[t], *[row[0] for row in self._discrepancies[t]]])
-            return r, np.concatenate([found, np.zeros((more, len(r)))]), numbers
-        assert isinstance(data, LineData)
-        own, channel = self._gains[t]
-        discrepancies = self._discrepancies[t]
-        record = [] if self._record is None else [self._record]
-        lights = self.lights(linear.matrices.dofs, x)
-        numbers = np.concatenate([rates.numbers[t], *[row[0] for row in discrepancies], own, np.array(record, int), *[n for _, n in lights]])
-        n_resp, n_ref, lines = response.value.shape
-        weight = np.sqrt(2) / data.sd
-        jacobian = np.zeros((len(numbers) + more, 2, n_resp, n_ref, lines))
-
-        def fill(first: int, moved: ComplexArray) -> int:
-            rows = jacobian[first : first + len(moved)]
-            np.multiply(moved.real, weight, out=rows[:, 0])
-            np.multiply(moved.imag, weight, out=rows[:, 1])
-            return first + len(moved)
-
-        at = fill(0, response.moved(rates.products[t]))
-        w = response.over(self.reference.over(linear.matrices.dofs))
-        for power, (_, i, j, size) in enumerate(discrepancies):
-            for moved in response.moved_together(w, power, i, j, size * np.where(i == j, 0.5, 1.0)):
-                at = fill(at, moved)
-        for k, c in enumerate(channel):
-            for row in np.flatnonzero(self._channel_of[t][:n_resp] == c):
-                gain = response.value[row] * weight[row] * self.parameters[own[k]].sd
-                jacobian[at + k, 0, row], jacobian[at + k, 1, row] = gain.real, gain.imag
-        at += len(own)
-        if record:
-            at = fill(at, response.cut_off[None])
-        for light, of_light in lights:
-            at = fill(at, response.by_light(light) * np.array([self.parameters[i].sd for i in of_light])[:, None, None, None])
-        return self.whitened(t, response.value, data.value), jacobian.reshape(len(jacobian), -1), numbers
-
-    def _by_discrepancies(self, t: int, linear: Linear) -> list[Products]:
-        """What discrepancies of stiffness change in test `t`, and those of damping."""
-        w = self.reference.over(linear.matrices.dofs)
-        return [pairs(w, power, i, j, size * np.where(i == j, 0.5, 1.0)) for power, (_, i, j, size) in enumerate(self._discrepancies[t])]
-
-    def column(self, t: int, x: Array, first: Applied, second: Applied, apart: float) -> Array:
-        """(residual at `second` - residual at `first`) / apart, (N,): the derivative by what differs between two lists of effects.
-
-        Where matrices alone differ the exact derivative of the FRF is taken, which has no error of the second order in the FRF.
-        """
-        at, moved = self.linear(t, x, first), self.linear(t, x, second)
-        answer = self._standing(t, x, first, at)
-        if at.layout == moved.layout and at.matrices.dofs == moved.matrices.dofs and same_chain(at.chain, moved.chain):
-            by = products(*((getattr(moved.matrices, k) - getattr(at.matrices, k)) / apart for k in ("mass", "damping", "stiffness")))
-            return answer.moved(by)[0] if isinstance(answer, Table) else self.whitened(t, answer.moved(by)[0], 0.0)
-        return (self._residual(t, self._answer(t, x, moved)) - self._residual(t, answer)) / apart
 
     @cached_property
     def structural(self) -> list[bool]:

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from thermospindle.diagnosis.forward import nuisance as kinds_of
+from thermospindle.diagnosis.forward.derivatives import column, nuisance_jacobian
 from thermospindle.diagnosis.forward.linear import Rates
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import FAILED, SIZE_STEP, Applied, CampaignModel
@@ -132,7 +133,7 @@ class Problem:
                 moved = list(effects)
                 moved[k] = (effect, {**values, q.name: values[q.name] + h})
                 try:
-                    return self.model.column(t, x, self.acting(effects), self.acting(moved), h)
+                    return column(self.model, t, x, self.acting(effects), self.acting(moved), h)
                 except FAILED:
                     continue
         return np.zeros(self.model.tests[t].count)
@@ -142,7 +143,7 @@ class Problem:
         x, sizes, shapes = self.parts(p)
         effects = self.applied(t, sizes, shapes)
         more = sum(t + 1 + len(m.shape) for m in self.mechanisms)
-        r, jacobian, numbers = self.model.jacobian(t, x, self.acting(effects), rates, more)
+        r, jacobian, numbers = nuisance_jacobian(self.model, t, x, self.acting(effects), rates, more)
         own: list[int] = []
         row, at = len(numbers), self.nuisances
         for k, (m, root) in enumerate(zip(self.mechanisms, self.roots, strict=True)):

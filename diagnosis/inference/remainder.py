@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
+from thermospindle.diagnosis.forward.derivatives import by_products_of_shares
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.forward.nuisance import SHARE_SD, Resonance
 from thermospindle.diagnosis.forward.response import Light
@@ -97,7 +98,7 @@ def light_resonance(model: CampaignModel, about: Fit, learned: Learned) -> tuple
     for t, d in enumerate(model.tests):
         if isinstance(d, LineData):
             residual, derivatives, numbers = at.rows[t]
-            moved, s = model.by_products_of_shares(t, x, effects[t], seen)
+            moved, s = by_products_of_shares(model, t, x, effects[t], seen)
             felt = np.array([-SHARE_SD**2 * light.felt(s)[0] for light in lights])
             of_cross, of_square, of_slope = by_frequency(moved, felt, residual, derivatives)
             cross[:, numbers] += of_cross

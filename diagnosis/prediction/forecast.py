@@ -15,6 +15,7 @@ import numpy as np
 
 from thermospindle.diagnosis.data.mode_table import ModeData
 from thermospindle.diagnosis.forward import nuisance as kinds_of
+from thermospindle.diagnosis.forward.derivatives import nuisance_jacobian
 from thermospindle.diagnosis.forward.mechanism import size_covariance
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.forward.rates import rates_of
@@ -113,7 +114,7 @@ def by_all(model: CampaignModel, s: Standing, plan: Condition) -> Array:
         model.tests[0].test, plan, np.array([m.frequency for m in found]), np.ones(k), np.ones(k), np.full(k, np.inf), tuple(m.kind for m in found)
     )
     there = replace(there, tests=(table,))
-    _, derivatives, numbers = there.jacobian(0, x, effects, rates_of(there, x, [effects], s.hypothesis.fit.rates))
+    _, derivatives, numbers = nuisance_jacobian(there, 0, x, effects, rates_of(there, x, [effects], s.hypothesis.fit.rates))
     rates = np.zeros((k, len(x) + 1))
     lasting = [there.parameters[i].test is None for i in numbers]
     rates[:, numbers[lasting]] = derivatives[lasting].T

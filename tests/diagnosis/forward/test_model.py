@@ -10,6 +10,7 @@ import pytest
 
 from tests.conftest import ROOT
 from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, truth, virtual_campaign
+from thermospindle.diagnosis.forward.derivatives import column, nuisance_jacobian
 from thermospindle.diagnosis.forward.linear import products, together
 from thermospindle.diagnosis.forward.making import BEYOND, IN_BAND, MOST_MODES
 from thermospindle.diagnosis.forward.nuisance import (
@@ -70,7 +71,7 @@ def differences(model, t, x, numbers, step=2e-3):
 def worst_by_kind(model, t, x):
     """Largest error of a derivative over the length of that derivative, for every kind of nuisance parameter."""
     rates = rates_of(model, x, [[] for _ in model.tests])
-    r, jacobian, numbers = model.jacobian(t, x, [], rates)
+    r, jacobian, numbers = nuisance_jacobian(model, t, x, [], rates)
     assert np.array_equal(r, model.residual(t, x, []))
     assert len(set(numbers)) == len(numbers)
     wanted = differences(model, t, x, numbers)
@@ -109,7 +110,7 @@ def test_a_test_of_a_flexible_shaft_that_is_left_out_has_none_either():
 
 
 def has_none(model, x):
-    r, jacobian, numbers = model.jacobian(1, x, [], rates_of(model, x, [[], []]))
+    r, jacobian, numbers = nuisance_jacobian(model, 1, x, [], rates_of(model, x, [[], []]))
     assert r.shape == (0,)
     assert jacobian.shape == (len(numbers), 0)
 
@@ -197,7 +198,7 @@ def test_parameters_of_other_tests_do_not_move_a_test(scene):
     model, x = made(scene)
     rates = rates_of(model, x, [[], []])
     for t in (0, 1):
-        _, _, numbers = model.jacobian(t, x, [], rates)
+        _, _, numbers = nuisance_jacobian(model, t, x, [], rates)
         others = [i for i in range(len(x)) if i not in set(numbers)]
         assert others
         assert {model.parameters[i].test for i in others} == {1 - t}
@@ -259,7 +260,7 @@ def test_column_of_a_measuring_effect(scene, name, size, values):
         return [(chosen, {**whole, first.name: value})]
 
     wanted = (model.residual(1, x, at(size + step)) - model.residual(1, x, at(size - step))) / (2 * step)
-    found = model.column(1, x, at(size), at(size + step), step)
+    found = column(model, 1, x, at(size), at(size + step), step)
     assert np.linalg.norm(wanted) > 0
     assert np.linalg.norm(found - wanted) < 2e-3 * np.linalg.norm(wanted)
 
@@ -274,7 +275,7 @@ def test_column_of_an_effect_on_matrices(scene):
         return [(lost, {"loss": value, share.name: share.neutral})]
 
     wanted = (model.residual(1, x, at(0.1 + 1e-4)) - model.residual(1, x, at(0.1 - 1e-4))) / 2e-4
-    found = model.column(1, x, at(0.1), at(0.1 + 2e-3), 2e-3)
+    found = column(model, 1, x, at(0.1), at(0.1 + 2e-3), 2e-3)
     secant = (model.residual(1, x, at(0.1 + 2e-3)) - model.residual(1, x, at(0.1))) / 2e-3
     assert np.linalg.norm(found - wanted) < 5e-3 * np.linalg.norm(wanted)
     assert np.linalg.norm(found - wanted) < 0.5 * np.linalg.norm(secant - wanted)

@@ -9,6 +9,7 @@ import pytest
 
 from tests.blind.hidden_structure import on_spring
 from tests.virtual_campaign import drawn, effect, model_of, virtual_campaign
+from thermospindle.diagnosis.forward.derivatives import nuisance_jacobian
 from thermospindle.diagnosis.forward.nuisance import RESONANCE, STIFFNESS_DRIFT, Resonance
 from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.inference.evidence import evidence
@@ -112,7 +113,7 @@ def test_derivatives_by_its_parameters(model):
     own = [i for i, q in enumerate(wider.parameters) if q.kind == RESONANCE]
     assert len(own) == len(model.reference.omega) + 2
     rates = rates_of(wider, x, [[]] * 3)
-    _, jacobian, numbers = wider.jacobian(1, x, [], rates)
+    _, jacobian, numbers = nuisance_jacobian(wider, 1, x, [], rates)
     for i in own:
         up, down = x.copy(), x.copy()
         up[i] += 1e-4

@@ -1,0 +1,89 @@
+"""Derivatives of a test's residuals: by all nuisance parameters, by what differs between two lists of effects, and by a light resonance that is not there yet.
+
+Everything that moves the dynamic stiffness D alone has the exact derivative -A D^-1 (s^2 dM + s dC + dK) D^-1 B^T of the receptance A D^-1 B^T, so that one factorisation a
+line serves all parameters; what also moves rows, gains or delays is differenced. Structure enters K, C and M in proportion: these derivatives are taken once.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from thermospindle.diagnosis.data.lines import LineData
+from thermospindle.diagnosis.forward.linear import Linear, Products, Rates, pairs, products, same_chain, together
+from thermospindle.diagnosis.forward.model import CampaignModel
+from thermospindle.diagnosis.forward.points import Applied
+from thermospindle.diagnosis.forward.response import Response
+from thermospindle.diagnosis.forward.table import Table
+from thermospindle.model.types import Array, ComplexArray, Integers
+
+
+def nuisance_jacobian(model: CampaignModel, t: int, x: Array, effects: Applied, rates: Rates, more: int = 0) -> tuple[Array, Array, Integers]:
+    """Residuals (N,) of test `t`, their derivatives (k + more, N) by k nuisance parameters, and the numbers (k,) of these; rows `more` are
+    left zero for whoever has further parameters."""
+    data, linear = model.tests[t], model.linear(t, x, effects)
+    response = model.standing(t, x, effects, linear)
+    if isinstance(response, Table):
+        r, found = response.residual, response.moved(together([rates.products[t], *_by_discrepancies(model, t, linear)]))
+        numbers = np.concatenate([rates.numbers[t], *[row[0] for row in model.discrepancies[t]]])
+        return r, np.concatenate([found, np.zeros((more, len(r)))]), numbers
+    assert isinstance(data, LineData)
+    own, channel = model.gains[t]
+    discrepancies = model.discrepancies[t]
+    record = [] if model.record is None else [model.record]
+    lights = model.lights(linear.matrices.dofs, x)
+    numbers = np.concatenate([rates.numbers[t], *[row[0] for row in discrepancies], own, np.array(record, int), *[n for _, n in lights]])
+    n_resp, n_ref, lines = response.value.shape
+    weight = np.sqrt(2) / data.sd
+    jacobian = np.zeros((len(numbers) + more, 2, n_resp, n_ref, lines))
+
+    def fill(first: int, moved: ComplexArray) -> int:
+        rows = jacobian[first : first + len(moved)]
+        np.multiply(moved.real, weight, out=rows[:, 0])
+        np.multiply(moved.imag, weight, out=rows[:, 1])
+        return first + len(moved)
+
+    at = fill(0, response.moved(rates.products[t]))
+    w = response.over(model.reference.over(linear.matrices.dofs))
+    for power, (_, i, j, size) in enumerate(discrepancies):
+        for moved in response.moved_together(w, power, i, j, size * np.where(i == j, 0.5, 1.0)):
+            at = fill(at, moved)
+    for k, c in enumerate(channel):
+        for row in np.flatnonzero(model.channel_of[t][:n_resp] == c):
+            gain = response.value[row] * weight[row] * model.parameters[own[k]].sd
+            jacobian[at + k, 0, row], jacobian[at + k, 1, row] = gain.real, gain.imag
+    at += len(own)
+    if record:
+        at = fill(at, response.cut_off[None])
+    for light, of_light in lights:
+        at = fill(at, response.by_light(light) * np.array([model.parameters[i].sd for i in of_light])[:, None, None, None])
+    return model.whitened(t, response.value, data.value), jacobian.reshape(len(jacobian), -1), numbers
+
+
+def _by_discrepancies(model: CampaignModel, t: int, linear: Linear) -> list[Products]:
+    """What discrepancies of stiffness change in test `t`, and those of damping."""
+    w = model.reference.over(linear.matrices.dofs)
+    return [pairs(w, power, i, j, size * np.where(i == j, 0.5, 1.0)) for power, (_, i, j, size) in enumerate(model.discrepancies[t])]
+
+
+def column(model: CampaignModel, t: int, x: Array, first: Applied, second: Applied, apart: float) -> Array:
+    """(residual at `second` - residual at `first`) / apart, (N,): the derivative by what differs between two lists of effects.
+
+    Where matrices alone differ the exact derivative of the FRF is taken, which has no error of the second order in the FRF.
+    """
+    at, moved = model.linear(t, x, first), model.linear(t, x, second)
+    answer = model.standing(t, x, first, at)
+    if at.layout == moved.layout and at.matrices.dofs == moved.matrices.dofs and same_chain(at.chain, moved.chain):
+        by = products(*((getattr(moved.matrices, k) - getattr(at.matrices, k)) / apart for k in ("mass", "damping", "stiffness")))
+        return answer.moved(by)[0] if isinstance(answer, Table) else model.whitened(t, answer.moved(by)[0], 0.0)
+    return (model.in_errors(t, model.answer(t, x, moved)) - model.in_errors(t, answer)) / apart
+
+
+def by_products_of_shares(model: CampaignModel, t: int, x: Array, effects: Applied, modes: int) -> tuple[ComplexArray, ComplexArray]:
+    """Derivatives (k, channels, L) of the FRFs of test `t`, in standard errors, by the products of two shares each, in the first reference `modes`, of a light resonance
+    that is not there yet and felt as a mass of -1 / s^2; and s (L,)."""
+    linear, data = model.linear(t, x, effects), model.tests[t]
+    answer = model.standing(t, x, effects, linear)
+    assert isinstance(answer, Response)
+    assert isinstance(data, LineData)
+    moved = answer.by_products_of_shares(model.reference.over(linear.matrices.dofs)[:, :modes], *np.triu_indices(modes)) * (np.sqrt(2) / data.sd)
+    return moved.reshape(len(moved), -1, moved.shape[-1]), answer.s
