@@ -108,7 +108,7 @@ def mode_campaign(
             ratio = mode.damping_ratio + ratio_sd * random.standard_normal()
             rows.append(ModeRow(f"test_{t}", k + 1, mode.kind, frequency, sd, ratio if damping else None, ratio_sd if damping else None))
         tests.append(Test(f"test_{t}", condition.temperature, condition.speed, modes=tuple(rows)))
-    return Campaign("virtual modes", spindle.name, "mobility", (), tuple(tests))
+    return Campaign("virtual modes", spindle.name, "mobility", (), tuple(tests), lumped_shafts=bool(spindle.structure.shafts))
 
 
 def model_of(spindle: Spindle, campaign: Campaign) -> CampaignModel:

@@ -8,7 +8,7 @@ import numpy as np
 
 from thermospindle.diagnosis.data.mode_table import ModeData
 from thermospindle.diagnosis.forward.linear import Linear, Products
-from thermospindle.model.rotor.modes import kinds, oscillating, poles, poles_below
+from thermospindle.model.rotor.modes import kinds, oscillating, poles_below, with_mass_between
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.identification import pairing
 from thermospindle.sim.identification.pairing import ModeSet
@@ -26,7 +26,7 @@ class Table:
     def residual(self) -> Array:
         """Frequencies and the dampings that are known, computed less measured in standard errors (N,)."""
         data = self._data
-        every, shape = poles_below(self._linear.matrices, REACH * float(data.frequency.max()))
+        every, shape = poles_below(self._linear.matrices, REACH * float(data.frequency.max()), self._linear.between)
         pole = every[self._partners(every, shape)] - self._linear.chain.decay
         frequency, damping = np.abs(pole) / (2 * np.pi), -pole.real / np.abs(pole)
         known = np.isfinite(data.damping_sd)
@@ -50,7 +50,7 @@ class Table:
     @cached_property
     def _modes(self) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
         """Pole, right and left vector of every mode of the table."""
-        p = poles(self._linear.matrices)
+        p = with_mass_between(self._linear.matrices, self._linear.between)
         found = oscillating(p, REACH * float(self._data.frequency.max()))
         own = np.array(found)[self._partners(p.value[found], p.right[:, found])]
         return p.value[own], p.right[:, own], p.left[own]

@@ -5,6 +5,10 @@ an element makes the consistent matrix M (Archer, *AIAA J.* 3 (1965) 1910), and 
 term of the dynamic stiffness K + s^2 M - s^4 N (Przemieniecki, *Theory of Matrix Structural Analysis*, 1968, 11.5). Lumps are right to the second order
 in an element's length where forces act on a shaft that shears, as those of bearings do, and this to the fourth. Moduli are those
 at one temperature: M knows only their ratios, and N, itself of the fourth order, goes with their inverse.
+
+It is not what MuJoCo steps, and so not `OperatingPoint.linear`. M alone is no nearer than lumps: the frequencies of `five_bearing` near 4.15 kHz are 1.3e-3 high with it,
+6e-4 low with lumps and 6e-6 off with N, those of `mk7702` at 4.08 kHz 1.4e-3, 1.1e-3 and 6e-6. Nor could it be stepped: the armature of a tendon between
+bodies that hang on the world by themselves comes onto the diagonal of MuJoCo's mass matrix alone, and its accelerations are then wrong (4.0.0).
 """
 
 from __future__ import annotations

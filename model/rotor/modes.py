@@ -8,7 +8,7 @@ Sources: Genta, *Dynamics of Rotating Systems* (2005), ch. 5; Ewins, *Modal Test
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -172,12 +172,27 @@ def modes(chain: RotorBase, linear: Matrices | None = None, highest: float = np.
     ]
 
 
-def poles_below(linear: Matrices, highest: float) -> tuple[ComplexArray, ComplexArray]:
+Between = tuple[Array, Array, Array]
+"""What the mass between nodes of shafts adds to M, the matrix N beside it, and what it adds to C + G (`model.rotor.distributed`), (n, n) each."""
+
+
+def with_mass_between(linear: Matrices, between: Between | None) -> Poles:
+    """Poles p of K + s C + s^2 M - s^4 N, in the order of those without N, which left p^4 N right moves to first order (Lancaster 1964, *AIAA J.* 2, 1659). Of an undamped
+    mode that is -w^2 n w / 2 with n of N for a mass of one, and w / sqrt(1 + w^2 n) is taken: right where N is, for modes far below those of one element, and no mode above
+    falls among these."""
+    if between is None:
+        return poles(linear)
+    mass, quartic, damping = between
+    p = poles(replace(linear, mass=linear.mass + mass, damping=linear.damping + damping))
+    return replace(p, value=p.value / np.sqrt(1 - 2 * p.value**3 * np.einsum("mi,im->m", p.left, quartic @ p.right)))
+
+
+def poles_below(linear: Matrices, highest: float, between: Between | None = None) -> tuple[ComplexArray, ComplexArray]:
     """Poles (m,) of the oscillating modes below `highest` (Hz), one of each conjugate pair, and their right vectors (n, m); of a flexible shaft by
-    its reduced model, where `highest` is finite."""
+    its reduced model, where `highest` is finite, and with its mass where it is and not at nodes, where that is told."""
     n = len(linear.mass)
     if n <= LARGE or not np.isfinite(highest):
-        p = poles(linear)
+        p = with_mass_between(linear, between)
         found = oscillating(p, highest)
         return p.value[found], p.right[:, found]
     values, columns, stiffest = [], [], 0.0
@@ -185,9 +200,11 @@ def poles_below(linear: Matrices, highest: float) -> tuple[ComplexArray, Complex
         grid = np.ix_(own, own)
         part = Matrices(linear.mass[grid], linear.damping[grid], linear.stiffness[grid], ())
         small = reduced(part, np.zeros((0, len(own))), HERTZ * highest, *FINE)
-        p = poles(Matrices(small.mass, small.damping, small.stiffness, ()))
+        q = small.basis
+        added = None if between is None else (q.T @ between[0][grid] @ q, q.T @ between[1][grid] @ q, q.T @ between[2][grid] @ q)
+        p = with_mass_between(Matrices(small.mass, small.damping, small.stiffness, ()), added)
         right = np.zeros((n, len(p.value)), complex)
-        right[own] = small.basis @ p.right
+        right[own] = q @ p.right
         values.append(p.value)
         columns.append(right)
         stiffest = max(stiffest, small.stiffest)
