@@ -3,6 +3,9 @@ PYTHON ?= python3
 SPINDLE = .venv/bin/spindle
 READY = .venv/ready
 
+# Compiled modules are kept, whatever the surroundings say: else each of the tests' processes compiles the program and pytest's rewritten tests anew.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: demo test test-all lint bench growth blind torture fuzz faults release-check docs clean
 
 demo: $(READY)

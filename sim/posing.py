@@ -58,9 +58,12 @@ def largest_displacement(point: OperatingPoint, motion: ComplexArray) -> Array:
         arm = np.concatenate([m.vertices for m in meshes]) - [0.0, 0.0, point.chain.body(name).z]
         rows = {move: i for i, (body, move) in enumerate(point.linear.dofs) if body == name}
         u = np.array([motion[rows[m]] if m in rows else 0 * motion[0] for m in MOVES])  # (5, frames)
-        x, y, z = (a[:, None] for a in arm.T)
-        moved = np.stack([u[0] + u[4] * z, u[1] - u[3] * z, u[2] + u[3] * y - u[4] * x])
-        largest = np.maximum(largest, np.sqrt((np.abs(moved) ** 2).sum(axis=0)).max(axis=0))
+        x, y, z = arm.T
+        lever = np.zeros((len(arm), 3, 5))  # displacement of every vertex from a unit motion
+        lever[:, range(3), range(3)] = 1.0
+        lever[:, 1, 3], lever[:, 2, 3], lever[:, 0, 4], lever[:, 2, 4] = -z, y, z, -x
+        squared = sum((lever.reshape(-1, 5) @ part) ** 2 for part in (u.real, u.imag))
+        largest = np.maximum(largest, np.sqrt(squared.reshape(len(arm), 3, -1).sum(axis=1).max(axis=0)))
     return largest
 
 
@@ -98,7 +101,7 @@ def poses(point: OperatingPoint, motion: ComplexArray) -> Poses:
         mujoco.mj_kinematics(model, data)
         turned = np.einsum("bij,bj->bi", data.xmat.reshape(-1, 3, 3), rest)
         translations.append(TO_MM * (data.xpos - turned))
-        turns.append(np.roll(data.xquat, -1, axis=1))
+        turns.append(data.xquat[:, [1, 2, 3, 0]])
     translation, turn = np.array(translations), np.array(turns)
     return {b.name: (translation[:, i], turn[:, i]) for b in point.chain.bodies for i in [model.body(b.name).id]}
 

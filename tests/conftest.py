@@ -1,5 +1,7 @@
 """Fixtures that every test may use."""
 
+from __future__ import annotations
+
 import gc
 import os
 
@@ -11,22 +13,14 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
-import cloudpickle
 import pytest
 
-from tests.small_run import small_run
-from thermospindle.diagnosis.verdict import Diagnosis, diagnose
-from thermospindle.model.bearing.pair import reference_motion, solve
-from thermospindle.model.machine import Condition, Spindle
-from thermospindle.model.scene.reading import load
-from thermospindle.sim import warmup
-from thermospindle.sim.campaign.campaign import read_campaign
-from thermospindle.sim.effects import by_name
-from thermospindle.sim.run import Run, measured_campaigns
-from thermospindle.thermal import readout
-from thermospindle.thermal.expansion import expand, influence
+if TYPE_CHECKING:  # the process that hands tests out to others loads this file too, and needs none of it
+    from thermospindle.diagnosis.verdict import Diagnosis
+    from thermospindle.model.machine import Spindle
+    from thermospindle.sim.run import Run
 
 ROOT = Path(__file__).parents[1]
 SCENE = ROOT / "scenes" / "hdd_2003"
@@ -43,30 +37,46 @@ def pytest_collection_finish() -> None:
 
 @pytest.fixture(scope="session")
 def spindle() -> Spindle:
+    from thermospindle.model.scene.reading import load
+
     return load(SCENE)
 
 
 @pytest.fixture(scope="session")
 def cold(spindle):
     """Both bearings at the reference temperature, at rest."""
+    from thermospindle.model.bearing.pair import reference_motion, solve
+    from thermospindle.model.machine import Condition
+
     return solve(spindle, Condition(20.0), {b.name: reference_motion(20.0) for b in spindle.bearings})
 
 
 @pytest.fixture(scope="session")
 def hot(spindle):
     """Both bearings at 60 C, at rest."""
+    from thermospindle.model.bearing.pair import solve
+    from thermospindle.model.machine import Condition
+    from thermospindle.thermal.expansion import expand
+
     return solve(spindle, Condition(60.0), expand(spindle, 60.0))
 
 
 @pytest.fixture(scope="session")
 def run(spindle) -> Run:
     """Two short tests and the scene's own measurement."""
+    from tests.small_run import small_run
+    from thermospindle.sim.run import measured_campaigns
+
     return small_run(spindle, (20.0, 60.0), measured_campaigns(spindle))
 
 
 @pytest.fixture(scope="session")
 def nothing_missing(spindle, tmp_path_factory) -> Diagnosis:
     """The diagnosis of three tests of another program's campaign with nothing hidden, beside two effects."""
+    from thermospindle.diagnosis.verdict import diagnose
+    from thermospindle.sim.campaign.campaign import read_campaign
+    from thermospindle.sim.effects import by_name
+
     effects = tuple(by_name(n) for n in ("soak_lag", "channel_delay"))
     campaign = read_campaign(DATA / "foreign_none")
     campaign = replace(campaign, tests=tuple(t for t in campaign.tests if t.id in ("T20_n0", "T40_n0", "T60_n7200")))
@@ -76,6 +86,10 @@ def nothing_missing(spindle, tmp_path_factory) -> Diagnosis:
 @contextmanager
 def coarse_warmups() -> Iterator[None]:
     """Warm-ups on meshes of few elements, for what holds on any."""
+    from thermospindle.sim import warmup
+    from thermospindle.thermal import readout
+    from thermospindle.thermal.expansion import influence
+
     with pytest.MonkeyPatch.context() as patch:
         for module in (warmup, readout):
             patch.setattr(module, "influence", lambda spindle, temperatures=None: influence(spindle, 2e-2, temperatures))
@@ -84,6 +98,8 @@ def coarse_warmups() -> Iterator[None]:
 
 def made_once(folders: pytest.TempPathFactory, name: str, make: Callable[[], Made]) -> Made:
     """What one of pytest's workers has made already, or what `make` makes, left on disk for the others."""
+    import cloudpickle
+
     if "PYTEST_XDIST_WORKER" not in os.environ:
         return make()
     file = folders.getbasetemp().parent / f"{name}.pickle"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Callable
+from functools import cache
 from importlib.metadata import version
 from math import inf, isfinite
 from pathlib import Path
@@ -112,6 +113,7 @@ def _setting(text: str) -> tuple[str, float]:
 # ---------------------------------------------------------------- verbs and their options
 
 
+@cache
 def parsers() -> tuple[_Parser, dict[str, argparse.ArgumentParser]]:
     """The parser, and those of the verbs: an option has the name (`dest`) of an argument of the verb's function, and its default."""
     parser = _Parser(prog="spindle", description="From temperature to modal peaks of a ball-bearing spindle.")

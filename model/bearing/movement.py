@@ -15,10 +15,10 @@ SECANTS = 20  # steps of the secant method, which takes six
 
 def balanced(rows: list[BallRow], imbalance: Callable[[list[BallRow], float], float]) -> float:
     """The movement without imbalance, by bracketing; that of balls with inertia is sought from the answer of balls without."""
+    if all(row.inertia is None for row in rows):
+        return _bracketed(lambda h: imbalance(rows, h), 0.0, 1e-6)
     massless = [replace(row, inertia=None) for row in rows]
     start = _bracketed(lambda h: imbalance(massless, h), 0.0, 1e-6)
-    if all(row.inertia is None for row in rows):
-        return start
     return _near(lambda h: imbalance(rows, h), start)
 
 

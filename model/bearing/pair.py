@@ -125,8 +125,7 @@ def solve(spindle: Spindle, condition: Condition, motions: Mapping[str, RingMoti
     states = []
     for b in spindle.bearings:
         row = rows[b.name]
-        own = bearing_state(spindle, b, replace(row, axial=row.axial + moved[b.name]), centres.get(row))
-        states.append(replace(own, movement=moved[b.name]))
+        states.append(bearing_state(spindle, b, replace(row, axial=row.axial + moved[b.name]), centres.get(row), moved[b.name]))
     sliding = {name for s in spindle.sets if s.spring is not None for name in s.spring.rings_of}
     hub = next((moved[b.name] for b in spindle.bearings if b.name not in sliding), 0.0)
     linear: tuple[LinearState, ...] = tuple(linear_state(spindle, b, condition) for b in spindle.linear_bearings)
@@ -320,8 +319,11 @@ def damping_time(spindle: Spindle, b: Bearing) -> float:
     return 2 * b.damping_ratio / (2 * np.pi * spindle.structure.damping_frequency)
 
 
-def bearing_state(spindle: Spindle, b: Bearing, row: BallRow, centre: Vector | None = None) -> BearingState:
-    """What bearing `b` is with its balls as in `row`, centred rings at their loaded position; its balls settle at or near `centre`, where one knows."""
+def bearing_state(spindle: Spindle, b: Bearing, row: BallRow, centre: Vector | None = None, movement: float = 0.0) -> BearingState:
+    """What bearing `b` is with its balls as in `row`: centred rings at their loaded position, after a rigid `movement` (m) of the outer one.
+
+    Its balls settle at or near `centre`, where one knows.
+    """
     answer: RowForce = respond(row, centre=centre)
     deformation = float(answer.deformation[0])
     # where rings are free to move between their balls, the equilibrium that is found lies at an end of that play, a rounding error within contact
@@ -343,4 +345,5 @@ def bearing_state(spindle: Spindle, b: Bearing, row: BallRow, centre: Vector | N
         damping=damping_time(spindle, b) * stiffness,
         row=row,
         in_contact=bool(answer.in_contact.all() and answer.ball_force.min() > felt),
+        movement=movement,
     )

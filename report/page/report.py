@@ -11,6 +11,7 @@ import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -208,8 +209,9 @@ def values_of_file(spindle: Spindle) -> tuple[dict[str, Any], bool]:
 # ---------------------------------------------------------------- the page
 
 
+@cache
 def _page() -> Any:
-    """The macros of the template."""
+    """The macros of the template, which takes longer to compile than to fill."""
     environment = Environment(
         loader=FileSystemLoader(Path(__file__).parent),
         autoescape=True,
