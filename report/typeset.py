@@ -39,6 +39,11 @@ def unit_word(unit: str, before: str = "") -> str:
     return "" if unit == "1" else before + unit
 
 
+def unit_cell(unit: str) -> str:
+    """A unit as a cell of a page has it: escaped, with the signs of degrees and micro, nothing of a plain number."""
+    return re.sub(r"(?<![a-z])u(?=(?:m|s|rad|N)\b)", "µ", str(escape(unit_word("°C" if unit == "C" else unit))))
+
+
 def known(values: Any) -> Any:
     """A number for JSON, or an array as nested lists of them: None where there is none."""
     return [known(v) for v in values] if np.ndim(values) else float(values) if np.isfinite(values) else None
@@ -55,9 +60,14 @@ def with_error(pair: tuple[float, float] | None, sign: bool = False, digits: int
     value, error = pair
     of_error = ""
     if 0 < error < np.inf:
-        digits = int(np.clip(-np.floor(np.log10(error / 2)), 0, 5))
+        digits = int(np.clip(-np.floor(np.log10(error / 2)), 0, 9))
         of_error = f" <small>± {error:.{digits}f}</small>"
     return Markup(minus(f"{round(value, digits) + 0.0:{'+' if sign else ''}.{digits}f}") + of_error)
+
+
+def plain(value: float, digits: int = 3) -> str:
+    """A number of so many digits without powers of ten: odds of 440, not of 4.4e+02."""
+    return f"{float(f'{value:.{digits}g}'):.15g}"
 
 
 def signed_short(value: float) -> str:

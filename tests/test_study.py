@@ -21,6 +21,7 @@ from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
+from thermospindle.report.verbs.study import _line
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.study.form import Steps
 from thermospindle.sim.study.sensitivity import robust_z, sensitivity
@@ -314,3 +315,10 @@ def test_without_an_answering_cluster_it_says_so(tmp_path, capsys, monkeypatch):
 def test_the_command_line_alone_imports_no_parquet():
     code = "import sys, thermospindle.cli as c\ntry:\n    c.main(['--version'])\nexcept SystemExit:\n    pass\nassert not {'pyarrow', 'distributed', 'numpy'} & set(sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, env={**os.environ, "PYTHONPATH": str(ROOT)}).returncode == 0
+
+
+def test_numbers_of_a_row_have_the_same_decimals_and_what_is_nothing_is_not_named():
+    spread = {"mean": 1000.96, "sd": 5.9619, "quantiles": [990.17, 1011.6]}
+    own = {"spread": spread, "sensitivity": {"coefficients": {"preload": {"value": 0.9991}, "mount damping": {"value": -0.0004}}, "r2": 1.0}}
+    assert _line("1 axial, Hz", 1002.0, own) == ["1 axial, Hz", "1002.0", "1001.0", "6.0", "990.2", "1011.6", "preload +1.00", "1.000"]
+    assert _line("lower, N", 16.0, {"least": 9.99999, "most": 20.0})[1:] == ["16.000", "10.000", "20.000"]

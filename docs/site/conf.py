@@ -19,6 +19,7 @@ default_role = "code"
 highlight_language = "none"  # commands and files; what is Python says so
 html_theme = "furo"
 html_title = "Thermospindle"
+html_show_copyright = False
 html_static_path = ["style"]
 html_css_files = ["site.css"]
 exclude_patterns = ["_build"]

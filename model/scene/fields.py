@@ -183,7 +183,7 @@ def _told(kind: str, message: str, value: Any) -> str:
         return "input should be a list in brackets, as [1.0, 2.0]"
     if kind in ("float_type", "int_type") and isinstance(value, str) and value.replace(".", "", 1).strip().isdigit():
         return f"{message}, without quotes"
-    return message
+    return message.replace(" after validation", "") + (", in quotes" if kind == "string_type" else "")
 
 
 def _shown(value: Any) -> str:

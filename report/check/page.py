@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from thermospindle.report.check.drawing import drawing
-from thermospindle.report.check.words import grids, sentences
+from thermospindle.report.check.words import grids, of_words, sentences
 from thermospindle.report.figures.common import save, svg
 from thermospindle.report.page.report import page
 from thermospindle.report.typeset import figure, micro, minus, prose, table
@@ -26,7 +26,7 @@ def write_check(point: OperatingPoint, values: Mapping[str, Any], folder: Path) 
     odd = "".join(f"<li>{prose(words)}</li>" for words in values["odd"])
     assumed = [[escape(a["key"]), prose(a["what"])] for a in values["assumed"]]
     tables = "".join(
-        table([micro(h) for h in head], [[minus(escape(cell)) for cell in row] for row in rows], [k for k, h in enumerate(head) if _words(rows, k)], escape(title))
+        table([micro(h) for h in head], [[minus(escape(cell)) for cell in row] for row in rows], [k for k, h in enumerate(head) if of_words(rows, k)], escape(title))
         for title, head, rows in grids(values)
     )
     sections = [
@@ -38,7 +38,3 @@ def write_check(point: OperatingPoint, values: Mapping[str, Any], folder: Path) 
     where = f"{values['reference_temperature_C']:g} °C, at rest"
     (folder / "check.html").write_text(page(point.spindle, where, sections, "Check"), encoding="utf-8")
     save(picture, folder, "section", 130)
-
-
-def _words(rows: list[list[str]], k: int) -> bool:
-    return not rows[0][k][:1].isdigit()

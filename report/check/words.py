@@ -17,8 +17,8 @@ def show_check(console: Console, values: Mapping[str, Any]) -> None:
         console.print(sentence, markup=False, highlight=False)
     for title, head, rows in grids(values):
         console.print()
-        show_grid(console, title, head, rows, words=[h for h, cell in zip(head, rows[0], strict=True) if not _numeric(cell)])
-    _list(console, "Assumed, where the scene says nothing", [f"{a['key']}: {a['what']}" for a in values["assumed"]])
+        show_grid(console, title, head, rows, words=[h for k, h in enumerate(head) if of_words(rows, k)])
+    _list(console, "Assumed, where the scene says nothing", [f"{a['key']}: {a['what']}" for a in values["assumed"]] or ["nothing"])
     _list(console, "Odd", values["odd"] or ["nothing"])
 
 
@@ -74,7 +74,7 @@ def grids(values: Mapping[str, Any]) -> list[tuple[str, list[str], list[list[str
         for name, s in values["shafts"].items()
     ]  # fmt: skip
     bodies = [
-        [name, f"{b['z_mm']:.2f}", f"{b['mass_kg']:.4g}", f"{b['inertia_kg_m2'][0]:.3g}", f"{b['inertia_kg_m2'][2]:.3g}", "yes" if b["turns"] else "no", " ".join(b["moves"])]
+        [name, f"{b['z_mm']:.4g}", f"{b['mass_kg']:.4g}", f"{b['inertia_kg_m2'][0]:.3g}", f"{b['inertia_kg_m2'][2]:.3g}", "yes" if b["turns"] else "no", " ".join(b["moves"])]
         for name, b in values["bodies"].items()
     ]
     joints = [
@@ -116,8 +116,9 @@ def _and(names: list[str]) -> str:
     return ", ".join(names[:-1]) + (" and " if len(names) > 1 else "") + names[-1] if names else ""
 
 
-def _numeric(cell: str) -> bool:
-    return cell.replace(".", "", 1).replace("e-", "").replace("e+", "").replace("-", "", 1).isdigit()
+def of_words(rows: list[list[str]], k: int) -> bool:
+    """Whether a column holds no numbers; dashes and gaps decide nothing."""
+    return not any(row[k].lstrip("+-")[:1].isdigit() for row in rows)
 
 
 def _list(console: Console, title: str, items: list[str]) -> None:

@@ -92,8 +92,9 @@ def save(figure: Figure, folder: Path, name: str, dpi: float = 150) -> None:
     """`name`.png and `name`.svg in a folder that exists: files of their own, on white; the same figure gives the same SVG."""
     with rc_context(DRAWN):
         laid_out(figure)
-        figure.savefig(folder / f"{name}.png", dpi=dpi, facecolor="white")
-        figure.savefig(folder / f"{name}.svg", dpi=dpi, facecolor="white", metadata={"Date": None})
+        look: dict[str, Any] = {"dpi": dpi, "facecolor": "white", "bbox_inches": "tight"}  # tight: no name beside the axes is cut off
+        figure.savefig(folder / f"{name}.png", **look)
+        figure.savefig(folder / f"{name}.svg", **look, metadata={"Date": None})
 
 
 def save_all(figures: Mapping[str, Figure], folder: Path, dpi: float = 150) -> None:
@@ -110,7 +111,7 @@ def svg(figure: Figure, key: str, description: str) -> str:
     solver leaves to chance.
     """
     buffer = io.BytesIO()
-    laid_out(figure).savefig(buffer, format="svg", dpi=170, metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
+    laid_out(figure).savefig(buffer, format="svg", dpi=170, bbox_inches="tight", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
     root = ElementTree.fromstring(buffer.getvalue())  # without comments
     for metadata in root.findall(f"{SVG}metadata"):
         root.remove(metadata)

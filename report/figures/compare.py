@@ -12,7 +12,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 
 from thermospindle.diagnosis.compare.compare import Comparison, PairedMode, TestComparison
-from thermospindle.diagnosis.compare.correlation import Correlation, Pair
+from thermospindle.diagnosis.compare.correlation import Band, Correlation, Pair
 from thermospindle.model.types import Array
 from thermospindle.report.figures.common import INK, PALE, STYLE, cells, colour, label, residual_bar, residual_norm
 from thermospindle.report.typeset import UNITS, signed_short
@@ -123,15 +123,23 @@ def _share(value: float) -> str:
     return f"{value:.2f}".removeprefix("0") if value < 0.995 else "1"
 
 
+def _third(b: Band) -> int:
+    """The number of a third of an octave, counted from that about 1000 Hz."""
+    return round(10 * np.log10(np.sqrt(b.low * b.high) / 1000))
+
+
 @rc_context(STYLE)
 def by_band(c: Comparison) -> Figure:
     """CSAC, CSF and the shift by FDAC, test by band."""
     tests = with_frfs(c)
-    edges = sorted({(round(b.low, 6), round(b.high, 6)) for _, found in tests for b in found.bands})
+    parts: dict[int, list[Band]] = {}  # a third of an octave is one column, however much of it each test's lines reach
+    for b in (b for _, found in tests for b in found.bands):
+        parts.setdefault(_third(b), []).append(b)
+    edges = {k: (min(b.low for b in parts[k]), max(b.high for b in parts[k])) for k in sorted(parts)}
     values: dict[str, Array] = {name: np.full((len(tests), len(edges)), np.nan) for name in ("csac", "csf", "shift")}
     for i, (_, found) in enumerate(tests):
         for b in found.bands:
-            place = i, edges.index((round(b.low, 6), round(b.high, 6)))
+            place = i, list(edges).index(_third(b))
             numbers = (b.csac, b.csf, np.nan if b.shift is None else 100 * b.shift)
             for grid, value in zip(values.values(), numbers, strict=True):
                 grid[place] = value
@@ -147,7 +155,7 @@ def by_band(c: Comparison) -> Figure:
     for axes, grid, (title, norm, colours, text) in zip(panels, values.values(), looks, strict=True):
         picture = cells(axes, grid, norm, colours, text, size)
         axes.set_title(title)
-        axes.set_xticks(range(len(edges)), [f"{a:.0f}–{b:.0f}" for a, b in edges], fontsize=7, rotation=90)
+        axes.set_xticks(range(len(edges)), [f"{a:.0f}–{b:.0f}" for a, b in edges.values()], fontsize=7, rotation=90)
         axes.set_xlabel("band, Hz")
         figure.colorbar(picture, ax=axes, shrink=0.9, pad=0.02, aspect=22).outline.set_visible(False)
     panels[0].set_yticks(range(len(tests)), [label(t.test, ", ") for t, _ in tests])

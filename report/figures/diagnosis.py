@@ -16,7 +16,7 @@ from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 from thermospindle.report.figures.common import INK, STYLE
-from thermospindle.report.typeset import unit_word
+from thermospindle.report.typeset import unit_cell
 
 NAMED, OTHER, FREE = "#1f6f5c", "#8c9aa8", "#d9b36c"
 MOST = 10  # explanations, and three drifts
@@ -80,7 +80,7 @@ def law(d: Diagnosis, c: Candidate) -> Figure:
         axes = figure.add_subplot(count, 1, k + 1)
         own = c.hypothesis.evidence
         _over_temperature(axes, conditions, own.sizes[k], np.sqrt(np.maximum(np.diag(own.size_covariance[k]), 0.0)))
-        axes.set_ylabel(m.size.name + unit_word(m.size.unit, ", "))
+        axes.set_ylabel(", ".join(filter(None, (m.size.name, unit_cell(m.size.unit)))))
         level = "with a law of the data's own" if m.own_law else "a level line is the law assumed"
         axes.set_title(f"{m.name}: its size in every test ({level})")
     return figure
@@ -110,12 +110,12 @@ def _over_temperature(axes: Axes, conditions: Sequence[Condition], value: Array,
             color=(NAMED, "#a0741a", "#7a3d8f", "#555f6b", "#2166ac")[k % 5], ms=4, lw=1.0, capsize=2, label=f"{speed / RPM:.0f} rpm",
         )  # fmt: skip
     axes.set_xlabel("temperature, °C")
-    axes.legend(frameon=False, fontsize=8, ncols=min(len(speeds), 5))
+    axes.legend(frameon=False, fontsize=8, ncols=min(len(speeds), 5), loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2)
 
 
 @rc_context(STYLE)
 def errors(d: Diagnosis) -> Figure:
-    """chi2 a number of every test, with tolerances fitted and with what the verdict names."""
+    """chi2 per number of every test, with tolerances fitted and with what the verdict names."""
     tests = d.search.model.tests
     shown: list[tuple[str, Any, str]] = [("tolerances fitted", d.search.base, OTHER)]
     if d.verdict.accepted is not d.search.base:
@@ -128,7 +128,7 @@ def errors(d: Diagnosis) -> Figure:
         axes.bar(np.arange(len(tests)) + (k - (len(shown) - 1) / 2) * width, value, width=width, color=paint, label=label)
     axes.axhline(1.0, color=INK, lw=0.8, ls="--")
     axes.set_xticks(range(len(tests)), [t.test.id for t in tests], rotation=30 if len(tests) > 6 else 0)
-    axes.set_ylabel("chi² a number")
+    axes.set_ylabel("chi² per number")
     axes.set_title("Error left in every test (1 is noise alone)")
     axes.set_ylim(0.0, 1.25 * axes.get_ylim()[1])  # room for the legend above the bars
     axes.legend(frameon=False, fontsize=8, loc="upper left", ncols=len(shown))

@@ -16,6 +16,7 @@ from thermospindle.report.text.ladder_table import ResidualMap, residual_map
 from thermospindle.report.typeset import signed_short
 
 ERROR, HELD_OUT = "#b3402a", "#2166ac"
+BESIDE = 12  # names of steps that fit beside each other
 
 
 @rc_context(STYLE)
@@ -54,7 +55,10 @@ def _errors(axes: Axes, found: Ladder) -> None:
     span = max(np.log10(high / low), 0.5)
     axes.set_ylim(low / 10 ** (0.16 * span), high * 10 ** (0.16 * span))
     axes.set_xlim(-0.5, len(place) - 0.5)
-    axes.set_xticks(place, [broken(r.name) for r in found.steps])
+    if len(place) > BESIDE:
+        axes.set_xticks(place, [r.name for r in found.steps], rotation=30, ha="right", rotation_mode="anchor")
+    else:
+        axes.set_xticks(place, [broken(r.name) for r in found.steps])
     axes.set_ylabel("rms residual, standard errors")
     axes.set_title("The error at every step")
     axes.legend(loc="upper right")

@@ -87,7 +87,7 @@ def campbell(found: ResonanceMap, at: int | None = None, size: tuple[float, floa
     axes.axvline(found.nominal.speed / RPM, color=PALE, lw=1.0, ls=":")
     axes.set(xlabel="speed, rpm", ylabel="frequency, Hz")
     figure.suptitle(f"Campbell diagram at {found.temperatures[t0]:.4g} °C", x=0.01, ha="left", fontweight="bold", fontsize=9.5)
-    figure.legend(handles=_key(found, drawn_lines(found)), loc="outside lower center", ncols=round(size[0] / 1.65), fontsize=7.5)
+    figure.legend(handles=_key(found, drawn_lines(found), bool(marked)), loc="outside lower center", ncols=round(size[0] / 1.65), fontsize=7.5)
     return figure
 
 
@@ -121,7 +121,7 @@ def over_temperature(found: ResonanceMap, size: tuple[float, float] = SIZE, key_
     title = f"Natural frequencies and the strongest lines among them at {found.nominal.speed / RPM:.0f} rpm"
     figure.suptitle(title, x=0.01, ha="left", fontweight="bold", fontsize=9.5)
     if key_below:
-        figure.legend(handles=_key(found, shown), loc="outside lower center", ncols=6, fontsize=7.5)
+        figure.legend(handles=_key(found, shown, bool(crossing)), loc="outside lower center", ncols=6, fontsize=7.5)
     return figure
 
 
@@ -146,7 +146,8 @@ def both(found: ResonanceMap, size: tuple[float, float] = SIZE, key_below: bool 
             end = (curve.speed[order][-1] / RPM, curve.temperature[order][-1])
             axes.annotate(f"{c.line.name}, {c.mode.number}", end, (4, 2), textcoords="offset points", fontsize=7.5, color=paint)
     _name_tops(axes, named)
-    _mark(axes, [(c.condition.speed / RPM, c.condition.temperature, c.strength) for c in chosen[:CURVES] if c.at_nominal_speed])
+    meeting = [(c.condition.speed / RPM, c.condition.temperature, c.strength) for c in chosen[:CURVES] if c.at_nominal_speed]
+    _mark(axes, meeting)
     axes.axvline(found.nominal.speed / RPM, color=PALE, lw=1.0, ls=":")
     axes.axhline(found.nominal.temperature, color=PALE, lw=1.0, ls=":")
     axes.plot(found.nominal.speed / RPM, found.nominal.temperature, "s", color=INK, ms=5, clip_on=False)
@@ -154,7 +155,7 @@ def both(found: ResonanceMap, size: tuple[float, float] = SIZE, key_below: bool 
     figure.suptitle("Where the strongest lines meet a mode (line, mode number)", x=0.01, ha="left", fontweight="bold", fontsize=9.5)
     if key_below:
         handles = [Line2D([], [], color=paints[m.number], label=f"mode {m.number} {m.kind}") for m in found.modes if m.number in paints]
-        handles += [Line2D([], [], color=INK, marker="s", ls="", ms=5, label="nominal"), _circle()]
+        handles += [Line2D([], [], color=INK, marker="s", ls="", ms=5, label="nominal"), *[_circle()] * bool(meeting)]
         figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=7.5)
     return figure
 
@@ -232,7 +233,7 @@ def _name_tops(axes: Axes, named: list[tuple[float, str, str]]) -> None:
         )
 
 
-def _key(found: ResonanceMap, lines: Sequence[LineTrack]) -> list[Line2D]:
+def _key(found: ResonanceMap, lines: Sequence[LineTrack], marked: bool) -> list[Line2D]:
     handles = [
         Line2D([], [], color=WHIRL[w], lw=1.9, label=f"mode, {'whirls ' + w if w != 'none' else 'axial or standing'}")
         for w in dict.fromkeys(m.whirl for m in found.modes)
@@ -241,7 +242,7 @@ def _key(found: ResonanceMap, lines: Sequence[LineTrack]) -> list[Line2D]:
     handles += [Line2D([], [], color=CAUSES[c], lw=0.9, label=c) for c in causes]
     if any(t.line.whirl < 0 for t in lines):
         handles.append(Line2D([], [], color=INK, lw=0.9, ls="--", label="line that whirls backward"))
-    return [*handles, _circle()]
+    return [*handles, *[_circle()] * marked]
 
 
 def _circle() -> Line2D:

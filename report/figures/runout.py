@@ -23,7 +23,7 @@ from thermospindle.sim.running.waterfall import LineSpectrum, on_grid
 REPEATS, BAND = "#c9371c", "#2166ac"
 NAMED = {"radial": 9, "axial": 7}  # lines with labels, at most
 DECADES = 3.0  # of the spectrum below its strongest line
-ROOM = 130.0  # for labels, times the strongest line
+ROOM = 250.0  # for labels, times the strongest line
 RANGE = 50.0  # dB below the strongest line that the waterfall shows
 
 

@@ -40,7 +40,7 @@ def sweep(of: Cases, table: pa.Table) -> dict[str, Figure]:
     x = numbers(table, along)
     panels = [(f"mode {n}, Hz", y) for n, y in frequencies(table).items()][: 2 * PANELS]
     if of.study.runout:
-        panels += [(f"{key.split('_')[0].upper()} {probe}, um", numbers(table, f"{key}.{probe}")) for key in OF_RUNOUT for probe in ("x", "axial")]
+        panels += [(f"{key.split('_')[0].upper()} {probe}, µm", numbers(table, f"{key}.{probe}")) for key in OF_RUNOUT for probe in ("x", "axial")]
     panels += [(f"preload {b.name}, N", numbers(table, f"preload_N.{b.name}")) for b in of.spindle.bearings]
     with rc_context(STYLE):
         figure, grid = _grid(len(panels))
@@ -112,7 +112,7 @@ def _spreads(of: Cases, table: pa.Table) -> Figure:
                 axes.hist(known, bins="auto" if np.ptp(known) > 0 else 1, density=True, histtype="step", color=colour(here["temperature_C"], every), ls="--" if here["speed_rpm"] else "-", label=label)  # fmt: skip
         axes.set_title(title)
         axes.set_yticks([])
-        axes.set_xlabel("Hz" if k < len(modes) else "um" if "RRO" in title else "N")
+        axes.set_xlabel("Hz" if k < len(modes) else "µm" if "RRO" in title else "N")
     handles, labels = grid[0].get_legend_handles_labels()
     if handles:
         figure.legend(handles, labels, loc="outside lower center", ncols=min(6, len(handles)))
@@ -171,4 +171,4 @@ def _map(axes: Axes, values: Array, largest: float, rows: Sequence[str], columns
     axes.grid(visible=False)
     for i, j in zip(*np.nonzero(np.abs(np.nan_to_num(values)) >= least), strict=True):
         value = values[i, j]
-        axes.text(j, i, format(value, form), ha="center", va="center", fontsize=7, color="white" if abs(value) > 0.7 * largest else INK)
+        axes.text(j, i, format(value, form).replace("-", "−"), ha="center", va="center", fontsize=7, color="white" if abs(value) > 0.7 * largest else INK)

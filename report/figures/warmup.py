@@ -25,7 +25,7 @@ def figure(warmup: Warmup) -> Figure:
     """Four panels over time in minutes, six where there are rollers; every line is named at its end."""
     rolling = roller_names(warmup)
     drawn = Figure(figsize=(15.5 if rolling else 9.6, 7.0))
-    panels = drawn.subplots(2, 3 if rolling else 2, sharex=True)
+    panels = drawn.subplots(2, 3 if rolling else 2, sharex=True, gridspec_kw={"wspace": 0.08})
     minutes = warmup.times / MINUTE
     bearings = [b.name for b in warmup.spindle.bearings]
     parts = {g.name: g.part for g in warmup.spindle.regions}

@@ -17,7 +17,7 @@ from thermospindle.report.log.compare import FrfsBeside, write_comparison_log
 from thermospindle.report.page import runout_compare as runout
 from thermospindle.report.page.report import Section, write_page
 from thermospindle.report.text.compare import AGREES, TOGETHER
-from thermospindle.report.typeset import figure, minus, signed, table
+from thermospindle.report.typeset import figure, minus, signed, table, with_error
 
 WORDS = {
     "pulls": (
@@ -114,7 +114,7 @@ def _table(c: Comparison) -> str:
         for k, m in enumerate(t.modes):
             damping = "–" if m.damping_measured is None else f"{100 * m.damping_measured:.3f}"
             cells = [
-                label(t.test, ", ") if k == 0 else "", str(m.number), m.kind, f"{m.measured:.2f} <small>± {m.sd:.2g}</small>", f"{m.computed:.2f}",
+                label(t.test, ", ") if k == 0 else "", str(m.number), m.kind, with_error((m.measured, m.sd), digits=2), f"{m.computed:.2f}",
                 signed(m.error, 2), signed(100 * m.error / m.measured, 2), signed(m.residual, 1), damping, f"{100 * m.damping_computed:.3f}",
                 "–" if m.mac is None else f"{m.mac:.3f}" + ("*" if m.close else ""),
             ]  # fmt: skip

@@ -18,7 +18,7 @@ from thermospindle.report.figures.runout_campaign import diagnosis_figures
 from thermospindle.report.page import runout_diagnosis
 from thermospindle.report.page.report import Section, write_page
 from thermospindle.report.text.diagnosis.words import hidden_words, plan_words
-from thermospindle.report.typeset import minus, prose, signed, table, unit_word, with_error
+from thermospindle.report.typeset import minus, plain, prose, signed, table, unit_cell, with_error
 
 CAPTIONS = {
     "errors": "Mean square of the whitened residuals of every test's FRF lines: one is noise alone.",
@@ -76,27 +76,28 @@ def _verdict(answer: dict[str, Any]) -> str:
 
 
 CANDIDATES = (
-    "ln evidence and error are against the model without effects; probability among everything tried: no effect, one, two, and free drift. "
+    "ln evidence is against the model without effects, and so is the error on conditions left out; probability among everything tried: no effect, one, "
+    "two, and free drift. "
     "Two effects at once are believed less beforehand."
 )
 
 
 def _candidates(answer: dict[str, Any]) -> str:
-    head = ["effects", "ln evidence", "probability", "error, %", "value", "", "unit", "believable"]
+    head = ["effects", "ln evidence", "probability", "left-out error, %", "value", "", "unit", "believable"]
     rows = []
     for c in answer["candidates"]:
         for k, (name, v) in enumerate(c["parameters"].items()):
             first = k == 0
-            value, _, sd = _with_error(v["value"], v["sd"]).partition(" <small>")
+            value, _, sd = _with_error(v["value"], v["sd"]).partition(" <small>") if "called" not in v else (escape(v["called"]), "", "")
             rows.append(
                 [
                     escape(" + ".join(c["effects"])) if first else "",
                     minus(_evidence(c["delta_evidence"])) if first else "",
                     f"{c['probability']:.3f}" if first else "",
-                    "" if not first else "-" if c["held_out_error_ratio"] is None else f"{100 * c['held_out_error_ratio']:.0f}",
+                    "" if not first else "–" if c["held_out_error_ratio"] is None else f"{100 * c['held_out_error_ratio']:.0f}",
                     escape(name.split(".", 1)[1] if len(c["effects"]) == 1 else name),
                     value + (f" <small>{sd}" if sd else ""),
-                    escape(unit_word(v["unit"])),
+                    unit_cell(v["unit"]),
                     ("yes" if c["believable"] else "no, at a limit") if first else "",
                 ]
             )
@@ -108,7 +109,7 @@ def _tests(answer: dict[str, Any]) -> str:
     for t in answer["next_test"]:
         times = "" if t["repeats"] == 1 else f"; {t['repeats']} of them make it 100 to 1"
         first, second = (escape(s) for s in t["separates"])
-        words = f"<h3>A test {escape(plan_words(t['condition']))}</h3><p>It separates {first} from {second} with odds of {_odds(t['odds'])} to 1{times}; most by {prose(t['tells'])}.</p>"
+        words = f"<h3>A test {prose(plan_words(t['condition']))}</h3><p>It separates {first} from {second} with odds of {_odds(t['odds'])} to 1{times}; most by {prose(t['tells'])}.</p>"
         most = max(len(rows) for rows in t["predicted"].values())
         rows = [
             [escape(name), *(_with_error(r["frequency_Hz"], r["sd_Hz"], 1) for r in predicted), *[""] * (most - len(predicted))]
@@ -119,7 +120,7 @@ def _tests(answer: dict[str, Any]) -> str:
 
 
 def _odds(odds: float) -> str:
-    return f"{odds:.3g}" if odds < 9.99e5 else "more than a million"
+    return plain(odds) if odds < 9.99e5 else "more than a million"
 
 
 def _tolerances(answer: dict[str, Any]) -> str:
@@ -129,7 +130,7 @@ def _tolerances(answer: dict[str, Any]) -> str:
         scale, unit = (1.0, "K") if t["kind"] == TEMPERATURE else (100.0, "%")
         rows.append(
             [
-                escape(name), signed(t["value"] / t["prior_sd"], 2), f"{share:.2f}", signed(scale * t["value"], 2), f"{scale * t['prior_sd']:.2f}", unit,
+                escape(name), signed(t["value"] / t["prior_sd"], 2), f"{share:.2f}" if share >= 0.01 else f"{share:.1g}", signed(scale * t["value"], 2), f"{scale * t['prior_sd']:.2f}", unit,
                 "cannot be seen" if share > UNSEEN else "",
             ]
         )  # fmt: skip
@@ -140,7 +141,7 @@ def _tolerances(answer: dict[str, Any]) -> str:
 def _detectable(answer: dict[str, Any]) -> str:
     rows = [
         [
-            escape(name), escape(row["parameter"]), f"{row['size']:.2g}", escape(unit_word(row["unit"])),
+            escape(name), escape(row["parameter"]), f"{row['size']:.2g}", unit_cell(row["unit"]),
             "not visible at a typical size" if name in answer["invisible"] else "",
         ]
         for name, row in sorted(answer["detectable_in"].items())
@@ -157,6 +158,6 @@ def _with_error(value: float, sd: float, digits: int = 3) -> str:
     """A value with its error, very large and small ones as powers of ten; what was chosen, not fitted, has none."""
     if sd == 0.0:
         return minus(f"{value:g}")
-    if 1e-3 <= max(abs(value), sd) < 1e5:
+    if 1e-5 <= max(abs(value), sd) < 1e5:
         return str(with_error((value, sd), digits=digits))
     return minus(f"{value:.3g}") + f" <small>± {sd:.1g}</small>"

@@ -63,9 +63,10 @@ def misses(table: Table) -> list[str]:
         sentences += [*_frequency_misses(table, measured, own), *_shift_misses(table, measured.label)]
         if paper is not None and (both := [n for n in paper.value if n in measured.value and n in own.value]):
             far, near = (max(abs(paper.value[n][0] - other.value[n][0]) for n in both) for other in (measured, own))
+            apart = f"at most {near:.1f}" if near >= 0.05 else "less than 0.1"
             sentences.append(
                 f"The published analysis misses the measurement too, by up to {far:.1f} Hz at {own.temperature:g} °C; "
-                f"it differs from the model by at most {near:.1f} Hz."
+                f"it differs from the model by {apart} Hz."
             )
     for name in dict.fromkeys(r.published_flexibility for r in table.rows if r.published_flexibility):
         other = [r for r in table.rows if r.published_flexibility == name and r.flexibility.rstrip("s") not in name]

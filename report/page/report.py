@@ -53,7 +53,7 @@ def html(run: Run, extra_sections: Sequence[Section] = ()) -> str:
     """The report as text; `extra_sections` stand between the results and the account of where they come from."""
     run = replace(run, steps=tuple(sorted(run.steps, key=temperature_of)))
     every = [*results(run), *extra_sections, *background(run)]
-    return page(run.spindle, _conditions(run), every, "Run")
+    return page(run.spindle, _conditions(run), every, "Report" if extra_sections else "Run")
 
 
 def page(spindle: Spindle, conditions: str, sections: Sequence[Section], kind: str = "") -> str:

@@ -12,7 +12,7 @@ from thermospindle.report.figures.common import pictures
 from thermospindle.report.page.report import Section
 from thermospindle.report.text.diagnosis.words import next_words
 from thermospindle.report.text.runout_diagnosis import CLEAR
-from thermospindle.report.typeset import minus, prose, table, unit_word
+from thermospindle.report.typeset import minus, plain_error, prose, table, unit_cell
 
 CAPTIONS = {
     "runout_explanations": "Green: what the verdict names. Every explanation is fitted to the lines that it can move, with the build's tolerances and what the "
@@ -57,11 +57,12 @@ def _candidates(answer: dict[str, Any]) -> str:
     for c in answer["candidates"]:
         for k, (name, v) in enumerate(c["parameters"].items()):
             first = k == 0
-            value = minus(f"{v['value']:.4g}") + (f" <small>± {v['sd']:.2g}</small>" if v["sd"] else "")
+            value, _, sd = minus(v.get("called") or plain_error(v["value"], v["sd"])).partition(" +- ")
             rows.append(
                 [
                     escape(" + ".join(c["effects"])) if first else "", minus(f"{c['delta_evidence']:+.1f}") if first else "",
-                    f"{c['probability']:.3f}" if first else "", escape(name.split(".", 1)[1] if len(c["effects"]) == 1 else name), value, escape(unit_word(v["unit"])),
+                    f"{c['probability']:.3f}" if first else "", escape(name.split(".", 1)[1] if len(c["effects"]) == 1 else name),
+                    escape(value) + (f" <small>± {sd}</small>" if sd else ""), unit_cell(v["unit"]),
                     ("yes" if c["believable"] else "no, at a limit") if first else "",
                 ]
             )  # fmt: skip
@@ -107,7 +108,7 @@ def _next(answer: dict[str, Any]) -> str:
 
 def _detectable(answer: dict[str, Any]) -> str:
     rows = [
-        [escape(name), escape(row["parameter"]), f"{row['size']:.2g}", escape(unit_word(row["unit"]))]
+        [escape(name), escape(row["parameter"]), f"{row['size']:.2g}", unit_cell(row["unit"])]
         for name, row in sorted(answer["detectable_in"].items())
     ]
     caption = f"Size from which each effect would have stood out by {CLEAR:g} in ln evidence of what the scene likely has of the same lines."

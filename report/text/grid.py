@@ -38,7 +38,8 @@ def show_grid(
         pieces[-1].append(k)
     for number, piece in enumerate(pieces):
         shown = [*range(keys), *piece]
-        table = grid(title if number == 0 else f"{title}, continued", [columns[k] for k in shown], words)
+        console.print(title if number == 0 else f"{title}, continued", style="bold", markup=False, highlight=False)
+        table = grid("", [columns[k] for k in shown], words)
         for row in rows:
             table.add_row(*(row[k] for k in shown))
         console.print(table)

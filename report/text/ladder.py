@@ -11,6 +11,7 @@ from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.ladder.ladder import CLEAR, DISCREPANCY, TOLERANCES, Ladder
 from thermospindle.diagnosis.ladder.step import Step
 from thermospindle.diagnosis.prediction.next_test import in_words
+from thermospindle.report.typeset import plain, plain_error
 
 CERTAIN = 1000.0  # odds, beyond which models are not to be trusted so far
 STRETCHED = 2.0  # standard deviations from which a tolerance is named
@@ -151,12 +152,12 @@ def _tests(found: Ladder) -> Iterator[str]:
         one, two = max(zip(*t.predictions, strict=True), key=lambda m: abs(m[0].frequency - m[1].frequency) / np.hypot(m[0].sd, m[1].sd))
         yield (
             f"A test {in_words(t.condition)} would separate {t.separates[0]} from {t.separates[1]}, at odds of {_odds(t.odds)} to 1 if either is "
-            f"right: a mode would lie at {one.frequency:.1f} +- {one.sd:.2g} Hz or at {two.frequency:.1f} +- {two.sd:.2g} Hz."
+            f"right: a mode would lie at {plain_error(one.frequency, one.sd)} Hz or at {plain_error(two.frequency, two.sd)} Hz."
         )
 
 
 def _odds(odds: float) -> str:
-    return f"{odds:.2g}" if odds < CERTAIN else f"more than {CERTAIN:g}"
+    return plain(odds, 2) if odds < CERTAIN else f"more than {CERTAIN:g}"
 
 
 def evidence(value: float, sign: str = "") -> str:

@@ -13,8 +13,8 @@ from thermospindle.diagnosis.runout.next_test import NextRunout
 from thermospindle.diagnosis.runout.sources import SourceKey
 from thermospindle.diagnosis.runout.verdict import CLEAR, RunoutDiagnosis
 from thermospindle.model.units import RPM, TO_UM
-from thermospindle.report.text.diagnosis.words import next_words
-from thermospindle.report.typeset import known, plain_error, unit_word
+from thermospindle.report.text.diagnosis.words import next_words, value_words
+from thermospindle.report.typeset import known
 from thermospindle.sim.effects.effect import Effect
 
 SHOWN = 12  # candidates
@@ -165,7 +165,7 @@ def show_runout_diagnosis(console: Console, answer: dict[str, Any]) -> None:
     if answer["verdict"] not in ("none",):
         console.print("\nBest explanations (ln evidence over the scene's own imperfections):")
         for c in answer["candidates"][:5]:
-            values = ", ".join(f"{k.split('.')[1]} {plain_error(v['value'], v['sd'])}{unit_word(v['unit'], ' ')}" for k, v in c["parameters"].items())
+            values = ", ".join(f"{k.split('.')[1]} {value_words(v)}" for k, v in c["parameters"].items())
             console.print(
                 f"  {' + '.join(c['effects'])}: {c['delta_evidence']:+.1f}, probability {c['probability']:.3f}; {values}", highlight=False
             )

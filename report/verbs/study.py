@@ -142,13 +142,13 @@ def _show(console: Console, values: dict[str, Any]) -> None:
 
 def _line(label: str, nominal: float, own: dict[str, Any]) -> list[str]:
     if "least" in own:
-        return [label, *map(_short, (nominal, own["least"], own["most"]))]
+        return [label, *_alike(nominal, own["least"], own["most"])]
     s = own["spread"]
-    cells = [label, _short(nominal)] + (["-"] * 4 if s is None else [_short(v) for v in (s["mean"], s["sd"], s["quantiles"][0], s["quantiles"][-1])])
+    cells = [label, *(_alike(nominal, *[None] * 4) if s is None else _alike(nominal, s["mean"], s["sd"], s["quantiles"][0], s["quantiles"][-1]))]
     if (sensitive := own.get("sensitivity")) is None:
         return [*cells, "-", "-"]
-    most = list(sensitive["coefficients"].items())[:2]
-    return [*cells, ", ".join(f"{name} {c['value']:+.2f}" for name, c in most), f"{sensitive['r2']:.3f}"]
+    most = [f"{name} {c['value']:+.2f}" for name, c in list(sensitive["coefficients"].items())[:2] if abs(c["value"]) >= 0.005]
+    return [*cells, ", ".join(most), f"{sensitive['r2']:.3f}"]
 
 
 def _show_fleet(console: Console, values: dict[str, Any]) -> None:
@@ -163,6 +163,13 @@ def _show_fleet(console: Console, values: dict[str, Any]) -> None:
         console.print(f"{o['campaign']} stands apart: {o['of']} {o['z']:+.1f} robust standard deviations from the fleet's middle")
     if not values["outliers"]:
         console.print(f"None stands more than {APART:g} robust standard deviations from the fleet's middle.")
+
+
+def _alike(*values: float | None) -> list[str]:
+    """Numbers of one row, to the decimal that is the fifth digit of the largest."""
+    largest = max((abs(v) for v in values if v), default=1.0)
+    decimals = int(np.clip(4 - np.floor(np.log10(largest)), 0, 9))
+    return ["-" if v is None else f"{v:.{decimals}f}" for v in values]
 
 
 def _short(value: float | None) -> str:

@@ -20,7 +20,7 @@ from thermospindle.report.workbench.state import (
     span,
     span_of_tolerance,
 )  # fmt: skip
-from thermospindle.sim.effects.effect import Effect, Parameter
+from thermospindle.sim.effects.effect import Effect, Parameter, called
 from thermospindle.sim.posing import round_down
 
 STEPS = 400  # of a slider, about
@@ -134,7 +134,8 @@ class Controls:
         key, value, unit = key_of(effect.name, p.name), s.effects[effect.name][p.name], "" if p.unit == "1" else f", {p.unit}"
         says = {**labelled(f"{p.name}{unit}"), "title": p.meaning}
         if p.choices:
-            chosen = Select(title=p.name, value=f"{value:g}", options=[f"{c:g}" for c in p.choices], stylesheets=[LOOK], description=None, html_attributes=says, **WIDE)
+            options = [(f"{c:g}", called(p, c, self.bench.spindle) or f"{c:g}") for c in p.choices]
+            chosen = Select(title=p.name, value=f"{value:g}", options=options, stylesheets=[LOOK], description=None, html_attributes=says, **WIDE)
             chosen.on_change("value", lambda attr, old, new: self._set(effect.name, p.name, float(new), False))
             self.sliders[key] = chosen
             return Row(chosen, **WIDE)

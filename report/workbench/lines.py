@@ -16,6 +16,7 @@ from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.verdict import campaign_data
 from thermospindle.model.errors import BadInput, NoEquilibrium
 from thermospindle.report.text.diagnosis.answer import parameters_of
+from thermospindle.report.typeset import plain_error
 from thermospindle.report.workbench.bench import Bench
 from thermospindle.report.workbench.state import Setting, key_of
 
@@ -25,7 +26,7 @@ STEPS = 3  # of the progress, beside the tests that are read
 @dataclass(frozen=True)
 class Weighed:
     """Values and standard errors by the names of `Setting.free`, effects' parameters and tolerances; `gain` in ln evidence over tolerances alone, and
-    chi2 a number before and after."""
+    chi2 per number before and after."""
 
     value: dict[str, float]
     sd: dict[str, float]
@@ -80,6 +81,7 @@ def _told(best: Hypothesis, none: Hypothesis, parameters) -> Weighed:  # type: i
 
 def said(found: Weighed) -> str:
     """The fit in a sentence."""
-    values = ", ".join(f"{key} {v:.4g} ± {found.sd[key]:.2g}" for key, v in found.value.items() if "." in key)
+    values = ", ".join(f"{key} {plain_error(v, found.sd[key])}" for key, v in found.value.items() if "." in key)
+    values = values.replace("+-", "±")
     gain = f"ln evidence {found.gain:+.0f} over tolerances alone; " if values else ""
-    return f"Fitted to the lines, as spindle diagnose does. {values + '; ' if values else ''}{gain}chi2 a number {found.before:.3g} → {found.after:.3g}."
+    return f"Fitted to the lines, as spindle diagnose does. {values + '; ' if values else ''}{gain}chi2 per number {found.before:.3g} → {found.after:.3g}."

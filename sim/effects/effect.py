@@ -74,9 +74,19 @@ def fitted_to(effect: Effect, spindle: Spindle) -> Effect:
     if refusal(effect, spindle) is not None:
         return effect
     factors = effect.sized(spindle) if effect.sized else {}
-    counts = {"bearings": len(spindle.bearings), "all bearings": len(spindle.all_bearings), "sets": len(spindle.sets)}
+    counts = {kind: len(names) for kind, names in _counted(spindle).items()}
     rows = tuple(_fitted(p, factors.get(p.name, 1.0), counts) for p in effect.parameters)
     return effect if rows == effect.parameters else replace(effect, parameters=rows, sized=None)
+
+
+def _counted(spindle: Spindle) -> dict[str, list[str]]:
+    """Names of what parameters may count (`Parameter.counts`)."""
+    return {"bearings": [b.name for b in spindle.bearings], "all bearings": [b.name for b in spindle.all_bearings], "sets": [s.name for s in spindle.sets]}
+
+
+def called(p: Parameter, value: float, spindle: Spindle) -> str | None:
+    """The name of what the value of a parameter that counts something means; None for other parameters."""
+    return None if not p.counts else "all" if value == ALL else _counted(spindle)[p.counts][int(value)]
 
 
 def _fitted(p: Parameter, factor: float, counts: Mapping[str, int]) -> Parameter:

@@ -277,7 +277,7 @@ def _modes(
     words += [f"chi-square {chi2:.3g} per degree of freedom" + (", errors enlarged by its root" if chi2 > 1 else "")]
     words += [] if strain else ["residues of rank one refused by the data, left free"]
     words += [f"residues of rank one strained, errors enlarged by {np.sqrt(strain):.2g}"] if strain > 1 else []
-    words += [f"{moved} modes at two places with one shape, errors enlarged by their distance"] if moved else []
+    words += [f"{moved} mode{'s' * (moved > 1)} at two places with one shape, errors enlarged by their distance"] if moved else []
     words += [f"{np.sum(~sure)} faint or uncertain poles not reported"] if not sure.all() else []
     edges = np.round(lines.s.imag[[0, -1]] * unit / (2 * np.pi), 6)
     return Modes(

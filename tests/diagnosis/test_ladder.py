@@ -175,7 +175,7 @@ def test_the_verdict_and_the_next_test_are_told(lagging):
     assert "Diagnosis: ambiguous. Because." in told
     assert told[-1] == (
         "A test at 70 C, 7200 rpm would separate soak_lag from preload_loss, at odds of more than 1000 to 1 if either is right: a mode would lie at "
-        "1000.0 +- 0.5 Hz or at 1010.0 +- 0.5 Hz."
+        "1000.00 +- 0.50 Hz or at 1010.00 +- 0.50 Hz."
     )
     assert ladder_json(named(lagging, "ambiguous", (test,)))["verdict"] == "ambiguous"
     assert ladder_json(lagging)["verdict"] is None

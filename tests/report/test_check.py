@@ -16,6 +16,7 @@ from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
 from thermospindle.report.check.drawing import drawing
 from thermospindle.report.check.understood import arrangement
+from thermospindle.report.check.words import of_words
 from thermospindle.sim.operating import operating_point
 
 SCENES = {name: ROOT / "scenes" / name / "spindle.toml" for name in ("hdd_2003", "mk7702", "five_bearing", "free_shaft")}
@@ -128,6 +129,13 @@ def test_defaults_are_told(capsys: pytest.CaptureFixture[str]) -> None:
     assert "timoshenko" in told["shafts.spindle.beam"]
     assert "thermal.convection" not in told
     assert not any(key.startswith("thermal") for key in {a["key"] for a in checked(SCENES["free_shaft"], capsys)["assumed"]})
+
+
+def test_columns_with_dashes_are_of_numbers_and_an_empty_list_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+    rows = [["front", "-", "-z", ""], ["rear", "200", "+z", "-1.5e+09, 2"]]
+    assert [of_words(rows, k) for k in range(4)] == [True, False, True, False]
+    assert main(["check", str(SCENES["hdd_2003"])]) == 0
+    assert "Assumed, where the scene says nothing:\n  - nothing" in capsys.readouterr().out
 
 
 ODD = [

@@ -20,6 +20,7 @@ from thermospindle.report.log.compare import FrfsBeside, write_comparison_log
 from thermospindle.report.log.read import read_log
 from thermospindle.report.page.compare import sections, write_comparison
 from thermospindle.report.text.compare import show_comparison, verdict
+from thermospindle.report.typeset import with_error
 from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Noise, Test
 from thermospindle.sim.identification.frf import Frf
 from thermospindle.sim.operating import operating_point
@@ -110,7 +111,7 @@ def test_the_report_tells_every_mode(found, folder):
     for test in found.tests:
         for m in test.modes:
             assert f"{m.computed:.2f}" in cells
-            assert any(cell.startswith(f"{m.measured:.2f} ±") for cell in cells)
+            assert str(with_error((m.measured, m.sd))).replace(" <small>", " ").removesuffix("</small>") in cells
     assert "1 % low &amp; &lt;slow&gt;" in text
     assert "<slow>" not in text
     assert not re.search(r'(?:src|href)="(?!#|data:)', text)  # needs no network
@@ -212,6 +213,17 @@ def test_many_tests_are_a_row_a_mode(found):
     assert (row[6], row[7]) == (f"{worst.error:+.2f}", test)
     show_comparison(console, many)
     assert console.export_text().count(f"{worst.measured:.2f}") == 3
+
+
+def test_a_third_of_an_octave_is_one_column_wherever_lines_begin(found, spindle, campaign):
+    """Records of other lengths have other first and last lines: their outer bands are cut elsewhere, and are the same bands."""
+    frf = campaign.tests[1].frf
+    cut = replace(campaign.tests[1], frf=replace(frf, frequency=frf.frequency[1:-4], value=frf.value[:, :, 1:-4], sd=frf.sd[:, :, 1:-4]))
+    other = compare(spindle, replace(campaign, tests=(campaign.tests[0], cut)))
+    axes = figures(other)["bands"].axes[0]
+    told = [t.get_text() for t in axes.get_xticklabels()]
+    assert told == [t.get_text() for t in figures(found)["bands"].axes[0].get_xticklabels()]
+    assert not np.ma.getmaskarray(axes.images[0].get_array()).any()
 
 
 def test_labels_and_pairs(found, campaign):

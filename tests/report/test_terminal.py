@@ -13,6 +13,7 @@ from rich.console import Console
 from tests.conftest import ROOT
 from thermospindle.cli import main
 from thermospindle.report.text.effects import show_effects
+from thermospindle.report.text.grid import show_grid
 from thermospindle.report.text.run import show_impact, show_run
 from thermospindle.sim.effects import CATALOGUE
 from thermospindle.sim.identification.numbering import identified
@@ -32,6 +33,12 @@ def test_the_terminal_promises_what_there_is(run: Run):
 
 
 # ---------------------------------------------------------------- pictures
+
+
+def test_the_title_of_a_narrow_table_stays_on_a_line():
+    out = StringIO()
+    show_grid(Console(file=out, width=30), "Bearings at the reference", ["bearing", "axial"], [["front", "34.18"]])
+    assert out.getvalue().startswith("Bearings at the reference\n")
 
 
 def test_the_list_of_effects_breaks_no_word():

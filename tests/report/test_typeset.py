@@ -2,7 +2,7 @@
 
 import pytest
 
-from thermospindle.report.typeset import plain_error, prose, signed, with_error
+from thermospindle.report.typeset import plain, plain_error, prose, signed, unit_cell, with_error
 
 ROWS = [
     pytest.param("moves -27.0 +- 1.4 Hz", "moves −27.0 ± 1.4\u00a0Hz", id="signs and units"),
@@ -46,8 +46,18 @@ def test_a_number_has_the_digits_that_its_error_leaves(value, error, told):
         ((-27.04, 1.4), "−27.0 <small>± 1.4</small>"),
         ((1234.5, 30.0), "1234 <small>± 30</small>"),
         ((-0.01, 0.0), "0.0"),
+        ((0.0123456, 3e-6), "0.012346 <small>± 0.000003</small>"),
         (None, "–"),
     ],
 )
 def test_a_number_of_a_page_has_the_digits_that_its_error_leaves(pair, told):
     assert str(with_error(pair)) == told
+
+
+@pytest.mark.parametrize(("unit", "told"), [("1", ""), ("C", "°C"), ("um", "µm"), ("urad/(N m) per nm/N", "µrad/(N m) per nm/N"), ("N/um", "N/µm"), ("mm", "mm")])
+def test_units_in_cells_have_their_signs(unit, told):
+    assert unit_cell(unit) == told
+
+
+def test_odds_have_no_powers_of_ten():
+    assert [plain(x, 2) for x in (437.2, 3.21, 99_600.0)] == ["440", "3.2", "100000"]

@@ -14,9 +14,11 @@ from thermospindle.diagnosis.inference.evidence import Evidence, left_out
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.resonance import shown
 from thermospindle.diagnosis.verdict import Diagnosis, Drift
+from thermospindle.model.machine import Spindle
 from thermospindle.model.types import Array
 from thermospindle.report.text.diagnosis.words import condition, drift_words, law_words, would_change
 from thermospindle.report.typeset import known
+from thermospindle.sim.effects.effect import Effect, called
 
 SHOWN = 12  # candidates
 
@@ -89,7 +91,7 @@ def _candidate(c: Candidate, d: Diagnosis) -> dict[str, Any]:
     laws = {}
     for k, m in enumerate(c.told.mechanisms):
         for name, row in parameters_of(c.told, k).items():
-            parameters[f"{m.name}.{name}"] = row
+            parameters[f"{m.name}.{name}"] = row | named(m.effect, name, row["value"], d.search.model.spindle)
     for k, m in enumerate(c.hypothesis.mechanisms):
         laws[m.name] = _law(c, k, d)
     own = c.hypothesis.evidence
@@ -113,6 +115,12 @@ def _held_out(c: Candidate, d: Diagnosis) -> float | None:
     model = d.search.model
     error, _ = left_out(model, c.hypothesis.fit, c.hypothesis.evidence, conditions_of(model.spindle, model.tests))
     return known(error / d.verdict.held_out_before) if d.verdict.held_out_before > 0 else None
+
+
+def named(effect: Effect, name: str, value: float, spindle: Spindle) -> dict[str, str]:
+    """`called`, where the value of a parameter stands for a bearing or a set: its name, or all of them."""
+    word = next((called(p, value, spindle) for p in effect.parameters if p.name == name), None)
+    return {"called": word} if word else {}
 
 
 def parameters_of(h: Hypothesis, k: int) -> dict[str, dict[str, Any]]:

@@ -12,7 +12,7 @@ from thermospindle.diagnosis.decision.loss import in_all
 from thermospindle.diagnosis.verdict import Diagnosis, Drift
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
-from thermospindle.report.typeset import plain_error, unit_word
+from thermospindle.report.typeset import plain, plain_error, unit_word
 
 ALIKE = 0.9  # of the evidence of what the verdict names, from which a free drift does as well
 DEPARTS = 0.3  # of the size, from which a law does not hold
@@ -51,14 +51,18 @@ def _drift_words(p: Drift) -> str:
 def _change_words(p: Drift) -> str:
     if len(p.change) == 1:
         ((change, sd),) = p.told
-        return f"{change:+.3g} +- {sd:.1g}{unit_word(p.unit, ' ')} {_where(p.conditions[0])}"
+        return f"{_signed(change, sd)}{unit_word(p.unit, ' ')} {_where(p.conditions[0])}"
     low, high = int(np.argmin(p.change)), int(np.argmax(p.change))
     goes = f", {p.pattern.shape.name}" if p.pattern and p.pattern.shape.name != "constant" else ""
     (least, its_sd), (most, sd) = p.told[low], p.told[high]
     return (
-        f"from {least:+.3g} +- {its_sd:.1g}{unit_word(p.unit, ' ')} {_where(p.conditions[low])} to {most:+.3g} +- "
-        f"{sd:.1g}{unit_word(p.unit, ' ')} {_where(p.conditions[high])}{goes}"
+        f"from {_signed(least, its_sd)}{unit_word(p.unit, ' ')} {_where(p.conditions[low])} to {_signed(most, sd)}{unit_word(p.unit, ' ')} "
+        f"{_where(p.conditions[high])}{goes}"
     )
+
+
+def _signed(change: float, sd: float) -> str:
+    return "+" * (change > 0) + plain_error(change, sd)
 
 
 def law_words(d: Diagnosis) -> list[str]:
@@ -146,7 +150,7 @@ def show_diagnosis(console: Console, answer: dict[str, Any], verbose: bool = Tru
             if best["departure_from_law"][name]:
                 law = "its law is the data's own" if name in best["own_law"] else "one size would be its own law"
                 console.print(f"\nThe size of {name} as the data have it, test by test ({law}):")
-                console.print("  " + ", ".join(f"{r['test']} {r['size']:.3g} +- {r['sd']:.1g}" for r in rows))
+                console.print("  " + ", ".join(f"{r['test']} {plain_error(r['size'], r['sd'])}" for r in rows))
     if answer["verdict"] != "none":
         console.print("\nWithout any catalogue, what would have to drift:")
         for sentence in answer["misfit"]["words"]:
@@ -177,9 +181,14 @@ def _show_little(console: Console, answer: dict[str, Any]) -> None:
     console.print("--verbose shows every explanation, what would drift, and what these data could have shown.", style="dim")
 
 
+def value_words(v: dict[str, Any]) -> str:
+    """A parameter's value with error and unit, or the name of what it stands for."""
+    return v.get("called") or plain_error(v["value"], v["sd"]) + unit_word(v["unit"], " ")
+
+
 def _values(candidate: dict[str, Any]) -> str:
     """Fitted parameters with their errors and units."""
-    values = ", ".join(f"{k.split('.', 1)[1]} {plain_error(v['value'], v['sd'])}{unit_word(v['unit'], ' ')}" for k, v in candidate["parameters"].items())
+    values = ", ".join(f"{k.split('.', 1)[1]} {value_words(v)}" for k, v in candidate["parameters"].items())
     own = candidate["own_law"]
     return f"{values} (in the mean: the law of {' and '.join(own)} is the data's own)" if own else values
 
@@ -187,7 +196,7 @@ def _values(candidate: dict[str, Any]) -> str:
 def next_words(test: dict[str, Any], which: str) -> str:
     """The test to make, in a sentence."""
     first, second = test["separates"]
-    odds = "more than a million" if test["odds"] >= 1e6 * (1 - 1e-9) else f"{test['odds']:.3g}"
+    odds = "more than a million" if test["odds"] >= 1e6 * (1 - 1e-9) else plain(test["odds"])
     return f"A test {which} would tell {first} from {second} with odds of {odds} to 1, most by {test['tells']}."
 
 

@@ -15,7 +15,7 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import build
 from thermospindle.sim.effects import CATALOGUE, by_name, usable
-from thermospindle.sim.effects.effect import fitted_to, refusal
+from thermospindle.sim.effects.effect import called, fitted_to, refusal
 from thermospindle.sim.effects.known import equipped
 from thermospindle.sim.effects.structure import mount_compliance
 from thermospindle.sim.effects.temperature import soak_lag
@@ -112,6 +112,7 @@ def test_a_choice_for_every_bearing(spindle):
     third = replace(spindle.bearings[1], name="third", z=0.030)
     three = replace(spindle, bearings=(*spindle.bearings, third))
     rows = {p.name: p for p in fitted_to(by_name("cage_unbalance"), three).parameters}
+    assert [called(rows["bearing"], k, three) for k in (-1.0, 2.0)] == ["all", three.bearings[2].name]
     assert rows["bearing"].choices == (0.0, 1.0, 2.0)
     assert rows["bearing"].limits == (0.0, 2.0)
 
