@@ -81,7 +81,7 @@ def trend(key: str, temperature: Sequence[float], curves: Mapping[str, Mapping[s
         figure.set_size_inches(3.55, 2.45 + 0.2 * -(-len(handles) // COLUMNS))
         figure.legend(handles=handles[::-1], loc="outside upper center", ncols=COLUMNS, columnspacing=1.0, handletextpad=0.4)
     else:
-        axes.legend(handles=handles[::-1], loc="lower left" if from_zero else "best")
+        axes.legend(handles=handles[::-1], loc="best")
     return svg(figure, key, f"{label} over temperature")
 
 

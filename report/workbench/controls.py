@@ -8,6 +8,7 @@ from typing import Any, Protocol
 from bokeh.models import Button, Checkbox, Column, CustomJSTickFormatter, Div, NumericInput, Row, Select, Slider, Toggle
 from markupsafe import Markup
 
+from thermospindle.report.typeset import unit_cell
 from thermospindle.report.workbench.bench import Bench
 from thermospindle.report.workbench.state import (
     FURTHEST,
@@ -131,7 +132,7 @@ class Controls:
         return Column(Row(head, drop, **WIDE), *rows, **WIDE)
 
     def _parameter(self, effect: Effect, p: Parameter, s: Setting) -> Row:
-        key, value, unit = key_of(effect.name, p.name), s.effects[effect.name][p.name], "" if p.unit == "1" else f", {p.unit}"
+        key, value, unit = key_of(effect.name, p.name), s.effects[effect.name][p.name], "" if p.unit == "1" else f", {unit_cell(p.unit)}"
         says = {**labelled(f"{p.name}{unit}"), "title": p.meaning}
         if p.choices:
             options = [(f"{c:g}", called(p, c, self.bench.spindle) or f"{c:g}") for c in p.choices]
