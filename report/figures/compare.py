@@ -151,7 +151,7 @@ def by_band(c: Comparison) -> Figure:
         ("Amplitude: mean CSF", Normalize(0, 1), "YlGnBu", _share),
         ("Shift of the model, %, by FDAC", Normalize(-far, far), "RdBu_r", lambda v: "0" if abs(v) < 0.05 else f"{v:+.1f}"),
     ]
-    size = min(6.5, 72 / max(len(edges), 1))  # numbers stand side by side
+    size = min(6.5, 62 / max(len(edges), 1))  # signed numbers stand side by side
     for axes, grid, (title, norm, colours, text) in zip(panels, values.values(), looks, strict=True):
         picture = cells(axes, grid, norm, colours, text, size)
         axes.set_title(title)
