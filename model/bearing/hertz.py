@@ -43,7 +43,7 @@ def ellipticity(curvature_difference: float) -> float:
     if not 0 <= curvature_difference < 1:
         raise ValueError(f"curvature difference {curvature_difference:g} is outside [0, 1)")
 
-    nearly_round, _ = _difference(NEARLY_ROUND)
+    nearly_round = _of_nearly_round()
     if curvature_difference <= nearly_round:
         return exp(NEARLY_ROUND * curvature_difference / nearly_round)
     log_k = exp(float(_guess()(log(1 - curvature_difference))))
@@ -67,6 +67,11 @@ def _difference(log_k: float) -> tuple[float, float]:
     by_first, by_second = (second - first / k2) / m, (second - first) / (m * k2)  # by ln k
     slope = 2 * (k2 - (by_first - quotient * by_second) / second) / (k2 - 1) - 2 * k2 * found / (k2 - 1)
     return found, slope
+
+
+@cache
+def _of_nearly_round() -> float:
+    return _difference(NEARLY_ROUND)[0]
 
 
 @cache
