@@ -19,7 +19,7 @@ from thermospindle.diagnosis.decision.explanations import Candidate, beyond_limi
 from thermospindle.diagnosis.decision.verdict import Verdict
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.search import Search
-from thermospindle.diagnosis.prediction.forecast import ModePrediction, by_all, covariance, forecast, standing
+from thermospindle.diagnosis.prediction.forecast import ModePrediction, Standing, by_all, covariance, forecast, standing
 from thermospindle.diagnosis.prediction.outcomes import same
 from thermospindle.model.machine import Condition
 from thermospindle.model.parallel import in_parallel
@@ -61,24 +61,28 @@ def next_tests(found: Search, verdict: Verdict) -> list[NextTest]:
         return []
     lead, rivals = alive[0], alive[1:]
     first, *others = in_parallel(partial(standing, found.model), [c.hypothesis for c in alive])
-    plans = {}
-    for plan in planned(found.model):
-        try:
-            rates = by_all(found.model, first, plan)  # which of the explanations is true makes no difference to these
-        except FAILED:
-            continue
-        if predicted := forecast(found.model, first, plan, rates):
-            plans[plan] = predicted, rates
+    plans = planned(found.model)
+    predicted = in_parallel(partial(_predicted, found.model, first, others), plans)
     tests = []
-    for rival, there in zip(rivals, others, strict=True):
+    for k, rival in enumerate(rivals):
         weighed = []
-        for plan, (a, rates) in plans.items():
-            if b := forecast(found.model, there, plan, rates):
+        for plan, own in zip(plans, predicted, strict=True):
+            if own and (a := own[0]) and (b := own[1 + k]):
                 weighed.append(_weighed(plan, lead, rival, a, b))
         weighed = [t for t in weighed if t.odds > TELLS]
         if weighed:
             tests.append(max(weighed, key=lambda t: (min(t.odds, np.exp(CERTAIN)), -abs(t.condition.temperature - 20), -t.condition.speed)))
     return tests
+
+
+def _predicted(model: CampaignModel, first: Standing, others: Sequence[Standing], plan: Condition) -> list[list[ModePrediction] | None]:
+    """Of every explanation its modes at a condition, None where it has no spindle there; nothing at all where the first has none."""
+    try:
+        rates = by_all(model, first, plan)  # which of the explanations is true makes no difference to these
+    except FAILED:
+        return []
+    a = forecast(model, first, plan, rates)
+    return [a, *(forecast(model, there, plan, rates) for there in others)] if a else []
 
 
 def planned(model: CampaignModel) -> list[Condition]:

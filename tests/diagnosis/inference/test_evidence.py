@@ -2,106 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.integrate import trapezoid
-from scipy.stats import multivariate_normal, norm
+from scipy.stats import multivariate_normal
 
-from tests.virtual_campaign import effect
-from thermospindle.diagnosis.forward.mechanism import REFERENCE_DEPARTURE, REFERENCE_WIDTH, Mechanism, size_covariance, variants
+from tests.diagnosis.inference.toy import toy
 from thermospindle.diagnosis.forward.nuisance import (
     BUILD,
     DAMPING,
     DAMPING_DRIFT,
     DAMPING_DRIFT_SD,
-    DAMPING_SD,
     DRIFT,
-    DRIFT_SD,
     STIFFNESS,
     STIFFNESS_DRIFT,
     STIFFNESS_DRIFT_SD,
-    STIFFNESS_SD,
-    TEMPERATURE,
     Nuisance,
 )
-from thermospindle.diagnosis.inference.evidence import WIDER, WIDTHS, Learned, amplitudes_apart, evidence, left_out
-from thermospindle.diagnosis.inference.fit import Fit, Held
-from thermospindle.diagnosis.inference.gaussian import Quadratic, impossible, marginal
+from thermospindle.diagnosis.inference.evidence import WIDER, WIDTHS, Learned, evidence, left_out
+from thermospindle.diagnosis.inference.gaussian import Quadratic, marginal
 from thermospindle.diagnosis.inference.prior import ACTION, Root, misjudged, nuisance_variances, precision_and_variances, whole_root
-from thermospindle.model.machine import Condition
-from thermospindle.sim.effects.effect import Effect, Parameter
-
-CONDITIONS = [Condition(20.0), Condition(40.0), Condition(60.0)]
-
-
-@dataclass(frozen=True)
-class Toy:
-    """y_t = J_t p + errors of unit variance, in `rows` numbers a test; p = [nuisances, whitened sizes]."""
-
-    model: SimpleNamespace
-    fit: Fit
-    jacobians: list[np.ndarray]
-    y: list[np.ndarray]
-    mechanisms: tuple[Mechanism, ...]
-
-    def prior(self, stiffness: float, damping: float, drift: float, own=()) -> np.ndarray:
-        size = {STIFFNESS: stiffness / STIFFNESS_SD, DAMPING: damping / DAMPING_SD, DRIFT: drift / DRIFT_SD}
-        n = len(self.model.parameters)
-        whole = np.zeros((len(self.fit.point), len(self.fit.point)))
-        whole[:n, :n] = np.diag([size.get(p.kind, 1.0) ** 2 for p in self.model.parameters])
-        for m, root, (width, departure) in zip(self.mechanisms, self.fit.roots, own, strict=True):
-            inverse = np.linalg.inv(root)
-            whole[n:, n:] = inverse @ size_covariance(CONDITIONS, width * m.size.prior_sd, departure) @ inverse.T
-        return whole
-
-    def ln(self, prior: np.ndarray, errors: float = 1.0) -> float:
-        """ln of the integral of likelihood times prior; the evidence leaves out (2 pi)^(-n/2)."""
-        jacobian, y = np.concatenate(self.jacobians), np.concatenate(self.y)
-        covariance = errors**2 * np.eye(len(y)) + jacobian @ prior @ jacobian.T
-        return float(multivariate_normal(np.zeros(len(y)), covariance).logpdf(y) + len(y) / 2 * np.log(2 * np.pi))
-
-
-def toy(
-    seed: int, stiffness: float, hidden: float | tuple[float, ...] | None = None, limits=(-50.0, 50.0), rows: int = 40, errors: float = 1.0,
-    confused: tuple[float, ...] = (0.0, 0.0, 0.0), build: float = 1.0,
-) -> Toy:
-    """Data drawn with a discrepancy of the size `stiffness`, build tolerances `build` times those stated, and, with a mechanism in the fit, a `hidden` size in every test, of which the first
-    tolerance cannot be told from `confused` times its change."""
-    random = np.random.default_rng(seed)
-    parameters = [Nuisance(BUILD, f"b{i}", 0.01) for i in range(3)] + [Nuisance(STIFFNESS, f"k{i}", STIFFNESS_SD, modes=(i, i)) for i in range(8)]
-    parameters += [Nuisance(DAMPING, f"c{i}", DAMPING_SD, modes=(i, i)) for i in range(2)]
-    parameters += [Nuisance(TEMPERATURE, f"t{t}", 0.2, test=t) for t in range(3)] + [Nuisance(DRIFT, f"g{t}", DRIFT_SD, test=t) for t in range(3)]
-    mechanisms, roots = (), ()
-    if hidden is not None:
-        size = Parameter("size", "1", 1.0, 1.5, 0.4, limits, "", "")
-        mechanisms = (Mechanism(Effect("toy", "", "", (size,), "", (), ""), {}, ()),)
-        roots = (np.linalg.cholesky(size_covariance(CONDITIONS, REFERENCE_WIDTH * size.prior_sd, REFERENCE_DEPARTURE)),)
-    n = len(parameters)
-    sizes = {STIFFNESS: stiffness / STIFFNESS_SD, BUILD: build, TEMPERATURE: 1.0}
-    p = np.array([sizes.get(q.kind, 0.0) for q in parameters])
-    p = np.concatenate([p * random.standard_normal(n), *([np.linalg.solve(r, np.full(3, np.array(hidden) - 1.0)) for r in roots])])
-    own_of_test = np.array([q.test is None for q in parameters])
-    jacobians, y = [], []
-    for t in range(3):
-        j = random.standard_normal((rows, n)) * np.where(own_of_test | np.array([q.test == t for q in parameters]), 1.0, 0.0)
-        j[:, [q.kind == STIFFNESS for q in parameters]] *= 5  # the smallest size shows by about five standard errors
-        by_size = 2 * random.standard_normal((rows, 1))
-        if any(confused):
-            j[:, :1] = confused[t] * by_size
-        j = np.concatenate([j, *[by_size * r[t][None, :] for r in roots]], axis=1)
-        jacobians.append(j)
-        y.append(j @ p + errors * random.standard_normal(rows))
-    point = p + 0.3 * random.standard_normal(len(p))  # the quadratic is the same about any point
-    by_test = tuple((float((j @ point - v) @ (j @ point - v)), j.T @ (j @ point - v), j.T @ j) for j, v in zip(jacobians, y, strict=True))
-    tests = tuple(SimpleNamespace(condition=c, count=rows) for c in CONDITIONS)
-    fit = Fit(
-        mechanisms, point, np.zeros((len(mechanisms), 3)), ((),) * len(mechanisms), roots, sum(b[0] for b in by_test),
-        np.sum([b[1] for b in by_test], axis=0), np.sum([b[2] for b in by_test], axis=0), by_test, 3 * rows, None, 1.0,
-    )  # fmt: skip
-    return Toy(SimpleNamespace(parameters=tuple(parameters), tests=tests), fit, jacobians, y, mechanisms)
 
 
 @pytest.mark.parametrize("errors", [1.0, 1.3])
@@ -144,7 +66,11 @@ def test_a_model_that_is_wrong_may_be_wrong_in_what_an_effect_does():
     ]  # fmt: skip
     model = SimpleNamespace(parameters=parameters)
     moved = np.zeros((1, 2, 2, 2))
-    moved[0, 0, 0, 1], moved[0, 1, 0, 1], moved[0, 1, 1, 0] = 0.01, 0.02, -0.3  # frequency of the second mode in both tests, damping of the first in one
+    moved[0, 0, 0, 1], moved[0, 1, 0, 1], moved[0, 1, 1, 0] = (
+        0.01,
+        0.02,
+        -0.3,
+    )  # frequency of the second mode in both tests, damping of the first in one
     right = {STIFFNESS: 0.0, STIFFNESS_DRIFT: 0.0, DAMPING_DRIFT: DAMPING_DRIFT_SD}
     assert nuisance_variances(model, right).tolist() == [1, 0, 0, 0, 0, 1, 1, 1, 1]
     assert misjudged(model, right, moved).shape == (9, 0)
@@ -224,25 +150,6 @@ def test_tolerances_wider_than_stated_are_learned(build, times):
         assert found.ln == pytest.approx(made.ln(prior, found.learned.errors) + WIDER[found.learned.sizes[BUILD]], abs=1e-6)
 
 
-def test_a_size_of_one_sign_has_half_a_prior():
-    """Twice the probability of the sign that limits allow: for a size well on that side ln 2, on the other far less than nothing."""
-    free, bound = toy(4, 0.0, hidden=1.6), toy(4, 0.0, hidden=1.6, limits=(1.0, 50.0))
-    assert evidence(bound.model, bound.fit).ln - evidence(free.model, free.fit).ln == pytest.approx(np.log(2), abs=1e-2)
-    wrong = toy(4, 0.0, hidden=0.4, limits=(1.0, 50.0))
-    other = toy(4, 0.0, hidden=0.4)
-    assert evidence(wrong.model, wrong.fit).ln - evidence(other.model, other.fit).ln < norm.logcdf(-5)
-
-
-def test_sizes_that_depart_from_their_law_keep_the_sign_that_all_have():
-    """Errors that all sizes share weigh them against each other: the mean of least variance of 1.8, 3.4 and 1.7 is then less than 1."""
-    sizes = {"hidden": (1.8, 3.4, 1.7), "confused": (0.3, 0.6, 0.3), "rows": 400}
-    free, bound = toy(6, 0.0, **sizes), toy(6, 0.0, **sizes, limits=(1.0, 50.0))
-    found = evidence(free.model, free.fit)
-    gls = np.linalg.solve(found.size_covariance[0], np.ones(3))
-    assert gls @ found.sizes[0] / gls.sum() < 1.0 < found.sizes[0].min()
-    assert 0 < evidence(bound.model, bound.fit).ln - found.ln < np.log(2) + 1e-9  # the sign is more probable than not
-
-
 @pytest.mark.parametrize(("hidden", "much"), [(2.0, False), ((1.2, 4.0, 1.1), True)])
 def test_what_departures_gain_is_told(hidden, much, monkeypatch):
     """By how much the evidence is larger than that of the same sizes held to their law; less than nothing where the law holds."""
@@ -264,62 +171,6 @@ def test_a_law_that_mechanics_gives_is_followed():
         assert gain > 0.1 if exact_gains else gain < -5.0
 
 
-@pytest.mark.parametrize("held", [False, True])
-def test_a_shape_within_limits_is_the_integral_over_these(held, monkeypatch):
-    """A share from nothing to one, neutral at nothing: the integral over it alone, by quadrature; held at nothing where the data would have it less."""
-    own, plain, random = (1.0, 0.0), toy(3, 0.0, hidden=2.0), np.random.default_rng(8)
-    monkeypatch.setattr("thermospindle.diagnosis.inference.evidence._own_grid", lambda lawless, departures: (own,))
-    jacobians = [np.column_stack([j, random.standard_normal(len(j))]) for j in plain.jacobians]
-    y = [v + (-0.4 if held else 0.6) * j[:, -1] for v, j in zip(plain.y, jacobians, strict=True)]
-    prior = plain.prior(0.0, 0.0, 0.0, [own])
-    kept = np.diag(prior) > 0  # sizes of nothing are no parameters
-    precision = np.eye(len(kept) + 1)
-    precision[np.ix_([*kept, False], [*kept, False])] = np.linalg.inv(prior[np.ix_(kept, kept)])
-    kept = np.append(kept, True)
-
-    def ln(u: float) -> float:
-        return replace(plain, y=[v - u * j[:, -1] for v, j in zip(y, jacobians, strict=True)]).ln(prior)
-
-    us = np.linspace(0.0, 2.0, 1001)
-    values = np.array([ln(u) + norm.logpdf(u) for u in us]) - np.log(norm.cdf(2.0) - 0.5)
-    by_quadrature = np.log(trapezoid(np.exp(values - values.max()), us)) + values.max()
-
-    whole, right, free = np.concatenate(jacobians), np.concatenate(y), kept.copy()
-    normal, point = whole.T @ whole + precision, np.zeros(len(kept))
-    free[-1] = not held
-    point[free] = np.linalg.solve(normal[np.ix_(free, free)], (whole.T @ right)[free])
-    slope = float(whole[:, -1] @ (whole @ point - right) + point[-1])
-    stands = (Held(len(point) - 1, slope, 1 / np.linalg.inv(normal[np.ix_(kept, kept)])[-1, -1]),) if held else ()
-    moving = [j * np.append(np.ones(len(kept) - 1), not held) for j in jacobians]
-    by_test = tuple((float((r := j @ point - v) @ r), m.T @ r, m.T @ m) for j, m, v in zip(jacobians, moving, y, strict=True))
-    mechanism = replace(plain.mechanisms[0], shape=(Parameter("share", "1", 0.0, 0.0, 0.5, (0.0, 1.0), "", ""),))
-    chi2, gradient, information = (sum(b[k] for b in by_test) for k in range(3))
-    done = replace(
-        plain.fit, mechanisms=(mechanism,), point=point, shapes=((0.5 * point[-1],),), chi2=chi2, gradient=gradient, information=information,
-        by_test=by_test, held=stands,
-    )  # fmt: skip
-    found = evidence(plain.model, done, [Learned({STIFFNESS: 0.0, DAMPING: 0.0, DRIFT: 0.0}, 1.0, (), ())])
-    assert (slope > 0) if held else (point[-1] > 0)
-    assert found.ln == pytest.approx(by_quadrature, abs=0.02)
-    assert (found.mean[-1] == 0.0) == held
-
-
-def test_a_shape_with_a_law_of_the_datas_own_says_nothing_of_amounts():
-    """What it moves in a test has no part of what the size moves there; of a law that is assumed it keeps it, for it may be the law's."""
-    plain, random = toy(3, 0.0, hidden=2.0), np.random.default_rng(9)
-    share = Parameter("share", "1", 0.0, 0.0, 0.5, (0.0, 1.0), "", "")
-    n = len(plain.fit.nuisance)
-    for own_law in (True, False):
-        m = replace(plain.mechanisms[0], shape=(share,), own_law=own_law)
-        moved = [np.column_stack([j, 3 * j[:, n + t] + random.standard_normal(len(j))]) for t, j in enumerate(plain.jacobians)]
-        by_test = tuple((1.0, np.zeros(n + 4), j.T @ j) for j in moved)
-        done = replace(plain.fit, mechanisms=(m,), point=np.append(plain.fit.point, 0.3), by_test=by_test)
-        turn = amplitudes_apart(done)
-        for t, (_, _, information) in enumerate(by_test):
-            before, after = information[n + t, -1], (turn.T @ information @ turn)[n + t, -1]
-            assert abs(after) < 1e-9 * abs(before) if own_law else after == before
-
-
 @pytest.mark.parametrize("hidden", [None, 1.6])
 def test_what_is_left_out_is_predicted_from_the_rest(hidden):
     """Against a fit of the other tests anew, group by group."""
@@ -338,18 +189,3 @@ def test_what_is_left_out_is_predicted_from_the_rest(hidden):
         density += made.ln(prior, learned.errors) - without.ln(prior, learned.errors)
     assert left_out(made.model, made.fit, found, groups) == pytest.approx((np.sqrt(total / made.fit.count), density), rel=1e-4)
     assert np.isnan(left_out(made.model, made.fit, found, [[0, 1, 2]])).all()
-
-
-@pytest.mark.parametrize(("count", "off", "alike", "cannot"), [(4, 1.2, 0.0, False), (8, 1.2, 0.0, True), (4, 2.4, 0.99, False), (4, 2.4, 0.0, True), (1, 2.9, 0.0, False), (1, 3.1, 0.0, True)])
-def test_what_a_size_cannot_be_is_asked_of_all_tests_together(count, off, alike, cannot):
-    """Sizes `off` standard errors below what they can be, in each of so many tests: independent errors make root-n as much of it, what is alike in all tests
-    hardly more than once. One that is well within makes no difference."""
-    m = variants(effect("preload_loss"))[0]
-    sd, low = 0.05, m.size.limits[0]
-    covariance = sd**2 * (alike * np.ones((count, count)) + (1 - alike) * np.eye(count))
-    assert impossible(m, np.full(count, low - off * sd), covariance) == cannot
-    well = np.block([[covariance, np.zeros((count, 1))], [np.zeros((1, count)), np.array([[sd**2]])]])
-    assert impossible(m, np.append(np.full(count, low - off * sd), 0.1), well) == cannot
-    assert not impossible(m, np.full(count, 0.1), covariance)
-    assert not impossible(m, np.full(count, 0.1), np.zeros((count, count)))
-    assert impossible(m, np.full(count, low - 0.01), -1e-18 * np.eye(count))  # rounding of what is known
