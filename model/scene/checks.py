@@ -11,6 +11,7 @@ from thermospindle.model.bearing.hertz import in_series
 from thermospindle.model.bearing.pair import contact_constants, reference_motion, ring_speeds
 from thermospindle.model.errors import BadInput, instead
 from thermospindle.model.machine import Bearing, Region, Spindle
+from thermospindle.model.rotor.section import cells
 from thermospindle.model.shaft import SAME_HEIGHT
 
 # ---------------------------------------------------------------- geometry
@@ -149,15 +150,34 @@ def check_rollers(file: Path, spindle: Spindle) -> None:
 
 
 def check_raceways(file: Path, spindle: Spindle) -> None:
-    """Raceways of bearings that share a region as a ring lie apart on it."""
+    """Raceways are free faces of their rings, and those on one region lie apart."""
+    for b in spindle.ringed:
+        for key, name, side in (("inner_ring", b.inner_ring, 1), ("outer_ring", b.outer_ring, 0)):
+            ring, heights = spindle.region(name), spindle.raceway(name, b)
+            if (free := _free_height(spindle, ring, side, heights)) < heights[1] - heights[0] - SAME_HEIGHT:
+                raise BadInput(
+                    f"{file}: bearings.{b.name}.{key} = {name!r}: other regions cover all but {free * 1e3:g} mm of its raceway at r_mm = {ring.r[side] * 1e3:g}, "
+                    f"z_mm = {_mm(heights)}; a raceway must be a free face of its ring, and where regions overlap the later one covers the earlier"
+                )
     for a, b in combinations(spindle.ringed, 2):
-        for ring in {a.inner_ring, a.outer_ring} & {b.inner_ring, b.outer_ring}:
-            lower, upper = sorted((spindle.raceway(ring, a), spindle.raceway(ring, b)))
+        for ring_of_both in {a.inner_ring, a.outer_ring} & {b.inner_ring, b.outer_ring}:
+            lower, upper = sorted((spindle.raceway(ring_of_both, a), spindle.raceway(ring_of_both, b)))
             if lower[1] > upper[0] + SAME_HEIGHT:
                 raise BadInput(
-                    f"{file}: bearings.{b.name}.raceway_width_mm: the raceways of {a.name!r} and {b.name!r} on {ring!r}, z_mm = {_mm(lower)} "
+                    f"{file}: bearings.{b.name}.raceway_width_mm: the raceways of {a.name!r} and {b.name!r} on {ring_of_both!r}, z_mm = {_mm(lower)} "
                     f"and {_mm(upper)}, overlap; allowed are widths that leave them apart"
                 )
+
+
+def _free_height(spindle: Spindle, ring: Region, side: int, heights: tuple[float, float]) -> float:
+    """Height (m) between `heights` over which the inner (0) or outer (1) face of a ring is neither another region's nor inside the part."""
+    tiles = cells([g for g in spindle.regions if g.part == ring.part])
+    behind = [t for t in tiles if t.r[1 - side] == ring.r[side]]
+    free = 0.0
+    for tile in tiles:
+        if tile.region == ring.name and tile.r[side] == ring.r[side] and not any(t.z == tile.z for t in behind):
+            free += max(0.0, min(tile.z[1], heights[1]) - max(tile.z[0], heights[0]))
+    return free
 
 
 def implied_clearance(spindle: Spindle, b: Bearing) -> float:

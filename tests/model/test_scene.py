@@ -49,6 +49,11 @@ def one_tube_too_wide(raw):
         b.update(outer_ring="lower outer ring", raceway_width_mm=12.0)
 
 
+def collar(raw, r_mm, z_mm=(15.0, 18.0)):
+    """A region more at the upper inner ring."""
+    raw["section"]["regions"].append(region(raw, "upper inner ring") | {"name": "collar", "r_mm": r_mm, "z_mm": list(z_mm)})
+
+
 REFUSED = [
     ("poisson", lambda r: r["materials"]["steel"].update(poisson_ratio=0.6), "materials.steel.poisson_ratio = 0.6", "less than or equal to 0.49"),
     ("misspelt", lambda r: r["materials"]["steel"].update(density=1.0), "materials.steel.density: unknown key", "density_kg_per_m3"),
@@ -89,6 +94,9 @@ REFUSED = [
     ("ring-off-shaft", lambda r: region(r, "lower inner ring").update(r_mm=[2.6, 3.752]), "r_mm = [2.6, 3.752]", "floats"),
     ("parts-collide", lambda r: region(r, "sleeve").update(r_mm=[3.0, 7.5]), "section.regions.sleeve", "parts may not share space"),
     ("materials-collide", lambda r: region(r, "magnet ring").update(r_mm=[13, 15]), "magnet ring", "only regions of one material"),
+    ("covered", lambda r: collar(r, [2.5, 3.752]), "bearings.upper.inner_ring", "covers the earlier"),
+    ("half-covered", lambda r: collar(r, [2.5, 3.752], [16.5, 18.0]), "all but 1.5 mm of its raceway", "covers the earlier"),
+    ("buried", lambda r: collar(r, [3.752, 3.8]), "all but 0 mm of its raceway at r_mm = 3.752", "a free face of its ring"),
     ("empty-span", lambda r: region(r, "shaft").update(z_mm=[3.0, 3.0]), "section.regions.shaft.z_mm = [3.0, 3.0]", "smaller"),
     ("bearing-outside", lambda r: r["bearings"]["upper"].update(z_mm=12.0), "bearings.upper.z_mm = 12", "outside its ring"),
     ("ring-name", lambda r: r["bearings"]["upper"].update(inner_ring="x"), "bearings.upper.inner_ring = 'x'", "no section region"),

@@ -104,12 +104,16 @@ def difference(one, other) -> float:
 
 NOTHING_HOLDS_A_TILT = Moved("grinding", ((("structure", "joints", 1, "tilt_stiffness_N_m_per_rad", 0), 0.0),))
 
+COVERED = Moved("five_bearing", ((("section", "regions", 9, "z_mm", 0), 0.0), (("section", "regions", 9, "z_mm", 1), 0.97)))
+"""A ring that reaches over three others, whose raceways it leaves no face."""
+
 TOO_FINE = Moved("mk7702", ((("shafts", 0, "longest_element_mm"), 1e-6),))
 
 
 @given(moved(), conditions, expansions())
 @example(NOTHING_HOLDS_A_TILT, (20.0, 0.0), None)
 @example(TOO_FINE, (20.0, 0.0), None)
+@example(COVERED, (20.0, 0.0), None)
 def test_a_machine_keeps_the_laws_or_is_refused(machine, condition, expansion):
     with outcome("machines"):
         spindle, point = checked(machine.raw(), condition, expansion)
