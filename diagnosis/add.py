@@ -11,7 +11,7 @@ import math
 import shutil
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,7 @@ from thermospindle.model.machine import Spindle
 from thermospindle.model.scene.reading import content_hash, load, scene_path
 from thermospindle.sim.campaign.form import toml
 from thermospindle.sim.effects import CATALOGUE, by_name, checked, resolved
-from thermospindle.sim.effects.effect import Effect, fitted_to, refusal
+from thermospindle.sim.effects.effect import Effect, called, fitted_to, refusal
 from thermospindle.sim.effects.own import OwnEffect
 
 OF_TEST, OF_CHANNEL = "temperature of ", "gain of channel "  # not the spindle's own, in answers of before rows told their `kind`
@@ -37,9 +37,10 @@ class Added:
     units: dict[str, str]
     origin: str
     source: str
+    called: dict[str, str] = field(default_factory=dict)  # of values that number a bearing or a set
 
     def words(self) -> str:
-        said = ", ".join(f"{name} = {value:g} {self.units[name]}".removesuffix(" 1") for name, value in self.values.items())
+        said = ", ".join(f"{name} = {self.called.get(name) or f'{value:g} {self.units[name]}'}".removesuffix(" 1") for name, value in self.values.items())
         return f"{self.effect} added ({self.origin}): {said}"
 
 
@@ -106,7 +107,7 @@ def new_scene(
         build, note = _build_of(effects, answer, diagnosis, old, file)
         note = "\n".join([*([note] if note else []), *(_lawless(e.name, diagnosis) for e in effects if e.name in answer.own_laws)])
     hand = _by_effect(effects, by_hand)
-    added = tuple(_added(e, fitted.get(e.name, {}), hand[e.name], diagnosis) for e in effects)
+    added = tuple(_added(e, old, fitted.get(e.name, {}), hand[e.name], diagnosis) for e in effects)
     _write(file, effects, added, build, answer.tests if answer else (), f"fitted, from {diagnosis}", folder, out, catalogue)
     return NewScene(added, build, note)
 
@@ -128,7 +129,7 @@ def scene_with(
     file = scene_path(target)
     old = load(file)
     effects = [fitted_to(by_name(name, catalogue), old) for name in values]
-    added = tuple(Added(e.name, checked(e, values[e.name]), {p.name: p.unit for p in e.parameters}, "calibrated", _of_own(e, source)) for e in effects)
+    added = tuple(_row(e, old, checked(e, values[e.name]), "calibrated", source) for e in effects)
     build = _further(old, deviations) if deviations else {}
     _write(file, effects, added, build, tests, source, folder, out, catalogue)
     return NewScene(added, build, f"{len(build)} build tolerances" if build else "")
@@ -150,7 +151,7 @@ def _write(
     if build:
         text = _without_build(text).rstrip("\n") + "\n\n" + _build_table(build, tests, source)
     for effect, row in zip(effects, added, strict=True):
-        text = text.rstrip("\n") + "\n\n" + _effect_table(effect, row.values, row.origin, row.source)
+        text = text.rstrip("\n") + "\n\n" + _effect_table(effect, row)
     (folder / "spindle.toml").write_text(text, encoding="utf-8")
     for part in ("measured", "published"):
         if (file.parent / part).is_dir():
@@ -161,7 +162,7 @@ def _write(
         raise BadInput(str(error).replace(str(folder), str(out))) from None
 
 
-def _added(effect: Effect, fitted: Mapping[str, float], by_hand: Mapping[str, float], diagnosis: Path | None) -> Added:
+def _added(effect: Effect, spindle: Spindle, fitted: Mapping[str, float], by_hand: Mapping[str, float], diagnosis: Path | None) -> Added:
     values = checked(effect, effect.typical() | dict(fitted) | dict(by_hand))
     origins = {
         "typical of the catalogue": [n for n in values if n not in fitted and n not in by_hand],
@@ -169,8 +170,13 @@ def _added(effect: Effect, fitted: Mapping[str, float], by_hand: Mapping[str, fl
         "set by hand": list(by_hand),
     }
     source = "; ".join(f"{what}: {', '.join(names)}" for what, names in origins.items() if names)
+    return _row(effect, spindle, values, "calibrated" if fitted else "assumed", source)
+
+
+def _row(effect: Effect, spindle: Spindle, values: dict[str, float], origin: str, source: str) -> Added:
     units = {p.name: p.unit for p in effect.parameters}
-    return Added(effect.name, values, units, "calibrated" if fitted else "assumed", _of_own(effect, source))
+    names = {p.name: word for p in effect.parameters if (word := called(p, values[p.name], spindle))}
+    return Added(effect.name, values, units, origin, _of_own(effect, source), names)
 
 
 def _of_own(effect: Effect, source: str) -> str:
@@ -193,10 +199,12 @@ def _by_effect(effects: Sequence[Effect], by_hand: Sequence[tuple[str, float]]) 
     return found
 
 
-def _effect_table(effect: Effect, values: dict[str, float], origin: str, source: str) -> str:
-    head = {"name": effect.name, "origin": origin, "source": source}
+def _effect_table(effect: Effect, row: Added) -> str:
+    head = {"name": effect.name, "origin": row.origin, "source": row.source}
     lines = [f"# {effect.title}", "[[effects]]", *(f"{k} = {toml(v)}" for k, v in head.items()), "", "[effects.values]"]
-    lines += [f"{p.name} = {toml(float(values[p.name]))}  # {'' if p.unit == '1' else p.unit + ': '}{p.meaning}" for p in effect.parameters]
+    for p in effect.parameters:
+        kind = row.called.get(p.name) or ("" if p.unit == "1" else p.unit)
+        lines.append(f"{p.name} = {toml(float(row.values[p.name]))}  # {kind + ': ' if kind else ''}{p.meaning}")
     return "\n".join(lines) + "\n"
 
 

@@ -22,6 +22,7 @@ from thermospindle.model.errors import NoEquilibrium, NotConverged, OutsideRange
 from thermospindle.model.machine import Condition, Point, Spindle
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
+from thermospindle.sim.effects.effect import called
 
 FAILED = (NoEquilibrium, NotConverged, OutsideRange)
 SPEEDS = (0.5, 0.75, 1.0, 1.25)  # of the spindle's nominal speed
@@ -83,7 +84,7 @@ def next_runout(
         except FAILED:
             continue  # the spindle cannot run so: contact is lost, say
         for k, other in enumerate(others):
-            found[k].append(_weighed(plan, parts, lead, other))
+            found[k].append(_weighed(spindle, plan, parts, lead, other))
     progress(f"{len(options)} further tests weighed")
     tests, words = [], []
     for k, other in enumerate(others):
@@ -92,7 +93,7 @@ def next_runout(
             tests.append(best)
         else:
             odds = f"at best odds of {best.odds:.2g} to 1" if best else "none of them can be computed"
-            first, second = named(lead, other)
+            first, second = named(spindle, lead, other)
             words.append(f"No test of those tried (other speeds and temperatures, a further probe, a longer record) tells {first} from {second}: {odds}.")
     return tuple(tests), " ".join(words)
 
@@ -119,7 +120,7 @@ def plans(spindle: Spindle, seen: Sequence[Seen], base: Seen) -> list[Plan]:
     return found + [Plan(at, (*record.nodes, p.node), record.length, f"with a probe at node {p.node} too", base.phased) for p in further]
 
 
-def named(first: Explanation, second: Explanation) -> tuple[str, str]:
+def named(spindle: Spindle, first: Explanation, second: Explanation) -> tuple[str, str]:
     """What the two are called; of the same effects, with the choices in which they differ."""
     names = [" + ".join(e.effects) for e in (first, second)]
     if names[0] != names[1]:
@@ -128,7 +129,8 @@ def named(first: Explanation, second: Explanation) -> tuple[str, str]:
     for e, other in ((first, second), (second, first)):
         words = []
         for v, w in zip(e.variants, other.variants, strict=True):
-            own = ", ".join(f"{p.name} {v.values[p.name]:g}" for p in v.effect.parameters[1:] if v.values[p.name] != w.values[p.name])
+            apart = [(p, v.values[p.name]) for p in v.effect.parameters[1:] if v.values[p.name] != w.values[p.name]]
+            own = ", ".join(f"{p.name} {called(p, value, spindle) or f'{value:g}'}" for p, value in apart)
             words.append(v.effect.name + (f" ({own})" if own else ""))
         told.append(" + ".join(words))
     return told[0], told[1]
@@ -140,7 +142,7 @@ def _families(spindle: Spindle, plan: Plan, like: Seen, points: Sequence[Point])
     return families([seen], sources(spindle, [seen], points))
 
 
-def _weighed(plan: Plan, parts: Sequence[Family], lead: Explanation, rival: Explanation) -> NextRunout:
+def _weighed(spindle: Spindle, plan: Plan, parts: Sequence[Family], lead: Explanation, rival: Explanation) -> NextRunout:
     lines = [(f, own) for f in parts for own in each_line(f)]
     weights, told = [], []
     for _, own in lines:
@@ -151,7 +153,7 @@ def _weighed(plan: Plan, parts: Sequence[Family], lead: Explanation, rival: Expl
         scene = float(np.linalg.norm(own.shown[node] * own.likely))
         told.append((own, node, (float(size[0, node]), float(size[1, node])), scene))
     total = sum(weights)
-    names = named(lead, rival)
+    names = named(spindle, lead, rival)
     order = np.argsort(weights)[::-1][:SHOWN]
     predicted = []
     for i in order:

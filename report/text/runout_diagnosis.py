@@ -12,7 +12,9 @@ from thermospindle.diagnosis.runout.moved import MovedLine, leading, moved_lines
 from thermospindle.diagnosis.runout.next_test import NextRunout
 from thermospindle.diagnosis.runout.sources import SourceKey
 from thermospindle.diagnosis.runout.verdict import CLEAR, RunoutDiagnosis
+from thermospindle.model.machine import Spindle
 from thermospindle.model.units import RPM, TO_UM
+from thermospindle.report.text.diagnosis.answer import named
 from thermospindle.report.text.diagnosis.words import next_words, value_words
 from thermospindle.report.typeset import known
 from thermospindle.sim.effects.effect import Effect
@@ -23,7 +25,7 @@ UNITS = {"unbalance": ("g mm", 1e6), "cage unbalance": ("g mm", 1e6)}
 """Unit of a source and its size in SI's; nm for all others."""
 
 
-def runout_diagnosis_json(d: RunoutDiagnosis, catalogue: tuple[Effect, ...]) -> dict[str, Any]:
+def runout_diagnosis_json(d: RunoutDiagnosis, catalogue: tuple[Effect, ...], spindle: Spindle) -> dict[str, Any]:
     accepted = leading(d)
     before = float(np.sqrt(d.chi2 / d.count))
     by_name = {e.name: e for e in catalogue}
@@ -33,7 +35,7 @@ def runout_diagnosis_json(d: RunoutDiagnosis, catalogue: tuple[Effect, ...]) -> 
         "effects": list(d.effects),
         "reason": d.reason,
         "would_change": would_change(d),
-        "candidates": [_candidate(e) for e in d.explanations[:SHOWN]],
+        "candidates": [_candidate(e, spindle) for e in d.explanations[:SHOWN]],
         "invisible": sorted(unseen),
         "detectable": {name: size for name, size in d.smallest.items() if np.isfinite(size)},
         "detectable_in": {
@@ -95,7 +97,7 @@ def _next_json(t: NextRunout) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _candidate(e: Explanation) -> dict[str, Any]:
+def _candidate(e: Explanation, spindle: Spindle) -> dict[str, Any]:
     parameters = {}
     for v, size, sd in zip(e.variants, e.size, e.size_sd, strict=True):
         main, *others = v.effect.parameters
@@ -103,6 +105,7 @@ def _candidate(e: Explanation) -> dict[str, Any]:
         for p in others:
             # choices were compared; what runout from an unknown start does not determine keeps its typical value and its prior
             parameters[f"{v.effect.name}.{p.name}"] = {"value": v.values[p.name], "sd": 0.0 if p.choices else p.prior_sd, "unit": p.unit}
+            parameters[f"{v.effect.name}.{p.name}"] |= named(v.effect, p.name, v.values[p.name], spindle)
     return {
         "effects": list(e.effects),
         "delta_evidence": e.delta_evidence,

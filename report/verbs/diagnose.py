@@ -114,5 +114,5 @@ def _of_runout(
         return None
     with progress_bar(tests + 3) as progress:
         found = diagnose_runout(spindle, campaign, catalogue, progress)
-    values = runout_diagnosis_json(found, catalogue)
+    values = runout_diagnosis_json(found, catalogue, spindle)
     return values, lambda console: show_runout_diagnosis(console, values), found

@@ -93,6 +93,16 @@ def test_values_by_hand_go_to_their_effect(add, tmp_path):
 # ---------------------------------------------------------------- build tolerances
 
 
+def test_a_bearing_has_its_name(capsys, tmp_path):
+    """In the answer, in the words and beside the number in the new scene."""
+    asked = ["add", str(SCENE), "bond_softening", "--set", "bond_softening.bearing=1", "--out"]
+    main([*asked, str(tmp_path / "told")])
+    assert "bearing = upper" in " ".join(capsys.readouterr().out.split())
+    main([*asked, str(tmp_path / "new"), "--json"])
+    assert json.loads(capsys.readouterr().out)["added"][0]["called"] == {"bearing": "upper"}
+    assert "bearing = 1.0  # upper: " in (tmp_path / "new" / "spindle.toml").read_text()
+
+
 def test_build_tolerances_are_in_the_numbers_of_the_scene(spindle, add, tmp_path):
     """Each toleranced parameter applied by `model.built.tolerance`, and looked at directly; those of tests and channels stay behind."""
     add("built", "preload_loss", "added_disk")

@@ -67,6 +67,9 @@ def test_a_hidden_imperfection_is_named_with_its_size_and_place(spindle, name) -
     assert best.size[0] == pytest.approx(values[main_one.name], abs=4 * best.size_sd[0])
     chosen = {p.name: best.variants[0].values[p.name] for p in by_name(name).parameters if p.choices}
     assert chosen == {k: values[k] for k in chosen}
+    told = runout_diagnosis_json(d, CATALOGUE, spindle)["candidates"][0]["parameters"]
+    rings = {k.split(".")[1]: v["called"] for k, v in told.items() if "called" in v}
+    assert rings == {k: spindle.bearings[int(v)].name for k, v in values.items() if k == "bearing"}
     assert best.size[0] > d.smallest[name]
 
 
@@ -101,7 +104,7 @@ def test_a_line_that_no_imperfection_has_is_unexplained(spindle) -> None:
     assert (d.verdict, d.effects) == ("unexplained", ())
     assert d.unexplained[0].frequency == pytest.approx(150.0, abs=1.0)
     assert d.unexplained[0].test == made.tests[1].id
-    answer = runout_diagnosis_json(d, CATALOGUE)
+    answer = runout_diagnosis_json(d, CATALOGUE, spindle)
     assert answer["unexplained_lines"][0]["order"] == pytest.approx(150 / 90, rel=0.01)
     assert "150.0 Hz" in answer["reason"] or f"{d.unexplained[0].frequency:.1f} Hz" in answer["reason"]
 
@@ -287,7 +290,7 @@ def test_the_test_that_is_proposed_parts_look_alikes_and_decides_for_the_true_on
     """A heavy cage and a large ball show one line at fc; at one speed its size could be either's."""
     made, before = heavy_cage
     assert before.verdict == "ambiguous"
-    (test,) = runout_diagnosis_json(before, CATALOGUE)["next_test"]
+    (test,) = runout_diagnosis_json(before, CATALOGUE, spindle)["next_test"]
     assert set(test["separates"]) == set(test["predicted"]) == {"ball_size", "cage_unbalance"}
     assert test["condition"]["speed_rpm"] != 7200
     assert test["odds"] > 1e3

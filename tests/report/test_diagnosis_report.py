@@ -170,7 +170,7 @@ def test_add_takes_what_it_fitted(told, spindle, tmp_path, capsys):
 def test_runout_stands_on_the_same_page(told, spindle, tmp_path):
     conditions = [Condition(20.0, 5400 * RPM), Condition(20.0, 7200 * RPM)]
     turning = diagnose_runout(spindle, runout_campaign(spindle, conditions, 0.3, seed=3, path="linear"))
-    write_diagnosis(*told, told[0].spindle, tmp_path, turning, runout_diagnosis_json(turning, CATALOGUE))
+    write_diagnosis(*told, told[0].spindle, tmp_path, turning, runout_diagnosis_json(turning, CATALOGUE, told[0].spindle))
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert page.index("<h2>Verdict") < page.index("<h2>Runout: verdict")
     assert "none" in page[page.index("<h2>Runout: verdict") :]

@@ -130,7 +130,7 @@ def test_lines_are_drawn_where_they_were_measured(beside):
 
 
 def test_a_diagnosis_of_runout_alone_has_its_page(spindle, campaign, diagnosed, tmp_path):
-    answer = runout_diagnosis_json(diagnosed, CATALOGUE) | {"campaign": campaign.title}
+    answer = runout_diagnosis_json(diagnosed, CATALOGUE, spindle) | {"campaign": campaign.title}
     assert diagnosed.verdict == "ambiguous"
     write_diagnosis(None, answer, spindle, tmp_path, diagnosed, answer)
     text, titles = read(tmp_path)
