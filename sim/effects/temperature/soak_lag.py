@@ -87,8 +87,8 @@ EFFECT = Effect(
             limits=(0.0, 1.0),
             meaning="the balls' share in the hub's lag: 0 they have the standing ring's temperature, 1/2 the mean of both rings, 1 the hub's",
             source=(
-                "0, and a groove half way between ball and ring, is what practice campaign C bears out: chi2 38 of 35, against 123 with "
-                "the groove at its ring's temperature and 1e4 with the balls at the mean of both rings"
+                "calibrated: 0, and a groove half way between ball and ring, fits a campaign of another program whose hub lacks a quarter of its rise "
+                "(chi2 38 of 35, against 123 with the groove at its ring's temperature and 1e4 with the balls at the mean of both rings)"
             ),
         ),
     ),
