@@ -86,6 +86,11 @@ def halved(row: Row) -> bool:
     return bool(after < before / 2)
 
 
+def above_noise(row: Row) -> bool:
+    """Whether half the error without effects is more than noise alone, one standard error, leaves."""
+    return bool(row["drafted"][0] > 2.0)
+
+
 def told_elsewhere(row: Row) -> bool:
     """Whether tests of more than one temperature have much of what is hidden: of one alone no law tells the others."""
     for amounts in row["amounts"]:
@@ -206,6 +211,7 @@ def show(console: Console, rows: Sequence[Row]) -> None:
     drafts = [r for r in outside if r.get("drafted")]
     console.print(f"  and the error left out halved by what draft writes: {share(drafts, halved)}")
     console.print(f"    where more than one temperature shows it: {share([r for r in drafts if told_elsewhere(r)], halved)}")
+    console.print(f"    and where it can be, more than twice the noise's before: {share([r for r in drafts if told_elsewhere(r) and above_noise(r)], halved)}")
     named = [r for r in told if nameless(r) and r["kind"] != "outside"]
     console.print(
         f"of these drawn with an effect in mind that cannot be it: {len(named)}; another effect than those in mind is right, too: "

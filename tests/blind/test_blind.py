@@ -10,7 +10,7 @@ from tests.blind.alike import left, right, right_names
 from tests.blind.campaigns import campaign, in_contact
 from tests.blind.laws import law
 from tests.blind.mechanisms import mechanisms
-from tests.blind.score import element_found, halved, interval, most_probable, outcome, show, told_elsewhere, truth_probability
+from tests.blind.score import above_noise, element_found, halved, interval, most_probable, outcome, show, told_elsewhere, truth_probability
 from tests.blind.study import FURTHER, FURTHER_FROM, FURTHER_SHARE, SCENES, draw
 from tests.blind.visible import change, seen, visibility
 from tests.blind.world import Record, World, answer
@@ -204,6 +204,8 @@ def test_what_one_temperature_alone_shows_no_law_tells():
     assert told_elsewhere({"tests": tests, "amounts": [[0.0, -0.4, 1.0, 1.0]]})
     assert halved({"drafted": [10.0, 4.9]})
     assert not halved({"drafted": [10.0, 5.1]})
+    assert above_noise({"drafted": [2.1, 1.0]})
+    assert not above_noise({"drafted": [1.9, 1.0]})
 
 
 def row(kind, verdict, effects=(), truth=(), none=0.0, unknown=0.0, candidates=(), drifts=(), elements=()):
