@@ -147,13 +147,14 @@ def compare(
 
 def _as_measured(spindle: Spindle, campaign: Campaign, o: Observation) -> Predicted:
     """Modes predicted for a test, with shapes at its response points."""
-    found = predict(measured_at(spindle, campaign.points, o.test.frf), o, of_scene(spindle))
+    found = predict(measured_at(spindle, campaign.points, o.test.frf), o, of_scene(spindle), lumped=campaign.lumped_shafts)
     return found if o.shape is None else replace(found, shape=found.shape[:, : o.shape.shape[1]])
 
 
 def _at_its_temperature(spindle: Spindle, campaign: Campaign, o: Observation, p: Predicted, partner: Integers) -> Observation:
     """The observation with the error of its temperature among its errors."""
-    slope = temperature_slope(measured_at(spindle, campaign.points, o.test.frf), o, p, of_scene(spindle)).reshape(2, -1)
+    here = measured_at(spindle, campaign.points, o.test.frf)
+    slope = temperature_slope(here, o, p, of_scene(spindle), campaign.lumped_shafts).reshape(2, -1)
     return with_temperature(o, np.where(partner >= 0, slope[:, partner], 0.0).ravel(), spindle.tolerances.temperature)
 
 

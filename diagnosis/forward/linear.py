@@ -9,9 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import Matrices
+from thermospindle.model.rotor.distributed import spread
+from thermospindle.model.rotor.modes import Between
 from thermospindle.model.types import Array, Integers
 from thermospindle.sim.effects.effect import Measurement
+from thermospindle.sim.operating import OperatingPoint
 
 Dofs = tuple[tuple[str, str], ...]
 
@@ -27,7 +31,7 @@ class Linear:
     matrices: Matrices
     chain: Measurement
     layout: tuple
-    between: tuple[Array, Array, Array] | None = None
+    between: Between | None = None
 
     def moved(self, first: Linear, second: Linear, times: float) -> Linear:
         """With `times` the difference of two others added, in all that may differ; the same where these have other degrees of freedom."""
@@ -40,6 +44,16 @@ class Linear:
         matrices = on(self.matrices, first.matrices, second.matrices, ("mass", "damping", "stiffness"))
         chain = self.chain if same_chain(first.chain, second.chain) else on(self.chain, first.chain, second.chain, CHAIN)
         return replace(self, matrices=matrices, chain=chain)
+
+
+def mass_between(point: OperatingPoint, drawing: Spindle) -> Between | None:
+    """What the mass between the nodes of shafts adds at an operating point, with the drawing's materials at the reference temperature: what an effect changes of so
+    little is left out."""
+    structure = point.spindle.structure
+    if not structure.shafts:
+        return None
+    mass, quartic, gyroscopic = spread(structure, drawing.materials, drawing.reference_temperature, point.chain.layout)
+    return mass, quartic, point.chain.speed * gyroscopic
 
 
 @dataclass(frozen=True, eq=False)

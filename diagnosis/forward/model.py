@@ -14,7 +14,7 @@ import numpy as np
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.mode_table import ModeData
 from thermospindle.diagnosis.forward import nuisance as kinds_of
-from thermospindle.diagnosis.forward.linear import Linear
+from thermospindle.diagnosis.forward.linear import Linear, mass_between
 from thermospindle.diagnosis.forward.nuisance import Nuisance, ReferenceModes, Resonance
 from thermospindle.diagnosis.forward.points import Applied, apart, replace_measuring, stretched
 from thermospindle.diagnosis.forward.response import Light, Response
@@ -23,7 +23,6 @@ from thermospindle.model.built.tolerance import Toleranced
 from thermospindle.model.errors import NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import Matrices, matrices
-from thermospindle.model.rotor.distributed import spread
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.effects.effect import HOOKS, Effect, Values
 from thermospindle.sim.operating import OperatingPoint, operating_point
@@ -190,20 +189,12 @@ class CampaignModel:
         point = self.operating(t, x, effects)
         worked_out = point.__dict__.get("_bare")
         if worked_out is None:
-            worked_out = matrices(point.chain), self._between(point)
+            worked_out = matrices(point.chain), None if self.lumped else mass_between(point, self.spindle)
             object.__setattr__(point, "_bare", worked_out)
         bare, between = worked_out
         stiffness, damping = self._discrepancy(t, bare, x)
         whole = Matrices(bare.mass, bare.damping + damping, bare.stiffness + stiffness, bare.dofs)
         return Linear(whole, point.measurement, point.chain.layout, between)
-
-    def _between(self, point: OperatingPoint) -> tuple[Array, Array, Array] | None:
-        """What the mass between the nodes of shafts adds, with the drawing's materials at the reference temperature; what an effect changes of so little is left out."""
-        structure = point.spindle.structure
-        if self.lumped or not structure.shafts:
-            return None
-        mass, quartic, gyroscopic = spread(structure, self.spindle.materials, self.spindle.reference_temperature, point.chain.layout)
-        return mass, quartic, point.chain.speed * gyroscopic
 
     def _discrepancy(self, t: int, linear: Matrices, x: Array) -> tuple[Array, Array]:
         w = self.reference.over(linear.dofs)

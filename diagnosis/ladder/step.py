@@ -121,8 +121,7 @@ def _step(
 
 
 def _predicted(model: CampaignModel, t: int, nuisance: Array, applied: Applied) -> Predicted:
-    linear = model.linear(t, nuisance, applied)
-    return predicted(linear.matrices, linear.chain, BEYOND * model.spindle.hammer.band[1])
+    return predicted(model.linear(t, nuisance, applied), BEYOND * model.spindle.hammer.band[1])
 
 
 def _computed(model: CampaignModel, measured: MeasuredModes, nuisance: Array, applied: Sequence[Applied]) -> tuple[Array, Array]:

@@ -23,7 +23,7 @@ from thermospindle.diagnosis.inference.hypothesis import LITTLE, Hypothesis, set
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.machine import Condition
-from thermospindle.model.rotor.modes import modes
+from thermospindle.model.rotor.modes import kinds, poles_below
 from thermospindle.model.types import Array
 
 READING = 5e-5  # relative error of a frequency read from a hammer test
@@ -108,11 +108,10 @@ def by_all(model: CampaignModel, s: Standing, plan: Condition) -> Array:
     problem = Problem(model, s.hypothesis.mechanisms)
     there = _unmade(model, plan)
     x, effects = _acting(there, problem, s.point, _continued(model, s.hypothesis, problem, plan)[0] @ s.point)
-    found = modes(there.operating(0, x, effects).chain, there.linear(0, x, effects).matrices, model.spindle.hammer.band[1])
-    k = len(found)
-    table = ModeData(
-        model.tests[0].test, plan, np.array([m.frequency for m in found]), np.ones(k), np.ones(k), np.full(k, np.inf), tuple(m.kind for m in found)
-    )
+    linear = there.linear(0, x, effects)
+    pole, shape = poles_below(linear.matrices, model.spindle.hammer.band[1], linear.between)
+    k = len(pole)
+    table = ModeData(model.tests[0].test, plan, np.abs(pole) / (2 * np.pi), np.ones(k), np.ones(k), np.full(k, np.inf), kinds(linear.matrices, shape))
     there = replace(there, tests=(table,))
     _, derivatives, numbers = nuisance_jacobian(there, 0, x, effects, rates_of(there, x, [effects], s.hypothesis.fit.rates))
     rates = np.zeros((k, len(x) + 1))
@@ -167,5 +166,6 @@ def _modes(model: CampaignModel, problem: Problem, p: Array, amounts: Array, pla
     point = there.operating(0, x, effects)
     if (status := point.state.status) != "in contact":  # a spindle that rattles has no modes to be read
         raise NoEquilibrium(status)
-    found = modes(point.chain, there.linear(0, x, effects).matrices, model.spindle.hammer.band[1])
-    return np.array([mode.frequency for mode in found]), np.array([mode.damping_ratio for mode in found])
+    linear = there.linear(0, x, effects)
+    pole, _ = poles_below(linear.matrices, model.spindle.hammer.band[1], linear.between)
+    return np.abs(pole) / (2 * np.pi), -pole.real / np.abs(pole)

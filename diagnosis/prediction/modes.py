@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from thermospindle.diagnosis.data.observe import Observation
+from thermospindle.diagnosis.forward.linear import Linear, mass_between
 from thermospindle.diagnosis.forward.model import Applied
 from thermospindle.model.machine import Spindle
-from thermospindle.model.rotor.chain import Matrices, matrices
-from thermospindle.model.rotor.modes import kinds, oscillating, poles
+from thermospindle.model.rotor.chain import matrices
+from thermospindle.model.rotor.modes import kinds, oscillating, with_mass_between
 from thermospindle.model.types import Array, ComplexArray
-from thermospindle.sim.effects.effect import Measurement
 from thermospindle.sim.identification.pairing import ModeSet
 from thermospindle.sim.operating import operating_point
 
@@ -46,18 +46,19 @@ class Predicted:
         return ModeSet(self.frequency, self.shape[:, :channels], self.kind)
 
 
-def predict(spindle: Spindle, observation: Observation, effects: Applied, warmer: float = 0.0) -> Predicted:
-    """Modes at the condition of an observation, `warmer` kelvin above what its thermometer said."""
+def predict(spindle: Spindle, observation: Observation, effects: Applied, warmer: float = 0.0, lumped: bool = False) -> Predicted:
+    """Modes at the condition of an observation, `warmer` kelvin above what its thermometer said; `lumped` with the masses of shafts at nodes, as MuJoCo steps them."""
     condition = replace(observation.condition, temperature=observation.condition.temperature + warmer)
     point = operating_point(spindle, condition, effects)
-    return predicted(matrices(point.chain), point.measurement, BEYOND * spindle.hammer.band[1])
+    linear = Linear(matrices(point.chain), point.measurement, point.chain.layout, None if lumped else mass_between(point, spindle))
+    return predicted(linear, BEYOND * spindle.hammer.band[1])
 
 
-def predicted(linear: Matrices, chain: Measurement, highest: float) -> Predicted:
+def predicted(linear: Linear, highest: float) -> Predicted:
     """Modes of a linear model up to `highest` (Hz) as its measuring chain shows them."""
-    own = poles(linear)
+    own, chain = with_mass_between(linear.matrices, linear.between), linear.chain
     found = oscillating(own, highest)
     pole, right = own.value[found] - chain.decay, own.right[:, found]
     seen = chain.gain * np.exp(-1j * np.abs(pole[:, None]) * chain.delay)
     participation = own.left[found] @ chain.reference_rows.T * (1 + chain.decay / pole[:, None])
-    return Predicted(pole, (chain.response_rows @ right).T * seen, participation, kinds(linear, right))
+    return Predicted(pole, (chain.response_rows @ right).T * seen, participation, kinds(linear.matrices, right))

@@ -23,13 +23,13 @@ from thermospindle.sim.identification.pairing import NEARBY, pairs
 STEP = 0.1  # K, of the difference: frequencies move by less than 1e-4 of themselves
 
 
-def temperature_slope(spindle: Spindle, o: Observation, p: Predicted, effects: Applied) -> Array:
-    """Derivative (2k,) by temperature, 1/K, of [ln frequency, ln damping] of the k computed modes `p` of a test.
+def temperature_slope(spindle: Spindle, o: Observation, p: Predicted, effects: Applied, lumped: bool = False) -> Array:
+    """Derivative (2k,) by temperature, 1/K, of [ln frequency, ln damping] of the k computed modes `p` of a test, `lumped` as `predict` has it.
 
     A one-sided difference towards the reference temperature, so that it stays inside laws that hold for the test itself.
     """
     step = -STEP if o.condition.temperature > spindle.reference_temperature else STEP
-    moved = predict(spindle, o, effects, step)
+    moved = predict(spindle, o, effects, step, lumped)
     channels = p.shape.shape[1]
     found = np.zeros(2 * len(p.frequency))
     for i, j in pairs(p.modes(channels), moved.modes(channels), NEARBY):

@@ -10,6 +10,7 @@ import pytest
 
 from tests.conftest import ROOT
 from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, truth, virtual_campaign
+from thermospindle.diagnosis.compare.compare import compare
 from thermospindle.diagnosis.forward.derivatives import column, nuisance_jacobian
 from thermospindle.diagnosis.forward.linear import products, together
 from thermospindle.diagnosis.forward.making import BEYOND, IN_BAND, MOST_MODES
@@ -338,11 +339,15 @@ def test_a_table_of_modes_has_the_mass_of_shafts_where_it_is():
     pole, shape = poles_below(linear, 4500.0, between)
     rows = [ModeRow("t", k, kind, abs(p) / (2 * np.pi), 1e-4 * abs(p) / (2 * np.pi)) for k, (p, kind) in enumerate(zip(pole, kinds(linear, shape), strict=True), 1)]
     told = Campaign("modes", coarse.name, "mobility", (), (Test("t", coarse.reference_temperature, 8000 * RPM, modes=tuple(rows)),))
-    missed = {}
+    missed, compared = {}, {}
     for lumped in (False, True):
         model = model_of(coarse, replace(told, lumped_shafts=lumped))
         missed[lumped] = np.abs(model.residual(0, np.zeros(len(model.parameters)), []))
+        compared[lumped] = [abs(m.computed / m.measured - 1) for m in compare(coarse, replace(told, lumped_shafts=lumped)).tests[0].modes]
     whole = with_mass_between(linear, between)
     assert whole.value[oscillating(whole, 4500.0)] == pytest.approx(pole, rel=1e-5)
     assert missed[False].max() < 0.3
     assert missed[True].max() > 10.0
+    assert len(compared[False]) == len(pole)
+    assert max(compared[False]) < 3e-5
+    assert max(compared[True]) > 1e-3
