@@ -30,13 +30,15 @@ def with_resonance(model: CampaignModel, h: Hypothesis, workers: int | None = No
     """The model with the light resonance that an explanation leaves unexplained in every test, and the explanation fitted in it; None where it
     leaves none, or it clears too little. Where discrepancies stand in for it, no misfit is left, and its evidence tells; without effects not even that where
     modes still drift beside it, for what changes from test to test is no resonance, and one that is taken for it then stands in the effect's way."""
-    hidden = h.evidence.learned.errors <= STRAIN
-    if len(model.resonances) == RESONANCES or (h.excess > SLIGHT and overlap(model, h.fit).tests < LOOKED):
+    if len(model.resonances) == RESONANCES:
         return None
-    seen = light_resonance(model.thinned, h.fit, h.evidence.learned)
-    if seen is None or seen[1] < PLENTY:
+    resonance = _left_by(model, h)
+    if resonance is not None and h.mechanisms:  # what fitting on would explain is no resonance
+        h = settled(model, h)
+        resonance = _left_by(model, h)
+    if resonance is None:
         return None
-    resonance, n = seen[0], len(model.parameters)
+    hidden, n = h.evidence.learned.errors <= STRAIN, len(model.parameters)
     wider, more = model.with_resonance(resonance), len(resonance.nuisances)
     fitted = with_more(h.fit.point, n, more)
     afresh = np.concatenate([np.zeros(n + more), h.fit.point[n:]])
@@ -59,6 +61,14 @@ def with_resonance(model: CampaignModel, h: Hypothesis, workers: int | None = No
     settles = found.excess < clear if not hidden else bool(h.mechanisms) or not drift
     asked = found.evidence.ln > h.evidence.ln + PLENTY and settles
     return (wider, found) if asked else None
+
+
+def _left_by(model: CampaignModel, h: Hypothesis) -> Resonance | None:
+    """The light resonance that an explanation leaves, where it is alike in all tests and promises enough."""
+    if h.excess > SLIGHT and overlap(model, h.fit).tests < LOOKED:
+        return None
+    seen = light_resonance(model.thinned, h.fit, h.evidence.learned)
+    return seen[0] if seen is not None and seen[1] >= PLENTY else None
 
 
 def shown(model: CampaignModel, h: Hypothesis) -> list[Resonance]:

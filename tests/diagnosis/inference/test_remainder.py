@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
 from thermospindle.diagnosis.inference.remainder import by_frequency
 from thermospindle.diagnosis.inference.resonance import shown, with_resonance
 from thermospindle.diagnosis.verdict import diagnose
+from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
 from thermospindle.sim.effects.effect import Effect, Parameter
@@ -151,3 +153,28 @@ def test_the_verdict_is_of_what_is_hidden_beside_it(spindle, hidden, word):
     assert found.verdict.effects == tuple(name for name, _ in hidden)
     assert [r.frequency for r in found.search.model.resonances] == pytest.approx([AT], rel=2e-3)
     assert "Taken into account: a light resonance" in found.verdict.reason
+
+
+@pytest.mark.parametrize("settles", [True, False])
+def test_what_fitting_on_would_explain_is_no_resonance(monkeypatch, settles):
+    """A grinding spindle's soft bond, fitted but not settled, left what looked like a resonance of its table at 876 Hz; settled it had 20 in ln evidence more than beside one."""
+    module = "thermospindle.diagnosis.inference.resonance"
+    own = SimpleNamespace(learned=SimpleNamespace(errors=1.0), ln=0.0)
+    early, late = (SimpleNamespace(mechanisms=("some",), fit=SimpleNamespace(point=np.zeros(1)), evidence=own, excess=0.0) for _ in range(2))
+    looked, fits = [], []
+
+    def seen(model, fit, learned):
+        looked.append(fit)
+        return None if fit is late.fit and settles else (SimpleNamespace(nuisances=()), 50.0)
+
+    def fitted(*args):
+        fits.append(args)
+        raise NoEquilibrium("what the fits would say is not asked here")
+
+    monkeypatch.setattr(f"{module}.light_resonance", seen)
+    monkeypatch.setattr(f"{module}.settled", lambda model, h: late)
+    monkeypatch.setattr(f"{module}.in_parallel", fitted)
+    model = SimpleNamespace(resonances=(), thinned=None, parameters=(), with_resonance=lambda resonance: None)
+    assert with_resonance(model, early) is None
+    assert looked == [early.fit, late.fit]
+    assert bool(fits) != settles
