@@ -11,7 +11,7 @@ import numpy as np
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.units import RPM
 from thermospindle.sim.campaign.campaign import Campaign, Test, read_campaign
-from thermospindle.sim.hammer.pulse import check_band
+from thermospindle.sim.hammer.pulse import check_band, middle_of_hit
 from thermospindle.sim.hammer.test import ImpactTest, impact_tests
 from thermospindle.sim.identification.frf import Frf
 from thermospindle.sim.identification.modal import Modes, extract
@@ -79,6 +79,7 @@ def as_campaign(run: Run, title: str) -> Campaign:
             speed=step.point.condition.speed,
             level=run.spindle.hammer.level,
             window_decay=step.test.estimate.window_decay,
+            pretrigger=middle_of_hit(run.spindle.hammer),
             frf=_as_measured(step.test.estimate.h1),
         )
         for step in run.steps

@@ -1,7 +1,7 @@
 """What records that end before the answer has died away leave out of FRFs, and how that moves.
 
-Of a velocity's mode p A e^(p t) a record of T seconds leaves out the part after T, -p A e^((p - w) T) / (s - p) with w what windows add. At the lines
-1/T apart of a discrete Fourier transform e^(-i omega T) is one, so that the part is smooth over lines (Brandt, *Noise and Vibration Analysis*, 2011, 10.3).
+Of a velocity's mode p A e^(p t) a record of R seconds that was hit at t0 leaves out the part after T = R - t0, -p A e^((p - w) T) e^(-i omega T) / (s - p) with w what windows add. At
+the lines 1/R apart of a discrete Fourier transform e^(-i omega T) is e^(i omega t0), so that the part is smooth over lines (Brandt, *Noise and Vibration Analysis*, 2011, 10.3).
 
 With the state matrix A = V diag(p) V^-1 it is -C (s - A)^-1 e^((A - w) T) B. Its derivatives need that of the exponential, whose elements in V are
 those of V^-1 dA V times the divided differences of e^(p T) (Higham, *Functions of Matrices*, 2008, Theorem 3.11). A change s^q u v^T of the dynamic
@@ -22,8 +22,8 @@ CLOSE = 1e-5  # times 1 / T, below which two poles' difference is their derivati
 
 @dataclass(frozen=True, eq=False)
 class RecordEnd:
-    """The end of records of `duration` seconds: `poles` p, with `force` (n, n_ref) of the references on them and `at_end` (n,) e^((p - w) T); of those
-    `seen` at the end `away` (k, L), s - p, and `read` (k, n_resp, L), what responses read of their velocity."""
+    """The end of records, `duration` T seconds after the hit: `poles` p, with `force` (n, n_ref) of the references on them and `at_end` (n,) e^((p - w) T); of those
+    `seen` at the end `away` (k, L), (s - p) e^(-i omega t0), and `read` (k, n_resp, L), what responses read of their velocity."""
 
     duration: float
     poles: Poles

@@ -117,12 +117,12 @@ class Response:
             return None
         p = poles(Matrices(*self._matrices, ()))
         window = linear.chain.decay + data.test.window_decay
-        grown = np.minimum((p.value.real - window) * data.duration, 0.0)
-        at_end = np.exp(grown + 1j * p.value.imag * data.duration)
+        after = data.duration - data.test.pretrigger  # s that the answer lasts in a record
+        at_end = np.exp(np.minimum((p.value.real - window) * after, 0.0) + 1j * p.value.imag * after)
         seen = np.flatnonzero(np.abs(at_end) > SILENT)
-        away = self.s[None, :] - p.value[seen, None]
+        away = (self.s[None, :] - p.value[seen, None]) * np.exp(-2j * np.pi * data.frequency * data.test.pretrigger)
         read = (self._rows @ (p.right * p.value)[:, seen]).T[:, :, None] * (self.factor / self.s) / away[:, None, :]
-        return RecordEnd(data.duration, p, p.left @ self._references, at_end, seen, away, read) if len(seen) else None
+        return RecordEnd(after, p, p.left @ self._references, at_end, seen, away, read) if len(seen) else None
 
     @property
     def _late(self) -> RecordEnd | None:

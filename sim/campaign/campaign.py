@@ -68,6 +68,7 @@ class Test:
     modes: tuple[ModeRow, ...] = ()
     window_decay: float = 0.0  # 1/s, damping that an exponential window exp(-decay t) has left in the FRFs
     runout: RunoutRecord | None = field(default=None, compare=False)
+    pretrigger: float = 0.0  # s from the start of a record to the middle of the hit
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,7 @@ def read_campaign(folder: Path, limits: Limits = LIMITS) -> Campaign:
             _check_size(folder / str(t.frf), frf)
             check_frf(folder / str(t.frf), frf, speed, limits)
         tests.append(
-            Test(t.id, t.temperature_C, speed, t.hammer_level_N, soak, t.repeat, t.conditions, frf, modes, t.window_decay_1_per_s, runout)
+            Test(t.id, t.temperature_C, speed, t.hammer_level_N, soak, t.repeat, t.conditions, frf, modes, t.window_decay_1_per_s, runout, t.pretrigger_s)
         )
     noise = Noise(table.noise.of_value, table.noise.of_largest) if table.noise else None
     return Campaign(table.title, table.spindle, table.quantity, points, tuple(tests), noise, table.note, table.lumped_shafts, folder)
@@ -197,7 +198,7 @@ def _write_files(campaign: Campaign, folder: Path, text: str) -> None:
 def _exact(campaign: Campaign) -> list[tuple[Any, ...]]:
     """What must read back bit for bit; speed, soak time and positions may have no exact number in the file's units."""
     points = [(p.node, p.name, p.body, p.direction) for p in campaign.points]
-    return points + [(t.id, t.temperature, t.level, t.repeat, t.window_decay, t.conditions, t.frf, t.modes) for t in campaign.tests]
+    return points + [(t.id, t.temperature, t.level, t.repeat, t.window_decay, t.pretrigger, t.conditions, t.frf, t.modes) for t in campaign.tests]
 
 
 def _write_modes(file: Path, campaign: Campaign) -> None:
@@ -242,6 +243,7 @@ def _toml_text(campaign: Campaign) -> str:
             "soak_time_min": None if t.soak_time is None else in_unit(t.soak_time, MINUTE),
             "repeat": t.repeat,
             "window_decay_1_per_s": t.window_decay or None,
+            "pretrigger_s": t.pretrigger or None,
             "conditions": t.conditions or None,
         }
         for t in campaign.tests

@@ -27,6 +27,11 @@ def pulse_duration(test: HammerTest) -> float:
     return float(np.pi * np.sqrt(test.hammer_mass / test.tip_stiffness))
 
 
+def middle_of_hit(test: HammerTest) -> float:
+    """Time (s) from the start of a record to the middle of its hit."""
+    return PRE_TRIGGER + pulse_duration(test) / 2
+
+
 def check_band(test: HammerTest, where: str) -> None:
     """Refuse a band beyond the first zero of the half-sine's spectrum, cos(pi f T) / (1 - (2 f T)^2): it lies at f = 1.5 / T."""
     reach = 1.5 / pulse_duration(test)

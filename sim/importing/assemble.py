@@ -26,12 +26,13 @@ from thermospindle.sim.importing.records import frfs_of, open_units
 
 @dataclass(frozen=True, eq=False)
 class Read:
-    """All files as read: `tests` by id with the curves, modes and window of each, `notes`, and what is open."""
+    """All files as read: `tests` by id with the curves, modes, window and time before the hit of each, `notes`, and what is open."""
 
     contents: tuple[Content, ...]
     curves: dict[str, list[Curve]]
     modes: dict[str, list[ModeLine]]
     window: dict[str, float]
+    pretrigger: dict[str, float]
     ends: tuple[tuple[str, End], ...]  # of what file, every end that is not placed
     points: dict[int, Point]
     notes: tuple[str, ...]
@@ -65,6 +66,7 @@ def read(
     curves: dict[str, list[Curve]] = {}
     modes: dict[str, list[ModeLine]] = {}
     window: dict[str, float] = {}
+    pretrigger: dict[str, float] = {}
     coherence: dict[str, dict[tuple[End, End], np.ndarray]] = {}
     for c in contents:
         own = settings[c.file].test or plain(c.file.stem)
@@ -86,6 +88,8 @@ def read(
         notes += made.notes
         questions += made.questions
         curves.setdefault(test, []).extend(made.curves)
+        if made.curves:
+            pretrigger[test] = made.pretrigger
         if made.window_decay > 0 and abs(window.setdefault(test, made.window_decay) / made.window_decay - 1) > 1e-9:
             questions.append(Question(f"test {test}", "hit_length_s", "one length for all hits, so that one window fits all its FRFs"))
     for every in curves.values():
@@ -102,9 +106,9 @@ def read(
     ends = tuple((name, end) for name, _, end in told if place(end, form, points) is None)
     questions += unplaced(ends, points, scene)
     questions += _units(own_curves, settings)
-    found = Read(tuple(contents), curves, modes, window, ends, points, tuple(notes), ())
+    found = Read(tuple(contents), curves, modes, window, pretrigger, ends, points, tuple(notes), ())
     questions += _conditions(found, form, scene, mapping)
-    return Read(tuple(contents), curves, modes, window, ends, points, tuple(notes), _together(questions))
+    return Read(tuple(contents), curves, modes, window, pretrigger, ends, points, tuple(notes), _together(questions))
 
 
 def _together(questions: Sequence[Question]) -> tuple[Question, ...]:
@@ -302,4 +306,7 @@ def _test(id_: str, told: TestForm, found: Read, placed: list[Placed], quantity:
     )
     soak = None if told.soak_time_min is None else told.soak_time_min * MINUTE
     decay = told.window_decay_1_per_s + found.window.get(id_, 0.0)
-    return Test(id_, told.temperature_C, speed, told.hammer_level_N, soak, told.repeat, told.conditions, frf, rows, decay)
+    before = told.pretrigger_s or found.pretrigger.get(id_, 0.0)
+    return Test(
+        id_, told.temperature_C, speed, told.hammer_level_N, soak, told.repeat, told.conditions, frf, rows, decay, pretrigger=before
+    )

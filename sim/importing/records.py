@@ -47,13 +47,14 @@ class Hit:
 
 @dataclass(frozen=True, eq=False)
 class FromRecords:
-    """FRFs made of time records, the damping (1/s) of the window left in them, and what was done and asked."""
+    """FRFs made of time records, the damping (1/s) of the window left in them, the time (s) from a record's start to the middle of its hit, and what was done and asked."""
 
     curves: tuple[Curve, ...]
     window_decay: float
     hits: int
     notes: tuple[str, ...]
     questions: tuple[Question, ...]
+    pretrigger: float = 0.0
 
 
 def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form: RecordForm) -> FromRecords:
@@ -115,7 +116,9 @@ def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form
         + ("no exponential window" if end == 1 else f"exponential window down to {end:g}")
         + ("; below, nothing is coherent with the force" if from_ else "")
     )
-    return FromRecords(tuple(curves), float(decay), len(good), tuple(notes), ())
+    pushed = np.where(force[0] > TOUCHING * force[0].max(axis=-1, keepdims=True), force[0], 0.0)
+    middle = step * float((pushed @ np.arange(float(n)) / pushed.sum(axis=-1)).mean())
+    return FromRecords(tuple(curves), float(decay), len(good), tuple(notes), (), middle)
 
 
 SI = {"receptance": "m/N", "mobility": "(m/s)/N", "accelerance": "(m/s^2)/N"}

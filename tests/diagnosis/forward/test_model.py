@@ -128,8 +128,9 @@ def test_derivatives_of_a_flexible_shaft():
         assert worst[kind] < 1e-2, kind
 
 
-def test_records_that_end_early(scene):
-    """A record of T seconds and its discrete Fourier transform, mode by mode: p A e^(p t) from 0 to T under the window."""
+@pytest.mark.parametrize("before", [0.0, 0.004])
+def test_records_that_end_early(scene, before):
+    """A record of T seconds and its discrete Fourier transform, mode by mode: p A e^(p t) from the hit, some time `before` which it began, to its end under the window."""
     decay = 15.0
     model, x = made(scene, window_decay=decay)
     x[[p.kind == RECORD for p in model.parameters]] = 1.0
@@ -139,9 +140,10 @@ def test_records_that_end_early(scene):
     lines = np.arange(10, 150) / duration
     away = 2j * np.pi * lines + decay + rows.decay - p.value[:, None]
     residue = (rows.response_rows @ p.right)[:, None, :] * (p.left @ rows.reference_rows.T).T[None] * p.value
-    at_lines = replace(data, frequency=lines, value=np.zeros((*data.value.shape[:2], len(lines)), complex))
+    test = replace(data.test, pretrigger=before)
+    at_lines = replace(data, test=test, frequency=lines, value=np.zeros((*data.value.shape[:2], len(lines)), complex))
     gain = np.ones(len(rows.gain))
-    exact = residue @ ((1 - np.exp(-away * duration)) / away) * rows.gain[:, None, None]
+    exact = residue @ ((1 - np.exp(-away * (duration - before))) / away) * rows.gain[:, None, None]
     cut, uncut = (Response(linear, at_lines, gain, share).value for share in (1.0, 0.0))
     assert np.abs(cut - exact).max() < 1e-9 * np.abs(exact).max()
     assert np.abs(uncut - exact).max() > 1e-3 * np.abs(exact).max()
@@ -151,7 +153,7 @@ def test_derivatives_of_records_that_end_early(scene):
     """By an element's mass, damping and stiffness, against central differences; without what they do to the end of the records they are wrong by parts
     in a hundred."""
     model, x = made(scene, window_decay=15.0)
-    data, linear = model.tests[0], model.linear(0, x, [])
+    data, linear = replace(model.tests[0], test=replace(model.tests[0].test, pretrigger=0.004)), model.linear(0, x, [])
     m, gain, n = linear.matrices, np.ones(len(linear.chain.gain)), len(linear.matrices.mass)
     random = np.random.default_rng(4)
     for which in ("mass", "damping", "stiffness"):

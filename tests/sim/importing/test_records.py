@@ -8,6 +8,7 @@ import pytest
 from thermospindle.model.errors import BadInput, Unanswered
 from thermospindle.report.verbs.importing import bring
 from thermospindle.sim.campaign.campaign import read_campaign
+from thermospindle.sim.hammer.pulse import PRE_TRIGGER
 
 RATE, LENGTH = 8192.0, 1.0
 POLES = 2 * np.pi * np.array([210.0, 640.0]), np.array([0.01, 0.008])
@@ -97,6 +98,7 @@ def test_hits_are_found_judged_and_averaged(folder, tmp_path, estimator):
     assert np.abs(frf.value - model).max() < 3e-3 * np.abs(model).max()
     assert np.median(frf.coherence) > 0.98
     assert test.window_decay > 1
+    assert test.pretrigger == pytest.approx(PRE_TRIGGER + 3e-4, abs=1.5 / RATE)  # to the middle of a hit of 0.6 ms
     if estimator == "H1":  # what standard errors say comes true, within the bias of a force cut to its window
         ratio = np.abs(frf.value - model) / frf.sd
         assert 0.4 < np.sqrt(np.mean(ratio**2)) < 3
