@@ -79,6 +79,8 @@ class HammerTest(Table):
 
     @model_validator(mode="after")
     def _sampling_carries_the_band(self) -> HammerTest:
+        if self.band_Hz[0] == 0.0:
+            raise ValueError("band_Hz must begin above 0 Hz, where what nothing holds has no answer")
         if self.band_Hz[1] > 0.4 * self.sample_rate_Hz:
             raise ValueError("sample_rate_Hz must be at least 2.5 times the upper end of band_Hz, for the anti-alias filter")
         lines = self.record_length_s * (self.band_Hz[1] - self.band_Hz[0])

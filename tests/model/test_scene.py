@@ -120,6 +120,7 @@ REFUSED = [
     ("long-name", lambda r: r["measuring"]["points"][0].update(name="a name too long"), "measuring.points.1.name", "at most 10"),
     ("node-twice", lambda r: r["measuring"]["points"][0].update(node=2), "node = 2 stands twice", "must differ"),
     ("hammer-node", lambda r: r["hammer_test"].update(hammer_nodes=[9]), "hammer_test.hammer_nodes: 9", "allowed are"),
+    ("from-0-Hz", lambda r: r["hammer_test"].update(band_Hz=[0.0, 6000.0]), "hammer_test", "above 0 Hz"),
     ("sampling", lambda r: r["hammer_test"].update(sample_rate_Hz=5000.0), "hammer_test", "2.5 times"),
     ("heat", lambda r: r["thermal"]["gaps"][0].update(regions=["shaft", "hub"]), "thermal.gaps: 'hub'", "did you mean hub body?"),
     ("unknown-table", lambda r: r.update(extra={}), "extra: unknown key", "materials"),
