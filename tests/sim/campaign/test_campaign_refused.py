@@ -62,6 +62,7 @@ TOML, UFF, CSV = "campaign.toml", "T20_n0.uff", "modes.csv"
         (edit(TOML, "= 20.5\n", "= \"20.5\"\n"), "tests.T20.5_n7200.temperature_C = '20.5': .*number"),
         (edit(TOML, "= 20.5\n", "= -300.0\n"), "tests.T20.5_n7200.temperature_C = -300.0: .*greater than -273.15"),
         (edit(TOML, "= 20.5\n", "= nan\n"), "tests.T20.5_n7200.temperature_C = nan: .*finite"),
+        (edit(TOML, "repeat = 2", "repeat = 2\npretrigger_s = 2.5"), "tests.T20.5_n7200.pretrigger_s = 2.5: must be less than the record of lines .* Hz apart"),
         (edit(TOML, "repeat = 2", "repeat = 0"), "tests.T20.5_n7200.repeat = 0: .*greater than or equal to 1"),
         (edit(TOML, "hammer_level_N = 3.3", "hammer_level_N = 0.0"), "hammer_level_N = 0.0: .*greater than 0"),
         (edit(TOML, "\"mobility\"", "\"impedance\""), "quantity = 'impedance': .*'receptance', 'mobility', 'accelerance' or 'displacement'"),
@@ -102,7 +103,7 @@ TOML, UFF, CSV = "campaign.toml", "T20_n0.uff", "modes.csv"
         (missing_line, "T20_n0.uff: set 1 .*from 519 to 521 Hz among steps of 1 Hz"),
     ],
     ids=[
-        "test-key", "top-key", "noise-key", "point-key", "no-quantity", "no-temperature", "text", "cold", "nan", "repeat", "level",
+        "test-key", "top-key", "noise-key", "point-key", "no-quantity", "no-temperature", "text", "cold", "nan", "pretrigger", "repeat", "level",
         "quantity", "direction", "long-name", "node-twice", "id-twice", "file-twice", "path", "no-file", "no-toml", "unknown-node",
         "csv-negative", "csv-no-sd", "csv-damping", "csv-sd-alone", "csv-test", "csv-mode-twice", "csv-columns", "csv-cells",
         "unit-label", "numerator", "denominator", "exponents", "force-label", "abscissa", "count", "float-format", "axis",
