@@ -13,7 +13,7 @@ from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.forward.linear import Linear, Products
 from thermospindle.diagnosis.forward.record import RecordEnd
 from thermospindle.model.rotor.chain import Matrices
-from thermospindle.model.rotor.modes import LARGE, poles
+from thermospindle.model.rotor.modes import LARGE, Poles, poles
 from thermospindle.model.rotor.reduced import reduced
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.campaign.beside import POWER
@@ -112,15 +112,27 @@ class Response:
     @cached_property
     def _end(self) -> RecordEnd | None:
         """The end of records, where some mode still answers there."""
+        return self._ending(self._of[1].test.pretrigger)
+
+    def cut_off_after(self, before: float) -> ComplexArray:
+        """What records that were hit `before` seconds after their start would leave out, (n_resp, n_ref, L)."""
+        end = self._ending(before)
+        return np.zeros_like(self.value) if end is None else end.value
+
+    @cached_property
+    def _every(self) -> Poles:
+        return poles(Matrices(*self._matrices, ()))
+
+    def _ending(self, before: float) -> RecordEnd | None:
         linear, data = self._of
         if not np.isfinite(data.duration):
             return None
-        p = poles(Matrices(*self._matrices, ()))
+        p = self._every
         window = linear.chain.decay + data.test.window_decay
-        after = data.duration - data.test.pretrigger  # s that the answer lasts in a record
+        after = data.duration - before  # s that the answer lasts in a record
         at_end = np.exp(np.minimum((p.value.real - window) * after, 0.0) + 1j * p.value.imag * after)
         seen = np.flatnonzero(np.abs(at_end) > SILENT)
-        away = (self.s[None, :] - p.value[seen, None]) * np.exp(-2j * np.pi * data.frequency * data.test.pretrigger)
+        away = (self.s[None, :] - p.value[seen, None]) * np.exp(-2j * np.pi * data.frequency * before)
         read = (self._rows @ (p.right * p.value)[:, seen]).T[:, :, None] * (self.factor / self.s) / away[:, None, :]
         return RecordEnd(after, p, p.left @ self._references, at_end, seen, away, read) if len(seen) else None
 

@@ -11,6 +11,7 @@ from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.freeform import alike
+from thermospindle.diagnosis.inference.hit import hit_found
 from thermospindle.diagnosis.inference.hypothesis import STRAIN, Hypothesis, settled, widened
 from thermospindle.diagnosis.inference.pairs import joined, joined_early, without_one
 from thermospindle.diagnosis.inference.resonance import with_resonance
@@ -43,6 +44,9 @@ def search(
     one."""
     every = [*named, *with_own_laws(named, model.spindle, strongest(model.spindle, [d.condition for d in model.tests])), *free]
     none = _without_effects(model)
+    if (hit := hit_found(model, none)) is not None:
+        model = hit
+        none = _without_effects(model)
     wider = with_resonance(model, none, workers)
     model, none = wider or (model, none)
     progress("fitted without effects")

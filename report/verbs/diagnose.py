@@ -30,8 +30,6 @@ from thermospindle.sim.campaign.campaign import Campaign, read_campaign
 from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.effects.own import effect_of
 
-CUT = 0.5  # share of what records that end early leave out, from which they are seen to (it is none or all)
-
 
 def diagnose(
     scene: Path,
@@ -73,18 +71,18 @@ def diagnose(
         write_json("diagnosis.json")(folder, answer)
         _write(found, answer, spindle, folder, *((turning[2], turning[0]) if turning else ()))
 
-    return answered(values, show, out, asked, write, [*left_out(tests), *_untold(found)])
+    return answered(values, show, out, asked, write, [*left_out(tests), *_found(found)])
 
 
-def _untold(found: verdict.Diagnosis) -> list[str]:
-    """A warning where records are seen to end early, and no test tells where in them it was hit."""
-    record = found.search.model.record
-    if record is None or any(t.pretrigger for t in found.campaign.tests) or found.verdict.accepted.evidence.mean[record] < CUT:
-        return []
-    return [
-        "records end before answers have died away, and no test tells by pretrigger_s where in its record it was hit: their start is taken, and off its peaks "
-        "an FRF depends on it"
-    ]
+def _found(found: verdict.Diagnosis) -> list[str]:
+    """A warning where records end early, and where in them they were hit was not told but found."""
+    for told, seen in zip(found.campaign.tests, found.search.model.tests, strict=True):
+        if seen.test.pretrigger != told.pretrigger:
+            return [
+                f"records end before answers have died away; that they were hit {1e3 * seen.test.pretrigger:.3g} ms after their start, which no test tells (pretrigger_s), "
+                "was found from these data"
+            ]
+    return []
 
 
 def _write(*what: Any) -> None:

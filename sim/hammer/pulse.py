@@ -28,8 +28,8 @@ def pulse_duration(test: HammerTest) -> float:
 
 
 def middle_of_hit(test: HammerTest) -> float:
-    """Time (s) from the start of a record to the middle of its hit."""
-    return PRE_TRIGGER + pulse_duration(test) / 2
+    """Time (s) from the start of a record, half a sample before its first one, to the middle of its hit."""
+    return PRE_TRIGGER + pulse_duration(test) / 2 + 0.5 / test.sample_rate
 
 
 def check_band(test: HammerTest, where: str) -> None:

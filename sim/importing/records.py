@@ -117,7 +117,7 @@ def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form
         + ("; below, nothing is coherent with the force" if from_ else "")
     )
     pushed = np.where(force[0] > TOUCHING * force[0].max(axis=-1, keepdims=True), force[0], 0.0)
-    middle = step * float((pushed @ np.arange(float(n)) / pushed.sum(axis=-1)).mean())
+    middle = step * float((pushed @ (np.arange(float(n)) + 0.5) / pushed.sum(axis=-1)).mean())
     return FromRecords(tuple(curves), float(decay), len(good), tuple(notes), (), middle)
 
 

@@ -6,7 +6,6 @@ import json
 import re
 from dataclasses import replace
 from html import unescape
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -30,7 +29,6 @@ from thermospindle.report.page.diagnosis import sections, write_diagnosis
 from thermospindle.report.text.diagnosis.answer import diagnosis_json
 from thermospindle.report.text.diagnosis.words import show_diagnosis
 from thermospindle.report.text.runout_diagnosis import runout_diagnosis_json
-from thermospindle.report.verbs.diagnose import _untold
 from thermospindle.sim.campaign.simulated import runout_campaign
 from thermospindle.sim.effects import CATALOGUE, by_name, of_scene
 
@@ -179,15 +177,3 @@ def test_runout_stands_on_the_same_page(told, spindle, tmp_path):
     identities = re.findall(r'id="([^"]+)"', page)
     assert len(identities) == len(set(identities))
     assert {"explanations.svg", "runout_explanations.svg"} <= {p.name for p in tmp_path.iterdir()}
-
-
-@pytest.mark.parametrize(("share", "told", "warned"), [(0.98, 0.0, True), (0.98, 2e-3, False), (0.02, 0.0, False)])
-def test_records_that_end_early_ask_where_they_were_hit(share, told, warned):
-    """Where their share is seen and no test says; the mean is over all nuisance values, of which the record's is the second here."""
-    accepted = SimpleNamespace(evidence=SimpleNamespace(mean=np.array([0.0, share])))
-    found = SimpleNamespace(
-        search=SimpleNamespace(model=SimpleNamespace(record=1)),
-        campaign=SimpleNamespace(tests=(SimpleNamespace(pretrigger=told),)),
-        verdict=SimpleNamespace(accepted=accepted),
-    )
-    assert any("pretrigger_s" in w for w in _untold(found)) == warned

@@ -1,0 +1,53 @@
+"""Where records that end early were hit: found from the data of a damped spindle whose answers these cut off, and not sought where they need not be."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.virtual_campaign import drawn, model_of, noisy, truth, virtual_campaign
+from thermospindle.diagnosis.forward.response import Response
+from thermospindle.diagnosis.inference.hit import hit_found
+from thermospindle.diagnosis.inference.search import _without_effects
+from thermospindle.model.machine import Condition
+from thermospindle.model.units import RPM
+from thermospindle.sim.campaign.campaign import Noise
+
+CONDITIONS = (Condition(20.0), Condition(40.0, 7200 * RPM))
+FREQUENCY = np.arange(400.0, 6000.1, 40.0)  # of records of 25 ms, at whose ends a tenth of the slowest answers is left
+WITHOUT, NOISE = Noise(0.0, 0.0), Noise(4e-3, 2e-4)
+
+
+def hit(spindle, before):
+    """Tests whose records begin so many seconds before the hit, None for records without end, and do not tell."""
+    errors = drawn(spindle, 2, 4)
+    whole = virtual_campaign(spindle, CONDITIONS, 4, errors=errors, noise=WITHOUT, frequency=FREQUENCY)
+    model, random, tests = model_of(spindle, replace(whole, noise=NOISE)), np.random.default_rng(5), []
+    x = truth(model, errors)
+    for t, (test, data) in enumerate(zip(whole.tests, model.tests, strict=True)):
+        every = replace(data, frequency=FREQUENCY, value=test.frf.value)
+        answer = Response(model.linear(t, x, []), every, np.exp(errors.gain))
+        value = test.frf.value + (0.0 if before is None else answer.cut_off_after(before))
+        tests.append(replace(test, frf=replace(test.frf, value=noisy(value, random, NOISE))))
+    return model_of(spindle, replace(whole, tests=tuple(tests), noise=NOISE))
+
+
+@pytest.mark.parametrize("before", [0.6e-3, 2.2e-3])
+def test_a_hit_is_found(spindle, before):
+    model = hit(spindle, before)
+    none = _without_effects(model)
+    found = hit_found(model, none)
+    assert [d.test.pretrigger for d in found.tests] == pytest.approx([before] * 2, abs=2e-5)
+    after = _without_effects(found)
+    assert none.fit.chi2 / none.fit.count > 1.3
+    assert after.fit.chi2 / after.fit.count < 1.1
+    assert hit_found(found, after) is None  # it is told now
+
+
+@pytest.mark.parametrize("before", [None, 0.0])
+def test_it_is_not_sought_without_need(spindle, before):
+    """Where records have no end, and where they begin with the hit."""
+    model = hit(spindle, before)
+    assert hit_found(model, _without_effects(model)) is None
