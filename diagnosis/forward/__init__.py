@@ -10,6 +10,7 @@ table        poles and their derivatives for a table of modes
 rates        how the matrices change with tolerances, temperature and ring expansion
 points       operating points that differ in the measuring chain alone, or in how far the rings expand
 model        residuals of every test in standard errors
+hit          where in records that end early a test was hit, where nobody tells
 derivatives  of these, by nuisance parameters, by what lists of effects differ in, by light resonances
 making       the model of a campaign made: scenes, tolerances, nuisance parameters
 ===========  ========================================================================================================

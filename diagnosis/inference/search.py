@@ -6,13 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
+from thermospindle.diagnosis.forward.hit import hit_found
 from thermospindle.diagnosis.forward.mechanism import Mechanism, strongest, with_own_laws
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.freeform import alike
-from thermospindle.diagnosis.inference.hit import hit_found
-from thermospindle.diagnosis.inference.hypothesis import STRAIN, Hypothesis, settled, widened
+from thermospindle.diagnosis.inference.hypothesis import PLENTY, STRAIN, Hypothesis, settled, widened
 from thermospindle.diagnosis.inference.pairs import joined, joined_early, without_one
 from thermospindle.diagnosis.inference.resonance import with_resonance
 from thermospindle.diagnosis.inference.screening import Screened
@@ -44,7 +44,7 @@ def search(
     one."""
     every = [*named, *with_own_laws(named, model.spindle, strongest(model.spindle, [d.condition for d in model.tests])), *free]
     none = _without_effects(model)
-    if (hit := hit_found(model, none)) is not None:
+    if (hit := hit_found(model, none.fit.nuisance, 2 * PLENTY * none.evidence.learned.errors**2)) is not None:
         model = hit
         none = _without_effects(model)
     wider = with_resonance(model, none, workers)

@@ -1,7 +1,7 @@
 """Where in their records a campaign's tests were hit, found where no test tells and answers have not died away at the records' end.
 
 What a record leaves out goes with e^(i omega t0) (`diagnosis.forward.record`): near its peak a mode hardly shows t0, far from it every t0 that is wrong by a period
-is a valley of its own. It is therefore sought on a grid, with all else as fitted without effects, and not by a fit.
+is a valley of its own. It is therefore sought on a grid, with all else as it was fitted without effects.
 """
 
 from __future__ import annotations
@@ -13,19 +13,19 @@ import numpy as np
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.forward.response import Response
-from thermospindle.diagnosis.inference.hypothesis import PLENTY, Hypothesis
+from thermospindle.model.types import Array
 
 REACH = 0.2  # of a record, up to which its hit is sought
 FINE = 8  # points of the grid in the period of the band's upper end, and again in each of these
 
 
-def hit_found(model: CampaignModel, none: Hypothesis) -> CampaignModel | None:
-    """The model with its tests hit where that leaves least of an explanation's misfit; None where they are told, where records are long enough, or where it gains little."""
+def hit_found(model: CampaignModel, fitted: Array, least: float) -> CampaignModel | None:
+    """The model with its tests hit where that leaves least of the misfit of nuisance values `fitted` (P,); None where they are told, where records are long enough, or where
+    chi2 does not fall by `least`."""
     lines = [(t, d) for t, d in enumerate(model.tests) if isinstance(d, LineData) and np.isfinite(d.duration)]
     if not lines or model.record is None or any(d.test.pretrigger for _, d in lines):
         return None
-    x = none.fit.nuisance.copy()
-    fitted = float(x[model.record])
+    x, own_share = fitted.copy(), float(fitted[model.record])
     x[model.record] = 0.0
     whole = [(t, d, model.answer(t, x, model.linear(t, x, []))) for t, d in lines]
     ending = [(t, d, answer) for t, d, answer in whole if isinstance(answer, Response) and answer.cut_off_after(0.0).any()]
@@ -41,6 +41,6 @@ def hit_found(model: CampaignModel, none: Hypothesis) -> CampaignModel | None:
     best = float(grid[np.argmin([chi2(before) for before in grid])])
     near = np.clip(best + step * np.linspace(-1, 1, 2 * FINE + 1), 0.0, None)
     best = float(near[np.argmin([chi2(before) for before in near])])
-    if best == 0.0 or chi2(0.0, fitted) - chi2(best) < 2 * PLENTY * none.evidence.learned.errors**2:
+    if best == 0.0 or chi2(0.0, own_share) - chi2(best) < least:
         return None
     return replace(model, tests=tuple(replace(d, test=replace(d.test, pretrigger=best)) if isinstance(d, LineData) else d for d in model.tests))

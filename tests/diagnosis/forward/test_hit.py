@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tests.virtual_campaign import drawn, model_of, noisy, truth, virtual_campaign
+from thermospindle.diagnosis.forward.hit import hit_found
 from thermospindle.diagnosis.forward.response import Response
-from thermospindle.diagnosis.inference.hit import hit_found
 from thermospindle.diagnosis.inference.search import _without_effects
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
@@ -18,6 +18,7 @@ from thermospindle.sim.campaign.campaign import Noise
 CONDITIONS = (Condition(20.0), Condition(40.0, 7200 * RPM))
 FREQUENCY = np.arange(400.0, 6000.1, 40.0)  # of records of 25 ms, at whose ends a tenth of the slowest answers is left
 WITHOUT, NOISE = Noise(0.0, 0.0), Noise(4e-3, 2e-4)
+LEAST = 24.0
 
 
 def hit(spindle, before):
@@ -38,16 +39,16 @@ def hit(spindle, before):
 def test_a_hit_is_found(spindle, before):
     model = hit(spindle, before)
     none = _without_effects(model)
-    found = hit_found(model, none)
+    found = hit_found(model, none.fit.nuisance, LEAST)
     assert [d.test.pretrigger for d in found.tests] == pytest.approx([before] * 2, abs=2e-5)
     after = _without_effects(found)
     assert none.fit.chi2 / none.fit.count > 1.3
     assert after.fit.chi2 / after.fit.count < 1.1
-    assert hit_found(found, after) is None  # it is told now
+    assert hit_found(found, after.fit.nuisance, LEAST) is None  # it is told now
 
 
 @pytest.mark.parametrize("before", [None, 0.0])
 def test_it_is_not_sought_without_need(spindle, before):
     """Where records have no end, and where they begin with the hit."""
     model = hit(spindle, before)
-    assert hit_found(model, _without_effects(model)) is None
+    assert hit_found(model, _without_effects(model).fit.nuisance, LEAST) is None
