@@ -17,27 +17,29 @@ from thermospindle.model.types import Array
 
 REACH = 0.2  # of a record, up to which its hit is sought
 FINE = 8  # points of the grid in the period of the band's upper end, and again in each of these
+MOST = 4000  # points of the grid: of long records and wide bands it reaches less far
 
 
 def hit_found(model: CampaignModel, fitted: Array, least: float) -> CampaignModel | None:
     """The model with its tests hit where that leaves least of the misfit of nuisance values `fitted` (P,); None where they are told, where records are long enough, or where
     chi2 does not fall by `least`."""
-    lines = [(t, d) for t, d in enumerate(model.tests) if isinstance(d, LineData) and np.isfinite(d.duration)]
+    thin = model.thinned
+    lines = [(t, d) for t, d in enumerate(thin.tests) if isinstance(d, LineData) and np.isfinite(d.duration)]
     if not lines or model.record is None or any(d.test.pretrigger for _, d in lines):
         return None
     x, own_share = fitted.copy(), float(fitted[model.record])
     x[model.record] = 0.0
-    whole = [(t, d, model.answer(t, x, model.linear(t, x, []))) for t, d in lines]
+    whole = [(t, d, thin.answer(t, x, thin.linear(t, x, []))) for t, d in lines]
     ending = [(t, d, answer) for t, d, answer in whole if isinstance(answer, Response) and answer.cut_off_after(0.0).any()]
     if not ending:
         return None
 
     def chi2(before: float, share: float = 1.0) -> float:
-        left = [model.whitened(t, answer.value + share * answer.cut_off_after(before), d.value) for t, d, answer in ending]
+        left = [thin.whitened(t, answer.value + share * answer.cut_off_after(before), d.value) for t, d, answer in ending]
         return sum(float(r @ r) for r in left)
 
     step = 1 / (FINE * max(d.frequency[-1] for _, d, _ in ending))
-    grid = np.arange(0.0, REACH * min(d.duration for _, d, _ in ending), step)
+    grid = np.arange(0.0, REACH * min(d.duration for _, d, _ in ending), step)[:MOST]
     best = float(grid[np.argmin([chi2(before) for before in grid])])
     near = np.clip(best + step * np.linspace(-1, 1, 2 * FINE + 1), 0.0, None)
     best = float(near[np.argmin([chi2(before) for before in near])])
