@@ -24,7 +24,7 @@ from thermospindle.diagnosis.data.window import left_by, neighbours, windowed
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.campaign.campaign import Noise, Test
-from thermospindle.sim.identification.frf import Frf, even, out_of
+from thermospindle.sim.identification.frf import Frf, even, out_of, record_length
 from thermospindle.sim.identification.modal import noise_model, scatter
 
 NODES = 5  # of a block: polynomials of degree 4
@@ -77,11 +77,6 @@ class LineData:
     def count(self) -> int:
         """Real numbers in the likelihood."""
         return 2 * self.value.size
-
-
-def record_length(frf: Frf) -> float:
-    """Length (s) of the record that lines so far apart are the discrete Fourier transform of; infinite for lines in uneven steps, which are of a sweep."""
-    return 1 / step if (step := even(frf.frequency)) else np.inf
 
 
 def line_data(test: Test, condition: Condition, stated: Noise | None, expected: Noise) -> LineData:

@@ -26,7 +26,7 @@ from thermospindle.model.units import MINUTE, MM, RPM
 from thermospindle.sim.campaign.form import MODE_COLUMNS, ModeTable, checked, in_unit, toml
 from thermospindle.sim.campaign.runout_record import RunoutRecord, read_runout, same, write_runout
 from thermospindle.sim.campaign.uff import LARGEST, read_frf, write_frf
-from thermospindle.sim.identification.frf import LIMITS, Frf, Limits, check_frf, even
+from thermospindle.sim.identification.frf import LIMITS, Frf, Limits, check_frf, record_length
 
 
 @dataclass(frozen=True)
@@ -108,8 +108,8 @@ def read_campaign(folder: Path, limits: Limits = LIMITS) -> Campaign:
         if frf is not None:
             _check_size(folder / str(t.frf), frf)
             check_frf(folder / str(t.frf), frf, speed, limits)
-            if t.pretrigger_s > 0 and (step := even(frf.frequency)) and t.pretrigger_s >= 1 / step:
-                raise BadInput(f"{file}: tests.{t.id}.pretrigger_s = {t.pretrigger_s:g}: must be less than the record of lines {step:g} Hz apart, {1 / step:g} s")
+            if t.pretrigger_s >= (record := record_length(frf)):
+                raise BadInput(f"{file}: tests.{t.id}.pretrigger_s = {t.pretrigger_s:g}: must be less than the record of lines {1 / record:g} Hz apart, {record:g} s")
         tests.append(
             Test(t.id, t.temperature_C, speed, t.hammer_level_N, soak, t.repeat, t.conditions, frf, modes, t.window_decay_1_per_s, runout, t.pretrigger_s)
         )

@@ -77,6 +77,11 @@ def even(values: np.ndarray) -> float:
     return float(step) if step > 0 and near.all() and (steps > 0).all() else 0.0
 
 
+def record_length(frf: Frf) -> float:
+    """Length (s) of the record that lines so far apart are the discrete Fourier transform of; infinite for lines in uneven steps, which are of a sweep."""
+    return 1 / step if (step := even(frf.frequency)) else np.inf
+
+
 def gap(lines: np.ndarray, sweep: bool = True) -> int | None:
     """The line (n,) before which others are missing, None where none are: a step unlike the others, which in a `sweep` may grow and stay so, but not
     stand alone among even ones."""
