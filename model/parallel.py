@@ -78,11 +78,28 @@ def in_parallel(
     return results
 
 
-def _sent(function: Callable[[Item], Result], items: list[Item], workers: int) -> Iterator[Result]:
+def meanwhile(function: Callable[[], Result], workers: int | None = None) -> Callable[[], Result]:
+    """What asks for `function()`, which a worker has begun on while much else is done here; on a single core, or within a worker, it is done when it is asked
+    for. For long work that is to be done in parallel later anyway: the workers are started with it."""
+    workers = workers or cores()
+    if workers < 2 or _inside:
+        return function
+    answer = _pool(workers).submit(_call_once, cloudpickle.dumps(function))
+    return answer.result
+
+
+def _pool(workers: int) -> Any:
     global _last
     workers = _last[0] if _running(workers) else workers  # a pool that is larger is not made smaller
     warnings.filterwarnings("ignore", "A worker was restarted", UserWarning)  # which loses nothing, and is no news to whoever waits
     pool = get_reusable_executor(workers, timeout=IDLE, initializer=_begin, initargs=(os.getpid(),), env=ENVIRONMENT)
+    _last = workers, time.monotonic()
+    return pool
+
+
+def _sent(function: Callable[[Item], Result], items: list[Item], workers: int) -> Iterator[Result]:
+    global _last
+    pool = _pool(workers)
     with TemporaryDirectory(prefix="thermospindle-") as folder:  # a pool sends with every item what it is to call
         sent = Path(folder) / uuid4().hex
         sent.write_bytes(cloudpickle.dumps(function))
@@ -91,7 +108,7 @@ def _sent(function: Callable[[Item], Result], items: list[Item], workers: int) -
         except KeyboardInterrupt:
             pool.shutdown(kill_workers=True)
             raise
-    _last = workers, time.monotonic()
+    _last = _last[0], time.monotonic()
 
 
 def _running(workers: int) -> bool:
@@ -130,3 +147,7 @@ def _function(sent: Path) -> Callable[[Any], Any]:
 
 def _call(sent: Path, item: Any) -> Any:
     return _function(sent)(item)
+
+
+def _call_once(sent: bytes) -> Any:
+    return cloudpickle.loads(sent)()

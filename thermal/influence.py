@@ -16,7 +16,7 @@ import numpy as np
 
 from thermospindle.model.machine import Bearing, Material, Region, RollerBearing, Spindle
 from thermospindle.thermal import store
-from thermospindle.thermal.elastic import Elasticity, Race, Response
+from thermospindle.thermal.elastic import Elasticity, Race, Response, Solid
 from thermospindle.thermal.mesh import PartMesh, tiled
 from thermospindle.thermal.reduced import Reduced, reduced
 from thermospindle.thermal.reduced import Region as Softening
@@ -129,6 +129,26 @@ def _softening(space: Reduced, temperatures: Mapping[str, float]) -> Gain:
     return Gain(space.races, space.section.regions, space.solution(moduli)[0])
 
 
+def on_its_mesh(spindle: Spindle, other: Spindle) -> dict[str, Response]:
+    """The influence of `other`, a spindle that differs in its moduli, part by part on the meshes of `spindle`: what two differ by there is no error of the
+    meshes, and costs one solution."""
+    parts = dict.fromkeys(g.part for g in spindle.regions)
+    return {part: _beside(_question(spindle, part, TOLERANCE, None), _question(other, part, TOLERANCE, None)) for part in parts}
+
+
+@lru_cache(maxsize=64)
+def _beside(question: Elastic, other: Elastic) -> Response:
+    response, convergence = _kept(question)
+    if other == question:
+        return response
+    key = f"{other!r} on the mesh of {question!r}"
+    if (found := store.load(key)) is not None:
+        return found[0]
+    answer = Solid(response.section, dict(other.elasticity)).respond(other.races)[0]
+    store.save(key, answer, convergence)
+    return answer
+
+
 def _softened(spindle: Spindle, part: str, temperatures: Mapping[str, float] | None) -> tuple[tuple[str, float], ...] | None:
     """Moduli (Pa) by region of a part at its temperatures; None where they are those of the reference."""
     if temperatures is None:
@@ -220,4 +240,5 @@ def _answer(question: Elastic, start: PartMesh) -> tuple[Response, Convergence]:
 def forget() -> None:
     """Drop what this process has kept, so that it reads from disk or computes again as a new one would."""
     _kept.cache_clear()
+    _beside.cache_clear()
     _gains.cache_clear()

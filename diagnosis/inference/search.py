@@ -17,7 +17,7 @@ from thermospindle.diagnosis.inference.pairs import joined, joined_early, withou
 from thermospindle.diagnosis.inference.resonance import with_resonance
 from thermospindle.diagnosis.inference.screening import Screened
 from thermospindle.diagnosis.inference.singles import better, by_own_laws, carried_over, fit_singles, of_each_name
-from thermospindle.model.parallel import in_parallel
+from thermospindle.model.parallel import in_parallel, meanwhile
 from thermospindle.model.types import Array
 
 FINALISTS = {1: 3, 2: 2, 3: 1}  # explanations of one, two and three mechanisms that are fitted anew at the end, of the catalogue and free
@@ -42,7 +42,8 @@ def search(
 ) -> Search:
     """The evidence of every explanation. A light resonance becomes part of the model where the data show it without effects, or beside the best single
     one."""
-    every = [*named, *with_own_laws(named, model.spindle, strongest(model.spindle, [d.condition for d in model.tests])), *free]
+    at = strongest(model.spindle, [d.condition for d in model.tests])
+    own_laws = meanwhile(partial(with_own_laws, named, model.spindle, at), workers)
     none = _without_effects(model)
     if (hit := hit_found(model, none.fit.nuisance, 2 * PLENTY * none.evidence.learned.errors**2)) is not None:
         model = hit
@@ -50,6 +51,7 @@ def search(
     wider = with_resonance(model, none, workers)
     model, none = wider or (model, none)
     progress("fitted without effects")
+    every = [*named, *own_laws(), *free]
     tried = fit_singles(model, none, every, progress, workers)
     best = max(tried.singles, key=lambda h: h.evidence.ln, default=none)
     wider = with_resonance(model, best, workers) if best.mechanisms else None

@@ -34,7 +34,8 @@ class BearingState(ByDirection):
 
     `stiffness`, `damping`: (5, 5) between the inner and the outer body at the ring centre, order x, y, z, tilt_x, tilt_y.
     `row` is the ball row at its loaded position, centred. `movement` is the rigid axial
-    movement of its outer ring against its inner one, beyond thermal expansion.
+    movement of its outer ring against its inner one, beyond thermal expansion. `preload` is the axial force in the row's own sense: less than nothing where
+    a load turns it round.
     """
 
     name: str
@@ -340,7 +341,7 @@ def bearing_state(spindle: Spindle, b: Bearing, row: BallRow, centre: Vector | N
         deformation=deformation,
         contact_force=float(answer.ball_force[0]),
         ball_stiffness=1.5 * row.constant * max(deformation, 0.0) ** 0.5,
-        preload=abs(float(answer.force[2])),
+        preload=b.sense * float(answer.force[2]),
         stiffness=stiffness,
         damping=damping_time(spindle, b) * stiffness,
         row=row,

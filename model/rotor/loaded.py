@@ -151,7 +151,7 @@ def _displaced(spindle: Spindle, b: BearingState, q: Array) -> BearingState:
         deformation=float(answer.deformation[most]),
         contact_force=float(answer.ball_force[most]),
         ball_stiffness=1.5 * b.row.constant * max(float(answer.deformation[most]), 0.0) ** 0.5,
-        preload=abs(float(answer.force[2])),
+        preload=spindle.bearing(b.name).sense * float(answer.force[2]),
         stiffness=stiffness,
         damping=damping_time(spindle, spindle.bearing(b.name)) * stiffness,
         in_contact=bool(answer.in_contact.any()),

@@ -64,6 +64,14 @@ def test_forces_and_moments_balance(pair: Spindle) -> None:
     assert sum(f[2] for f in held) == pytest.approx(0.0, abs=1e-6)
 
 
+def test_a_preload_that_a_load_turns_round_is_less_than_nothing(pair: Spindle) -> None:
+    """Far beyond any use: under 8 kN across and 9.6 kN along, a row bears along z against its own sense; with their signs, the forces bear the load."""
+    _, state = under(replace(pair, axial_load=9600.0), (8000.0, 0.0), 0.02)
+    forces = [pair.bearing(b.name).sense * b.preload for b in state.bearings]
+    assert min(b.preload for b in state.bearings) < -10.0
+    assert sum(forces) == pytest.approx(9600.0, rel=1e-6)
+
+
 def test_a_load_in_the_middle_is_shared_evenly(pair: Spindle) -> None:
     middle = sum(b.z for b in pair.bearings) / 2
     _, state = under(pair, (2.0, 0.0), middle)

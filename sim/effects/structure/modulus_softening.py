@@ -31,7 +31,7 @@ RANGE = (-100.0, 250.0)
 """Temperatures (C) between which a constant modulus is replaced by a falling one."""
 
 STEP = 0.02
-"""Relative fall of one modulus for the sensitivity of ring motions: far above the finite elements' error, still linear."""
+"""Relative fall of one modulus for the sensitivity of ring motions: far above rounding, still linear."""
 
 
 def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
@@ -118,14 +118,15 @@ def sensitivity(spindle: Spindle) -> tuple[Sensitivity, ...]:
 
 @lru_cache(maxsize=8)
 def _sensitivity(section: Section) -> tuple[Sensitivity, ...]:
-    from thermospindle.thermal.influence import influence
+    from thermospindle.thermal.influence import influence, on_its_mesh
 
     spindle = section.spindle
+    softer = {name: on_its_mesh(spindle, _softer(spindle, name)) for name in dict.fromkeys(g.material for g in spindle.regions)}
     found = []
     for part, hard in influence(spindle).responses.items():
         strained = tuple(spindle.region(name).material for name in hard.section.regions)
         used = tuple(dict.fromkeys(strained))
-        gains = [influence(_softer(spindle, name)).responses[part].gain if len(used) > 1 else hard.gain for name in used]
+        gains = [softer[name][part].gain if len(used) > 1 else hard.gain for name in used]
         found.append(Sensitivity(hard.races, used, strained, (np.array(gains) - hard.gain) / STEP))
     return tuple(found)
 
