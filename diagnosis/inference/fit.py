@@ -23,7 +23,7 @@ from thermospindle.model.types import Array
 
 TEMPERS = (3e-4, 3e-3, 0.03, 0.3, 1.0)
 MOST_STEPS = (30, 40)  # while errors are taken too large, and at the end
-LEAST_DAMPING, RAISED_DAMPING = 1e-4, 1e-3  # of a parameter's own curvature, at first and after a step that was refused
+LEAST_DAMPING, RAISED_DAMPING = 1e-7, 1e-3  # of a parameter's own curvature, at first and after a step that was refused
 MOST_GROWTH = 2.0**6  # of the damping, one refusal after the other
 ENOUGH = 0.3  # of the cost, from which a fit goes on
 ENOUGH_FAR, ENOUGH_EARLY = 2e-3, 0.02  # share of what is left beyond noise, and of all the cost while errors are taken too large, likewise
@@ -95,53 +95,55 @@ def fit(
         problem = at(temper)
         if rates is None or temper == 1.0:  # with errors enlarged those from elsewhere lead as far
             rates = rates_of(problem.model, problem.parts(p)[0], problem.effects_of(p), rates)
-        p, lines, residuals = _settled(problem, p, rates, temper)
+        p, lines, residuals, rates = _settled(problem, p, rates, temper)
         done = problem, p, rates, temper, lines, residuals
     return _finished(*done)
 
 
-def _settled(problem: Problem, p: Array, rates: Rates, temper: float) -> tuple[Array, Linearisation, Sequence[Array]]:
+def _settled(problem: Problem, p: Array, rates: Rates, temper: float) -> tuple[Array, Linearisation, Sequence[Array], Rates]:
     """Levenberg-Marquardt steps at one temper until the cost stands still, damped as in Madsen, Nielsen & Tingleff, *Methods for Non-Linear Least
-    Squares Problems*, 2004, algorithm 3.16. Derivatives are taken anew only where a step does not do what it promises, and at the end of the last
-    temper."""
+    Squares Problems*, 2004, algorithm 3.16. Derivatives are taken anew only where a step does not do what it promises, or gains little; at the last temper the
+    rates too, for the cost stands still where the gradient is right."""
     last, count = temper == 1.0, sum(d.count for d in problem.model.tests)
     lines = problem.linearisation(p, rates)
     here = Point(p, lines.residuals, problem.cost(p, temper, lines.residuals))
-    current, damping, growth = True, LEAST_DAMPING, 2.0
+    current, rated, damping, growth = True, True, LEAST_DAMPING, 2.0  # lines, and rates, of this very point
     for _ in range(MOST_STEPS[last]):
         gradient, normal = lines.slope(problem, here, temper), temper**2 * lines.information + problem.precision
         damped = np.diag(temper**2 * np.diag(lines.information) + problem.least_stiff)  # not what is stiff only with all others held
         move = problem.step(here.p, gradient, normal + damping * damped)
         promised = -2 * float(gradient @ move) - float(move @ normal @ move)
-        if promised < ENOUGH and current:
+        if promised < ENOUGH and current and rated:
             break
-        there = problem.at(here.p + move, temper)
-        corrected = False
+        there, corrected = problem.at(here.p + move, temper), False
         if current and there.residuals is not None and here.cost - there.cost < POOR * promised:
             stiff = normal + max(damping, RAISED_DAMPING) * damped
             best = _corrected(problem, lines, stiff, temper, there)
             there, corrected = best, best is not there
         gained = here.cost - there.cost
+        enough = max(ENOUGH, ENOUGH_FAR * (here.cost - count)) if last else max(1.0, ENOUGH_EARLY * here.cost)
         if gained > 0:
             here, growth = there, 2.0
             damping *= max(1 / 3, 1 - (2 * min(gained / promised, 1.0) - 1) ** 3)
-            enough = max(ENOUGH, ENOUGH_FAR * (here.cost - count)) if last else max(1.0, ENOUGH_EARLY * here.cost)
-            if gained < enough and (current or not last):
+            if gained < enough and ((current and rated) or not last):
                 break
-        elif current:
+        elif current and rated:
             damping, growth = max(2.5 * growth * damping, RAISED_DAMPING), 2 * growth
             if growth > MOST_GROWTH:
                 break
-        if (corrected and gained > 0) or (gained < TRUSTED * promised and (gained > 0 or not current)):
+        poor = (corrected and gained > 0) or gained < max(TRUSTED * promised, enough)
+        if poor and (gained > 0 or not (current and rated)):
+            if last and (current or gained < enough):  # it is not the lines that are old
+                rates, rated = rates_of(problem.model, problem.parts(here.p)[0], problem.effects_of(here.p), rates), True
             lines, current = problem.linearisation(here.p, rates), True
             here = replace(here, residuals=lines.residuals)
         elif gained > 0:
-            current = False
+            current, rated = False, not last
     if last and not current:
         lines = problem.linearisation(here.p, rates)
         here = replace(here, residuals=lines.residuals)
     assert here.residuals is not None
-    return here.p, lines, here.residuals
+    return here.p, lines, here.residuals, rates
 
 
 def _corrected(problem: Problem, lines: Linearisation, normal: Array, temper: float, there: Point) -> Point:

@@ -23,6 +23,7 @@ RESONANCES, CLEARED = 2, 0.1  # light resonances at most, and the share of what 
 CHANCE = 3.0  # standard deviations of chi2 by chance, of which nothing is said to be left
 SLIGHT = 0.5  # squares of the errors, of which it cannot be told whether they are alike in all tests
 RESONANT = 0.2  # damping ratio up to which it is a resonance
+FAR = 3.0  # times what a resonance may leave, from which counting its parameters anew will not help
 CENTRED = 2  # times that a light resonance's parameters are counted anew from where they were fitted
 
 
@@ -42,11 +43,18 @@ def with_resonance(model: CampaignModel, h: Hypothesis, workers: int | None = No
     wider, more = model.with_resonance(resonance), len(resonance.nuisances)
     fitted = with_more(h.fit.point, n, more)
     afresh = np.concatenate([np.zeros(n + more), h.fit.point[n:]])
+    clear = max(CLEARED * h.excess, CHANCE * np.sqrt(2 / h.fit.count))
+
+    def asked(found: Hypothesis, left: float) -> bool:
+        """Whether it explains more than it costs, and leaves no more than that beyond noise."""
+        drift = any(found.evidence.learned.sizes.get(kind, 0.0) > 0 for kind in DRIFTING)
+        return found.evidence.ln > h.evidence.ln and (found.excess < left if not hidden else bool(h.mechanisms) or not drift)
+
     try:
         tried = in_parallel(partial(_from, wider, h.mechanisms), ((fitted, TEMPERS[EARLY:]), (afresh, TEMPERS)), workers)
         best = replace(min(tried, key=lambda f: f.cost), mechanisms=h.mechanisms)
         sd, learned = np.array([q.sd for q in resonance.nuisances]), None
-        if evidence(wider, best).ln < h.evidence.ln or resonance.at(sd * best.point[n : n + more]).damping > RESONANT:
+        if not asked(Hypothesis(best, evidence(wider, best)), FAR * clear) or resonance.at(sd * best.point[n : n + more]).damping > RESONANT:
             return None  # smooth over the band, it would stand in for something else
         for _ in range(CENTRED):  # so that all explanations start about it as it is
             resonance = resonance.at(sd * best.point[n : n + more])
@@ -56,11 +64,7 @@ def with_resonance(model: CampaignModel, h: Hypothesis, workers: int | None = No
             best, learned = found.fit, found.evidence.learned
     except FAILED:
         return None
-    clear = max(CLEARED * h.excess, CHANCE * np.sqrt(2 / h.fit.count))
-    drift = any(found.evidence.learned.sizes.get(kind, 0.0) > 0 for kind in DRIFTING)
-    settles = found.excess < clear if not hidden else bool(h.mechanisms) or not drift
-    asked = found.evidence.ln > h.evidence.ln + PLENTY and settles
-    return (wider, found) if asked else None
+    return (wider, found) if found.evidence.ln > h.evidence.ln + PLENTY and asked(found, clear) else None
 
 
 def _left_by(model: CampaignModel, h: Hypothesis) -> Resonance | None:

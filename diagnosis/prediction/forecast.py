@@ -56,9 +56,10 @@ class Standing:
     point: Array
 
 
-def standing(model: CampaignModel, h: Hypothesis) -> Standing:
-    """At its posterior mean, which is the least of a quadratic; where the true chi2 there is none of that, fitted anew, and where it still is not, at that fit."""
-    if not _as_promised(model, h):
+def standing(model: CampaignModel, h: Hypothesis, least: float = -np.inf) -> Standing:
+    """At its posterior mean, which is the least of a quadratic; where the true chi2 there is none of that, fitted anew, and where it still is not, at that fit:
+    there at once where its ln evidence is below `least`."""
+    if h.evidence.ln > least and not _as_promised(model, h):
         h = settled(model, h)
     return Standing(h, h.evidence.mean if _as_promised(model, h) else h.fit.point)
 

@@ -18,7 +18,7 @@ import numpy as np
 from thermospindle.diagnosis.decision.explanations import Candidate, beyond_limits
 from thermospindle.diagnosis.decision.verdict import Verdict
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
-from thermospindle.diagnosis.inference.search import Search
+from thermospindle.diagnosis.inference.search import NEAR, Search
 from thermospindle.diagnosis.prediction.forecast import ModePrediction, Standing, by_all, covariance, forecast, standing
 from thermospindle.diagnosis.prediction.outcomes import same
 from thermospindle.model.machine import Condition
@@ -50,17 +50,18 @@ class NextTest:
 
 def next_tests(found: Search, verdict: Verdict) -> list[NextTest]:
     """The best test for each pair of the leading explanation and its nearest rivals."""
-    alive = [c for c in verdict.candidates if set(c.names) <= set(verdict.effects) or c.probability > ALIVE][: MOST + 1]
+    possible = [c for c in verdict.candidates if c.names == verdict.effects or not beyond_limits(c.hypothesis)]
+    alive = [c for c in possible if set(c.names) <= set(verdict.effects) or c.probability > ALIVE][: MOST + 1]
     if len(alive) < 2:
-        alive += [c for c in verdict.candidates if c not in alive][: 2 - len(alive)]
-    alive = [c for c in alive if c.names == verdict.effects or not beyond_limits(c.hypothesis)]
+        alive += [c for c in possible if c not in alive][: 2 - len(alive)]
     if verdict.word != "identified":
         alive += [c for c in verdict.free if c.hypothesis.mechanisms][:1]  # what is only left predicts nothing
     alive = alive[: MOST + 1]
     if len(alive) < 2:
         return []
     lead, rivals = alive[0], alive[1:]
-    first, *others = in_parallel(partial(standing, found.model), [c.hypothesis for c in alive])
+    least = lead.hypothesis.evidence.ln - NEAR  # what is as far behind as that was not fitted anew in the search either
+    first, *others = in_parallel(partial(standing, found.model, least=least), [c.hypothesis for c in alive])
     plans = planned(found.model)
     predicted = in_parallel(partial(_predicted, found.model, first, others), plans)
     tests = []

@@ -15,6 +15,7 @@ from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.forward.nuisance import APART, BUILD, DAMPING, DRIFT, GAIN, STIFFNESS, TEMPERATURE
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
+from thermospindle.diagnosis.inference.freeform import free_forms
 from thermospindle.diagnosis.inference.hypothesis import scan
 from thermospindle.diagnosis.inference.prior import steady
 from thermospindle.diagnosis.inference.problem import Problem
@@ -92,6 +93,21 @@ def test_a_fit_rests(spindle):
     moved = np.concatenate([model.residual(t, done.point + step, []) for t in range(2)])
     promised = done.chi2 + 2 * done.gradient @ step + step @ done.information @ step
     assert moved @ moved == pytest.approx(promised, abs=0.02 * abs(promised - done.chi2) + 0.05)
+
+
+def test_a_fit_rests_where_the_gradient_is_right(spindle):
+    """What tolerances do to the matrices changes with an effect that grows in the fit. With what they did where the fit began its gradient was wrong, and it rested
+    in a valley 19 in cost above the end (a free bearing stiffness, where bonds soften by the half)."""
+    hidden = (effect("bond_softening"), effect("bond_softening").typical())
+    model = model_of(spindle, virtual_campaign(spindle, THREE, 3, effects=[hidden], frequency=np.arange(400.0, 6000.1, 16.0)))
+    softer = next(m for m in free_forms(spindle) if m.name == "bearings radial stiffness")
+    done = fit(model, (softer,))
+    problem, p = Problem(model, (softer,)), done.point
+    for i in [i for i, q in enumerate(model.parameters) if q.name in ("preload", "bearing damping", "radial motion of the rings")]:
+        step = np.where(np.arange(len(p)) == i, 1e-3, 0.0)
+        slope = (problem.cost(p + step, 1.0) - problem.cost(p - step, 1.0)) / 2e-3
+        curvature = 2 * (done.information[i, i] + 1.0)
+        assert slope == pytest.approx(2 * (done.gradient[i] + p[i]), abs=2e-3 * np.sqrt(curvature))
 
 
 def bounded(low: list[float], high: list[float]) -> Problem:
@@ -256,6 +272,6 @@ def test_a_part_of_its_own_may_go_and_come(spindle):
     rim = next(m for m in variants(effect("hub_flexibility")) if m.choices == {"seat_share": 0.0})
     problem = Problem(model, (rim,))
     found = [fit(model, (rim,), problem.start({0: size}), tempers=(1.0,)) for size in (3.0, 0.0)]
-    assert found[0].cost == pytest.approx(found[1].cost, abs=1.0)
+    assert found[0].cost == pytest.approx(found[1].cost, abs=2.0)  # both may stand still a little above the end of a valley as bent as this one
     dofs = [len(model.linear(0, f.nuisance, problem.effects_of(problem.start({0: size}))[0]).matrices.dofs) for f, size in zip(found, (3.0, 0.0), strict=True)]
     assert dofs[0] == dofs[1] + 2

@@ -160,7 +160,7 @@ def test_what_fitting_on_would_explain_is_no_resonance(monkeypatch, settles):
     """A grinding spindle's soft bond, fitted but not settled, left what looked like a resonance of its table at 876 Hz; settled it had 20 in ln evidence more than beside one."""
     module = "thermospindle.diagnosis.inference.resonance"
     own = SimpleNamespace(learned=SimpleNamespace(errors=1.0), ln=0.0)
-    early, late = (SimpleNamespace(mechanisms=("some",), fit=SimpleNamespace(point=np.zeros(1)), evidence=own, excess=0.0) for _ in range(2))
+    early, late = (SimpleNamespace(mechanisms=("some",), fit=SimpleNamespace(point=np.zeros(1), count=100), evidence=own, excess=0.0) for _ in range(2))
     looked, fits = [], []
 
     def seen(model, fit, learned):
