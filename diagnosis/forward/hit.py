@@ -1,4 +1,4 @@
-"""Where in their records a campaign's tests were hit, found where no test tells and answers have not died away at the records' end.
+"""Where in their records tests were hit, found where they do not tell and answers have not died away at the records' end.
 
 What a record leaves out goes with e^(i omega t0) (`diagnosis.forward.record`): near its peak a mode hardly shows t0, far from it every t0 that is wrong by a period
 is a valley of its own. It is therefore sought on a grid, with all else as it was fitted without effects.
@@ -21,28 +21,41 @@ MOST = 4000  # points of the grid: of long records and wide bands it reaches les
 
 
 def hit_found(model: CampaignModel, fitted: Array, least: float) -> CampaignModel | None:
-    """The model with its tests hit where that leaves least of the misfit of nuisance values `fitted` (P,); None where they are told, where records are long enough, or where
-    chi2 does not fall by `least`."""
+    """The model with its tests hit where that leaves least of the misfit of nuisance values `fitted` (P,): those that do not tell it, at one time of the record, and one that
+    gains `least` by another at that. None where all tell, where records are long enough, or where chi2 does not fall by `least`."""
     thin = model.thinned
-    lines = [(t, d) for t, d in enumerate(thin.tests) if isinstance(d, LineData) and np.isfinite(d.duration)]
-    if not lines or model.record is None or any(d.test.pretrigger for _, d in lines):
+    untold = [(t, d) for t, d in enumerate(thin.tests) if isinstance(d, LineData) and np.isfinite(d.duration) and not d.test.pretrigger]
+    if not untold or model.record is None:
         return None
     x, own_share = fitted.copy(), float(fitted[model.record])
     x[model.record] = 0.0
-    whole = [(t, d, thin.answer(t, x, thin.linear(t, x, []))) for t, d in lines]
+    whole = [(t, d, thin.answer(t, x, thin.linear(t, x, []))) for t, d in untold]
     ending = [(t, d, answer) for t, d, answer in whole if isinstance(answer, Response) and answer.cut_off_after(0.0).any()]
     if not ending:
         return None
 
-    def chi2(before: float, share: float = 1.0) -> float:
+    def chi2(before: float, share: float = 1.0) -> Array:
         left = [thin.whitened(t, answer.value + share * answer.cut_off_after(before), d.value) for t, d, answer in ending]
-        return sum(float(r @ r) for r in left)
+        return np.array([float(r @ r) for r in left])
 
     step = 1 / (FINE * max(d.frequency[-1] for _, d, _ in ending))
     grid = np.arange(0.0, REACH * min(d.duration for _, d, _ in ending), step)[:MOST]
-    best = float(grid[np.argmin([chi2(before) for before in grid])])
-    near = np.clip(best + step * np.linspace(-1, 1, 2 * FINE + 1), 0.0, None)
-    best = float(near[np.argmin([chi2(before) for before in near])])
-    if best == 0.0 or chi2(0.0, own_share) - chi2(best) < least:
+    coarse = np.array([chi2(before) for before in grid])  # (grid, tests)
+
+    def best(own: slice) -> tuple[float, Array]:
+        """The time that leaves least of some tests, and what it leaves of every test."""
+        start = float(grid[np.argmin(coarse[:, own].sum(axis=1))])
+        near = np.clip(start + step * np.linspace(-1, 1, 2 * FINE + 1), 0.0, None)
+        left = np.array([chi2(before) for before in near])
+        k = int(np.argmin(left[:, own].sum(axis=1)))
+        return float(near[k]), left[k]
+
+    common, left = best(slice(None))
+    at = {t: common for t, _ in untold}
+    for k, (t, _, _) in enumerate(ending):
+        own, left_by_own = best(slice(k, k + 1))
+        if left[k] - left_by_own[k] > least:
+            at[t], left[k] = own, left_by_own[k]
+    if not any(at.values()) or chi2(0.0, own_share).sum() - left.sum() < least:
         return None
-    return replace(model, tests=tuple(replace(d, test=replace(d.test, pretrigger=best)) if isinstance(d, LineData) else d for d in model.tests))
+    return replace(model, tests=tuple(replace(d, test=replace(d.test, pretrigger=at[t])) if t in at else d for t, d in enumerate(model.tests)))

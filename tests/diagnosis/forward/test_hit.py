@@ -21,8 +21,9 @@ WITHOUT, NOISE = Noise(0.0, 0.0), Noise(4e-3, 2e-4)
 LEAST = 24.0
 
 
-def hit(spindle, before):
-    """Tests whose records begin so many seconds before the hit, None for records without end, and do not tell."""
+def hit(spindle, *before, told=()):
+    """Tests whose records begin so many seconds before the hit, None for records without end, alike or each by its own, and do not tell but for those `told`."""
+    before = before * (2 // len(before))
     errors = drawn(spindle, 2, 4)
     whole = virtual_campaign(spindle, CONDITIONS, 4, errors=errors, noise=WITHOUT, frequency=FREQUENCY)
     model, random, tests = model_of(spindle, replace(whole, noise=NOISE)), np.random.default_rng(5), []
@@ -30,8 +31,8 @@ def hit(spindle, before):
     for t, (test, data) in enumerate(zip(whole.tests, model.tests, strict=True)):
         every = replace(data, frequency=FREQUENCY, value=test.frf.value)
         answer = Response(model.linear(t, x, []), every, np.exp(errors.gain))
-        value = test.frf.value + (0.0 if before is None else answer.cut_off_after(before))
-        tests.append(replace(test, frf=replace(test.frf, value=noisy(value, random, NOISE))))
+        value = test.frf.value + (0.0 if before[t] is None else answer.cut_off_after(before[t]))
+        tests.append(replace(test, frf=replace(test.frf, value=noisy(value, random, NOISE)), pretrigger=before[t] if t in told else 0.0))
     return model_of(spindle, replace(whole, tests=tuple(tests), noise=NOISE))
 
 
@@ -52,3 +53,14 @@ def test_it_is_not_sought_without_need(spindle, before):
     """Where records have no end, and where they begin with the hit."""
     model = hit(spindle, before)
     assert hit_found(model, _without_effects(model).fit.nuisance, LEAST) is None
+
+
+@pytest.mark.parametrize("told", [(), (0,)])
+def test_tests_may_be_hit_at_times_of_their_own(spindle, told):
+    """Where neither tells, and where one does: what is told stays as it is."""
+    before = (0.6e-3, 2.2e-3)
+    model = hit(spindle, *before, told=told)
+    found = hit_found(model, _without_effects(model).fit.nuisance, LEAST)
+    assert [d.test.pretrigger for d in found.tests] == pytest.approx(before, abs=3e-5)
+    after = _without_effects(found).fit
+    assert after.chi2 / after.count < 1.1
