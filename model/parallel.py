@@ -13,6 +13,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from functools import lru_cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -78,14 +79,20 @@ def in_parallel(
     return results
 
 
-def meanwhile(function: Callable[[], Result], workers: int | None = None) -> Callable[[], Result]:
+@contextmanager
+def meanwhile(function: Callable[[], Result], workers: int | None = None) -> Iterator[Callable[[], Result]]:
     """What asks for `function()`, which a worker has begun on while much else is done here; on a single core, or within a worker, it is done when it is asked
     for. For long work that is to be done in parallel later anyway: the workers are started with it."""
     workers = workers or cores()
     if workers < 2 or _inside:
-        return function
-    answer = _pool(workers).submit(_call_once, cloudpickle.dumps(function))
-    return answer.result
+        yield function
+        return
+    pool = _pool(workers)
+    try:
+        yield pool.submit(_call_once, cloudpickle.dumps(function)).result
+    except KeyboardInterrupt:
+        pool.shutdown(kill_workers=True)
+        raise
 
 
 def _pool(workers: int) -> Any:

@@ -43,15 +43,15 @@ def search(
     """The evidence of every explanation. A light resonance becomes part of the model where the data show it without effects, or beside the best single
     one."""
     at = strongest(model.spindle, [d.condition for d in model.tests])
-    own_laws = meanwhile(partial(with_own_laws, named, model.spindle, at), workers)
-    none = _without_effects(model)
-    if (hit := hit_found(model, none.fit.nuisance, 2 * PLENTY * none.evidence.learned.errors**2)) is not None:
-        model = hit
+    with meanwhile(partial(with_own_laws, named, model.spindle, at), workers) as own_laws:
         none = _without_effects(model)
-    wider = with_resonance(model, none, workers)
-    model, none = wider or (model, none)
+        if (hit := hit_found(model, none.fit.nuisance, 2 * PLENTY * none.evidence.learned.errors**2)) is not None:
+            model = hit
+            none = _without_effects(model)
+        wider = with_resonance(model, none, workers)
+        model, none = wider or (model, none)
+        every = [*named, *own_laws(), *free]
     progress("fitted without effects")
-    every = [*named, *own_laws(), *free]
     tried = fit_singles(model, none, every, progress, workers)
     best = max(tried.singles, key=lambda h: h.evidence.ln, default=none)
     wider = with_resonance(model, best, workers) if best.mechanisms else None

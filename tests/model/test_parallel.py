@@ -202,6 +202,6 @@ def _runs(pid: int) -> bool:
 
 def test_what_is_begun_meanwhile_is_there_when_it_is_asked_for():
     """By a worker, which is another process; on one core by whoever asks."""
-    there, here = parallel.meanwhile(os.getpid, 2), parallel.meanwhile(os.getpid, 1)
-    assert there() == there() != os.getpid()
-    assert here() == os.getpid()
+    with parallel.meanwhile(os.getpid, 2) as there, parallel.meanwhile(os.getpid, 1) as here:
+        assert there() == there() != os.getpid()
+        assert here() == os.getpid()
