@@ -2,7 +2,7 @@
 
 Two explanations differ at a condition by D in the frequencies of their modes; with the covariance S of the errors of a test there and of what each leaves
 open, the expected ln odds if either is true are D S^-1 D / 2 (Box & Hill, *Technometrics* 9 (1967) 57). That they leave different things open would add to
-that; it is not counted, for these are known to first order alone.
+that; it is not counted, for these are known to first order alone. In S is also what two honest programs differ by: a test by which it is decided has to show more than that.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from itertools import product
 import numpy as np
 
 from thermospindle.diagnosis.decision.explanations import Candidate, beyond_limits
+from thermospindle.diagnosis.decision.reason import NUMERICS
 from thermospindle.diagnosis.decision.verdict import Verdict
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.search import NEAR, Search
@@ -95,7 +96,8 @@ def planned(model: CampaignModel) -> list[Condition]:
 
 
 def _weighed(plan: Condition, lead: Candidate, rival: Candidate, a: Sequence[ModePrediction], b: Sequence[ModePrediction]) -> NextTest:
-    difference, errors = np.array([x.frequency - y.frequency for x, y in zip(a, b, strict=True)]), of_both(a, b)
+    difference = np.array([x.frequency - y.frequency for x, y in zip(a, b, strict=True)])
+    errors = of_both(a, b)
     ln_odds = min(float(difference @ np.linalg.solve(errors, difference)) / 2, CERTAIN)
     most = int(np.argmax(difference**2 / np.diag(errors)))
     tells = f"the mode near {a[most].frequency:.0f} Hz, which differs by {abs(difference[most]):.1f} Hz"
@@ -110,7 +112,8 @@ def of_both(a: Sequence[ModePrediction], b: Sequence[ModePrediction]) -> Array:
     each of the two leaves open."""
     first, second = covariance(a), covariance([replace(m, sd=float(np.sqrt(max(m.sd**2 - m.common[0] ** 2, 0.0))), common=m.common[1:]) for m in b])
     one, other = (np.array([m.sd**2 - sum(v**2 for v in m.common) for m in of]) for of in (a, b))
-    return first + second - np.diag(np.minimum(one, other))
+    programs = np.array([NUMERICS[0] * m.frequency for m in a])
+    return first + second - np.diag(np.minimum(one, other) - programs**2)
 
 
 def in_words(c: Condition) -> str:

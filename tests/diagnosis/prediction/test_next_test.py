@@ -107,7 +107,8 @@ def test_odds_come_true():
     shift = 3 * size + 0.05 * random.standard_normal(9)
     a, b = predicted(shift, np.column_stack([thermometer, size])), predicted(0.0, np.column_stack([thermometer, size]))
     errors = of_both(a, b)
-    assert errors == pytest.approx(0.01 * np.eye(9) + np.outer(thermometer, thermometer) + 2 * np.outer(size, size))
+    programs = np.diag([(1e-4 * m.frequency) ** 2 for m in a])
+    assert errors == pytest.approx(0.01 * np.eye(9) + programs + np.outer(thermometer, thermometer) + 2 * np.outer(size, size))
     off = random.multivariate_normal(np.zeros(9), errors, 20_000)
     inverse = np.linalg.inv(errors)
     ln_odds = (np.einsum("ni,ij,nj->n", off + shift, inverse, off + shift) - np.einsum("ni,ij,nj->n", off, inverse, off)) / 2
