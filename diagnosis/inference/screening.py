@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from scipy.linalg import cho_factor, cho_solve
 
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import Mechanism
@@ -39,12 +40,12 @@ class Screened:
 
 @dataclass(frozen=True, eq=False)
 class _Beside:
-    """What is fitted already, its discrepancies and errors of the sizes learned: the prior's precision (n, n), and the ln evidence."""
+    """What is fitted already, its discrepancies and errors of the sizes learned: its information and the prior's precision (n, n) as factors, and the ln evidence."""
 
     model: CampaignModel
     about: Fit
     sizes: Learned
-    precision: Array
+    factors: tuple[Array, bool]
     ln: float
 
 
@@ -58,7 +59,7 @@ def screen(
     prior = Problem(model, about.mechanisms, replace(as_stated(learned.sizes, about.mechanisms), errors=sizes.errors))
     at = linearised(model, about)  # where a fit has not arrived its own derivatives are of an earlier point
     nothing = evidence(model, replace(about, chi2=at.chi2, gradient=at.gradient, information=at.information), [sizes, *smaller(sizes)]).ln
-    beside = _Beside(model, about, sizes, prior.precision, nothing)
+    beside = _Beside(model, about, sizes, cho_factor(at.information + prior.precision), nothing)
     found = in_parallel(partial(_screened, beside), list(mechanisms), workers)
     found = [replace(s, mechanism=m) for s, m in zip(found, mechanisms, strict=True)]
     best = {(s.mechanism.name, s.mechanism.kind): s for s in sorted(found, key=lambda s: s.gain) if turned and s.visibility > 0 and s.mechanism.shape}
@@ -125,7 +126,7 @@ def _promised(problem: Problem, beside: _Beside, shape: Array) -> Screened:
         about, mechanisms=problem.mechanisms, point=p, sizes=own_sizes, shapes=tuple(tuple(float(v) for v in s) for s in shapes),
         roots=problem.roots, chi2=at.chi2, gradient=gradient, information=information, by_test=(),
     )  # fmt: skip
-    left = square - float(typical @ np.linalg.solve(at.information + beside.precision, typical))
+    left = square - float(typical @ cho_solve(beside.factors, typical))
     visibility = float(abs(mechanism.size.typical - mechanism.size.neutral) * np.sqrt(max(left, 0.0))) / beside.sizes.errors
     if visibility == 0.0:
         return Screened(mechanism, -np.inf, p, 0.0)
