@@ -69,8 +69,8 @@ def search(
     found = better([*singles, *pairs, *without_one(model, [*singles, *pairs], tried.most, tried.expected, workers)])
     progress("pairs fitted")
     finalists = _finalists(found)
-    anew = dict(zip(map(id, finalists), in_parallel(partial(_at_the_end, model), finalists, workers), strict=True))
-    none = widened(model, none)
+    none, *ended = in_parallel(partial(_at_the_end, model), [none, *finalists], workers)
+    anew = dict(zip(map(id, finalists), ended, strict=True))
     ranked = [replace(anew[id(h)], fit=replace(anew[id(h)].fit, mechanisms=h.mechanisms)) if id(h) in anew else h for h in found]
     progress("the best fitted anew")
     hypotheses = tuple(sorted([none, *ranked], key=lambda h: -h.evidence.ln))
@@ -83,7 +83,7 @@ def _without_effects(model: CampaignModel) -> Hypothesis:
 
 
 def _at_the_end(model: CampaignModel, h: Hypothesis) -> Hypothesis:
-    return widened(model, settled(model, h))
+    return widened(model, settled(model, h) if h.mechanisms else h)  # without any it is settled
 
 
 def _finalists(found: Sequence[Hypothesis]) -> list[Hypothesis]:
