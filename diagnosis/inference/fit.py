@@ -18,7 +18,7 @@ from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.inference.prior import UNMOVED, Learned
-from thermospindle.diagnosis.inference.problem import Linearisation, Point, Problem
+from thermospindle.diagnosis.inference.problem import LONGEST, Linearisation, Point, Problem
 from thermospindle.model.types import Array
 
 TEMPERS = (3e-4, 3e-3, 0.03, 0.3, 1.0)
@@ -27,7 +27,7 @@ LEAST_DAMPING, RAISED_DAMPING = 1e-7, 1e-3  # of a parameter's own curvature, at
 MOST_GROWTH = 2.0**6  # of the damping, one refusal after the other
 ENOUGH = 0.3  # of the cost, from which a fit goes on
 ENOUGH_FAR, ENOUGH_EARLY = 2e-3, 0.02  # share of what is left beyond noise, and of all the cost while errors are taken too large, likewise
-TRUSTED, POOR = 0.6, 0.25  # of the gain promised: from there derivatives stay in use, and below it a step is corrected
+KEPT, TRUSTED, POOR = 0.75, 0.6, 0.25  # of the gain promised: from there steps may be longer, derivatives stay in use, and below it a step is corrected
 CORRECTIONS = 2
 
 
@@ -107,11 +107,11 @@ def _settled(problem: Problem, p: Array, rates: Rates, temper: float) -> tuple[A
     last, count = temper == 1.0, sum(d.count for d in problem.model.tests)
     lines = problem.linearisation(p, rates)
     here = Point(p, lines.residuals, problem.cost(p, temper, lines.residuals))
-    current, rated, damping, growth = True, True, LEAST_DAMPING, 2.0  # lines, and rates, of this very point
+    current, rated, damping, growth, longest = True, True, LEAST_DAMPING, 2.0, LONGEST  # lines, and rates, of this very point
     for _ in range(MOST_STEPS[last]):
         gradient, normal = lines.slope(problem, here, temper), temper**2 * lines.information + problem.precision
         damped = np.diag(temper**2 * np.diag(lines.information) + problem.least_stiff)  # not what is stiff only with all others held
-        move = problem.step(here.p, gradient, normal + damping * damped)
+        move = problem.step(here.p, gradient, normal + damping * damped, longest)
         promised = -2 * float(gradient @ move) - float(move @ normal @ move)
         if promised < ENOUGH and current and rated:
             break
@@ -121,6 +121,10 @@ def _settled(problem: Problem, p: Array, rates: Rates, temper: float) -> tuple[A
             best = _corrected(problem, lines, stiff, temper, there)
             there, corrected = best, best is not there
         gained = here.cost - there.cost
+        if gained < POOR * promised:
+            longest = LONGEST
+        elif gained > KEPT * promised and not corrected and problem.length_of(move) > 0.99 * longest:
+            longest *= 2
         enough = max(ENOUGH, ENOUGH_FAR * (here.cost - count)) if last else max(1.0, ENOUGH_EARLY * here.cost)
         if gained > 0:
             here, growth = there, 2.0

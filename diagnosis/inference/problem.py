@@ -19,7 +19,7 @@ from thermospindle.diagnosis.inference.prior import UNMOVED, Learned, precision_
 from thermospindle.model.types import Array, Integers
 
 NONE: Integers = np.zeros(0, int)
-LONGEST = 3.0  # prior standard deviations in one step
+LONGEST = 3.0  # prior standard deviations in one step, until steps as long as that do what they promise
 NARROW = 1e4  # precision in reference widths, between those of what may be and of next to nothing
 
 
@@ -68,8 +68,8 @@ class Problem:
         """Numbers of the shape parameters that stand at a limit beyond which alone the cost, of half gradient `slope` (n,), would fall."""
         return np.flatnonzero(((p <= self.low) & (slope > 0)) | ((p >= self.high) & (slope < 0)))
 
-    def step(self, p: Array, slope: Array, normal: Array) -> Array:
-        """The move (n,) from `p` to the least of a quadratic of the cost within the limits, shortened to `LONGEST`: the quadratic of what is limited alone, all
+    def step(self, p: Array, slope: Array, normal: Array, longest: float = LONGEST) -> Array:
+        """The move (n,) from `p` to the least of a quadratic of the cost within the limits, shortened to the `longest` one: the quadratic of what is limited alone, all
         else following it, is solved between bounds."""
         limited = np.isfinite(self.low) | np.isfinite(self.high)
         free, move = ~limited, np.zeros(self.length)
@@ -80,7 +80,11 @@ class Problem:
             bounds = self.low[limited] - p[limited], self.high[limited] - p[limited]
             move[limited] = lsq_linear(factor.T, -np.linalg.solve(factor, left[:, 0]), bounds, method="bvls").x
         move[free] = -follows[:, 0] - follows[:, 1:] @ move[limited]
-        return move * min(1.0, LONGEST / max(float((np.abs(move) * self.reach).max()), 1e-300))
+        return move * min(1.0, longest / max(self.length_of(move), 1e-300))
+
+    def length_of(self, move: Array) -> float:
+        """Of a move (n,), in prior standard deviations of what moves most."""
+        return float((np.abs(move) * self.reach).max())
 
     def parts(self, p: Array) -> tuple[Array, Array, list[Array]]:
         """Nuisance values (P,), sizes (mechanisms, tests) and shape parameters of a parameter vector, in their units."""

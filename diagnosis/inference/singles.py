@@ -107,9 +107,10 @@ def _owed(
 
 def by_own_laws(model: CampaignModel, none: Hypothesis, tried: Singles, mechanisms: Sequence[Mechanism], workers) -> list[Hypothesis]:
     """Effects with laws of the data's own, fitted from what the best free form says. Where that does better than an effect which changes much the same by the
-    law assumed, the effect may do as well by another; screening, which is linear, need not have seen it."""
+    law assumed, the effect may do as well by another; screening, which is linear, need not have seen it. Not where that is far behind the best."""
     told = max((h for h in tried.singles if h.free), key=lambda h: h.evidence.ln, default=none)
-    if not told.free or told.evidence.ln < none.evidence.ln + PLENTY:
+    best = max((h.evidence.ln for h in tried.singles), default=none.evidence.ln)
+    if not told.free or told.evidence.ln < max(none.evidence.ln + PLENTY, best - FAR):
         return []
     reached = {h.names[0]: h.evidence.ln for h in sorted(tried.singles, key=lambda h: h.evidence.ln)}
     tasks = []
