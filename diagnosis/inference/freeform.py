@@ -16,6 +16,7 @@ import numpy as np
 
 from thermospindle.diagnosis.forward.mechanism import Mechanism, asked_at
 from thermospindle.diagnosis.forward.model import CampaignModel
+from thermospindle.diagnosis.inference.gaussian import CANNOT
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.model.bearing.pair import BearingState, PairState
 from thermospindle.model.built.tolerance import scaled_preload
@@ -32,6 +33,7 @@ CROSS_WIDTH = 1.0  # % of the radial stiffness; where k_xy = -k_yx is as large a
 RING_WIDTH = 0.2  # um
 TIE_WIDTH = 2e-3  # of the stiffness at which what turns would swing in the middle of the band: a thousandth of a frequency there
 ALIKE = 2e-4  # of the squares of what an effect moves, that a free form which is its own change may leave
+FLAT = 0.1  # of the most that a law does, by which it does more in one test than in another
 NEARLY = 0.1  # of them, likewise, where a fit of the effect may start from what the free form says
 OF_BEAMS: list[tuple[str, tuple[int, ...]]] = [("axial", (2,)), ("shear", (0, 1)), ("bending", (3, 4))]
 """What each stiffness of a beam element resists, as its moves are told in `model.rotor.beam`."""
@@ -223,6 +225,23 @@ def as_told_by(model: CampaignModel, x: Array, free: Mechanism, named: Mechanism
         named.size.neutral + change * float(f @ n) / float(n @ n) if n.any() else named.size.neutral
         for change, f, n in zip(sizes, of_free, of_named, strict=True)
     ])  # fmt: skip
+
+
+def runs_against(model: CampaignModel, x: Array, law: Mechanism, own: Mechanism, sizes: Array, covariance: Array) -> bool:
+    """Whether an effect that can only be of one sign, with a law of the data's `own`, is told by nothing but that there is less of it where its `law` has more: sizes (tests,)
+    of which none is known to be there, for a tolerance does what all have in common, and which are less, by more than `CANNOT` standard errors, where the law does more, and nowhere
+    there more."""
+    acts = 1.0 if own.size.limits[0] >= own.size.neutral else -1.0 if own.size.limits[1] <= own.size.neutral else 0.0
+    amounts = acts * (sizes - own.size.neutral)
+    if not acts or np.any(amounts > 2 * np.sqrt(np.maximum(np.diag(covariance), 0.0))):
+        return False
+    of_law, of_own = _by_size(model, x, law), _by_size(model, x, own)
+    by_law = np.array([float(f @ n) / float(n @ n) if n.any() else 0.0 for f, n in zip(of_law, of_own, strict=True)])
+    least = int(np.argmin(by_law))
+    more = by_law - by_law[least] > FLAT * np.abs(by_law).max()
+    apart, variance = amounts - amounts[least], np.diag(covariance) + covariance[least, least] - 2 * covariance[least]
+    by = (apart / np.sqrt(np.maximum(variance, 1e-300)))[more]
+    return bool(np.any(by < -CANNOT) and not np.any(by > 2))
 
 
 def _by_size(model: CampaignModel, x: Array, m: Mechanism, shape: Sequence[float] | None = None) -> list[Array]:

@@ -154,6 +154,9 @@ def impossible(m: Mechanism, sizes: Array, covariance: Array) -> bool:
 
 
 def opposite(m: Mechanism, sizes: Array, covariance: Array) -> bool:
-    """Whether a mechanism would need the sign that it cannot have in every test (tests,), by more than twice its standard error."""
-    twice, (low, high) = 2 * np.sqrt(np.maximum(np.diag(covariance), 0.0)), m.size.limits
-    return bool((low >= m.size.neutral and np.all(sizes < low - twice)) or (high <= m.size.neutral and np.all(sizes > high + twice)))
+    """Whether a mechanism would need the sign that it cannot have: in every test (tests,), by more than twice its standard error, or by more than `CANNOT` in one and the
+    sign that it can have in none; where its law does nothing any sign would do."""
+    sd, (low, high) = np.sqrt(np.maximum(np.diag(covariance), 1e-300)), m.size.limits
+    beyond = [(low - sizes) / sd] if low >= m.size.neutral else []
+    beyond += [(sizes - high) / sd] if high <= m.size.neutral else []
+    return any(bool(np.all(b > 2) or (b.max() > CANNOT and b.min() > -2)) for b in beyond)

@@ -11,7 +11,7 @@ from thermospindle.diagnosis.forward.mechanism import Mechanism, strongest, with
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
-from thermospindle.diagnosis.inference.freeform import alike
+from thermospindle.diagnosis.inference.freeform import alike, runs_against
 from thermospindle.diagnosis.inference.hypothesis import PLENTY, STRAIN, Hypothesis, settled, widened
 from thermospindle.diagnosis.inference.pairs import joined, joined_early, without_one
 from thermospindle.diagnosis.inference.resonance import with_resonance
@@ -73,6 +73,8 @@ def search(
     anew = dict(zip(map(id, finalists), ended, strict=True))
     ranked = [replace(anew[id(h)], fit=replace(anew[id(h)].fit, mechanisms=h.mechanisms)) if id(h) in anew else h for h in found]
     progress("the best fitted anew")
+    laws = {m.name: m for m in reversed(named)}
+    ranked = [h for h in ranked if not _against_its_law(model, none.fit.nuisance, h, laws)]
     hypotheses = tuple(sorted([none, *ranked], key=lambda h: -h.evidence.ln))
     return Search(model, none, hypotheses, tried.screened, _alike(model, none.fit.nuisance, hypotheses))
 
@@ -84,6 +86,12 @@ def _without_effects(model: CampaignModel) -> Hypothesis:
 
 def _at_the_end(model: CampaignModel, h: Hypothesis) -> Hypothesis:
     return widened(model, settled(model, h) if h.mechanisms else h)  # without any it is settled
+
+
+def _against_its_law(model: CampaignModel, x: Array, h: Hypothesis, laws: Mapping[str, Mechanism]) -> bool:
+    """Whether an effect in an explanation has a law of the data's own that runs against its own: what it stands for is another's."""
+    rows = zip(h.mechanisms, h.evidence.sizes, h.evidence.size_covariance, strict=True)
+    return any(m.own_law and runs_against(model, x, laws[m.name], m, *told) for m, *told in rows)
 
 
 def _finalists(found: Sequence[Hypothesis]) -> list[Hypothesis]:

@@ -19,7 +19,7 @@ from thermospindle.diagnosis.forward.nuisance import (
 )
 from thermospindle.diagnosis.inference.evidence import Learned, amplitudes_apart, evidence
 from thermospindle.diagnosis.inference.fit import Held
-from thermospindle.diagnosis.inference.gaussian import impossible
+from thermospindle.diagnosis.inference.gaussian import impossible, opposite
 from thermospindle.sim.effects.effect import Parameter
 
 
@@ -114,3 +114,14 @@ def test_what_a_size_cannot_be_is_asked_of_all_tests_together(count, off, alike,
     assert not impossible(m, np.full(count, 0.1), covariance)
     assert not impossible(m, np.full(count, 0.1), np.zeros((count, count)))
     assert impossible(m, np.full(count, low - 0.01), -1e-18 * np.eye(count))  # rounding of what is known
+
+
+@pytest.mark.parametrize(("sizes", "sd", "wrong"), [
+    ((-0.10, -0.12, -0.11), (0.04, 0.04, 0.04), True),  # all of them, by more than twice their errors
+    ((-0.10, -0.12, -0.11), (0.10, 0.02, 0.10), True),  # where the law does anything, there far below nothing
+    ((-0.10, -0.12, 0.30), (0.10, 0.02, 0.05), False),  # it is there in one
+    ((-0.10, -0.05, -0.11), (0.10, 0.02, 0.10), False),  # not by so much
+])  # fmt: skip
+def test_a_sign_that_cannot_be(sizes, sd, wrong):
+    (loss, *_) = variants(effect("flange_fit_loosening"))
+    assert opposite(loss, np.array(sizes), np.diag(sd) ** 2) == wrong

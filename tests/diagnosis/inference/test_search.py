@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
 from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, virtual_campaign
 from thermospindle.diagnosis.decision.verdict import decide
-from thermospindle.diagnosis.forward.mechanism import asked_at, variants
+from thermospindle.diagnosis.forward.mechanism import asked_at, variants, with_own_laws
 from thermospindle.diagnosis.forward.nuisance import BUILD, STIFFNESS
 from thermospindle.diagnosis.inference import hypothesis
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, fit
-from thermospindle.diagnosis.inference.freeform import free_forms
+from thermospindle.diagnosis.inference.freeform import free_forms, runs_against
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
 from thermospindle.diagnosis.inference.pairs import joined_early, without_one
 from thermospindle.diagnosis.inference.prior import DRIFTING, steady, undrifted
@@ -179,3 +180,19 @@ def test_an_effect_is_found_where_its_law_gives_nothing(spindle):
     assert np.all(np.abs(sizes - [0.0, 2.0, 4.0, 4.0]) < 2 * np.sqrt(np.diag(covariance)))  # bearings that differ could be a constant part of it
     assert sizes[1:] - sizes[0] == pytest.approx([2.0, 4.0, 4.0], abs=0.15)
     assert "with a law of the data's own" in v.reason
+
+
+def test_a_law_that_runs_against_its_own_is_anothers(spindle):
+    """A flange that stiffened by 0.2 % where it was warm or turned was named a fit that loosens with warmth: of sizes that it could have, less and less of them, for a tolerance of the
+    flange made up for what all tests have in common."""
+    conditions = (Condition(20.0), Condition(40.0), Condition(60.0))
+    model = model_of(spindle, mode_campaign(spindle, conditions, 1, errors=drawn(spindle, 3, 1)))
+    law = variants(effect("flange_fit_loosening"))[0]
+    (own,) = with_own_laws([law], spindle, conditions[-1])
+    asked = partial(runs_against, model, np.zeros(len(model.parameters)), law, own)
+    falls, common, each = np.array([0.006, 0.004, 0.002]), 1e-4 * np.ones((3, 3)), np.eye(3)
+    assert asked(falls, common + 1e-8 * each)
+    assert not asked(falls[::-1], common + 1e-8 * each)  # as its law has it
+    assert not asked(np.array([0.004, 0.006, 0.002]), common + 1e-8 * each)  # a law of its own
+    assert not asked(falls, 1e-8 * each)  # it is there, whatever its law
+    assert not asked(falls, 1e-4 * each)  # nobody knows
