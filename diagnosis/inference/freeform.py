@@ -33,8 +33,8 @@ CROSS_WIDTH = 1.0  # % of the radial stiffness; where k_xy = -k_yx is as large a
 RING_WIDTH = 0.2  # um
 TIE_WIDTH = 2e-3  # of the stiffness at which what turns would swing in the middle of the band: a thousandth of a frequency there
 ALIKE = 2e-4  # of the squares of what an effect moves, that a free form which is its own change may leave
-FLAT = 0.1  # of the most that a law does, by which it does more in one test than in another
 NEARLY = 0.1  # of them, likewise, where a fit of the effect may start from what the free form says
+FLAT = 0.1  # of the most that a law does, by which it does more in one test than in another
 OF_BEAMS: list[tuple[str, tuple[int, ...]]] = [("axial", (2,)), ("shear", (0, 1)), ("bending", (3, 4))]
 """What each stiffness of a beam element resists, as its moves are told in `model.rotor.beam`."""
 OF_BEARINGS: list[tuple[str, tuple[int, ...]]] = [("radial", (0, 1)), ("x", (0,)), ("y", (1,)), ("axial", (2,)), ("tilt", (3, 4))]
