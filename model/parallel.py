@@ -87,35 +87,31 @@ def meanwhile(function: Callable[[], Result], workers: int | None = None) -> Ite
     if workers < 2 or _inside:
         yield function
         return
-    pool = _pool(workers)
-    try:
-        yield pool.submit(_call_once, cloudpickle.dumps(function)).result
-    except KeyboardInterrupt:
-        pool.shutdown(kill_workers=True)
-        raise
+    with _pool(workers) as pool:
+        yield pool.submit(function).result
 
 
-def _pool(workers: int) -> Any:
+@contextmanager
+def _pool(workers: int) -> Iterator[Any]:
+    """The pool of workers, which whoever interrupts what is done with them ends."""
     global _last
     workers = _last[0] if _running(workers) else workers  # a pool that is larger is not made smaller
     warnings.filterwarnings("ignore", "A worker was restarted", UserWarning)  # which loses nothing, and is no news to whoever waits
     pool = get_reusable_executor(workers, timeout=IDLE, initializer=_begin, initargs=(os.getpid(),), env=ENVIRONMENT)
     _last = workers, time.monotonic()
-    return pool
+    try:
+        yield pool
+    except KeyboardInterrupt:
+        pool.shutdown(kill_workers=True)
+        raise
+    _last = _last[0], time.monotonic()
 
 
 def _sent(function: Callable[[Item], Result], items: list[Item], workers: int) -> Iterator[Result]:
-    global _last
-    pool = _pool(workers)
-    with TemporaryDirectory(prefix="thermospindle-") as folder:  # a pool sends with every item what it is to call
+    with _pool(workers) as pool, TemporaryDirectory(prefix="thermospindle-") as folder:  # a pool sends with every item what it is to call
         sent = Path(folder) / uuid4().hex
         sent.write_bytes(cloudpickle.dumps(function))
-        try:
-            yield from pool.map(partial(_call, sent), items)
-        except KeyboardInterrupt:
-            pool.shutdown(kill_workers=True)
-            raise
-    _last = _last[0], time.monotonic()
+        yield from pool.map(partial(_call, sent), items)
 
 
 def _running(workers: int) -> bool:
@@ -154,7 +150,3 @@ def _function(sent: Path) -> Callable[[Any], Any]:
 
 def _call(sent: Path, item: Any) -> Any:
     return _function(sent)(item)
-
-
-def _call_once(sent: bytes) -> Any:
-    return cloudpickle.loads(sent)()

@@ -129,24 +129,17 @@ def _softening(space: Reduced, temperatures: Mapping[str, float]) -> Gain:
     return Gain(space.races, space.section.regions, space.solution(moduli)[0])
 
 
-def on_its_mesh(spindle: Spindle, other: Spindle) -> dict[str, Response]:
-    """The influence of `other`, a spindle that differs in its moduli, part by part on the meshes of `spindle`: what two differ by there is no error of the
-    meshes, and costs one solution."""
-    parts = dict.fromkeys(g.part for g in spindle.regions)
-    return {part: _beside(_question(spindle, part, TOLERANCE, None), _question(other, part, TOLERANCE, None)) for part in parts}
+def on_its_mesh(spindle: Spindle, other: Spindle, part: str) -> Response:
+    """The influence of a part of `other`, a spindle that differs in its moduli, on the mesh of `spindle`: what two differ by there is no error of the meshes, and costs one
+    solution."""
+    return _beside(_question(spindle, part, TOLERANCE, None), _question(other, part, TOLERANCE, None))
 
 
 @lru_cache(maxsize=64)
 def _beside(question: Elastic, other: Elastic) -> Response:
     response, convergence = _kept(question)
-    if other == question:
-        return response
     key = f"{other!r} on the mesh of {question!r}"
-    if (found := store.load(key)) is not None:
-        return found[0]
-    answer = Solid(response.section, dict(other.elasticity)).respond(other.races)[0]
-    store.save(key, answer, convergence)
-    return answer
+    return _stored(key, lambda: (Solid(response.section, dict(other.elasticity)).respond(other.races)[0], convergence))[0]
 
 
 def _softened(spindle: Spindle, part: str, temperatures: Mapping[str, float] | None) -> tuple[tuple[str, float], ...] | None:
@@ -224,12 +217,17 @@ def _question(spindle: Spindle, part: str, tolerance: float, temperatures: Mappi
 
 @lru_cache(maxsize=64)
 def _kept(question: Elastic) -> tuple[Response, Convergence]:
-    if (found := store.load(repr(question))) is not None:
-        return found
     size = max(np.ptp([g.r for g in question.regions]), np.ptp([g.z for g in question.regions])) / CELLS_ACROSS
     heights = [race.z for race in question.races if race.z is not None]
-    answer = _answer(question, tiled(question.part, question.regions, size, heights=heights))
-    store.save(repr(question), *answer)
+    return _stored(repr(question), lambda: _answer(question, tiled(question.part, question.regions, size, heights=heights)))
+
+
+def _stored(key: str, worked_out: Callable[[], tuple[Response, Convergence]]) -> tuple[Response, Convergence]:
+    """What is kept on disk under a key, or is `worked_out` and kept."""
+    if (found := store.load(key)) is not None:
+        return found
+    answer = worked_out()
+    store.save(key, *answer)
     return answer
 
 

@@ -113,7 +113,8 @@ def _settled(problem: Problem, p: Array, rates: Rates, temper: float) -> tuple[A
         damped = np.diag(temper**2 * np.diag(lines.information) + problem.least_stiff)  # not what is stiff only with all others held
         move = problem.step(here.p, gradient, normal + damping * damped, longest)
         promised = -2 * float(gradient @ move) - float(move @ normal @ move)
-        if promised < ENOUGH and current and rated:
+        exact = current and rated
+        if promised < ENOUGH and exact:
             break
         there, corrected = problem.at(here.p + move, temper), False
         if current and there.residuals is not None and here.cost - there.cost < POOR * promised:
@@ -129,14 +130,14 @@ def _settled(problem: Problem, p: Array, rates: Rates, temper: float) -> tuple[A
         if gained > 0:
             here, growth = there, 2.0
             damping *= max(1 / 3, 1 - (2 * min(gained / promised, 1.0) - 1) ** 3)
-            if gained < enough and ((current and rated) or not last):
+            if gained < enough and (exact or not last):
                 break
-        elif current and rated:
+        elif exact:
             damping, growth = max(2.5 * growth * damping, RAISED_DAMPING), 2 * growth
             if growth > MOST_GROWTH:
                 break
         poor = (corrected and gained > 0) or gained < max(TRUSTED * promised, enough)
-        if poor and (gained > 0 or not (current and rated)):
+        if poor and (gained > 0 or not exact):
             if last and (current or gained < enough):  # it is not the lines that are old
                 rates, rated = rates_of(problem.model, problem.parts(here.p)[0], problem.effects_of(here.p), rates), True
             lines, current = problem.linearisation(here.p, rates), True

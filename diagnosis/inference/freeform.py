@@ -221,22 +221,17 @@ def as_told_by(model: CampaignModel, x: Array, free: Mechanism, named: Mechanism
     of_free, of_named = _by_size(model, x, free), _by_size(model, x, named)
     if _apart(of_free, of_named) >= NEARLY:
         return None
-    return np.array([
-        named.size.neutral + change * float(f @ n) / float(n @ n) if n.any() else named.size.neutral
-        for change, f, n in zip(sizes, of_free, of_named, strict=True)
-    ])  # fmt: skip
+    return named.size.neutral + sizes * _shares(of_free, of_named)
 
 
 def runs_against(model: CampaignModel, x: Array, law: Mechanism, own: Mechanism, sizes: Array, covariance: Array) -> bool:
     """Whether an effect that can only be of one sign, with a law of the data's `own`, is told by nothing but that there is less of it where its `law` has more: sizes (tests,)
     of which none is known to be there, for a tolerance does what all have in common, and which are less, by more than `CANNOT` standard errors, where the law does more, and nowhere
     there more."""
-    acts = 1.0 if own.size.limits[0] >= own.size.neutral else -1.0 if own.size.limits[1] <= own.size.neutral else 0.0
-    amounts = acts * (sizes - own.size.neutral)
-    if not acts or np.any(amounts > 2 * np.sqrt(np.maximum(np.diag(covariance), 0.0))):
+    amounts = own.size.sign * (sizes - own.size.neutral)
+    if not own.size.sign or np.any(amounts > 2 * np.sqrt(np.maximum(np.diag(covariance), 0.0))):
         return False
-    of_law, of_own = _by_size(model, x, law), _by_size(model, x, own)
-    by_law = np.array([float(f @ n) / float(n @ n) if n.any() else 0.0 for f, n in zip(of_law, of_own, strict=True)])
+    by_law = _shares(_by_size(model, x, law), _by_size(model, x, own))
     least = int(np.argmin(by_law))
     more = by_law - by_law[least] > FLAT * np.abs(by_law).max()
     apart, variance = amounts - amounts[least], np.diag(covariance) + covariance[least, least] - 2 * covariance[least]
@@ -248,6 +243,11 @@ def _by_size(model: CampaignModel, x: Array, m: Mechanism, shape: Sequence[float
     """Derivatives (N,) of every test by the size of a mechanism that does nothing yet."""
     at = [(m.effect, m.values(m.size.neutral, [q.neutral for q in m.shape] if shape is None else shape))]
     return [Problem(model, (m,)).by_size(t, x, at, 0) for t in range(len(model.tests))]
+
+
+def _shares(of: Sequence[Array], by: Sequence[Array]) -> Array:
+    """How much (tests,) of what moves lines `by` so much does what another moves them, by least squares; none where it moves nothing."""
+    return np.array([float(o @ b) / float(b @ b) if b.any() else 0.0 for o, b in zip(of, by, strict=True)])
 
 
 def _apart(of_free: Sequence[Array], of_named: Sequence[Array]) -> float:

@@ -132,8 +132,7 @@ def one_sided(model: CampaignModel, mechanism: Mechanism, own: tuple[float, floa
     posterior `mean` (n,) and `covariance` (n, n) are given (conditional mean of jointly Gaussian quantities: Rasmussen & Williams, *Gaussian
     Processes*, 2006, Eq. A.6).
     """
-    low, high = mechanism.size.limits
-    sign = 1.0 if low >= mechanism.size.neutral else -1.0 if high <= mechanism.size.neutral else 0.0
+    sign = mechanism.size.sign
     if not sign:
         return 0.0
     width, departure = own
@@ -156,7 +155,6 @@ def impossible(m: Mechanism, sizes: Array, covariance: Array) -> bool:
 def opposite(m: Mechanism, sizes: Array, covariance: Array) -> bool:
     """Whether a mechanism would need the sign that it cannot have: in every test (tests,), by more than twice its standard error, or by more than `CANNOT` in one and the
     sign that it can have in none; where its law does nothing any sign would do."""
-    sd, (low, high) = np.sqrt(np.maximum(np.diag(covariance), 1e-300)), m.size.limits
-    beyond = [(low - sizes) / sd] if low >= m.size.neutral else []
-    beyond += [(sizes - high) / sd] if high <= m.size.neutral else []
-    return any(bool(np.all(b > 2) or (b.max() > CANNOT and b.min() > -2)) for b in beyond)
+    sign, (low, high) = m.size.sign, m.size.limits
+    beyond = sign * ((low if sign > 0 else high) - sizes) / np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    return bool(sign and (np.all(beyond > 2) or (beyond.max() > CANNOT and beyond.min() > -2)))

@@ -45,16 +45,16 @@ def with_resonance(model: CampaignModel, h: Hypothesis, workers: int | None = No
     afresh = np.concatenate([np.zeros(n + more), h.fit.point[n:]])
     clear = max(CLEARED * h.excess, CHANCE * np.sqrt(2 / h.fit.count))
 
-    def asked(found: Hypothesis, left: float) -> bool:
-        """Whether it explains more than it costs, and leaves no more than that beyond noise."""
+    def asked(found: Hypothesis, gain: float, left: float) -> bool:
+        """Whether it gains so much ln evidence, and leaves no more than that beyond noise."""
         drift = any(found.evidence.learned.sizes.get(kind, 0.0) > 0 for kind in DRIFTING)
-        return found.evidence.ln > h.evidence.ln and (found.excess < left if not hidden else bool(h.mechanisms) or not drift)
+        return found.evidence.ln > h.evidence.ln + gain and (found.excess < left if not hidden else bool(h.mechanisms) or not drift)
 
     try:
         tried = in_parallel(partial(_from, wider, h.mechanisms), ((fitted, TEMPERS[EARLY:]), (afresh, TEMPERS)), workers)
         best = replace(min(tried, key=lambda f: f.cost), mechanisms=h.mechanisms)
         sd, learned = np.array([q.sd for q in resonance.nuisances]), None
-        if not asked(Hypothesis(best, evidence(wider, best)), FAR * clear) or resonance.at(sd * best.point[n : n + more]).damping > RESONANT:
+        if not asked(Hypothesis(best, evidence(wider, best)), 0.0, FAR * clear) or resonance.at(sd * best.point[n : n + more]).damping > RESONANT:
             return None  # smooth over the band, it would stand in for something else
         for _ in range(CENTRED):  # so that all explanations start about it as it is
             resonance = resonance.at(sd * best.point[n : n + more])
@@ -64,7 +64,7 @@ def with_resonance(model: CampaignModel, h: Hypothesis, workers: int | None = No
             best, learned = found.fit, found.evidence.learned
     except FAILED:
         return None
-    return (wider, found) if found.evidence.ln > h.evidence.ln + PLENTY and asked(found, clear) else None
+    return (wider, found) if asked(found, PLENTY, clear) else None
 
 
 def _left_by(model: CampaignModel, h: Hypothesis) -> Resonance | None:

@@ -59,9 +59,11 @@ class Standing:
 def standing(model: CampaignModel, h: Hypothesis, least: float = -np.inf) -> Standing:
     """At its posterior mean, which is the least of a quadratic; where the true chi2 there is none of that, fitted anew, and where it still is not, at that fit:
     there at once where its ln evidence is below `least`."""
-    if h.evidence.ln > least and not _as_promised(model, h):
+    promised = _as_promised(model, h)
+    if not promised and h.evidence.ln > least:
         h = settled(model, h)
-    return Standing(h, h.evidence.mean if _as_promised(model, h) else h.fit.point)
+        promised = _as_promised(model, h)
+    return Standing(h, h.evidence.mean if promised else h.fit.point)
 
 
 def _as_promised(model: CampaignModel, h: Hypothesis) -> bool:

@@ -96,8 +96,7 @@ def planned(model: CampaignModel) -> list[Condition]:
 
 
 def _weighed(plan: Condition, lead: Candidate, rival: Candidate, a: Sequence[ModePrediction], b: Sequence[ModePrediction]) -> NextTest:
-    difference = np.array([x.frequency - y.frequency for x, y in zip(a, b, strict=True)])
-    errors = of_both(a, b)
+    difference, errors = np.array([x.frequency - y.frequency for x, y in zip(a, b, strict=True)]), of_both(a, b)
     ln_odds = min(float(difference @ np.linalg.solve(errors, difference)) / 2, CERTAIN)
     most = int(np.argmax(difference**2 / np.diag(errors)))
     tells = f"the mode near {a[most].frequency:.0f} Hz, which differs by {abs(difference[most]):.1f} Hz"

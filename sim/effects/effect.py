@@ -43,6 +43,12 @@ class Parameter:
     """What its choices are the numbers of, from 0: "bearings" a spindle's ball bearings, "all bearings" those of any kind, "sets" what shares a preload.
     One that is -1 where neutral stands for all of them there."""
 
+    @property
+    def sign(self) -> float:
+        """The one sign that limits allow of what differs from neutral; 0 where it may be either."""
+        low, high = self.limits
+        return 1.0 if low >= self.neutral else -1.0 if high <= self.neutral else 0.0
+
 
 ALL = -1.0
 """Of a parameter that numbers things: every one of them."""

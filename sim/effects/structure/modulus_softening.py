@@ -121,12 +121,11 @@ def _sensitivity(section: Section) -> tuple[Sensitivity, ...]:
     from thermospindle.thermal.influence import influence, on_its_mesh
 
     spindle = section.spindle
-    softer = {name: on_its_mesh(spindle, _softer(spindle, name)) for name in dict.fromkeys(g.material for g in spindle.regions)}
     found = []
     for part, hard in influence(spindle).responses.items():
         strained = tuple(spindle.region(name).material for name in hard.section.regions)
         used = tuple(dict.fromkeys(strained))
-        gains = [softer[name][part].gain if len(used) > 1 else hard.gain for name in used]
+        gains = [on_its_mesh(spindle, _softer(spindle, name), part).gain if len(used) > 1 else hard.gain for name in used]
         found.append(Sensitivity(hard.races, used, strained, (np.array(gains) - hard.gain) / STEP))
     return tuple(found)
 

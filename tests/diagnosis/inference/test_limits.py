@@ -123,5 +123,5 @@ def test_what_a_size_cannot_be_is_asked_of_all_tests_together(count, off, alike,
     ((-0.10, -0.05, -0.11), (0.10, 0.02, 0.10), False),  # not by so much
 ])  # fmt: skip
 def test_a_sign_that_cannot_be(sizes, sd, wrong):
-    (loss, *_) = variants(effect("flange_fit_loosening"))
-    assert opposite(loss, np.array(sizes), np.diag(sd) ** 2) == wrong
+    (loosening, *_) = variants(effect("flange_fit_loosening"))
+    assert opposite(loosening, np.array(sizes), np.diag(sd) ** 2) == wrong
