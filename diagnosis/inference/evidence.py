@@ -63,7 +63,8 @@ class Evidence:
 
 def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide: bool = False) -> Evidence:
     """The evidence of a fit at its own temper (its errors are 1 / temper times the data's); with `near` the sizes of discrepancies, drift and
-    errors are taken from the best of these, which is quick. Build tolerances are as stated, or with `wide` as much wider as is likeliest."""
+    errors are taken from the best of these, which is quick. Build tolerances are as stated, or with `wide` as much wider as is likeliest. What a fit with the
+    data's own errors still owes is not counted."""
     turn = amplitudes_apart(fit)
     whole = turned(turn, fit.chi2, fit.gradient, fit.information, fit.point)
     t2 = fit.temper**2
@@ -119,7 +120,7 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
     by_law = [np.array([d == 0.0 or m.kind != "law" for _, d in grid]) for m, grid in zip(fit.mechanisms, own_grids, strict=True)]
     held = reduce(np.multiply.outer, by_law, np.array(True)).ravel()
     return Evidence(
-        _ln_mean(values) + truncation, learned, mean, spread, np.array(means).reshape(shape), np.array(covariances).reshape(*shape, tests), chi2,
+        _ln_mean(values) + truncation - (fit.owed / 2 if fit.temper == 1.0 else 0.0), learned, mean, spread, np.array(means).reshape(shape), np.array(covariances).reshape(*shape, tests), chi2,
         _ln_mean(values) - _ln_mean(values[held]),
     )  # fmt: skip
 

@@ -27,8 +27,10 @@ LEAST_DAMPING, RAISED_DAMPING = 1e-7, 1e-3  # of a parameter's own curvature, at
 MOST_GROWTH = 2.0**6  # of the damping, one refusal after the other
 ENOUGH = 0.3  # of the cost, from which a fit goes on
 ENOUGH_FAR, ENOUGH_EARLY = 2e-3, 0.02  # share of what is left beyond noise, and of all the cost while errors are taken too large, likewise
-KEPT, TRUSTED, POOR = 0.75, 0.6, 0.25  # of the gain promised: from there steps may be longer, derivatives stay in use, and below it a step is corrected
+KEPT, TRUSTED, POOR = 0.75, 0.6, 0.25  # of the gain promised: below the first a step is corrected, and from there it may be longer; derivatives stay in use; below the last no step is long
 CORRECTIONS = 2
+NO_NEARER = 0.05  # of what the cost is above one that beats it, however far it goes on: what gains less in a step comes no nearer
+AFAR = 30.0  # chi2 a number at the start, from which errors are enlarged first
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,7 @@ class Fit:
     moved: Array = field(default_factory=lambda: UNMOVED)  # (mechanisms, tests, 2, modes), of frequency and damping of every mode, relative
     held: tuple[Held, ...] = ()
     cost: float = np.nan  # chi2, its errors 1 / temper times the data's, and priors: those that it was fitted with
+    owed: float = 0.0  # by how much less the quadratic promises, which no step has found
 
     @property
     def nuisance(self) -> Array:
@@ -73,10 +76,11 @@ class Fit:
 
 def fit(
     model: CampaignModel, mechanisms: Sequence[Mechanism] = (), start: Array | Sequence[Array] | None = None, rates: Rates | None = None,
-    tempers: Sequence[float] = TEMPERS, learned: Learned | None = None, moved: Array = UNMOVED,
+    tempers: Sequence[float] = TEMPERS, learned: Learned | None = None, moved: Array = UNMOVED, beaten: float = np.inf,
 ) -> Fit:
     """The fit with the reference widths of all priors, or those `learned`, with what may be misjudged of mechanisms that `moved` the modes; of several
-    starts from the one of least cost. While errors are taken too large, the thinned model serves.
+    starts from the one of least cost, and from there with errors as much larger at first as it is `AFAR`. While they are taken too large, the thinned model serves.
+    What ends above the cost `beaten` need not end exactly.
 
     Raises what the model raises where even the start cannot be built.
     """
@@ -91,16 +95,24 @@ def fit(
     else:
         p = min(start, key=lambda start: problem.cost(start, tempers[0])).copy()
     p = problem.within_limits(p)
-    for temper in tempers:
+    for temper in (*_from_afar(problem, p, tempers[0]), *tempers):
         problem = at(temper)
         if rates is None or temper == 1.0:  # with errors enlarged those from elsewhere lead as far
             rates = rates_of(problem.model, problem.parts(p)[0], problem.effects_of(p), rates)
-        p, lines, residuals, rates = _settled(problem, p, rates, temper)
+        p, lines, residuals, rates = _settled(problem, p, rates, temper, beaten)
         done = problem, p, rates, temper, lines, residuals
     return _finished(*done)
 
 
-def _settled(problem: Problem, p: Array, rates: Rates, temper: float) -> tuple[Array, Linearisation, Sequence[Array], Rates]:
+def _from_afar(problem: Problem, p: Array, first: float) -> Sequence[float]:
+    """Tempers before the `first` one, of which the earliest takes errors so large that the start is near."""
+    far = problem.cost(p, first) / (AFAR * sum(d.count for d in problem.model.tests))
+    before = [t for t in TEMPERS if t < first]
+    near = [k for k, t in enumerate(before) if far * (t / first) ** 2 <= 1.0]
+    return before[near[-1] :] if far > 1.0 and near else ()
+
+
+def _settled(problem: Problem, p: Array, rates: Rates, temper: float, beaten: float) -> tuple[Array, Linearisation, Sequence[Array], Rates]:
     """Levenberg-Marquardt steps at one temper until the cost stands still, damped as in Madsen, Nielsen & Tingleff, *Methods for Non-Linear Least
     Squares Problems*, 2004, algorithm 3.16. Derivatives are taken anew only where a step does not do what it promises, or gains little; at the last temper the
     rates too, for the cost stands still where the gradient is right."""
@@ -117,7 +129,7 @@ def _settled(problem: Problem, p: Array, rates: Rates, temper: float) -> tuple[A
         if promised < ENOUGH and exact:
             break
         there, corrected = problem.at(here.p + move, temper), False
-        if current and there.residuals is not None and here.cost - there.cost < POOR * promised:
+        if current and there.residuals is not None and here.cost - there.cost < KEPT * promised:
             stiff = normal + max(damping, RAISED_DAMPING) * damped
             best = _corrected(problem, lines, stiff, temper, there)
             there, corrected = best, best is not there
@@ -126,7 +138,7 @@ def _settled(problem: Problem, p: Array, rates: Rates, temper: float) -> tuple[A
             longest = LONGEST
         elif gained > KEPT * promised and not corrected and problem.length_of(move) > 0.99 * longest:
             longest *= 2
-        enough = max(ENOUGH, ENOUGH_FAR * (here.cost - count)) if last else max(1.0, ENOUGH_EARLY * here.cost)
+        enough = max(ENOUGH, ENOUGH_FAR * (here.cost - count), NO_NEARER * (here.cost - beaten)) if last else max(1.0, ENOUGH_EARLY * here.cost)
         if gained > 0:
             here, growth = there, 2.0
             damping *= max(1 / 3, 1 - (2 * min(gained / promised, 1.0) - 1) ** 3)
@@ -166,7 +178,9 @@ def _corrected(problem: Problem, lines: Linearisation, normal: Array, temper: fl
 
 def _finished(problem: Problem, p: Array, rates: Rates, temper: float, lines: Linearisation, residuals: Sequence[Array]) -> Fit:
     _, sizes, shapes = problem.parts(p)
-    held = _held(problem, p, temper, lines, residuals)
+    slope, normal = lines.slope(problem, Point(p, residuals, np.nan), temper), temper**2 * lines.information + problem.precision
+    held = _held(problem, p, slope, normal)
+    rest = problem.step(p, slope, normal, np.inf)
     lines = lines.without(np.array([h.number for h in held], int))
     by_test = tuple((float(r @ r), g, a) for r, g, a in zip(residuals, lines.gradients(residuals), lines.by_test, strict=True))
     return Fit(
@@ -185,15 +199,14 @@ def _finished(problem: Problem, p: Array, rates: Rates, temper: float, lines: Li
         _moved(problem, p) if temper == 1.0 and problem.mechanisms else UNMOVED,
         held,
         problem.cost(p, temper, residuals),
+        max(-2 * float(slope @ rest) - float(rest @ normal @ rest), 0.0),
     )
 
 
-def _held(problem: Problem, p: Array, temper: float, lines: Linearisation, residuals: Sequence[Array]) -> tuple[Held, ...]:
-    slope = lines.slope(problem, Point(p, residuals, np.nan), temper)
+def _held(problem: Problem, p: Array, slope: Array, normal: Array) -> tuple[Held, ...]:
     numbers = problem.held(p, slope)
     if not len(numbers):
         return ()
-    normal = temper**2 * lines.information + problem.precision
     free = np.setdiff1d(np.arange(problem.length), numbers)
     inner = np.linalg.solve(normal[np.ix_(free, free)], normal[np.ix_(free, numbers)])
     curvature = np.diag(normal)[numbers] - np.einsum("ij,ij->j", normal[np.ix_(free, numbers)], inner)

@@ -60,14 +60,17 @@ class Task:
     hoped: float
 
 
-def fitted(model, tasks, tempers, about: Fit, most: float, expected: Learned, workers, afresh: bool = False) -> list[Hypothesis]:
-    found = in_parallel(partial(_fit_one, model, about.rates, tuple(tempers), most, expected, afresh), tasks, workers)
+def fitted(
+    model, tasks, tempers, about: Fit, most: float, expected: Learned, workers, afresh: bool = False, beaten: float = np.inf
+) -> list[Hypothesis]:
+    """All that can be built. None should cost more than `most`, and what costs more than is `beaten` need not end exactly."""
+    found = in_parallel(partial(_fit_one, model, about.rates, tuple(tempers), most, expected, afresh, min(most, beaten)), tasks, workers)
     return [
         Hypothesis(replace(h.fit, mechanisms=task.mechanisms), h.evidence) for h, task in zip(found, tasks, strict=True) if h is not None
     ]
 
 
-def _fit_one(model: CampaignModel, rates, tempers, most: float, expected: Learned, afresh: bool, task: Task) -> Hypothesis | None:
+def _fit_one(model: CampaignModel, rates, tempers, most: float, expected: Learned, afresh: bool, beaten: float, task: Task) -> Hypothesis | None:
     """A fit; with `afresh` from where a `scan` leads while errors are larger still, if that costs less. Once more with errors enlarged where it did not
     reach `most`, the cost of a model that it contains, or the evidence that screening `hoped` for: then it had stalled."""
     mechanisms, starts = task.mechanisms, task.starts
@@ -76,11 +79,11 @@ def _fit_one(model: CampaignModel, rates, tempers, most: float, expected: Learne
         if afresh:
             before = TEMPERS[1 : TEMPERS.index(tempers[0])]
             starts = (*starts, fit(model, mechanisms, scan(model, mechanisms), rates, before, learned=prior).point)
-        found = fit(model, mechanisms, starts, rates, tempers, learned=prior)
+        found = fit(model, mechanisms, starts, rates, tempers, learned=prior, beaten=beaten)
         reached = Hypothesis(found, evidence(model, found))
         if found.temper == 1.0 and (found.cost > most + LITTLE or reached.evidence.ln < task.hoped - LITTLE):
             loose = np.concatenate([np.zeros(len(model.parameters)), task.starts[0][len(model.parameters) :]])
-            again = fit(model, mechanisms, loose, rates, TEMPERS[1:], learned=prior)
+            again = fit(model, mechanisms, loose, rates, TEMPERS[1:], learned=prior, beaten=beaten)
             if again.cost < found.cost:
                 reached = Hypothesis(again, evidence(model, again))
         return reached
@@ -122,10 +125,10 @@ def settled(model: CampaignModel, h: Hypothesis) -> Hypothesis:
     return h
 
 
-def widened(model: CampaignModel, h: Hypothesis) -> Hypothesis:
-    """With build tolerances wider than stated, where that is likelier: a drawing that is off. Nothing is sought with them, for they would take what is missing
-    before anything is found."""
+def widened(model: CampaignModel, h: Hypothesis, least: float = -np.inf) -> Hypothesis:
+    """With build tolerances wider than stated, where that is likelier, and promises the `least` ln evidence that counts: a drawing that is off. Nothing is sought
+    with them, for they would take what is missing before anything is found."""
     wide = evidence(model, h.fit, wide=True)
-    if wide.learned.sizes[kinds_of.BUILD] == 1.0:
+    if wide.learned.sizes[kinds_of.BUILD] == 1.0 or wide.ln < least:
         return h
     return max(h, settled(model, Hypothesis(h.fit, wide)), key=lambda h: h.evidence.ln)

@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
+import numpy as np
+
 from thermospindle.diagnosis.forward.hit import hit_found
 from thermospindle.diagnosis.forward.mechanism import Mechanism, strongest, with_own_laws
 from thermospindle.diagnosis.forward.model import CampaignModel
@@ -16,7 +18,7 @@ from thermospindle.diagnosis.inference.hypothesis import PLENTY, STRAIN, Hypothe
 from thermospindle.diagnosis.inference.pairs import joined, joined_early, without_one
 from thermospindle.diagnosis.inference.resonance import with_resonance
 from thermospindle.diagnosis.inference.screening import Screened
-from thermospindle.diagnosis.inference.singles import better, by_own_laws, carried_over, fit_singles, of_each_name
+from thermospindle.diagnosis.inference.singles import FAR, better, by_own_laws, carried_over, fit_singles, of_each_name
 from thermospindle.model.parallel import in_parallel, meanwhile
 from thermospindle.model.types import Array
 
@@ -69,7 +71,8 @@ def search(
     found = better([*singles, *pairs, *without_one(model, [*singles, *pairs], tried.most, tried.expected, workers)])
     progress("pairs fitted")
     finalists = _finalists(found)
-    none, *ended = in_parallel(partial(_at_the_end, model), [none, *finalists], workers)
+    least = max((h.evidence.ln for h in found), default=-np.inf) - FAR
+    none, *ended = in_parallel(partial(_at_the_end, model, least), [none, *finalists], workers)
     anew = dict(zip(map(id, finalists), ended, strict=True))
     ranked = [replace(anew[id(h)], fit=replace(anew[id(h)].fit, mechanisms=h.mechanisms)) if id(h) in anew else h for h in found]
     progress("the best fitted anew")
@@ -84,8 +87,8 @@ def _without_effects(model: CampaignModel) -> Hypothesis:
     return settled(model, Hypothesis(first, evidence(model, first)))
 
 
-def _at_the_end(model: CampaignModel, h: Hypothesis) -> Hypothesis:
-    return widened(model, settled(model, h) if h.mechanisms else h)  # without any it is settled
+def _at_the_end(model: CampaignModel, least: float, h: Hypothesis) -> Hypothesis:
+    return widened(model, settled(model, h) if h.mechanisms else h, least)  # without any it is settled
 
 
 def _against_its_law(model: CampaignModel, x: Array, h: Hypothesis, laws: Mapping[str, Mechanism]) -> bool:

@@ -109,8 +109,8 @@ def by_own_laws(model: CampaignModel, none: Hypothesis, tried: Singles, mechanis
     """Effects with laws of the data's own, fitted from what the best free form says. Where that does better than an effect which changes much the same by the
     law assumed, the effect may do as well by another; screening, which is linear, need not have seen it. Not where that is far behind the best."""
     told = max((h for h in tried.singles if h.free), key=lambda h: h.evidence.ln, default=none)
-    best = max((h.evidence.ln for h in tried.singles), default=none.evidence.ln)
-    if not told.free or told.evidence.ln < max(none.evidence.ln + PLENTY, best - FAR):
+    best = max(tried.singles, key=lambda h: h.evidence.ln, default=none)
+    if not told.free or told.evidence.ln < max(none.evidence.ln + PLENTY, best.evidence.ln - FAR):
         return []
     reached = {h.names[0]: h.evidence.ln for h in sorted(tried.singles, key=lambda h: h.evidence.ln)}
     tasks = []
@@ -121,7 +121,7 @@ def by_own_laws(model: CampaignModel, none: Hypothesis, tried: Singles, mechanis
                 start = Problem(model, (m,)).start({0: sizes - min(0.0, (sizes - m.size.limits[0]).min())})
                 start[: len(model.parameters)] = told.fit.nuisance
                 tasks.append(Task((m,), (start,), -np.inf))
-    return fitted(model, tasks, TEMPERS[-1:], told.fit, tried.most, tried.expected, workers)
+    return fitted(model, tasks, TEMPERS[-1:], told.fit, tried.most, tried.expected, workers, beaten=best.fit.cost + 2 * FAR)
 
 
 def cost_of(model: CampaignModel, none: Hypothesis, expected: Learned) -> float:
