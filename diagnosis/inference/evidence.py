@@ -119,10 +119,9 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
     shape = (len(fit.mechanisms), tests)
     by_law = [np.array([d == 0.0 or m.kind != "law" for _, d in grid]) for m, grid in zip(fit.mechanisms, own_grids, strict=True)]
     held = reduce(np.multiply.outer, by_law, np.array(True)).ravel()
-    return Evidence(
-        _ln_mean(values) + truncation - (fit.owed / 2 if fit.temper == 1.0 else 0.0), learned, mean, spread, np.array(means).reshape(shape), np.array(covariances).reshape(*shape, tests), chi2,
-        _ln_mean(values) - _ln_mean(values[held]),
-    )  # fmt: skip
+    ln = _ln_mean(values) + truncation - (fit.owed / 2 if fit.temper == 1.0 else 0.0)
+    by_departing = _ln_mean(values) - _ln_mean(values[held])
+    return Evidence(ln, learned, mean, spread, np.array(means).reshape(shape), np.array(covariances).reshape(*shape, tests), chi2, by_departing)
 
 
 def _ln_mean(values: Array) -> float:
@@ -136,6 +135,8 @@ def amplitudes_apart(fit: Fit) -> csr_array:
     What a shape parameter moves at the fitted sizes is in proportion to these: to a quadratic it could stand in for them, and for their law over the
     tests, which of its own it has not. So with each, the size in every test gives way by what it would change of the amount: sizes' part of its column.
     """
+    if not any(m.own_law and m.shape for m in fit.mechanisms):
+        return csr_array(eye_array(len(fit.point)))
     turn, at = lil_array(eye_array(len(fit.point))), len(fit.nuisance)
     for m, root in zip(fit.mechanisms, fit.roots, strict=True):
         tests, shapes = len(root), slice(at + len(root), at + len(root) + len(m.shape))

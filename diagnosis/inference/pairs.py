@@ -15,6 +15,7 @@ from thermospindle.diagnosis.inference.prior import Learned, undrifted
 from thermospindle.diagnosis.inference.screening import screen
 from thermospindle.diagnosis.inference.singles import (
     CLOSE,
+    FAR,
     MOST,
     OCCAM,
     Singles,
@@ -84,7 +85,7 @@ def without_one(model: CampaignModel, found: Sequence[Hypothesis], most: float, 
         if rest and with_laws(rest) not in known:
             tasks.append(Task(rest, (np.delete(best.fit.point, slice(at, at + own)),), -np.inf))
         at += own
-    return fitted(model, tasks, TEMPERS[-2:], best.fit, most, expected, workers) if tasks else []
+    return fitted(model, tasks, TEMPERS[-2:], best.fit, most, expected, workers, beaten=best.fit.cost + 2 * FAR) if tasks else []
 
 
 def _beside(model, leads: Sequence[Hypothesis], mechanisms: Sequence[Mechanism], most: float, expected: Learned, workers) -> list[Hypothesis]:

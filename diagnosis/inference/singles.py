@@ -231,5 +231,5 @@ def fitted_in_steps(
         near = sorted((h for h in found if h.evidence.ln > best - FAR), key=lambda h: -h.evidence.ln)
         keep = {id(h) for kind in MOST for h in [h for h in near if h.mechanisms[0].kind == kind][:2]}
         kept = [h for h in found if id(h) in keep or h.names[0] in first or h.evidence.ln > best - BEHIND]
-        alive = [Task(h.mechanisms, (h.fit.point,), -np.inf) for h in kept]
+        alive = [Task(h.mechanisms, (h.fit.point,), -np.inf) for h in sorted(kept, key=lambda h: -h.fit.cost)]  # what has furthest to go begins first
     return found, early

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 import scipy
@@ -24,6 +25,8 @@ from thermospindle.model.errors import BadInput, NoEquilibrium
 from thermospindle.model.machine import Bearing, BearingSet, Condition, RingMotion, RollerBearing, Spindle
 from thermospindle.model.types import Array
 
+Elastic = tuple[float, float]
+"""Young's modulus (Pa) and Poisson's ratio."""
 TOUCHING = 1e-9
 """Contact force, over that of the preload, below which a ball is loose."""
 
@@ -274,16 +277,28 @@ def row_at(spindle: Spindle, b: Bearing, sense: int, motion: RingMotion, speed: 
 
 def reference_deformation(spindle: Spindle, b: Bearing) -> float:
     """Deformation (m) of each ball under the preload at the reference temperature, both contacts: Eq. (6) inverted."""
-    constants = contact_constants(spindle, b, reference_motion(spindle.reference_temperature), b.contact_angle)
+    motion = reference_motion(spindle.reference_temperature)
+    return _reference_deformation(b, *_elastic(spindle, b, motion.temperature), motion)
+
+
+@lru_cache(maxsize=4096)
+def _reference_deformation(b: Bearing, ball: Elastic, ring: Elastic, motion: RingMotion) -> float:
+    constants = _contact_constants(b, ball, ring, motion, b.contact_angle)
     return float((b.preload / (b.balls * np.sin(b.contact_angle)) / in_series(*constants)) ** (2 / 3))
 
 
 def contact_constants(spindle: Spindle, b: Bearing, motion: RingMotion, angle: float) -> tuple[float, float]:
     """Hertz constants (inner, outer) at the temperature of `motion`, with its grown ball and its elastic moduli."""
-    ball, ring = (
-        (spindle.materials[name].youngs_modulus(motion.temperature), spindle.materials[name].poisson_ratio)
-        for name in (b.ball_material, b.ring_material)
-    )
+    return _contact_constants(b, *_elastic(spindle, b, motion.temperature), motion, angle)
+
+
+def _elastic(spindle: Spindle, b: Bearing, temperature: float) -> tuple[Elastic, Elastic]:
+    """Of balls and rings at a temperature."""
+    ball, ring = spindle.materials[b.ball_material], spindle.materials[b.ring_material]
+    return (ball.youngs_modulus(temperature), ball.poisson_ratio), (ring.youngs_modulus(temperature), ring.poisson_ratio)
+
+
+def _contact_constants(b: Bearing, ball: Elastic, ring: Elastic, motion: RingMotion, angle: float) -> tuple[float, float]:
     d = b.ball_diameter * (1 + motion.ball_strain)
     inner, outer = (
         race_contact(d, f * b.ball_diameter * (1 + strain) / d, b.pitch_diameter * (1 + strain), angle, is_inner, ball, ring).stiffness
