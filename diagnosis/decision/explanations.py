@@ -14,6 +14,7 @@ from itertools import permutations
 from math import comb
 
 import numpy as np
+from scipy.special import softmax
 
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.inference.gaussian import impossible, opposite
@@ -31,7 +32,8 @@ Weighed = tuple[Hypothesis, float]  # and its ln weight
 @dataclass(frozen=True, eq=False)
 class Candidate:
     """An explanation of the catalogue, or a free form: ln evidence over the model without effects and posterior probability. Effects that were fitted with
-    several laws are one; `hypothesis` is the likeliest of these and `by_law` the one with the laws assumed, where there is one."""
+    several laws, or acting in several ways, are one; `hypothesis` is the likeliest of these and `by_law` the one with the laws assumed, where there is one. `ways` are all with the laws
+    of the one that is `told`, and the share of each in their probability."""
 
     hypothesis: Hypothesis
     names: Names
@@ -39,6 +41,7 @@ class Candidate:
     delta_evidence: float
     probability: float
     by_law: Hypothesis | None = None
+    ways: tuple[tuple[Hypothesis, float], ...] = ()
 
     @property
     def told(self) -> Hypothesis:
@@ -145,8 +148,11 @@ def _by_names(rows: Sequence[Weighed]) -> list[list[Weighed]]:
 def _candidate(rows: Sequence[Weighed], base: float, total: float) -> Candidate:
     """One explanation of the `rows` with its mechanisms: their probabilities added up."""
     h, _ = max(rows, key=lambda row: row[1])
-    by_law = next((o for o, _ in rows if not any(m.own_law for m in o.mechanisms)), None)
-    return Candidate(h, h.names, h.free, h.evidence.ln - base, float(sum(np.exp(w - total) for _, w in rows)), by_law)
+    by_law = max((row for row in rows if not any(m.own_law for m in row[0].mechanisms)), key=lambda row: row[1], default=(None, 0.0))[0]
+    told = [(o, w) for o, w in rows if [m.own_law for m in o.mechanisms] == [m.own_law for m in (by_law or h).mechanisms] and o.names == (by_law or h).names]
+    shares = softmax([w for _, w in told])
+    ways = tuple((o, float(share)) for (o, _), share in zip(told, shares, strict=True))
+    return Candidate(h, h.names, h.free, h.evidence.ln - base, float(sum(np.exp(w - total) for _, w in rows)), by_law, ways)
 
 
 def _ways(found: Search) -> dict[tuple[str, str], int]:

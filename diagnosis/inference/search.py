@@ -12,18 +12,19 @@ from thermospindle.diagnosis.forward.hit import hit_found
 from thermospindle.diagnosis.forward.mechanism import Mechanism, strongest, with_own_laws
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.evidence import evidence
-from thermospindle.diagnosis.inference.fit import fit
+from thermospindle.diagnosis.inference.fit import TEMPERS, fit
 from thermospindle.diagnosis.inference.freeform import alike, runs_against
-from thermospindle.diagnosis.inference.hypothesis import PLENTY, STRAIN, Hypothesis, settled, widened
+from thermospindle.diagnosis.inference.hypothesis import PLENTY, STRAIN, Hypothesis, Task, fitted, settled, widened
 from thermospindle.diagnosis.inference.pairs import joined, joined_early, without_one
 from thermospindle.diagnosis.inference.resonance import with_resonance
 from thermospindle.diagnosis.inference.screening import Screened
-from thermospindle.diagnosis.inference.singles import FAR, better, by_own_laws, carried_over, fit_singles, of_each_name
+from thermospindle.diagnosis.inference.singles import FAR, Singles, better, by_own_laws, carried_over, fit_singles, of_each_name
 from thermospindle.model.parallel import in_parallel, meanwhile
 from thermospindle.model.types import Array
 
 FINALISTS = {1: 3, 2: 2, 3: 1}  # explanations of one, two and three mechanisms that are fitted anew at the end, of the catalogue and free
 NEAR = 100.0  # ln evidence behind the best, so far
+WAYS = 8  # in which an effect of the best explanation may act too, at most, those that screening promises most of
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +76,7 @@ def search(
     none, *ended = in_parallel(partial(_at_the_end, model, least), [none, *finalists], workers)
     anew = dict(zip(map(id, finalists), ended, strict=True))
     ranked = [replace(anew[id(h)], fit=replace(anew[id(h)].fit, mechanisms=h.mechanisms)) if id(h) in anew else h for h in found]
+    ranked += _other_ways(model, ranked, every, tried, workers)
     progress("the best fitted anew")
     laws = {m.name: m for m in reversed(named)}
     ranked = [h for h in ranked if not _against_its_law(model, none.fit.nuisance, h, laws)]
@@ -89,6 +91,27 @@ def _without_effects(model: CampaignModel) -> Hypothesis:
 
 def _at_the_end(model: CampaignModel, least: float, h: Hypothesis) -> Hypothesis:
     return widened(model, settled(model, h) if h.mechanisms else h, least)  # without any it is settled
+
+
+def _other_ways(model: CampaignModel, ranked: Sequence[Hypothesis], every: Sequence[Mechanism], tried: Singles, workers: int | None) -> list[Hypothesis]:
+    """The best explanation of the catalogue with each of its effects acting in every other way that it has (the other bearing, the other ideal case of its law): screening
+    chose one, and what the data do not tell of that is not to be told as if they did."""
+    best = max((h for h in ranked if h.mechanisms and not h.free), key=lambda h: h.evidence.ln, default=None)
+    if best is None:
+        return []
+    promised = {(s.mechanism.name, s.mechanism.kind, *s.mechanism.choices.items()): s.gain for s in sorted(tried.screened, key=lambda s: s.gain)}
+    tasks, at = [], len(model.parameters)
+    for k, m in enumerate(best.mechanisms):
+        sizes, after = at + len(model.tests), at + len(model.tests) + len(m.shape)
+        others = [o for o in every if (o.name, o.kind) == (m.name, m.kind) and o.choices != m.choices]
+        for o in sorted(others, key=lambda o: -promised.get((o.name, o.kind, *o.choices.items()), -np.inf))[:WAYS]:
+            start = np.concatenate([best.fit.point[:sizes], np.zeros(len(o.shape)), best.fit.point[after:]])
+            tasks.append(Task((*best.mechanisms[:k], o, *best.mechanisms[k + 1 :]), (start,), -np.inf))
+        at = after
+    found = fitted(model, tasks, TEMPERS[-1:], best.fit, tried.most, tried.expected, workers, beaten=best.fit.cost + 2 * PLENTY)
+    near = [h for h in found if h.evidence.ln > best.evidence.ln - PLENTY]
+    ended = in_parallel(partial(_at_the_end, model, -np.inf), near, workers)
+    return [replace(e, fit=replace(e.fit, mechanisms=h.mechanisms)) for e, h in zip(ended, near, strict=True)]
 
 
 def _against_its_law(model: CampaignModel, x: Array, h: Hypothesis, laws: Mapping[str, Mechanism]) -> bool:

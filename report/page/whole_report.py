@@ -22,13 +22,13 @@ from thermospindle.report.text.warmup import warmup_section
 from thermospindle.sim.campaign.campaign import Campaign
 from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.operating import operating_point
-from thermospindle.sim.resonance.map import SEED, resonance_map
+from thermospindle.sim.resonance.map import SEED, resonance_map, stages
 from thermospindle.sim.run import Run
 from thermospindle.sim.running.runout import runout, with_imperfections
-from thermospindle.sim.warmup import warm_up
+from thermospindle.sim.warmup import STAGES, warm_up
 
-STEPS = 7  # of progress, without those of the ladders
-LADDER_STEPS = 12  # of each ladder, beside two a test: it reads modes, and the diagnosis reads lines
+STEPS = 3  # of progress, beside those of the warm-up, of the map and of the ladders
+LADDER_STEPS = 12  # of each ladder, beside three a test: it reads modes, and the diagnosis reads lines
 OVER_TEMPERATURE, OVER_SPEED = 13, 31  # grid of the map
 
 
@@ -39,7 +39,7 @@ def climbed(run: Run) -> list[Campaign]:
 
 def steps(run: Run) -> int:
     """About how often the functions here report progress."""
-    return STEPS + sum(LADDER_STEPS + 2 * len(c.tests) for c in climbed(run))
+    return STEPS + STAGES + stages(run.spindle, OVER_TEMPERATURE) + sum(LADDER_STEPS + 3 * len(c.tests) for c in climbed(run))
 
 
 def more_sections(run: Run, speed: float, catalogue: tuple[Effect, ...], progress: Callable[[str], None]) -> Iterator[Section]:

@@ -21,6 +21,7 @@ from thermospindle.report.typeset import known
 from thermospindle.sim.effects.effect import Effect, called
 
 SHOWN = 12  # candidates
+NOTHING = 0.01  # probability of a way to act that is not told
 
 
 def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
@@ -90,8 +91,8 @@ def _candidate(c: Candidate, d: Diagnosis) -> dict[str, Any]:
     parameters: dict[str, Any] = {}
     laws = {}
     for k, m in enumerate(c.told.mechanisms):
-        for name, row in parameters_of(c.told, k).items():
-            parameters[f"{m.name}.{name}"] = row | named(m.effect, name, row["value"], d.search.model.spindle)
+        for name, row in told_values(c, k, d.search.model.spindle).items():
+            parameters[f"{m.name}.{name}"] = row
     for k, m in enumerate(c.hypothesis.mechanisms):
         laws[m.name] = _law(c, k, d)
     own = c.hypothesis.evidence
@@ -121,6 +122,26 @@ def named(effect: Effect, name: str, value: float, spindle: Spindle) -> dict[str
     """`called`, where the value of a parameter stands for a bearing or a set: its name, or all of them."""
     word = next((called(p, value, spindle) for p in effect.parameters if p.name == name), None)
     return {"called": word} if word else {}
+
+
+def told_values(c: Candidate, k: int, spindle: Spindle) -> dict[str, dict[str, Any]]:
+    """Values of effect `k` of an explanation, with errors that hold whichever way it acts: about the value in the likeliest way, the mean square over all of them. What names
+    something has its probability, and the `others` theirs, where they are not nothing."""
+    effect = c.told.mechanisms[k].effect
+    rows = parameters_of(c.told, k)
+    ways = [(parameters_of(h, k), share) for h, share in c.ways] or [(rows, 1.0)]
+    for p in effect.parameters:
+        row = rows[p.name]
+        if p.choices:
+            found: dict[float, float] = {}
+            for way, share in ways:
+                found[way[p.name]["value"]] = found.get(way[p.name]["value"], 0.0) + share
+            others = [{"value": v, "probability": share} | named(effect, p.name, v, spindle) for v, share in found.items() if v != row["value"] and share > NOTHING]
+            row |= named(effect, p.name, row["value"], spindle)
+            row |= {"probability": found[row["value"]], "others": sorted(others, key=lambda o: -float(o["probability"]))} if others else {}
+        else:
+            row["sd"] = float(np.sqrt(sum(share * (way[p.name]["sd"] ** 2 + (way[p.name]["value"] - row["value"]) ** 2) for way, share in ways)))
+    return rows
 
 
 def parameters_of(h: Hypothesis, k: int) -> dict[str, dict[str, Any]]:

@@ -182,8 +182,10 @@ def _show_little(console: Console, answer: dict[str, Any]) -> None:
 
 
 def value_words(v: dict[str, Any]) -> str:
-    """A parameter's value with error and unit, or the name of what it stands for."""
-    return v.get("called") or plain_error(v["value"], v["sd"]) + unit_word(v["unit"], " ")
+    """A parameter's value with error and unit, or the name of what it stands for; and what it may be as well."""
+    value = v.get("called") or plain_error(v["value"], v["sd"]) + unit_word(v["unit"], " ")
+    others = "".join(f" or {o.get('called') or plain(o['value'])} ({_percent(o['probability'])})" for o in v.get("others", ()))
+    return f"{value} ({_percent(v['probability'])}){others}" if others else value
 
 
 def _values(candidate: dict[str, Any]) -> str:

@@ -42,6 +42,21 @@ def test_of_many_ways_in_which_an_effect_may_act_one_was_fitted():
     assert b / a == pytest.approx(8.0)
 
 
+def test_each_way_to_act_has_its_share_of_an_explanation():
+    """At the lower bearing or the upper one, 2 in ln evidence apart: one explanation, as probable as both together, and its ways as likely as their evidence says."""
+    found = made({"a": 30.0, "b": 30.0})
+    own = [replace(mechanism("a"), choices={"bearing": float(k)}) for k in range(2)]
+    h = next(h for h in found.hypotheses if h.names == ("a",))
+    both = [replace(h, fit=replace(h.fit, mechanisms=(m,)), evidence=replace(h.evidence, ln=h.evidence.ln - 2.0 * k)) for k, m in enumerate(own)]
+    every = tuple(sorted([*(o for o in found.hypotheses if o is not h), *both], key=lambda h: -h.evidence.ln))
+    shown = [Screened(m, 0.0, np.zeros(2), 1.0) for m in own]
+    v = decide(replace(found, hypotheses=every, screened=(*found.screened, *shown)))
+    a, b = (next(c for c in v.candidates if c.names == (k,)) for k in "ab")
+    assert a.probability / b.probability == pytest.approx((1 + np.exp(-2)) / 2)
+    assert [(o.mechanisms[0].choices["bearing"], share) for o, share in a.ways] == [(0.0, pytest.approx(1 / (1 + np.exp(-2)))), (1.0, pytest.approx(1 / (1 + np.exp(2))))]
+    assert a.hypothesis.mechanisms[0].choices == {"bearing": 0.0}
+
+
 WRONG = [({}, 1.0, 1.0), ({STIFFNESS: 1e-3, DAMPING: 0.01}, 1.0, 1.0), ({BUILD: 1.0}, 1.0, 1.0), ({BUILD: 4.0}, 1.0, COARSE), ({}, 1.1, COARSE)]
 
 

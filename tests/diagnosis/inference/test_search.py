@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, virtual_campaign
+from thermospindle.diagnosis.decision.explanations import explanations
 from thermospindle.diagnosis.decision.verdict import decide
 from thermospindle.diagnosis.forward.mechanism import asked_at, variants, with_own_laws
 from thermospindle.diagnosis.forward.nuisance import BUILD, STIFFNESS
@@ -20,12 +21,13 @@ from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
 from thermospindle.diagnosis.inference.pairs import joined_early, without_one
 from thermospindle.diagnosis.inference.prior import DRIFTING, steady, undrifted
 from thermospindle.diagnosis.inference.problem import Problem
-from thermospindle.diagnosis.inference.screening import linearised, screen
-from thermospindle.diagnosis.inference.search import search
-from thermospindle.diagnosis.inference.singles import HIDING, cost_of, fit_singles, lasting
+from thermospindle.diagnosis.inference.screening import Screened, linearised, screen
+from thermospindle.diagnosis.inference.search import Search, _other_ways, search
+from thermospindle.diagnosis.inference.singles import HIDING, Singles, cost_of, fit_singles, lasting
 from thermospindle.model.built.tolerance import deviated
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
+from thermospindle.report.text.diagnosis.answer import told_values
 
 TESTS = (Condition(20.0), Condition(40.0), Condition(60.0))
 
@@ -96,6 +98,31 @@ def test_a_mass_that_strained_tolerances_hide_is_found(spindle):
     assert found[0].evidence.ln > none.evidence.ln + 12
     assert found[0].evidence.sizes[0] == pytest.approx(2.0, abs=1.0)
     assert found[0].evidence.learned.departures == (0.0,)
+
+
+def test_ways_that_the_data_do_not_tell_apart_are_told_as_such(spindle):
+    """A fifth of the preload lost, in tests at 60 C alone: whether it was lost at assembly or comes with temperature makes no difference to them. Screening chose one, and
+    practice campaign d was answered `common_share` 1 without an error where 0 was hidden."""
+    lost, hot = effect("preload_loss"), (Condition(60.0), Condition(60.0, 7200 * RPM))
+    model = model_of(spindle, mode_campaign(spindle, hot, 3, [(lost, {"loss": 0.2, "thermal_share": 1.0})]))
+    every = variants(lost)
+    assembly, warm = (next(m for m in every if m.choices.get("thermal_share") == end) for end in (0.0, 1.0))
+    first = fit(model, [assembly])
+    best, none = Hypothesis(first, evidence(model, first)), fit(model)
+    tried = Singles([best], (), np.inf, steady(best.evidence.learned))
+    found = _other_ways(model, [best], every, tried, 1)
+    other = next(h for h in found if h.mechanisms == (warm,))
+    assert other.evidence.ln == pytest.approx(best.evidence.ln, abs=0.5)
+    assert other.evidence.sizes[0] == pytest.approx(best.evidence.sizes[0], abs=0.01)
+    base = Hypothesis(none, evidence(model, none))
+    hypotheses = tuple(sorted([base, best, *found], key=lambda h: -h.evidence.ln))
+    looked = tuple(Screened(m, 0.0, first.point, 1.0) for m in every)
+    (told,), _, _ = explanations(Search(model, base, hypotheses, looked), 1.0)
+    assert len(told.ways) == 3
+    assert all(share > 0.2 for _, share in told.ways)
+    values = told_values(told, 0, spindle)
+    assert values["thermal_share"]["sd"] > 0.3
+    assert abs(values["loss"]["value"] - 0.2) < 2 * values["loss"]["sd"] < 0.2
 
 
 @pytest.mark.slow
