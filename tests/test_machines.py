@@ -92,6 +92,7 @@ def test_tables_are_whole_at_80_columns(words: str, capsys: pytest.CaptureFixtur
     assert max(map(len, said.splitlines())) <= 80
 
 
+@pytest.mark.slow
 def test_unbalance_of_a_shaft_of_thin_segments_runs_as_in_the_frequency_domain(capsys: pytest.CaptureFixture[str]) -> None:
     """Static and couple unbalance on a segment whose polar moment is the sum of the others."""
     once = []

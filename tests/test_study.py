@@ -97,6 +97,7 @@ def test_a_case_without_an_answer_says_why_in_its_row(tmp_path, capsys, undrawn)
     assert "1 of 2 rows have no result" in said.err
 
 
+@pytest.mark.slow
 def test_draws_scatter_as_the_tolerances_say(tmp_path, capsys):
     out, rows = study(tmp_path, DRAWN + "draws = 150\nseed = 5\nchunk = 40\n")
     answer = json.loads(capsys.readouterr().out)

@@ -99,16 +99,22 @@ def coarsening(best: Hypothesis, inflation: float) -> float:
 
 
 def _weighed(h: Hypothesis, every: Sequence[Hypothesis]) -> float:
-    """ln evidence, of which what one mechanism more gains counts a `COARSE`-th as far as the best explanation without it gains as much by laws that are not
-    its effects' own: what is wrong in a law looks like a little of something else, and an effect whose law is not quite its own is not quite its own in what
-    it does either."""
+    """ln evidence, of which what one mechanism more gains counts a `COARSE`-th as far as the best explanation without it, and every other that does as well, gains as
+    much by laws that are not its effects' own: what is wrong in a law looks like a little of something else."""
     parts = [o for o in every if o.mechanisms and set(o.names) < set(h.names)]
     if not parts:
         return h.evidence.ln
     lead = max(parts, key=lambda o: o.evidence.ln)
     gain = h.evidence.ln - lead.evidence.ln
-    in_doubt = min(gain, _by_other_laws(lead, every))
+    in_doubt = min(gain, *(_by_other_laws(o, every) for o in [lead, *_doing_as_well(lead, set(h.names) - set(lead.names), every)]))
     return _weighed(lead, every) + gain - (1 - 1 / COARSE) * max(in_doubt, 0.0)
+
+
+def _doing_as_well(lead: Hypothesis, more: Collection[str], every: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Other explanations that do as well as the `lead`, and were fitted with the same mechanisms `more` beside them."""
+    beside = {frozenset(o.names) for o in every}
+    near = [o for o in every if len(o.names) == len(lead.names) and o.evidence.ln > lead.evidence.ln - LITTLE]
+    return [o for o in near if frozenset(o.names) != frozenset(lead.names) and frozenset(o.names) | frozenset(more) in beside and not set(more) & set(o.names)]
 
 
 def _by_other_laws(h: Hypothesis, every: Sequence[Hypothesis]) -> float:

@@ -165,6 +165,7 @@ def test_visibility_grows_with_size_and_gains_hide_a_gain():
     assert _visible(drawn, gain) < 2.0
 
 
+@pytest.mark.slow
 def test_right_answers_are_what_effects_do():
     """Rings apart are cleared by what opens the clearance, not by a film, which only brings them together; softer bearings by a bond; a whirl force by nothing."""
     drawn = draw(2)

@@ -61,6 +61,7 @@ def test_what_cannot_be_told_apart_is_said(measured):
         assert test["odds"] < 5
 
 
+@pytest.mark.slow
 def test_a_beam_that_shears_lacks_nothing(coarse, campaign):
     """With shear and rotary inertia in the scene and frequencies of that very beam, nothing is named."""
     from thermospindle.model.machine import Condition

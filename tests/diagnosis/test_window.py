@@ -73,7 +73,8 @@ def test_errors_of_compressed_lines_come_true(hidden):
     assert total / count == pytest.approx(1.0, abs=0.1)
 
 
-@pytest.mark.parametrize("seed", [pytest.param(113, marks=pytest.mark.slow), 165])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [113, 165])
 def test_noise_under_a_window_is_that_of_all_tests(seed):
     """Blind campaigns 113 and 165: the same noise in every test. A fit of it that let one block rule the next told a tenth of it in one test, and that was missed
     by six standard errors and more."""

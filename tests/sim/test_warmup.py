@@ -105,6 +105,7 @@ def test_error_estimate_is_third_order_and_holds(spindle, model):
     assert 0.3 * true < steps[0].error < 10 * true
 
 
+@pytest.mark.slow
 def test_slowest_decay(spindle, model):
     """The time constant of the linearised equation is that of the transient's tail, friction's fall by temperature included."""
     drive = heat.running(spindle, 20.0, SPEED)
@@ -203,6 +204,7 @@ def test_soak_of_a_good_conductor_is_newtons_law(spindle, coarse):
     assert energy(warm)["friction"] == 0.0
 
 
+@pytest.mark.slow
 def test_long_soak_is_the_chamber_test(spindle):
     """At rest for ever in a chamber at 60 C: the operating point of a soaked spindle, modes included."""
     first = warm_up(spindle, 0.0, 20.0, air=60.0, duration=200.0, tolerance=0.2)
@@ -262,6 +264,7 @@ def test_units_go_with_the_size_of_the_machine(warm, monkeypatch):
     assert "bearings 2544.0 kJ in; convection 2139.7 kJ out; stored 404.3 kJ" in warmup_section(warm)[1]
 
 
+@pytest.mark.slow
 def test_soak_from_the_command_line(tmp_path, capsys):
     scene, out = str(SCENE), tmp_path / "out"
     assert main(["warmup", scene, "--minutes", "0.5", "--json", "--out", str(out), "--soak", "60"]) == 0

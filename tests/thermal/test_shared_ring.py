@@ -33,6 +33,7 @@ def test_free_expansion_of_a_long_tube(tube):
     assert motion["upper"].outer_z - motion["lower"].outer_z == pytest.approx(strain * 11.5e-3, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_tube_in_its_hub_moves_as_two_rings_of_it_would(spindle):
     """The sleeve of the reference made of steel, as one region and as three: the same part, the same motion of either raceway."""
     ends = (3.0e-3, 3.5e-3, 6.5e-3, 15.0e-3, 18.0e-3, 20.0e-3)

@@ -123,6 +123,7 @@ def test_what_breaks_its_library_off_is_refused(tmp_path):
     assert read_arrays(tmp_path / "whole.mat")["H"].tolist() == [0.0, 1.0, 2.0]
 
 
+@pytest.mark.slow
 def test_what_its_library_never_ends_on_is_refused(tmp_path, monkeypatch):
     """Found by `make torture`: 72 bytes twice in an HDF5 file, among whose groups h5py goes round for ever."""
     data = damaged(matlab("hdf5"), [Damage("twice", 0.0177, b"", 0.0177)])

@@ -93,14 +93,15 @@ def test_a_little_more_beside_a_law_that_does_not_hold_is_no_second_effect(gaine
     assert (v.word, v.effects[0]) == (word, "first")
 
 
-@pytest.mark.parametrize(("a", "b", "doubt"), [(0.0, 0.0, 0.0), (15.0, 0.0, 15.0), (15.0, 15.0, 0.0), (900.0, 15.0, 285.0)])
-def test_what_a_law_leaves_in_doubt_is_no_more_than_it_gained(a, b, doubt):
+@pytest.mark.parametrize(("a", "b", "behind", "doubt"), [(0.0, 0.0, 9.0, 0.0), (15.0, 0.0, 9.0, 15.0), (15.0, 15.0, 9.0, 0.0), (900.0, 15.0, 9.0, 285.0), (15.0, 0.0, 1.0, 0.0)])
+def test_what_a_law_leaves_in_doubt_is_no_more_than_it_gained(a, b, behind, doubt):
     """Two effects that explain as much with the same second one: by departures of `a` and a law of `b`'s own, which lose in ln evidence as much of what the
-    second gains as they gained, and all of its 300 at most."""
-    found = made({("a", "c"): 400.0, ("b'", "c"): 400.0, "a": 100.0, "b'": 100.0, "b": 100.0 - b})
+    second gains as they gained, and all of its 300 at most; nothing where the other does as well alone, by its own law, and has the second beside it: then that is
+    no matter of laws. Campaign 851 of the blind study was answered another effect than the preload for that."""
+    found = made({("a", "c"): 400.0 + behind, ("b'", "c"): 400.0, "a": 100.0 + behind, "b'": 100.0, "b": 100.0 - b})
     hypotheses = tuple(by_departing(h, a) if h.names == ("a",) else h for h in found.hypotheses)
     first, second = (next(c.probability for c in decide(replace(found, hypotheses=hypotheses)).candidates if c.names == (k, "c")) for k in "ab")
-    assert np.log(second / first) == pytest.approx((1 - 1 / COARSE) * doubt - np.log(1 + OWN_LAW), abs=1e-6)
+    assert np.log(second / first) == pytest.approx((1 - 1 / COARSE) * doubt - np.log(1 + OWN_LAW) - behind, abs=1e-6)
 
 
 OWN_LAWS = {

@@ -65,7 +65,7 @@ def residuals(data: LineData, exact: np.ndarray) -> np.ndarray:
     return np.concatenate([left.real, left.imag])
 
 
-@pytest.mark.parametrize("damping", [BROAD, SHARP])
+@pytest.mark.parametrize("damping", [BROAD, pytest.param(SHARP, marks=pytest.mark.slow)])
 def test_compression_leaves_chi2_its_distribution(damping):
     """Fifty draws, the FRF itself at the nodes: chi2 of each is chi-square distributed (Kolmogorov-Smirnov), the mean is 1.
 

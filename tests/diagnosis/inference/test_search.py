@@ -81,6 +81,7 @@ def test_a_promise_is_over_the_model_without_it_at_the_same_place(spindle):
     assert np.abs(linearised(model, one).information - linearised(model, other).information).max() > 1.0
 
 
+@pytest.mark.slow
 def test_a_mass_that_strained_tolerances_hide_is_found(spindle):
     """Two grams within the hub, the same in every test: strained tolerances take all of it, and a scan of sizes as drawn finds it again."""
     disk = effect("added_disk")
@@ -173,6 +174,7 @@ def test_what_came_first_is_tried_without(spindle):
     assert more["bond_softening", "preload_loss"] > more["preload_loss", "modulus_softening"] + 10
 
 
+@pytest.mark.slow
 def test_a_drawing_that_is_off_is_no_missing_effect(spindle):
     """Three stiffnesses a tenth off and the preload by an eighth, four to eight times their tolerances, and nothing hidden."""
     off = {"mount axial stiffness": 0.125, "flange lateral stiffness": -0.107, "flange tilt stiffness": 0.094, "preload": -0.12}

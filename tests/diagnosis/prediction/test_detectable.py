@@ -66,6 +66,7 @@ def test_what_tolerances_take_is_not_counted(plain):
     assert size > 3 * promised
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("times", "seen"), [(2.0, True), (0.4, False)])
 def test_a_fit_finds_it_at_twice_that_size(spindle, plain, times, seen):
     model, done, learned, looked = plain

@@ -91,6 +91,7 @@ def test_frf_against_the_linear_model(spindle, quick, temperature, speed, hammer
     assert error(test, exact_frf(test)) < CLOSE
 
 
+@pytest.mark.slow
 def test_ball_by_ball_at_a_low_level_is_linear(spindle, quick):
     """In the limit of a light tap the ball-by-ball model has the FRF of the linear one."""
     gentle = replace(quick, level=0.02, hammer_nodes=quick.hammer_nodes[:1])

@@ -256,6 +256,7 @@ def test_log_without_its_numbers_is_refused(met, tmp_path):
         write_map_log(met, tmp_path / "none" / "map.rrd")
 
 
+@pytest.mark.slow
 def test_map_from_the_command_line(tmp_path, capsys):
     scene, out = str(SCENE), tmp_path / "out"
     grid = ["--temperatures", "20", "50", "--speeds", "5000", "8000"]

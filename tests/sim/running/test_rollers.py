@@ -96,6 +96,7 @@ def test_what_cancels_makes_no_line(tail, state, running):
     assert free_displacements(state, kin, RowImperfections(ball_waves=((Wave(3, NANO, 0.0),),) * 52)) == []
 
 
+@pytest.mark.slow
 def test_a_run_of_the_tailstock_has_the_lines_of_its_rollers(running):
     """25 turns a second: the cage at (1 - 9/91) / 2 of them, rollers past the inner race (1 + 9/91) / 2 times 26; nothing of theirs along the axis."""
     cage = 25 * (1 - 9 / 91) / 2

@@ -252,6 +252,7 @@ def test_refused(spindle, call, message):
 # ---------------------------------------------------------------- balls that move
 
 
+@pytest.mark.slow
 def test_moving_balls_agree_in_the_limit_of_small_amplitude(spindle):
     """Second path: Hertz contacts of orbiting balls in time. The difference goes with the amplitude, to 1e-3 at a tenth of a draw."""
     point = at(spindle, Imperfections())
