@@ -24,6 +24,7 @@ from thermospindle.model.types import Array
 
 FINALISTS = {1: 3, 2: 2, 3: 1}  # explanations of one, two and three mechanisms that are fitted anew at the end, of the catalogue and free
 NEAR = 100.0  # ln evidence behind the best, so far
+UNLIKELY = 5.0  # ln evidence behind the best, of a way to act that need not be told
 WAYS = 8  # in which an effect of the best explanation may act too, at most, those that screening promises most of
 
 
@@ -97,7 +98,7 @@ def _other_ways(model: CampaignModel, ranked: Sequence[Hypothesis], every: Seque
     """The best explanation of the catalogue with each of its effects acting in every other way that it has (the other bearing, the other ideal case of its law): screening
     chose one, and what the data do not tell of that is not to be told as if they did."""
     best = max((h for h in ranked if h.mechanisms and not h.free), key=lambda h: h.evidence.ln, default=None)
-    if best is None:
+    if best is None or best.evidence.ln < max(h.evidence.ln for h in ranked) - NEAR:
         return []
     promised = {(s.mechanism.name, s.mechanism.kind, *s.mechanism.choices.items()): s.gain for s in sorted(tried.screened, key=lambda s: s.gain)}
     tasks, at = [], len(model.parameters)
@@ -109,7 +110,7 @@ def _other_ways(model: CampaignModel, ranked: Sequence[Hypothesis], every: Seque
             tasks.append(Task((*best.mechanisms[:k], o, *best.mechanisms[k + 1 :]), (start,), -np.inf))
         at = after
     found = fitted(model, tasks, TEMPERS[-1:], best.fit, tried.most, tried.expected, workers, beaten=best.fit.cost + 2 * PLENTY)
-    near = [h for h in found if h.evidence.ln > best.evidence.ln - PLENTY]
+    near = [h for h in found if h.evidence.ln > best.evidence.ln - UNLIKELY]
     ended = in_parallel(partial(_at_the_end, model, -np.inf), near, workers)
     return [replace(e, fit=replace(e.fit, mechanisms=h.mechanisms)) for e, h in zip(ended, near, strict=True)]
 

@@ -65,7 +65,7 @@ def _shown(model: CampaignModel, about: Fit, learned: Learned, mechanisms: Seque
 
 
 def _smallest(model: CampaignModel, about: Fit, learned: Learned, task: tuple[float, Mechanism]) -> float | None:
-    """By the rule of three from the size of first order, then by halves between what is too small and too large."""
+    """By the rule of three from the size of first order, then by halves between what is too small and too large, or cannot be built."""
     size, m = task
     sign = 1.0 if m.size.typical >= m.size.neutral else -1.0
     limit = abs((m.size.limits[1] if sign > 0 else m.size.limits[0]) - m.size.neutral)
@@ -73,6 +73,10 @@ def _smallest(model: CampaignModel, about: Fit, learned: Learned, task: tuple[fl
     size = min(size, limit)
     for _ in range(TRIES):
         seen = visibility(model, about, learned, m, m.size.neutral + sign * size)
+        if not np.isfinite(seen):  # no spindle can be built with so much of it
+            high = size
+            size = (low + high) / 2
+            continue
         asked = standard_errors(m, size, seen)
         if abs(seen / asked - 1) < NEAR:
             break
@@ -85,7 +89,7 @@ def _smallest(model: CampaignModel, about: Fit, learned: Learned, task: tuple[fl
         size = float(np.clip(size * asked / max(seen, asked / 10), low, high))
         if size in (low, high) and size != limit:
             size = (low + high) / 2
-    return size
+    return size if np.isfinite(seen) else None
 
 
 def standard_errors(m: Mechanism, size: float, seen: float) -> float:

@@ -13,6 +13,7 @@ from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.screening import screen
+from thermospindle.diagnosis.prediction import detectable
 from thermospindle.diagnosis.prediction.detectable import ASKED, smallest, visibility
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
@@ -56,6 +57,19 @@ def test_beside_a_model_that_is_worse_less_shows(plain, worse, least, most):
     assert least < now / known < most
     known, now = (screen(model, done, 1.0, of, [m], 1, turned=False)[0].visibility for of in (learned, worse(learned)))
     assert least < now / known < 0.95
+
+
+@pytest.mark.parametrize(("built", "found"), [(0.3, True), (0.0, False)])
+def test_sizes_with_which_no_spindle_can_be_built_are_too_large(monkeypatch, built, found):
+    """Up to `built` of its limit the effect shows in proportion, beyond that nothing stands: of a machine-tool spindle a size that is no number was told for that."""
+    m = variants(effect("preload_loss"))[0]
+    end = built * m.size.limits[1]
+    shows = 40.0 / m.size.limits[1]
+    monkeypatch.setattr(detectable, "visibility", lambda model, about, learned, m, size: shows * size if size <= end else np.inf)
+    size = detectable._smallest(None, None, None, (0.9 * m.size.limits[1], m))
+    assert (size is not None) == found
+    if size is not None:
+        assert shows * size == pytest.approx(detectable.standard_errors(m, size, shows * size), rel=detectable.NEAR)
 
 
 def test_what_tolerances_take_is_not_counted(plain):
