@@ -17,7 +17,7 @@ from thermospindle.report.figures.diagnosis import figures
 from thermospindle.report.figures.runout_campaign import diagnosis_figures
 from thermospindle.report.page import runout_diagnosis
 from thermospindle.report.page.report import Section, write_page
-from thermospindle.report.text.diagnosis.words import hidden_words, plan_words
+from thermospindle.report.text.diagnosis.words import hidden_words, plan_words, value_words
 from thermospindle.report.typeset import minus, plain, prose, signed, table, unit_cell, with_error
 
 CAPTIONS = {
@@ -88,7 +88,7 @@ def _candidates(answer: dict[str, Any]) -> str:
     for c in answer["candidates"]:
         for k, (name, v) in enumerate(c["parameters"].items()):
             first = k == 0
-            value, _, sd = _with_error(v["value"], v["sd"]).partition(" <small>") if "called" not in v else (escape(v["called"]), "", "")
+            value, _, sd = _with_error(v["value"], v["sd"]).partition(" <small>") if not ("called" in v or v.get("others")) else (escape(value_words(v)), "", "")
             rows.append(
                 [
                     escape(" + ".join(c["effects"])) if first else "",

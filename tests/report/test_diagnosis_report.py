@@ -27,7 +27,7 @@ from thermospindle.model.units import RPM
 from thermospindle.report.figures.diagnosis import errors, explanations, law
 from thermospindle.report.page.diagnosis import sections, write_diagnosis
 from thermospindle.report.text.diagnosis.answer import diagnosis_json
-from thermospindle.report.text.diagnosis.words import show_diagnosis
+from thermospindle.report.text.diagnosis.words import show_diagnosis, value_words
 from thermospindle.report.text.runout_diagnosis import runout_diagnosis_json
 from thermospindle.sim.campaign.simulated import runout_campaign
 from thermospindle.sim.effects import CATALOGUE, by_name, of_scene
@@ -177,3 +177,12 @@ def test_runout_stands_on_the_same_page(told, spindle, tmp_path):
     identities = re.findall(r'id="([^"]+)"', page)
     assert len(identities) == len(set(identities))
     assert {"explanations.svg", "runout_explanations.svg"} <= {p.name for p in tmp_path.iterdir()}
+
+
+def test_a_value_is_told_with_what_it_may_be_as_well():
+    lower = {"value": 0.0, "sd": 0.0, "unit": "1", "called": "lower"}
+    upper = {"value": 1.0, "probability": 0.28, "called": "upper"}
+    assert value_words(lower) == "lower"
+    assert value_words(lower | {"probability": 0.72, "others": [upper]}) == "lower (72.0%) or upper (28.0%)"
+    channel = {"value": 3.0, "sd": 0.0, "unit": "1", "probability": 0.6, "others": [{"value": 4.0, "probability": 0.4}]}
+    assert value_words(channel) == "3 (60.0%) or 4 (40.0%)"
