@@ -128,19 +128,18 @@ def told_values(c: Candidate, k: int, spindle: Spindle) -> dict[str, dict[str, A
     """Values of effect `k` of an explanation, with errors that hold whichever way it acts: about the value in the likeliest way, the mean square over all of them. What names
     something has its probability, and the `others` theirs, where they are not nothing."""
     effect = c.told.mechanisms[k].effect
-    rows = parameters_of(c.told, k)
+    rows, numbers = parameters_of(c.told, k), {p.name for p in effect.parameters if p.choices}
     ways = [(parameters_of(h, k), share) for h, share in c.ways] or [(rows, 1.0)]
-    for p in effect.parameters:
-        row = rows[p.name]
-        if p.choices:
+    for name, row in rows.items():
+        if name in numbers:
             found: dict[float, float] = {}
             for way, share in ways:
-                found[way[p.name]["value"]] = found.get(way[p.name]["value"], 0.0) + share
-            others = [{"value": v, "probability": share} | named(effect, p.name, v, spindle) for v, share in found.items() if v != row["value"] and share > NOTHING]
-            row |= named(effect, p.name, row["value"], spindle)
+                found[way[name]["value"]] = found.get(way[name]["value"], 0.0) + share
+            others = [{"value": v, "probability": share} | named(effect, name, v, spindle) for v, share in found.items() if v != row["value"] and share > NOTHING]
+            row |= named(effect, name, row["value"], spindle)
             row |= {"probability": found[row["value"]], "others": sorted(others, key=lambda o: -float(o["probability"]))} if others else {}
         else:
-            row["sd"] = float(np.sqrt(sum(share * (way[p.name]["sd"] ** 2 + (way[p.name]["value"] - row["value"]) ** 2) for way, share in ways)))
+            row["sd"] = float(np.sqrt(sum(share * (way[name]["sd"] ** 2 + (way[name]["value"] - row["value"]) ** 2) for way, share in ways)))
     return rows
 
 
