@@ -14,7 +14,7 @@ from thermospindle.diagnosis.forward.mechanism import asked_at, variants, with_o
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.forward.nuisance import APART, BUILD, DAMPING, DRIFT, GAIN, STIFFNESS, TEMPERATURE
 from thermospindle.diagnosis.inference.evidence import evidence
-from thermospindle.diagnosis.inference.fit import fit
+from thermospindle.diagnosis.inference.fit import AFAR, TEMPERS, _from_afar, fit
 from thermospindle.diagnosis.inference.freeform import free_forms
 from thermospindle.diagnosis.inference.hypothesis import scan
 from thermospindle.diagnosis.inference.prior import steady
@@ -115,6 +115,62 @@ def bounded(low: list[float], high: list[float]) -> Problem:
     problem = object.__new__(Problem)
     problem.length, problem.low, problem.high, problem.reach = len(low), np.array(low), np.array(high), np.zeros(len(low))
     return problem
+
+
+@pytest.fixture(scope="module")
+def softer(spindle):
+    """The model of a campaign in which bearings are softer at 60 C, and what softens them."""
+    bond = effect("bond_softening")
+    values = {q.name: q.neutral for q in bond.parameters} | {"hot_compliance": 2.0, "bearing": -1.0}
+    model = model_of(spindle, virtual_campaign(spindle, THREE[:2], 3, [(bond, values)], drawn(spindle, 2, 3), responses=(1, 3, 6), frequency=np.arange(400.0, 6000.1, 32.0)))
+    return model, variants(bond)[0]
+
+
+def test_from_afar_errors_are_enlarged_first(softer):
+    """A start six prior standard deviations off costs tens of times the noise: from there errors are taken larger first, as `AFAR` has it, and not from near. By the data's own errors
+    alone practice campaign g had fits of 51 linearisations."""
+    model, m = softer
+    problem = Problem(model, (m,))
+    near = fit(model, (m,))
+    p = problem.within_limits(problem.start({0: m.size.neutral + 6 * m.size.prior_sd}))
+    far = problem.cost(p, 1.0) / sum(d.count for d in model.tests)
+    assert far > AFAR
+    tempers = _from_afar(problem, p, 1.0)
+    assert tuple(tempers) == TEMPERS[TEMPERS.index(tempers[0]) : -1]
+    assert far * tempers[0] ** 2 <= AFAR < far * TEMPERS[TEMPERS.index(tempers[0]) + 1] ** 2
+    assert _from_afar(problem, near.point, 1.0) == ()
+    assert fit(model, (m,), p, tempers=TEMPERS[-1:]).cost == pytest.approx(near.cost, abs=1.0)
+
+
+def test_a_gain_that_no_step_has_found_is_not_counted(softer, monkeypatch):
+    """What a fit that stopped on its way owes is taken from its evidence; one that rests owes nothing."""
+    model, m = softer
+    rested = fit(model, (m,))
+    assert rested.owed < 0.3
+    start = rested.point + 0.3 * np.sign(rested.gradient)
+    monkeypatch.setattr("thermospindle.diagnosis.inference.fit.MOST_STEPS", (0, 0))
+    stopped = fit(model, (m,), start, rested.rates, TEMPERS[-1:])
+    assert stopped.cost > rested.cost + 10
+    assert stopped.owed > 10
+    assert evidence(model, stopped).ln == pytest.approx(evidence(model, replace(stopped, owed=0.0)).ln - stopped.owed / 2)
+    assert evidence(model, stopped).ln < evidence(model, rested).ln
+
+
+def test_what_is_beaten_ends_early(softer, monkeypatch):
+    """A fit that comes no nearer a cost that others have reached is left; one that does goes on to its end."""
+    model, m = softer
+    asked = []
+    taken = Problem.linearisation
+    monkeypatch.setattr(Problem, "linearisation", lambda self, *given: asked.append(self) or taken(self, *given))
+    found, counts = [], []
+    for beaten in (np.inf, -1e7):
+        asked.clear()
+        found.append(fit(model, (), beaten=beaten))
+        counts.append(len(asked))
+    assert counts[1] < counts[0]
+    assert found[1].cost > found[0].cost
+    rests = fit(model, (m,))
+    assert fit(model, (m,), beaten=rests.cost).cost == pytest.approx(rests.cost, abs=1.0)
 
 
 def test_a_step_ends_within_limits():
