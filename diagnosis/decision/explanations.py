@@ -155,7 +155,8 @@ def _candidate(rows: Sequence[Weighed], base: float, total: float) -> Candidate:
     """One explanation of the `rows` with its mechanisms: their probabilities added up."""
     h, _ = max(rows, key=lambda row: row[1])
     by_law = max((row for row in rows if not any(m.own_law for m in row[0].mechanisms)), key=lambda row: row[1], default=(None, 0.0))[0]
-    told = [(o, w) for o, w in rows if [m.own_law for m in o.mechanisms] == [m.own_law for m in (by_law or h).mechanisms] and o.names == (by_law or h).names]
+    laws = [(m.name, m.own_law) for m in (by_law or h).mechanisms]
+    told = [(o, w) for o, w in rows if [(m.name, m.own_law) for m in o.mechanisms] == laws]
     shares = softmax([w for _, w in told])
     ways = tuple((o, float(share)) for (o, _), share in zip(told, shares, strict=True))
     return Candidate(h, h.names, h.free, h.evidence.ln - base, float(sum(np.exp(w - total) for _, w in rows)), by_law, ways)

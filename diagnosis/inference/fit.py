@@ -124,7 +124,7 @@ def _settled(problem: Problem, p: Array, rates: Rates, temper: float, beaten: fl
         gradient, normal = lines.slope(problem, here, temper), temper**2 * lines.information + problem.precision
         damped = np.diag(temper**2 * np.diag(lines.information) + problem.least_stiff)  # not what is stiff only with all others held
         move = problem.step(here.p, gradient, normal + damping * damped, longest)
-        promised = -2 * float(gradient @ move) - float(move @ normal @ move)
+        promised = _promised(gradient, normal, move)
         exact = current and rated
         if promised < ENOUGH and exact:
             break
@@ -163,6 +163,11 @@ def _settled(problem: Problem, p: Array, rates: Rates, temper: float, beaten: fl
     return here.p, lines, here.residuals, rates
 
 
+def _promised(slope: Array, normal: Array, move: Array) -> float:
+    """By how much less a quadratic of half slope (n,) and half curvature (n, n) is after a move (n,)."""
+    return -2 * float(slope @ move) - float(move @ normal @ move)
+
+
 def _corrected(problem: Problem, lines: Linearisation, normal: Array, temper: float, there: Point) -> Point:
     """The best of a few steps on from a point with the derivatives of the one before: peaks narrower than they move bend every valley, and a step along
     it is back on its floor after them."""
@@ -199,7 +204,7 @@ def _finished(problem: Problem, p: Array, rates: Rates, temper: float, lines: Li
         _moved(problem, p) if temper == 1.0 and problem.mechanisms else UNMOVED,
         held,
         problem.cost(p, temper, residuals),
-        max(-2 * float(slope @ rest) - float(rest @ normal @ rest), 0.0),
+        max(_promised(slope, normal, rest), 0.0),
     )
 
 

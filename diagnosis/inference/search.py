@@ -74,9 +74,9 @@ def search(
     progress("pairs fitted")
     finalists = _finalists(found)
     least = max((h.evidence.ln for h in found), default=-np.inf) - FAR
-    none, *ended = in_parallel(partial(_at_the_end, model, least), [none, *finalists], workers)
+    none, *ended = _ended(model, least, [none, *finalists], workers)
     anew = dict(zip(map(id, finalists), ended, strict=True))
-    ranked = [replace(anew[id(h)], fit=replace(anew[id(h)].fit, mechanisms=h.mechanisms)) if id(h) in anew else h for h in found]
+    ranked = [anew.get(id(h), h) for h in found]
     ranked += _other_ways(model, ranked, every, tried, workers)
     progress("the best fitted anew")
     laws = {m.name: m for m in reversed(named)}
@@ -88,6 +88,12 @@ def search(
 def _without_effects(model: CampaignModel) -> Hypothesis:
     first = fit(model)
     return settled(model, Hypothesis(first, evidence(model, first)))
+
+
+def _ended(model: CampaignModel, least: float, found: Sequence[Hypothesis], workers: int | None) -> list[Hypothesis]:
+    """Each fitted anew, with the very mechanisms that it has here."""
+    ended = in_parallel(partial(_at_the_end, model, least), found, workers)
+    return [replace(e, fit=replace(e.fit, mechanisms=h.mechanisms)) for e, h in zip(ended, found, strict=True)]
 
 
 def _at_the_end(model: CampaignModel, least: float, h: Hypothesis) -> Hypothesis:
@@ -111,8 +117,7 @@ def _other_ways(model: CampaignModel, ranked: Sequence[Hypothesis], every: Seque
         at = after
     found = fitted(model, tasks, TEMPERS[-1:], best.fit, tried.most, tried.expected, workers, beaten=best.fit.cost + 2 * PLENTY)
     near = [h for h in found if h.evidence.ln > best.evidence.ln - UNLIKELY]
-    ended = in_parallel(partial(_at_the_end, model, -np.inf), near, workers)
-    return [replace(e, fit=replace(e.fit, mechanisms=h.mechanisms)) for e, h in zip(ended, near, strict=True)]
+    return _ended(model, -np.inf, near, workers)
 
 
 def _against_its_law(model: CampaignModel, x: Array, h: Hypothesis, laws: Mapping[str, Mechanism]) -> bool:
