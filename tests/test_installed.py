@@ -112,7 +112,7 @@ def wheel(tmp_path_factory) -> Path:
     return wheel_of(copy_of_checkout(tmp_path_factory.mktemp("checkout")), tmp_path_factory.mktemp("wheel"))
 
 
-@pytest.fixture(scope="module", params=["wheel", "editable", pytest.param("editable without links", marks=pytest.mark.slow)])
+@pytest.fixture(scope="module", params=["wheel", *(pytest.param(way, marks=pytest.mark.slow) for way in ("editable", "editable without links"))])
 def installed(request, tmp_path_factory) -> Environment:
     environment = Environment(tmp_path_factory.mktemp("environment") / "venv")
     if request.param == "wheel":

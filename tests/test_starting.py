@@ -42,7 +42,7 @@ def test_a_new_scene_has_its_name(scenes: Path, kind: str) -> None:
 
 
 def _runs(kind: str, verb: str) -> Any:
-    return pytest.param(kind, verb, marks=[pytest.mark.slow] if verb == "map" or (verb == "runout" and kind != "hdd") else [])
+    return pytest.param(kind, verb, marks=[pytest.mark.slow] if verb in ("map", "runout") else [])
 
 
 @pytest.mark.parametrize(("kind", "verb"), [_runs(kind, verb) for kind in KINDS for verb in ("modes", "static", "table", "map", "runout")])

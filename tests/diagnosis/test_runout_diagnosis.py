@@ -57,7 +57,7 @@ HIDDEN = {
 }
 
 
-@pytest.mark.parametrize("name", ["ball_size", "cage_unbalance", *(pytest.param(n, marks=pytest.mark.slow) for n in ("unbalance", "race_waviness", "ball_waviness"))])
+@pytest.mark.parametrize("name", ["cage_unbalance", *(pytest.param(n, marks=pytest.mark.slow) for n in ("ball_size", "unbalance", "race_waviness", "ball_waviness"))])
 def test_a_hidden_imperfection_is_named_with_its_size_and_place(spindle, name) -> None:
     values = HIDDEN[name]
     d = found(spindle, {name: values})
@@ -73,7 +73,7 @@ def test_a_hidden_imperfection_is_named_with_its_size_and_place(spindle, name) -
     assert best.size[0] > d.smallest[name]
 
 
-@pytest.mark.parametrize("own", [True, False], ids=["own", "drawn"])
+@pytest.mark.parametrize("own", [pytest.param(True, id="own", marks=pytest.mark.slow), pytest.param(False, id="drawn")])
 def test_nothing_is_named_where_nothing_hides(spindle, own) -> None:
     d = found(spindle, {}, seed=4, own=own)
     assert (d.verdict, d.effects) == ("none", ()), d.reason

@@ -36,7 +36,7 @@ def hit(spindle, *before, told=()):
     return model_of(spindle, replace(whole, tests=tuple(tests), noise=NOISE))
 
 
-@pytest.mark.parametrize("before", [0.6e-3, 2.2e-3])
+@pytest.mark.parametrize("before", [2.2e-3, pytest.param(0.6e-3, marks=pytest.mark.slow)])
 def test_a_hit_is_found(spindle, before):
     model = hit(spindle, before)
     none = _without_effects(model)
@@ -55,7 +55,7 @@ def test_it_is_not_sought_without_need(spindle, before):
     assert hit_found(model, _without_effects(model).fit.nuisance, LEAST) is None
 
 
-@pytest.mark.parametrize("told", [(), (0,)])
+@pytest.mark.parametrize("told", [(0,), pytest.param((), marks=pytest.mark.slow)])
 def test_tests_may_be_hit_at_times_of_their_own(spindle, told):
     """Where neither tells, and where one does: what is told stays as it is."""
     before = (0.6e-3, 2.2e-3)

@@ -82,7 +82,7 @@ def test_what_images_of_the_held_force_leave(spindle):
         assert np.abs(left).max() == pytest.approx(y[-1] ** 4 / 15, rel=0.2)
 
 
-@pytest.mark.parametrize(("temperature", "speed", "hammer"), CONDITIONS, ids=["20C-rest", "60C-7200rpm"])
+@pytest.mark.parametrize(("temperature", "speed", "hammer"), [pytest.param(*CONDITIONS[0], id="20C-rest", marks=pytest.mark.slow), pytest.param(*CONDITIONS[1], id="60C-7200rpm")])
 def test_frf_against_the_linear_model(spindle, quick, temperature, speed, hammer):
     """Time simulation, filter, sampling and H1 without noise are the exact FRF over 400-6000 Hz."""
     one = replace(quick, hammer_nodes=quick.hammer_nodes[hammer:][:1])
