@@ -45,7 +45,8 @@ def spindle() -> Spindle:
 @pytest.fixture(scope="session")
 def cold(spindle):
     """Both bearings at the reference temperature, at rest."""
-    from thermospindle.model.bearing.pair import reference_motion, solve
+    from thermospindle.model.bearing.pair import solve
+    from thermospindle.model.bearing.row import reference_motion
     from thermospindle.model.machine import Condition
 
     return solve(spindle, Condition(20.0), {b.name: reference_motion(20.0) for b in spindle.bearings})

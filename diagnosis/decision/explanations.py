@@ -167,7 +167,7 @@ def _ways(found: Search) -> dict[tuple[str, str], int]:
     seen: dict[tuple[str, str], set] = {}
     for s in found.screened:
         if s.visibility > 0:
-            seen.setdefault((s.mechanism.name, s.mechanism.kind), set()).add(tuple(sorted(s.mechanism.choices.items())))
+            seen.setdefault((s.mechanism.name, s.mechanism.kind), set()).add(s.mechanism.variant)
     return {key: len(choices) for key, choices in seen.items()}
 
 

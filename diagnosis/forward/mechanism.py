@@ -53,6 +53,11 @@ class Mechanism:
         return self.effect.name
 
     @property
+    def variant(self) -> tuple:
+        """What it is told by: its effect's name, whose law, and the choices made."""
+        return self.name, self.kind, *sorted(self.choices.items())
+
+    @property
     def size(self) -> Parameter:
         return self.effect.parameters[0]
 

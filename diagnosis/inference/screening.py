@@ -69,7 +69,7 @@ def screen(
 
 def linearised(model: CampaignModel, about: Fit) -> Linearisation:
     """The model `about`, taken anew at its own lines; the last one asked for is kept with the model."""
-    key = about.point.tobytes(), tuple((m.name, m.kind, *m.choices.items()) for m in about.mechanisms), about.held
+    key = about.point.tobytes(), tuple(m.variant for m in about.mechanisms), about.held
     if key not in model.kept:
         model.kept.clear()
         model.kept[key] = Problem(model, about.mechanisms).linearisation(about.point, about.rates, np.array([h.number for h in about.held], int))

@@ -106,12 +106,12 @@ def _other_ways(model: CampaignModel, ranked: Sequence[Hypothesis], every: Seque
     best = max((h for h in ranked if h.mechanisms and not h.free), key=lambda h: h.evidence.ln, default=None)
     if best is None or best.evidence.ln < max(h.evidence.ln for h in ranked) - NEAR:
         return []
-    promised = {(s.mechanism.name, s.mechanism.kind, *s.mechanism.choices.items()): s.gain for s in sorted(tried.screened, key=lambda s: s.gain)}
+    promised = {s.mechanism.variant: s.gain for s in sorted(tried.screened, key=lambda s: s.gain)}
     tasks, at = [], len(model.parameters)
     for k, m in enumerate(best.mechanisms):
         sizes, after = at + len(model.tests), at + len(model.tests) + len(m.shape)
         others = [o for o in every if (o.name, o.kind) == (m.name, m.kind) and o.choices != m.choices]
-        for o in sorted(others, key=lambda o: -promised.get((o.name, o.kind, *o.choices.items()), -np.inf))[:WAYS]:
+        for o in sorted(others, key=lambda o: -promised.get(o.variant, -np.inf))[:WAYS]:
             start = np.concatenate([best.fit.point[:sizes], np.zeros(len(o.shape)), best.fit.point[after:]])
             tasks.append(Task((*best.mechanisms[:k], o, *best.mechanisms[k + 1 :]), (start,), -np.inf))
         at = after

@@ -16,14 +16,8 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from thermospindle.model.bearing.pair import (
-    BearingState,
-    PairState,
-    bearing_state,
-    contact_status,
-    reference_deformation,
-    reference_motion,
-)
+from thermospindle.model.bearing.pair import BearingState, PairState, bearing_state, contact_status
+from thermospindle.model.bearing.row import reference_deformation, reference_motion
 from thermospindle.model.machine import Bearing, Condition, RingMotion, Spindle
 from thermospindle.sim.effects.effect import Effect, Parameter, Values
 

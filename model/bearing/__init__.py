@@ -11,6 +11,7 @@ pair             the ball rows of all sets against each other: axial equilibrium
                  states that follow
 movement         how far rings move until their axial forces balance
 roller           cylindrical roller rows: line contacts in slices, clearance that follows the temperature, stiffness
+row              a ball row where its rings are at a temperature
 springs          balls as springs between points of two bodies: what a ball-by-ball bearing element is made of
 state            what a bearing is to the rotor: stiffness and damping, with names for their entries
 stiffness_table  the stiffness table: bearing properties over temperature and speed, as a CSV with units in its header

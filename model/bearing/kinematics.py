@@ -32,7 +32,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from thermospindle.model.bearing.pair import BearingState, PairState, ring_speeds
+from thermospindle.model.bearing.pair import BearingState, PairState
+from thermospindle.model.bearing.row import ring_speeds
 from thermospindle.model.machine import Bearing, RollerBearing, Spindle
 
 SMALLEST = 1e-9

@@ -1,32 +1,28 @@
 """The ball rows of all sets against each other: axial equilibrium at a temperature, and the bearing states that follow.
 
-Jang, Kim, Han, Kim (2003): contact angle and deformation from ring motion, Eqs. (1)-(5); load-deflection and stiffness, Eqs. (6),
-(7); the hub moves until the axial forces balance, Eq. (8) and Fig. 5. Besides the ball (Eq. 3) the grooves grow too, which makes
-a uniform expansion of everything leave the contact angle alone. The secant method of Fig. 5 is replaced by a bracketing one:
-every row's axial force rises monotonically with the hub's movement, so the root is unique and cannot be missed.
+Jang, Kim, Han, Kim (2003): load-deflection and stiffness, Eqs. (6), (7); the hub moves until the axial forces balance, Eq. (8) and
+Fig. 5. The secant method of Fig. 5 is replaced by a bracketing one: every row's axial force rises monotonically with the hub's
+movement, so the root is unique and cannot be missed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 import scipy
 
-from thermospindle.model.bearing.ball_row import BallInertia, BallRow, Centres, RowForce, centred_axial_force, respond
+from thermospindle.model.bearing.ball_row import BallRow, Centres, RowForce, centred_axial_force, respond
 from thermospindle.model.bearing.heavy_ball import Vector
-from thermospindle.model.bearing.hertz import in_series, race_contact
 from thermospindle.model.bearing.movement import balanced
 from thermospindle.model.bearing.roller import RollerState, roller_state
+from thermospindle.model.bearing.row import row_at
 from thermospindle.model.bearing.state import ByDirection, LinearState, linear_state
 from thermospindle.model.errors import BadInput, NoEquilibrium
-from thermospindle.model.machine import Bearing, BearingSet, Condition, RingMotion, RollerBearing, Spindle
+from thermospindle.model.machine import Bearing, BearingSet, Condition, RingMotion, Spindle
 from thermospindle.model.types import Array
 
-Elastic = tuple[float, float]
-"""Young's modulus (Pa) and Poisson's ratio."""
 TOUCHING = 1e-9
 """Contact force, over that of the preload, below which a ball is loose."""
 
@@ -108,11 +104,6 @@ def check_centred(state: PairState, what: str) -> None:
     """`BadInput` where a radial load displaces rings, for `what` takes rows with centred ones."""
     if any(b.displacement for b in state.bearings):
         raise BadInput(f"{what} is for centred rings, and here radial_load_N displaces them; take it out, or ask what their stiffness decides: modes, table, static, impact with linear elements")
-
-
-def reference_motion(temperature: float) -> RingMotion:
-    """Rings that have not moved: the reference state."""
-    return RingMotion(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, temperature)
 
 
 def solve(spindle: Spindle, condition: Condition, motions: Mapping[str, RingMotion]) -> PairState:
@@ -244,90 +235,6 @@ def contact_status(bearings: tuple[BearingState, ...]) -> str:
     """The status of a pair: that all bearings are in contact, or which of them is not."""
     loose = [b.name for b in bearings if not b.in_contact]
     return "in contact" if not loose else f"{' and '.join(loose)} bearing lost contact"
-
-
-def row_at(spindle: Spindle, b: Bearing, sense: int, motion: RingMotion, speed: float) -> BallRow:
-    """The ball row of bearing `b` with its rings moved by `motion` and the hub not yet moved.
-
-    The groove curvature centres move with the rings, plus the growth of the groove radii and of their distance from the ring's
-    middle: Jang et al. 2003, Eqs. (1)-(5).
-    """
-    loaded = b.unloaded_distance + reference_deformation(spindle, b)
-    radial = loaded * np.cos(b.contact_angle)
-    axial = loaded * np.sin(b.contact_angle)
-    d, fi, fo = b.ball_diameter, b.inner_conformity, b.outer_conformity
-    radial += motion.inner_r + fi * d * motion.inner_strain - (motion.outer_r - fo * d * motion.outer_strain)
-    inner_share = (fi - 0.5) / (fi + fo - 1)  # the groove centres lie off the ring's middle by this share of their distance
-    growth = inner_share * motion.inner_strain + (1 - inner_share) * motion.outer_strain
-    axial += sense * (motion.outer_z - motion.inner_z) + growth * axial
-    ball_radius = d / 2 * (1 + motion.ball_strain)
-    inner_constant, outer_constant = contact_constants(spindle, b, motion, float(np.arctan2(axial, radial)))
-    return BallRow(
-        balls=b.balls,
-        radial=float(radial),
-        axial=float(sense * axial),
-        inner_length=fi * d * (1 + motion.inner_strain) - ball_radius,
-        outer_length=fo * d * (1 + motion.outer_strain) - ball_radius,
-        inner_constant=inner_constant,
-        outer_constant=outer_constant,
-        arm=b.pitch_diameter / 2,
-        inertia=_ball_inertia(spindle, b, speed),
-    )
-
-
-def reference_deformation(spindle: Spindle, b: Bearing) -> float:
-    """Deformation (m) of each ball under the preload at the reference temperature, both contacts: Eq. (6) inverted."""
-    motion = reference_motion(spindle.reference_temperature)
-    return _reference_deformation(b, *_elastic(spindle, b, motion.temperature), motion)
-
-
-@lru_cache(maxsize=4096)
-def _reference_deformation(b: Bearing, ball: Elastic, ring: Elastic, motion: RingMotion) -> float:
-    constants = _contact_constants(b, ball, ring, motion, b.contact_angle)
-    return float((b.preload / (b.balls * np.sin(b.contact_angle)) / in_series(*constants)) ** (2 / 3))
-
-
-def contact_constants(spindle: Spindle, b: Bearing, motion: RingMotion, angle: float) -> tuple[float, float]:
-    """Hertz constants (inner, outer) at the temperature of `motion`, with its grown ball and its elastic moduli."""
-    return _contact_constants(b, *_elastic(spindle, b, motion.temperature), motion, angle)
-
-
-def _elastic(spindle: Spindle, b: Bearing, temperature: float) -> tuple[Elastic, Elastic]:
-    """Of balls and rings at a temperature."""
-    ball, ring = spindle.materials[b.ball_material], spindle.materials[b.ring_material]
-    return (ball.youngs_modulus(temperature), ball.poisson_ratio), (ring.youngs_modulus(temperature), ring.poisson_ratio)
-
-
-def _contact_constants(b: Bearing, ball: Elastic, ring: Elastic, motion: RingMotion, angle: float) -> tuple[float, float]:
-    d = b.ball_diameter * (1 + motion.ball_strain)
-    inner, outer = (
-        race_contact(d, f * b.ball_diameter * (1 + strain) / d, b.pitch_diameter * (1 + strain), angle, is_inner, ball, ring).stiffness
-        for f, strain, is_inner in (
-            (b.inner_conformity, motion.inner_strain, True),
-            (b.outer_conformity, motion.outer_strain, False),
-        )
-    )
-    return b.constant_factor * inner, b.constant_factor * outer
-
-
-def _ball_inertia(spindle: Spindle, b: Bearing, speed: float) -> BallInertia | None:
-    if speed == 0.0 or spindle.ball_inertia == 0.0:
-        return None
-    inner, outer = ring_speeds(spindle, b, speed)
-    density = spindle.materials[b.ball_material].density
-    return BallInertia(b.ball_diameter, b.pitch_diameter, density, inner, outer, spindle.ball_inertia)
-
-
-def ring_speeds(spindle: Spindle, b: Bearing | RollerBearing, speed: float) -> tuple[float, float]:
-    """Speeds (rad/s) of the inner and the outer ring of a bearing where the spindle turns at `speed`."""
-
-    def of(name: str) -> float:
-        if name == "ground":
-            return 0.0
-        body = spindle.structure.body(name)
-        return body.speed_ratio * speed if body.turns else 0.0
-
-    return of(b.inner_body), of(b.outer_body)
 
 
 def damping_time(spindle: Spindle, b: Bearing) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 
 from thermospindle.model.bearing.hertz import in_series
-from thermospindle.model.bearing.pair import contact_constants, reference_deformation, reference_motion
+from thermospindle.model.bearing.row import contact_constants, reference_deformation, reference_motion
 from thermospindle.model.errors import BadInput, NoEquilibrium
 from thermospindle.model.machine import Spindle
 from thermospindle.model.shaft import Shaft

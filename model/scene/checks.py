@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from thermospindle.model.bearing.hertz import in_series
-from thermospindle.model.bearing.pair import contact_constants, reference_motion, ring_speeds
+from thermospindle.model.bearing.row import contact_constants, reference_motion, ring_speeds
 from thermospindle.model.errors import BadInput, instead
 from thermospindle.model.machine import Bearing, Region, Spindle
 from thermospindle.model.rotor.section import cells

@@ -19,7 +19,8 @@ import scipy
 from pydantic import ValidationError
 
 from thermospindle.model.bearing.catalogue import derived
-from thermospindle.model.bearing.pair import reference_motion, solve
+from thermospindle.model.bearing.pair import solve
+from thermospindle.model.bearing.row import reference_motion
 from thermospindle.model.built.drawn import GRADES, drawn
 from thermospindle.model.built.tolerance import deviated
 from thermospindle.model.errors import BadInput

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from thermospindle.diagnosis.ladder.forms import FIXED_STIFFNESS, FORMS, RADIAL_EXPANSION
-from thermospindle.model.bearing.pair import PairState, reference_motion, solve
+from thermospindle.model.bearing.pair import PairState, solve
+from thermospindle.model.bearing.row import reference_motion
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
 from thermospindle.sim.operating import operating_point

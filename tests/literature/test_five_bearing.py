@@ -13,7 +13,8 @@ import pytest
 from tests.conftest import ROOT
 from thermospindle.cli import main
 from thermospindle.model.bearing.catalogue import CatalogueRow, derived
-from thermospindle.model.bearing.pair import reference_motion, solve
+from thermospindle.model.bearing.pair import solve
+from thermospindle.model.bearing.row import reference_motion
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import BearingSet, Condition
 from thermospindle.model.rotor.beam import with_theory

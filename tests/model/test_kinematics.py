@@ -15,7 +15,7 @@ from thermospindle.model.bearing.kinematics import (
     race_line,
     row_kinematics,
 )
-from thermospindle.model.bearing.pair import ring_speeds
+from thermospindle.model.bearing.row import ring_speeds
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
 

@@ -10,8 +10,9 @@ import pytest
 
 from tests.conftest import ROOT
 from thermospindle.model.bearing.ball_row import respond
-from thermospindle.model.bearing.pair import reference_motion, solve
+from thermospindle.model.bearing.pair import solve
 from thermospindle.model.bearing.roller import EXPONENT, RollerState, line_constant
+from thermospindle.model.bearing.row import reference_motion
 from thermospindle.model.errors import BadInput, NoEquilibrium
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor import mjcf

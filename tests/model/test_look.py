@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from tests.conftest import ROOT
-from thermospindle.model.bearing.pair import reference_motion, solve
+from thermospindle.model.bearing.pair import solve
+from thermospindle.model.bearing.row import reference_motion
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor import look, mjcf
 from thermospindle.model.rotor.chain import rotor_base

@@ -8,7 +8,8 @@ import pytest
 from tests.mounting import sprung
 from thermospindle.model.bearing.ball_row import respond
 from thermospindle.model.bearing.definitions import SENSE
-from thermospindle.model.bearing.pair import bearing_state, reference_deformation, reference_motion, row_at, solve
+from thermospindle.model.bearing.pair import bearing_state, solve
+from thermospindle.model.bearing.row import reference_deformation, reference_motion, row_at
 from thermospindle.model.built.tolerance import scaled_preload
 from thermospindle.model.machine import Condition, Law, RingMotion
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from tests.mounting import sprung
-from thermospindle.model.bearing.pair import reference_motion, solve
+from thermospindle.model.bearing.pair import solve
+from thermospindle.model.bearing.row import reference_motion
 from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor import mjcf

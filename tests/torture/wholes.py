@@ -17,7 +17,8 @@ import pytest
 from scipy.io import savemat
 
 from tests.conftest import DATA, ROOT, SCENE
-from thermospindle.model.bearing.pair import reference_motion, solve
+from thermospindle.model.bearing.pair import solve
+from thermospindle.model.bearing.row import reference_motion
 from thermospindle.model.bearing.stiffness_table import tabulate, write_table
 from thermospindle.model.files import kept as store
 from thermospindle.model.machine import Condition

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from thermospindle.model.bearing.ball_row import respond
-from thermospindle.model.bearing.pair import BearingState, PairState, contact_status, reference_deformation
+from thermospindle.model.bearing.pair import BearingState, PairState, contact_status
+from thermospindle.model.bearing.row import reference_deformation
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values, direction_parameter
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from thermospindle.model.bearing.pair import reference_deformation
+from thermospindle.model.bearing.row import reference_deformation
 from thermospindle.model.machine import Condition, RingMotion, Spindle
 from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values
 

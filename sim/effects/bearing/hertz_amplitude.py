@@ -15,7 +15,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from thermospindle.model.bearing.pair import BearingState, PairState, reference_deformation
+from thermospindle.model.bearing.pair import BearingState, PairState
+from thermospindle.model.bearing.row import reference_deformation
 from thermospindle.model.machine import Bearing, Condition, Spindle
 from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values, scale_parameter
 

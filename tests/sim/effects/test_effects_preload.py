@@ -5,7 +5,8 @@ import pytest
 
 from tests.conftest import ROOT
 from tests.effect_points import at
-from thermospindle.model.bearing.pair import reference_motion, solve
+from thermospindle.model.bearing.pair import solve
+from thermospindle.model.bearing.row import reference_motion
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
 from thermospindle.sim.effects.bearing import clearance_opening, constant_force_preload, preload_loss

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.mounting import turning_inside
-from thermospindle.model.bearing.pair import reference_motion
+from thermospindle.model.bearing.row import reference_motion
 from thermospindle.model.machine import Condition
 from thermospindle.sim.effects.bearing import ring_growth
 

@@ -10,7 +10,7 @@ import pytest
 from tests.conftest import SCENE
 from tests.mounting import turning_inside
 from thermospindle.diagnosis.add import new_scene
-from thermospindle.model.bearing.pair import reference_motion
+from thermospindle.model.bearing.row import reference_motion
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import build

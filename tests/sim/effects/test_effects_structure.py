@@ -7,7 +7,7 @@ import pytest
 from scipy.special import jn_zeros
 
 from tests.effect_points import REST, at
-from thermospindle.model.bearing.pair import contact_constants
+from thermospindle.model.bearing.row import contact_constants
 from thermospindle.model.machine import Condition, Law
 from thermospindle.model.rotor.chain import Element, RotorBase, matrices
 from thermospindle.model.rotor.modes import modes, poles
