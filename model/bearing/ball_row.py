@@ -134,7 +134,12 @@ def respond(row: BallRow, displacement: Array | None = None, centre: Vector | No
 
 
 def centred_axial_force(row: BallRow, movement: float = 0.0, centres: Centres | None = None) -> float:
-    """Axial force (N) needed on the outer ring of a row with centred rings when it has moved by `movement` (m), as `respond` has it.
+    """Axial force (N) needed on the outer ring of a row with centred rings when it has moved by `movement` (m), as `respond` has it."""
+    return centred_axial(row, movement, centres)[0]
+
+
+def centred_axial(row: BallRow, movement: float, centres: Centres | None = None) -> tuple[float, float]:
+    """`centred_axial_force` and its derivative by the movement (N/m).
 
     Of rows that are asked at many places near each other `centres` keeps where their balls have settled.
     """
@@ -143,10 +148,12 @@ def centred_axial_force(row: BallRow, movement: float = 0.0, centres: Centres | 
         centres = {} if centres is None else centres
         found = _settled(row, [(-row.radial, axial)], centres.get(row))[0]
         centres[row] = found.centre
-        return row.balls * found.on_outer[1]
+        return row.balls * found.on_outer[1], row.balls * found.stiffness()[3]
     length = hypot(row.radial, axial)
     deformation = max(length - row.unloaded_distance, 0.0)
-    return row.balls * row.constant * deformation**1.5 * axial / length
+    root, sine = row.balls * row.constant * sqrt(deformation), axial / length
+    force = root * deformation
+    return force * sine, 1.5 * root * sine**2 + force / length * (1 - sine**2)
 
 
 def _heavy(row: BallRow) -> bool:

@@ -3,48 +3,114 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import scipy
 
-from thermospindle.model.bearing.ball_row import BallRow
+from thermospindle.model.bearing.ball_row import BallRow, Centres, centred_axial, centred_axial_force
 from thermospindle.model.errors import NoEquilibrium
 
-SECANTS = 20  # steps of the secant method, which takes six
+STEPS = 20  # of Newton's method, which takes six
+FARTHEST = 1e-4  # m, in one of them
+EXACT, ROUNDED = 1e-17, 1e-15  # m, of what is left of a step, and below which a step that does not get shorter is rounding
+REACH, NEAR = 1e-6, 1e-9  # m, first bracket about where nothing has moved, and about the answer of balls without inertia
 
 
-def balanced(rows: list[BallRow], imbalance: Callable[[list[BallRow], float], float]) -> float:
-    """The movement without imbalance, by bracketing; that of balls with inertia is sought from the answer of balls without."""
-    if all(row.inertia is None for row in rows):
-        return _bracketed(lambda h: imbalance(rows, h), 0.0, 1e-6)
-    massless = [replace(row, inertia=None) for row in rows]
-    start = _bracketed(lambda h: imbalance(massless, h), 0.0, 1e-6)
-    return _near(lambda h: imbalance(rows, h), start)
+@dataclass(frozen=True)
+class Sleeve:
+    """Rings that slide together on a spring: their rows, whether they go with the hub (1) or against it (-1), and the spring's push in the sense of z (N) and its
+    rate (N/m; 0 for a constant force)."""
+
+    rows: tuple[BallRow, ...]
+    towards: int
+    push: float
+    rate: float
 
 
-def _near(imbalance: Callable[[float], float], start: float) -> float:
-    """The movement without imbalance near `start`, by the secant method; by bracketing where that does not arrive."""
-    before, here = start, start + 1e-8
-    f_before, f = imbalance(before), imbalance(here)
-    for _ in range(SECANTS):
-        if f == 0.0:
-            return here
-        if f == f_before:
-            break
-        step = -f * (here - before) / (f - f_before)
-        if abs(step) > 1e-4:
-            break
-        before, f_before = here, f
-        here = here + step
-        if abs(step) <= 1e-17 + 1e-14 * abs(here):
-            return here
-        f = imbalance(here)
-    return _bracketed(imbalance, start, 1e-9)
+@dataclass(frozen=True)
+class Rings:
+    """What one movement of a hub (m) balances: rows whose outer rings it moves with it (1) or against it (-1), rows on sleeves, and the load on it (N)."""
+
+    fixed: tuple[tuple[BallRow, int], ...]
+    sleeves: tuple[Sleeve, ...]
+    load: float
+
+    @property
+    def heavy(self) -> bool:
+        return any(row.inertia is not None for row in (*(row for row, _ in self.fixed), *(row for s in self.sleeves for row in s.rows)))
+
+    @property
+    def massless(self) -> Rings:
+        fixed = tuple((replace(row, inertia=None), towards) for row, towards in self.fixed)
+        return Rings(fixed, tuple(replace(s, rows=tuple(replace(row, inertia=None) for row in s.rows)) for s in self.sleeves), self.load)
 
 
-def _bracketed(imbalance: Callable[[float], float], start: float, reach: float) -> float:
+def equilibrium(rings: Rings, centres: Centres) -> tuple[float, ...]:
+    """Movement (m) of the hub without imbalance, and of the rings on every sleeve, by Newton's method, or by bracketing where that does not arrive; that of balls
+    with inertia is sought from the answer of balls without. `centres` keeps where balls settled. Raises `NoEquilibrium`."""
+    without, nowhere = rings.massless if rings.heavy else rings, (0.0,) * (1 + len(rings.sleeves))
+    found = _near(without, nowhere, centres) or _bracketed(without, nowhere, REACH, centres)
+    if rings.heavy:
+        found = _near(rings, found, centres) or _bracketed(rings, found, NEAR, centres)
+    return found
+
+
+def _near(rings: Rings, start: tuple[float, ...], centres: Centres) -> tuple[float, ...] | None:
+    """The equilibrium near a start by Newton's method: of every sleeve f(r) + rate (r - h) = push, of the hub the sum of its rows and springs. None where steps do
+    not end, are long, or nothing is pressed."""
+    hub, slid = start[0], list(start[1:])
+    last = 0.0
+    for _ in range(STEPS):
+        off, stiffness, own = -rings.load, 0.0, []
+        for row, towards in rings.fixed:
+            force, slope = centred_axial(row, towards * hub, centres)
+            off += towards * force
+            stiffness += slope
+        for s, r in zip(rings.sleeves, slid, strict=True):
+            spring = s.push - s.rate * (r - s.towards * hub)
+            answers = [centred_axial(row, r, centres) for row in s.rows]
+            held = sum(slope for _, slope in answers) + s.rate
+            if held <= 0.0:
+                return None
+            missing = spring - sum(force for force, _ in answers)
+            own.append((missing / held, s.towards * s.rate / held))  # how far it goes alone, and with the hub
+            off += s.towards * (spring - s.rate * missing / held)
+            stiffness += s.rate * (1 - s.rate / held)
+        if stiffness <= 0.0:
+            return None
+        step = -off / stiffness
+        moves = [step, *(alone + share * step for alone, share in own)]
+        longest = max(map(abs, moves))
+        if longest > FARTHEST:
+            return None
+        hub, slid = hub + step, [r + m for r, m in zip(slid, moves[1:], strict=True)]
+        # steps that double their digits leave longest^3 / last^2
+        if longest <= EXACT or longest**3 <= EXACT * last**2 or last / 2 < longest < ROUNDED:
+            return hub, *slid
+        last = longest
+    return None
+
+
+def _bracketed(rings: Rings, start: tuple[float, ...], reach: float, centres: Centres) -> tuple[float, ...]:
+    """Every force rises with its movement: brackets about a `start`, for the sleeves within that of the hub."""
+
+    def slid(s: Sleeve, at: float, hub: float) -> float:
+        return _root(lambda r: sum(centred_axial_force(row, r, centres) for row in s.rows) + s.rate * (r - s.towards * hub) - s.push, at, reach)
+
+    def imbalance(hub: float) -> float:
+        found = sum(towards * centred_axial_force(row, towards * hub, centres) for row, towards in rings.fixed) - rings.load
+        for s, at in zip(rings.sleeves, start[1:], strict=True):
+            # whatever rings under a constant force do, it is the push
+            found += s.towards * (s.push - s.rate * (slid(s, at, hub) - s.towards * hub) if s.rate else s.push)
+        return found
+
+    hub = _root(imbalance, start[0], reach)
+    return hub, *(slid(s, at, hub) for s, at in zip(rings.sleeves, start[1:], strict=True))
+
+
+def _root(imbalance: Callable[[float], float], start: float, reach: float) -> float:
     while reach < 5e-3:
         if imbalance(start - reach) <= 0 <= imbalance(start + reach):
-            return float(scipy.optimize.brentq(imbalance, start - reach, start + reach, xtol=1e-17, rtol=1e-14))
+            return float(scipy.optimize.brentq(imbalance, start - reach, start + reach, xtol=EXACT, rtol=1e-14))
         reach *= 4
     raise NoEquilibrium(f"the bearings find no axial equilibrium within {reach * 1e3:.1f} mm of hub movement")

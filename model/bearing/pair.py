@@ -15,7 +15,7 @@ import scipy
 
 from thermospindle.model.bearing.ball_row import BallRow, Centres, RowForce, centred_axial_force, respond
 from thermospindle.model.bearing.heavy_ball import Vector
-from thermospindle.model.bearing.movement import balanced
+from thermospindle.model.bearing.movement import Rings, Sleeve, equilibrium
 from thermospindle.model.bearing.roller import RollerState, roller_state
 from thermospindle.model.bearing.row import row_at
 from thermospindle.model.bearing.state import ByDirection, LinearState, linear_state
@@ -145,54 +145,27 @@ def _carriers(spindle: Spindle, b: Bearing) -> tuple[str, str]:
     return spindle.structure.carrier(b.inner_body), spindle.structure.carrier(b.outer_body)
 
 
-@dataclass(frozen=True)
-class _Sleeve:
-    """Rings that slide together on a spring: their rows, its push in the sense of z (N) and its rate (N/m; 0 for a constant force)."""
-
-    rows: tuple[str, ...]
-    push: float
-    rate: float
-
-
 def _positions(spindle: Spindle, rows: Mapping[str, BallRow], group: Sequence[Bearing], centres: Centres) -> dict[str, float]:
     """Movement (m) of every row's outer ring against its inner one, for one group of rows that share carriers."""
     of = {b.name: _carriers(spindle, b) for b in group}
     carriers = list(dict.fromkeys(c for pair in of.values() for c in pair))
     sets = [s for s in spindle.sets if s.bearings[0] in rows]
-    sleeves = [
-        _Sleeve(s.spring.rings_of, spindle.bearing(s.spring.rings_of[0]).sense * s.preload, s.spring.rate or 0.0)
-        for s in sets
-        if s.spring is not None
-    ]
+    springs = [(s.spring.rings_of, spindle.bearing(s.spring.rings_of[0]).sense * s.preload, s.spring.rate or 0.0) for s in sets if s.spring is not None]
     if len(carriers) > 2:
-        return _many_positions(spindle, rows, of, carriers, sets, sleeves)
+        if springs or spindle.axial_load:
+            raise NoEquilibrium(f"rings on springs and axial loads are for one rotor in one housing; here are {', '.join(carriers)}")
+        return _many_positions(spindle, rows, of, carriers, sets)
     # one unknown: how far the second carrier of the first row has moved against its first
     towards = {name: 1 if pair == of[group[0].name] else -1 for name, pair in of.items()}
     # rows loaded one way carry all shares together, from outside; opposed ones carry each other's
     outside = sum(towards[name] * spindle.bearing(name).sense * s.preload / len(s.bearings) for s in sets if spindle.one_way(s) for name in s.bearings)
-    load = outside + spindle.axial_load
-    fixed = [name for name in rows if not any(name in s.rows for s in sleeves)]
-
-    def slid(at: Mapping[str, BallRow], sleeve: _Sleeve, hub: float) -> float:
-        """Movement of the rings on a sleeve: they carry f(R) = push - rate (R - H), which rises with R."""
-        own = [at[name] for name in sleeve.rows]
-        return balanced(own, lambda rows, r: sum(centred_axial_force(row, r, centres) for row in rows) + sleeve.rate * (r - towards[sleeve.rows[0]] * hub) - sleeve.push)
-
-    def imbalance(at: Sequence[BallRow], hub: float) -> float:
-        by_name = dict(zip(rows, at, strict=True))
-        found = sum(towards[name] * centred_axial_force(by_name[name], towards[name] * hub, centres) for name in fixed)
-        for sleeve in sleeves:
-            if sleeve.rate:
-                moved = slid(by_name, sleeve, hub)
-                found += towards[sleeve.rows[0]] * sum(centred_axial_force(by_name[name], moved, centres) for name in sleeve.rows)
-            else:  # whatever its rings do, their force is the push
-                found += towards[sleeve.rows[0]] * sleeve.push
-        return found - load
-
-    hub = balanced(list(rows.values()), imbalance)
+    sliding = [name for names, _, _ in springs for name in names]
+    fixed = tuple((row, towards[name]) for name, row in rows.items() if name not in sliding)
+    sleeves = tuple(Sleeve(tuple(rows[n] for n in names), towards[names[0]], push, rate) for names, push, rate in springs)
+    hub, *slid = equilibrium(Rings(fixed, sleeves, outside + spindle.axial_load), centres)
     moved = {name: towards[name] * hub for name in rows}
-    for sleeve in sleeves:
-        moved |= dict.fromkeys(sleeve.rows, slid(rows, sleeve, hub))
+    for (names, _, _), r in zip(springs, slid, strict=True):
+        moved |= dict.fromkeys(names, r)
     return moved
 
 
@@ -202,14 +175,11 @@ def _many_positions(
     of: Mapping[str, tuple[str, str]],
     carriers: Sequence[str],
     sets: Sequence[BearingSet],
-    sleeves: Sequence[_Sleeve],
 ) -> dict[str, float]:
     """As `_positions` for more than two carriers, as of rotors within rotors: all balances at once, by Powell's hybrid method.
 
     The energy of rows without ball inertia is convex in the positions, so that their answer is unique; it is the start for those with it.
     """
-    if sleeves or spindle.axial_load:
-        raise NoEquilibrium(f"rings on springs and axial loads are for one rotor in one housing; here are {', '.join(carriers)}")
     names, unknown = list(rows), list(carriers[1:])
     motion = np.array([[(of[n][1] == c) - (of[n][0] == c) for c in unknown] for n in names], float)
     outside = np.zeros(len(names))
