@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache, reduce
-from itertools import product
+from itertools import product, zip_longest
 
 import numpy as np
 from scipy.sparse import csr_array, eye_array, lil_array
@@ -23,8 +23,18 @@ from scipy.special import logsumexp
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.fit import Fit
-from thermospindle.diagnosis.inference.gaussian import Quadratic, ln_integral, ln_within_limits, marginal, one_sided, posterior, quadratic
-from thermospindle.diagnosis.inference.prior import Learned, nuisance_root, whitened_covariance, whole_root
+from thermospindle.diagnosis.inference.gaussian import (
+    Nuisances,
+    Quadratic,
+    ln_integral,
+    ln_within_limits,
+    marginal,
+    one_sided,
+    posterior,
+    quadratic,
+    under,
+)
+from thermospindle.diagnosis.inference.prior import Learned, mechanism_root, nuisance_root, whitened_covariance
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import Effect
@@ -61,9 +71,9 @@ class Evidence:
     by_departing: float = 0.0
 
 
-def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide: bool = False) -> Evidence:
+def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide: bool = False, kept: Sequence[Nuisances] = ()) -> Evidence:
     """The evidence of a fit at its own temper (its errors are 1 / temper times the data's); with `near` the sizes of discrepancies, drift and
-    errors are taken from the best of these, which is quick. Build tolerances are as stated, or with `wide` as much wider as is likeliest. What a fit with the
+    errors are taken from the best of these, which is quick, and quicker with the nuisances `kept` of each (`integrated`). Build tolerances are as stated, or with `wide` as much wider as is likeliest. What a fit with the
     data's own errors still owes is not counted."""
     turn = amplitudes_apart(fit)
     whole = turned(turn, fit.chi2, fit.gradient, fit.information, fit.point)
@@ -76,14 +86,16 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
     conditions = tuple(d.condition for d in model.tests)
     roots = [_roots(conditions, grid, len(m.shape)) for m, grid in zip(fit.mechanisms, own_grids, strict=True)]
 
-    def each(s: float, sizes: Mapping[str, float]) -> Array:
+    def each(s: float, sizes: Mapping[str, float], nuisances: Nuisances | None = None) -> Array:
         """ln evidence of every combination of widths and departures of the mechanisms."""
         scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
         wider = WIDER[sizes.get(kinds_of.BUILD, 1.0)]
-        return marginal(scaled, nuisance_root(model, sizes, fit.moved)).integrated(roots) - fit.count * np.log(s) + wider
+        return marginal(scaled, nuisances or integrated(model, fit, s, sizes)).integrated(roots) - fit.count * np.log(s) + wider
 
+    nuisances = None
     if near:
-        values, s, sizes = max(((each(n.errors, n.sizes), n.errors, dict(n.sizes)) for n in near), key=lambda row: _ln_mean(row[0]))
+        every = [(each(n.errors, n.sizes, own), n.errors, dict(n.sizes), own) for n, own in zip_longest(near, kept)]
+        values, s, sizes, nuisances = max(every, key=lambda row: _ln_mean(row[0]))
     else:
         scales = [1.0] if fit.temper < 1.0 else [float(s) for s in _error_scales(whole, fit.count)]
         s, sizes = scales[len(scales) // 2], {kind: grid[0] for kind, grid in grids.items()}
@@ -103,7 +115,7 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
     own = [grid[k] for grid, k in zip(own_grids, best, strict=True)]
     scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
     learned = Learned(sizes, s, tuple(w for w, _ in own), tuple(d for _, d in own))
-    mean, spread = posterior(scaled, whole_root(model, fit.mechanisms, learned, fit.moved))
+    mean, spread = posterior(scaled, nuisances or integrated(model, fit, s, sizes), mechanism_root(model, fit.mechanisms, learned))
     chi2 = whole.at(mean)
     mean, spread = fit.point + turn @ (mean - fit.point), turn @ spread @ turn.T
     truncation = ln_within_limits(fit, mean, spread)
@@ -122,6 +134,12 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
     ln = _ln_mean(values) + truncation - (fit.owed / 2 if fit.temper == 1.0 else 0.0)
     by_departing = _ln_mean(values) - _ln_mean(values[held])
     return Evidence(ln, learned, mean, spread, np.array(means).reshape(shape), np.array(covariances).reshape(*shape, tests), chi2, by_departing)
+
+
+def integrated(model: CampaignModel, fit: Fit, errors: float, sizes: Mapping[str, float]) -> Nuisances:
+    """The nuisances of a fit at its own temper, of `errors` times those stated, under priors of `sizes` learned."""
+    p = len(model.parameters)
+    return under(nuisance_root(model, sizes, fit.moved), (fit.temper / errors) ** 2 * fit.information[:p, :p])
 
 
 def _ln_mean(values: Array) -> float:
@@ -187,7 +205,8 @@ def left_out(model: CampaignModel, fit: Fit, found: Evidence, groups: Sequence[S
     """Of groups of tests predicted each from all others, with what was learned from all: root mean square residual, in standard errors of the data, and the sum
     of ln of their probability densities, which knows how sure a prediction is (Geisser & Eddy, *J. Am. Statist. Assoc.* 74 (1979) 153). Not a number where
     there are no others."""
-    s, prior, turn = found.learned.errors, whole_root(model, fit.mechanisms, found.learned, fit.moved), amplitudes_apart(fit)
+    s, prior, own = found.learned.errors, nuisance_root(model, found.learned.sizes, fit.moved), mechanism_root(model, fit.mechanisms, found.learned)
+    turn, p = amplitudes_apart(fit), len(model.parameters)
     by_test = [turned(turn, *b, fit.point) for b in fit.by_test]
     counts = [d.count for d in model.tests]
 
@@ -195,7 +214,8 @@ def left_out(model: CampaignModel, fit: Fit, found: Evidence, groups: Sequence[S
         return Quadratic(*(sum(getattr(by_test[t], part) for t in tests) / s**2 for part in ("constant", "b", "a")))
 
     def ln_density(tests: Sequence[int]) -> float:
-        return ln_integral(together(tests), prior) - sum(counts[t] for t in tests) * float(np.log(s))
+        q = together(tests)
+        return ln_integral(q, under(prior, q.a[:p, :p]), own) - sum(counts[t] for t in tests) * float(np.log(s))
 
     every = range(len(by_test))
     whole = ln_density(every)
@@ -203,7 +223,8 @@ def left_out(model: CampaignModel, fit: Fit, found: Evidence, groups: Sequence[S
     for group in groups:
         rest = [t for t in every if t not in group]
         if rest:
-            mean, _ = posterior(together(rest), prior)
+            q = together(rest)
+            mean, _ = posterior(q, under(prior, q.a[:p, :p]), own)
             total += sum(by_test[t].at(mean) for t in group)
             count += sum(counts[t] for t in group)
             density += whole - ln_density(rest)

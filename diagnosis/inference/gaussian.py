@@ -5,9 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cholesky, solve_triangular
+from scipy.linalg.lapack import dtrtri
 from scipy.optimize import lsq_linear
 from scipy.special import log_ndtr, ndtr
 
@@ -75,35 +77,72 @@ def _factor(information: Array) -> Array:
         return np.asarray(np.linalg.cholesky((vector * np.maximum(value, 0.0)[..., None, :]) @ vector.swapaxes(-1, -2) + one))
 
 
-def marginal(q: Quadratic, prior: Root) -> Marginal:
-    """What is left of the quadratic without the first parameters, which have that prior."""
-    p = len(prior.scale)
-    inner = prior.within(q.a[:p, :p])
-    factor, lower = cho_factor(inner + np.eye(len(inner)), lower=True)
-    b1 = prior.turned(q.b[:p, None])[:, 0]
-    solved_b = cho_solve((factor, lower), b1)
-    constant = -0.5 * q.constant + 0.5 * float(b1 @ solved_b) - float(np.log(np.diag(factor)).sum())
-    if q.a.shape[0] == p:
-        return Marginal(constant, np.zeros(0), np.zeros((0, 0)))
-    cross = prior.turned(q.a[:p, p:])
-    solved = cho_solve((factor, lower), cross)
-    return Marginal(constant, q.b[p:] - solved.T @ b1, q.a[p:, p:] - cross.T @ solved)
+@dataclass(frozen=True, eq=False)
+class Nuisances:
+    """The first parameters (p,) of a quadratic under their prior R R^T: what all mechanisms that stand beside them have in common. `factor` (r, r) is the lower
+    Cholesky factor of 1 + R^T A R."""
+
+    prior: Root
+    factor: Array
+
+    def halved(self, matrix: Array) -> Array:
+        """H (r, c) of a matrix B (p, c), whose H^T H is B^T (A + (R R^T)^-1)^-1 B."""
+        return np.asarray(solve_triangular(self.factor, self.prior.turned(matrix), lower=True))
+
+    def back(self, half: Array) -> Array:
+        """(A + (R R^T)^-1)^-1 B of H (r, c)."""
+        return self.prior.times(solve_triangular(self.factor, half, lower=True, trans="T"))
+
+    @cached_property
+    def half_ln_determinant(self) -> float:
+        return float(np.log(np.diag(self.factor)).sum())
+
+    @cached_property
+    def covariance(self) -> Array:
+        """(A + (R R^T)^-1)^-1, (p, p)."""
+        inverse, _ = dtrtri(self.factor, lower=1)
+        root = self.prior.times(inverse.T)
+        return root @ root.T
 
 
-def ln_integral(q: Quadratic, prior: Root) -> float:
-    """ln of the integral of exp(-chi2 / 2) over all parameters, which have that prior."""
-    inner = prior.within(q.a)
-    factor, lower = cho_factor(inner + np.eye(len(inner)), lower=True)
-    b = prior.turned(q.b[:, None])[:, 0]
-    return -0.5 * q.constant + 0.5 * float(b @ cho_solve((factor, lower), b)) - float(np.log(np.diag(factor)).sum())
+def under(prior: Root, information: Array) -> Nuisances:
+    """Nuisances of an information (p, p) under a prior of theirs alone."""
+    inner = prior.within(information)
+    return Nuisances(prior, np.asarray(cholesky(inner + np.eye(len(inner)), lower=True)))
 
 
-def posterior(q: Quadratic, prior: Root) -> tuple[Array, Array]:
-    """Mean (n,) and covariance (n, n)."""
-    inner = prior.within(q.a)
-    inverse = np.asarray(np.linalg.inv(inner + np.eye(len(inner))))
-    covariance = prior.times(prior.times(inverse).T)
-    return covariance @ q.b, covariance
+def marginal(q: Quadratic, nuisances: Nuisances) -> Marginal:
+    """What is left of the quadratic without the nuisances."""
+    p = len(nuisances.prior.scale)
+    b, a = _halves(q, nuisances)
+    constant = -0.5 * q.constant + 0.5 * float(b @ b) - nuisances.half_ln_determinant
+    return Marginal(constant, q.b[p:] - a.T @ b, q.a[p:, p:] - a.T @ a)
+
+
+def _halves(q: Quadratic, nuisances: Nuisances) -> tuple[Array, Array]:
+    """`Nuisances.halved` of b (r,) and of what couples nuisances to mechanisms (r, m)."""
+    p = len(nuisances.prior.scale)
+    halves = nuisances.halved(np.concatenate([q.b[:p, None], q.a[:p, p:]], axis=1))
+    return halves[:, 0], halves[:, 1:]
+
+
+def posterior(q: Quadratic, nuisances: Nuisances, own: Array) -> tuple[Array, Array]:
+    """Mean (n,) and covariance (n, n), where the mechanisms have the prior `own` own^T (m, m)."""
+    b, a = _halves(q, nuisances)
+    left = marginal(q, nuisances)
+    half = solve_triangular(_factor(own.T @ left.a @ own), own.T, lower=True)
+    covariance = half.T @ half
+    mean, beside = covariance @ left.b, nuisances.back(a)
+    coupled = -beside @ covariance
+    return (
+        np.concatenate([nuisances.back(b[:, None])[:, 0] - beside @ mean, mean]),
+        np.block([[nuisances.covariance - coupled @ beside.T, coupled], [coupled.T, covariance]]),
+    )
+
+
+def ln_integral(q: Quadratic, nuisances: Nuisances, own: Array) -> float:
+    """ln of the integral of exp(-chi2 / 2) over all parameters, where the mechanisms have the prior `own` own^T (m, m)."""
+    return float(marginal(q, nuisances).integrated([own[None]])[0])
 
 
 def ln_within_limits(fit: Fit, mean: Array, spread: Array) -> float:

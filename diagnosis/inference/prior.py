@@ -114,11 +114,10 @@ def whitened_covariance(conditions: tuple[Condition, ...], width: float, departu
 
 @dataclass(frozen=True, eq=False)
 class Root:
-    """R (n, r) of a prior covariance R R^T: the nuisances' diag(`scale`) (P,) and `beside` (P, k), and `own` (m, m) of the mechanisms."""
+    """R (P, r) of the nuisances' prior covariance R R^T: diag(`scale`) (P,) and `beside` (P, k)."""
 
     scale: Array
     beside: Array
-    own: Array
 
     @cached_property
     def wide(self) -> Integers:
@@ -126,31 +125,30 @@ class Root:
         return np.flatnonzero(self.scale)
 
     def turned(self, matrix: Array) -> Array:
-        """R^T `matrix`, (n, c) to (r, c)."""
-        p, wide = len(self.scale), self.wide
-        return np.concatenate([self.scale[wide, None] * matrix[wide], self.beside.T @ matrix[:p], self.own.T @ matrix[p:]])
+        """R^T `matrix`, (P, c) to (r, c)."""
+        return np.concatenate([self.scale[self.wide, None] * matrix[self.wide], self.beside.T @ matrix])
 
     def times(self, matrix: Array) -> Array:
-        """R `matrix`, (r, c) to (n, c)."""
-        w, k = len(self.wide), self.beside.shape[1]
-        nuisances = self.beside @ matrix[w : w + k]
-        nuisances[self.wide] += self.scale[self.wide, None] * matrix[:w]
-        return np.concatenate([nuisances, self.own @ matrix[w + k :]])
+        """R `matrix`, (r, c) to (P, c)."""
+        w = len(self.wide)
+        found = self.beside @ matrix[w:]
+        found[self.wide] += self.scale[self.wide, None] * matrix[:w]
+        return np.asarray(found)
 
     def within(self, matrix: Array) -> Array:
-        """R^T `matrix` R of a symmetric one, (n, n) to (r, r)."""
+        """R^T `matrix` R of a symmetric one, (P, P) to (r, r)."""
         return self.turned(self.turned(matrix).T)
 
 
 def nuisance_root(model: CampaignModel, sizes: Mapping[str, float], moved: Array) -> Root:
-    """Of the nuisances alone, the mechanisms having `moved` the modes."""
-    return Root(np.sqrt(nuisance_variances(model, sizes)), misjudged(model, sizes, moved), np.zeros((0, 0)))
+    """Of the nuisances, the mechanisms having `moved` the modes; singular where a size is zero."""
+    return Root(np.sqrt(nuisance_variances(model, sizes)), misjudged(model, sizes, moved))
 
 
-def whole_root(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned, moved: Array) -> Root:
-    """Of all parameters at learned sizes, the mechanisms having `moved` the modes; singular where a size is zero."""
+def mechanism_root(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned) -> Array:
+    """Root (m, m) of the prior covariance of [z, u] of all mechanisms, with what was learned of each."""
     own = mechanism_covariance(model, mechanisms, list(zip(learned.widths, learned.departures, strict=True)))
-    return replace(nuisance_root(model, learned.sizes, moved), own=np.asarray(np.linalg.cholesky(own + 1e-14 * np.eye(len(own))), float))
+    return np.asarray(np.linalg.cholesky(own + 1e-14 * np.eye(len(own))), float)
 
 
 def precision_and_variances(

@@ -12,9 +12,9 @@ from scipy.linalg import cho_factor, cho_solve
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
-from thermospindle.diagnosis.inference.evidence import GRIDS, evidence
+from thermospindle.diagnosis.inference.evidence import GRIDS, evidence, integrated
 from thermospindle.diagnosis.inference.fit import Fit
-from thermospindle.diagnosis.inference.gaussian import impossible
+from thermospindle.diagnosis.inference.gaussian import Nuisances, impossible
 from thermospindle.diagnosis.inference.prior import Learned, as_stated
 from thermospindle.diagnosis.inference.problem import Linearisation, Problem
 from thermospindle.model.parallel import in_parallel
@@ -40,13 +40,16 @@ class Screened:
 
 @dataclass(frozen=True, eq=False)
 class _Beside:
-    """What is fitted already, its discrepancies and errors of the sizes learned: its information and the prior's precision (n, n) as factors, and the ln evidence."""
+    """What is fitted already, its discrepancies and errors of the sizes learned: its information and the prior's precision (n, n) as factors, and the ln evidence;
+    and its nuisances at these sizes and at others `near` them."""
 
     model: CampaignModel
     about: Fit
     sizes: Learned
     factors: tuple[Array, bool]
     ln: float
+    near: tuple[Learned, ...]
+    kept: tuple[Nuisances, ...]
 
 
 def screen(
@@ -58,8 +61,9 @@ def screen(
     sizes = Learned(learned.sizes, learned.errors if temper == 1.0 else 1.0, (), ())
     prior = Problem(model, about.mechanisms, replace(as_stated(learned.sizes, about.mechanisms), errors=sizes.errors))
     at = linearised(model, about)  # where a fit has not arrived its own derivatives are of an earlier point
-    nothing = evidence(model, replace(about, chi2=at.chi2, gradient=at.gradient, information=at.information), [sizes, *smaller(sizes)]).ln
-    beside = _Beside(model, about, sizes, cho_factor(at.information + prior.precision), nothing)
+    here, near = replace(about, chi2=at.chi2, gradient=at.gradient, information=at.information), (sizes, *smaller(sizes))
+    kept = tuple(integrated(model, here, n.errors, n.sizes) for n in near)
+    beside = _Beside(model, about, sizes, cho_factor(at.information + prior.precision), evidence(model, here, near, kept=kept).ln, near, kept)
     found = in_parallel(partial(_screened, beside), list(mechanisms), workers)
     found = [replace(s, mechanism=m) for s, m in zip(found, mechanisms, strict=True)]
     best = {(s.mechanism.name, s.mechanism.kind): s for s in sorted(found, key=lambda s: s.gain) if turned and s.visibility > 0 and s.mechanism.shape}
@@ -130,7 +134,7 @@ def _promised(problem: Problem, beside: _Beside, shape: Array) -> Screened:
     visibility = float(abs(mechanism.size.typical - mechanism.size.neutral) * np.sqrt(max(left, 0.0))) / beside.sizes.errors
     if visibility == 0.0:
         return Screened(mechanism, -np.inf, p, 0.0)
-    found = evidence(model, whole, [beside.sizes, *smaller(beside.sizes)])
+    found = evidence(model, whole, beside.near, kept=beside.kept)
     start = found.mean
     start[problem.length - len(shape) :] = shape
     possible = not impossible(mechanism, found.sizes[-1], found.size_covariance[-1])

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.linalg import block_diag
 from scipy.stats import multivariate_normal
 
 from tests.diagnosis.inference.toy import toy
@@ -22,8 +23,16 @@ from thermospindle.diagnosis.forward.nuisance import (
     Nuisance,
 )
 from thermospindle.diagnosis.inference.evidence import WIDER, WIDTHS, Learned, evidence, left_out
-from thermospindle.diagnosis.inference.gaussian import Quadratic, marginal
-from thermospindle.diagnosis.inference.prior import ACTION, Root, misjudged, nuisance_variances, precision_and_variances, whole_root
+from thermospindle.diagnosis.inference.gaussian import Quadratic, ln_integral, marginal, posterior, under
+from thermospindle.diagnosis.inference.prior import (
+    ACTION,
+    Root,
+    mechanism_root,
+    misjudged,
+    nuisance_root,
+    nuisance_variances,
+    precision_and_variances,
+)
 
 
 @pytest.mark.parametrize("errors", [1.0, 1.3])
@@ -88,7 +97,8 @@ def test_what_is_wrong_in_an_effect_is_alike_in_all_tests():
     random = np.random.default_rng(5)
     jacobian, y = random.standard_normal((60, 5)), random.standard_normal(60)
     beside, diagonal = random.standard_normal((5, 2)), np.array([1.0, 0.0, 0.3, 0.0, 2.0])
-    left = marginal(Quadratic(float(y @ y), jacobian.T @ y, jacobian.T @ jacobian), Root(np.sqrt(diagonal), beside, np.zeros((0, 0))))
+    q = Quadratic(float(y @ y), jacobian.T @ y, jacobian.T @ jacobian)
+    left = marginal(q, under(Root(np.sqrt(diagonal), beside), q.a))
     prior = np.diag(diagonal) + beside @ beside.T
     whole = multivariate_normal(np.zeros(60), np.eye(60) + jacobian @ prior @ jacobian.T)
     assert left.constant == pytest.approx(whole.logpdf(y) + 30 * np.log(2 * np.pi), rel=1e-9)
@@ -107,15 +117,33 @@ def test_a_fit_and_the_evidence_have_one_prior():
     )  # fmt: skip
     model = SimpleNamespace(parameters=parameters, tests=made.model.tests)
     moved = np.random.default_rng(8).normal(0, 0.2, (1, len(tests), 2, 2))
-    found = whole_root(model, made.fit.mechanisms, learned, moved)
-    n = len(found.scale) + len(found.own)
-    assert (found.beside.shape[1], len(found.own)) == (4, len(tests) + len(made.fit.mechanisms[0].shape))
+    found, own = nuisance_root(model, learned.sizes, moved), mechanism_root(model, made.fit.mechanisms, learned)
+    p = len(found.scale)
+    assert (found.beside.shape[1], len(own)) == (4, len(tests) + len(made.fit.mechanisms[0].shape))
     inverse, variances = precision_and_variances(model, made.fit.mechanisms, learned, moved)
-    assert variances == pytest.approx(np.diag(found.times(found.turned(np.eye(n)))), abs=1e-7)
-    covariance = found.times(found.turned(np.eye(n)))
+    covariance = block_diag(found.times(found.turned(np.eye(p))), own @ own.T)
+    assert variances == pytest.approx(np.diag(covariance), abs=1e-7)
     assert np.abs(found.beside).max() > 0.1
-    assert inverse @ covariance == pytest.approx(np.eye(n), abs=1e-5)
-    assert found.within(np.eye(n)) == pytest.approx(found.turned(found.times(np.eye(len(found.within(np.eye(n)))))))
+    assert inverse @ covariance == pytest.approx(np.eye(len(covariance)), abs=1e-5)
+    assert found.within(np.eye(p)) == pytest.approx(found.turned(found.times(np.eye(len(found.within(np.eye(p)))))))
+
+
+def test_the_posterior_beside_nuisances_that_are_kept_is_that_of_all_together():
+    """Mean, covariance and integral of a joint Gaussian in closed form; of nuisances without a width, with what two of them share, and of none but these."""
+    random = np.random.default_rng(6)
+    jacobian, y = random.standard_normal((40, 7)), random.standard_normal(40)
+    scale, beside, own = np.array([1.0, 0.0, 0.3, 2.0]), random.standard_normal((4, 1)), np.tril(random.standard_normal((3, 3)))
+    for m in (3, 0):
+        n = 4 + m
+        q = Quadratic(float(y @ y), jacobian[:, :n].T @ y, jacobian[:, :n].T @ jacobian[:, :n])
+        kept = under(Root(scale, beside), q.a[:4, :4])
+        prior = block_diag(np.diag(scale**2) + beside @ beside.T, own @ own.T)[:n, :n]
+        gain = prior @ jacobian[:, :n].T @ np.linalg.inv(np.eye(40) + jacobian[:, :n] @ prior @ jacobian[:, :n].T)
+        mean, covariance = posterior(q, kept, own[:m, :m])
+        assert mean == pytest.approx(gain @ y, abs=1e-10)
+        assert covariance == pytest.approx(prior - gain @ jacobian[:, :n] @ prior, abs=1e-10)
+        whole = multivariate_normal(np.zeros(40), np.eye(40) + jacobian[:, :n] @ prior @ jacobian[:, :n].T)
+        assert ln_integral(q, kept, own[:m, :m]) == pytest.approx(whole.logpdf(y) + 20 * np.log(2 * np.pi), rel=1e-9)
 
 
 def test_rounding_does_not_end_an_evidence():
@@ -124,9 +152,12 @@ def test_rounding_does_not_end_an_evidence():
     jacobian = np.stack([column, column, 0.5 * column])
     information = jacobian @ jacobian.T
     information[1:, 1:] -= 1e3 * np.eye(2)  # as rounding may have it
-    left = marginal(Quadratic(0.0, np.zeros(3), information), Root(np.ones(1), np.zeros((1, 0)), np.zeros((0, 0))))
+    q = Quadratic(0.0, np.zeros(3), information)
+    kept = under(Root(np.ones(1), np.zeros((1, 0))), q.a[:1, :1])
+    left = marginal(q, kept)
     root = np.array([np.eye(2), 3 * np.eye(2)])
     assert np.isfinite(left.integrated([root])).all()
+    assert (np.linalg.eigvalsh(posterior(q, kept, np.eye(2))[1]) > -1e-12).all()
 
 
 def test_errors_larger_than_stated_are_learned():
