@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -14,7 +14,7 @@ from thermospindle.diagnosis.data.observe import condition_of
 from thermospindle.diagnosis.decision.verdict import Verdict, decide
 from thermospindle.diagnosis.forward.making import campaign_model, expected_noise
 from thermospindle.diagnosis.forward.mechanism import Mechanism, strongest, variants
-from thermospindle.diagnosis.forward.model import CampaignModel, TestData
+from thermospindle.diagnosis.forward.model import FAILED, SIZE_STEP, CampaignModel, TestData
 from thermospindle.diagnosis.inference.freeform import free_forms
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.search import Search, search
@@ -74,7 +74,7 @@ class Drift:
 class Diagnosis:
     """All that `spindle diagnose` tells; `own_laws` how much of the effects that the verdict names the data have in every test, where that is not their law;
     `detectable`: of every effect the variant and size (from neutral, in its unit) that would have shown; `may_hide` what could act beside what the
-    verdict names, unseen."""
+    verdict names, unseen; `unable` the effects that were no explanation of some test because they cannot be worked out there, and why."""
 
     spindle: Spindle
     campaign: Campaign
@@ -85,6 +85,7 @@ class Diagnosis:
     tests: tuple[NextTest, ...]
     detectable: Mapping[str, tuple[Mechanism, float]]
     may_hide: tuple[str, ...] = ()
+    unable: Mapping[str, str] = field(default_factory=dict)
 
 
 def diagnose(
@@ -103,7 +104,22 @@ def diagnose(
     progress("next tests weighed")
     seen = smallest(found.model, found.base.fit, verdict.accepted.evidence.learned, found.screened)
     progress("smallest sizes found")
-    return Diagnosis(spindle, campaign, found, verdict, drifts, own_laws, tests, seen, unseen_beside(found, verdict.accepted))
+    beside, why = unseen_beside(found, verdict.accepted), unable(found.model, [s.mechanism for s in found.screened])
+    return Diagnosis(spindle, campaign, found, verdict, drifts, own_laws, tests, seen, beside, why)
+
+
+def unable(model: CampaignModel, mechanisms: Sequence[Mechanism]) -> dict[str, str]:
+    """Of effects of the catalogue those that cannot be worked out at the conditions of some test, however small, and why: screening takes them for nothing there."""
+    found, nothing = dict[str, str](), np.zeros(len(model.parameters))
+    for m in {m.name: m for m in reversed(mechanisms) if m.kind == "law"}.values():
+        step = SIZE_STEP * m.size.prior_sd
+        least = m.size.neutral + (step if m.size.neutral + step <= m.size.limits[1] else -step)
+        for t, data in enumerate(model.tests):
+            try:
+                model.operating(t, nothing, [(m.effect, m.values(least, [q.neutral for q in m.shape]))])
+            except FAILED as error:
+                found.setdefault(m.name, f"{data.test.id}: {error}")
+    return found
 
 
 def campaign_data(spindle: Spindle, campaign: Campaign, progress: Callable[[str], None] = lambda done: None) -> CampaignModel:

@@ -75,14 +75,16 @@ def diagnose(
 
 
 def _found(found: verdict.Diagnosis) -> list[str]:
-    """A warning where records end early, and where in them they were hit was not told but found."""
+    """Warnings: of effects that cannot be worked out; where records end early, and where in them they were hit was not told but found."""
+    unable = [f"{name} is no explanation of test {why}" for name, why in found.unable.items()]
     for told, seen in zip(found.campaign.tests, found.search.model.tests, strict=True):
         if seen.test.pretrigger != told.pretrigger:
             return [
+                *unable,
                 f"records end before answers have died away; that they were hit {1e3 * seen.test.pretrigger:.3g} ms after their start, which no test tells (pretrigger_s), "
                 "was found from these data"
             ]
-    return []
+    return unable
 
 
 def _write(*what: Any) -> None:

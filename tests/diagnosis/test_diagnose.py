@@ -1,14 +1,19 @@
 """The whole diagnosis on campaigns with a known answer: another program's, and mode tables drawn from the model with a hidden effect."""
 
 import json
+import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from tests.conftest import DATA, SCENE
+from tests.virtual_campaign import mode_campaign, model_of
 from thermospindle.diagnosis.decision.conditions import conditions_of
-from thermospindle.diagnosis.verdict import diagnose
-from thermospindle.model.machine import Condition
+from thermospindle.diagnosis.forward.mechanism import variants
+from thermospindle.diagnosis.verdict import diagnose, unable
+from thermospindle.model.machine import Condition, Law
+from thermospindle.model.units import RPM
 from thermospindle.report.text.diagnosis.answer import diagnosis_json
 from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Test, read_campaign
 from thermospindle.sim.effects import by_name
@@ -27,6 +32,20 @@ def tables(spindle, effects, highest=2600.0, seed=1):
             rows.append(ModeRow(f"T{t:g}", i, m.kind, f, 5e-5 * m.frequency, z, 0.01 * m.damping_ratio))
         tests.append(Test(f"T{t:g}", t, 0.0, modes=tuple(rows)))
     return Campaign("made", spindle.name, "mobility", spindle.points, tuple(tests))
+
+
+def test_an_effect_that_cannot_be_worked_out_is_told(spindle):
+    """Grease whose law ends at 30 C, and tests at 20 and at 40 C: friction heat is no explanation of the running one at 40 C, and who reads the answer is told why."""
+    viscosity = spindle.thermal.friction.viscosity
+    short = Law((-20.0, 30.0), (viscosity(-20.0), viscosity(30.0)))
+    cold = replace(spindle, thermal=replace(spindle.thermal, friction=replace(spindle.thermal.friction, viscosity=short)))
+    conditions = [Condition(t, n * RPM) for t, n in ((20.0, 0.0), (20.0, 7200.0), (40.0, 7200.0))]
+    rings, lag = (variants(by_name(name))[0] for name in ("thermal_gradient", "soak_lag"))
+    for own, told in ((cold, {"thermal_gradient"}), (spindle, set())):
+        why = unable(model_of(own, mode_campaign(spindle, conditions, 3, [])), [rings, lag])
+        assert set(why) == told
+    why = unable(model_of(cold, mode_campaign(spindle, conditions, 3, [])), [rings])
+    assert re.fullmatch(r"test_2: bearing friction brings the lubricant to 4\d C, and its viscosity is given from -20 to 30 C", why["thermal_gradient"])
 
 
 def test_nothing_is_named_where_nothing_is_hidden(nothing_missing):

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from tests.effect_points import REST, RUNNING
+from thermospindle.model.errors import OutsideRange
 from thermospindle.model.machine import Condition, Friction, Law, Region
 from thermospindle.model.rotor.modes import modes
 from thermospindle.model.units import RPM
 from thermospindle.sim.effects.bearing import preload_loss
 from thermospindle.sim.effects.temperature import expansion_mismatch, loose_inserts, soak_lag, thermal_gradient
 from thermospindle.sim.operating import operating_point
-from thermospindle.thermal import conduction, heat
+from thermospindle.thermal import conduction, friction, heat
 from thermospindle.thermal.expansion import expand
 from thermospindle.thermal.influence import influence
 
@@ -32,6 +33,22 @@ def test_friction_heat_against_the_steady_solver(spindle):
     told = thermal_gradient.EFFECT.temperatures(spindle, RUNNING, {"scale": 1.0, "common_share": 0.0, "level_share": 0.0}, uniform)
     assert told["lower outer ring"] + told["upper outer ring"] == pytest.approx(120.0, abs=1e-9)
     assert told["shaft"] - told["sleeve"] == pytest.approx(found["shaft"] - found["sleeve"], abs=1e-9)
+
+
+def test_friction_heat_of_a_fast_spindle(spindle):
+    """Found on another's machine: cold grease at speed makes more heat than its own warmth leaves it, which took the way to the answer beyond the viscosity's law; the
+    effect was then no explanation of anything. What lies beyond it at the end is refused."""
+    thermal = spindle.thermal
+    still = replace(spindle, thermal=replace(thermal, sources=(), friction=replace(thermal.friction, f0=2 * thermal.friction.f0)))
+    fast, unit = Condition(0.0, 30_000 * RPM), thermal_gradient.unit_rise(still)
+    cold = friction.heat(still.thermal.friction, still.bearings[0], fast.speed, 0.0, 16.0)
+    assert cold * unit.bearing[0].sum() > 2 * still.thermal.friction.viscosity.temperature[-1]
+    found = thermal_gradient.heat(still, fast, unit) @ unit.region
+    model = conduction.model(still, influence(still).sections)
+    expected = heat.steady(model, heat.running(still, 0.0, fast.speed)).region_means()
+    assert dict(zip(unit.regions, found, strict=True)) == pytest.approx(expected, abs=1e-6)
+    with pytest.raises(OutsideRange, match="brings the lubricant to [0-9]+ C, and its viscosity is given from -20 to 120 C"):
+        thermal_gradient.heat(still, replace(fast, temperature=110.0), unit)
 
 
 def test_friction_heat_grows_with_speed_as_palmgren(spindle):
