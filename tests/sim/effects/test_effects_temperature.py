@@ -47,7 +47,7 @@ def test_friction_heat_of_a_fast_spindle(spindle):
     model = conduction.model(still, influence(still).sections)
     expected = heat.steady(model, heat.running(still, 0.0, fast.speed)).region_means()
     assert dict(zip(unit.regions, found, strict=True)) == pytest.approx(expected, abs=1e-6)
-    with pytest.raises(OutsideRange, match="brings the lubricant to [0-9]+ C, and its viscosity is given from -20 to 120 C"):
+    with pytest.raises(OutsideRange, match=r"brings the lubricant to [0-9]+ C, and its viscosity is given from -20 to 120 C"):
         thermal_gradient.heat(still, replace(fast, temperature=110.0), unit)
 
 
