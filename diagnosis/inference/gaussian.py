@@ -113,23 +113,21 @@ def under(prior: Root, information: Array) -> Nuisances:
 
 def marginal(q: Quadratic, nuisances: Nuisances) -> Marginal:
     """What is left of the quadratic without the nuisances."""
-    p = len(nuisances.prior.scale)
-    b, a = _halves(q, nuisances)
-    constant = -0.5 * q.constant + 0.5 * float(b @ b) - nuisances.half_ln_determinant
-    return Marginal(constant, q.b[p:] - a.T @ b, q.a[p:, p:] - a.T @ a)
+    return _apart(q, nuisances)[0]
 
 
-def _halves(q: Quadratic, nuisances: Nuisances) -> tuple[Array, Array]:
-    """`Nuisances.halved` of b (r,) and of what couples nuisances to mechanisms (r, m)."""
+def _apart(q: Quadratic, nuisances: Nuisances) -> tuple[Marginal, Array, Array]:
+    """`marginal`, and `Nuisances.halved` of b (r,) and of what couples nuisances to mechanisms (r, m)."""
     p = len(nuisances.prior.scale)
     halves = nuisances.halved(np.concatenate([q.b[:p, None], q.a[:p, p:]], axis=1))
-    return halves[:, 0], halves[:, 1:]
+    b, a = halves[:, 0], halves[:, 1:]
+    constant = -0.5 * q.constant + 0.5 * float(b @ b) - nuisances.half_ln_determinant
+    return Marginal(constant, q.b[p:] - a.T @ b, q.a[p:, p:] - a.T @ a), b, a
 
 
 def posterior(q: Quadratic, nuisances: Nuisances, own: Array) -> tuple[Array, Array]:
     """Mean (n,) and covariance (n, n), where the mechanisms have the prior `own` own^T (m, m)."""
-    b, a = _halves(q, nuisances)
-    left = marginal(q, nuisances)
+    left, b, a = _apart(q, nuisances)
     half = solve_triangular(_factor(own.T @ left.a @ own), own.T, lower=True)
     covariance = half.T @ half
     mean, beside = covariance @ left.b, nuisances.back(a)

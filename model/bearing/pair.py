@@ -1,8 +1,8 @@
 """The ball rows of all sets against each other: axial equilibrium at a temperature, and the bearing states that follow.
 
 Jang, Kim, Han, Kim (2003): load-deflection and stiffness, Eqs. (6), (7); the hub moves until the axial forces balance, Eq. (8) and
-Fig. 5. The secant method of Fig. 5 is replaced by a bracketing one: every row's axial force rises monotonically with the hub's
-movement, so the root is unique and cannot be missed.
+Fig. 5. The secant method of Fig. 5 is replaced by Newton's, and by brackets where it does not arrive (`model.bearing.movement`): every
+row's axial force rises monotonically with the hub's movement, so the root is unique and cannot be missed.
 """
 
 from __future__ import annotations
