@@ -55,13 +55,14 @@ def decide(found: Search) -> Verdict:
     accepted = _accepted(found, word, effects, candidates, free)
     groups = conditions_of(found.model.spindle, found.model.tests)
     (before, plain), (after, density) = (left_out(found.model, h.fit, h.evidence, groups) for h in (found.base, accepted))
-    why = reason.of_verdict(found, word, effects, candidates, free, none, before, after, density - plain)
+    whole, rest = _with_drift_beside(candidates, free)
+    weighed = (whole, rest) if word == "ambiguous" else (candidates, free)
+    why = reason.of_verdict(found, word, effects, *weighed, none, before, after, density - plain)
     why += reason.of_resonances(found.model, best) + reason.of_what_is_left(best, same)
     told = best if word == "unexplained" else accepted
     why += reason.of_tolerances(found.model, told)
-    candidates, free = _with_drift_beside(candidates, free)
-    unknown = sum(c.probability for c in free)
-    return Verdict(word, effects, why, candidates, free, none, unknown, losses, before, after, density - plain, accepted, told)
+    unknown = sum(c.probability for c in rest)
+    return Verdict(word, effects, why, whole, rest, none, unknown, losses, before, after, density - plain, accepted, told)
 
 
 def _unheld(

@@ -9,7 +9,6 @@ from functools import cached_property
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
-from scipy.linalg.lapack import dtrtri
 from scipy.optimize import lsq_linear
 from scipy.special import log_ndtr, ndtr
 
@@ -90,7 +89,7 @@ class Nuisances:
         return np.asarray(solve_triangular(self.factor, self.prior.turned(matrix), lower=True))
 
     def back(self, half: Array) -> Array:
-        """(A + (R R^T)^-1)^-1 B of H (r, c)."""
+        """(A + (R R^T)^-1)^-1 B of H (r, c); of ones a root of the covariance."""
         return self.prior.times(solve_triangular(self.factor, half, lower=True, trans="T"))
 
     @cached_property
@@ -100,8 +99,7 @@ class Nuisances:
     @cached_property
     def covariance(self) -> Array:
         """(A + (R R^T)^-1)^-1, (p, p)."""
-        inverse, _ = dtrtri(self.factor, lower=1)
-        root = self.prior.times(inverse.T)
+        root = self.back(np.eye(len(self.factor)))
         return root @ root.T
 
 

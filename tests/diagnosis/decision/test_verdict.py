@@ -98,6 +98,16 @@ def test_a_set_is_as_large_as_its_probability_asks(count):
     assert sum(c.probability for c in v.candidates if set(c.names) <= set(v.effects)) > 0.95
 
 
+def test_a_set_has_what_its_names_have_with_a_little_drift_beside_them():
+    """Two names that do as well, the likelier with a little drift beside it: the sentence tells of both what is told of each."""
+    v = decide(made({"a": 58.0, "b": 58.5, "~x": 20.0, ("a", "~x"): 64.0, ("b", "~x"): 63.0}))
+    assert (v.word, set(v.effects)) == ("ambiguous", {"a", "b"})
+    share = sum(c.probability for c in v.candidates if set(c.names) <= {"a", "b"})
+    assert share > 0.95
+    assert f"(together {share:.0%} probable)" in v.reason
+
+
+
 def test_a_set_holds_only_what_is_probable():
     """One effect alone, with another, or with something that drifts: the set is those two, not what the rest of the catalogue reaches far behind."""
     v = decide(made({("left", "right"): 58.0, "left": 53.5, ("left", "~drift"): 56.0, "behind": 5.0, "far": -40.0}))
