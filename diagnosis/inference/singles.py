@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain, zip_longest
 
 import numpy as np
@@ -26,6 +27,7 @@ from thermospindle.diagnosis.inference.prior import DRIFTING, Learned, steady, u
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.inference.resonance import with_more
 from thermospindle.diagnosis.inference.screening import Screened, screen
+from thermospindle.model.parallel import meanwhile
 
 BEHIND, FAR = 12.0, 200.0  # tempered ln evidence behind the best from which a mechanism is not followed, and from which not even the best two of a kind
 MOST = {"law": 14, "own law": 4, "free": 4}  # mechanisms fitted at most, of the catalogue with their laws and with laws of the data's own, and free forms
@@ -59,15 +61,16 @@ def fit_singles(
         about, temper = fit(model, tempers=TEMPERS[: EARLY + 1], learned=expected), TEMPERS[EARLY]
     else:
         about, temper = none.fit, 1.0
-    looked = screen(model if temper == 1.0 else model.thinned, about, temper, learned, mechanisms, workers)
-    rankings = [looked]
-    if misfit and learned.errors <= STRAIN:  # drift alone explains what is missing: what would, were there none
-        rankings.append(screen(model, none.fit, 1.0, undrifted(learned), mechanisms, workers))
+    with meanwhile(partial(cost_of, model, none, expected), workers) as most_of:
+        looked = screen(model if temper == 1.0 else model.thinned, about, temper, learned, mechanisms, workers)
+        rankings = [looked]
+        if misfit and learned.errors <= STRAIN:  # drift alone explains what is missing: what would, were there none
+            rankings.append(screen(model, none.fit, 1.0, undrifted(learned), mechanisms, workers))
+        most = most_of()
     progress("effects screened")
     chosen = _chosen(rankings, misfit)
     # tolerances strained to stand in for an effect must give way with it; while errors are enlarged they are not strained yet
     tasks = [task_of((), about, s, -np.inf if misfit else none.evidence.ln + s.gain - OCCAM, far=not misfit) for s in chosen]
-    most = cost_of(model, none, expected)
     first = {s.mechanism.name for ranking in rankings for kind in MOST for s in promising(ranking, kind)[:1]}
     early: list[Hypothesis] = []
     if misfit:
