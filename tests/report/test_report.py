@@ -238,7 +238,7 @@ def test_title_command_and_date(run: Run, text: str, tmp_path: Path):
 # ---------------------------------------------------------------- other scenes, temperatures, measurements
 
 
-@pytest.mark.parametrize("temperatures", [1, 2])
+@pytest.mark.parametrize("temperatures", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_without_measurements_or_file(run: Run, alone: str, temperatures: int):
     page = Page(alone if temperatures == 1 else html(Run(replace(run.spindle, file=None), run.steps, ())))
     rows = [row for row in page.tables["frequencies"] if row and row[0].isdigit()]

@@ -42,7 +42,7 @@ def test_sizes_that_depart_from_their_law_keep_the_sign_that_all_have():
     assert 0 < evidence(bound.model, bound.fit).ln - found.ln < np.log(2) + 1e-9  # the sign is more probable than not
 
 
-@pytest.mark.parametrize("held", [False, True])
+@pytest.mark.parametrize("held", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_shape_within_limits_is_the_integral_over_these(held, monkeypatch):
     """A share from nothing to one, neutral at nothing: the integral over it alone, by quadrature; held at nothing where the data would have it less."""
     own, plain, random = (1.0, 0.0), toy(3, 0.0, hidden=2.0), np.random.default_rng(8)
