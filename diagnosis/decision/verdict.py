@@ -69,7 +69,8 @@ def _unheld(
     found: Search, best: Hypothesis, same: Overlap, candidates: tuple[Candidate, ...], free: tuple[Candidate, ...], none: float
 ) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...], float]:
     """What is only the best of what was tried, with its probability moved to the unknown: nothing missing, where modes drift by more than two honest
-    programs differ by, the data are missed grossly, or much is left that is not alike in all tests; effects, where they leave most of what changes."""
+    programs differ by, the data are missed grossly, or much is left that is not alike in all tests; effects, where they leave most of what changes; and drifts that
+    miss the data grossly."""
     alike = overlap(found.model, found.base.fit)
     kept = changing(found.base, alike), changing(best, same)
     gross = found.base.evidence.chi2 > GROSS * found.base.fit.count
@@ -82,6 +83,8 @@ def _unheld(
     if kept[1] > MUCH and kept[1] > (1 - MOSTLY) * kept[0]:
         free = (*free, Candidate(found.base, (LEFT,), True, 0.0, sum(c.probability for c in candidates)))
         candidates = tuple(replace(c, probability=0.0) for c in candidates)
+    if best.mechanisms and all(m.free for m in best.mechanisms) and best.fit.chi2 > GROSS * best.fit.count:  # what drifts in it does not explain the data either
+        free = (*(replace(c, probability=0.0) for c in free), Candidate(found.base, (LEFT,), True, 0.0, sum(c.probability for c in free)))
     return candidates, tuple(sorted(free, key=lambda c: -c.probability)), none
 
 

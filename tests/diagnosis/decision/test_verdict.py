@@ -131,6 +131,18 @@ def test_what_leaves_most_of_the_misfit_is_no_explanation(leaves, word):
     assert ("the best leaves" in v.reason) == (word == "unexplained")
 
 
+@pytest.mark.parametrize(("leaves", "drifts"), [(45.0, False), (30.0, False), (3.0, True)])
+def test_drift_that_misses_the_data_grossly_is_not_told_as_what_explains_them(leaves, drifts):
+    """Found on another's campaign: an absorber whose frequency falls left 27 standard errors with the best of all that drifts, which was told as what would have to."""
+    found = made({"~x": 2300.0, "a": 100.0})
+    left = {(): 50.0, ("~x",): leaves, ("a",): 49.0}
+    wrong = tuple(replace(h, fit=replace(h.fit, chi2=h.fit.count * left[h.names])) for h in found.hypotheses)
+    v = decide(replace(found, hypotheses=wrong, base=wrong[-1]))
+    assert v.word == "unexplained"
+    assert total(v) == pytest.approx(1.0)
+    assert ("~x would have to drift" in v.reason, "the best leaves" in v.reason) == (drifts, not drifts)
+
+
 @pytest.mark.parametrize(("chi2", "word"), [(30.0, "unexplained"), (3.0, "none")])
 def test_data_that_are_missed_grossly_are_not_nothing_missing(chi2, word):
     """More than five times the errors, and nothing tried gains anything: no probability is left for *none*, and the sentence says where to look."""
