@@ -133,7 +133,7 @@ def test_what_leaves_most_of_the_misfit_is_no_explanation(leaves, word):
 
 @pytest.mark.parametrize(("leaves", "drifts"), [(45.0, False), (30.0, False), (3.0, True)])
 def test_drift_that_misses_the_data_grossly_is_not_told_as_what_explains_them(leaves, drifts):
-    """Found on another's campaign: an absorber whose frequency falls left 27 standard errors with the best of all that drifts, which was told as what would have to."""
+    """More than five times the errors are left with the best of all that drifts: it is not what would have to."""
     found = made({"~x": 2300.0, "a": 100.0})
     left = {(): 50.0, ("~x",): leaves, ("a",): 49.0}
     wrong = tuple(replace(h, fit=replace(h.fit, chi2=h.fit.count * left[h.names])) for h in found.hypotheses)
