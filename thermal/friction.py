@@ -7,7 +7,13 @@ load rating, so far below 0.001 under a light preload.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import scipy
+
 from thermospindle.model.machine import Bearing, Friction, RollerBearing
+from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 
 
@@ -30,3 +36,28 @@ def viscous_torque(friction: Friction, bearing: Bearing | RollerBearing, speed: 
 def heat(friction: Friction, bearing: Bearing | RollerBearing, speed: float, temperature: float, load: float) -> float:
     """Friction heat (W): torque times speed."""
     return torque(friction, bearing, speed, temperature, load) * abs(speed)
+
+
+def balanced(friction: Friction, bearings: Sequence[Bearing | RollerBearing], speed: float, loads: Mapping[str, float], cold: Array, gain: Array) -> Array:
+    """Friction heat H (bearings,) in W with t = cold + gain H(t), t the temperatures (C) of the lubricant, `gain` (bearings, bearings) in K/W.
+
+    Bearing after bearing, each by bracketing: friction falls with temperature and `gain` is symmetric and positive, so this
+    is a descent on a convex function. OutsideRange where the viscosity law does not reach the answer.
+    """
+    warmest = friction.viscosity.temperature[-1] if len(friction.viscosity.value) > 1 else np.inf
+
+    def made(k: int, t: float) -> float:
+        return heat(friction, bearings[k], speed, t, loads[bearings[k].name])
+
+    found = np.zeros(cold.size)
+    for _ in range(200):
+        before = found.copy()
+        for k, own in enumerate(np.diag(gain)):
+            base = float(cold[k] + gain[k] @ found - own * found[k])
+            most = base + 1.01 * own * made(k, base)  # friction jumps up by 0.8 % where nu n falls below 2000
+            if most > warmest > base and warmest - base >= own * made(k, warmest):
+                most = warmest  # the root is inside the viscosity table though the bracket is not
+            found[k] = made(k, scipy.optimize.brentq(lambda t, k=k, own=own, base=base: t - base - own * made(k, t), base, most, xtol=1e-12))
+        if np.abs(gain @ (found - before)).max() < 1e-10:
+            return found
+    raise RuntimeError("bearing friction and temperature did not settle")

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from scipy.optimize import brentq
 from scipy.sparse import csc_array, csr_array
 from scipy.sparse.linalg import SuperLU, eigsh, splu
 
@@ -306,26 +305,5 @@ def _factors(model: HeatModel, h: float) -> tuple[SuperLU, np.ndarray]:
 
 
 def _bearing_heat(model: HeatModel, cold: np.ndarray, gain: np.ndarray, drive: Running) -> np.ndarray:
-    """Friction heat H (bearings,) with t = cold + gain H(t), t the bearing temperatures.
-
-    Bearing after bearing, each by bracketing: friction falls with temperature and `gain` is symmetric and positive, so this
-    is a descent on a convex function.
-    """
-    law, bearings = model.spindle.thermal.friction, model.spindle.ringed
-    warmest = law.viscosity.temperature[-1] if len(law.viscosity.value) > 1 else np.inf
-
-    def made(k: int, t: float) -> float:
-        return friction.heat(law, bearings[k], drive.speed, t, drive.loads[bearings[k].name])
-
-    heat = np.zeros(cold.size)
-    for _ in range(200):
-        before = heat.copy()
-        for k, own in enumerate(np.diag(gain)):
-            base = float(cold[k] + gain[k] @ heat - own * heat[k])
-            most = base + 1.01 * own * made(k, base)  # friction jumps up by 0.8 % where nu n falls below 2000
-            if most > warmest > base and warmest - base >= own * made(k, warmest):
-                most = warmest  # the root is inside the viscosity table though the bracket is not
-            heat[k] = made(k, brentq(lambda t, k=k, own=own, base=base: t - base - own * made(k, t), base, most, xtol=1e-12))
-        if np.abs(gain @ (heat - before)).max() < 1e-10:
-            return heat
-    raise RuntimeError("bearing friction and temperature did not settle")
+    """Friction heat H (bearings,) with t = cold + gain H(t), t the bearing temperatures."""
+    return friction.balanced(model.spindle.thermal.friction, model.spindle.ringed, drive.speed, drive.loads, cold, gain)

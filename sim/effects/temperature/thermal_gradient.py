@@ -13,7 +13,7 @@ import numpy as np
 import scipy
 
 from thermospindle.model.bearing.roller import reference_loads
-from thermospindle.model.errors import NoEquilibrium, OutsideRange
+from thermospindle.model.errors import OutsideRange
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import ROWS, SECTION, Effect, Parameter, Values, scale_parameter
@@ -61,23 +61,16 @@ def levelled(spindle: Spindle, regions: tuple[str, ...], rise: Array) -> Array:
 
 
 def heat(spindle: Spindle, condition: Condition, unit: UnitRise) -> Array:
-    """Friction heat (bearings,) in W where every lubricant has the temperature that all of it makes: w = T + G Palmgren(w), of one answer, since friction falls as it
-    warms. Powell's hybrid method; on its way the viscosity's law is held at its ends. OutsideRange where the answer lies beyond them, NoEquilibrium where none is found.
-    """
-    law, loads = spindle.thermal.friction, reference_loads(spindle)
+    """Friction heat (bearings,) in W where every lubricant has the temperature that all of it makes. OutsideRange where that is beyond its viscosity's law."""
+    law, loads, cold = spindle.thermal.friction, reference_loads(spindle), np.full(len(spindle.ringed), condition.temperature)
     low, high = law.viscosity.temperature[0], law.viscosity.temperature[-1]
-
-    def made(warm: Array) -> Array:
-        held = np.clip(warm, low, high) if low < high else warm
-        return np.array([friction.heat(law, b, condition.speed, float(t), loads[b.name]) for b, t in zip(spindle.ringed, held, strict=True)])
-
-    start = np.full(len(spindle.ringed), condition.temperature)
-    found = scipy.optimize.root(lambda warm: warm - condition.temperature - made(warm) @ unit.bearing, start, options={"xtol": 1e-13})
-    if np.abs(found.fun).max() > 1e-9:
-        raise NoEquilibrium("bearing friction and temperature did not settle")
-    if low < high and not (low <= found.x.min() and found.x.max() <= high):
-        raise OutsideRange(f"bearing friction brings the lubricant to {found.x.max():.0f} C, and its viscosity is given from {low:g} to {high:g} C")
-    return made(found.x)
+    try:
+        return friction.balanced(law, spindle.ringed, condition.speed, loads, cold, unit.bearing)
+    except OutsideRange:
+        end = high if condition.temperature >= low else low
+        at_end = [friction.heat(law, b, condition.speed, end, loads[b.name]) for b in spindle.ringed]
+        warm = (cold + np.array(at_end) @ unit.bearing).max()
+        raise OutsideRange(f"bearing friction brings the lubricant to {warm:.0f} C, and its viscosity is given from {low:g} to {high:g} C") from None
 
 
 def unit_rise(spindle: Spindle) -> UnitRise:
