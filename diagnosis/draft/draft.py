@@ -25,14 +25,13 @@ def draft(diagnosis: Path, name: str, element: str | None = None) -> str:
     top = float(speed.max()) or 1.0
     tried = [fit_law(law, temperature, speed / top, change, whitening(covariance)) for law in laws(temperature, speed / top, reference)]
     best, *others = ranked([f for f in tried if f is not None])
-    constant = " + offset" if best.law.has_offset else ""
     return _template().render(
         name=name,
         place=place,
         best=best,
         rivals=[(f.law.name, f"{f.criterion - best.criterion:+.1f}") for f in others if f.criterion - best.criterion < NEAR],
         shape=list(zip(best.law.shape, best.values[2:], best.sd[2:], strict=True)),
-        formula=f"size * ({best.law.expression}){constant}",
+        formula=f"size * ({best.law.expression}{' + offset' if best.law.has_offset else ''})",
         top=top,
         file=diagnosis.name,
         limits=[_about(v) for v in best.values[:2]],

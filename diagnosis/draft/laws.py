@@ -1,14 +1,14 @@
 """The simple laws that physics has over temperature T and speed n, and how each fits what drifts.
 
-None, linear, exponential, Arrhenius, sigmoid, step; and a power of speed, alone, times one of these or beside it. Each is fitted with an offset beside it,
-weighted by the covariance over the tests; the Bayesian information criterion chooses (Schwarz, *Ann. Statist.* 6 (1978) 461). A law with as many parameters
-as tests fits whatever they are: it is taken where chi2 rules all others out, and the file says that it is not tested.
+None, linear, exponential, Arrhenius, sigmoid, step; and a power of speed, alone, times one of these or beside it. Each is fitted alone and with what is there
+everywhere beside it, weighted by the covariance over the tests; the Bayesian information criterion chooses (Schwarz, *Ann. Statist.* 6 (1978) 461). A law with
+as many parameters as tests fits whatever they are: it is taken where chi2 rules all others out, and the file says that it is not tested.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -26,15 +26,15 @@ KELVIN = 273.15
 
 @dataclass(frozen=True)
 class Law:
-    """A law g(T, n; shape): its Python expression, the shape parameters with unit, start and limits."""
+    """A law size (g(T, n; shape) + offset): the Python expression of g, the shape parameters with unit, start and limits, and whether it has an offset.
+
+    The offset is counted in sizes: an effect of no size is none at all, also of a law that has one.
+    """
 
     name: str
     expression: str
     shape: tuple[tuple[str, str, float, tuple[float, float]], ...] = ()
-
-    @property
-    def has_offset(self) -> bool:
-        return self.expression != "1.0"
+    has_offset: bool = False
 
     @property
     def is_step(self) -> bool:
@@ -86,12 +86,12 @@ def laws(temperature: Array, share: Array, reference: float = REFERENCE) -> list
     if thermal and speed:
         found += of_both(reference, hottest)
         found += [Law(f"{t.name} and linear in speed", f"{t.expression} + of_speed * n", (*t.shape, ("of_speed", "1", 0.0, (-20.0, 20.0)))) for t in thermal[:4]]
-    return found
+    return found + [replace(law, name=f"{law.name}, and a constant", has_offset=True) for law in found[1:]]
 
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A law fitted: `size`, `offset` (0 for the constant law) and shape values with standard errors; chi2 in how many `tests`, and the number of parameters."""
+    """A law fitted: `size`, `offset` (in sizes; 0 of a law without) and shape values with standard errors; chi2 in how many `tests`, and the number of parameters."""
 
     law: Law
     values: Array  # size, offset, shape...
@@ -117,8 +117,8 @@ class Fitted:
 
 
 def fit_law(law: Law, temperature: Array, share: Array, change: Array, white: Array) -> Fitted | None:
-    """Least squares in size, offset and shape, the first two linear; None where there are more parameters than tests. `white` (n, n) makes errors of `change`
-    (n,) independent and of unit variance."""
+    """Least squares in size, size times offset and shape, the first two linear; None where there are more parameters than tests, or no size is best.
+    `white` (n, n) makes errors of `change` (n,) independent and of unit variance."""
     offset = law.has_offset
     count = 1 + offset + len(law.shape)
     if count > len(change):
@@ -138,8 +138,8 @@ def fit_law(law: Law, temperature: Array, share: Array, change: Array, white: Ar
             shape = least_squares(lambda v: linear(v)[1], begin, bounds=(low, high)).x
         amplitude, residual = linear(shape)
         squares = float(residual @ residual)
-        if best is None or squares < best.chi2:
-            values = np.concatenate([amplitude, np.zeros(int(not offset)), shape])
+        if amplitude[0] != 0.0 and (best is None or squares < best.chi2):
+            values = np.array([amplitude[0], amplitude[1] / amplitude[0] if offset else 0.0, *shape])
             best = Fitted(law, values, _errors(law, values, offset, temperature, share, white), squares, len(change), count)
     return best
 
@@ -164,7 +164,7 @@ def _starts(law: Law, temperature: Array) -> list[Array]:
 
 def _errors(law: Law, values: Array, offset: bool, temperature: Array, share: Array, white: Array) -> Array:
     def model(v: Array) -> Array:
-        return v[0] * law(temperature, share, v[2:]) + v[1]
+        return v[0] * (law(temperature, share, v[2:]) + v[1])
 
     columns = []
     for i in range(len(values)):

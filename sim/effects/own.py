@@ -61,7 +61,7 @@ class OwnEffect(Effect):
     file: Path | None = None
 
     def __reduce_ex__(self, protocol: SupportsIndex) -> str | tuple[Any, ...]:
-        return super().__reduce_ex__(protocol) if self.file is None else (_effect_of, (self.file, self.where))
+        return super().__reduce_ex__(protocol) if self.file is None else (effect_of, (self.file, self.where))
 
 
 def guarded(effect: Effect, where: str) -> OwnEffect:
@@ -76,15 +76,15 @@ def guarded(effect: Effect, where: str) -> OwnEffect:
     return OwnEffect(**keys, where=where)
 
 
-def effect_of(file: Path) -> OwnEffect:
-    """The EFFECT of a Python file; `BadInput` where there is none, naming file and line. A file is run once."""
+def effect_of(file: Path, where: str = "") -> OwnEffect:
+    """The EFFECT of a Python file, called `where` in messages; `BadInput` where there is none, naming file and line. A file is run once until it is changed."""
     if not file.is_file():
-        raise BadInput(f"--effect {file}: no such file; it must be a Python file that defines EFFECT")
-    return _effect_of(file.resolve(), str(file))
+        raise BadInput(f"--effect {where or file}: no such file; it must be a Python file that defines EFFECT")
+    return _effect_of(file.resolve(), where or str(file), file.stat().st_mtime_ns)
 
 
 @cache
-def _effect_of(file: Path, where: str) -> OwnEffect:
+def _effect_of(file: Path, where: str, changed: int) -> OwnEffect:
     name = f"effect_{hashlib.sha256(str(file).encode()).hexdigest()[:12]}"  # one that no other module has
     spec = spec_from_file_location(name, file)
     if spec is None or spec.loader is None:
