@@ -189,7 +189,7 @@ def _settled(row: BallRow, lines: Sequence[Vector], centre: Vector | None = None
     ball = HeavyBall(row.inner_length, row.outer_length, row.inner_constant, row.outer_constant, row.inertia)
     different = dict.fromkeys(lines)
     stretch = max(LEAST_STRETCH, max(hypot(r, z) for r, z in different) - row.unloaded_distance)
-    contact, flung = row.constant * stretch**1.5, row.inertia.loads(1.0, 0.0)[0]
+    contact, flung = row.constant * stretch**1.5, row.inertia.loads((1.0, 0.0), (1.0, 0.0)).centrifugal
     tolerance, least = 1e-12 * contact + 1e-13 * flung, 1e-9 * row.constant * sqrt(stretch)
     # a groove distance is rounded to some of its last bits, which the stiffer race turns into force: 1.5 K^(2/3) F^(1/3) of it
     stiffest = 1.5 * max(row.inner_constant, row.outer_constant) ** (2 / 3) * max(contact, flung) ** (1 / 3)

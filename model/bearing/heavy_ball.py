@@ -4,10 +4,11 @@ Centrifugal force and gyroscopic moment make the inner and outer contact angles 
 outer-race control). The ball's centre c and the outer groove's centre l are measured from the inner groove's, in the ball's r-z
 plane. With phi the outer contact angle, e = (-cos phi, sin phi) from the ball to the outer groove and t = de/dphi across it,
 
-    resultant on the ball  R = -F_i c/|c| + P + (C, 0) = 0,    force on the outer ring  P = F_o e - 2 M / D t.
+    resultant on the ball  R = -F_i c/|c| + P + (C, 0) = 0,    force on the outer ring  P = F_o e - 2 M / D t:
 
-C and M depend on phi alone and dphi = t . (dl - dc) / |l - c|, so with S_i, J, G the derivatives of F_i c/|c|, P, P + (C, 0) by
-their own argument: dR/dc = -(S_i + G), dR/dl = G, and the ring sees k = J (S_i + G)^-1 S_i.
+a positive M pushes the ball towards a larger outer angle. C and M depend on both contact angles, the outer one by the gap l - c
+between ball and outer groove and the inner one by c. With G = dR/dl, J = dP/dl, and S = -dR/dc, H = dP/dc where the gap is held,
+dR/dc = -(S + G), and the ring sees k = J (S + G)^-1 S + H (S + G)^-1 G.
 
 With M the friction is no derivative of an energy, so k, the exact derivative of P, is not symmetric: for a row of the reference spindle the
 radial-tilt entries differ by 7e-9 of their size at 7200 rpm, 7e-5 at 30,000, as the fourth power of the speed.
@@ -48,24 +49,43 @@ class BallInertia:
     def mass(self) -> float:
         return pi / 6 * self.density * self.diameter**3
 
-    def loads(self, cosine: float, sine: float) -> tuple[float, float, float, float]:
-        """Centrifugal force C (N), its derivative by the outer contact angle, gyroscopic moment M (N m) and its derivative.
+    def loads(self, outer: Vector, inner: Vector) -> Loads:
+        """What the ball's inertia asks of its contacts, for the cosine and sine of its `outer` and `inner` contact angles a_o, a_i.
 
-        Kinematics after Harris 1991, ch. 8: rolling at both races, outer-race control, tan beta = sin a / (cos a + gamma), the inner
-        angle taken equal to the outer. A ball that spins with w about an axis at beta to z while it orbits with the cage's speed has
-        dH/dt = cage z x H = J w cage sin(beta) about the direction of travel. Rolling makes w (cos a cos beta + sin a sin beta) equal
-        to the rings' relative speed over gamma / (1 + gamma cos a) + gamma / (1 - gamma cos a); with beta put in, what is left of
-        w sin(beta) is relative sin a (1 - gamma cos a) / (2 gamma).
+        Kinematics of Harris 1991, ch. 8: rolling at both races and no spin at the outer, tan beta = sin a_o / (cos a_o + gamma). A ball that
+        spins with w about an axis at beta to z while it orbits with the cage's speed has dH/dt = cage z x H = J w cage sin(beta) about the
+        direction of travel. Rolling is (cage - outer speed) (1 + gamma cos a_o) / cos(a_o - beta) = (inner speed - cage) (1 - gamma cos a_i) /
+        cos(a_i - beta) = -gamma w; with beta put in, the cage is behind the outer ring by relative (1 - gamma cos a_i) / (1 + cos(a_i - a_o))
+        and what is left of w sin(beta) is that sin a_o / gamma.
         """
+        (co, so), (ci, si) = outer, inner
         gamma = self.diameter / self.pitch_diameter
-        lag, lead = 1 - gamma * cosine, 1 + gamma * cosine
+        lag, both, across = 1 - gamma * ci, 1 + co * ci + so * si, si * co - ci * so
         relative = self.outer_speed - self.inner_speed
-        cage = (self.inner_speed * lag + self.outer_speed * lead) / 2
-        cage_slope = -gamma * sine * relative / 2
+        behind, by_outer, by_inner = (relative / both * x for x in (lag, -lag * across / both, gamma * si + lag * across / both))
+        cage = self.outer_speed - behind
         orbit = self.share * self.mass * self.pitch_diameter / 2
-        polar = self.share * self.mass * self.diameter**2 / 10 * relative / (2 * gamma)
-        moment_slope = polar * (cage_slope * sine * lag + cage * (cosine * lag + gamma * sine**2))
-        return orbit * cage**2, 2 * orbit * cage * cage_slope, polar * cage * sine * lag, moment_slope
+        polar = self.share * self.mass * self.diameter**2 / 10 / gamma
+        turned = cage - behind  # of cage times behind, by behind
+        return Loads(
+            orbit * cage**2,
+            -2 * orbit * cage * by_outer,
+            -2 * orbit * cage * by_inner,
+            polar * cage * behind * so,
+            polar * (turned * by_outer * so + cage * behind * co),
+            polar * turned * by_inner * so,
+        )
+
+
+class Loads(NamedTuple):
+    """Centrifugal force C (N) and gyroscopic moment M (N m) of a ball, and their derivatives by the outer and the inner contact angle."""
+
+    centrifugal: float
+    centrifugal_by_outer: float
+    centrifugal_by_inner: float
+    moment: float
+    moment_by_outer: float
+    moment_by_inner: float
 
 
 @dataclass(frozen=True)
@@ -80,7 +100,7 @@ class HeavyBall:
 
 
 class Balance(NamedTuple):
-    """Forces on a ball at one place of its `centre` (m), (r, z) components (N), and their derivatives (N/m): S_i, J and G above."""
+    """Forces on a ball at one place of its `centre` (m), (r, z) components (N), and their derivatives (N/m): S, J, G and H above."""
 
     centre: Vector
     resultant: Vector
@@ -93,6 +113,7 @@ class Balance(NamedTuple):
     by_inner: Matrix
     by_outer: Matrix
     by_line: Matrix
+    passed_on: Matrix
 
     @property
     def off(self) -> float:
@@ -100,10 +121,11 @@ class Balance(NamedTuple):
         return hypot(*self.resultant)
 
     def stiffness(self) -> Matrix:
-        """J (S_i + G)^-1 S_i: what the outer ring sees of the ball, whose centre follows it."""
-        s, j, g = self.by_inner, self.by_outer, self.by_line
+        """J (S + G)^-1 S + H (S + G)^-1 G: what the outer ring sees of the ball, whose centre follows it."""
+        s, g = self.by_inner, self.by_line
         inverse = _inverse((s[0] + g[0], s[1] + g[1], s[2] + g[2], s[3] + g[3]))
-        return _product(j, _product(inverse, s))
+        own, passed = _product(self.by_outer, _product(inverse, s)), _product(self.passed_on, _product(inverse, g))
+        return own[0] + passed[0], own[1] + passed[1], own[2] + passed[2], own[3] + passed[3]
 
 
 def settled(ball: HeavyBall, line: Vector, tolerance: float, least: float, start: Vector | None = None) -> Balance:
@@ -152,7 +174,8 @@ def _start(ball: HeavyBall, line: Vector) -> Vector:
     on the outer race alone clears the inner one, on the radius of the outer groove's centre. Steps along a loose ball's circles would be many.
     """
     length = hypot(*line)
-    flung = ball.inertia.loads(-line[0] / length, abs(line[1]) / length)[0]
+    along = -line[0] / length, abs(line[1]) / length
+    flung = ball.inertia.loads(along, along).centrifugal
     inner, outer = (own + (flung / k) ** (2 / 3) for own, k in ((ball.inner_length, ball.inner_constant), (ball.outer_length, ball.outer_constant)))
     if inner + outer <= length or flung == 0.0:
         stretch = max(length - ball.inner_length - ball.outer_length, LEAST_STRETCH)
@@ -175,28 +198,34 @@ def balance(ball: HeavyBall, centre: Vector, line: Vector) -> Balance:
     gap = (line[0] - centre[0], line[1] - centre[1])
     outer_length, (er, ez), outer, outer_along = _contact(gap, ball.outer_length, ball.outer_constant)
     cosine, sine = -er, ez
-    centrifugal, centrifugal_slope, moment, moment_slope = ball.inertia.loads(cosine, sine)
+    loads = ball.inertia.loads((cosine, sine), (-ir, iz))
     # outer-race control: the friction that turns the ball's angular momentum acts at the outer contact, 2 M / D across it
     grip = 2 / ball.inertia.diameter if outer > 0 else 0.0
-    friction, friction_slope = grip * moment, grip * moment_slope
+    friction, by_outer_angle, by_inner_angle = grip * loads.moment, grip * loads.moment_by_outer, grip * loads.moment_by_inner
     on_outer = (outer * er - friction * sine, outer * ez - friction * cosine)
     # across (sine, cosine) turns into (cosine, -sine) with the angle, which turns by across / length for a movement of the line
-    turn_r, turn_z = -friction_slope * sine - friction * cosine, -friction_slope * cosine + friction * sine
+    turn_r, turn_z = -by_outer_angle * sine - friction * cosine, -by_outer_angle * cosine + friction * sine
     angle_r, angle_z = sine / outer_length, cosine / outer_length
+    inner_r, inner_z = iz / inner_length, -ir / inner_length
+    held = _spring((ir, iz), inner_along, inner / inner_length)
     spring = _spring((er, ez), outer_along, outer / outer_length)
     by_outer = (spring[0] + turn_r * angle_r, spring[1] + turn_r * angle_z, spring[2] + turn_z * angle_r, spring[3] + turn_z * angle_z)
+    drag_r, drag_z = -by_inner_angle * sine, -by_inner_angle * cosine
+    passed_on = (drag_r * inner_r, drag_r * inner_z, drag_z * inner_r, drag_z * inner_z)
+    flung_r, flung_z = loads.centrifugal_by_inner * inner_r, loads.centrifugal_by_inner * inner_z
     return Balance(
         centre,
-        (on_outer[0] - inner * ir + centrifugal, on_outer[1] - inner * iz),
+        (on_outer[0] - inner * ir + loads.centrifugal, on_outer[1] - inner * iz),
         on_outer,
         inner,
         outer,
         atan2(abs(iz), -ir),
         atan2(abs(ez), -er),
         inner_length - ball.inner_length + outer_length - ball.outer_length,
-        _spring((ir, iz), inner_along, inner / inner_length),
+        (held[0] - passed_on[0] - flung_r, held[1] - passed_on[1] - flung_z, held[2] - passed_on[2], held[3] - passed_on[3]),
         by_outer,
-        (by_outer[0] + centrifugal_slope * angle_r, by_outer[1] + centrifugal_slope * angle_z, by_outer[2], by_outer[3]),
+        (by_outer[0] + loads.centrifugal_by_outer * angle_r, by_outer[1] + loads.centrifugal_by_outer * angle_z, by_outer[2], by_outer[3]),
+        passed_on,
     )
 
 

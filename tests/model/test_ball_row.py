@@ -126,12 +126,12 @@ def test_forces_on_a_heavy_ball_balance():
     inner, outer = answer.ball_force[0], answer.outer_ball_force[0]
     ai, ao = answer.inner_angle[0], answer.outer_angle[0]
     gamma = FAST.diameter / FAST.pitch_diameter
-    cage = FAST.inner_speed * (1 - gamma * np.cos(ao)) / 2
+    beta = np.arctan2(np.sin(ao), np.cos(ao) + gamma)  # Harris 1991, Eqs. 8.47-8.50 for a still outer ring
+    lead, lag = (1 + gamma * np.cos(ao)) / np.cos(ao - beta), (1 - gamma * np.cos(ai)) / np.cos(ai - beta)
+    spin = -FAST.inner_speed / (1 / lead + 1 / lag) / gamma
+    cage = FAST.inner_speed * lag / (lag + lead)
     centrifugal = FAST.mass * FAST.pitch_diameter / 2 * cage**2
-    beta = np.arctan2(np.sin(ao), np.cos(ao) + gamma)
-    rolling = gamma / (1 + gamma * np.cos(ao)) + gamma / (1 - gamma * np.cos(ao))
-    spin = FAST.inner_speed / ((np.cos(ao) * np.cos(beta) + np.sin(ao) * np.sin(beta)) * rolling)
-    friction = 2 / FAST.diameter * FAST.mass * FAST.diameter**2 / 10 * spin * cage * np.sin(beta)
+    friction = -2 / FAST.diameter * FAST.mass * FAST.diameter**2 / 10 * spin * cage * np.sin(beta)
     assert inner * np.cos(ai) - outer * np.cos(ao) + centrifugal + friction * np.sin(ao) == pytest.approx(0, abs=1e-6 * outer)
     assert inner * np.sin(ai) - outer * np.sin(ao) - friction * np.cos(ao) == pytest.approx(0, abs=1e-6 * outer)
     assert ao < np.radians(41.5) < ai
