@@ -10,7 +10,7 @@ import numpy as np
 
 from thermospindle.diagnosis.forward.hit import hit_found
 from thermospindle.diagnosis.forward.mechanism import Mechanism, strongest, with_own_laws
-from thermospindle.diagnosis.forward.model import CampaignModel
+from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, fit
 from thermospindle.diagnosis.inference.freeform import alike, runs_against
@@ -18,7 +18,7 @@ from thermospindle.diagnosis.inference.hypothesis import PLENTY, STRAIN, Hypothe
 from thermospindle.diagnosis.inference.pairs import joined, joined_early, without_one
 from thermospindle.diagnosis.inference.resonance import with_resonance
 from thermospindle.diagnosis.inference.screening import Screened
-from thermospindle.diagnosis.inference.singles import FAR, Singles, better, by_own_laws, carried_over, fit_singles, of_each_name
+from thermospindle.diagnosis.inference.singles import FAR, OCCAM, Singles, better, by_own_laws, carried_over, fit_singles, of_each_name
 from thermospindle.model.parallel import in_parallel, meanwhile
 from thermospindle.model.types import Array
 
@@ -75,6 +75,7 @@ def search(
     finalists = _finalists(found)
     least = max((h.evidence.ln for h in found), default=-np.inf) - FAR
     none, *ended = _ended(model, least, [none, *finalists], workers)
+    none = _without_what_does_nothing(model, none, ended)
     anew = dict(zip(map(id, finalists), ended, strict=True))
     ranked = [anew.get(id(h), h) for h in found]
     ranked += _other_ways(model, ranked, every, tried, workers)
@@ -88,6 +89,28 @@ def search(
 def _without_effects(model: CampaignModel) -> Hypothesis:
     first = fit(model)
     return settled(model, Hypothesis(first, evidence(model, first)))
+
+
+def _without_what_does_nothing(model: CampaignModel, none: Hypothesis, ended: Sequence[Hypothesis]) -> Hypothesis:
+    """The model without effects, fitted on from the best explanation that explains more with effects of no size in any test: then it had stalled."""
+    idle = [h for h in ended if none.evidence.learned.errors > STRAIN and h.evidence.ln > none.evidence.ln + OCCAM and _does_nothing(h)]
+    if not idle:
+        return none
+    best = max(idle, key=lambda h: h.evidence.ln)
+    learned = replace(best.evidence.learned, widths=(), departures=())
+    try:
+        again = fit(model, (), best.fit.nuisance, best.fit.rates, TEMPERS[-1:], learned)
+        found = settled(model, Hypothesis(again, evidence(model, again, wide=True)))
+    except FAILED:
+        return none
+    return max(none, found, key=lambda h: h.evidence.ln)
+
+
+def _does_nothing(h: Hypothesis) -> bool:
+    """Whether the sizes of all its mechanisms, in all tests, are their neutral values within three of their errors."""
+    errors = np.sqrt(np.einsum("mtt->mt", h.evidence.size_covariance))
+    neutral = np.array([[m.size.neutral] for m in h.mechanisms])
+    return bool((np.abs(h.evidence.sizes - neutral) <= 3 * errors).all())
 
 
 def _ended(model: CampaignModel, least: float, found: Sequence[Hypothesis], workers: int | None) -> list[Hypothesis]:

@@ -32,6 +32,7 @@ STEPS, FEW = 100, 6  # from where a ball may be, and from where it was
 HALVINGS = 30
 LONGEST = 0.05  # of the distance between the groove centres, in one step
 LEAST_STRETCH = 0.02e-6  # m, pressed into the races at the start
+LEAST_ROLLING = 1e-9  # of 1 + cos(a_i - a_o), which is 2 where both contacts lie opposite each other
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,8 @@ class BallInertia:
         """
         (co, so), (ci, si) = outer, inner
         gamma = self.diameter / self.pitch_diameter
-        lag, both, across = 1 - gamma * ci, 1 + co * ci + so * si, si * co - ci * so
+        # a step may lead to where the contacts lie on one side of the ball, and nothing rolls
+        lag, both, across = 1 - gamma * ci, max(1 + co * ci + so * si, LEAST_ROLLING), si * co - ci * so
         relative = self.outer_speed - self.inner_speed
         behind, by_outer, by_inner = (relative / both * x for x in (lag, -lag * across / both, gamma * si + lag * across / both))
         cage = self.outer_speed - behind

@@ -22,7 +22,7 @@ from thermospindle.diagnosis.inference.pairs import joined_early, without_one
 from thermospindle.diagnosis.inference.prior import DRIFTING, steady, undrifted
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.inference.screening import Screened, linearised, screen
-from thermospindle.diagnosis.inference.search import Search, _other_ways, search
+from thermospindle.diagnosis.inference.search import Search, _other_ways, _without_what_does_nothing, search
 from thermospindle.diagnosis.inference.singles import HIDING, Singles, cost_of, fit_singles, lasting
 from thermospindle.model.built.tolerance import deviated
 from thermospindle.model.machine import Condition
@@ -172,6 +172,25 @@ def test_what_came_first_is_tried_without(spindle):
     assert set(more) == {("bond_softening", "preload_loss"), ("preload_loss", "modulus_softening")}
     assert more["bond_softening", "preload_loss"] > max(h.evidence.ln for h in found) - 1
     assert more["bond_softening", "preload_loss"] > more["preload_loss", "modulus_softening"] + 10
+
+
+def test_a_model_without_effects_that_stalled_is_fitted_from_one_whose_effect_does_nothing(spindle):
+    """A campaign of another's, with an absorber, left it at a chi2 of 729 a number, and bearing damping of 0 +- 6 % at 1.2. An effect that does
+    something says nothing of it."""
+    m = variants(effect("preload_loss"))[0]
+    for hidden in ([], [(m.effect, m.values(m.size.typical, [q.neutral for q in m.shape]))]):
+        model = model_of(spindle, mode_campaign(spindle, TESTS, 3, hidden))
+        own, first = fit(model, [m]), fit(model)
+        h, none = Hypothesis(own, evidence(model, own)), Hypothesis(first, evidence(model, first))
+        away = replace(none.evidence, ln=h.evidence.ln - 1000, learned=replace(none.evidence.learned, errors=30.0))
+        stalled = Hypothesis(replace(first, point=first.point + 3.0), away)
+        found = _without_what_does_nothing(model, stalled, [h])
+        if hidden:
+            assert found is stalled
+        else:
+            assert found.names == ()
+            assert found.evidence.ln == pytest.approx(none.evidence.ln, abs=0.5)
+            assert _without_what_does_nothing(model, none, [h]) is none
 
 
 @pytest.mark.slow
