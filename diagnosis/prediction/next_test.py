@@ -39,7 +39,7 @@ MOST = 3
 @dataclass(frozen=True)
 class NextTest:
     """How far apart a test at `condition` puts two explanations, as odds if either is true (no more than a million); how many repeats make them
-    100 to 1; what they differ in most, in words; and what each predicts of every mode in the band."""
+    100 to 1; what they differ in most, in words; what each predicts of every mode in the band; and whether it is `beyond` what the spindle is meant for."""
 
     condition: Condition
     separates: tuple[str, str]
@@ -47,16 +47,21 @@ class NextTest:
     repeats: int
     tells: str
     predictions: tuple[tuple[ModePrediction, ...], tuple[ModePrediction, ...]]
+    beyond: bool = False
 
 
 def next_tests(found: Search, verdict: Verdict) -> list[NextTest]:
-    """The best test for each pair of the leading explanation and its nearest rivals."""
+    """The best test for each pair of the leading explanation and its nearest rivals; of what nothing explains but drift, of that and the best of the catalogue.
+    One beyond what the spindle is meant for only where none within decides."""
     possible = [c for c in verdict.candidates if c.names == verdict.effects or not beyond_limits(c.hypothesis)]
     alive = [c for c in possible if set(c.names) <= set(verdict.effects) or c.probability > ALIVE][: MOST + 1]
     if len(alive) < 2:
         alive += [c for c in possible if c not in alive][: 2 - len(alive)]
-    if verdict.word != "identified":
-        alive += [c for c in verdict.free if c.hypothesis.mechanisms][:1]  # what is only left predicts nothing
+    drifting = [c for c in verdict.free if c.hypothesis.mechanisms][:1]  # what is only left predicts nothing
+    if verdict.word == "unexplained":
+        alive = [*drifting, *alive[:1]]
+    elif verdict.word != "identified":
+        alive += drifting
     alive = alive[: MOST + 1]
     if len(alive) < 2:
         return []
@@ -65,15 +70,16 @@ def next_tests(found: Search, verdict: Verdict) -> list[NextTest]:
     first, *others = in_parallel(partial(standing, found.model, least=least), [c.hypothesis for c in alive])
     plans = planned(found.model)
     predicted = in_parallel(partial(_predicted, found.model, first, others), plans)
-    tests = []
+    tests, meant = [], partial(is_meant, found.model)
     for k, rival in enumerate(rivals):
         weighed = []
         for plan, own in zip(plans, predicted, strict=True):
             if own and (a := own[0]) and (b := own[1 + k]):
-                weighed.append(_weighed(plan, lead, rival, a, b))
+                weighed.append(replace(_weighed(plan, lead, rival, a, b), beyond=not meant(plan)))
         weighed = [t for t in weighed if t.odds > TELLS]
+        decide = [t for t in weighed if not t.beyond and t.odds >= np.exp(DECIDED)]
         if weighed:
-            tests.append(max(weighed, key=lambda t: (min(t.odds, np.exp(CERTAIN)), -abs(t.condition.temperature - 20), -t.condition.speed)))
+            tests.append(max(decide or weighed, key=lambda t: (min(t.odds, np.exp(CERTAIN)), -abs(t.condition.temperature - 20), -t.condition.speed)))
     return tests
 
 
@@ -93,6 +99,14 @@ def planned(model: CampaignModel) -> list[Condition]:
     (how, _), = Counter((c.level, c.soak_time) for c in tested).most_common(1)
     plans = [Condition(t, s * model.spindle.nominal_speed, *how) for t, s in product(TEMPERATURES, SPEEDS)]
     return [plan for plan in plans if not any(same(plan, c) for c in tested)]
+
+
+def is_meant(model: CampaignModel, plan: Condition) -> bool:
+    """Whether temperature and speed lie within what the scene states, or tests of the campaign went to."""
+    tested = [d.condition for d in model.tests]
+    temperatures = [*model.spindle.temperatures, *(c.temperature for c in tested)]
+    fastest = max(model.spindle.nominal_speed, *(abs(c.speed) for c in tested))
+    return min(temperatures) <= plan.temperature <= max(temperatures) and abs(plan.speed) <= fastest * (1 + 1e-9)
 
 
 def _weighed(plan: Condition, lead: Candidate, rival: Candidate, a: Sequence[ModePrediction], b: Sequence[ModePrediction]) -> NextTest:

@@ -17,7 +17,7 @@ from thermospindle.report.figures.diagnosis import figures
 from thermospindle.report.figures.runout_campaign import diagnosis_figures
 from thermospindle.report.page import runout_diagnosis
 from thermospindle.report.page.report import Section, write_page
-from thermospindle.report.text.diagnosis.words import hidden_words, plan_words, value_words
+from thermospindle.report.text.diagnosis.words import beyond_words, hidden_words, plan_words, value_words
 from thermospindle.report.typeset import minus, plain, prose, signed, table, unit_cell, with_error
 
 CAPTIONS = {
@@ -109,7 +109,7 @@ def _tests(answer: dict[str, Any]) -> str:
     for t in answer["next_test"]:
         times = "" if t["repeats"] == 1 else f"; {t['repeats']} of them make it 100 to 1"
         first, second = (escape(s) for s in t["separates"])
-        words = f"<h3>A test {prose(plan_words(t['condition']))}</h3><p>It separates {first} from {second} with odds of {_odds(t['odds'])} to 1{times}; most by {prose(t['tells'])}.</p>"
+        words = f"<h3>A test {prose(plan_words(t['condition']))}</h3><p>It separates {first} from {second} with odds of {_odds(t['odds'])} to 1{times}; most by {prose(t['tells'])}.{beyond_words(t)}</p>"
         most = max(len(rows) for rows in t["predicted"].values())
         rows = [
             [escape(name), *(_with_error(r["frequency_Hz"], r["sd_Hz"], 1) for r in predicted), *[""] * (most - len(predicted))]

@@ -53,6 +53,7 @@ def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
                 "odds": t.odds,
                 "repeats": t.repeats,
                 "tells": t.tells,
+                "beyond": t.beyond,
                 "predicted": {
                     name: [{"frequency_Hz": m.frequency, "sd_Hz": m.sd, "common_Hz": list(m.common)} for m in rows]
                     for name, rows in zip(t.separates, t.predictions, strict=True)

@@ -199,7 +199,12 @@ def next_words(test: dict[str, Any], which: str) -> str:
     """The test to make, in a sentence."""
     first, second = test["separates"]
     odds = "more than a million" if test["odds"] >= 1e6 * (1 - 1e-9) else plain(test["odds"])
-    return f"A test {which} would tell {first} from {second} with odds of {odds} to 1, most by {test['tells']}."
+    return f"A test {which} would tell {first} from {second} with odds of {odds} to 1, most by {test['tells']}.{beyond_words(test)}"
+
+
+def beyond_words(test: dict[str, Any]) -> str:
+    """That a proposed test is beyond what the scene states, where it is."""
+    return " None within the temperatures and the speed that the scene states and the campaign had is as sure." if test.get("beyond") else ""
 
 
 def _percent(probability: float) -> str:

@@ -15,6 +15,7 @@ from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.problem import Problem
+from thermospindle.diagnosis.prediction import next_test
 from thermospindle.diagnosis.prediction.forecast import ModePrediction, Standing, covariance, forecast, standing
 from thermospindle.diagnosis.prediction.next_test import _weighed, next_tests, of_both, planned
 from thermospindle.diagnosis.prediction.outcomes import same
@@ -73,6 +74,30 @@ def test_no_test_that_was_made_is_proposed(one_test):
     proposed = next_tests(SimpleNamespace(model=model), verdict)
     assert proposed
     assert not any(same(t.condition, TESTED) for t in proposed)
+
+
+def test_a_test_beyond_what_the_spindle_is_meant_for_only_where_none_within_decides(one_test, monkeypatch):
+    """A rig that is meant for 20 to 60 C and 7200 rpm was sent to 80 C and 10,800 rpm where 60 C at rest told as surely."""
+    model, found = one_test
+    verdict = SimpleNamespace(word="ambiguous", effects=tuple(n for h in found for n in h.names), candidates=tuple(Candidate(h, h.names, False, 10.0, 0.5) for h in found), free=())
+    odds = {30.0: 200.0, 0.0: 1e5}
+    weigh = next_test._weighed
+    monkeypatch.setattr(next_test, "_weighed", lambda plan, *of: replace(weigh(plan, *of), odds=odds.get(plan.temperature, 3.0)))
+    [t] = next_tests(SimpleNamespace(model=model), verdict)
+    assert (t.condition.temperature, t.beyond) == (30.0, False)
+    odds[30.0] = 20.0
+    [t] = next_tests(SimpleNamespace(model=model), verdict)
+    assert (t.condition.temperature, t.beyond) == (0.0, True)
+
+
+def test_of_what_nothing_explains_the_test_parts_drift_from_the_catalogue(one_test):
+    """Not two effects that were both turned down from each other."""
+    model, found = one_test
+    free = Candidate(found[0], ("preload",), True, 20.0, 1.0)
+    known = tuple(Candidate(h, h.names, False, 10.0, 0.0) for h in reversed(found))
+    told = next_tests(SimpleNamespace(model=model), SimpleNamespace(word="unexplained", effects=(), candidates=known, free=(free,)))
+    assert {t.separates for t in told} <= {("preload", "clearance_opening")}
+    assert told
 
 
 def test_what_is_only_left_predicts_nothing(one_test):
