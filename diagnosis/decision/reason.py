@@ -107,7 +107,7 @@ def of_tolerances(model: CampaignModel, best: Hypothesis) -> str:
     if times == 1.0:
         return ""
     build = [(float(m), q) for m, q in zip(best.evidence.mean, model.parameters, strict=False) if q.kind == kinds_of.BUILD]
-    off = [f"{q.name} by {m * q.sd:+.0%}" for m, q in sorted(build, key=lambda row: -abs(row[0])) if abs(m) > OFF][:NAMED]
+    off = [f"{q.name} by {q.at(m):+.0%}" for m, q in sorted(build, key=lambda row: -abs(row[0])) if abs(m) > OFF][:NAMED]
     which = f": {', '.join(off)}" if off else ""
     return f" The drawing is off by more than its tolerances, which are taken {times:g} times as wide as stated{which}."
 

@@ -70,9 +70,9 @@ class CampaignModel:
             if len(self._spindles) > 4 * len(self.tests):
                 self._spindles.clear()
             spindle = self.scenes[t]
-            for parameter, value in zip(self.build, values, strict=True):
+            for parameter, nuisance, value in zip(self.build, self.parameters[: len(values)], values, strict=True):
                 if value:
-                    spindle = parameter.apply(spindle, float(max(value * parameter.sd, -0.9)))
+                    spindle = parameter.apply(spindle, nuisance.at(value))
             self._spindles[key] = spindle
         return self._spindles[key]
 

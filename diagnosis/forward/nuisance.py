@@ -40,6 +40,7 @@ STIFFNESS_DRIFT_SD, DAMPING_DRIFT_SD = 1e-4, 0.01  # of one mode in one test, at
 DRIFT_SD = 1e-3  # of one channel's gain from test to test, at the reference width
 SHARE_SD = 0.03  # root of the mass that a mode carries along in a light resonance, over its own modal mass
 RESONANCE_SD = (0.02, 0.5)  # relative, of its frequency and of its damping ratio, about where it was seen
+LEAST_BUILD = -0.9  # relative, of what is built
 COINCIDE = 0.01  # of a frequency, within which modes are a pair or a cluster
 RIGID = 1e-6  # of the highest frequency, below which a mode is a rigid body's: rounding leaves some 1e-8 of it, and a beam's highest is in MHz
 EXPANSION_SD = {"radial motion of the rings": 3e-3, "axial motion of the rings": 3e-3, "growth of the grooves": 0.03}
@@ -61,6 +62,10 @@ class Nuisance:
     test: int | None = None
     index: int = -1
     modes: tuple[int, int] = (-1, -1)
+
+    def at(self, x: float) -> float:
+        """Its value at `x` prior standard deviations; of a mass or a stiffness a tenth is left at least."""
+        return max(float(x) * self.sd, LEAST_BUILD) if self.kind == BUILD else float(x) * self.sd
 
 
 @dataclass(frozen=True, eq=False)

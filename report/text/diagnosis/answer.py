@@ -63,7 +63,7 @@ def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
         ],
         "misfit": _misfit(d),
         "tolerances": {
-            p.name: {"value": float(m * p.sd), "sd": float(s * p.sd), "prior_sd": p.sd, "kind": p.kind}
+            p.name: {"value": p.at(m), "sd": float(s * p.sd), "prior_sd": p.sd, "kind": p.kind}
             | ({"test": d.search.model.tests[p.test].test.id} if p.kind == kinds_of.TEMPERATURE and p.test is not None else {})
             for p, m, s in zip(d.search.model.parameters, v.told.evidence.mean, _sd(v.told.evidence), strict=False)
             if p.kind in (kinds_of.BUILD, kinds_of.TEMPERATURE, kinds_of.GAIN)

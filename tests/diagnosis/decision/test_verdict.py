@@ -175,11 +175,11 @@ def test_what_changes_beyond_noise_is_not_nothing_missing(leaves, tests, word):
 
 
 def test_a_drawing_that_is_off_is_said():
-    """With the tolerances that are off by more than twice what is stated, the largest first."""
+    """With the tolerances that are off by more than twice what is stated, the largest first; nothing is told as less than a tenth of itself, as nothing is built so."""
     found = made({"a": 60.0})
-    parameters = tuple(Nuisance(BUILD, name, 0.02) for name in ("mass", "preload", "mount"))
+    parameters = tuple(Nuisance(BUILD, name, 0.02) for name in ("mass", "preload", "mount", "hub"))
     lead = found.hypotheses[0]
-    mean = np.array([0.5, -6.0, 2.5, *lead.evidence.mean])
+    mean = np.array([0.5, -6.0, 2.5, -52.5, *lead.evidence.mean])
 
     def told(times: float) -> str:
         learned = replace(lead.evidence.learned, sizes={BUILD: times})
@@ -188,7 +188,7 @@ def test_a_drawing_that_is_off_is_said():
         return reason.of_tolerances(model, h)
 
     assert told(1.0) == ""
-    assert told(4.0) == " The drawing is off by more than its tolerances, which are taken 4 times as wide as stated: preload by -12%, mount by +5%."
+    assert told(4.0) == " The drawing is off by more than its tolerances, which are taken 4 times as wide as stated: hub by -90%, preload by -12%, mount by +5%."
 
 
 @pytest.mark.parametrize(("misses", "confirmed"), [(30.0, True), (80.0, False)])
