@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from thermospindle.diagnosis.decision.explanations import DEPARTS
 from thermospindle.diagnosis.forward.nuisance import BUILD, GAIN, TEMPERATURE
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.formats import DIAGNOSIS, migrated
@@ -57,16 +58,24 @@ class NewScene:
 
 
 @dataclass(frozen=True)
-class Answer:
-    """What `add` takes of an answer of `diagnose --json`: candidates as (effects, parameters), the tolerances fitted beside `best`, and the effects of which
-    the data have the laws of their own (`own_laws`)."""
+class Offered:
+    """A candidate: its effects, their parameters, and those of which the data have another law than they assume."""
 
-    candidates: tuple[tuple[tuple[str, ...], Mapping[str, Any]], ...]
+    effects: tuple[str, ...]
+    parameters: Mapping[str, Any]
+    lawless: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What `add` takes of an answer of `diagnose --json`: candidates, the tolerances fitted beside `best`, and the elements of which a law can be `drafted`."""
+
+    candidates: tuple[Offered, ...]
     best: tuple[str, ...]  # empty: no effect was taken for true, and the tolerances are those fitted without any
     build: dict[str, float]
     tests: tuple[str, ...]
     scene_hash: str | None
-    own_laws: frozenset[str] = frozenset()
+    drafted: frozenset[str] = frozenset()
 
 
 def check_place(target: Path, out: Path) -> None:
@@ -103,9 +112,10 @@ def new_scene(
     note = ""
     answer = read_answer(diagnosis) if diagnosis else None
     if answer and diagnosis:
-        fitted = fitted_values(effects, answer, diagnosis)
+        offered = offered_for(effects, answer, diagnosis)
+        fitted = fitted_values(effects, offered, diagnosis)
         build, note = _build_of(effects, answer, diagnosis, old, file)
-        note = "\n".join([*([note] if note else []), *(_lawless(e.name, diagnosis) for e in effects if e.name in answer.own_laws)])
+        note = "\n".join([*([note] if note else []), *(_lawless(e, answer, diagnosis) for e in effects if e.name in offered.lawless)])
     hand = _by_effect(effects, by_hand)
     added = tuple(_added(e, old, fitted.get(e.name, {}), hand[e.name], diagnosis) for e in effects)
     _write(file, effects, added, build, answer.tests if answer else (), f"fitted, from {diagnosis}", folder, out, catalogue)
@@ -235,21 +245,28 @@ def _kind(name: str) -> str:
 def answer_of(raw: Any, where: str) -> Answer:
     """The same from the object of such an answer; `where` it is from is what a refusal begins with."""
     try:
-        candidates = tuple((tuple(map(_text, c["effects"])), dict(c["parameters"])) for c in raw["candidates"])
-        own_laws = frozenset(_text(name) for c in raw["candidates"][:1] for name in c.get("own_law", ()))
+        candidates = tuple(_offered(c) for c in raw["candidates"])
+        drafted = frozenset(_text(p["element"]) for p in raw.get("where", ()))
         tolerances = {name: _finite(row["value"]) for name, row in raw.get("tolerances", {}).items()}
         kinds = {name: row.get("kind", _kind(name)) for name, row in raw.get("tolerances", {}).items()}
-        best = candidates[0][0] if candidates and raw.get("effects") else ()
+        best = candidates[0].effects if candidates and raw.get("effects") else ()
         scene_hash = raw.get("scene_hash")
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError):
         raise BadInput(f"{where}: {NO_ANSWER}") from None
     build = {name: float(f"{v:.8g}") for name, v in tolerances.items() if kinds[name] == BUILD}
     tests = tuple(str(raw["tolerances"][name].get("test", name.removeprefix(OF_TEST))) for name in tolerances if kinds[name] == TEMPERATURE)
-    return Answer(candidates, best, build, tests, scene_hash, own_laws)
+    return Answer(candidates, best, build, tests, scene_hash, drafted)
 
 
-def _lawless(name: str, diagnosis: Path) -> str:
-    return f"the data have another law than {name} assumes: spindle draft {diagnosis} --element {name} writes an effect with theirs"
+def _offered(raw: Any) -> Offered:
+    departing = {_text(name) for name, departure in raw.get("departure_from_law", {}).items() if _finite(departure) >= DEPARTS}
+    return Offered(tuple(map(_text, raw["effects"])), dict(raw["parameters"]), frozenset(departing | set(map(_text, raw.get("own_law", ())))))
+
+
+def _lawless(effect: Effect, answer: Answer, diagnosis: Path) -> str:
+    name, size = effect.name, effect.parameters[0].name
+    drafts = f": spindle draft {diagnosis} --element {name} writes an effect with theirs" if name in answer.drafted else ""
+    return f"the data have another law than {name} assumes, and {size} is its mean over the tests{drafts}"
 
 
 def _text(value: Any) -> str:
@@ -267,16 +284,22 @@ def _finite(value: Any) -> float:
     return number
 
 
-def fitted_values(effects: Sequence[Effect], answer: Answer, file: Path) -> dict[str, dict[str, float]]:
-    """Values of effects in the first candidate that has them all, from `<effect>.<parameter>` or, alone, `<parameter>`."""
+def offered_for(effects: Sequence[Effect], answer: Answer, file: Path) -> Offered:
+    """The first candidate that has all these effects."""
     names = [e.name for e in effects]
-    parameters = next((p for own, p in answer.candidates if set(names) <= set(own)), None)
-    if parameters is None:
-        offered = dict.fromkeys(" + ".join(own) if len(names) > 1 else e for own, _ in answer.candidates for e in own)
+    found = next((c for c in answer.candidates if set(names) <= set(c.effects)), None)
+    if found is None:
+        offered = dict.fromkeys(" + ".join(c.effects) if len(names) > 1 else e for c in answer.candidates for e in c.effects)
         raise BadInput(
             f"--from {file}: no candidate has effect{'s' * (len(names) > 1)} {' and '.join(names)}; its candidates are "
             f"{', '.join(offered) or 'none'}"
         )
+    return found
+
+
+def fitted_values(effects: Sequence[Effect], offered: Offered, file: Path) -> dict[str, dict[str, float]]:
+    """Values of effects in a candidate, from `<effect>.<parameter>` or, alone, `<parameter>`."""
+    parameters = offered.parameters
     found: dict[str, dict[str, float]] = {}
     for effect in effects:
         found[effect.name] = {}

@@ -11,6 +11,7 @@ import numpy as np
 from thermospindle.diagnosis.data.lines import line_data
 from thermospindle.diagnosis.data.mode_table import mode_data
 from thermospindle.diagnosis.data.observe import condition_of
+from thermospindle.diagnosis.decision.explanations import DEPARTS
 from thermospindle.diagnosis.decision.verdict import Verdict, decide
 from thermospindle.diagnosis.forward.making import campaign_model, expected_noise
 from thermospindle.diagnosis.forward.mechanism import Mechanism, strongest, variants
@@ -34,9 +35,9 @@ STEPS = 7  # of progress, beside one a test
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """What would have to change from test to test: without any catalogue an element, or an effect of it with a law of the data's own, its `values` but the
-    size and the condition `at` which its formula is asked in every test. `change` (tests,) with `covariance` (tests, tests) in `unit`, what they go with, and the ln evidence over
-    the model without effects."""
+    """What would have to change from test to test: without any catalogue an element, or an effect of it whose size in every test is the data's own: its `values` but the
+    size (None of an element), and the condition `at` which its formula is asked in every test (None: at the test's own). `change` (tests,) with `covariance` (tests, tests) in `unit`,
+    what they go with, and the ln evidence over the model without effects."""
 
     element: str
     unit: str
@@ -46,7 +47,12 @@ class Drift:
     pattern: Chosen | None
     gain: float
     at: Condition | None = None
-    values: Mapping[str, float] = field(default_factory=dict)
+    values: Mapping[str, float] | None = None
+
+    @property
+    def relative(self) -> bool:
+        """Whether it is told as a share of what was: what free forms count in per cent of a logarithm."""
+        return self.unit == "%" and self.values is None
 
     @property
     def sd(self) -> Array:
@@ -55,8 +61,8 @@ class Drift:
 
     @property
     def told(self) -> list[tuple[float, float]]:
-        """Change and standard error of every test: what free forms count in per cent of a logarithm as a share of what was."""
-        if self.unit != "%" or self.at is not None:
+        """Change and standard error of every test, as a share (%) of what was where it is `relative`."""
+        if not self.relative:
             return [(float(a), float(s)) for a, s in zip(self.change, self.sd, strict=True)]
         factor = np.exp(self.change / 100)
         return [(float(100 * (f - 1)), float(f * s)) for f, s in zip(factor, self.sd, strict=True)]
@@ -64,7 +70,7 @@ class Drift:
     @property
     def told_covariance(self) -> Array:
         """Covariance (tests, tests) of the changes that are `told`."""
-        if self.unit != "%" or self.at is not None:
+        if not self.relative:
             return self.covariance
         factor = np.exp(self.change / 100)
         return np.asarray(factor[:, None] * self.covariance * factor)
@@ -72,7 +78,7 @@ class Drift:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """All that `spindle diagnose` tells; `own_laws` how much of the effects that the verdict names the data have in every test, where that is not their law;
+    """All that `spindle diagnose` tells; `own_laws` how much of the effects that the verdict names the data have in every test, where that is not by their law;
     `detectable`: of every effect the variant and size (from neutral, in its unit) that would have shown; `may_hide` what could act beside what the
     verdict names, unseen; `unable` the effects that were no explanation of some test because they cannot be worked out there, and why."""
 
@@ -136,12 +142,14 @@ def _data(stated: Noise | None, expected: Noise, test: Test) -> TestData:
 
 
 def _own_laws(found: Search, verdict: Verdict) -> tuple[Drift, ...]:
-    """Every effect that the verdict names and that is likelier with a law of the data's own, once: from the most probable explanation that has it."""
+    """Every effect that the verdict names and that is likelier with a law of the data's own, or departs from the one assumed, once: from the most probable
+    explanation that has it."""
     drifts: dict[str, Drift] = {}
     for c in verdict.candidates:
-        for k, m in enumerate(c.hypothesis.mechanisms):
-            if m.own_law and set(c.names) <= set(verdict.effects):
-                drifts.setdefault(m.name, _drift(found, c.hypothesis, k))
+        if set(c.names) <= set(verdict.effects):
+            for k, (m, departure) in enumerate(zip(c.hypothesis.mechanisms, c.hypothesis.evidence.learned.departures, strict=True)):
+                if m.own_law or departure >= DEPARTS:
+                    drifts.setdefault(m.name, _drift(found, c.hypothesis, k))
     return tuple(drifts.values())
 
 
@@ -153,6 +161,6 @@ def _drift(found: Search, h: Hypothesis, k: int) -> Drift:
     gain = h.evidence.ln - found.base.evidence.ln
     regular = covariance + 1e-6 * np.trace(covariance) / len(change) * np.eye(len(change))
     pattern = choose_for(conditions, change, regular) if len(change) > 2 else None
-    values = {name: v for name, v in m.values(0.0, h.fit.shapes[k]).items() if name != m.size.name}
+    values = None if m.free else {name: v for name, v in m.values(0.0, h.fit.shapes[k]).items() if name != m.size.name}
     at = strongest(found.model.spindle, conditions) if m.own_law else None
     return Drift(m.name, m.size.unit, conditions, change, covariance, pattern, gain, at, values)

@@ -23,6 +23,7 @@ from thermospindle.diagnosis.inference.search import Search
 
 PRIOR = {"none": 0.5, "one": 0.32, "two": 0.08, "free": 0.05, "two free": 0.02, "one and free": 0.02, "three": 0.01}
 OWN_LAW = 1.0  # prior odds of a law of the data's own over the one assumed, for an effect whose formula asks for the condition
+DEPARTS = 0.3  # of the size from test to test, from which a law does not hold
 COARSE = 4.0  # chosen on blind campaigns 1 to 16, by judgement; others judge it
 
 Names = tuple[str, ...]

@@ -23,14 +23,15 @@ Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 
 
 class Acting(BaseModel):
-    """An effect of the catalogue, which has a law of the data's own: the condition at which it acts as its formula has it, and its other values."""
+    """An effect of the catalogue, whose size has a law of the data's own: the condition at which it acts as its formula has it (none: the test's), and its
+    other values."""
 
-    at: dict[str, Number]
+    at: dict[str, Number] | None = None
     values: dict[str, Number]
 
     @model_validator(mode="after")
     def whole(self) -> Acting:
-        if not {"temperature_C", "speed_rpm"} <= set(self.at):
+        if self.at is not None and not {"temperature_C", "speed_rpm"} <= set(self.at):
             raise ValueError
         return self
 
@@ -105,7 +106,7 @@ def place_of(diagnosis: Path, element: str | None) -> tuple[Place, float]:
     if not found:
         raise BadInput(f"--element {element}: does not drift in {diagnosis}; allowed are {', '.join(named) or 'none'}")
     place = found[0]
-    _check_plain(place.element, place.unit, diagnosis.name, *((*place.effect.at, *place.effect.values) if place.effect else ()))
+    _check_plain(place.element, place.unit, diagnosis.name, *((*(place.effect.at or ()), *place.effect.values) if place.effect else ()))
     if not place.of_tests(place.key).any():
         raise BadInput(f"{diagnosis}: where: {place.element} changes by 0 in every test; there is nothing to draft")
     return place, reference

@@ -264,17 +264,18 @@ def drifting(
     element: str, *, name: str, title: str, equation: str, law: Callable, parameters: tuple[Parameter, ...], source: str,
     at: Mapping[str, float] | None = None, others: Mapping[str, float] | None = None,
 ) -> Effect:
-    """An effect of one's own: what the free form called `element` changes, by `law`(temperature C, speed rpm, values) in its unit; with `at` what the
-    effect of the catalogue called `element` changes at that condition (temperature_C, speed_rpm, level_N, soak_time_min), its size by the law at any, its
-    `others` parameters as given.
+    """An effect of one's own: what the free form called `element` changes, by `law`(temperature C, speed rpm, values) in its unit; with `others` what the
+    effect of the catalogue called `element` changes, its size by the law and these parameters as given, by its formula or with `at` as that has it at this
+    condition (temperature_C, speed_rpm, level_N, soak_time_min).
 
     What `spindle draft` writes is made with it; it acts where the free form or that effect acts, and at size zero not at all.
     """
-    known = None if at is None else by_name(element, CATALOGUE)
+    known = None if others is None else by_name(element, CATALOGUE)
 
     def acts(spindle: Spindle) -> Effect:
-        if known is not None and at is not None:
-            return asked_at(fitted_to(known, spindle), _condition(at))
+        if known is not None:
+            effect = fitted_to(known, spindle)
+            return effect if at is None else asked_at(effect, _condition(at))
         found = next((m for m in free_forms(spindle) if m.name == element), None)
         if found is None:
             raise ValueError(f"effect {name}: spindle {spindle.name} has no {element}")

@@ -64,11 +64,11 @@ def explanations(raw: Mapping[str, Any], bench: Bench, where: str) -> Explanatio
     """What the workbench shows of an answer; candidates with effects that cannot be added to this scene are left away."""
     answer, known, rows = answer_of(raw, where), {e.name for e in bench.effects}, []
     try:
-        for candidate in raw["candidates"]:
-            names = tuple(candidate["effects"])
+        for candidate, offered in zip(raw["candidates"], answer.candidates, strict=True):
+            names = offered.effects
             if not set(names) <= known:
                 continue
-            values = fitted_values([bench.effect(n) for n in names], answer, Path(where.removeprefix("--diagnosis ")))
+            values = fitted_values([bench.effect(n) for n in names], offered, Path(where.removeprefix("--diagnosis ")))
             own = answer.build if set(names) == set(answer.best) else {}
             rows.append(Explanation(names, float(candidate["probability"]), float(candidate["delta_evidence"]), values, own))
         odds = {key: float(raw["probability"][key]) for key in ("none", "unknown")}

@@ -135,10 +135,20 @@ def test_tolerances_of_another_explanation_are_left_out(add, tmp_path, change, n
 def test_what_has_another_law_in_the_data_says_where_to_get_it(add):
     """The catalogue's law goes into the scene, which is not what the data have."""
     [pair, alone] = answer()["candidates"]
-    said = add("new", "preload_loss", "added_disk", found=answer() | {"candidates": [pair | {"own_law": ["preload_loss"]}, alone]})["note"]
-    assert said.count("another law than") == 1
-    assert "the data have another law than preload_loss assumes: spindle draft" in said
-    assert "--element preload_loss" in said
+    where = [{"element": "preload_loss"}]
+    for k, law in enumerate(({"own_law": ["preload_loss"]}, {"departure_from_law": {"preload_loss": 0.3, "added_disk": 0.1}})):
+        said = add(f"new{k}", "preload_loss", "added_disk", found=answer() | {"candidates": [pair | law, alone], "where": where})["note"]
+        assert said.count("another law than") == 1
+        assert "the data have another law than preload_loss assumes, and loss is its mean over the tests: spindle draft" in said
+        assert "--element preload_loss" in said
+
+
+def test_of_the_candidate_that_is_taken_it_is_said_that_a_law_departs(add):
+    """Also where that is not the first; no draft is named that there is nothing of."""
+    [pair, alone] = answer()["candidates"]
+    said = add("new", "soak_lag", found=answer() | {"candidates": [pair, alone | {"own_law": ["soak_lag"]}]})["note"]
+    assert "the data have another law than soak_lag assumes" in said
+    assert "spindle draft" not in said
 
 
 def test_tolerances_of_the_best_explanation_do_not_go_with_the_second(add, tmp_path):

@@ -137,7 +137,7 @@ def test_a_law_that_two_tests_rule_out_is_not_drafted(tmp_path):
 
 def test_a_drift_is_told_from_where_an_effect_is_neutral():
     """As a drafted file adds it there: an effect of one's own may be neutral at 1."""
-    mechanism = SimpleNamespace(name="own", own_law=False, size=SimpleNamespace(name="size", unit="1", neutral=1.0), values=lambda size, shape: {})
+    mechanism = SimpleNamespace(name="own", own_law=False, free=False, size=SimpleNamespace(name="size", unit="1", neutral=1.0), values=lambda size, shape: {})
     tests = [SimpleNamespace(condition=Condition(t)) for t in (20.0, 60.0)]
     h = SimpleNamespace(
         mechanisms=[mechanism], fit=SimpleNamespace(shapes=[()]), evidence=SimpleNamespace(ln=2.0, sizes=np.array([[1.0, 1.5]]), size_covariance=np.eye(2)[None])
@@ -257,6 +257,23 @@ def test_an_effect_of_the_catalogue_is_drafted_with_the_law_that_the_data_have(s
     answer.write_text(json.dumps(damaged), encoding="utf-8")
     with pytest.raises(BadInput, match="elements that drift"):
         draft(answer, "warm")
+
+
+def test_an_effect_that_departs_from_its_law_acts_by_its_formula_in_the_size_that_was_seen(spindle, tmp_path):
+    """Without a condition `at` which its formula is asked: at each test's own. Half the size at 60 C, where a law of its own softens with temperature."""
+    softening = by_name("bond_softening", CATALOGUE)
+    size, *others = softening.parameters
+    values = {p.name: p.typical for p in others}
+    rows = [{"temperature_C": t, "speed_rpm": 0.0, f"change_{size.unit}": size.typical * (1 - (t - 20) / 80), "sd": 0.01 * size.typical} for t in (20.0, 30.0, 40.0, 50.0, 60.0)]
+    answer, file = tmp_path / "d.json", tmp_path / "own_bond.py"
+    answer.write_text(json.dumps({"where": [{"element": "bond_softening", "unit": size.unit, "change": rows, "effect": {"values": values}}]}), encoding="utf-8")
+    file.write_text(text := draft(answer, "own_bond"), encoding="utf-8")
+    assert "acts as its formula has it at each condition" in text
+    own, hot = effect_of(file), Condition(60.0)
+    by_file, by_effect = (operating_point(spindle, hot, [acting]).linear.stiffness for acting in ((own, own.typical()), (softening, {**values, size.name: size.typical / 2})))
+    assert by_file == pytest.approx(by_effect, rel=1e-6, abs=1e-6 * np.abs(by_effect).max())
+    assert not np.allclose(by_effect, operating_point(spindle, hot).linear.stiffness, rtol=1e-3)
+    check(own, spindle)
 
 
 @pytest.mark.parametrize(("told", "counted"), [({"reference_temperature_C": 35.0}, "(T - 35) / 40"), ({"reference_temperature_C": -5.0}, "(T + 5) / 40"), ({}, "(T - 20) / 40")])

@@ -201,14 +201,13 @@ def _places(d: Diagnosis) -> list[Drift]:
 
 def _place(p: Drift, d: Diagnosis) -> dict[str, Any]:
     best = max((c.delta_evidence for c in (*d.verdict.candidates, *d.verdict.free)), default=0.0)
-    relative = p.unit == "%" and p.at is None
-    share, key = (100, "relative") if relative else (1, f"change_{p.unit}")
+    share, key = (100, "relative") if p.relative else (1, f"change_{p.unit}")
     return {
         "element": p.element,
         "unit": p.unit,
         "change": [{**condition(c), key: float(a / share), "sd": float(s / share)} for c, (a, s) in zip(p.conditions, p.told, strict=True)],
         "change_covariance": (p.told_covariance / share**2).tolist(),
-        **({"effect": {"at": condition(p.at), "values": dict(p.values)}} if p.at is not None else {}),
+        **({"effect": ({"at": condition(p.at)} if p.at else {}) | {"values": dict(p.values)}} if p.values is not None else {}),
         "with": p.pattern.shape.name if p.pattern else "",
         "removes": float(np.clip(p.gain / best, 0.0, 1.0)) if best > 0 else 0.0,
         "delta_evidence": p.gain,

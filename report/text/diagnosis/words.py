@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from thermospindle.diagnosis.decision.explanations import beyond_limits
+from thermospindle.diagnosis.decision.explanations import DEPARTS, beyond_limits
 from thermospindle.diagnosis.decision.loss import in_all
 from thermospindle.diagnosis.verdict import Diagnosis, Drift
 from thermospindle.model.machine import Condition
@@ -15,7 +15,6 @@ from thermospindle.model.units import RPM
 from thermospindle.report.typeset import plain, plain_error, unit_word
 
 ALIKE = 0.9  # of the evidence of what the verdict names, from which a free drift does as well
-DEPARTS = 0.3  # of the size, from which a law does not hold
 
 
 SENTENCES = {
@@ -70,15 +69,16 @@ def law_words(d: Diagnosis) -> list[str]:
     v, found = d.verdict, []
     lead = next((c for c in v.candidates if c.hypothesis is v.accepted), None)
     for m, departure in zip(lead.hypothesis.mechanisms, v.accepted.evidence.learned.departures, strict=True) if lead else ():
-        own = next((p for p in d.own_laws if p.element == m.name), None) if m.own_law else None
-        if own is not None:
-            theirs = f"its {m.size.name} {_change_words(own)}"
-            drafts = f"`spindle draft` with --element {m.name} writes an effect with that law"
+        own = next((p for p in d.own_laws if p.element == m.name), None)
+        theirs = f"its {m.size.name} {_change_words(own)}" if own else ""
+        drafts = f"`spindle draft` with --element {m.name} writes an effect with that law"
+        if own and m.own_law:
             found.append(f"The data do not have the law that {m.name} assumes, but one of their own: {theirs}. {drafts}.")
         elif departure >= DEPARTS:
             same = [p for p in d.drifts if p.pattern and lead and p.gain > ALIKE * lead.delta_evidence]
             instead = f"; {_drift_words(same[0])}, does as well without any law" if same else ""
-            found.append(f"The data do not have the law that {m.name} assumes{instead}.")
+            sizes = f": {theirs}" if own else ""
+            found.append(f"The data do not have the law that {m.name} assumes{sizes}{instead}.{f' {drafts}.' if own else ''}")
     return found
 
 
