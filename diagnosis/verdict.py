@@ -103,7 +103,8 @@ def diagnose(
     named = [v for e in usable(spindle, catalogue) if e.name not in present for v in variants(e)]
     found = search(model, named, free_forms(spindle), progress)
     verdict = decide(found)
-    alone = sorted((c for c in verdict.free if len(c.hypothesis.mechanisms) == 1 and c.delta_evidence > 0), key=lambda c: -c.delta_evidence)
+    drifting = (c for c in verdict.free if len(c.hypothesis.mechanisms) == 1 and not c.hypothesis.mechanisms[0].beyond and c.delta_evidence > 0)
+    alone = sorted(drifting, key=lambda c: -c.delta_evidence)
     drifts = tuple(_drift(found, c.hypothesis, 0) for c in alone)
     own_laws = _own_laws(found, verdict)
     tests = tuple(next_tests(found, verdict)) if verdict.word != "none" else ()

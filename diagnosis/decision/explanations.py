@@ -9,7 +9,7 @@ as well is that effect.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations
 from math import comb
 
@@ -17,9 +17,11 @@ import numpy as np
 from scipy.special import softmax
 
 from thermospindle.diagnosis.forward import nuisance as kinds_of
+from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.inference.gaussian import impossible, opposite
-from thermospindle.diagnosis.inference.hypothesis import LITTLE, STRAIN, Hypothesis
+from thermospindle.diagnosis.inference.hypothesis import LITTLE, PLENTY, STRAIN, Hypothesis
 from thermospindle.diagnosis.inference.search import Search
+from thermospindle.model.types import Array
 
 PRIOR = {"none": 0.5, "one": 0.32, "two": 0.08, "free": 0.05, "two free": 0.02, "one and free": 0.02, "three": 0.01}
 OWN_LAW = 1.0  # prior odds of a law of the data's own over the one assumed, for an effect whose formula asks for the condition
@@ -53,6 +55,24 @@ class Candidate:
     def own_laws(self) -> Names:
         """The effects of the catalogue that are likelier with a law of the data's own than with the one assumed."""
         return tuple(m.name for m in self.hypothesis.mechanisms if m.own_law)
+
+
+def with_unknown(found: Search) -> Search:
+    """Effects at sizes that they cannot have as free forms, where something is missing, and they explain more than all that can be: something else then changes
+    what they do. Where what can be explains no more than nothing, they gain by what is wrong with the model."""
+    most = max((h.evidence.ln for h in found.hypotheses if h.mechanisms and _can_be(h)), default=-np.inf)
+    if most < found.base.evidence.ln + PLENTY:
+        return found
+    return replace(found, hypotheses=tuple(_as_unknown(h) if h.evidence.ln > most + PLENTY else h for h in found.hypotheses))
+
+
+def _as_unknown(h: Hypothesis) -> Hypothesis:
+    def beyond(m: Mechanism, sizes: Array, covariance: Array) -> Mechanism:
+        cannot = opposite(m, sizes, covariance) or (m.own_law and impossible(m, sizes, covariance))
+        return replace(m, free=True, beyond=True) if cannot else m
+
+    mechanisms = tuple(map(beyond, h.mechanisms, h.evidence.sizes, h.evidence.size_covariance))
+    return replace(h, fit=replace(h.fit, mechanisms=mechanisms))
 
 
 def explanations(found: Search, inflation: float) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...], float]:
@@ -128,9 +148,8 @@ def _by_other_laws(h: Hypothesis, every: Sequence[Hypothesis]) -> float:
 def _can_be(h: Hypothesis) -> bool:
     """Whether it is weighed: a law of the data's own may be any, but of no size that the effect cannot have; and what would have to be of the opposite sign in
     every test is not there, whatever it gains."""
-    return not (
-        (any(m.own_law for m in h.mechanisms) and beyond_limits(h)) or any(map(opposite, h.mechanisms, h.evidence.sizes, h.evidence.size_covariance))
-    )
+    rows = [row for row in zip(h.mechanisms, h.evidence.sizes, h.evidence.size_covariance, strict=True) if not row[0].beyond]
+    return not ((any(m.own_law for m, *_ in rows) and beyond_limits(h)) or any(opposite(*row) for row in rows))
 
 
 def _is_named(h: Hypothesis, every: Sequence[Hypothesis], alike: Mapping[str, frozenset[str]], little: float) -> bool:
@@ -193,7 +212,8 @@ def _prior(h: Hypothesis, named: int, free: int, either: Collection[str], ways: 
 
 def beyond_limits(h: Hypothesis) -> bool:
     """Whether an effect would need a size that it cannot have."""
-    return any(map(impossible, h.mechanisms, h.evidence.sizes, h.evidence.size_covariance))
+    rows = zip(h.mechanisms, h.evidence.sizes, h.evidence.size_covariance, strict=True)
+    return any(not row[0].beyond and impossible(*row) for row in rows)
 
 
 def named_part(c: Candidate) -> Names:

@@ -36,7 +36,9 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
             of = f" of {np.sqrt(chi2 / n):.1f}" if left.mechanisms else ""
             place = f"the best leaves {np.sqrt(left.chi2 / left.count):.1f} standard errors{of}, and not the same in every test"
         elif free and free[0].hypothesis.mechanisms:
-            place = f"{' and '.join(free[0].names)} would have to drift ({free[0].delta_evidence:.0f} in ln evidence)"
+            forms = [f"what {m.name} does" if m.beyond else m.name for m in free[0].hypothesis.mechanisms]
+            beyond = ", by sizes that it cannot have" if any(m.beyond for m in free[0].hypothesis.mechanisms) else ""
+            place = f"{' and '.join(forms)} would have to drift{beyond} ({free[0].delta_evidence:.0f} in ln evidence)"
             place += _impossible(found, free[0].names)
         elif free and free[0].names != (UNTOLD,):
             sizes = found.base.evidence.learned.sizes

@@ -9,7 +9,15 @@ import numpy as np
 
 from thermospindle.diagnosis.decision import reason
 from thermospindle.diagnosis.decision.conditions import conditions_of
-from thermospindle.diagnosis.decision.explanations import Candidate, Names, explanations, likelier_first, likeliest, named_part
+from thermospindle.diagnosis.decision.explanations import (
+    Candidate,
+    Names,
+    explanations,
+    likelier_first,
+    likeliest,
+    named_part,
+    with_unknown,
+)
 from thermospindle.diagnosis.decision.loss import MOSTLY, least_loss, mostly_named
 from thermospindle.diagnosis.decision.reason import LEFT, NUMERICS, UNTOLD
 from thermospindle.diagnosis.forward import nuisance as kinds_of
@@ -47,6 +55,7 @@ class Verdict:
 
 def decide(found: Search) -> Verdict:
     """The verdict with the least expected loss."""
+    found = with_unknown(found)
     best = likeliest(found)
     same = overlap(found.model, best.fit)
     candidates, free, none = explanations(found, same.inflation)

@@ -36,13 +36,14 @@ REFERENCE_WIDTH = 2.0  # prior standard deviations of the size, likewise
 @dataclass(frozen=True, eq=False)
 class Mechanism:
     """An effect with its choices made; `free` for free-form models, which have no law and no name in the catalogue, `own_law` for effects of the
-    catalogue whose law is the data's own."""
+    catalogue whose law is the data's own. One that is `beyond` changes what an effect does, by sizes that this cannot have: something unknown, and free."""
 
     effect: Effect
     choices: Mapping[str, float]
     shape: tuple[Parameter, ...]
     free: bool = False
     own_law: bool = False
+    beyond: bool = False
 
     @property
     def kind(self) -> str:
