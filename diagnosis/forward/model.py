@@ -15,8 +15,8 @@ from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.mode_table import ModeData
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.linear import Linear, mass_between
-from thermospindle.diagnosis.forward.nuisance import Nuisance, ReferenceModes, Resonance
-from thermospindle.diagnosis.forward.points import Applied, apart, replace_measuring, stretched
+from thermospindle.diagnosis.forward.nuisance import Nuisance, ReferenceModes, Resonance, Unevenness, unevennesses
+from thermospindle.diagnosis.forward.points import Applied, apart, replace_measuring, stretched, uneven
 from thermospindle.diagnosis.forward.response import Light, Response
 from thermospindle.diagnosis.forward.table import Table
 from thermospindle.model.built.tolerance import Toleranced
@@ -97,6 +97,15 @@ class CampaignModel:
         return [i for i, p in enumerate(self.parameters) if p.kind in kinds_of.APART]
 
     @cached_property
+    def uneven(self) -> list[int]:
+        """Numbers of the parameters by which joints are uneven about the axis."""
+        return [i for i, p in enumerate(self.parameters) if p.kind == kinds_of.UNEVEN]
+
+    @cached_property
+    def unevennesses(self) -> tuple[Unevenness, ...]:
+        return unevennesses(self.spindle)
+
+    @cached_property
     def temperature(self) -> list[int]:
         """For every test the number of its thermometer's parameter."""
         return [next(i for i, p in enumerate(self.parameters) if p.kind == kinds_of.TEMPERATURE and p.test == t) for t in range(len(self.tests))]
@@ -144,7 +153,8 @@ class CampaignModel:
         """The operating point of test `t`, sizes within their limits; what differs in the measuring chain alone is not worked out again."""
         effects = within_limits(effects)
         acting = tuple((id(e), *v.values()) for e, v in effects if any(getattr(e, hook) for hook in MEASURING))
-        key = (t, x[: len(self.build)].tobytes(), float(x[self.temperature[t]]), x[self.expansion].tobytes(), x[self.apart].tobytes(), acting)
+        little = tuple(x[own].tobytes() for own in (self.expansion, self.apart, self.uneven))
+        key = (t, x[: len(self.build)].tobytes(), float(x[self.temperature[t]]), little, acting)
         late = self._points.get(key)
         if late is None:
             if len(self._points) > 6 * len(self.tests):
@@ -156,6 +166,9 @@ class CampaignModel:
             if x[self.apart].any():
                 names, own = [b.name for b in self.spindle.all_bearings], [(self.parameters[i], float(x[i])) for i in self.apart]
                 every = [apart(*({names[p.index]: v * p.sd for p, v in own if p.kind == kind} for kind in kinds_of.APART)), *every]
+            if x[self.uneven].any():
+                joints = [(self.unevennesses[p.index], float(x[i]) * p.sd) for i in self.uneven for p in [self.parameters[i]]]
+                every = [uneven(joints), *every]
             if x[self.expansion].any():
                 every = [stretched(*(1 + float(x[i]) * self.parameters[i].sd for i in self.expansion)), *every]
             late = self._points[key] = operating_point(self._built(t, x), condition, every)

@@ -26,10 +26,12 @@ from scipy.linalg import eigh
 from thermospindle.model.built.tolerance import Toleranced
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import Matrices
+from thermospindle.model.structure import MOVES
 from thermospindle.model.types import Array
 
 BUILD, TEMPERATURE, GAIN, DRIFT, EXPANSION = "build", "temperature", "gain", "gain drift", "thermal expansion"
 APART = "stiffness apart", "damping apart"  # of bearings
+UNEVEN = "stiffness of a joint uneven"  # about the axis
 RECORD = "end of records"
 RESONANCE = "light resonance"
 STIFFNESS, DAMPING = "stiffness discrepancy", "damping discrepancy"
@@ -53,7 +55,7 @@ in whether a groove grows with its ring's free strain or follows its face."""
 class Nuisance:
     """One nuisance parameter; `sd` is one prior standard deviation in its own unit (relative or K).
 
-    `index` is the number of the toleranced parameter (build), of the bearing (apart), the channel (gain: sensors in the order in which tests first have them), or unused; `modes` the pair of a discrepancy.
+    `index` is the number of the toleranced parameter (build), of the bearing (apart), the unevenness, the channel (gain: sensors in the order in which tests first have them), or unused; `modes` the pair of a discrepancy.
     """
 
     kind: str
@@ -66,6 +68,32 @@ class Nuisance:
     def at(self, x: float) -> float:
         """Its value at `x` prior standard deviations; of a mass or a stiffness a tenth is left at least."""
         return max(float(x) * self.sd, LEAST_BUILD) if self.kind == BUILD else float(x) * self.sd
+
+
+@dataclass(frozen=True)
+class Unevenness:
+    """How a joint that is drawn alike all around may be built: against two `moves`, of which it is stiffer against the first, or against their sum with `turned`."""
+
+    joint: str
+    moves: tuple[int, int]
+    turned: bool
+
+    @property
+    def name(self) -> str:
+        first, second = (MOVES[m].replace("_", " ") for m in self.moves)
+        return f"{self.joint} stiffer against {first} + {second} than {first} - {second}" if self.turned else f"{self.joint} stiffer against {first} than {second}"
+
+
+def unevennesses(spindle: Spindle) -> tuple[Unevenness, ...]:
+    """Of every joint whose stiffness is drawn alike against both moves across the axis, or both tilts: no joint is built so."""
+    beams = {name for s in spindle.structure.shafts for name in s.elements}
+    return tuple(
+        Unevenness(joint.name, moves, turned)
+        for joint in spindle.structure.joints
+        for moves in ((0, 1), (3, 4))
+        if joint.name not in beams and joint.stiffness[moves[0]] == joint.stiffness[moves[1]] > 0
+        for turned in (False, True)
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,6 +162,7 @@ def nuisances(
     for kind, own, sd in zip(APART, ([b.name for b in spindle.rolling], every), (t.structure, t.damping), strict=True):  # given ones have stiffnesses of their own
         if len(own) > 1:
             found += [Nuisance(kind, f"{kind.removesuffix(' apart')} of {b} beside the others", sd, index=every.index(b)) for b in own]
+    found += [Nuisance(UNEVEN, u.name, t.structure / np.sqrt(2), index=i) for i, u in enumerate(unevennesses(spindle))]  # of two that are off by as much each
     found += [Nuisance(TEMPERATURE, f"temperature of {name}", t.temperature, test=k) for k, name in enumerate(tests)]
     for i in range(modes.seen):
         for j in range(i, len(modes.omega) if with_lines else i + 1):

@@ -1,12 +1,17 @@
-"""Operating points that differ in little from those that are there: in the measuring chain, in how far the rings expand, or in how bearings differ."""
+"""Operating points that differ in little from those that are there: in the measuring chain, in how far the rings expand, in how bearings differ, or joints about the axis."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
+from thermospindle.diagnosis.forward.nuisance import Unevenness
 from thermospindle.model.bearing.pair import PairState
 from thermospindle.model.machine import Condition, RingMotion, Spindle
+from thermospindle.model.rotor.chain import RotorBase
+from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import Effect, Values
 from thermospindle.sim.operating import OperatingPoint
 
@@ -47,3 +52,23 @@ def apart(stiffness: Mapping[str, float], damping: Mapping[str, float]) -> tuple
         return replace(state, bearings=bearings, linear=linear)
 
     return Effect("apart", "", "", (), "", (), "", pair=pair), {}
+
+
+def uneven(shares: Sequence[tuple[Unevenness, float]]) -> tuple[Effect, Values]:
+    """Joints stiffer by a share one way and less stiff by as much across, to first order: K -> S K S, damping with it."""
+    by_joint: dict[str, Array] = {}
+    for u, share in shares:
+        first, second = u.moves
+        turn = by_joint.setdefault(u.joint, np.eye(5))
+        if u.turned:
+            turn[first, second] += share / 2
+            turn[second, first] += share / 2
+        else:
+            turn[first, first] += share / 2
+            turn[second, second] -= share / 2
+
+    def chain(spindle: Spindle, condition: Condition, values: Values, chain: RotorBase) -> RotorBase:
+        turned = ((e, by_joint.get(e.name)) for e in chain.elements)
+        return replace(chain, elements=tuple(e if s is None else replace(e, stiffness=s @ e.stiffness @ s, damping=s @ e.damping @ s) for e, s in turned))
+
+    return Effect("uneven", "", "", (), "", (), "", chain=chain), {}
