@@ -88,7 +88,8 @@ def explanations(found: Search, inflation: float) -> tuple[tuple[Candidate, ...]
     twins = [h for h in known if _is_named(h, known, found.alike, LITTLE * worth)]
     weighed = [h for h in known if h not in twins]
     ways = _ways(found)
-    rows = [(h, _prior(h, named_count, free_count, either, ways) + (_weighed(h, found.hypotheses) - base) / worth) for h in weighed]
+    values = _by_change([(h, _weighed(h, found.hypotheses)) for h in weighed], found.alike, max(COARSE / worth, 1.0))
+    rows = [(h, _prior(h, named_count, free_count, either, ways) + (w - base) / worth) for h, w in values]
     top = max(w for _, w in rows)
     total = np.log(sum(np.exp(w - top) for _, w in rows)) + top
     every = [_candidate(same_names, base, float(total)) for same_names in _by_names(rows)]
@@ -160,6 +161,29 @@ def _is_named(h: Hypothesis, every: Sequence[Hypothesis], alike: Mapping[str, fr
         return len(names) == len(means) and any(all(n in of for n, of in zip(row, means, strict=True)) for row in permutations(names))
 
     return h.free and any(not o.free and o.evidence.ln > h.evidence.ln - little and same(o.names) for o in every)
+
+
+def _by_change(rows: Sequence[Weighed], alike: Mapping[str, frozenset[str]], coarse: float) -> list[Weighed]:
+    """ln evidence, of which explanations that change the same have what they are behind the best of the catalogue among them divided by `coarse`: between these
+    the law alone tells, and no effect's law is known so well that data which depart from all of them tell whose they are."""
+    of_names = {frozenset(h.names): (h, w) for h, w in sorted(rows, key=lambda row: row[1])}  # the best with these
+    raised = {}
+    for names, (h, w) in of_names.items():
+        top = max((v for o, v in of_names.values() if not o.free and _change_the_same(h, o, alike)), default=w)
+        raised[names] = (1 - 1 / coarse) * max(top - w, 0.0)
+    return [(h, w + raised[frozenset(h.names)]) for h, w in rows]
+
+
+def _change_the_same(h: Hypothesis, other: Hypothesis, alike: Mapping[str, frozenset[str]]) -> bool:
+    """Whether each mechanism of one has one in the other that is it, or changes the same as a free form that both are."""
+
+    def changes(m: Mechanism) -> frozenset[str]:
+        return frozenset([m.name, *(() if m.free else (form for form, names in alike.items() if m.name in names))])
+
+    if len(h.mechanisms) != len(other.mechanisms):
+        return False
+    of_h = [changes(m) for m in h.mechanisms]
+    return any(all(a & b for a, b in zip(of_h, row, strict=True)) for row in permutations([changes(m) for m in other.mechanisms]))
 
 
 def _by_names(rows: Sequence[Weighed]) -> list[list[Weighed]]:
