@@ -31,7 +31,7 @@ from thermospindle.thermal.expansion import expand
 class OperatingPoint:
     """One spindle at one condition; what follows from it is computed when first asked.
 
-    `spindle` is the drawing as the effects of the scene leave it at this condition.
+    `spindle` is the drawing as the effects of the scene leave it at this condition, `condition` as they have it.
     """
 
     spindle: Spindle
@@ -114,6 +114,9 @@ def operating_point(
     temperatures.
     """
     present = tuple(of_scene(spindle) if effects is None else effects)
+    for effect, values in present:
+        if effect.condition:
+            condition = effect.condition(spindle, condition, values)
     spindle = drawing(spindle, condition, present)
     if expansion and (prescribing := [effect.name for effect, _ in present if effect.temperatures]):
         raise ValueError(f"region temperatures are given, and {', '.join(prescribing)} would prescribe them")

@@ -92,11 +92,11 @@ def strongest(spindle: Spindle, conditions: Sequence[Condition]) -> Condition:
 
 def with_own_laws(mechanisms: Sequence[Mechanism], spindle: Spindle, at: Condition) -> list[Mechanism]:
     """The same with laws of the data's own: every effect does at any condition what its formula gives `at` one. Of what lies between two ideal cases of a
-    law one serves for all, and what there is but another size is no shape; what lasts, or asks for no condition, has no law but a constant, and what is `exact` no other."""
+    law one serves for all, and what there is but another size is no shape; what lasts, or asks for no condition, has no law but a constant, what is `exact` no other, and what changes the condition cannot be asked at another."""
     found: dict[tuple, Mechanism] = {}
     for m in mechanisms:
         chosen = {p.name: m.choices[p.name] for p in m.effect.parameters if p.choices}
-        if not (m.effect.lasting or m.effect.exact) and (m.name, *chosen.items()) not in found and _asks(m.effect, spindle, at):
+        if not (m.effect.lasting or m.effect.exact or m.effect.condition) and (m.name, *chosen.items()) not in found and _asks(m.effect, spindle, at):
             own = replace(m, effect=asked_at(m.effect, at), own_law=True)
             found[m.name, *chosen.items()] = _without_scales(own, spindle, at)
     return list(found.values())

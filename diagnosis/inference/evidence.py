@@ -52,6 +52,7 @@ tolerance that is strained tells of an effect, several of a drawing that is off.
 WIDTHS = (0.5, 1.0, 2.0, 4.0)  # of a size, in its own prior standard deviations
 DEPARTURES = (0.0, 0.1, 0.3, 1.0)  # from a law, of the size
 FREE_WIDTHS = (0.1, 0.3, 1.0, 3.0, 10.0)  # of what has no law but a constant: its width is to be learned
+FARTHEST = 3.0  # times what a shape parameter does at the fitted size of a test, of what it does at the size that all share
 SWEEPS = 3  # at most, through the sizes of nuisances one after the other
 
 
@@ -76,7 +77,10 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
     errors are taken from the best of these, which is quick, and quicker with the nuisances `kept` of each (`integrated`). Build tolerances are as stated, or with `wide` as much wider as is likeliest. What a fit with the
     data's own errors still owes is not counted."""
     turn = amplitudes_apart(fit)
-    whole = turned(turn, fit.chi2, fit.gradient, fit.information, fit.point)
+    by_test, gradient, information = at_one_size(fit), fit.gradient, fit.information
+    if by_test is not fit.by_test:
+        gradient, information = np.sum([g for _, g, _ in by_test], axis=0), np.sum([a for *_, a in by_test], axis=0)
+    whole = turned(turn, fit.chi2, gradient, information, fit.point)
     t2 = fit.temper**2
     whole = Quadratic(t2 * whole.constant, t2 * whole.b, t2 * whole.a)
     p = len(fit.nuisance)
@@ -169,6 +173,27 @@ def amplitudes_apart(fit: Fit) -> csr_array:
     return csr_array(turn)
 
 
+def at_one_size(fit: Fit) -> Sequence[tuple[float, Array, Array]]:
+    """chi2, gradient (n,) and information (n, n) of every test about a fit, in which a shape parameter of a mechanism that has a law does in every test what it does
+    at one size, the likeliest that all share.
+
+    At the fitted sizes it moves each test in proportion to its own. Where these depart from the law, so that one test has nearly all of it, a shape parameter would
+    move that test alone, and to a quadratic a law that holds could explain it.
+    """
+    if not fit.by_test or not any(m.kind == "law" and m.shape for m in fit.mechanisms):
+        return fit.by_test
+    scales, at = np.ones((len(fit.by_test), len(fit.point))), len(fit.nuisance)
+    for m, root, sizes in zip(fit.mechanisms, fit.roots, fit.sizes, strict=True):
+        tests, amounts = len(root), sizes - m.size.neutral
+        if m.shape and m.kind == "law":
+            own = np.array([b[2][at + t, at + t] / root[t, t] ** 2 for t, b in enumerate(fit.by_test)])
+            shared = float(own @ amounts / own.sum()) if own.sum() > 0 else 0.0
+            known = np.where(amounts == 0.0, 1.0, amounts)
+            scales[:, at + tests : at + tests + len(m.shape)] = np.clip(np.where(amounts == 0.0, 1.0, shared / known), -FARTHEST, FARTHEST)[:, None]
+        at += tests + len(m.shape)
+    return [(chi2, s * g, s[:, None] * a * s) for s, (chi2, g, a) in zip(scales, fit.by_test, strict=True)]
+
+
 def turned(turn: csr_array, chi2: float, gradient: Array, information: Array, point: Array) -> Quadratic:
     """A quadratic about a point in other coordinates about it."""
     return quadratic(chi2, turn.T @ gradient, turn.T @ information @ turn, point)
@@ -207,7 +232,7 @@ def left_out(model: CampaignModel, fit: Fit, found: Evidence, groups: Sequence[S
     there are no others."""
     s, prior, own = found.learned.errors, nuisance_root(model, found.learned.sizes, fit.moved), mechanism_root(model, fit.mechanisms, found.learned)
     turn, p = amplitudes_apart(fit), len(model.parameters)
-    by_test = [turned(turn, *b, fit.point) for b in fit.by_test]
+    by_test = [turned(turn, *b, fit.point) for b in at_one_size(fit)]
     counts = [d.count for d in model.tests]
 
     def together(tests: Sequence[int]) -> Quadratic:

@@ -286,7 +286,8 @@ def drifting(
             effect, change = acts(spindle), float(law(condition.temperature, condition.speed / RPM, values))
             acting, size = getattr(effect, key), effect.parameters[0]
             sized = {**(others or {}), size.name: float(np.clip(size.neutral + change, *size.limits))}
-            return acting(spindle, condition, sized, *what) if acting and change else what[-1] if what else spindle
+            unchanged = what[-1] if what else condition if key == "condition" else spindle
+            return acting(spindle, condition, sized, *what) if acting and change else unchanged
 
         return changed
 

@@ -61,7 +61,7 @@ def screen(
     sizes = Learned(learned.sizes, learned.errors if temper == 1.0 else 1.0, (), ())
     prior = Problem(model, about.mechanisms, replace(as_stated(learned.sizes, about.mechanisms), errors=sizes.errors))
     at = linearised(model, about)  # where a fit has not arrived its own derivatives are of an earlier point
-    here, near = replace(about, chi2=at.chi2, gradient=at.gradient, information=at.information), (sizes, *smaller(sizes))
+    here, near = replace(about, chi2=at.chi2, gradient=at.gradient, information=at.information, by_test=()), (sizes, *smaller(sizes))
     kept = tuple(integrated(model, here, n.errors, n.sizes) for n in near)
     beside = _Beside(model, about, sizes, cho_factor(at.information + prior.precision), evidence(model, here, near, kept=kept).ln, near, kept)
     found = in_parallel(partial(_screened, beside), list(mechanisms), workers)

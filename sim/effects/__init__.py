@@ -41,7 +41,7 @@ from thermospindle.sim.effects.bearing import (
 )
 from thermospindle.sim.effects.effect import Effect, Values, fitted_to, refusal
 from thermospindle.sim.effects.holder import drawbar_force, taper_contact
-from thermospindle.sim.effects.measuring import channel_delay, hammer_position, sensor_gain, window_damping
+from thermospindle.sim.effects.measuring import channel_delay, hammer_position, sensor_gain, thermometer_error, window_damping
 from thermospindle.sim.effects.own import OwnEffect, effect_of, installed
 from thermospindle.sim.effects.running import ball_size, ball_waviness, cage_unbalance, race_waviness, unbalance
 from thermospindle.sim.effects.structure import (
@@ -110,6 +110,7 @@ CATALOGUE: tuple[Effect, ...] = (
     channel_delay.EFFECT,
     window_damping.EFFECT,
     hammer_position.EFFECT,
+    thermometer_error.EFFECT,
 )
 
 

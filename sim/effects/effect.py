@@ -1,6 +1,6 @@
 """What a physical effect is: a file with its equation, parameters and pure functions that change what one step of the chain sees.
 
-A condition flows  spindle -> region temperatures -> ring motions -> bearing pair -> rotor-base chain -> measurement;  an effect changes
+A condition, as it is said to be, flows  the condition as it is -> spindle -> region temperatures -> ring motions -> bearing pair -> rotor-base chain -> measurement;  an effect changes
 any of these, and at its neutral values it changes nothing, exactly. Effects are applied in the order of the scene. No other code
 knows an effect by name: where it seemed to need to, the state would lack a field.
 """
@@ -187,6 +187,7 @@ Sizes = Callable[[Spindle], Mapping[str, float]]
 class Effect:
     """A physical effect. Each function may be left out; `Values` hold every parameter.
 
+    `condition(spindle, condition, values)` the condition that a test was made at, of which all others ask;
     `spindle(spindle, condition, values)` the drawing itself at a condition: materials, structure, preload, bearings;
     `temperatures(spindle, condition, values, by_region)` region temperatures (C);
     `motions(spindle, condition, values, by_bearing)` thermal and other ring motions;
@@ -208,6 +209,7 @@ class Effect:
     sees: str  # what one sees of it
     resembles: tuple[str, ...]  # effects it is easily confused with
     valid: str  # where it is valid
+    condition: Callable[[Spindle, Condition, Values], Condition] | None = None
     spindle: Callable[[Spindle, Condition, Values], Spindle] | None = None
     temperatures: Callable[[Spindle, Condition, Values, dict[str, float]], dict[str, float]] | None = None
     motions: Callable[[Spindle, Condition, Values, dict[str, RingMotion]], dict[str, RingMotion]] | None = None
@@ -230,6 +232,7 @@ class Effect:
 
 
 HOOKS: Mapping[str, type] = {
+    "condition": Condition,
     "spindle": Spindle,
     "temperatures": dict,
     "motions": dict,

@@ -7,7 +7,8 @@ from tests.effect_points import RUNNING, at
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.chain import matrices
 from thermospindle.model.rotor.modes import frf, point_rows, poles
-from thermospindle.sim.effects.measuring import channel_delay, hammer_position, sensor_gain, window_damping
+from thermospindle.sim.effects.bearing import bond_softening
+from thermospindle.sim.effects.measuring import channel_delay, hammer_position, sensor_gain, thermometer_error, window_damping
 from thermospindle.sim.operating import operating_point
 
 LINES = np.linspace(500.0, 2500.0, 41)
@@ -33,6 +34,18 @@ def test_channel_delay_turns_the_phase(spindle, skew, last):
     turn = np.unwrap(np.angle(point.frf(LINES)[[0, 6]] / ideal(spindle)[[0, 6]]))
     slope = np.polyfit(LINES, turn[:, 0].T, 1)[0]
     assert slope == pytest.approx(-2 * np.pi * np.array([50e-6, last]), rel=1e-9)
+
+
+def test_a_thermometer_error_is_another_temperature(spindle):
+    """Whatever depends on it: the very matrices of a spindle that is as warm as that, and those of other effects with it."""
+    bond = (bond_softening.EFFECT, bond_softening.EFFECT.typical())
+    error = (thermometer_error.EFFECT, {"offset": 8.0})
+    for others in ([], [bond]):
+        read, true = operating_point(spindle, Condition(45.0), [*others, error]), operating_point(spindle, Condition(53.0), others)
+        for own, there in ((read.linear.stiffness, true.linear.stiffness), (read.linear.damping, true.linear.damping)):
+            assert np.array_equal(own, there)
+        assert read.state.bearings[0].preload == true.state.bearings[0].preload != operating_point(spindle, Condition(45.0), others).state.bearings[0].preload
+        assert read.condition == true.condition
 
 
 def test_one_channel_alone_is_late_or_wrong(spindle):

@@ -227,7 +227,7 @@ HOOKED = [
     ("idle", 'values["radius"] * 1e-3', "15e-3", None, "parameter radius: from 15 to 16 mm it moves"),
     ("not-symmetric", "np.zeros((5, 5)), damping", "np.diag([0, 0, 0, 1e3], 1) * bool(c), damping", None, "MuJoCo's model of it"),
     ("changes-its-input", "    if c == 0.0:", "    if c:\n        spindle.materials['air'] = spindle.materials['steel']\n    if c == 0.0:", None, "changes the spindle it is given"),
-    ("no-hook", "chain=chain,", "", None, "has no function; it needs one of spindle, temperatures"),
+    ("no-hook", "chain=chain,", "", None, "has no function; it needs one of condition, spindle, temperatures"),
     ("name", 'name="air_film"', 'name="air film"', None, "its name must be one word"),
     ("taken", 'name="air_film"', 'name="soak_lag"', None, "the name is taken by the catalogue"),
     ("title", 'title="Squeezed air in the gap under the hub"', 'title=""', None, "title = '': must say it in words"),

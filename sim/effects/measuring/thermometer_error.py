@@ -1,0 +1,39 @@
+"""Thermometers read wrong: the spindle is warmer than a test says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from thermospindle.model.machine import Condition, Spindle
+from thermospindle.sim.effects.effect import Effect, Parameter, Values
+
+
+def condition(spindle: Spindle, condition: Condition, values: Values) -> Condition:
+    offset = values["offset"]
+    return replace(condition, temperature=condition.temperature + offset) if offset else condition
+
+
+EFFECT = Effect(
+    name="thermometer_error",
+    title="Thermometers read wrong by more than their tolerance",
+    equation="T = T_read + offset, of the spindle as a whole: all that depends on temperature is that of T",
+    parameters=(
+        Parameter(
+            "offset",
+            "K",
+            neutral=0.0,
+            typical=3.0,
+            prior_sd=3.0,
+            limits=(-40.0, 40.0),
+            meaning="by how much the spindle is warmer than its thermometer reads",
+            source="assumed: a thermometer on the chamber's wall, a thermocouple of another type (4 % between K and N), a test that was labelled wrongly",
+        ),
+    ),
+    sees=(
+        "modes lie where they would at another temperature, all of them; where one test's thermometer alone is wrong, the size is nothing in all "
+        "others: its law is the data's own, and the test is to be corrected, not the spindle"
+    ),
+    resembles=("soak_lag", "expansion_mismatch", "modulus_softening"),
+    valid="the whole spindle at one temperature; the offset changes from test to test as the data have it, and not within one",
+    condition=condition,
+)
