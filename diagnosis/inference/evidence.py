@@ -45,6 +45,7 @@ GRIDS = {
     kinds_of.STIFFNESS_DRIFT: (0.0, 3e-5, 1e-4, 3e-4, 1e-3),
     kinds_of.DAMPING_DRIFT: (0.0, 0.01, 0.03),
     kinds_of.DRIFT: (0.0, 3e-4, 1e-3, 3e-3, 1e-2),
+    kinds_of.ACTION: (0.0, 0.01, 0.03, 0.1),
 }
 WIDER = {1.0: 0.0, 2.0: -12.0, 4.0: -13.0, 8.0: -14.0}
 """Prior odds (ln) that a drawing is off by so many times the build tolerances that the scene states, assumed, and less than those of any two effects: one
@@ -85,6 +86,7 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
     whole = Quadratic(t2 * whole.constant, t2 * whole.b, t2 * whole.a)
     p = len(fit.nuisance)
     kinds = {q.kind for q in model.parameters}
+    kinds |= {kinds_of.ACTION} if fit.moved.any() else set()
     grids = {kind: grid for kind, grid in GRIDS.items() if kind in kinds} | ({kinds_of.BUILD: tuple(WIDER)} if wide else {})  # last: modes may be off instead
     own_grids = [_own_grid(m.free or m.own_law, _departures(m.effect)) for m in fit.mechanisms]  # (width, departure) of every mechanism
     conditions = tuple(d.condition for d in model.tests)

@@ -48,7 +48,7 @@ def steady(learned: Learned, mechanisms: Sequence[Mechanism] = ()) -> Learned:
     """What was learned of constant discrepancies and of gains, for a fit of `mechanisms`: how much modes drift, and a drawing is off, is left as it is on
     paper, so that neither takes what the mechanisms should explain."""
     on_paper = (*DRIFTING, kinds_of.BUILD)
-    sizes = {kind: max(REFERENCE[kind], learned.sizes[kind]) if kind not in on_paper else REFERENCE[kind] for kind in learned.sizes}
+    sizes = {kind: REFERENCE[kind] if kind in on_paper else max(REFERENCE[kind], size) for kind, size in learned.sizes.items() if kind in REFERENCE}
     return as_stated(sizes, mechanisms)
 
 
@@ -81,9 +81,9 @@ def misjudged(model: CampaignModel, sizes: Mapping[str, float], moved: Array) ->
 
     A model whose frequencies are constantly wrong is wrong, too, in what an effect does: of the relative change of frequency and of damping that each
     mechanism makes of a mode, `moved` (mechanisms, tests, 2, modes), a share is wrong, the same in all tests: `ACTION` times the relative error of the
-    frequencies.
+    frequencies, or what was learned of it.
     """
-    share = ACTION * sizes.get(kinds_of.STIFFNESS, 0.0)
+    share = max(ACTION * sizes.get(kinds_of.STIFFNESS, 0.0), sizes.get(kinds_of.ACTION, 0.0))
     found = np.zeros((len(model.parameters), len(moved), *moved.shape[2:]))
     if share and moved.any():
         for i, q in enumerate(model.parameters):

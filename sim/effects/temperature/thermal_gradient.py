@@ -112,7 +112,7 @@ EFFECT = Effect(
         scale_parameter(
             typical=1.0,
             prior_sd=0.7,
-            limits=(0.0, 4.0),
+            limits=(0.0, 10.0),
             meaning="temperature rise by bearing friction in units of the one computed from the scene's Palmgren and cooling data",
             source="Palmgren's f0 spreads by about 2 for greased bearings (Harris 2001); convection is known no better",
         ),

@@ -11,6 +11,7 @@ from scipy.linalg import block_diag
 from scipy.stats import multivariate_normal
 
 from tests.diagnosis.inference.toy import toy
+from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.nuisance import (
     BUILD,
     DAMPING,
@@ -88,6 +89,8 @@ def test_a_model_that_is_wrong_may_be_wrong_in_what_an_effect_does():
     assert found[[2, 4], 0] == pytest.approx(one_number)  # of one mode in all tests
     assert found[7] == pytest.approx([0, -ACTION * 0.01 * 0.3 / DAMPING_DRIFT_SD])
     assert np.count_nonzero(found) == 3
+    learned = misjudged(model, right | {kinds_of.ACTION: 0.1}, moved)  # by what an effect of another's may do otherwise, whatever the frequencies are
+    assert learned[[2, 4], 0] == pytest.approx(0.1 / STIFFNESS_DRIFT_SD * np.array([0.01, 0.02]))
     opposed = misjudged(model, right | {STIFFNESS: 0.01}, np.concatenate([moved, -moved]))
     assert opposed @ opposed.T == pytest.approx(2 * found @ found.T)  # two mechanisms may be misjudged though together they move nothing
 
