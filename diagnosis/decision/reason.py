@@ -54,7 +54,8 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
     named = " + ".join(effects)
     checked = ""
     if np.isfinite(after):
-        checked = f"; conditions left out are predicted with {after:.2f} instead of {before:.2f} standard errors, {gain:+.0f} in ln probability density"
+        how = "" if after < before else ", for it is less sure of them"
+        checked = f"; conditions left out are predicted with {after:.2f} instead of {before:.2f} standard errors, {gain:+.0f} in ln probability density{how}"
     if word == "ambiguous":
         rows = [c for c in candidates if set(c.names) <= set(effects)]
         share = sum(c.probability for c in rows)
@@ -103,14 +104,16 @@ def of_resonances(model: CampaignModel, best: Hypothesis) -> str:
     return f" Taken into account: {one} at {told} that the drawing lacks and every test shows, of a table, a fixture or a cable."
 
 
-def of_tolerances(model: CampaignModel, best: Hypothesis) -> str:
-    """What of the drawing is off by more than the scene's tolerances, where these are taken wider than stated."""
+def of_tolerances(model: CampaignModel, best: Hypothesis, explained: bool = True) -> str:
+    """What of the drawing is off by more than the scene's tolerances, where these are taken wider than stated; where the data are not `explained`, that may be something else."""
     times = best.evidence.learned.sizes.get(kinds_of.BUILD, 1.0)
     if times == 1.0:
         return ""
     build = [(float(m), q) for m, q in zip(best.evidence.mean, model.parameters, strict=False) if q.kind == kinds_of.BUILD]
     off = [f"{q.name} by {q.at(m):+.0%}" for m, q in sorted(build, key=lambda row: -abs(row[0])) if abs(m) > OFF][:NAMED]
     which = f": {', '.join(off)}" if off else ""
+    if not explained:
+        return f" Beside that, tolerances are taken {times:g} times as wide as stated{which}; they may stand in for what is not explained."
     return f" The drawing is off by more than its tolerances, which are taken {times:g} times as wide as stated{which}."
 
 

@@ -28,7 +28,7 @@ from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 
 TEMPERATURES = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0)  # C, a chamber's reach
-SPEEDS = (0.0, 0.5, 1.0, 1.5)  # of the spindle's nominal speed
+SPEEDS = (0.0, 0.5, 1.0)  # of the nominal speed, or the highest that was tested: what a spindle is not built for is not proposed
 CERTAIN = np.log(1e6)  # ln odds beyond which nothing is gained, and models are not to be trusted
 ALIVE = 0.01  # posterior probability from which an explanation is to be told from the best
 TELLS = 2.0  # odds from which a test is worth naming
@@ -39,7 +39,7 @@ MOST = 3
 @dataclass(frozen=True)
 class NextTest:
     """How far apart a test at `condition` puts two explanations, as odds if either is true (no more than a million); how many repeats make them
-    100 to 1; what they differ in most, in words; what each predicts of every mode in the band; and whether it is `beyond` what the spindle is meant for."""
+    100 to 1; what they differ in most, in words; what each predicts of every mode in the band; and whether it is `beyond` the temperatures that the spindle is meant for."""
 
     condition: Condition
     separates: tuple[str, str]
@@ -52,11 +52,12 @@ class NextTest:
 
 def next_tests(found: Search, verdict: Verdict) -> list[NextTest]:
     """The best test for each pair of the leading explanation and its nearest rivals; of what nothing explains but drift, of that and the best of the catalogue.
-    One beyond what the spindle is meant for only where none within decides."""
+    One beyond the temperatures that the spindle is meant for only where none within decides; none faster than it is."""
     possible = [c for c in verdict.candidates if c.names == verdict.effects or not beyond_limits(c.hypothesis)]
     alive = [c for c in possible if set(c.names) <= set(verdict.effects) or c.probability > ALIVE][: MOST + 1]
     if len(alive) < 2:
-        alive += [c for c in possible if c not in alive][: 2 - len(alive)]
+        near = max((c.hypothesis.evidence.ln for c in alive or possible), default=0.0) - NEAR  # what is farther behind needs no test
+        alive += [c for c in possible if c not in alive and c.hypothesis.evidence.ln > near][: 2 - len(alive)]
     drifting = [c for c in verdict.free if c.hypothesis.mechanisms][:1]  # what is only left predicts nothing
     if verdict.word == "unexplained":
         alive = [*drifting, *alive[:1]]
@@ -97,16 +98,15 @@ def planned(model: CampaignModel) -> list[Condition]:
     """Conditions that were not tested, hit and soaked as most tests of the campaign were."""
     tested = [d.condition for d in model.tests]
     (how, _), = Counter((c.level, c.soak_time) for c in tested).most_common(1)
-    plans = [Condition(t, s * model.spindle.nominal_speed, *how) for t, s in product(TEMPERATURES, SPEEDS)]
+    highest = max(model.spindle.nominal_speed, *(abs(c.speed) for c in tested))
+    plans = [Condition(t, s * highest, *how) for t, s in product(TEMPERATURES, SPEEDS)]
     return [plan for plan in plans if not any(same(plan, c) for c in tested)]
 
 
 def is_meant(model: CampaignModel, plan: Condition) -> bool:
-    """Whether temperature and speed lie within what the scene states, or tests of the campaign went to."""
-    tested = [d.condition for d in model.tests]
-    temperatures = [*model.spindle.temperatures, *(c.temperature for c in tested)]
-    fastest = max(model.spindle.nominal_speed, *(abs(c.speed) for c in tested))
-    return min(temperatures) <= plan.temperature <= max(temperatures) and abs(plan.speed) <= fastest * (1 + 1e-9)
+    """Whether a temperature lies within what the scene states, or tests of the campaign went to."""
+    temperatures = [*model.spindle.temperatures, *(d.condition.temperature for d in model.tests)]
+    return min(temperatures) <= plan.temperature <= max(temperatures)
 
 
 def _weighed(plan: Condition, lead: Candidate, rival: Candidate, a: Sequence[ModePrediction], b: Sequence[ModePrediction]) -> NextTest:

@@ -67,15 +67,17 @@ def _signed(change: float, sd: float) -> str:
 def law_words(d: Diagnosis) -> list[str]:
     """Of every effect that the verdict names and whose law the data do not have: that, and what they have instead."""
     v, found = d.verdict, []
-    lead = next((c for c in v.candidates if c.hypothesis is v.accepted), None)
-    for m, departure in zip(lead.hypothesis.mechanisms, v.accepted.evidence.learned.departures, strict=True) if lead else ():
+    gain = v.accepted.evidence.ln - d.search.base.evidence.ln
+    for m, departure in zip(v.accepted.mechanisms, v.accepted.evidence.learned.departures, strict=True):
+        if m.free:
+            continue
         own = next((p for p in d.own_laws if p.element == m.name), None)
         theirs = f"its {m.size.name} {_change_words(own)}" if own else ""
         drafts = f"`spindle draft` with --element {m.name} writes an effect with that law"
         if own and m.own_law:
             found.append(f"The data do not have the law that {m.name} assumes, but one of their own: {theirs}. {drafts}.")
-        elif departure >= DEPARTS:
-            same = [p for p in d.drifts if p.pattern and lead and p.gain > ALIKE * lead.delta_evidence]
+        elif own or departure >= DEPARTS:
+            same = [p for p in d.drifts if p.pattern and p.gain > ALIKE * gain]
             instead = f"; {_drift_words(same[0])}, does as well without any law" if same else ""
             sizes = f": {theirs}" if own else ""
             found.append(f"The data do not have the law that {m.name} assumes{sizes}{instead}.{f' {drafts}.' if own else ''}")
@@ -191,8 +193,14 @@ def value_words(v: dict[str, Any]) -> str:
 def _values(candidate: dict[str, Any]) -> str:
     """Fitted parameters with their errors and units."""
     values = ", ".join(f"{k.split('.', 1)[1]} {value_words(v)}" for k, v in candidate["parameters"].items())
-    own = candidate["own_law"]
-    return f"{values} (in the mean: the law of {' and '.join(own)} is the data's own)" if own else values
+    means = [f"the size of {name} in the mean: {_range(candidate['law'][name])}" for name, departure in candidate["departure_from_law"].items() if departure >= DEPARTS]
+    return f"{values} ({'; '.join(means)})" if means else values
+
+
+def _range(rows: list[dict[str, Any]]) -> str:
+    """From the least to the largest size that tests have."""
+    least, most = (choose(rows, key=lambda r: float(r["size"])) for choose in (min, max))
+    return f"from {plain_error(least['size'], least['sd'])} in {least['test']} to {plain_error(most['size'], most['sd'])} in {most['test']}"
 
 
 def next_words(test: dict[str, Any], which: str) -> str:
@@ -204,7 +212,7 @@ def next_words(test: dict[str, Any], which: str) -> str:
 
 def beyond_words(test: dict[str, Any]) -> str:
     """That a proposed test is beyond what the scene states, where it is."""
-    return " None within the temperatures and the speed that the scene states and the campaign had is as sure." if test.get("beyond") else ""
+    return " None within the temperatures that the scene states and the campaign had is as sure." if test.get("beyond") else ""
 
 
 def _percent(probability: float) -> str:
