@@ -68,10 +68,11 @@ class Offered:
 
 @dataclass(frozen=True)
 class Answer:
-    """What `add` takes of an answer of `diagnose --json`: candidates, the tolerances fitted beside `best`, and the elements of which a law can be `drafted`."""
+    """What `add` takes of an answer of `diagnose --json`: candidates, the tolerances fitted beside `best` (effects, or where none is named what drifts), and the
+    elements of which a law can be `drafted`."""
 
     candidates: tuple[Offered, ...]
-    best: tuple[str, ...]  # empty: no effect was taken for true, and the tolerances are those fitted without any
+    best: tuple[str, ...]  # empty: nothing was taken for true, and the tolerances are those fitted without any
     build: dict[str, float]
     tests: tuple[str, ...]
     scene_hash: str | None
@@ -175,12 +176,12 @@ def _write(
 def _added(effect: Effect, spindle: Spindle, fitted: Mapping[str, float], by_hand: Mapping[str, float], diagnosis: Path | None) -> Added:
     values = checked(effect, effect.typical() | dict(fitted) | dict(by_hand))
     origins = {
-        "typical of the catalogue": [n for n in values if n not in fitted and n not in by_hand],
+        "as drafted" if effect.drifts else "typical of the catalogue": [n for n in values if n not in fitted and n not in by_hand],
         f"fitted, from {diagnosis}": [n for n in fitted if n not in by_hand],
         "set by hand": list(by_hand),
     }
     source = "; ".join(f"{what}: {', '.join(names)}" for what, names in origins.items() if names)
-    return _row(effect, spindle, values, "calibrated" if fitted else "assumed", source)
+    return _row(effect, spindle, values, "calibrated" if fitted or effect.drifts else "assumed", source)
 
 
 def _row(effect: Effect, spindle: Spindle, values: dict[str, float], origin: str, source: str) -> Added:
@@ -249,7 +250,7 @@ def answer_of(raw: Any, where: str) -> Answer:
         drafted = frozenset(_text(p["element"]) for p in raw.get("where", ()))
         tolerances = {name: _finite(row["value"]) for name, row in raw.get("tolerances", {}).items()}
         kinds = {name: row.get("kind", _kind(name)) for name, row in raw.get("tolerances", {}).items()}
-        best = candidates[0].effects if candidates and raw.get("effects") else ()
+        best = candidates[0].effects if candidates and raw.get("effects") else tuple(map(_text, raw.get("tolerances_beside", ())))
         scene_hash = raw.get("scene_hash")
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError):
         raise BadInput(f"{where}: {NO_ANSWER}") from None
@@ -285,9 +286,11 @@ def _finite(value: Any) -> float:
 
 
 def offered_for(effects: Sequence[Effect], answer: Answer, file: Path) -> Offered:
-    """The first candidate that has all these effects."""
-    names = [e.name for e in effects]
+    """The first candidate that has all these effects, or what drafted ones are of; of elements that drift the answer has no other values than a draft."""
+    names = [_of(e, answer) for e in effects]
     found = next((c for c in answer.candidates if set(names) <= set(c.effects)), None)
+    if found is None and all(e.drifts for e in effects) and set(names) <= set(answer.best):
+        return Offered(tuple(names), {})
     if found is None:
         offered = dict.fromkeys(" + ".join(c.effects) if len(names) > 1 else e for c in answer.candidates for e in c.effects)
         raise BadInput(
@@ -297,12 +300,19 @@ def offered_for(effects: Sequence[Effect], answer: Answer, file: Path) -> Offere
     return found
 
 
+def _of(effect: Effect, answer: Answer) -> str:
+    """What an answer calls an effect: of one that was drafted the element, or effect, whose drift it is."""
+    return effect.drifts if effect.drifts and not any(effect.name in c.effects for c in answer.candidates) else effect.name
+
+
 def fitted_values(effects: Sequence[Effect], offered: Offered, file: Path) -> dict[str, dict[str, float]]:
-    """Values of effects in a candidate, from `<effect>.<parameter>` or, alone, `<parameter>`."""
+    """Values of effects in a candidate, from `<effect>.<parameter>` or, alone, `<parameter>`; those that were drafted have theirs."""
     parameters = offered.parameters
     found: dict[str, dict[str, float]] = {}
     for effect in effects:
         found[effect.name] = {}
+        if effect.drifts and effect.name not in offered.effects:
+            continue
         for name in effect.neutral():
             row = parameters.get(f"{effect.name}.{name}", parameters.get(name) if len(effects) == 1 else None)
             if row is not None:
@@ -322,7 +332,7 @@ def _build_of(effects: Sequence[Effect], answer: Answer, diagnosis: Path, old: S
     A diagnosis of a scene that has deviations already found more of them, relative to those; one of the scene before (the second
     effect of a pair, added after the first) found the same.
     """
-    names = {e.name for e in effects}
+    names = {_of(e, answer) for e in effects}
     if not answer.build:
         return {}, f"{diagnosis} holds no tolerances: the build is the drawing's"
     if not names <= set(answer.best):

@@ -285,7 +285,7 @@ def drifting(
         def changed(spindle: Spindle, condition: Condition, values: Values, *what: Any) -> Any:
             effect, change = acts(spindle), float(law(condition.temperature, condition.speed / RPM, values))
             acting, size = getattr(effect, key), effect.parameters[0]
-            sized = {**(others or {}), size.name: float(np.clip(size.neutral + change, *size.limits))}
+            sized = {**effect.neutral(), **(others or {}), size.name: float(np.clip(size.neutral + change, *size.limits))}
             unchanged = what[-1] if what else condition if key == "condition" else spindle
             return acting(spindle, condition, sized, *what) if acting and change else unchanged
 
@@ -306,7 +306,7 @@ def drifting(
     hooks: dict[str, Any] = {key: hook(key) for key in HOOKS if known is None or getattr(known, key)}
     sees = f"whatever a change of {element} shows, over the conditions of its law"
     return Effect(
-        name, title, equation, parameters, sees, alike, f"the tests it was drafted from: {source}", idle=idle, **hooks
+        name, title, equation, parameters, sees, alike, f"the tests it was drafted from: {source}", idle=idle, drifts=element, **hooks
     )  # fmt: skip
 
 

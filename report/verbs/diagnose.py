@@ -113,7 +113,7 @@ def draft(diagnosis: Path, name: str | None = None, element: str | None = None, 
 
     def show(console: Console) -> None:
         console.print(f"{out}: {effect.title}; {effect.equation}")
-        console.print(f"Read it, edit it, then: spindle add SCENE {called} --effect {out} --out NEW_SCENE")
+        console.print(f"Read it, edit it, then: spindle add SCENE {called} --effect {out} --from {diagnosis} --out NEW_SCENE")
 
     return Answer(values, show)
 

@@ -221,6 +221,7 @@ class Effect:
     idle: Question | None = None
     outside: Question | None = None
     sized: Sizes | None = None
+    drifts: str = ""  # of one drafted from a diagnosis: the element, or effect, whose change it is
     lasting: bool = False  # its size is the same in every test, as a mass is: no law that data may depart from
     exact: bool = False  # mechanics alone gives its law over speed and temperature: data may hardly depart from it, and have none of their own
 

@@ -9,12 +9,14 @@ from tests.conftest import DATA, SCENE
 from thermospindle.cli import main
 from thermospindle.diagnosis.add import answer_of
 from thermospindle.diagnosis.compare.before_after import held_out, without
+from thermospindle.diagnosis.draft.draft import draft
 from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import build, content_hash, load
 from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Test
 from thermospindle.sim.effects import of_scene
+from thermospindle.sim.effects.own import effect_of
 from thermospindle.sim.operating import operating_point
 
 PAIR = {"preload_loss.loss": 0.2, "added_disk.mass": 1.5, "added_disk.height": 2.0}
@@ -141,6 +143,25 @@ def test_what_has_another_law_in_the_data_says_where_to_get_it(add):
         assert said.count("another law than") == 1
         assert "the data have another law than preload_loss assumes, and loss is its mean over the tests: spindle draft" in said
         assert "--element preload_loss" in said
+
+
+@pytest.mark.parametrize(("element", "effects", "beside"), [("preload", [], ["preload"]), ("preload_loss", ["preload_loss"], ["preload_loss"])])
+def test_what_was_drafted_comes_with_the_tolerances_that_were_fitted_beside_it(add, tmp_path, element, effects, beside):
+    """Of an element that drifts, and of an effect with the sizes that were seen. It was no candidate's, so that the error stayed where it was."""
+    rows = [{"temperature_C": t, "speed_rpm": 0.0, ("relative" if not effects else "change_1"): (t - 20) / 200, "sd": 0.01} for t in (20.0, 40.0, 60.0)]
+    place = {"element": element, "unit": "%" if not effects else "1", "change": rows} | ({"effect": {"values": {}}} if effects else {})
+    candidates = [{"effects": effects, "parameters": {"loss": row(0.1)}}] if effects else []
+    found = answer(effects) | {"verdict": "identified" if effects else "unexplained", "candidates": candidates, "where": [place], "tolerances_beside": beside}
+    source, file = tmp_path / "answer.json", tmp_path / "slipping.py"
+    source.write_text(json.dumps(found), encoding="utf-8")
+    file.write_text(draft(source, "slipping"), encoding="utf-8")
+    said = add("new", "slipping", found=found, options=["--effect", str(file)])
+    assert isinstance(said, dict), said
+    assert f"{len(TOLERANCES)} build tolerances as fitted beside {element}" in said["note"]
+    assert said["added"][0]["values"]["size"] == pytest.approx(effect_of(file).typical()["size"])
+    assert load(tmp_path / "new").build.deviations == TOLERANCES
+    other = found | {"tolerances_beside": ["mount stiffness"], "effects": [], "candidates": []}
+    assert "no candidate has effect" in add("other", "slipping", found=other, options=["--effect", str(file)])
 
 
 def test_of_the_candidate_that_is_taken_it_is_said_that_a_law_departs(add):
