@@ -57,21 +57,22 @@ def test_what_is_left_over(climbed):
 
 
 def test_ten_numbers_carry_no_more_than_they_can(climbed):
-    """Tolerances alone buy a fit that is none; granted that the model is a hundredth wrong everywhere, they stay where they are believed, and
-    most of what the data tell has gone into offsets."""
+    """Tolerances alone, the flange's unevenness among them, buy a fit with some of them where they are not believed; granted that the model is a hundredth wrong
+    everywhere, they stay where they are, and most of what the data tell has gone into offsets."""
     strict, top = climbed.step(TOLERANCES), climbed.step(DISCREPANCY)
     assert top is climbed.top
-    assert strict.error > 5
-    assert strict.stretch > 2.5
-    assert top.error < 2
-    assert top.stretch < 1.2
-    assert top.evidence > strict.evidence + 5
+    assert strict.error > 1.8
+    assert strict.stretch > 1.5
+    assert np.abs(strict.fitted.fit.point).max() > 3
+    assert top.error < 0.9 * strict.error
+    assert top.stretch < 1.0
+    assert top.evidence > strict.evidence + 10
     assert top.fitted.learned.sizes[STIFFNESS] == pytest.approx(1e-2)
     assert top.fitted.fit.count == 10
     assert 3 < top.fitted.determined() < 9
     assert strict.held_out > 1.1 * strict.error  # a temperature left out is predicted worse than it is fitted
     assert top.held_out > 1.2 * top.error
-    assert top.held_out < 0.6 * strict.held_out
+    assert top.held_out < 0.9 * strict.held_out
 
 
 @pytest.mark.slow
