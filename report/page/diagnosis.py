@@ -8,6 +8,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from thermospindle.diagnosis.decision.explanations import DEPARTS
 from thermospindle.diagnosis.forward.nuisance import TEMPERATURE
 from thermospindle.diagnosis.runout.verdict import RunoutDiagnosis
 from thermospindle.diagnosis.verdict import Diagnosis
@@ -86,8 +87,11 @@ def _candidates(answer: dict[str, Any]) -> str:
     head = ["effects", "ln evidence", "probability", "left-out error, %", "value", "", "unit", "believable"]
     rows = []
     for c in answer["candidates"]:
+        told: set[str] = set()
         for k, (name, v) in enumerate(c["parameters"].items()):
-            first = k == 0
+            first, effect = k == 0, name.split(".", 1)[0]
+            mean = " (mean of the tests)" if effect not in told and c["departure_from_law"].get(effect, 0.0) >= DEPARTS else ""  # an effect's size comes first
+            told.add(effect)
             value, _, sd = _with_error(v["value"], v["sd"]).partition(" <small>") if not ("called" in v or v.get("others")) else (escape(value_words(v)), "", "")
             rows.append(
                 [
@@ -95,7 +99,7 @@ def _candidates(answer: dict[str, Any]) -> str:
                     minus(_evidence(c["delta_evidence"])) if first else "",
                     f"{c['probability']:.3f}" if first else "",
                     "" if not first else "–" if c["held_out_error_ratio"] is None else f"{100 * c['held_out_error_ratio']:.0f}",
-                    escape(name.split(".", 1)[1] if len(c["effects"]) == 1 else name),
+                    escape((name.split(".", 1)[1] if len(c["effects"]) == 1 else name) + mean),
                     value + (f" <small>{sd}" if sd else ""),
                     unit_cell(v["unit"]),
                     ("yes" if c["believable"] else "no, at a limit") if first else "",

@@ -27,7 +27,7 @@ from thermospindle.model.units import RPM
 from thermospindle.report.figures.diagnosis import errors, explanations, law
 from thermospindle.report.page.diagnosis import sections, write_diagnosis
 from thermospindle.report.text.diagnosis.answer import diagnosis_json
-from thermospindle.report.text.diagnosis.words import show_diagnosis, value_words
+from thermospindle.report.text.diagnosis.words import law_words, show_diagnosis, value_words
 from thermospindle.report.text.runout_diagnosis import runout_diagnosis_json
 from thermospindle.sim.campaign.simulated import runout_campaign
 from thermospindle.sim.effects import CATALOGUE, by_name, of_scene
@@ -70,6 +70,29 @@ def test_the_page_says_what_the_json_says(told):
         assert float(tolerances[name][4]) == pytest.approx(unit * t["prior_sd"], abs=0.006)
         assert (tolerances[name][6] == "cannot be seen") == (t["sd"] > 0.9 * t["prior_sd"])
     assert {row[0] for row in cells(by_title["What these data could have shown"])[1:]} == set(answer["detectable"])
+
+
+def test_a_size_that_is_a_mean_says_so(told, capsys):
+    """Another's taper opened by speed: 0.05, 0.20 and 0.45, and page and terminal told a share of 0.191 +- 0.011."""
+    found, answer = told
+    [first, *rest] = answer["candidates"]
+    name = first["effects"][0]
+    for departure, mean in ((0.1, False), (0.3, True)):
+        other = answer | {"candidates": [first | {"departure_from_law": {name: departure}}, *rest]}
+        row = cells(dict(sections(found, other))["Explanations"])[1]
+        assert ("(mean of the tests)" in row[4]) == mean
+        show_diagnosis(Console(width=2000), other)
+        assert (f"the size of {name} in the mean: from " in capsys.readouterr().out) == mean
+
+
+def test_the_law_that_departs_is_told_where_something_drifts_beside_it(told):
+    """What is accepted then is no candidate of the catalogue alone, and nothing was said."""
+    found, _ = told
+    v = found.verdict
+    accepted = replace(v.accepted, evidence=replace(v.accepted.evidence, learned=replace(v.accepted.evidence.learned, departures=(1.0,))))
+    assert all(c.hypothesis is not accepted for c in v.candidates)
+    [sentence] = law_words(replace(found, verdict=replace(v, accepted=accepted)))
+    assert "The data do not have the law that soak_lag assumes" in sentence
 
 
 def test_what_a_test_would_show(told):
