@@ -166,12 +166,17 @@ def _is_named(h: Hypothesis, every: Sequence[Hypothesis], alike: Mapping[str, fr
 def _by_change(rows: Sequence[Weighed], alike: Mapping[str, frozenset[str]], coarse: float) -> list[Weighed]:
     """ln evidence, of which explanations that change the same have what they are behind the best of the catalogue among them divided by `coarse`: between these
     the law alone tells, and no effect's law is known so well that data which depart from all of them tell whose they are."""
-    of_names = {frozenset(h.names): (h, w) for h, w in sorted(rows, key=lambda row: row[1])}  # the best with these
+    of_names = {_known_as(h): (h, w) for h, w in sorted(rows, key=lambda row: row[1])}  # the best with these
     raised = {}
     for names, (h, w) in of_names.items():
         top = max((v for o, v in of_names.values() if not o.free and _change_the_same(h, o, alike)), default=w)
         raised[names] = (1 - 1 / coarse) * max(top - w, 0.0)
-    return [(h, w + raised[frozenset(h.names)]) for h, w in rows]
+    return [(h, w + raised[_known_as(h)]) for h, w in rows]
+
+
+def _known_as(h: Hypothesis) -> frozenset[tuple[str, bool]]:
+    """The names of its mechanisms, and which are something unknown: of what an effect does, that effect and something else are two."""
+    return frozenset((m.name, m.free) for m in h.mechanisms)
 
 
 def _change_the_same(h: Hypothesis, other: Hypothesis, alike: Mapping[str, frozenset[str]]) -> bool:
@@ -188,10 +193,10 @@ def _change_the_same(h: Hypothesis, other: Hypothesis, alike: Mapping[str, froze
 
 def _by_names(rows: Sequence[Weighed]) -> list[list[Weighed]]:
     """Explanations of the same mechanisms together, whatever their laws; those of none left out."""
-    found: dict[frozenset[str], list[Weighed]] = {}
+    found: dict[frozenset[tuple[str, bool]], list[Weighed]] = {}
     for h, w in rows:
         if h.mechanisms:
-            found.setdefault(frozenset(h.names), []).append((h, w))
+            found.setdefault(_known_as(h), []).append((h, w))
     return list(found.values())
 
 

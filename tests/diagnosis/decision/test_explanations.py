@@ -226,6 +226,21 @@ def test_what_does_what_an_effect_cannot_is_something_unknown(best, word):
         assert "what a does would have to drift, by sizes that it cannot have (66 in ln evidence); the best of the catalogue, b, reaches 40" in v.reason
 
 
+def test_an_effect_and_what_does_what_it_cannot_are_two():
+    """A law that the effect can have, and sizes that it cannot, which do better: not one explanation with the probability of both."""
+    found = made({"a": 40.0, "a'": 66.0})
+
+    def fitted(h: Hypothesis) -> Hypothesis:
+        sizes = np.array([[3.0, -10.0]]) if any(m.own_law for m in h.mechanisms) else h.evidence.sizes
+        return Hypothesis(h.fit, replace(h.evidence, sizes=sizes, size_covariance=1e-4 * np.eye(2)[None] if h.mechanisms else h.evidence.size_covariance))
+
+    v = decide(replace(found, hypotheses=tuple(map(fitted, found.hypotheses))))
+    assert v.word == "unexplained"
+    assert [c.names for c in v.candidates] == [("a",)]
+    assert [c.names for c in v.free] == [("a",)]
+    assert total(v) == pytest.approx(1.0)
+
+
 def test_enormous_evidence_is_still_finite():
     """A lead of a million, and a loss of a million: no overflow, probabilities that sum to one."""
     v = decide(made({"a": 1e6, "b": -1e6}))
