@@ -15,8 +15,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from thermospindle.diagnosis.decision.explanations import DEPARTS
 from thermospindle.diagnosis.forward.nuisance import BUILD, GAIN, TEMPERATURE
+from thermospindle.diagnosis.inference.hypothesis import DEPARTS
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.formats import DIAGNOSIS, migrated
 from thermospindle.model.machine import Spindle

@@ -19,13 +19,12 @@ from scipy.special import softmax
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.inference.gaussian import impossible, opposite
-from thermospindle.diagnosis.inference.hypothesis import LITTLE, PLENTY, STRAIN, Hypothesis
+from thermospindle.diagnosis.inference.hypothesis import DEPARTS, LITTLE, PLENTY, STRAIN, Hypothesis
 from thermospindle.diagnosis.inference.search import Search
 from thermospindle.model.types import Array
 
 PRIOR = {"none": 0.5, "one": 0.32, "two": 0.08, "free": 0.05, "two free": 0.02, "one and free": 0.02, "three": 0.01}
 OWN_LAW = 1.0  # prior odds of a law of the data's own over the one assumed, for an effect whose formula asks for the condition
-DEPARTS = 0.3  # of the size from test to test, from which a law does not hold
 COARSE = 4.0  # chosen on blind campaigns 1 to 16, by judgement; others judge it
 
 Names = tuple[str, ...]
@@ -111,12 +110,13 @@ def likeliest(found: Search) -> Hypothesis:
 def coarsening(best: Hypothesis, inflation: float) -> float:
     """What ln evidence is divided by where what the best explanation leaves shows the model to be wrong: `COARSE`, or one.
 
-    Residuals that are too large, or say the same over lines or tests (an `inflation` beyond one), and a drawing beyond its tolerances tell of something that is
-    not in the model, and evidence that counts lines as if nothing were missing is too sure (Miller & Dunson, *J. Am. Statist. Assoc.* 114 (2019) 1113: the coarsened
+    Residuals that are too large, or say the same over lines or tests (an `inflation` beyond one), a drawing beyond its tolerances, and several effects of which none
+    has its law tell of something that is not in the model, and evidence that counts lines as if nothing were missing is too sure (Miller & Dunson, *J. Am. Statist. Assoc.* 114 (2019) 1113: the coarsened
     posterior is a power of the likelihood). Constant errors of modes that are learned are in the model, with what they make wrong in an effect (`ACTION`).
     """
     learned = best.evidence.learned
-    wrong = learned.errors > STRAIN or inflation > 1.0 or learned.sizes.get(kinds_of.BUILD, 1.0) > 1.0
+    lawless = len(best.mechanisms) > 1 and not best.free and min(learned.departures) >= DEPARTS
+    wrong = learned.errors > STRAIN or inflation > 1.0 or learned.sizes.get(kinds_of.BUILD, 1.0) > 1.0 or lawless
     return COARSE if wrong else 1.0
 
 

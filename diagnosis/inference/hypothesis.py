@@ -23,6 +23,7 @@ SCAN = (-10.0, -6.0, -3.0, -1.5, 1.5, 3.0, 6.0, 10.0)  # prior standard deviatio
 STRAIN = 1.02  # times the errors, from which the model without effects leaves a misfit
 REFITS = 2  # at most
 PLENTY = 12.0  # ln evidence that anything more must promise where no misfit is left
+DEPARTS = 0.3  # of the size from test to test, from which a law does not hold
 LITTLE = 2.0  # ln evidence that a screened mechanism must promise
 
 

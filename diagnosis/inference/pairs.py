@@ -10,7 +10,7 @@ import numpy as np
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.fit import TEMPERS
-from thermospindle.diagnosis.inference.hypothesis import LITTLE, PLENTY, Hypothesis, Task, fitted
+from thermospindle.diagnosis.inference.hypothesis import DEPARTS, LITTLE, PLENTY, Hypothesis, Task, fitted, scan
 from thermospindle.diagnosis.inference.prior import Learned, undrifted
 from thermospindle.diagnosis.inference.screening import screen
 from thermospindle.diagnosis.inference.singles import (
@@ -32,6 +32,7 @@ from thermospindle.diagnosis.inference.singles import (
 LEADS = 2  # single mechanisms of the catalogue to which a second is joined, of those near the best
 SECONDS = 2  # of each kind, joined to each of them
 PAIRS = 6  # fitted at most
+EXCHANGED = 8  # effects tried in either's place
 ENOUGH = 5.0  # ln evidence that a second mechanism must promise beside one that leaves a misfit
 
 
@@ -86,6 +87,24 @@ def without_one(model: CampaignModel, found: Sequence[Hypothesis], most: float, 
             tasks.append(Task(rest, (np.delete(best.fit.point, slice(at, at + own)),), -np.inf))
         at += own
     return fitted(model, tasks, TEMPERS[-2:], best.fit, most, expected, workers, beaten=best.fit.cost + 2 * FAR) if tasks else []
+
+
+def exchanged(
+    model: CampaignModel, found: Sequence[Hypothesis], tried: Singles, workers
+) -> list[Hypothesis]:
+    """Two effects of which neither has its law, with either exchanged for each of those that promised or explained most alone: where peaks are far off, screening
+    beside the first chooses badly, and what has no law of its own stands in for anything."""
+    best = max((h for h in found if not h.free), key=lambda h: h.evidence.ln, default=None)
+    if best is None or len(best.mechanisms) != 2 or min(best.evidence.learned.departures) < DEPARTS:
+        return []
+    reached = {s.mechanism.name: s.gain for s in sorted(tried.screened, key=lambda s: s.gain) if s.mechanism.kind == "law"}
+    reached |= {h.names[0]: h.evidence.ln for h in sorted(tried.singles, key=lambda h: h.evidence.ln) if not h.free}
+    known = {with_laws(h.mechanisms) for h in found}
+    ways = {s.mechanism.name: s.mechanism for s in sorted(tried.screened, key=lambda s: s.gain) if s.mechanism.kind == "law"}  # the most promising of each
+    others = sorted((m for m in ways.values() if m.name not in best.names), key=lambda m: -reached[m.name])[:EXCHANGED]
+    pairs = [(kept, m) for kept in best.mechanisms for m in others if with_laws((kept, m)) not in known]
+    tasks = [Task(pair, scan(model, pair), -np.inf) for pair in pairs]
+    return fitted(model, tasks, TEMPERS[1:], best.fit, tried.most, tried.expected, workers, beaten=best.fit.cost + 2 * FAR)
 
 
 def _beside(model, leads: Sequence[Hypothesis], mechanisms: Sequence[Mechanism], most: float, expected: Learned, workers) -> list[Hypothesis]:

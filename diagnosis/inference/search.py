@@ -15,7 +15,7 @@ from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, fit
 from thermospindle.diagnosis.inference.freeform import alike, runs_against
 from thermospindle.diagnosis.inference.hypothesis import PLENTY, STRAIN, Hypothesis, Task, fitted, settled, widened
-from thermospindle.diagnosis.inference.pairs import joined, joined_early, without_one
+from thermospindle.diagnosis.inference.pairs import exchanged, joined, joined_early, without_one
 from thermospindle.diagnosis.inference.resonance import with_resonance
 from thermospindle.diagnosis.inference.screening import Screened
 from thermospindle.diagnosis.inference.singles import FAR, OCCAM, Singles, better, by_own_laws, carried_over, fit_singles, of_each_name
@@ -71,6 +71,7 @@ def search(
     pairs = joined(model, none, singles, every, tried.most, tried.expected, workers)
     pairs = better([*pairs, *joined_early(model, none, tried, pairs, every, workers)])
     found = better([*singles, *pairs, *without_one(model, [*singles, *pairs], tried.most, tried.expected, workers)])
+    found = better([*found, *exchanged(model, found, tried, workers)])
     progress("pairs fitted")
     finalists = _finalists(found)
     least = max((h.evidence.ln for h in found), default=-np.inf) - FAR

@@ -8,8 +8,8 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from thermospindle.diagnosis.decision.explanations import DEPARTS
 from thermospindle.diagnosis.forward.nuisance import TEMPERATURE
+from thermospindle.diagnosis.inference.hypothesis import DEPARTS
 from thermospindle.diagnosis.runout.verdict import RunoutDiagnosis
 from thermospindle.diagnosis.verdict import Diagnosis
 from thermospindle.model.machine import Spindle

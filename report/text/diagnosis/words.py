@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from thermospindle.diagnosis.decision.explanations import DEPARTS, beyond_limits
+from thermospindle.diagnosis.decision.explanations import beyond_limits
 from thermospindle.diagnosis.decision.loss import in_all
+from thermospindle.diagnosis.inference.hypothesis import DEPARTS
 from thermospindle.diagnosis.verdict import Diagnosis, Drift
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM

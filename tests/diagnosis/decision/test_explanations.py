@@ -241,6 +241,17 @@ def test_an_effect_and_what_does_what_it_cannot_are_two():
     assert total(v) == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize(("departures", "word"), [((1.0, 1.0), "ambiguous"), ((0.0, 1.0), "two effects")])
+def test_two_effects_of_which_neither_has_its_law_are_not_sure(departures, word):
+    """Another's campaign with a warm shaft and a softening plate: `plate_prestress` + `thermometer_error`, whose sizes went where they liked, were 7 in ln evidence before the truth."""
+    found = made({("a", "b"): 107.0, ("a", "c"): 100.0, "a": 20.0})
+
+    def departing(h: Hypothesis) -> Hypothesis:
+        return replace(h, evidence=replace(h.evidence, learned=replace(h.evidence.learned, departures=departures))) if h.names == ("a", "b") else h
+
+    assert decide(replace(found, hypotheses=tuple(map(departing, found.hypotheses)))).word == word
+
+
 def test_enormous_evidence_is_still_finite():
     """A lead of a million, and a loss of a million: no overflow, probabilities that sum to one."""
     v = decide(made({"a": 1e6, "b": -1e6}))

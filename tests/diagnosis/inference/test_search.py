@@ -18,7 +18,7 @@ from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, fit
 from thermospindle.diagnosis.inference.freeform import free_forms, runs_against
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
-from thermospindle.diagnosis.inference.pairs import joined_early, without_one
+from thermospindle.diagnosis.inference.pairs import exchanged, joined_early, without_one
 from thermospindle.diagnosis.inference.prior import DRIFTING, steady, undrifted
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.inference.screening import Screened, linearised, screen
@@ -172,6 +172,23 @@ def test_what_came_first_is_tried_without(spindle):
     assert set(more) == {("bond_softening", "preload_loss"), ("preload_loss", "modulus_softening")}
     assert more["bond_softening", "preload_loss"] > max(h.evidence.ln for h in found) - 1
     assert more["bond_softening", "preload_loss"] > more["preload_loss", "modulus_softening"] + 10
+
+
+def test_two_effects_without_laws_are_exchanged_for_others(spindle):
+    """A bond that softens and a weaker preload, and a pair that leads with neither's law: in the place of either every other effect is tried. Not where one has its law."""
+    bond, preload, modulus = (variants(effect(name))[0] for name in ("bond_softening", "preload_loss", "modulus_softening"))
+    hidden = [(m.effect, m.values(m.size.typical, [q.neutral for q in m.shape])) for m in (bond, preload)]
+    model = model_of(spindle, mode_campaign(spindle, TESTS[:2], 3, hidden))
+    own = fit(model, (bond, modulus), tempers=TEMPERS[-2:])
+    pair = Hypothesis(own, evidence(model, own))
+    lawless = replace(pair, evidence=replace(pair.evidence, learned=replace(pair.evidence.learned, departures=(1.0, 0.3))))
+    screened = tuple(Screened(m, 1.0, np.zeros(0), 1.0) for m in (bond, preload, modulus))
+    tried = Singles([], screened, np.inf, steady(pair.evidence.learned))
+    more = {h.names: h.evidence.ln for h in exchanged(model, [lawless], tried, 1)}
+    assert set(more) == {("bond_softening", "preload_loss"), ("modulus_softening", "preload_loss")}
+    assert more["bond_softening", "preload_loss"] > max(pair.evidence.ln, more["modulus_softening", "preload_loss"])
+    lawful = replace(pair, evidence=replace(pair.evidence, learned=replace(pair.evidence.learned, departures=(1.0, 0.1))))
+    assert exchanged(model, [lawful], tried, 1) == []
 
 
 def test_a_model_without_effects_that_stalled_is_fitted_from_one_whose_effect_does_nothing(spindle):
