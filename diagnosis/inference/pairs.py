@@ -100,7 +100,7 @@ def exchanged(
     reached = {s.mechanism.name: s.gain for s in sorted(tried.screened, key=lambda s: s.gain) if s.mechanism.kind == "law"}
     reached |= {h.names[0]: h.evidence.ln for h in sorted(tried.singles, key=lambda h: h.evidence.ln) if not h.free}
     known = {with_laws(h.mechanisms) for h in found}
-    ways = {s.mechanism.name: s.mechanism for s in sorted(tried.screened, key=lambda s: s.gain) if s.mechanism.kind == "law"}  # the most promising of each
+    ways = {s.mechanism.name: s.mechanism for s in reversed(tried.screened) if s.mechanism.kind == "law"}  # the first of each, which has all its shape
     others = sorted((m for m in ways.values() if m.name not in best.names), key=lambda m: -reached[m.name])[:EXCHANGED]
     pairs = [(kept, m) for kept in best.mechanisms for m in others if with_laws((kept, m)) not in known]
     tasks = [Task(pair, scan(model, pair), -np.inf) for pair in pairs]
