@@ -11,7 +11,7 @@ from typing import Any
 from markupsafe import Markup
 
 from thermospindle.diagnosis import verdict
-from thermospindle.diagnosis.add import answer_of, fitted_values, read_answer
+from thermospindle.diagnosis.answer import answer_of, fitted_values, read_answer
 from thermospindle.diagnosis.compare.before_after import without
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.formats import DIAGNOSIS, migrated

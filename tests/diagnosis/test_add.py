@@ -7,7 +7,7 @@ import pytest
 
 from tests.conftest import DATA, SCENE
 from thermospindle.cli import main
-from thermospindle.diagnosis.add import answer_of
+from thermospindle.diagnosis.answer import answer_of
 from thermospindle.diagnosis.compare.before_after import held_out, without
 from thermospindle.diagnosis.draft.draft import draft
 from thermospindle.model.built.tolerance import toleranced

@@ -8,7 +8,7 @@ import pytest
 
 from tests.conftest import ROOT, SCENE
 from thermospindle.cli import main
-from thermospindle.diagnosis.add import read_answer
+from thermospindle.diagnosis.answer import read_answer
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.formats import CURRENT, KEY, MIGRATIONS, migrated
 from thermospindle.model.scene.reading import content_hash, load

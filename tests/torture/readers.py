@@ -34,7 +34,7 @@ from tests.torture.wholes import (
     study_key,
     uffs,
 )
-from thermospindle.diagnosis.add import read_answer
+from thermospindle.diagnosis.answer import read_answer
 from thermospindle.diagnosis.draft.draft import draft
 from thermospindle.diagnosis.prediction.outcomes import outcomes
 from thermospindle.model.bearing.stiffness_table import read_table

@@ -18,7 +18,7 @@ from tests.torture.damage import Damage, damaged, damages
 from tests.torture.readers import READERS
 from tests.torture.wholes import MAPPING, STUDIES, TABLE, diagnosis, matlab, stiffness
 from thermospindle.cli import main
-from thermospindle.diagnosis.add import read_answer
+from thermospindle.diagnosis.answer import read_answer
 from thermospindle.diagnosis.draft.draft import draft
 from thermospindle.model.errors import BadInput
 from thermospindle.sim.importing.assemble import campaign_of, read
