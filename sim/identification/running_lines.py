@@ -58,6 +58,8 @@ def running_lines(frequency: Array, value: ComplexArray, speed: float) -> Runnin
     multiples = multiples[multiples * turning >= max(frequency[0] - low / 2, low)]
     step = np.interp(multiples * turning, (frequency[1:] + frequency[:-1]) / 2, np.diff(frequency))  # that of the lines there: sweeps have uneven ones
     reach = np.maximum(1.5 * step, DRIFT * multiples * turning)
+    apart = reach < turning / 2  # others are no lines between lines
+    multiples, reach = multiples[apart], reach[apart]
     suspect = np.zeros(len(frequency), bool)
     for f, r in zip(multiples * turning, reach, strict=True):
         suspect |= np.abs(frequency - f) <= r

@@ -11,7 +11,8 @@ from thermospindle.sim.importing.measured import Content
 TEMPERATURE = re.compile(
     r"(?:^|[_\W])T?(-?\d+(?:\.\d+)?)\s*_?(?:(?:deg|grad)?_?C|deg|grad)(?=$|[_\W])|(?:^|[_\W])T(-?\d+(?:\.\d+)?)(?=$|[_\W])", re.IGNORECASE
 )
-SPEED = re.compile(r"(?:^|[_\W])(\d+)\s*_?(?:rpm|min-1|U_?min)|(?:^|[_\W])n(\d+)(?=$|[_\W])|(?:^|[_\W])(at_?rest|standstill|stillstand)(?=$|[_\W])", re.IGNORECASE)
+# n3 numbers something: nobody hammers at 3 rpm
+SPEED = re.compile(r"(?:^|[_\W])(\d+)\s*_?(?:rpm|min-1|U_?min)|(?:^|[_\W])n(0|\d\d+)(?=$|[_\W])|(?:^|[_\W])(at_?rest|standstill|stillstand)(?=$|[_\W])", re.IGNORECASE)
 HAMMER = re.compile(r"[_\W]*(?<![A-Za-z])(?:hammer|excitation|exc|reference|ref|drive|driving|input|inp|impact)[_\W]*(\d+)[+-]?[XYZ]?[+-]?(?=$|[_\W])", re.IGNORECASE)
 PART = re.compile(r"[_\W]*(?<![A-Za-z])(?:hit|shot|schlag|response|resp|rsp|dof|point|pt|channel|ch)[_\W]*\d+[+-]?[XYZ]?[+-]?(?=$|[_\W])", re.IGNORECASE)
 
@@ -22,12 +23,12 @@ def plain(stem: str) -> str:
 
 
 def conditions_of(test: str) -> dict[str, float]:
-    """`temperature_C` and `speed_rpm`, as far as the name of a test seems to tell them."""
+    """`temperature_C` and `speed_rpm`, as far as the name of a test seems to tell them: not where it seems to tell two."""
     found: dict[str, float] = {}
     for key, pattern in (("temperature_C", TEMPERATURE), ("speed_rpm", SPEED)):
-        if match := pattern.search(test):
-            told = next(g for g in match.groups() if g)
-            found[key] = float(told) if told[-1].isdigit() else 0.0
+        told = {float(text) if text[-1].isdigit() else 0.0 for match in pattern.finditer(test) for text in match.groups() if text}
+        if len(told) == 1:
+            found[key] = told.pop()
     return found
 
 

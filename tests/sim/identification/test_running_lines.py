@@ -139,3 +139,11 @@ def test_multiples_on_the_ends_of_the_band_go_with_the_others(spindle):
     assert found.multiples == (6,)
     assert found.out[ends].all()
     assert found.out.sum() < 20
+
+
+def test_multiples_closer_than_lines_are_not_looked_for(spindle, monkeypatch):
+    """At 1 rpm every line is a multiple's: nobody tells them apart, and 180,000 multiples are not tried."""
+    monkeypatch.setattr("thermospindle.sim.identification.running_lines._chance", lambda *asked: pytest.fail("asked"))
+    found = out_of(measured(spindle, 0), 2 * np.pi / 60)
+    assert found.multiples == ()
+    assert not found.out.any()

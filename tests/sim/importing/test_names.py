@@ -44,7 +44,7 @@ def test_what_0_dB_are_of_a_unit_counts():
 @pytest.mark.parametrize(
     ("name", "told"),
     [("Spindel_20C_0rpm", (20, 0)), ("T60_n7200", (60, 7200)), ("warm 41.5deg 3600 rpm", (41.5, 3600)), ("20_C_standstill", (20, 0)), ("test_4", (None, None)),
-     ("run_20_0", (None, None))],
+     ("run_20_0", (None, None)), ("n3_T20", (20, None)), ("n10_T20_n7200", (20, None)), ("20C_warmed_to_60C_n0", (None, 0))],
 )  # fmt: skip
 def test_what_names_tell(name, told):
     found = conditions_of(plain(name))
