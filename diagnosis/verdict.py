@@ -13,7 +13,7 @@ from thermospindle.diagnosis.data.mode_table import mode_data
 from thermospindle.diagnosis.data.observe import condition_of
 from thermospindle.diagnosis.decision.verdict import Verdict, decide
 from thermospindle.diagnosis.forward.making import campaign_model, expected_noise
-from thermospindle.diagnosis.forward.mechanism import Mechanism, strongest, variants
+from thermospindle.diagnosis.forward.mechanism import Mechanism, strongest, unmoved, variants
 from thermospindle.diagnosis.forward.model import FAILED, SIZE_STEP, CampaignModel, TestData
 from thermospindle.diagnosis.inference.freeform import free_forms
 from thermospindle.diagnosis.inference.hypothesis import DEPARTS, Hypothesis
@@ -100,7 +100,7 @@ def diagnose(
     model = campaign_data(spindle, campaign, progress)
     present = {e.name for e, _ in of_scene(spindle)}
     named = [v for e in usable(spindle, catalogue) if e.name not in present for v in variants(e)]
-    found = search(model, named, free_forms(spindle), progress)
+    found = search(model, named, free_forms(spindle, unmoved(spindle, [d.condition for d in model.tests])), progress)
     verdict = decide(found)
     drifting = (c for c in verdict.free if len(c.hypothesis.mechanisms) == 1 and not c.hypothesis.mechanisms[0].beyond and c.delta_evidence > 0)
     alone = sorted(drifting, key=lambda c: -c.delta_evidence)

@@ -34,7 +34,7 @@ def hypothesis(names: tuple[str, ...], ln: float) -> Hypothesis:
         tuple(mechanism(k) for k in names), np.zeros(n), np.zeros((len(names), 2)), ((),) * len(names), (np.eye(2),) * len(names), 100.0,
         np.zeros(n), np.zeros((n, n)), by_test, count, None, 1.0,
     )  # fmt: skip
-    learned = Learned({}, 1.0, (1.0,) * len(names), (0.1,) * len(names))
+    learned = Learned({}, 1.0, (1.0,) * len(names), (0.1,) * len(names), (1.0,) * len(names))
     sizes = np.zeros((len(names), 2))
     return Hypothesis(fit, Evidence(-1000.0 + ln, learned, np.zeros(n), np.eye(n), sizes, np.zeros((len(names), 2, 2)), 100.0))
 

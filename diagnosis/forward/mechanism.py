@@ -4,7 +4,8 @@ The size of an effect is its first parameter. Its law is what the effect's formu
 not a gospel: the size that acts in test t is a_t = a (1 + r_t), with departures r that are continuous over the conditions (an
 exponential covariance, Rasmussen & Williams, *Gaussian Processes*, 2006, Eq. 4.18) and whose size is learned. Where a law gives nothing it
 goes on giving nothing; with a law of the data's own the same mechanism acts in every test as its formula has it where it does most, and its
-size alone says how much. Beyond a limit of its size the matrices of an effect continue in a straight line, so that sizes may
+size alone says how much. What drifts begins at the reference: where a formula gives nothing there, a law of the data's own does not either, and what is
+the same in all tests is an offset of the drawing. Beyond a limit of its size the matrices of an effect continue in a straight line, so that sizes may
 scatter about zero.
 """
 
@@ -28,6 +29,7 @@ MEMORY_RPM = 6000.0
 MEMORY_LEVEL = 2.0  # of ln level
 MEMORY_SOAK = 2.0  # of ln soak time
 LITTLE = 0.02  # of an effect's typical size, which is linear in all that it changes
+IDLE = 0.02  # of what an effect changes where it does most, by which it may change something where it does nothing
 SAME = 1e-6  # of the square of a change, by which it may differ from another that is the same
 REFERENCE_DEPARTURE = 0.5  # of the size, in the fit itself; evidence takes others into account
 REFERENCE_WIDTH = 2.0  # prior standard deviations of the size, likewise
@@ -36,7 +38,8 @@ REFERENCE_WIDTH = 2.0  # prior standard deviations of the size, likewise
 @dataclass(frozen=True, eq=False)
 class Mechanism:
     """An effect with its choices made; `free` for free-form models, which have no law and no name in the catalogue, `own_law` for effects of the
-    catalogue whose law is the data's own. One that is `beyond` changes what an effect does, by sizes that this cannot have: something unknown, and free."""
+    catalogue whose law is the data's own. Sizes of one that has a `reference` grow from there, where it does nothing; those of the others start from one that all tests
+    share. One that is `beyond` changes what an effect does, by sizes that this cannot have: something unknown, and free."""
 
     effect: Effect
     choices: Mapping[str, float]
@@ -44,6 +47,7 @@ class Mechanism:
     free: bool = False
     own_law: bool = False
     beyond: bool = False
+    reference: Condition | None = None
 
     @property
     def kind(self) -> str:
@@ -90,14 +94,22 @@ def strongest(spindle: Spindle, conditions: Sequence[Condition]) -> Condition:
     return Condition(furthest, fastest, max(c.level for c in conditions), min(c.soak_time for c in conditions))
 
 
-def with_own_laws(mechanisms: Sequence[Mechanism], spindle: Spindle, at: Condition) -> list[Mechanism]:
-    """The same with laws of the data's own: every effect does at any condition what its formula gives `at` one. Of what lies between two ideal cases of a
+def unmoved(spindle: Spindle, conditions: Sequence[Condition]) -> Condition:
+    """Where nothing has drifted yet: the reference temperature, at rest, at the softest hit and the longest soak of all tests."""
+    return Condition(spindle.reference_temperature, 0.0, min(c.level for c in conditions), max(c.soak_time for c in conditions))
+
+
+def with_own_laws(mechanisms: Sequence[Mechanism], spindle: Spindle, conditions: Sequence[Condition]) -> list[Mechanism]:
+    """The same with laws of the data's own: every effect does at any condition what its formula gives where it does most, and what gives nothing at the reference
+    grows from there. Of what lies between two ideal cases of a
     law one serves for all, and what there is but another size is no shape; what lasts, or asks for no condition, has no law but a constant, what is `exact` no other, and what changes the condition cannot be asked at another."""
+    at, reference = strongest(spindle, conditions), unmoved(spindle, conditions)
     found: dict[tuple, Mechanism] = {}
     for m in mechanisms:
         chosen = {p.name: m.choices[p.name] for p in m.effect.parameters if p.choices}
         if not (m.effect.lasting or m.effect.exact or m.effect.condition) and (m.name, *chosen.items()) not in found and _asks(m.effect, spindle, at):
-            own = replace(m, effect=asked_at(m.effect, at), own_law=True)
+            grows = _idle(m.effect, spindle, reference, at)
+            own = replace(m, effect=asked_at(m.effect, at), own_law=True, reference=reference if grows else None)
             found[m.name, *chosen.items()] = _without_scales(own, spindle, at)
     return list(found.values())
 
@@ -118,19 +130,30 @@ def asked_at(effect: Effect, at: Any) -> Effect:
 def _without_scales(m: Mechanism, spindle: Spindle, at: Condition) -> Mechanism:
     """Without the shape parameters that do no more than a size does where one condition alone is asked: a law's, such as the interference by which a fit
     opens with temperature. They stay where they are neutral."""
-
-    def change(values: Mapping[str, float]) -> Array:
-        found = operating_point(spindle, at, [(m.effect, values)]).linear
-        return np.concatenate([np.ravel(getattr(found, w) - getattr(plain, w)) / np.abs(getattr(plain, w)).max() for w in ("mass", "damping", "stiffness")])
-
     try:
-        plain = operating_point(spindle, at).linear
         neutral = m.values(m.size.neutral + LITTLE * (m.size.typical - m.size.neutral), [q.neutral for q in m.shape])
-        drawn = change(neutral)
-        scales = [q for q in m.shape if _parallel(drawn, change({**neutral, q.name: _inside(q)}))]
+        drawn = _changed(spindle, at, m.effect, neutral)
+        scales = [q for q in m.shape if _parallel(drawn, _changed(spindle, at, m.effect, {**neutral, q.name: _inside(q)}))]
     except (ArithmeticError, LookupError, RuntimeError, TypeError, ValueError):
         return m
     return replace(m, choices={**m.choices, **{q.name: q.neutral for q in scales}}, shape=tuple(q for q in m.shape if q not in scales))
+
+
+def _idle(effect: Effect, spindle: Spindle, reference: Condition, at: Condition) -> bool:
+    """Whether an effect of typical size changes next to nothing at the `reference` of what it changes `at` another condition."""
+    if effect.measurement is not None:
+        return False
+    try:
+        there, here = (_changed(spindle, c, effect, effect.typical()) for c in (reference, at))
+    except (ArithmeticError, LookupError, RuntimeError, TypeError, ValueError):
+        return False
+    return bool(float(there @ there) < IDLE**2 * float(here @ here))
+
+
+def _changed(spindle: Spindle, at: Condition, effect: Effect, values: Mapping[str, float]) -> Array:
+    """What an effect changes of the matrices, in shares of the largest entry of each."""
+    plain, found = operating_point(spindle, at).linear, operating_point(spindle, at, [(effect, values)]).linear
+    return np.concatenate([np.ravel(getattr(found, w) - getattr(plain, w)) / np.abs(getattr(plain, w)).max() for w in ("mass", "damping", "stiffness")])
 
 
 def _inside(q: Parameter) -> float:
@@ -167,17 +190,43 @@ def _asks(effect: Effect, spindle: Spindle, at: Condition) -> bool:
     return watched.asked
 
 
-def likeness(conditions: Sequence[Condition]) -> Array:
-    """Correlation (n, n) of departures from a law between tests: 1 where conditions agree, falling with their distance."""
+def _places(conditions: Sequence[Condition]) -> Array:
+    """Temperature, speed, ln level and ln soak time (4, n), each over the distance within which departures are alike."""
     t = np.array([c.temperature for c in conditions]) / MEMORY_K
     n = np.array([c.speed for c in conditions]) / (MEMORY_RPM * RPM)
     level = np.log(np.maximum([c.level for c in conditions], 0.1)) / MEMORY_LEVEL
     soak = np.log(np.clip([c.soak_time for c in conditions], 60.0, 1e6)) / MEMORY_SOAK
-    distance = sum(np.abs(v[:, None] - v[None, :]) for v in (t, n, level, soak))
-    return np.exp(-distance)
+    return np.array([t, n, level, soak])
 
 
-def size_covariance(conditions: Sequence[Condition], width: float, departure: float) -> Array:
-    """Prior covariance (n, n) of the sizes in all tests: `width`^2 (1 + `departure`^2 likeness), with a little of each test's own."""
+def likeness(conditions: Sequence[Condition], others: Sequence[Condition] | None = None) -> Array:
+    """Correlation (n, m) of departures from a law between tests, and the same or `others`: 1 where conditions agree, falling with their distance."""
+    one, other = _places(conditions), _places(conditions if others is None else others)
+    return np.exp(-np.abs(one[:, :, None] - other[:, None, :]).sum(axis=0))
+
+
+def grown(conditions: Sequence[Condition], reference: Condition) -> Array:
+    """How far (4, n) every test is from the reference in temperature, speed, level and soak: what grows in a straight line with each."""
+    away = _places(conditions) - _places([reference])
+    return np.array([away[0], np.abs(away[1]), *away[2:]])
+
+
+def shared(m: Mechanism, conditions: Sequence[Condition]) -> Array:
+    """Of one size of a mechanism how much (n,) every test has where its law holds: all of it, or what has grown from its reference, 1 at most."""
+    if m.reference is None:
+        return np.ones(len(conditions))
+    amounts = grown(conditions, m.reference).sum(axis=0)
+    return np.asarray(amounts / max(float(np.abs(amounts).max()), 1e-9))
+
+
+def size_covariance(conditions: Sequence[Condition], width: float, departure: float, offset: float = 1.0, reference: Condition | None = None) -> Array:
+    """Prior covariance (n, n) of the sizes in all tests, with a little of each test's own: `width`^2 (`offset`^2 + `departure`^2 likeness); of what grows from
+    a `reference` `width`^2 (`offset`^2 + what grows straight, for each of temperature, speed, level and soak + `departure`^2 times the covariance of x - x there,
+    x having the likeness)."""
     n = len(conditions)
-    return width**2 * (np.ones((n, n)) + departure**2 * (0.98 * likeness(conditions) + 0.02 * np.eye(n)) + 1e-9 * np.eye(n))
+    alike, straight = likeness(conditions), np.zeros((n, n))
+    if reference is not None:
+        to = likeness(conditions, [reference])
+        alike, away = 1.0 + alike - to - to.T, grown(conditions, reference)
+        straight = away.T @ away
+    return width**2 * (offset**2 + straight + departure**2 * (0.98 * alike + 0.02 * np.eye(n)) + 1e-9 * np.eye(n))

@@ -13,14 +13,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, lru_cache, reduce
-from itertools import product, zip_longest
+from functools import lru_cache, reduce
+from itertools import zip_longest
 
 import numpy as np
 from scipy.sparse import csr_array, eye_array, lil_array
 from scipy.special import logsumexp
 
 from thermospindle.diagnosis.forward import nuisance as kinds_of
+from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.fit import Fit
 from thermospindle.diagnosis.inference.gaussian import (
@@ -34,7 +35,7 @@ from thermospindle.diagnosis.inference.gaussian import (
     quadratic,
     under,
 )
-from thermospindle.diagnosis.inference.prior import Learned, mechanism_root, nuisance_root, whitened_covariance
+from thermospindle.diagnosis.inference.prior import Learned, Own, counted_in, mechanism_root, nuisance_root, whitened_covariance
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import Effect
@@ -52,7 +53,9 @@ WIDER = {1.0: 0.0, 2.0: -12.0, 4.0: -13.0, 8.0: -14.0}
 tolerance that is strained tells of an effect, several of a drawing that is off."""
 WIDTHS = (0.5, 1.0, 2.0, 4.0)  # of a size, in its own prior standard deviations
 DEPARTURES = (0.0, 0.1, 0.3, 1.0)  # from a law, of the size
-FREE_WIDTHS = (0.1, 0.3, 1.0, 3.0, 10.0)  # of what has no law but a constant: its width is to be learned
+FREE_WIDTHS = (0.1, 0.3, 1.0, 3.0, 10.0)  # of what has no law: its width is to be learned
+OFFSET = -12.0
+"""Prior odds (ln) that what drifts is off by as much in all tests as well: that is a drawing that is off (`WIDER`), and not what temperature and speed do."""
 FARTHEST = 3.0  # times what a shape parameter does at the fitted size of a test, of what it does at the size that all share
 SWEEPS = 3  # at most, through the sizes of nuisances one after the other
 
@@ -88,39 +91,40 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
     kinds = {q.kind for q in model.parameters}
     kinds |= {kinds_of.ACTION} if fit.moved.any() else set()
     grids = {kind: grid for kind, grid in GRIDS.items() if kind in kinds} | ({kinds_of.BUILD: tuple(WIDER)} if wide else {})  # last: modes may be off instead
-    own_grids = [_own_grid(m.free or m.own_law, _departures(m.effect)) for m in fit.mechanisms]  # (width, departure) of every mechanism
+    own_grids = [own_grid(m) for m in fit.mechanisms]
     conditions = tuple(d.condition for d in model.tests)
-    roots = [_roots(conditions, grid, len(m.shape)) for m, grid in zip(fit.mechanisms, own_grids, strict=True)]
+    roots = [_roots(conditions, m.reference, counted_in(m), tuple(grid), len(m.shape)) for m, grid in zip(fit.mechanisms, own_grids, strict=True)]
+    odds = np.asarray(reduce(np.add.outer, [np.array(list(grid.values())) for grid in own_grids], np.array(0.0))).ravel()
 
     def each(s: float, sizes: Mapping[str, float], nuisances: Nuisances | None = None) -> Array:
-        """ln evidence of every combination of widths and departures of the mechanisms."""
+        """ln evidence of every combination of widths, departures and offsets of the mechanisms, by its prior odds."""
         scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
         wider = WIDER[sizes.get(kinds_of.BUILD, 1.0)]
-        return marginal(scaled, nuisances or integrated(model, fit, s, sizes)).integrated(roots) - fit.count * np.log(s) + wider
+        return marginal(scaled, nuisances or integrated(model, fit, s, sizes)).integrated(roots) + odds - fit.count * np.log(s) + wider
 
     nuisances = None
     if near:
         every = [(each(n.errors, n.sizes, own), n.errors, dict(n.sizes), own) for n, own in zip_longest(near, kept)]
-        values, s, sizes, nuisances = max(every, key=lambda row: _ln_mean(row[0]))
+        values, s, sizes, nuisances = max(every, key=lambda row: logsumexp(row[0]))
     else:
         scales = [1.0] if fit.temper < 1.0 else [float(s) for s in _error_scales(whole, fit.count)]
         s, sizes = scales[len(scales) // 2], {kind: grid[0] for kind, grid in grids.items()}
         values = each(s, sizes)
         for _ in range(SWEEPS):
-            before = _ln_mean(values)
+            before = logsumexp(values)
             for kind, grid in grids.items():
                 for size in grid:
-                    if size != sizes[kind] and _ln_mean(there := each(s, {**sizes, kind: size})) > _ln_mean(values):
+                    if size != sizes[kind] and logsumexp(there := each(s, {**sizes, kind: size})) > logsumexp(values):
                         values, sizes = there, {**sizes, kind: size}
             for scale in scales:
-                if scale != s and _ln_mean(there := each(scale, sizes)) > _ln_mean(values):
+                if scale != s and logsumexp(there := each(scale, sizes)) > logsumexp(values):
                     values, s = there, scale
-            if _ln_mean(values) - before < 0.01:
+            if logsumexp(values) - before < 0.01:
                 break
     best = np.unravel_index(int(np.argmax(values)), [len(grid) for grid in own_grids]) if own_grids else ()
-    own = [grid[k] for grid, k in zip(own_grids, best, strict=True)]
+    own = [tuple(grid)[k] for grid, k in zip(own_grids, best, strict=True)]
     scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
-    learned = Learned(sizes, s, tuple(w for w, _ in own), tuple(d for _, d in own))
+    learned = Learned(sizes, s, *(tuple(of) for of in zip(*own, strict=True)))
     mean, spread = posterior(scaled, nuisances or integrated(model, fit, s, sizes), mechanism_root(model, fit.mechanisms, learned))
     chi2 = whole.at(mean)
     mean, spread = fit.point + turn @ (mean - fit.point), turn @ spread @ turn.T
@@ -128,17 +132,17 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
     mean[[h.number for h in fit.held]] = fit.point[[h.number for h in fit.held]]
     at, means, covariances = p, [], []
     tests = len(model.tests)
-    for m, root, width_departure in zip(fit.mechanisms, fit.roots, own, strict=True):
+    for m, root, widths in zip(fit.mechanisms, fit.roots, own, strict=True):
         part = slice(at, at + tests)
         means.append(m.size.neutral + root @ mean[part])
         covariances.append(root @ spread[part, part] @ root.T)
-        truncation += one_sided(model, m, width_departure, means[-1], covariances[-1])
+        truncation += one_sided(model, m, widths, means[-1], covariances[-1])
         at += tests + len(m.shape)
     shape = (len(fit.mechanisms), tests)
-    by_law = [np.array([d == 0.0 or m.kind != "law" for _, d in grid]) for m, grid in zip(fit.mechanisms, own_grids, strict=True)]
+    by_law = [np.array([d == 0.0 or m.kind != "law" for _, d, _ in grid]) for m, grid in zip(fit.mechanisms, own_grids, strict=True)]
     held = reduce(np.multiply.outer, by_law, np.array(True)).ravel()
-    ln = _ln_mean(values) + truncation - (fit.owed / 2 if fit.temper == 1.0 else 0.0)
-    by_departing = _ln_mean(values) - _ln_mean(values[held])
+    ln = logsumexp(values) + truncation - (fit.owed / 2 if fit.temper == 1.0 else 0.0)
+    by_departing = logsumexp(values) - logsumexp(values[held]) + logsumexp(odds[held])
     return Evidence(ln, learned, mean, spread, np.array(means).reshape(shape), np.array(covariances).reshape(*shape, tests), chi2, by_departing)
 
 
@@ -146,10 +150,6 @@ def integrated(model: CampaignModel, fit: Fit, errors: float, sizes: Mapping[str
     """The nuisances of a fit at its own temper, of `errors` times those stated, under priors of `sizes` learned."""
     p = len(model.parameters)
     return under(nuisance_root(model, sizes, fit.moved), (fit.temper / errors) ** 2 * fit.information[:p, :p])
-
-
-def _ln_mean(values: Array) -> float:
-    return float(logsumexp(values) - np.log(len(values)))
 
 
 def amplitudes_apart(fit: Fit) -> csr_array:
@@ -213,18 +213,21 @@ def _departures(effect: Effect) -> tuple[float, ...]:
     return DEPARTURES[:1] if effect.lasting else DEPARTURES[:2] if effect.exact else DEPARTURES
 
 
-@cache
-def _own_grid(lawless: bool, departures: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
-    """(width, departure) that one mechanism may have."""
-    return tuple(product(FREE_WIDTHS if lawless else WIDTHS, departures))
+def own_grid(m: Mechanism) -> dict[Own, float]:
+    """Width, departure and offset that a mechanism may have, with the ln of their prior odds, which add up to one. What grows from a reference has an offset
+    there only where nothing but its element is told."""
+    offsets = {1.0: 0.0} if m.reference is None else {0.0: 0.0, 1.0: OFFSET} if m.free else {0.0: 0.0}
+    found = {(w, d, o): ln for w in (WIDTHS if m.kind == "law" else FREE_WIDTHS) for d in _departures(m.effect) for o, ln in offsets.items()}
+    whole = float(logsumexp(list(found.values())))
+    return {own: ln - whole for own, ln in found.items()}
 
 
 @lru_cache(maxsize=64)
-def _roots(conditions: tuple[Condition, ...], grid: tuple[tuple[float, float], ...], shapes: int) -> Array:
-    """Roots (g, m, m) of the prior covariance of one mechanism's [z, u] at every (width, departure) of its grid."""
+def _roots(conditions: tuple[Condition, ...], reference: Condition | None, counted: Own, grid: tuple[Own, ...], shapes: int) -> Array:
+    """Roots (g, m, m) of the prior covariance of one mechanism's [z, u] at every place of its grid."""
     m = len(conditions) + shapes
     found = np.tile(np.eye(m), (len(grid), 1, 1))
-    found[:, : len(conditions), : len(conditions)] = [whitened_covariance(conditions, *own) for own in grid]
+    found[:, : len(conditions), : len(conditions)] = [whitened_covariance(conditions, reference, counted, own) for own in grid]
     return np.asarray(np.linalg.cholesky(found + 1e-12 * np.eye(m)), float)
 
 

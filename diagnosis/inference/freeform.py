@@ -44,8 +44,9 @@ SKEW = np.zeros((5, 5))
 SKEW[0, 1], SKEW[1, 0] = 1.0, -1.0
 
 
-def free_forms(spindle: Spindle) -> list[Mechanism]:
-    """One mechanism for everything that might drift; its size in per cent (of ln) or um is what changes in each test."""
+def free_forms(spindle: Spindle, reference: Condition | None = None) -> list[Mechanism]:
+    """One mechanism for everything that might drift; its size in per cent (of ln) or um is what changes in each test. With a `reference` what the drawing has drifts
+    from there, where it may be off as it may in all tests; what the drawing does not have acts anywhere."""
     found = []
     shafts = spindle.structure.shafts
     joints = spindle.structure.own_joints
@@ -61,7 +62,6 @@ def free_forms(spindle: Spindle) -> list[Mechanism]:
         found.append(_form(f"{name} mass", "%", MASS_WIDTH, chain=_heavier(bodies, whole=True)))
         if len(bodies) == 1:
             found.append(_form(f"{name} transverse inertia", "%", MASS_WIDTH, chain=_heavier(bodies, whole=False)))
-    found += _tied(spindle)
     names = [b.name for b in spindle.bearings]
     sets = [("bearings", names), *([(name, [name]) for name in names] if len(names) > 1 else [])]
     for label, own in sets:
@@ -69,12 +69,12 @@ def free_forms(spindle: Spindle) -> list[Mechanism]:
         found.append(_form(f"{label} rings apart radially", "um", RING_WIDTH, motions=_moved(own, "outer_r")))
     for label, moves in OF_BEARINGS:
         found.append(_form(f"bearings {label} stiffness", "%", STIFFNESS_WIDTH, pair=_stiffened(names, moves)))
-    found.append(_form("bearings cross-coupled stiffness", "%", CROSS_WIDTH, pair=_crossed(names)))
     found.append(_form("bearings damping", "%", DAMPING_WIDTH, pair=_damped(names)))
     of_sets = [s.name for s in spindle.sets]
     for label, own in [("preload", of_sets), *([(f"{name} preload", [name]) for name in of_sets] if len(of_sets) > 1 else [])]:
         found.append(_form(label, "%", PRELOAD_WIDTH, spindle=_preloaded(own)))
-    return found
+    found = [replace(m, reference=reference) for m in found]
+    return [*found, *_tied(spindle), _form("bearings cross-coupled stiffness", "%", CROSS_WIDTH, pair=_crossed(names))]
 
 
 def _tied(spindle: Spindle) -> list[Mechanism]:

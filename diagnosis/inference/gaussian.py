@@ -12,7 +12,7 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import lsq_linear
 from scipy.special import log_ndtr, ndtr
 
-from thermospindle.diagnosis.forward.mechanism import Mechanism, size_covariance
+from thermospindle.diagnosis.forward.mechanism import Mechanism, grown, size_covariance
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.fit import Fit
 from thermospindle.diagnosis.inference.prior import Root
@@ -160,20 +160,23 @@ def ln_within_limits(fit: Fit, mean: Array, spread: Array) -> float:
     return found
 
 
-def one_sided(model: CampaignModel, mechanism: Mechanism, own: tuple[float, float], mean: Array, covariance: Array) -> float:
+def one_sided(model: CampaignModel, mechanism: Mechanism, own: tuple[float, float, float], mean: Array, covariance: Array) -> float:
     """ln of twice the posterior probability of the sign that limits allow: a size that may not be negative has half its prior.
 
-    The sign is that of the size a which all tests share, about which `own` (width, departure) lets them scatter: a_t = a (1 + r_t), of which the
-    posterior `mean` (n,) and `covariance` (n, n) are given (conditional mean of jointly Gaussian quantities: Rasmussen & Williams, *Gaussian
+    The sign is that of the size a which all tests share, about which `own` (width, departure, offset) lets them scatter: a_t = a (1 + r_t), of which the
+    posterior `mean` (n,) and `covariance` (n, n) are given; of what grows from a reference, of the sum of its slopes (conditional mean of jointly Gaussian quantities: Rasmussen & Williams, *Gaussian
     Processes*, 2006, Eq. A.6).
     """
     sign = mechanism.size.sign
     if not sign:
         return 0.0
-    width, departure = own
-    prior = size_covariance([d.condition for d in model.tests], 1.0, departure)
-    weight = np.linalg.solve(prior, np.ones(len(mean)))
-    variance = (width * mechanism.size.prior_sd) ** 2 * max(1.0 - float(weight.sum()), 0.0) + float(weight @ covariance @ weight)
+    conditions, (width, departure, offset) = [d.condition for d in model.tests], own
+    prior = size_covariance(conditions, 1.0, departure, offset, mechanism.reference)
+    terms = np.ones((1, len(mean))) if mechanism.reference is None else grown(conditions, mechanism.reference)
+    terms = terms[terms.any(axis=1)]
+    together = terms.sum(axis=0)
+    weight = np.linalg.solve(prior, together)
+    variance = (width * mechanism.size.prior_sd) ** 2 * max(len(terms) - float(weight @ together), 0.0) + float(weight @ covariance @ weight)
     return float(np.log(2) + log_ndtr(sign * float(weight @ (mean - mechanism.size.neutral)) / np.sqrt(max(variance, 1e-300))))
 
 

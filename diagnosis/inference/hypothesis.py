@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from thermospindle.diagnosis.forward import nuisance as kinds_of
-from thermospindle.diagnosis.forward.mechanism import Mechanism
+from thermospindle.diagnosis.forward.mechanism import Mechanism, shared
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.evidence import Evidence, evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit
@@ -93,11 +93,12 @@ def _fit_one(model: CampaignModel, rates, tempers, most: float, expected: Learne
 
 
 def scan(model: CampaignModel, mechanisms: Sequence[Mechanism]) -> tuple[Array, ...]:
-    """Starts with no tolerance off its drawing and one mechanism of a size, the same in all tests: what moves peaks by many of their widths has no
+    """Starts with no tolerance off its drawing and one mechanism of a size, by its law in all tests: what moves peaks by many of their widths has no
     slope to follow from where it does not act."""
     problem = Problem(model, mechanisms)
-    scanned = [(k, m.size.neutral + s * m.size.prior_sd, m.size.limits) for k, m in enumerate(mechanisms) for s in SCAN]
-    return problem.start({}), *(problem.start({k: size}) for k, size, (low, high) in scanned if low <= size <= high)
+    conditions = [d.condition for d in model.tests]
+    scanned = [(k, m.size.neutral + s * m.size.prior_sd * shared(m, conditions), m.size.limits) for k, m in enumerate(mechanisms) for s in SCAN]
+    return problem.start({}), *(problem.start({k: sizes}) for k, sizes, (low, high) in scanned if low <= sizes.min() and sizes.max() <= high)
 
 
 def settled(model: CampaignModel, h: Hypothesis) -> Hypothesis:

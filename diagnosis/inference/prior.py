@@ -25,6 +25,8 @@ REFERENCE = {
 }
 """Widths in which nuisances of unknown size are counted; build tolerances in those that the scene states."""
 ACTION = 3.0  # times the relative error of frequencies, which what the model says of an effect may be wrong by
+Own = tuple[float, float, float]
+"""Width in a size's own prior standard deviations, departure and offset of one mechanism."""
 UNMOVED = np.zeros((0, 0, 2, 0))
 """Of a model without effects, and of fits with errors enlarged, which are a place to start from."""
 NOTHING = 1e-4  # of a reference width: what stands for a size of zero where a prior must be inverted
@@ -32,13 +34,19 @@ NOTHING = 1e-4  # of a reference width: what stands for a size of zero where a p
 
 @dataclass(frozen=True)
 class Learned:
-    """What is likeliest: `sizes` of discrepancies, of gain drift and of build tolerances by kind of nuisance, the factor of the stated errors; width and
-    departure of every mechanism."""
+    """What is likeliest: `sizes` of discrepancies, of gain drift and of build tolerances by kind of nuisance, the factor of the stated errors; width,
+    departure and offset of every mechanism (`size_covariance`)."""
 
     sizes: Mapping[str, float]
     errors: float
-    widths: tuple[float, ...]
-    departures: tuple[float, ...]
+    widths: tuple[float, ...] = ()
+    departures: tuple[float, ...] = ()
+    offsets: tuple[float, ...] = ()
+
+    @property
+    def own(self) -> list[Own]:
+        """Of every mechanism."""
+        return list(zip(self.widths, self.departures, self.offsets, strict=True))
 
 
 DRIFTING = (kinds_of.STIFFNESS_DRIFT, kinds_of.DAMPING_DRIFT)
@@ -59,16 +67,19 @@ def undrifted(learned: Learned) -> Learned:
 
 def as_stated(sizes: Mapping[str, float], mechanisms: Sequence[Mechanism] = ()) -> Learned:
     """Discrepancies of some sizes, errors as stated and mechanisms at their reference widths."""
-    return Learned(sizes, 1.0, (REFERENCE_WIDTH,) * len(mechanisms), (REFERENCE_DEPARTURE,) * len(mechanisms))
+    return Learned(sizes, 1.0, *zip(*[counted_in(m) for m in mechanisms], strict=True)) if mechanisms else Learned(sizes, 1.0)
+
+
+def counted_in(m: Mechanism) -> Own:
+    """What a fit counts the sizes of a mechanism in: an offset may be found where one is conceivable."""
+    return REFERENCE_WIDTH, REFERENCE_DEPARTURE, 1.0 if m.free or m.reference is None else 0.0
 
 
 def roots_of(model: CampaignModel, mechanisms: Sequence[Mechanism]) -> tuple[Array, ...]:
     """Of every mechanism the root (tests, tests) of its sizes' covariance at the reference width: sizes = neutral + root z."""
     conditions = [d.condition for d in model.tests]
-    return tuple(
-        np.asarray(np.linalg.cholesky(size_covariance(conditions, REFERENCE_WIDTH * m.size.prior_sd, REFERENCE_DEPARTURE)), float)
-        for m in mechanisms
-    )
+    own = [(m, *counted_in(m)) for m in mechanisms]
+    return tuple(np.asarray(np.linalg.cholesky(size_covariance(conditions, w * m.size.prior_sd, d, o, m.reference)), float) for m, w, d, o in own)
 
 
 def nuisance_variances(model: CampaignModel, sizes: Mapping[str, float]) -> Array:
@@ -94,21 +105,23 @@ def misjudged(model: CampaignModel, sizes: Mapping[str, float], moved: Array) ->
     return columns[:, columns.any(axis=0)]
 
 
-def mechanism_covariance(model: CampaignModel, mechanisms: Sequence[Mechanism], own: Sequence[tuple[float, float]]) -> Array:
-    """Prior covariance of [z, u] of all mechanisms, each with its (width, departure)."""
+def mechanism_covariance(model: CampaignModel, mechanisms: Sequence[Mechanism], own: Sequence[Own]) -> Array:
+    """Prior covariance of [z, u] of all mechanisms, each with its width, departure and offset."""
     tests = len(model.tests)
     prior, at = np.eye(sum(tests + len(m.shape) for m in mechanisms)), 0
-    for m, (width, departure) in zip(mechanisms, own, strict=True):
-        prior[at : at + tests, at : at + tests] = whitened_covariance(tuple(d.condition for d in model.tests), width, departure)
+    conditions = tuple(d.condition for d in model.tests)
+    for m, widths in zip(mechanisms, own, strict=True):
+        prior[at : at + tests, at : at + tests] = whitened_covariance(conditions, m.reference, counted_in(m), widths)
         at += tests + len(m.shape)
     return prior
 
 
 @lru_cache(maxsize=256)
-def whitened_covariance(conditions: tuple[Condition, ...], width: float, departure: float) -> Array:
-    """Covariance (tests, tests) of z = root^-1 (sizes - neutral): the same for every mechanism, as widths are counted in its own standard deviation."""
-    root = np.linalg.cholesky(size_covariance(conditions, REFERENCE_WIDTH, REFERENCE_DEPARTURE))
-    half = solve_triangular(root, size_covariance(conditions, width, departure), lower=True)
+def whitened_covariance(conditions: tuple[Condition, ...], reference: Condition | None, counted: Own, own: Own) -> Array:
+    """Covariance (tests, tests) of z = root^-1 (sizes - neutral), where the root is that of what is `counted` in: the same for every mechanism of one
+    reference, as widths are counted in its own standard deviation."""
+    root = np.linalg.cholesky(size_covariance(conditions, *counted, reference))
+    half = solve_triangular(root, size_covariance(conditions, *own, reference), lower=True)
     return np.asarray(solve_triangular(root, half.T, lower=True))
 
 
@@ -147,7 +160,7 @@ def nuisance_root(model: CampaignModel, sizes: Mapping[str, float], moved: Array
 
 def mechanism_root(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned) -> Array:
     """Root (m, m) of the prior covariance of [z, u] of all mechanisms, with what was learned of each."""
-    own = mechanism_covariance(model, mechanisms, list(zip(learned.widths, learned.departures, strict=True)))
+    own = mechanism_covariance(model, mechanisms, learned.own)
     return np.asarray(np.linalg.cholesky(own + 1e-14 * np.eye(len(own))), float)
 
 
@@ -173,6 +186,6 @@ def precision_and_variances(
 def _floored(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned, moved: Array) -> tuple[Array, Array, Array]:
     """The parts of a prior covariance that can be inverted: variances (P,) of nuisances, the root (P, k) of what is misjudged, and the covariance (m, m) of
     the mechanisms."""
-    own = mechanism_covariance(model, mechanisms, list(zip(learned.widths, learned.departures, strict=True)))
+    own = mechanism_covariance(model, mechanisms, learned.own)
     alone = np.maximum(nuisance_variances(model, learned.sizes), NOTHING**2)
     return alone, misjudged(model, learned.sizes, moved), own + NOTHING**2 * np.eye(len(own))

@@ -58,7 +58,7 @@ def screen(
     """Every one of `mechanisms` beside the model `about`, its errors 1 / `temper` times the data's and sizes of discrepancies as `learned`, or smaller;
     and the best of each name, and kind of law, once more with its shape `turned`."""
     about = replace(about, temper=temper)
-    sizes = Learned(learned.sizes, learned.errors if temper == 1.0 else 1.0, (), ())
+    sizes = Learned(learned.sizes, learned.errors if temper == 1.0 else 1.0)
     prior = Problem(model, about.mechanisms, replace(as_stated(learned.sizes, about.mechanisms), errors=sizes.errors))
     at = linearised(model, about)  # where a fit has not arrived its own derivatives are of an earlier point
     here, near = replace(about, chi2=at.chi2, gradient=at.gradient, information=at.information, by_test=()), (sizes, *smaller(sizes))

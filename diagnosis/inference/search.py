@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from thermospindle.diagnosis.forward.hit import hit_found
-from thermospindle.diagnosis.forward.mechanism import Mechanism, strongest, with_own_laws
+from thermospindle.diagnosis.forward.mechanism import Mechanism, with_own_laws
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, fit
@@ -46,8 +46,7 @@ def search(
 ) -> Search:
     """The evidence of every explanation. A light resonance becomes part of the model where the data show it without effects, or beside the best single
     one."""
-    at = strongest(model.spindle, [d.condition for d in model.tests])
-    with meanwhile(partial(with_own_laws, named, model.spindle, at), workers) as own_laws:
+    with meanwhile(partial(with_own_laws, named, model.spindle, [d.condition for d in model.tests]), workers) as own_laws:
         none = _without_effects(model)
         if (hit := hit_found(model, none.fit.nuisance, 2 * PLENTY * none.evidence.learned.errors**2)) is not None:
             model = hit
@@ -98,7 +97,7 @@ def _without_what_does_nothing(model: CampaignModel, none: Hypothesis, ended: Se
     if not idle:
         return none
     best = max(idle, key=lambda h: h.evidence.ln)
-    learned = replace(best.evidence.learned, widths=(), departures=())
+    learned = replace(best.evidence.learned, widths=(), departures=(), offsets=())
     try:
         again = fit(model, (), best.fit.nuisance, best.fit.rates, TEMPERS[-1:], learned)
         found = settled(model, Hypothesis(again, evidence(model, again, wide=True)))

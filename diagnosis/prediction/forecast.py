@@ -145,8 +145,8 @@ def _continued(model: CampaignModel, h: Hypothesis, problem: Problem, plan: Cond
     prior standard deviations: derivatives (a, n) by all parameters, and the variances (a,) that laws leave open."""
     conditions, n, at, learned = [*(d.condition for d in model.tests), plan], len(model.tests), problem.nuisances, h.evidence.learned
     rows, left = [np.zeros((0, problem.length))], []
-    for m, root, width, departure in zip(h.mechanisms, problem.roots, learned.widths, learned.departures, strict=True):
-        prior = size_covariance(conditions, width, departure)
+    for m, root, own in zip(h.mechanisms, problem.roots, learned.own, strict=True):
+        prior = size_covariance(conditions, *own, m.reference)
         weights = np.linalg.solve(prior[:n, :n], prior[:n, n])
         row = np.zeros((1 + len(m.shape), problem.length))
         row[0, at : at + n] = weights @ root / m.size.prior_sd

@@ -32,6 +32,8 @@ from thermospindle.sim.identification.poles import (
 )
 
 KINDS = {"receptance": 0, "mobility": 1, "accelerance": 2}
+MOST_LINES = 6400
+"""Of an FRF: half a minute's record of a spindle has tens of thousands, which tell no more of where poles are."""
 FAINT = 4.0
 """A mode is reported if its squared shape, weighted by its information, exceeds this many times what the information criterion asks."""
 
@@ -102,7 +104,8 @@ def extract(
     """Modes within `band` (Hz, all lines if None) of `frf` (n_resp, n_ref, n) at `frequency` (n,) Hz, with noise `frf_sd` of that shape.
 
     Without `frf_sd` it is taken from the `scatter` of neighbouring lines, as the status records. Lines at 0 Hz are left out. Records
-    under an exponential window exp(-window_decay t), 1/s, give H at s = i w + window_decay, and are taken so. Not reported
+    under an exponential window exp(-window_decay t), 1/s, give H at s = i w + window_decay, and are taken so. Of more than `MOST_LINES` one in so many
+    is taken, as long as they are closer than the narrowest mode is wide. Not reported
     are modes out of the band or with a damping that is not `BELIEVED`, not known better than to their half-width, or `FAINT`.
     Raises ValueError if shapes do not agree or numbers are unusable.
     """
@@ -121,9 +124,20 @@ def extract(
     if not (np.isfinite(frf).all() and np.isfinite(sd).all() and (sd > 0).all()):
         raise ValueError("the FRF must be finite and its noise finite and positive at every line")
     unit = 2 * np.pi * np.sqrt(frequency[0] * frequency[-1])
-    lines = Lines((window_decay + 2j * np.pi * frequency) / unit, frf, np.sqrt(2) / sd, KINDS[kind])
+    every = -(-len(frequency) // MOST_LINES)
+    while True:
+        lines = Lines((window_decay + 2j * np.pi * frequency[::every]) / unit, frf[..., ::every], np.sqrt(2) / sd[..., ::every], KINDS[kind])
+        accepted = _accepted(lines, search(lines))
+        if every == 1 or _resolved(*accepted[:2]):
+            return _modes(*accepted, unit, given, frf.shape[:2], every)
+        every = -(-every // 2)
 
-    return _modes(*_accepted(lines, search(lines)), unit, given, frf.shape[:2])
+
+def _resolved(lines: Lines, fit: Fit) -> bool:
+    """Whether lines stand closer than the half-width of every mode found."""
+    own = fit.poles[believed(lines, fit.poles)]
+    between = np.interp(np.abs(own), lines.s.imag[1:], np.diff(lines.s.imag))
+    return bool(np.all(between <= -own.real))
 
 
 def _accepted(lines: Lines, found: Fit) -> tuple[Lines, Fit, float, list[tuple[complex, complex]]]:
@@ -218,6 +232,7 @@ def _modes(
     unit: float,
     given: bool,
     functions: tuple[int, int],
+    every: int,
 ) -> Modes:
     """Physical units, standard errors, and the choice of what is reported."""
     responses, references = functions
@@ -274,6 +289,7 @@ def _modes(
     kept = np.append(keep, a + keep)
     chi2 = fit.chi2 / (lines.count - fit.unknowns)
     words = ["noise as given" if given else "noise estimated from neighbouring lines"]
+    words += [f"one line in {every}, closer than the narrowest mode is wide"] if every > 1 else []
     words += [f"chi-square {chi2:.3g} per degree of freedom" + (", errors enlarged by its root" if chi2 > 1 else "")]
     words += [] if strain else ["residues of rank one refused by the data, left free"]
     words += [f"residues of rank one strained, errors enlarged by {np.sqrt(strain):.2g}"] if strain > 1 else []

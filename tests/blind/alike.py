@@ -19,7 +19,7 @@ from scipy.optimize import lsq_linear, minimize
 from tests.blind.campaigns import Made
 from tests.blind.visible import SMALL, Seen, change
 from tests.blind.world import Answer, World
-from thermospindle.diagnosis.forward.mechanism import Mechanism, strongest, variants, with_own_laws
+from thermospindle.diagnosis.forward.mechanism import Mechanism, variants, with_own_laws
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.effects import CATALOGUE, usable
@@ -49,7 +49,7 @@ def left(made: Made, spindle: Spindle, of: Seen, changes: Sequence[Array], catal
         return _least(of, d, *_by_size(made.built, m, shape, conditions, base, of))
 
     named = [v for e in usable(spindle, tuple(catalogue)) for v in variants(e)]
-    for m in [*named, *with_own_laws(named, spindle, strongest(spindle, conditions))]:
+    for m in [*named, *with_own_laws(named, spindle, conditions)]:
         if not any(getattr(m.effect, hook) for hook in ("spindle", "temperatures", "motions", "pair", "chain", "measurement")):
             continue
         tried = [(shape, _by_size(made.built, m, shape, conditions, base, of)) for shape in _shapes(m)]

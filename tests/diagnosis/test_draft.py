@@ -241,7 +241,7 @@ def test_an_effect_of_the_catalogue_is_drafted_with_the_law_that_the_data_have(s
     drafted = effect_of(file)
     assert "linear in temperature" in drafted.title
     assert drafted.resembles[0] == "thermal_gradient"
-    [own] = with_own_laws(variants(by_name("thermal_gradient", CATALOGUE))[:1], spindle, at)
+    [own] = with_own_laws(variants(by_name("thermal_gradient", CATALOGUE))[:1], spindle, [at])
     cold, warm = Condition(20.0), Condition(40.0)
     fitted = drafted.typical()
     assert operating_point(spindle, cold, [(drafted, fitted)]).state.bearings[0].stiffness == pytest.approx(

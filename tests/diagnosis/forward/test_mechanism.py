@@ -39,6 +39,22 @@ def test_sizes_have_a_proper_prior(departure):
         assert values[-2] > 1e-3 * departure**2 * values[-1]
 
 
+@pytest.mark.parametrize("departure", [0.0, 0.3, 1.0])
+def test_what_grows_from_a_reference_is_nothing_there(departure):
+    """Straight with temperature and with speed; departures are those of a process of the same likeness since the reference: x(c) - x(reference), of which the covariance
+    follows from that of x at the tests and there. An offset is the same in all tests."""
+    conditions = [Condition(20.0), Condition(40.0), Condition(60.0), Condition(0.0), Condition(60.0, 7200 * RPM), Condition(60.0, -7200 * RPM)]
+    reference = conditions[0]
+    found = size_covariance(conditions, 2.0, departure, 0.0, reference)
+    assert found[0, 0] == pytest.approx(4.0 * (0.02 * departure**2 + 1e-9), rel=1e-9)
+    t, n = np.array([0.0, 0.5, 1.0, -0.5, 1.0, 1.0]), np.array([0.0, 0.0, 0.0, 0.0, 1.2, 1.2])
+    since = np.eye(6) - np.eye(6)[[0]]  # rows: x(c) - x(reference)
+    expected = np.outer(t, t) + np.outer(n, n) + departure**2 * (0.98 * since @ likeness(conditions) @ since.T + 0.02 * np.eye(6))
+    assert found == pytest.approx(4.0 * expected, abs=1e-7)
+    assert np.linalg.eigvalsh(found).min() > 0
+    assert size_covariance(conditions, 2.0, departure, 1.0, reference) - found == pytest.approx(4.0 * np.ones((6, 6)))
+
+
 def test_departures_are_alike_where_conditions_are():
     like = likeness(CONDITIONS)
     assert like[0, 1] == 1.0
@@ -67,7 +83,7 @@ def test_laws_of_the_datas_own_act_in_every_test_as_where_they_do_most(spindle):
     assert at == Condition(60.0, 7200 * RPM, 100.0, 60.0)
     assert strongest(spindle, [Condition(20.0), Condition(-5.0)]) == Condition(-5.0, spindle.nominal_speed)
     named = [m for e in usable(spindle) for m in variants(e)]
-    own = with_own_laws(named, spindle, at)
+    own = with_own_laws(named, spindle, CONDITIONS)
     names = [m.name for m in own]
     assert {"thermal_gradient", "grease_damping", "bond_softening", "soak_lag", "clearance_opening", "mount_compliance"} <= set(names)
     assert not {"added_disk", "sensor_mass", "support_anisotropy", "ball_material", "sensor_gain"} & set(names)
@@ -79,6 +95,10 @@ def test_laws_of_the_datas_own_act_in_every_test_as_where_they_do_most(spindle):
     assert [q.name for q in of["flange_fit_loosening"].shape] == ["translation_share", "loss_factor"]  # its interference is but another size there
     assert of["flange_fit_loosening"].choices == {"interference": 7.0, "closed": 0.0}
     assert [q.name for q in of["thermal_gradient"].shape] == ["common_share", "level_share"]
+    grows = {m.name for m in own if m.reference is not None}
+    assert {"thermal_gradient", "modulus_softening", "plate_prestress", "lubricant_film", "soak_lag"} <= grows  # nothing at 20 C and at rest
+    assert not {"preload_loss", "bond_softening", "mount_compliance", "window_damping"} & grows  # theirs may be there already
+    assert {m.reference for m in own} == {None, Condition(20.0, 0.0, 0.0, np.inf)}
     warm = of["thermal_gradient"]
     by_region = {g.name: 20.0 for g in spindle.regions}
     values = warm.values(1.0, [q.neutral for q in warm.shape])
@@ -132,7 +152,7 @@ def test_a_free_form_is_alike_to_effects_that_change_the_same(spindle, model, fo
 def test_a_free_form_says_how_much_of_an_effect_that_would_be(spindle, model):
     """A preload lower by 2 % and by 4 % (of ln) is a loss of so much, to first order; of what changes otherwise it says nothing."""
     x, free = np.zeros(len(model.parameters)), {m.name: m for m in free_forms(spindle)}
-    own = with_own_laws([v for e in usable(spindle) if e.name == "preload_loss" for v in variants(e)], spindle, strongest(spindle, CONDITIONS))[0]
+    own = with_own_laws([v for e in usable(spindle) if e.name == "preload_loss" for v in variants(e)], spindle, CONDITIONS)[0]
     told = as_told_by(model, x, free["preload"], own, np.array([-2.0, -4.0]))
     assert told == pytest.approx([0.02, 0.04], rel=0.02)
     assert as_told_by(model, x, free["flange damping"], own, np.array([-2.0, -4.0])) is None

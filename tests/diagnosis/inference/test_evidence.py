@@ -40,7 +40,7 @@ from thermospindle.diagnosis.inference.prior import (
 @pytest.mark.parametrize("sizes", [(0.0, 0.0, 0.0), (1e-3, 0.03, 1e-3), (1e-2, 0.1, 0.0)])
 def test_one_choice_of_priors_is_the_gaussian_integral(sizes, errors):
     made = toy(1, 1e-3)
-    found = evidence(made.model, made.fit, [Learned(dict(zip((STIFFNESS, DAMPING, DRIFT), sizes, strict=True)), errors, (), ())])
+    found = evidence(made.model, made.fit, [Learned(dict(zip((STIFFNESS, DAMPING, DRIFT), sizes, strict=True)), errors)])
     assert found.ln == pytest.approx(made.ln(made.prior(*sizes), errors), abs=1e-6)
 
 
@@ -48,7 +48,7 @@ def test_mean_and_covariance_are_the_posterior():
     made = toy(3, 1e-3, hidden=1.6)
     found = evidence(made.model, made.fit)
     learned = found.learned
-    prior = made.prior(*(learned.sizes[k] for k in (STIFFNESS, DAMPING, DRIFT)), list(zip(learned.widths, learned.departures, strict=True)))
+    prior = made.prior(*(learned.sizes[k] for k in (STIFFNESS, DAMPING, DRIFT)), learned.own)
     jacobian, y = np.concatenate(made.jacobians), np.concatenate(made.y)
     gain = prior @ jacobian.T @ np.linalg.inv(learned.errors**2 * np.eye(len(y)) + jacobian @ prior @ jacobian.T)
     assert found.mean == pytest.approx(gain @ y, abs=1e-5)
@@ -189,7 +189,7 @@ def test_what_departures_gain_is_told(hidden, much, monkeypatch):
     """By how much the evidence is larger than that of the same sizes held to their law; less than nothing where the law holds."""
     made = toy(3, 0.0, hidden=hidden, rows=200)
     found = evidence(made.model, made.fit)
-    monkeypatch.setattr("thermospindle.diagnosis.inference.evidence._own_grid", lambda lawless, departures: tuple((w, 0.0) for w in WIDTHS))
+    monkeypatch.setattr("thermospindle.diagnosis.inference.evidence.own_grid", lambda m: {(w, 0.0, 1.0): -np.log(len(WIDTHS)) for w in WIDTHS})
     held = evidence(made.model, made.fit, [found.learned])
     assert found.by_departing == pytest.approx(found.ln - held.ln, abs=1e-6)
     assert found.by_departing > 20.0 if much else -2.0 < found.by_departing < 0.0
@@ -211,7 +211,7 @@ def test_what_is_left_out_is_predicted_from_the_rest(hidden):
     made = toy(5, 1e-3, hidden)
     found = evidence(made.model, made.fit)
     learned = found.learned
-    prior = made.prior(*(learned.sizes[k] for k in (STIFFNESS, DAMPING, DRIFT)), list(zip(learned.widths, learned.departures, strict=True)))
+    prior = made.prior(*(learned.sizes[k] for k in (STIFFNESS, DAMPING, DRIFT)), learned.own)
     groups = [[0], [1, 2]]
     total, density = 0.0, 0.0
     for group in groups:

@@ -203,7 +203,7 @@ def test_a_fit_does_not_stall_at_a_limit(spindle):
 
     hidden = {q.name: q.neutral for q in rings.parameters} | {"scale": 4.0}
     model = model_of(spindle, mode_campaign(spindle, conditions, 3, [(replace(rings, temperatures=warmer), hidden)]))
-    own = with_own_laws(variants(effect("thermal_gradient")), spindle, at)[0]
+    own = with_own_laws(variants(effect("thermal_gradient")), spindle, conditions)[0]
     fixed = replace(own, shape=(), choices={q.name: q.neutral for q in own.shape})
     prior = steady(evidence(model, fit(model)).learned, (own,))
     with_shape, without = (fit(model, (m,), scan(model, (m,)), tempers=(1.0,), learned=prior) for m in (own, fixed))

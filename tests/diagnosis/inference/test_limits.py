@@ -45,8 +45,8 @@ def test_sizes_that_depart_from_their_law_keep_the_sign_that_all_have():
 @pytest.mark.parametrize("held", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_shape_within_limits_is_the_integral_over_these(held, monkeypatch):
     """A share from nothing to one, neutral at nothing: the integral over it alone, by quadrature; held at nothing where the data would have it less."""
-    own, plain, random = (1.0, 0.0), toy(3, 0.0, hidden=2.0), np.random.default_rng(8)
-    monkeypatch.setattr("thermospindle.diagnosis.inference.evidence._own_grid", lambda lawless, departures: (own,))
+    own, plain, random = (1.0, 0.0, 1.0), toy(3, 0.0, hidden=2.0), np.random.default_rng(8)
+    monkeypatch.setattr("thermospindle.diagnosis.inference.evidence.own_grid", lambda m: {own: 0.0})
     jacobians = [np.column_stack([j, random.standard_normal(len(j))]) for j in plain.jacobians]
     y = [v + (-0.4 if held else 0.6) * j[:, -1] for v, j in zip(plain.y, jacobians, strict=True)]
     prior = plain.prior(0.0, 0.0, 0.0, [own])
@@ -76,7 +76,7 @@ def test_a_shape_within_limits_is_the_integral_over_these(held, monkeypatch):
         plain.fit, mechanisms=(mechanism,), point=point, shapes=((0.5 * point[-1],),), chi2=chi2, gradient=gradient, information=information,
         by_test=by_test, held=stands,
     )  # fmt: skip
-    found = evidence(plain.model, done, [Learned({STIFFNESS: 0.0, DAMPING: 0.0, DRIFT: 0.0}, 1.0, (), ())])
+    found = evidence(plain.model, done, [Learned({STIFFNESS: 0.0, DAMPING: 0.0, DRIFT: 0.0}, 1.0)])
     assert (slope > 0) if held else (point[-1] > 0)
     assert found.ln == pytest.approx(by_quadrature, abs=0.02)
     assert (found.mean[-1] == 0.0) == held

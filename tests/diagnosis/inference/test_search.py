@@ -289,7 +289,7 @@ def test_a_law_that_runs_against_its_own_is_anothers(spindle):
     conditions = (Condition(20.0), Condition(40.0), Condition(60.0))
     model = model_of(spindle, mode_campaign(spindle, conditions, 1, errors=drawn(spindle, 3, 1)))
     law = variants(effect("flange_fit_loosening"))[0]
-    (own,) = with_own_laws([law], spindle, conditions[-1])
+    (own,) = with_own_laws([law], spindle, conditions)
     asked = partial(runs_against, model, np.zeros(len(model.parameters)), law, own)
     falls, common, each = np.array([0.006, 0.004, 0.002]), 1e-4 * np.ones((3, 3)), np.eye(3)
     assert asked(falls, common + 1e-8 * each)

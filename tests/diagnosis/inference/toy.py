@@ -42,7 +42,7 @@ class Toy:
         n = len(self.model.parameters)
         whole = np.zeros((len(self.fit.point), len(self.fit.point)))
         whole[:n, :n] = np.diag([size.get(p.kind, 1.0) ** 2 for p in self.model.parameters])
-        for m, root, (width, departure) in zip(self.mechanisms, self.fit.roots, own, strict=True):
+        for m, root, (width, departure, _) in zip(self.mechanisms, self.fit.roots, own, strict=True):
             inverse = np.linalg.inv(root)
             whole[n:, n:] = inverse @ size_covariance(CONDITIONS, width * m.size.prior_sd, departure) @ inverse.T
         return whole
