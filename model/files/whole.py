@@ -32,7 +32,7 @@ def whole(path: Path) -> Iterator[Path]:
     """Where to write the file or folder that shall stand at `path`: it is moved there when the block ends well, removed otherwise.
 
     The block must make it, a file or a folder; what stands at `path` then is replaced. The folder of `path` must exist. OSError, as
-    the system has it, where nothing can be written; a `BadInput` of the block names `path` and not the work folder.
+    the system has it, where nothing can be written; it and a `BadInput` of the block name `path` and not the work folder.
     """
     path = Path(path).absolute()
     _tidy(path)
@@ -73,7 +73,11 @@ def _prefix(path: Path) -> str:
 def _work_folder(path: Path) -> tuple[Path, int | None]:
     """A new work folder and its lock; made again where another writer took it for a dead one's before it was locked."""
     while True:
-        work = Path(tempfile.mkdtemp(prefix=_prefix(path), dir=path.parent))
+        try:
+            work = Path(tempfile.mkdtemp(prefix=_prefix(path), dir=path.parent))
+        except OSError as error:
+            error.filename = str(path)  # nobody has asked for the work folder
+            raise
         lock = _lock(work)
         if fcntl is None or (lock is not None and work.exists()):
             return work, lock

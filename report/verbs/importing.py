@@ -98,18 +98,20 @@ def _form_written(mapping: Path, open_: list[str], left: list[str], proposed: li
     return Answer(values, show)
 
 
-FAR = 100.0
-"""K beyond the temperatures that a scene is meant for, at which another unit is likelier than such a test."""
+FAR, FASTER = 100.0, 5.0
+"""K beyond the temperatures that a scene is meant for, and times its nominal speed, at which another unit is likelier than such a test."""
 
 
 def _doubts(campaign: Campaign, spindle: Spindle) -> list[str]:
-    """What fits the scene so badly that it may be in another unit: kelvin for C, kHz for Hz."""
+    """What fits the scene so badly that it may be in another unit: kelvin for C, kHz for Hz, Hz for rpm."""
     low, high = spindle.temperatures[0], spindle.temperatures[-1]
     first, last = spindle.hammer.band
     found = []
     for t in campaign.tests:
         if not low - FAR <= t.temperature <= high + FAR:
             found.append(f"test {t.id}: temperature_C = {t.temperature:g}, and {spindle.name} is meant for {low:g} to {high:g} C: is it in another unit?")
+        if abs(t.speed) > FASTER * spindle.nominal_speed:
+            found.append(f"test {t.id}: speed_rpm = {t.speed / RPM:g}, and {spindle.name} is meant for {spindle.nominal_speed / RPM:g} rpm: is it in another unit?")
         if t.frf is not None and (t.frf.frequency[-1] < first or t.frf.frequency[0] > last):
             found.append(
                 f"test {t.id}: lines from {t.frf.frequency[0]:g} to {t.frf.frequency[-1]:g} Hz, and the hammer test of {spindle.name} is from {first:g} to {last:g} Hz: "
@@ -150,6 +152,6 @@ def _written(campaign: Campaign, out: Path, notes: list[str], scene: Path | None
             console.print(f"  {t['id']}: {t['temperature_C']:g} C, {t['speed_rpm']:g} rpm: {', '.join(x for x in (frfs, modes) if x)}", highlight=False)
         for note in notes:
             console.print(f"  {note}", highlight=False)
-        console.print(f"Next: spindle compare {scene or campaign.spindle} {out}", highlight=False)
+        console.print(f"Next: spindle compare {scene or 'SCENE'} {out}", highlight=False)
 
     return Answer(values, show)

@@ -232,7 +232,7 @@ def campaign_of(found: Read, form: MappingForm, scene: Spindle | None, files: Se
         tail = f"answer them in {mapping}" if mapping else "--mapping NEW.toml writes a form to answer them in"
         raise Unanswered(head, spoken(found, files), tail)
     if not found.tests:
-        raise BadInput(f"{listed(f.name for f in files)}: hold no FRF, time record or mode; geometry alone is no campaign")
+        raise BadInput(f"{listed(f.name for f in files)}: no FRF, time record or mode in {'it' if len(files) == 1 else 'them'}; geometry, spectra or coherence alone are no campaign")
     forms = {t.id: t for t in form.tests}
     settings = {c.file: settings_of(form, c.file) for c in found.contents}
     notes = list(found.notes)

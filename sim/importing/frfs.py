@@ -191,13 +191,19 @@ def _check(frf: Frf, placed: Sequence[Placed], speed: float) -> None:
 
 
 def _meant(frf: Frf, placed: Sequence[Placed], speed: float) -> str:
-    """Whether the same numbers, taken for another quantity, are of a passive structure: then another unit is meant."""
+    """Whether the same numbers, taken for another quantity, are of a passive structure: then another unit is meant, unless the other sign would do as well."""
+
+    def passes(value: np.ndarray) -> bool:
+        try:
+            check_frf("", replace(frf, value=value, coherence=None, sd=None), speed)
+        except BadInput:
+            return False
+        return True
+
     told = {p.quantity for p in placed}
     for other in set(POWER) - told if len(told) == 1 else ():
-        turned = replace(frf, value=frf.value * (2j * np.pi * frf.frequency) ** (POWER[min(told)] - POWER[other]), coherence=None, sd=None)
-        try:
-            check_frf("", turned, speed)
-        except BadInput:
-            continue
-        return f"taken for {other} its numbers pass: is its unit told as that of {min(told)} by mistake?"
+        if passes(frf.value * (2j * np.pi * frf.frequency) ** (POWER[min(told)] - POWER[other])):
+            if passes(-frf.value):
+                return f"{ADVICE['negative real part']}; or, where the unit may be wrong, taken for {other} its numbers pass as well"
+            return f"taken for {other} its numbers pass: is its unit told as that of {min(told)} by mistake?"
     return ""

@@ -40,6 +40,13 @@ def test_the_old_one_stays_when_writing_fails(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["a"]
 
 
+def test_what_cannot_be_written_is_named_as_it_was_asked_for(tmp_path):
+    """Not by the hidden folder that it would have been written in."""
+    with pytest.raises(FileNotFoundError) as told, whole(tmp_path / "nowhere" / "a"):
+        pass
+    assert told.value.filename == str(tmp_path / "nowhere" / "a")
+
+
 @pytest.mark.parametrize("when", [1, 2, 3])
 def test_the_old_or_the_new_one_can_be_had_after_a_kill(tmp_path, when):
     """Killed before the first, second and third move of a replacement; the next writer puts the old one back and clears away."""

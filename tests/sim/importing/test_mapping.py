@@ -61,15 +61,16 @@ def test_points_of_a_scene(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("unit", "temperature", "doubts"),
-    [("Hz", 293.15, ["test T20: temperature_C = 293.15, and hdd_2003 is meant for 20 to 60 C: is it in another unit?"]), ("kHz", 20.0, ["test T20: lines from 400000 to"])],
-)
-def test_other_units_than_the_scenes_are_doubted(tmp_path, unit, temperature, doubts):
+    ("unit", "temperature", "speed", "doubts"),
+    [("Hz", 293.15, 0.0, ["test T20: temperature_C = 293.15, and hdd_2003 is meant for 20 to 60 C: is it in another unit?"]),
+     ("Hz", 20.0, -1e9, ["test T20: speed_rpm = -1e+09, and hdd_2003 is meant for 7200 rpm: is it in another unit?"]), ("kHz", 20.0, 0.0, ["test T20: lines from 400000 to"])],
+)  # fmt: skip
+def test_other_units_than_the_scenes_are_doubted(tmp_path, unit, temperature, speed, doubts):
     from tests.conftest import SCENE
 
     heads, found = columns("real", "(m/s)/N", FRF.value)
     file = table(tmp_path / "T20.csv", [f"Frequency [{unit}]", *heads], [FREQUENCY, *found])
-    (tmp_path / "m.toml").write_text(f'[[tests]]\nid = "T20"\ntemperature_C = {temperature}\nspeed_rpm = 0.0\n')
+    (tmp_path / "m.toml").write_text(f'[[tests]]\nid = "T20"\ntemperature_C = {temperature}\nspeed_rpm = {speed}\n')
     said = bring([file], mapping=tmp_path / "m.toml", scene=SCENE, out=tmp_path / "c").values["warnings"]
     assert len(said) == len(doubts)
     assert all(one.startswith(doubt) for one, doubt in zip(said, doubts, strict=True))
@@ -90,6 +91,14 @@ def test_what_no_structure_does_is_told_with_the_users_file(tmp_path, change, sa
     heads, found = columns("real", "(m/s)/N", change(FRF.value))
     file = table(tmp_path / "T20.csv", ["Frequency", *heads], [FREQUENCY, *found])
     with pytest.raises(BadInput, match=said):
+        imported(tmp_path, "", file)
+
+
+def test_a_sign_that_looks_like_another_quantity_is_told_as_a_sign(tmp_path):
+    """Minus an accelerance is a receptance's phase."""
+    heads, found = columns("real", "(m/s^2)/N", -FRF.value * 2j * np.pi * FREQUENCY)
+    file = table(tmp_path / "T20.csv", ["Frequency", *heads], [FREQUENCY, *found])
+    with pytest.raises(BadInput, match=r"looks the other way, say so where it is named, as in 3:-Z; .*; or, where the unit may be wrong, taken for receptance"):
         imported(tmp_path, "", file)
 
 
