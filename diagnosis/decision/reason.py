@@ -34,7 +34,7 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
         if free and free[0].names == (LEFT,):
             left = likeliest(found).fit
             of = f" of {np.sqrt(chi2 / n):.1f}" if left.mechanisms else ""
-            apart = ', and not the same in every test' if len(found.model.tests) > 1 else ''
+            apart = ", and not the same in every test" if len(found.model.tests) > 1 else ""
             place = f"the best leaves {np.sqrt(left.chi2 / left.count):.1f} standard errors{of}{apart}"
         elif free and free[0].hypothesis.mechanisms:
             forms = [f"what {m.name} does" if m.beyond else m.name for m in free[0].hypothesis.mechanisms]

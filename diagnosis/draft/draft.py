@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 
 from thermospindle.diagnosis.draft.answer import place_of, whitening
-from thermospindle.diagnosis.draft.laws import fit_law, laws, ranked
+from thermospindle.diagnosis.draft.laws import Fitted, fit_law, laws, ranked
 
 LIMIT = 400.0  # of sizes in their unit, at least
 NEAR = 10.0  # criterion within which rivals are named in the file
 
 
-def draft(diagnosis: Path, name: str, element: str | None = None) -> str:
-    """The text of an effect file called `name` from the free-form answer in an answer of `spindle diagnose --json`.
+@dataclass(frozen=True)
+class Draft:
+    """The text of an effect file, how well its law fits in a sentence, and whether that leaves it in `doubt`."""
+
+    text: str
+    fits: str
+    doubt: bool
+
+
+def draft(diagnosis: Path, name: str, element: str | None = None) -> Draft:
+    """An effect file called `name` from the free-form answer in an answer of `spindle diagnose --json`.
 
     The first element that would have to drift is taken, or `element`. Raises `BadInput` where the file holds none, or one that changes by nothing.
     """
@@ -25,7 +35,8 @@ def draft(diagnosis: Path, name: str, element: str | None = None) -> str:
     top = float(speed.max()) or 1.0
     tried = [fit_law(law, temperature, speed / top, change, whitening(covariance)) for law in laws(temperature, speed / top, reference)]
     best, *others = ranked([f for f in tried if f is not None])
-    return _template().render(
+    fits, doubt = _fits(best)
+    text = _template().render(
         name=name,
         place=place,
         best=best,
@@ -35,7 +46,16 @@ def draft(diagnosis: Path, name: str, element: str | None = None) -> str:
         top=top,
         file=diagnosis.name,
         limits=[_about(v) for v in best.values[:2]],
+        fits=fits,
     )
+    return Draft(text, fits, doubt)
+
+
+def _fits(best: Fitted) -> tuple[str, bool]:
+    if not best.tested:
+        return f"{best.count} parameters fit {best.tests} tests whatever they are: that it is this law is not tested", True
+    misses = ": no law here fits, this one least badly" if best.refuted else ""
+    return f"chi2 {best.chi2:.3g} of {best.tests} tests with {best.count} parameters{misses}", bool(best.refuted)
 
 
 def _template() -> Template:

@@ -105,14 +105,14 @@ def draft(diagnosis: Path, name: str | None = None, element: str | None = None, 
     called = name or out.stem
     if not called.isidentifier():
         raise BadInput(f"--name {called}: is no name of an effect; letters, digits and underscores are allowed")
-    text = drafted(Path(diagnosis), called, element)
+    written = drafted(Path(diagnosis), called, element)
     with whole(out) as file:
-        file.write_text(text, encoding="utf-8")
+        file.write_text(written.text, encoding="utf-8")
     effect = effect_of(out)
-    values = {"effect": called, "file": str(out), "equation": effect.equation, "parameters": effect.typical(), "warnings": []}
+    values = {"effect": called, "file": str(out), "equation": effect.equation, "parameters": effect.typical(), "warnings": [written.fits] if written.doubt else []}
 
     def show(console: Console) -> None:
-        console.print(f"{out}: {effect.title}; {effect.equation}")
+        console.print(f"{out}: {effect.title}; {effect.equation}" + ("" if written.doubt else f"; {written.fits}"))
         console.print(f"Read it, edit it, then: spindle add SCENE {called} --effect {out} --from {diagnosis} --out NEW_SCENE")
 
     return Answer(values, show)

@@ -175,7 +175,7 @@ def drafted(found: Diagnosis, told: dict[str, Any]) -> list[float]:
     with TemporaryDirectory() as folder:
         answer, file = Path(folder) / "diagnosis.json", Path(folder) / "drafted.py"
         answer.write_text(json.dumps(told), encoding="utf-8")
-        file.write_text(draft(answer, "drafted"), encoding="utf-8")
+        file.write_text(draft(answer, "drafted").text, encoding="utf-8")
         mechanisms = variants(effect_of(file))
     model, base, groups = found.search.model, found.search.base, conditions_of(found.search.model.spindle, found.search.model.tests)
     fits = []

@@ -154,7 +154,7 @@ def test_what_was_drafted_comes_with_the_tolerances_that_were_fitted_beside_it(a
     found = answer(effects) | {"verdict": "identified" if effects else "unexplained", "candidates": candidates, "where": [place], "tolerances_beside": beside}
     source, file = tmp_path / "answer.json", tmp_path / "slipping.py"
     source.write_text(json.dumps(found), encoding="utf-8")
-    file.write_text(draft(source, "slipping"), encoding="utf-8")
+    file.write_text(draft(source, "slipping").text, encoding="utf-8")
     said = add("new", "slipping", found=found, options=["--effect", str(file)])
     assert isinstance(said, dict), said
     assert f"{len(TOLERANCES)} build tolerances as fitted beside {element}" in said["note"]

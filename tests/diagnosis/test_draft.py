@@ -90,7 +90,7 @@ def of_rings(folder, change, sd, at=AT):
 def drafted(answer, folder):
     """The text of the file drafted from an answer, and its effect, which keeps the rules."""
     file = folder / "own.py"
-    file.write_text(text := draft(answer, "own"), encoding="utf-8")
+    file.write_text(text := draft(answer, "own").text, encoding="utf-8")
     own = effect_of(file)
     has_full_rows(own, [])
     return text, own, runpy.run_path(str(file))["law"]
@@ -130,7 +130,7 @@ def test_a_law_that_two_tests_rule_out_is_not_drafted(tmp_path):
     assert "linear in temperature" in own.title
     assert "2 parameters fit 2 tests whatever they are" in text
     assert [law(t, 0.0, own.typical()) for t in (20.0, 60.0)] == pytest.approx([1.0, 10.0], abs=1e-4)
-    text = draft(of_rings(tmp_path, [5.0, 5.1], 0.1, (20.0, 60.0)), "own")  # as it must be where nothing rules it out
+    text = draft(of_rings(tmp_path, [5.0, 5.1], 0.1, (20.0, 60.0)), "own").text  # as it must be where nothing rules it out
     assert "radially drifts: constant" in text
     assert "of 2 tests with 1 parameters" in text
 
@@ -156,7 +156,7 @@ def test_what_is_wrong_alike_in_all_tests_hides_no_law(slope, shift, law, tmp_pa
     random = np.random.default_rng(1)
     change = shift + COMMON * random.standard_normal() + slope * (np.array(AT) - 20) / 50 + OWN * random.standard_normal(6)
     answer = of_rings(tmp_path, change, float(np.hypot(COMMON, OWN)))
-    assert "radially drifts: constant" in draft(answer, "own")  # answers of before
+    assert "radially drifts: constant" in draft(answer, "own").text  # answers of before
     raw = json.loads(answer.read_text(encoding="utf-8"))
     raw["where"][0]["change_covariance"] = (COMMON**2 + OWN**2 * np.eye(6)).tolist()
     answer.write_text(json.dumps(raw), encoding="utf-8")
@@ -216,7 +216,7 @@ def test_with_the_drafted_effect_the_error_falls(slipping, tmp_path):
     """Also on conditions that were left out, beside which the step lies between two others: there at least twofold; and it acts as drafted."""
     model, base, answer = slipping
     file = tmp_path / "slip.py"
-    file.write_text(draft(answer, "slip"), encoding="utf-8")
+    file.write_text(draft(answer, "slip").text, encoding="utf-8")
     effect = effect_of(file)
     assert effect.name == "slip"
     assert "step in temperature" in effect.title
@@ -237,7 +237,7 @@ def test_an_effect_of_the_catalogue_is_drafted_with_the_law_that_the_data_have(s
     answer, file = tmp_path / "d.json", tmp_path / "warm.py"
     place = {"element": "thermal_gradient", "unit": "1", "change": rows, "effect": effect}
     answer.write_text(json.dumps({"where": [place]}), encoding="utf-8")
-    file.write_text(draft(answer, "warm"), encoding="utf-8")
+    file.write_text(draft(answer, "warm").text, encoding="utf-8")
     drafted = effect_of(file)
     assert "linear in temperature" in drafted.title
     assert drafted.resembles[0] == "thermal_gradient"
@@ -267,7 +267,7 @@ def test_an_effect_that_departs_from_its_law_acts_by_its_formula_in_the_size_tha
     rows = [{"temperature_C": t, "speed_rpm": 0.0, f"change_{size.unit}": size.typical * (1 - (t - 20) / 80), "sd": 0.01 * size.typical} for t in (20.0, 30.0, 40.0, 50.0, 60.0)]
     answer, file = tmp_path / "d.json", tmp_path / "own_bond.py"
     answer.write_text(json.dumps({"where": [{"element": "bond_softening", "unit": size.unit, "change": rows, "effect": {"values": values}}]}), encoding="utf-8")
-    file.write_text(text := draft(answer, "own_bond"), encoding="utf-8")
+    file.write_text(text := draft(answer, "own_bond").text, encoding="utf-8")
     assert "acts as its formula has it at each condition" in text
     own, hot = effect_of(file), Condition(60.0)
     by_file, by_effect = (operating_point(spindle, hot, [acting]).linear.stiffness for acting in ((own, own.typical()), (softening, {**values, size.name: size.typical / 2})))
@@ -282,7 +282,7 @@ def test_laws_count_temperature_from_the_scenes_reference(told, counted, tmp_pat
     zero = told.get("reference_temperature_C", 20.0)
     rows = [{"temperature_C": t, "speed_rpm": 0.0, "relative": np.expm1(-0.002 * (t - zero)), "sd": 0.001} for t in (zero, 28.0, 36.0, 44.0, 52.0, 60.0)]
     (tmp_path / "d.json").write_text(json.dumps({"where": [{"element": "preload", "unit": "%", "change": rows}], **told}), encoding="utf-8")
-    text = draft(tmp_path / "d.json", "own")
+    text = draft(tmp_path / "d.json", "own").text
     assert f"change = size * ({counted}) in %," in text
     (tmp_path / "own.py").write_text(text, encoding="utf-8")
     assert [p.name for p in effect_of(tmp_path / "own.py").parameters] == ["size"]
@@ -313,4 +313,4 @@ def test_temperatures_beyond_a_law_are_drafted_too(tmp_path):
     raw = json.loads(diagnosis())
     raw["where"][0]["change"][-1]["temperature_C"] = 600.0
     (tmp_path / "d.json").write_text(json.dumps(raw), encoding="utf-8")
-    assert "EFFECT" in draft(tmp_path / "d.json", "own", None)
+    assert "EFFECT" in draft(tmp_path / "d.json", "own", None).text

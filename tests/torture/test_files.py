@@ -49,7 +49,7 @@ def test_what_is_read_is_what_was_meant(folder):
     form = read_mapping(folder / "m.toml")
     assert campaign_of(read([folder / "right.csv"], form, None, folder / "m.toml"), form, None, [folder / "right.csv"], None)[0].tests
     (folder / "d.json").write_bytes(diagnosis())
-    assert "EFFECT" in draft(folder / "d.json", "own", None)
+    assert "EFFECT" in draft(folder / "d.json", "own", None).text
     assert read_answer(folder / "d.json").best == ("bond_softening",)
 
 
