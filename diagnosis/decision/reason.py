@@ -9,12 +9,14 @@ from thermospindle.diagnosis.decision.explanations import Names, beyond_limits, 
 from thermospindle.diagnosis.decision.loss import NEGLIGIBLE, in_all
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.model import CampaignModel
+from thermospindle.diagnosis.forward.nuisance import Resonance
 from thermospindle.diagnosis.inference.hypothesis import LITTLE, STRAIN, Hypothesis
 from thermospindle.diagnosis.inference.remainder import ALIKE, Overlap
-from thermospindle.diagnosis.inference.resonance import shown
+from thermospindle.diagnosis.inference.resonance import moving, shown
 from thermospindle.diagnosis.inference.search import Search
 
 UNTOLD = "nothing tried"  # what explains data that are missed grossly
+MOVING = "a light resonance"  # whose frequency changes with temperature
 LEFT = "what is left"  # that changes, and tells of something else
 OFF, NAMED = 2.0, 4  # stated standard deviations from which a tolerance is said to be off, and how many of these are named
 NUMERICS = (1e-4, 0.01)  # drift of frequencies and of damping that two honest programs may differ by
@@ -36,6 +38,9 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
             of = f" of {np.sqrt(chi2 / n):.1f}" if left.mechanisms else ""
             apart = ", and not the same in every test" if len(found.model.tests) > 1 else ""
             place = f"the best leaves {np.sqrt(left.chi2 / left.count):.1f} standard errors{of}{apart}"
+        elif free and free[0].names == (MOVING,):
+            moves = [f"a light resonance that the drawing lacks would have to move {_moves(found.model, r)}" for r in moving(found.model, found.base)]
+            place = " and ".join(moves)
         elif free and free[0].hypothesis.mechanisms:
             forms = [f"what {m.name} does" if m.beyond else m.name for m in free[0].hypothesis.mechanisms]
             beyond = ", by sizes that it cannot have" if any(m.beyond for m in free[0].hypothesis.mechanisms) else ""
@@ -98,11 +103,20 @@ def of_resonances(model: CampaignModel, best: Hypothesis) -> str:
     if not resonances:
         return ""
     highest = max(float(d.frequency.max()) for d in model.tests)
+    moves = moving(model, best)
     told = ", ".join(
-        f"{r.frequency:.0f} Hz ({f'damping ratio {r.damping:.2g}' if r.frequency <= highest else 'beyond the band'})" for r in resonances
+        f"{r.frequency:.0f} Hz ({f'damping ratio {r.damping:.2g}' if r.frequency <= highest else 'beyond the band'}{f', moving {_moves(model, r)}' if r in moves else ''})"
+        for r in resonances
     )
     one = "a light resonance" if len(resonances) == 1 else "light resonances"
     return f" Taken into account: {one} at {told} that the drawing lacks and every test shows, of a table, a fixture or a cable."
+
+
+def _moves(model: CampaignModel, r: Resonance) -> str:
+    """From where to where the frequency of a light resonance moves over the tests."""
+    rows = sorted((d.condition.temperature, r.frequency_at(model.far(t))) for t, d in enumerate(model.tests))
+    (cold, first), (warm, last) = rows[0], rows[-1]
+    return f"from {first:.0f} Hz at {cold:g} C to {last:.0f} Hz at {warm:g} C"
 
 
 def of_tolerances(model: CampaignModel, best: Hypothesis, explained: bool = True) -> str:

@@ -19,11 +19,12 @@ from thermospindle.diagnosis.decision.explanations import (
     with_unknown,
 )
 from thermospindle.diagnosis.decision.loss import MOSTLY, least_loss, mostly_named
-from thermospindle.diagnosis.decision.reason import LEFT, NUMERICS, UNTOLD
+from thermospindle.diagnosis.decision.reason import LEFT, MOVING, NUMERICS, UNTOLD
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.inference.evidence import left_out
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.remainder import ALIKE, Overlap, overlap
+from thermospindle.diagnosis.inference.resonance import moving
 from thermospindle.diagnosis.inference.search import Search
 
 GROSS = 25.0  # chi2 a number, five times the errors, from which nothing has explained the data whatever else explains them no better
@@ -77,12 +78,15 @@ def decide(found: Search) -> Verdict:
 def _unheld(
     found: Search, best: Hypothesis, same: Overlap, candidates: tuple[Candidate, ...], free: tuple[Candidate, ...], none: float
 ) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...], float]:
-    """What is only the best of what was tried, with its probability moved to the unknown: nothing missing, where modes drift by more than two honest
+    """What is only the best of what was tried, with its probability moved to the unknown: nothing missing, where a light resonance moves with temperature, modes drift by more than two honest
     programs differ by, the data are missed grossly, or much is left that is not alike in all tests; effects, where they leave most of what changes; and drifts that
     miss the data grossly."""
     alike = overlap(found.model, found.base.fit)
     kept = changing(found.base, alike), changing(best, same)
     gross = found.base.evidence.chi2 > GROSS * found.base.fit.count
+    if moving(found.model, found.base):
+        free = (*free, Candidate(found.base, (MOVING,), True, 0.0, none))
+        none = 0.0
     by_chance = SURE * np.sqrt(2 / found.base.fit.count)  # standard deviations of chi2 a number
     changes = len(found.model.tests) > 1 and alike.tests < ALIKE and kept[0] > max(MUCH, by_chance)
     if _adrift(found.base) or gross or changes:

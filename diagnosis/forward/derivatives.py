@@ -30,7 +30,7 @@ def nuisance_jacobian(model: CampaignModel, t: int, x: Array, effects: Applied, 
     own, channel = model.gains[t]
     discrepancies = model.discrepancies[t]
     record = [] if model.record is None else [model.record]
-    lights = model.lights(linear.matrices.dofs, x)
+    lights = model.lights(t, linear.matrices.dofs, x)
     numbers = np.concatenate([rates.numbers[t], *[row[0] for row in discrepancies], own, np.array(record, int), *[n for _, n in lights]])
     n_resp, n_ref, lines = response.value.shape
     weight = np.sqrt(2) / data.sd

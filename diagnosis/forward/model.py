@@ -246,21 +246,24 @@ class CampaignModel:
 
     def _response(self, t: int, x: Array, linear: Linear, data: LineData) -> Response:
         cut = 0.0 if self.record is None else float(x[self.record])
-        return Response(linear, data, self._gain(t, x), cut, [light for light, _ in self.lights(linear.matrices.dofs, x)])
+        return Response(linear, data, self._gain(t, x), cut, [light for light, _ in self.lights(t, linear.matrices.dofs, x)])
 
-    def lights(self, dofs: Sequence[tuple[str, str]], x: Array) -> list[tuple[Light, Integers]]:
-        """The light resonances at nuisance values, over `dofs`, and the numbers of the parameters of each."""
+    def lights(self, t: int, dofs: Sequence[tuple[str, str]], x: Array) -> list[tuple[Light, Integers]]:
+        """The light resonances of test `t` at nuisance values, over `dofs`, and the numbers of the parameters of each."""
         found = []
-        first = len(self.parameters) - sum(len(r.shares) + 2 for r in self.resonances)
+        first = len(self.parameters) - sum(len(r.nuisances) for r in self.resonances)
         for r in self.resonances:
-            numbers = np.arange(first, first + len(r.shares) + 2)
+            numbers = np.arange(first, first + len(r.nuisances))
             first += len(numbers)
-            found.append((self._light(dofs, r.at(x[numbers] * np.array([self.parameters[i].sd for i in numbers]))), numbers))
+            there = r.at(x[numbers] * np.array([self.parameters[i].sd for i in numbers]))
+            columns = self.reference.over(dofs)[:, : len(r.shares)]
+            far = self.far(t)
+            found.append((Light(columns, np.array(there.shares), 2 * np.pi * there.frequency_at(far), there.damping, far), numbers))
         return found
 
-    def _light(self, dofs: Sequence[tuple[str, str]], resonance: Resonance) -> Light:
-        columns = self.reference.over(dofs)[:, : len(resonance.shares)]
-        return Light(columns, np.array(resonance.shares), 2 * np.pi * resonance.frequency, resonance.damping)
+    def far(self, t: int) -> float:
+        """How far test `t` is from the reference temperature, in `RANGE_K`."""
+        return (self.tests[t].condition.temperature - self.spindle.reference_temperature) / kinds_of.RANGE_K
 
     def with_resonance(self, resonance: Resonance) -> CampaignModel:
         """With one light resonance more, whose parameters follow all others."""

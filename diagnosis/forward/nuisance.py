@@ -43,6 +43,8 @@ ACTION = "action of effects"  # no nuisance's kind, but a size that is learned: 
 DRIFT_SD = 1e-3  # of one channel's gain from test to test, at the reference width
 SHARE_SD = 0.03  # root of the mass that a mode carries along in a light resonance, over its own modal mass
 RESONANCE_SD = (0.02, 0.5)  # relative, of its frequency and of its damping ratio, about where it was seen
+DRIFTS_SD = {False: 0.005, True: 0.02}  # of what ln frequency changes by with temperature: of a table, and of one that was seen to move
+RANGE_K = 40.0  # over which that is told
 LEAST_BUILD = -0.9  # relative, of what is built
 COINCIDE = 0.01  # of a frequency, within which modes are a pair or a cluster
 RIGID = 1e-6  # of the highest frequency, below which a mode is a rigid body's: rounding leaves some 1e-8 of it, and a beam's highest is in MHz
@@ -118,25 +120,33 @@ class ReferenceModes:
 
 @dataclass(frozen=True)
 class Resonance:
-    """A light resonance as it was seen, about which its parameters move: frequency in Hz, damping ratio, and the roots of the masses that the first
-    reference modes carry along in it, over their modal masses."""
+    """A light resonance as it was seen, about which its parameters move: frequency in Hz at the reference temperature, damping ratio, and the roots of the masses that the first
+    reference modes carry along in it, over their modal masses; `drift` is what ln frequency changes by over `RANGE_K`, in a straight line and with the square."""
 
     frequency: float
     damping: float
     shares: tuple[float, ...]
+    drift: tuple[float, float] = (0.0, 0.0)
 
     @property
     def nuisances(self) -> tuple[Nuisance, ...]:
-        """The share of each mode, its frequency and its damping."""
+        """The share of each mode, its frequency, its damping and how its frequency drifts with temperature."""
         of = f"of the light resonance near {self.frequency:.0f} Hz"
         shares = [Nuisance(RESONANCE, f"share in mode {i + 1} {of}", SHARE_SD) for i in range(len(self.shares))]
-        shape = zip((f"frequency {of}", f"damping {of}"), RESONANCE_SD, strict=True)
+        drifts = (DRIFTS_SD[any(self.drift)],) * 2
+        shape = zip((f"frequency {of}", f"damping {of}", f"drift {of}", f"bent drift {of}"), (*RESONANCE_SD, *drifts), strict=True)
         return (*shares, *(Nuisance(RESONANCE, name, sd) for name, sd in shape))
 
     def at(self, values: Array) -> Resonance:
-        """At `values` (k + 2,) of its parameters, in their units."""
-        shares = tuple(float(a + v) for a, v in zip(self.shares, values[:-2], strict=True))
-        return Resonance(self.frequency * float(np.exp(values[-2])), self.damping * float(np.exp(values[-1])), shares)
+        """At `values` (k + 4,) of its parameters, in their units."""
+        k = len(self.shares)
+        shares = tuple(float(a + v) for a, v in zip(self.shares, values[:k], strict=True))
+        frequency, damping = (float(v) for v in np.array([self.frequency, self.damping]) * np.exp(values[k : k + 2]))
+        return Resonance(frequency, damping, shares, (self.drift[0] + float(values[k + 2]), self.drift[1] + float(values[k + 3])))
+
+    def frequency_at(self, far: float) -> float:
+        """Its frequency (Hz) so `far` from the reference temperature, in `RANGE_K`."""
+        return self.frequency * float(np.exp(self.drift[0] * far + self.drift[1] * far**2))
 
 
 def reference_modes(linear: Matrices, seen: float, highest: float, most: int) -> ReferenceModes:

@@ -25,12 +25,13 @@ TOGETHER = 8  # derivatives at a time
 @dataclass(frozen=True, eq=False)
 class Light:
     """A light resonance: a mass of one on a spring on the generalised force b = `columns` (n, k) `shares` (k,), which adds s^2 m(s) b b^T to the dynamic
-    stiffness with m = (2 z w s + w^2) / (s^2 + 2 z w s + w^2) (Den Hartog, *Mechanical Vibrations*, 1956, 3.2)."""
+    stiffness with m = (2 z w s + w^2) / (s^2 + 2 z w s + w^2) (Den Hartog, *Mechanical Vibrations*, 1956, 3.2); its frequency drifts with what is `far`."""
 
     columns: Array
     shares: Array
     omega: float
     damping: float
+    far: float = 0.0
 
     def felt(self, s: ComplexArray) -> ComplexArray:
         """What is felt of the mass, (3, L): s^2 m(s), and its derivatives by ln w and ln z."""
@@ -150,13 +151,14 @@ class Response:
         return columns if self._basis is None else self._basis.T @ columns
 
     def by_light(self, light: Light) -> ComplexArray:
-        """Derivatives (k + 2, n_resp, n_ref, L) by the shares of a light resonance, its ln frequency and its ln damping."""
+        """Derivatives (k + 4, n_resp, n_ref, L) by the shares of a light resonance, its ln frequency, its ln damping and how ln frequency drifts."""
         left, right = self._modal(light.columns)
         felt = -light.felt(self.s)
         own_left, own_right = np.tensordot(light.shares, left, 1), np.tensordot(light.shares, right, 1)
         shares = felt[0] * (left[:, :, None] * own_right[None, None] + own_left[None, :, None] * right[:, None])
         whole = own_left[:, None] * own_right[None]
-        return np.concatenate([shares, (felt[1:, None, None] * whole)])
+        by_frequency, by_damping = felt[1:, None, None] * whole
+        return np.concatenate([shares, [by_frequency, by_damping, light.far * by_frequency, light.far**2 * by_frequency]])
 
     def by_products_of_shares(self, columns: Array, rows: Integers, others: Integers) -> ComplexArray:
         """Derivatives (k, n_resp, n_ref, L) by products of two shares each of light resonances on `columns` (n, m), for one that is felt as a mass of -1 / s^2."""

@@ -26,6 +26,7 @@ from thermospindle.model.types import Array, ComplexArray
 LAGS, SMALL = 12, 0.05  # lines over which residuals are compared, and the correlation that chance makes
 LOOKED = 0.2  # correlation from which a light resonance is looked for
 ALIKE = 0.5  # correlation of what is left in one test with what is left in another, from which it is called constant
+DRIFTS = tuple(0.02 * k for k in range(-12, 13))  # of ln frequency over `RANGE_K`, of a resonance that moves with temperature
 SPACING, DAMPING = 0.02, 0.02  # of neighbouring frequencies (ln) at which a light resonance is looked for, and its damping ratio there
 
 
@@ -76,8 +77,9 @@ def between_tests(left: Sequence[tuple[Array, Array]]) -> float:
     return float(np.mean(found)) if found else 0.0
 
 
-def light_resonance(model: CampaignModel, about: Fit, learned: Learned) -> tuple[Resonance, float] | None:
-    """The light resonance that would explain most beside the model `about`, and the ln evidence that it promises; None where no test has FRF lines.
+def light_resonance(model: CampaignModel, about: Fit, learned: Learned, drifts: Sequence[float] = (0.0,)) -> tuple[Resonance, float] | None:
+    """The light resonance that would explain most beside the model `about`, its frequency moving by one of `drifts`, and the ln evidence that it promises; None where no
+    test has FRF lines.
 
     To first order the products of its shares count, a symmetric matrix; its shares are the first eigenvector's, those of modes beyond the band none.
     """
@@ -90,31 +92,37 @@ def light_resonance(model: CampaignModel, about: Fit, learned: Learned) -> tuple
     gradient = problem.precision @ about.point + at.gradient
     inverse = np.asarray(np.linalg.inv(problem.precision + at.information), float)
     low, high = min(float(f.min()) for f in lines), max(float(f.max()) for f in lines)
-    grid = np.geomspace(low, high, int(np.log(high / low) / SPACING) + 1)
+    with_lines = [(t, d) for t, d in enumerate(model.tests) if isinstance(d, LineData)]
+    shifts = np.array([[round(drift * model.far(t) / SPACING) for t, _ in with_lines] for drift in drifts])
+    beyond, count = int(np.abs(shifts).max()), int(np.log(high / low) / SPACING) + 1
+    grid = np.exp(np.log(low) + SPACING * np.arange(-beyond, count + beyond))
     seen = model.reference.seen
     lights = [Light(np.zeros((0, 0)), np.zeros(0), 2 * np.pi * float(f), DAMPING) for f in grid]
     k = seen * (seen + 1) // 2
-    cross, square, slope = np.zeros((len(grid), len(inverse), k)), np.zeros((len(grid), k, k)), np.zeros((len(grid), k))
-    for t, d in enumerate(model.tests):
-        if isinstance(d, LineData):
-            residual, derivatives, numbers = at.rows[t]
-            moved, s = by_products_of_shares(model, t, x, effects[t], seen)
-            felt = np.array([-SHARE_SD**2 * light.felt(s)[0] for light in lights])
-            of_cross, of_square, of_slope = by_frequency(moved, felt, residual, derivatives)
-            cross[:, numbers] += of_cross
-            square += of_square
-            slope += of_slope
+    own = []
+    for t, _ in with_lines:
+        residual, derivatives, numbers = at.rows[t]
+        moved, s = by_products_of_shares(model, t, x, effects[t], seen)
+        felt = np.array([-SHARE_SD**2 * light.felt(s)[0] for light in lights])
+        own.append((numbers, *by_frequency(moved, felt, residual, derivatives)))
     rows = []
-    for frequency, of_cross, of_square, of_slope in zip(grid, cross, square, slope, strict=True):
-        products, gain = _promised(of_cross, of_square, of_slope, inverse, gradient, learned.errors)
-        rows.append((gain, float(frequency), SHARE_SD**2 * products))
-    gain, frequency, products = max(rows, key=lambda row: row[0])
+    for drift, shift in zip(drifts, shifts, strict=True):
+        cross, square, slope = np.zeros((count, len(inverse), k)), np.zeros((count, k, k)), np.zeros((count, k))
+        for by, (numbers, of_cross, of_square, of_slope) in zip(shift, own, strict=True):
+            there = slice(beyond + by, beyond + by + count)
+            cross[:, numbers] += of_cross[there]
+            square += of_square[there]
+            slope += of_slope[there]
+        for frequency, of_cross, of_square, of_slope in zip(grid[beyond : beyond + count], cross, square, slope, strict=True):
+            products, gain = _promised(of_cross, of_square, of_slope, inverse, gradient, learned.errors)
+            rows.append((gain, float(frequency), drift, SHARE_SD**2 * products))
+    gain, frequency, drift, products = max(rows, key=lambda row: row[0])
     matrix = np.zeros((seen, seen))
     matrix[np.triu_indices(seen)] = products
     size, vector = np.linalg.eigh(matrix + np.triu(matrix, 1).T)
     shares = np.zeros(len(model.reference.omega))
     shares[:seen] = np.sqrt(max(size[-1], 0.0)) * vector[:, -1]
-    return Resonance(frequency, DAMPING, tuple(shares.tolist())), gain - float(np.log(len(rows)))
+    return Resonance(frequency, DAMPING, tuple(shares.tolist()), (drift, 0.0)), gain - float(np.log(len(rows)))
 
 
 def by_frequency(moved: ComplexArray, felt: ComplexArray, residual: Array, derivatives: Array) -> tuple[Array, Array, Array]:

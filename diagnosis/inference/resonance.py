@@ -1,4 +1,5 @@
-"""The model with a light resonance more, where the data of every test ask for one: of a table, a fixture or a cable that the drawing lacks."""
+"""The model with a light resonance more, where the data of every test ask for one: of a table, a fixture or a cable that the drawing lacks, or of something that
+softens with temperature and whose resonance moves."""
 
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit
 from thermospindle.diagnosis.inference.hypothesis import EARLY, PLENTY, STRAIN, Hypothesis, settled
 from thermospindle.diagnosis.inference.prior import DRIFTING
-from thermospindle.diagnosis.inference.remainder import LOOKED, light_resonance, overlap
+from thermospindle.diagnosis.inference.remainder import DRIFTS, LOOKED, light_resonance, overlap
 from thermospindle.model.parallel import in_parallel
 from thermospindle.model.types import Array
 
@@ -24,16 +25,18 @@ CHANCE = 3.0  # standard deviations of chi2 by chance, of which nothing is said 
 SLIGHT = 0.5  # squares of the errors, of which it cannot be told whether they are alike in all tests
 RESONANT = 0.2  # damping ratio up to which it is a resonance
 FAR = 3.0  # times what a resonance may leave, from which counting its parameters anew will not help
+MOVES, SURELY = 0.01, 5.0  # relative change of its frequency over the tests, and standard errors of it, from which it moves
 CENTRED = 2  # times that a light resonance's parameters are counted anew from where they were fitted
 
 
-def with_resonance(model: CampaignModel, h: Hypothesis, workers: int | None = None) -> tuple[CampaignModel, Hypothesis] | None:
+def with_resonance(model: CampaignModel, h: Hypothesis, workers: int | None = None, moves: bool = False) -> tuple[CampaignModel, Hypothesis] | None:
     """The model with the light resonance that an explanation leaves unexplained in every test, and the explanation fitted in it; None where it
     leaves none, or it clears too little. Where discrepancies stand in for it, no misfit is left, and its evidence tells; without effects not even that where
-    modes still drift beside it, for what changes from test to test is no resonance, and one that is taken for it then stands in the effect's way."""
-    if len(model.resonances) == RESONANCES:
+    modes still drift beside it, for what changes from test to test is no resonance, and one that is taken for it then stands in the effect's way. With `moves` one
+    whose frequency may be another at another temperature."""
+    if len(model.resonances) >= RESONANCES + moves:
         return None
-    resonance = _left_by(model, h)
+    resonance = _left_by(model, h, moves)
     if resonance is not None and h.mechanisms:  # what fitting on would explain is no resonance
         h = settled(model, h)
         resonance = _left_by(model, h)
@@ -67,26 +70,45 @@ def with_resonance(model: CampaignModel, h: Hypothesis, workers: int | None = No
     return (wider, found) if asked(found, PLENTY, clear) else None
 
 
-def _left_by(model: CampaignModel, h: Hypothesis) -> Resonance | None:
-    """The light resonance that an explanation leaves, where it is alike in all tests and promises enough."""
-    if h.excess > SLIGHT and overlap(model, h.fit).tests < LOOKED:
+def _left_by(model: CampaignModel, h: Hypothesis, moves: bool = False) -> Resonance | None:
+    """The light resonance that an explanation leaves, where it is alike in all tests, or `moves`, and promises enough."""
+    if not moves and h.excess > SLIGHT and overlap(model, h.fit).tests < LOOKED:
         return None
-    seen = light_resonance(model.thinned, h.fit, h.evidence.learned)
+    seen = light_resonance(model.thinned, h.fit, h.evidence.learned, DRIFTS if moves else (0.0,))
     return seen[0] if seen is not None and seen[1] >= PLENTY else None
 
 
 def shown(model: CampaignModel, h: Hypothesis) -> list[Resonance]:
     """The light resonances that an explanation needs, as it has them: where their shares in all modes may be nothing, what they were taken for is explained
     otherwise."""
+    return [r for r, _ in _needed(model, h)]
+
+
+def moving(model: CampaignModel, h: Hypothesis) -> list[Resonance]:
+    """Those whose frequency is surely another at another temperature."""
+    far = np.array([model.far(t) for t in range(len(model.tests))])
+    by_drift = np.stack([far, far**2], axis=1)
+    by_drift = by_drift[:, None] - by_drift[None]  # of every two tests
+
+    def moves(r: Resonance, covariance: Array) -> bool:
+        change = by_drift @ np.array(r.drift)
+        sd = np.sqrt(np.einsum("abi,ij,abj->ab", by_drift, covariance, by_drift))
+        return bool(np.any(np.abs(change) > np.maximum(MOVES, SURELY * sd)))
+
+    return [r for r, covariance in _needed(model, h) if moves(r, covariance)]
+
+
+def _needed(model: CampaignModel, h: Hypothesis) -> list[tuple[Resonance, Array]]:
+    """Each with the covariance (2, 2) of its drift."""
     found, at = [], len(model.parameters) - sum(len(r.nuisances) for r in model.resonances)
     for r in model.resonances:
         own = slice(at, at + len(r.nuisances))
         sd = np.array([q.sd for q in r.nuisances])
         seen = r.at(sd * h.evidence.mean[own])
         shares = np.array(seen.shares) / sd[: len(r.shares)]
-        covariance = h.evidence.covariance[own, own][: len(shares), : len(shares)]
-        if shares @ np.linalg.solve(covariance, shares) > 2 * PLENTY:
-            found.append(seen)
+        whole = h.evidence.covariance[own, own]
+        if shares @ np.linalg.solve(whole[: len(shares), : len(shares)], shares) > 2 * PLENTY:
+            found.append((seen, sd[-2:, None] * whole[-2:, -2:] * sd[-2:]))
         at = own.stop
     return found
 

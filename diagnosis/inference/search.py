@@ -45,7 +45,7 @@ def search(
     workers: int | None = None,
 ) -> Search:
     """The evidence of every explanation. A light resonance becomes part of the model where the data show it without effects, or beside the best single
-    one."""
+    one; and one that moves with temperature where no effect alone explains them, and it explains more."""
     with meanwhile(partial(with_own_laws, named, model.spindle, [d.condition for d in model.tests]), workers) as own_laws:
         none = _without_effects(model)
         if (hit := hit_found(model, none.fit.nuisance, 2 * PLENTY * none.evidence.learned.errors**2)) is not None:
@@ -65,6 +65,11 @@ def search(
             tried = fit_singles(model, none, every, lambda done: None, workers)  # steps that were counted already
         else:
             tried = carried_over(model, none, tried, before, workers)
+    elif best.evidence.learned.errors > STRAIN:
+        moves = with_resonance(model, none, workers, moves=True)
+        if moves is not None and moves[1].evidence.ln > best.evidence.ln + PLENTY:
+            model, none = moves
+            tried = fit_singles(model, none, every, lambda done: None, workers)
     tried = replace(tried, singles=better([*tried.singles, *by_own_laws(model, none, tried, every, workers)]))
     singles = tried.singles
     pairs = joined(model, none, singles, every, tried.most, tried.expected, workers)

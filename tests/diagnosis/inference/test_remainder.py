@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -17,7 +18,7 @@ from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
 from thermospindle.diagnosis.inference.remainder import by_frequency
-from thermospindle.diagnosis.inference.resonance import shown, with_resonance
+from thermospindle.diagnosis.inference.resonance import moving, shown, with_resonance
 from thermospindle.diagnosis.verdict import diagnose
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.machine import Condition
@@ -109,11 +110,11 @@ def test_sums_over_channels_are_those_of_whole_columns():
 def test_derivatives_by_its_parameters(model):
     """Against central differences, beside tolerances that are off."""
     random = np.random.default_rng(2)
-    wider = model.with_resonance(Resonance(AT, RATIO, tuple(0.05 * random.standard_normal(len(model.reference.omega)))))
+    wider = model.with_resonance(Resonance(AT, RATIO, tuple(0.05 * random.standard_normal(len(model.reference.omega))), (0.05, -0.02)))
     x = 0.1 * random.standard_normal(len(wider.parameters))
     x[[i for i, q in enumerate(wider.parameters) if q.kind == "end of records"]] = 0.0
     own = [i for i, q in enumerate(wider.parameters) if q.kind == RESONANCE]
-    assert len(own) == len(model.reference.omega) + 2
+    assert len(own) == len(model.reference.omega) + 4
     rates = rates_of(wider, x, [[]] * 3)
     _, jacobian, numbers = nuisance_jacobian(wider, 1, x, [], rates)
     for i in own:
@@ -155,6 +156,42 @@ def test_the_verdict_is_of_what_is_hidden_beside_it(spindle, hidden, word):
     assert "Taken into account: a light resonance" in found.verdict.reason
 
 
+def rubber(cold: float, warm: float) -> Effect:
+    """An oscillator on the base whose frequency falls with temperature, the more the warmer."""
+    size = Parameter("mass", "kg", 0.0, MASS, MASS, (0.0, 1.0), "", "")
+
+    def chain(spindle, condition, values, chain):
+        at = cold * (warm / cold) ** (max((condition.temperature - 20.0) / 40.0, 0.0) ** 1.2)
+        return on_spring(chain, spindle.structure.bodies[0].name, "rubber", values["mass"], at, 0.03, "z")
+
+    return Effect("rubber", "", "", (size,), "", (), "", chain=chain)
+
+
+def test_one_that_moves_with_temperature_is_found(spindle):
+    """1.2 g on rubber, of another's campaign: without it the best was three elements that drift, and a resonance that nobody has."""
+    conditions = [Condition(t) for t in (20.0, 30.0, 45.0, 60.0)]
+    made = virtual_campaign(spindle, conditions, 5, [(rubber(1645.0, 1445.0), {"mass": 0.004})], drawn(spindle, 4, 5), responses=(1, 3, 6), frequency=FREQUENCY)
+    model = model_of(spindle, made)
+    first = fit(model)
+    none = settled(model, Hypothesis(first, evidence(model, first)))
+    found = with_resonance(model, none, moves=True)
+    assert found is not None
+    wider, h = found
+    (moves,) = moving(wider, h)
+    assert [moves.frequency_at((t - 20.0) / 40.0) for t in (20.0, 60.0)] == pytest.approx([1645.0, 1445.0], rel=3e-3)
+    assert h.fit.chi2 / h.fit.count == pytest.approx(1.0, abs=0.15)
+    assert h.evidence.ln > none.evidence.ln + 1000
+
+
+@pytest.mark.slow
+def test_the_verdict_of_one_that_moves_is_that_it_is_unknown(spindle):
+    conditions = [*(Condition(t) for t in (20.0, 30.0, 45.0, 60.0)), *(Condition(t, 7200 * RPM) for t in (20.0, 60.0))]
+    made = virtual_campaign(spindle, conditions, 5, [(rubber(1645.0, 1445.0), {"mass": 0.0012})], drawn(spindle, 6, 5), frequency=FREQUENCY)
+    found = diagnose(spindle, made)
+    assert found.verdict.word == "unexplained"
+    assert re.search(r"a light resonance that the drawing lacks would have to move from 16[45]\d Hz at 20 C to 14[45]\d Hz at 60 C", found.verdict.reason)
+
+
 @pytest.mark.parametrize("settles", [True, False])
 def test_what_fitting_on_would_explain_is_no_resonance(monkeypatch, settles):
     """A grinding spindle's soft bond, fitted but not settled, left what looked like a resonance of its table at 876 Hz; settled it had 20 in ln evidence more than beside one."""
@@ -163,7 +200,7 @@ def test_what_fitting_on_would_explain_is_no_resonance(monkeypatch, settles):
     early, late = (SimpleNamespace(mechanisms=("some",), fit=SimpleNamespace(point=np.zeros(1), count=100), evidence=own, excess=0.0) for _ in range(2))
     looked, fits = [], []
 
-    def seen(model, fit, learned):
+    def seen(model, fit, learned, drifts):
         looked.append(fit)
         return None if fit is late.fit and settles else (SimpleNamespace(nuisances=()), 50.0)
 
