@@ -79,21 +79,22 @@ def _unheld(
     found: Search, best: Hypothesis, same: Overlap, candidates: tuple[Candidate, ...], free: tuple[Candidate, ...], none: float
 ) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...], float]:
     """What is only the best of what was tried, with its probability moved to the unknown: nothing missing, where a light resonance moves with temperature, modes drift by more than two honest
-    programs differ by, the data are missed grossly, or much is left that is not alike in all tests; effects, where they leave most of what changes; and drifts that
+    programs differ by, the data are missed grossly, or much is left that is not alike in all tests; effects, where they leave much of what changes, or miss it grossly; and drifts that
     miss the data grossly."""
     alike = overlap(found.model, found.base.fit)
     kept = changing(found.base, alike), changing(best, same)
     gross = found.base.evidence.chi2 > GROSS * found.base.fit.count
     if moving(found.model, found.base):
-        free = (*free, Candidate(found.base, (MOVING,), True, 0.0, none))
-        none = 0.0
+        little = [c for c in candidates if c.delta_evidence < MOSTLY * (c.delta_evidence + found.by_moving)]
+        free = (*free, Candidate(found.base, (MOVING,), True, 0.0, none + sum(c.probability for c in little)))
+        candidates, none = tuple(replace(c, probability=0.0) if c in little else c for c in candidates), 0.0
     by_chance = SURE * np.sqrt(2 / found.base.fit.count)  # standard deviations of chi2 a number
     changes = len(found.model.tests) > 1 and alike.tests < ALIKE and kept[0] > max(MUCH, by_chance)
     if _adrift(found.base) or gross or changes:
         name = UNTOLD if gross else LEFT if changes else "every mode"
         free = (*free, Candidate(found.base, (name,), True, 0.0, none))
         none = 0.0
-    if kept[1] > MUCH and kept[1] > (1 - MOSTLY) * kept[0]:
+    if kept[1] > MUCH and (kept[1] > (1 - MOSTLY) * kept[0] or kept[1] > GROSS):
         free = (*free, Candidate(found.base, (LEFT,), True, 0.0, sum(c.probability for c in candidates)))
         candidates = tuple(replace(c, probability=0.0) for c in candidates)
     if best.mechanisms and all(m.free for m in best.mechanisms) and best.fit.chi2 > GROSS * best.fit.count:  # what drifts in it does not explain the data either

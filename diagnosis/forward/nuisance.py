@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import eigh
 
-from thermospindle.model.built.tolerance import Toleranced
+from thermospindle.model.built.tolerance import LEAST, MOST, Toleranced
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import Matrices
 from thermospindle.model.structure import MOVES
@@ -45,7 +45,6 @@ SHARE_SD = 0.03  # root of the mass that a mode carries along in a light resonan
 RESONANCE_SD = (0.02, 0.5)  # relative, of its frequency and of its damping ratio, about where it was seen
 DRIFTS_SD = {False: 0.005, True: 0.02}  # of what ln frequency changes by with temperature: of a table, and of one that was seen to move
 RANGE_K = 40.0  # over which that is told
-LEAST_BUILD = -0.9  # relative, of what is built
 COINCIDE = 0.01  # of a frequency, within which modes are a pair or a cluster
 RIGID = 1e-6  # of the highest frequency, below which a mode is a rigid body's: rounding leaves some 1e-8 of it, and a beam's highest is in MHz
 EXPANSION_SD = {"radial motion of the rings": 3e-3, "axial motion of the rings": 3e-3, "growth of the grooves": 0.03}
@@ -70,7 +69,7 @@ class Nuisance:
 
     def at(self, x: float) -> float:
         """Its value at `x` prior standard deviations; of a mass or a stiffness a tenth is left at least."""
-        return max(float(x) * self.sd, LEAST_BUILD) if self.kind == BUILD else float(x) * self.sd
+        return float(np.clip(float(x) * self.sd, LEAST, MOST)) if self.kind == BUILD else float(x) * self.sd
 
 
 @dataclass(frozen=True)

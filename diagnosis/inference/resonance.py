@@ -86,6 +86,9 @@ def shown(model: CampaignModel, h: Hypothesis) -> list[Resonance]:
 
 def moving(model: CampaignModel, h: Hypothesis) -> list[Resonance]:
     """Those whose frequency is surely another at another temperature."""
+    needed = _needed(model, h)
+    if not needed:
+        return []
     far = np.array([model.far(t) for t in range(len(model.tests))])
     by_drift = np.stack([far, far**2], axis=1)
     by_drift = by_drift[:, None] - by_drift[None]  # of every two tests
@@ -95,7 +98,7 @@ def moving(model: CampaignModel, h: Hypothesis) -> list[Resonance]:
         sd = np.sqrt(np.einsum("abi,ij,abj->ab", by_drift, covariance, by_drift))
         return bool(np.any(np.abs(change) > np.maximum(MOVES, SURELY * sd)))
 
-    return [r for r, covariance in _needed(model, h) if moves(r, covariance)]
+    return [r for r, covariance in needed if moves(r, covariance)]
 
 
 def _needed(model: CampaignModel, h: Hypothesis) -> list[tuple[Resonance, Array]]:

@@ -99,7 +99,8 @@ def planned(model: CampaignModel) -> list[Condition]:
     tested = [d.condition for d in model.tests]
     (how, _), = Counter((c.level, c.soak_time) for c in tested).most_common(1)
     highest = max(model.spindle.nominal_speed, *(abs(c.speed) for c in tested))
-    plans = [Condition(t, s * highest, *how) for t, s in product(TEMPERATURES, SPEEDS)]
+    turns = any(b.turns for b in model.spindle.structure.bodies)
+    plans = [Condition(t, s * highest, *how) for t, s in product(TEMPERATURES, SPEEDS if turns else SPEEDS[:1])]
     return [plan for plan in plans if not any(same(plan, c) for c in tested)]
 
 

@@ -15,6 +15,9 @@ from thermospindle.model.machine import Spindle
 from thermospindle.model.shaft import Shaft
 from thermospindle.model.structure import MOVES, Body, Joint
 
+LEAST, MOST = -0.9, 10.0
+"""Relative deviations that a built spindle can have."""
+
 
 @dataclass(frozen=True)
 class Toleranced:

@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 
 from thermospindle.model import machine as m
 from thermospindle.model.bearing.definitions import SENSE
+from thermospindle.model.built.tolerance import LEAST, MOST
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.formats import CURRENT, SCENE
 from thermospindle.model.scene.bearings import BallRow, Bearing, BearingPair, BearingSet, Mounted, RollerRow, check_sets
@@ -72,7 +73,7 @@ class Effect(Table):
 
 
 class Build(Table):
-    deviations: dict[str, Annotated[float, Field(gt=-0.5, lt=1.0)]] = Field(min_length=1)
+    deviations: dict[str, Annotated[float, Field(ge=LEAST, le=MOST)]] = Field(min_length=1)
     tests: list[str] = Field(default_factory=list)
 
     def build(self) -> m.Build:

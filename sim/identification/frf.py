@@ -18,6 +18,8 @@ from thermospindle.sim.identification.running_lines import RunningLines, running
 
 TO_POWER = {"receptance": 1j, "mobility": 1.0, "accelerance": -1j}
 """What an FRF may be, with the phase that turns it to mobility."""
+TO_SIZE = {"receptance": 1, "mobility": 0, "accelerance": -1}
+"""With the power of the angular frequency that does so."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,12 +128,14 @@ class Limits:
     coherence: float = 0.8  # smallest median, weighted by the size of the FRF
     reciprocity: float = 0.15  # largest |H_ij - H_ji| over the mean |H|, root mean squares over the lines
     negative_power: float = 0.01  # largest share of a driving point's strong lines that give power back
+    falling: float = 0.2  # largest share of a driving point's lines between resonances where its susceptance falls
 
 
 LIMITS = Limits()
 FLOOR = 1e-3  # of the largest FRF of a test: its noise where no standard error is told, five times the 0.02 % of a good vibrometer
 FINER = 4  # lines for one of a sweep with uneven steps, where the direction of time is looked at
 ENOUGH = 16  # lines, from which their scatter tells noise
+REACTIVE, STEP = 0.3, 0.05  # of its imaginary part a mobility's real part between resonances, and its change from line to line
 HUGE = 1e100  # in any unit; squares of what is larger overflow
 SILENT = 0.02  # of the strongest answer to a hammer; below it symmetry forbids an answer, and noise alone has no coherence
 DRIFT = 1e-3  # of the same, below which what a record holds may be the drift of its sensor, or rounding: neither knows when the blow was
@@ -159,7 +163,9 @@ def check_frf(where: str | Path, frf: Frf, speed: float, limits: Limits = LIMITS
             if share > DRIFT:
                 _check_direction_of_time(key, frf.frequency, quiet.value[i, j])
             if response == reference:
-                _check_driving_point(key, frf.frequency, quiet.value[i, j] * TO_POWER[frf.quantity], _noise(frf, i, j), limits)
+                mobility, noise = quiet.value[i, j] * TO_POWER[frf.quantity], _noise(frf, i, j)
+                _check_driving_point(key, frf.frequency, mobility, noise, limits)
+                _check_susceptance(key, frf.frequency, mobility, noise, TO_SIZE[frf.quantity], limits)
     if speed == 0:
         _check_reciprocity(where, frf, limits)
 
@@ -233,6 +239,27 @@ def _check_driving_point(key: str, frequency: np.ndarray, mobility: np.ndarray, 
         raise BadInput(
             f"{key}: the driving point's mobility has a negative real part on {share:.0%} of its strong lines, the strongest at "
             f"{peak:g} Hz; allowed is {limits.negative_power:.0%} (a wrong sign, or another point than the hammer's)"
+        )
+
+
+def _check_susceptance(key: str, frequency: np.ndarray, turned: np.ndarray, noise: np.ndarray, power: int, limits: Limits) -> None:
+    """Away from its resonances the imaginary part of a passive structure's mobility, where it is driven, rises with frequency (Foster, *Bell Syst. Tech. J.* 3 (1924)
+    259): an antiresonance stands between every two resonances. That tells where damping is so light that no line shows power.
+
+    `turned` (n,) has a mobility's phase and is one times w^`power`. Steps of a twentieth count, beyond five of their errors, on lines that are reactive and of one sign.
+    """
+    scale = frequency ** float(power)
+    mobility, error = turned * scale, noise * scale
+    own = mobility.imag
+    told = (np.abs(mobility.real) < REACTIVE * np.abs(own)) & (np.abs(mobility) > 10 * error)
+    step = np.diff(own)
+    counts = told[1:] & told[:-1] & (own[1:] * own[:-1] > 0) & (np.abs(step) > STEP * np.maximum(np.abs(own[1:]), np.abs(own[:-1])))
+    counts &= np.abs(step) > 5 * np.hypot(error[1:], error[:-1])
+    share = (counts & (step < 0)).sum() / max(counts.sum(), 1)
+    if counts.sum() >= ENOUGH // 2 and share > limits.falling:
+        raise BadInput(
+            f"{key}: between resonances the imaginary part of the driving point's mobility falls on {share:.0%} of the lines, as without antiresonances it does; "
+            f"allowed is {limits.falling:.0%}: this is the answer of another point than the hammer's"
         )
 
 

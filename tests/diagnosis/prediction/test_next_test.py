@@ -112,7 +112,11 @@ def test_what_is_only_left_predicts_nothing(one_test):
 def test_tests_are_planned_as_the_campaign_was_made():
     """Hit and soaked as most tests were: predictions at no force for ever in the chamber were judged by tests at 50 N after a minute."""
     tests = [SimpleNamespace(condition=Condition(t, 0.0, *how)) for t, how in ((20.0, (50.0, 60.0)), (40.0, (50.0, 60.0)), (60.0, ()))]
-    plans = planned(SimpleNamespace(tests=tests, spindle=SimpleNamespace(nominal_speed=700.0)))
+    turning, standing = (
+        SimpleNamespace(tests=tests, spindle=SimpleNamespace(nominal_speed=700.0, structure=SimpleNamespace(bodies=[SimpleNamespace(turns=turns)]))) for turns in (True, False)
+    )
+    assert {plan.speed for plan in planned(standing)} == {0.0}
+    plans = planned(turning)
     assert {(p.level, p.soak_time) for p in plans} == {(50.0, 60.0)}
     assert Condition(20.0, 0.0, 50.0, 60.0) not in plans
     assert Condition(60.0, 0.0, 50.0, 60.0) in plans

@@ -119,6 +119,18 @@ def test_reading_refuses(folder: Path, change: Callable[[Path], None], words: st
     assert "\n" not in str(refusal.value)
 
 
+def test_another_point_than_the_hammers_is_known_where_no_line_shows_power() -> None:
+    """A beam of 0.05 Hz wide modes on lines of 1 Hz, by its own measurement: told for the driving point, the answer of another passed, and its reader sought 35 minutes."""
+    f, at = np.arange(2.0, 1000.0), np.array([63.4, 175.4, 344.6, 570.5, 851.5])
+    modes = 1 / (at[:, None] ** 2 - f**2 + 2j * 5e-5 * at[:, None] * f)
+    driven, signs = np.array([1.0, 0.8, 0.9, 0.7, 0.8]), np.array([1.0, -1.0, 1.0, -1.0, 1.0])
+    for quantity, power in (("accelerance", 2), ("mobility", 1), ("receptance", 0)):
+        here, there = (((weights @ modes) * (2j * np.pi * f) ** power)[None, None] for weights in (driven, signs * driven))
+        check_frf("file", Frf(f, here, (1,), (1,), quantity), 0.0)
+        with pytest.raises(BadInput, match=r"H\(1,1\): between resonances .* falls on \d+% of the lines.*another point than the hammer's"):
+            check_frf("file", Frf(f, there, (1,), (1,), quantity), 0.0)
+
+
 def test_missing_folder_is_named(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="nowhere: no campaign there"):
         read_campaign(tmp_path / "nowhere")

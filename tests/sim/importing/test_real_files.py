@@ -104,14 +104,14 @@ def _only(folder, head):
 
 
 def test_a_lone_column_of_complex_numbers(tmp_path):
-    """pyuff's beam: complex numbers in brackets and no frequencies; step and points are told."""
+    """pyuff's beam: complex numbers in brackets and no frequencies; step and points are told. The sensor was at none of the first three points, as its FRFs show."""
     files = sorted((PYUFF / "beam_frf").glob("*.txt"))
     assert "step_Hz" in questions(*files)
     points = "".join(
-        f'[[points]]\nnode = {k}\nname = "p{k}"\nbody = "beam"\nposition_mm = [{k}.0, 0.0, 0.0]\ndirection = "+Z"\n' for k in (1, 2, 3)
+        f'[[points]]\nnode = {k}\nname = "p{k}"\nbody = "beam"\nposition_mm = [{k}.0, 0.0, 0.0]\ndirection = "+Z"\n' for k in (1, 2, 3, 4)
     )
     told = "".join(f'[[files]]\nfile = "meas_point_{k}.txt"\nreference = {k}\n' for k in (1, 2, 3))
-    common = '[[files]]\nfile = "*.txt"\ntest = "lab"\nstep_Hz = 1.0\nresponse = 1\nunit = "(m/s^2)/N"\n'
+    common = '[[files]]\nfile = "*.txt"\ntest = "lab"\nstep_Hz = 1.0\nresponse = 4\nunit = "(m/s^2)/N"\n'
     (tmp_path / "m.toml").write_text(f'spindle = "beam"\n{common}{told}{TEST}{points}')
     bring(files, mapping=tmp_path / "m.toml", out=tmp_path / "c")
     frf = read_campaign(tmp_path / "c").tests[0].frf
