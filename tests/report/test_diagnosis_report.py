@@ -20,6 +20,7 @@ from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.prediction.next_test import ModePrediction, NextTest
 from thermospindle.diagnosis.runout.verdict import diagnose_runout
+from thermospindle.diagnosis.verdict import Drift
 from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import content_hash, load
@@ -27,7 +28,7 @@ from thermospindle.model.units import RPM
 from thermospindle.report.figures.diagnosis import errors, explanations, law
 from thermospindle.report.page.diagnosis import sections, write_diagnosis
 from thermospindle.report.text.diagnosis.answer import diagnosis_json
-from thermospindle.report.text.diagnosis.words import law_words, show_diagnosis, value_words
+from thermospindle.report.text.diagnosis.words import _drift_words, law_words, show_diagnosis, value_words
 from thermospindle.report.text.runout_diagnosis import runout_diagnosis_json
 from thermospindle.sim.campaign.simulated import runout_campaign
 from thermospindle.sim.effects import CATALOGUE, by_name, of_scene
@@ -209,3 +210,14 @@ def test_a_value_is_told_with_what_it_may_be_as_well():
     assert value_words(lower | {"probability": 0.72, "others": [upper]}) == "lower (72.0%) or upper (28.0%)"
     channel = {"value": 3.0, "sd": 0.0, "unit": "1", "probability": 0.6, "others": [{"value": 4.0, "probability": 0.4}]}
     assert value_words(channel) == "3 (60.0%) or 4 (40.0%)"
+
+
+def test_one_test_that_differs_from_all_others_is_told_by_itself():
+    """A thermometer wrong by 8 K in one test of eight; with errors that all have in common, of which none of what tells them apart is made."""
+    conditions = tuple(Condition(t) for t in (20.0, 30.0, 40.0, 50.0, 60.0))
+    change, covariance = np.array([1.2, 1.35, 0.9, -6.75, 1.0]), 0.45 * np.ones((5, 5)) + 0.02 * np.eye(5)
+    alone = Drift("thermometer_error", "K", conditions, change, covariance, None, 100.0, None, {})
+    assert _drift_words(alone) == "thermometer_error: -6.75 +- 0.69 K at 50 C, 0 rpm alone, and +0.90 +- 0.69 to +1.35 +- 0.69 K in all other tests"
+    step = replace(alone, change=np.array([1.2, 1.35, 0.9, -6.75, -6.5]))
+    assert " to " in _drift_words(step)
+    assert "alone" not in _drift_words(step)

@@ -15,6 +15,7 @@ from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
 from thermospindle.report.typeset import plain, plain_error, unit_word
 
+ODD, AGREE = 5.0, 3.0  # errors by which one test differs from all others, and within which these agree
 ALIKE = 0.9  # of the evidence of what the verdict names, from which a free drift does as well
 
 
@@ -52,6 +53,10 @@ def _change_words(p: Drift) -> str:
     if len(p.change) == 1:
         ((change, sd),) = p.told
         return f"{_signed(change, sd)}{unit_word(p.unit, ' ')} {_where(p.conditions[0])}"
+    if (odd := _odd_one(p)) is not None:
+        unit, others = unit_word(p.unit, " "), [row for i, row in enumerate(p.told) if i != odd]
+        least, most = (_signed(*choose(others)) for choose in (min, max))
+        return f"{_signed(*p.told[odd])}{unit} {_where(p.conditions[odd])} alone, and {least} to {most}{unit} in all other tests"
     low, high = int(np.argmin(p.change)), int(np.argmax(p.change))
     goes = f", {p.pattern.shape.name}" if p.pattern and p.pattern.shape.name != "constant" else ""
     (least, its_sd), (most, sd) = p.told[low], p.told[high]
@@ -59,6 +64,20 @@ def _change_words(p: Drift) -> str:
         f"from {_signed(least, its_sd)}{unit_word(p.unit, ' ')} {_where(p.conditions[low])} to {_signed(most, sd)}{unit_word(p.unit, ' ')} "
         f"{_where(p.conditions[high])}{goes}"
     )
+
+
+def _odd_one(p: Drift) -> int | None:
+    """The one test that differs from each of the others, by `ODD` of its errors, where these agree among themselves; None where there is none."""
+    if len(p.change) < 4:
+        return None
+    apart = np.abs(p.change[:, None] - p.change)
+    variance = np.diag(p.covariance)
+    sd = np.sqrt(np.maximum(variance[:, None] + variance - 2 * p.covariance, 1e-300))
+    np.fill_diagonal(sd, np.inf)
+    by = apart / sd
+    odd = int(np.argmax(by.sum(axis=1)))
+    rest = np.delete(np.arange(len(by)), odd)
+    return odd if by[odd, rest].min() > ODD and by[np.ix_(rest, rest)].max() < AGREE else None
 
 
 def _signed(change: float, sd: float) -> str:
@@ -200,6 +219,8 @@ def _values(candidate: dict[str, Any]) -> str:
 
 def _range(rows: list[dict[str, Any]]) -> str:
     """From the least to the largest size that tests have."""
+    if len(rows) == 1:
+        return plain_error(rows[0]["size"], rows[0]["sd"])
     least, most = (choose(rows, key=lambda r: float(r["size"])) for choose in (min, max))
     return f"from {plain_error(least['size'], least['sd'])} in {least['test']} to {plain_error(most['size'], most['sd'])} in {most['test']}"
 
