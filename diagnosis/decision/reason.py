@@ -16,6 +16,7 @@ from thermospindle.diagnosis.inference.resonance import moving, shown
 from thermospindle.diagnosis.inference.search import Search
 
 UNTOLD = "nothing tried"  # what explains data that are missed grossly
+SAME = 3.0  # errors of their difference, within which sizes are the same
 MOVING = "a light resonance"  # whose frequency changes with temperature
 LEFT = "what is left"  # that changes, and tells of something else
 OFF, NAMED = 2.0, 4  # stated standard deviations from which a tolerance is said to be off, and how many of these are named
@@ -42,9 +43,12 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
             moves = [f"a light resonance that the drawing lacks would have to move {_moves(found.model, r)}" for r in moving(found.model, found.base)]
             place = " and ".join(moves)
         elif free and free[0].hypothesis.mechanisms:
-            forms = [f"what {m.name} does" if m.beyond else m.name for m in free[0].hypothesis.mechanisms]
-            beyond = ", by sizes that it cannot have" if any(m.beyond for m in free[0].hypothesis.mechanisms) else ""
-            place = f"{' and '.join(forms)} would have to drift{beyond} ({free[0].delta_evidence:.0f} in ln evidence)"
+            h = free[0].hypothesis
+            forms = [f"what {m.name} does" if m.beyond else m.name for m in h.mechanisms if m.free]
+            beyond = ", by sizes that it cannot have" if any(m.beyond for m in h.mechanisms) else ""
+            drift = "differ from the drawing, by as much in every test" if _same_in_all(h) else "drift"
+            beside = f" beside {' and '.join(named_part(free[0]))}" if named_part(free[0]) else ""
+            place = f"{' and '.join(forms)} would have to {drift}{beyond}{beside} ({free[0].delta_evidence:.0f} in ln evidence)"
             place += _impossible(found, free[0].names)
         elif free and free[0].names != (UNTOLD,):
             sizes = found.base.evidence.learned.sizes
@@ -88,6 +92,13 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
     whose = f" of {' and '.join(own)}" if len(effects) > 1 else ""
     law = f" with a law of the data's own{whose}{before_own}" if own else ""
     return f"{named} {word_of}: {chosen.delta_evidence:.0f} in ln evidence over the model without effects{law}, {odds}{beside}{instead}{checked}{disagreement}."
+
+
+def _same_in_all(h: Hypothesis) -> bool:
+    """Whether what is free in an explanation is as much in every test, of two or more: an offset, and no drift."""
+    rows = [(a, c) for m, a, c in zip(h.mechanisms, h.evidence.sizes, h.evidence.size_covariance, strict=True) if m.free]
+    apart = [np.abs(a[:, None] - a) - SAME * np.sqrt(np.maximum(np.diag(c)[:, None] + np.diag(c) - 2 * c, 0.0)) for a, c in rows]
+    return all(len(a) > 1 and np.all(np.abs(a) > SAME * np.sqrt(np.diag(c))) and np.all(by <= 0.0) for (a, c), by in zip(rows, apart, strict=True))
 
 
 def _impossible(found: Search, drifting: Names) -> str:

@@ -55,8 +55,8 @@ def _change_words(p: Drift) -> str:
         return f"{_signed(change, sd)}{unit_word(p.unit, ' ')} {_where(p.conditions[0])}"
     if (odd := _odd_one(p)) is not None:
         unit, others = unit_word(p.unit, " "), [row for i, row in enumerate(p.told) if i != odd]
-        least, most = (_signed(*choose(others)) for choose in (min, max))
-        return f"{_signed(*p.told[odd])}{unit} {_where(p.conditions[odd])} alone, and {least} to {most}{unit} in all other tests"
+        rest = [_signed(*row) for row in (min(others), max(others))]
+        return f"{_signed(*p.told[odd])}{unit} {_where(p.conditions[odd])} alone, and {' to '.join(rest)}{unit} in all other tests"
     low, high = int(np.argmin(p.change)), int(np.argmax(p.change))
     goes = f", {p.pattern.shape.name}" if p.pattern and p.pattern.shape.name != "constant" else ""
     (least, its_sd), (most, sd) = p.told[low], p.told[high]

@@ -143,6 +143,19 @@ def test_drift_that_misses_the_data_grossly_is_not_told_as_what_explains_them(le
     assert ("~x would have to drift" in v.reason, "the best leaves" in v.reason) == (drifts, not drifts)
 
 
+@pytest.mark.parametrize(
+    ("sizes", "said"), [((2.22, 2.21), "~x would have to differ from the drawing, by as much in every test (150"), ((2.22, 2.0), "~x would have to drift (150"), ((0.01, 0.01), "~x would have to drift")]
+)
+def test_what_is_as_much_in_every_test_does_not_drift(sizes, said):
+    """Another's dashpot beside the plate was told as damping that would have to drift, by +2.2272 in all eight tests."""
+    found = made({"~x": 150.0})
+    x, *rest = found.hypotheses
+    x = replace(x, evidence=replace(x.evidence, sizes=np.array([sizes]), size_covariance=1e-4 * np.eye(2)[None]))
+    v = decide(replace(found, hypotheses=(x, *rest)))
+    assert v.word == "unexplained"
+    assert said in v.reason
+
+
 @pytest.mark.parametrize(("chi2", "word"), [(30.0, "unexplained"), (3.0, "none")])
 def test_data_that_are_missed_grossly_are_not_nothing_missing(chi2, word):
     """More than five times the errors, and nothing tried gains anything: no probability is left for *none*, and the sentence says where to look."""
