@@ -16,7 +16,7 @@ from thermospindle.diagnosis.data.mode_table import ModeData
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.linear import Linear, mass_between
 from thermospindle.diagnosis.forward.nuisance import Nuisance, ReferenceModes, Resonance, Unevenness, unevennesses
-from thermospindle.diagnosis.forward.points import Applied, apart, replace_measuring, stretched, uneven
+from thermospindle.diagnosis.forward.points import Applied, apart, directed, replace_measuring, stretched, uneven
 from thermospindle.diagnosis.forward.response import Light, Response
 from thermospindle.diagnosis.forward.table import Table
 from thermospindle.model.built.tolerance import Toleranced
@@ -97,6 +97,11 @@ class CampaignModel:
         return [i for i, p in enumerate(self.parameters) if p.kind in kinds_of.APART]
 
     @cached_property
+    def directed(self) -> list[int]:
+        """Numbers of the parameters by which bearings are stiffer in one direction."""
+        return [i for i, p in enumerate(self.parameters) if p.kind == kinds_of.DIRECTED]
+
+    @cached_property
     def uneven(self) -> list[int]:
         """Numbers of the parameters by which joints are uneven about the axis."""
         return [i for i, p in enumerate(self.parameters) if p.kind == kinds_of.UNEVEN]
@@ -153,7 +158,7 @@ class CampaignModel:
         """The operating point of test `t`, sizes within their limits; what differs in the measuring chain alone is not worked out again."""
         effects = within_limits(effects)
         acting = tuple((id(e), *v.values()) for e, v in effects if any(getattr(e, hook) for hook in MEASURING))
-        little = tuple(x[own].tobytes() for own in (self.expansion, self.apart, self.uneven))
+        little = tuple(x[own].tobytes() for own in (self.expansion, self.apart, self.directed, self.uneven))
         key = (t, x[: len(self.build)].tobytes(), float(x[self.temperature[t]]), little, acting)
         late = self._points.get(key)
         if late is None:
@@ -166,6 +171,8 @@ class CampaignModel:
             if x[self.apart].any():
                 names, own = [b.name for b in self.spindle.all_bearings], [(self.parameters[i], float(x[i])) for i in self.apart]
                 every = [apart(*({names[p.index]: v * p.sd for p, v in own if p.kind == kind} for kind in kinds_of.APART)), *every]
+            if x[self.directed].any():
+                every = [directed({self.parameters[i].index: float(x[i]) * self.parameters[i].sd for i in self.directed}), *every]
             if x[self.uneven].any():
                 joints = [(self.unevennesses[p.index], float(x[i]) * p.sd) for i in self.uneven for p in [self.parameters[i]]]
                 every = [uneven(joints), *every]

@@ -9,7 +9,8 @@ frequencies and mixes shapes, never their changes, and it is smooth where modes 
 mode in each test: what laws that hold only nearly leave. The size of each is learned from the data.
 
 Bearings differ among themselves: each has a stiffness and a damping of its own about those that all share with the drawing, within the scene's tolerances. A
-constant discrepancy of modes cannot stand in for that: bearings soften with speed, and what one of two is off by with them.
+constant discrepancy of modes cannot stand in for that: bearings soften with speed, and what one of two is off by with them. So it is with how stiff balls are along the axis and in
+tilt beside across it, in which two honest programs differ by a per cent or two: where the forces of a row are said to act, and what the races give.
 
 A light resonance is one that the drawing lacks, of the table, a fixture or a cable: an oscillator on some point of the machine, wherever that is, and so
 given by how much of it each reference mode carries along. It is looked for where the data show the same misfit in every test.
@@ -31,6 +32,8 @@ from thermospindle.model.types import Array
 
 BUILD, TEMPERATURE, GAIN, DRIFT, EXPANSION = "build", "temperature", "gain", "gain drift", "thermal expansion"
 APART = "stiffness apart", "damping apart"  # of bearings
+DIRECTED = "bearing stiffness by direction"
+DIRECTIONS = (("axial", (2,)), ("tilt", (3, 4)))
 UNEVEN = "stiffness of a joint uneven"  # about the axis
 RECORD = "end of records"
 RESONANCE = "light resonance"
@@ -172,6 +175,8 @@ def nuisances(
     for kind, own, sd in zip(APART, ([b.name for b in spindle.rolling], every), (t.structure, t.damping), strict=True):  # given ones have stiffnesses of their own
         if len(own) > 1:
             found += [Nuisance(kind, f"{kind.removesuffix(' apart')} of {b} beside the others", sd, index=every.index(b)) for b in own]
+    if spindle.bearings:
+        found += [Nuisance(DIRECTED, f"{name} stiffness of the balls", t.structure, index=i) for i, (name, _) in enumerate(DIRECTIONS)]
     found += [Nuisance(UNEVEN, u.name, t.structure / np.sqrt(2), index=i) for i, u in enumerate(unevennesses(spindle))]  # of two that are off by as much each
     found += [Nuisance(TEMPERATURE, f"temperature of {name}", t.temperature, test=k) for k, name in enumerate(tests)]
     for i in range(modes.seen):

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from thermospindle.diagnosis.forward.nuisance import Unevenness
+from thermospindle.diagnosis.forward.nuisance import DIRECTIONS, Unevenness
 from thermospindle.model.bearing.pair import PairState
 from thermospindle.model.machine import Condition, RingMotion, Spindle
 from thermospindle.model.rotor.chain import RotorBase
@@ -52,6 +52,19 @@ def apart(stiffness: Mapping[str, float], damping: Mapping[str, float]) -> tuple
         return replace(state, bearings=bearings, linear=linear)
 
     return Effect("apart", "", "", (), "", (), "", pair=pair), {}
+
+
+def directed(shares: Mapping[int, float]) -> tuple[Effect, Values]:
+    """Stiffness and damping of ball rows in each of `DIRECTIONS`, by number, off by these shares."""
+    d = np.ones(5)
+    for i, share in shares.items():
+        d[list(DIRECTIONS[i][1])] = np.sqrt(max(1 + share, 0.0))
+    square = np.outer(d, d)
+
+    def pair(spindle: Spindle, condition: Condition, values: Values, state: PairState) -> PairState:
+        return replace(state, bearings=tuple(replace(b, stiffness=square * b.stiffness, damping=square * b.damping) for b in state.bearings))
+
+    return Effect("directed", "", "", (), "", (), "", pair=pair), {}
 
 
 def uneven(shares: Sequence[tuple[Unevenness, float]]) -> tuple[Effect, Values]:

@@ -15,6 +15,7 @@ from thermospindle.diagnosis.forward.nuisance import (
     APART,
     BUILD,
     DAMPING,
+    DIRECTED,
     DRIFT,
     EXPANSION,
     GAIN,
@@ -34,7 +35,7 @@ from thermospindle.sim.campaign.campaign import Noise
 NOISELESS = Noise(0.0, 0.0)
 CONDITIONS = (Condition(20.0), Condition(45.0, 7200 * RPM))
 FREQUENCY = np.arange(400.0, 6000.1, 40.0)
-KINDS = (BUILD, EXPANSION, *APART, TEMPERATURE, GAIN, DRIFT, STIFFNESS, DAMPING, RECORD)
+KINDS = (BUILD, EXPANSION, *APART, DIRECTED, TEMPERATURE, GAIN, DRIFT, STIFFNESS, DAMPING, RECORD)
 SCENES = {"reference": ROOT / "scenes" / "hdd_2003", "symmetric": ROOT / "tests" / "scenes" / "symmetric"}
 
 
@@ -84,7 +85,7 @@ def test_derivatives_of_lines(scene, quantity, decay):
     assert set(worst) == set(KINDS)
     for kind in (GAIN, DRIFT, STIFFNESS, DAMPING, RECORD):
         assert worst[kind] < 1e-4, kind
-    for kind in (BUILD, EXPANSION, *APART, TEMPERATURE):
+    for kind in (BUILD, EXPANSION, *APART, DIRECTED, TEMPERATURE):
         assert worst[kind] < 5e-3, kind
 
 
@@ -117,7 +118,7 @@ def test_derivatives_of_a_flexible_shaft():
     worst = worst_by_kind(model, 1, x)
     for kind in (GAIN, DRIFT, STIFFNESS, DAMPING, RECORD):
         assert worst[kind] < 3e-3, kind
-    for kind in (BUILD, EXPANSION, *APART, TEMPERATURE):
+    for kind in (BUILD, EXPANSION, *APART, DIRECTED, TEMPERATURE):
         assert worst[kind] < 1e-2, kind
 
 
