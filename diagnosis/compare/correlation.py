@@ -31,6 +31,7 @@ from thermospindle.sim.campaign.beside import Beside
 
 SILENT = 1e-6  # of the largest FRF of the test; smaller computed ones are forbidden by symmetry and have no shape to compare
 FEWEST = 8  # lines of a band that is worth a number
+LOUDER = 3.0  # dB, from which a factor that all FRFs share is told, and within which they share it
 SHIFT_STEP = 5e-4  # relative, between the shifts tried
 DISTINCT = 0.05  # by how much FDAC must vary over the shifts tried for one of them to be the best
 THIRD = 10**0.1  # ratio of neighbouring third-octave band centres
@@ -151,6 +152,19 @@ def correlate(beside: Beside) -> Correlation:
     every = [b for low, high in parts if (b := band(low, high, high == parts[-1][1])) is not None]
     whole = band(float(frequency[0]), float(frequency[-1]), True)
     return Correlation(beside, computed, csac, csf, whole or _nothing(frequency), tuple(every))
+
+
+def in_common(tests: Sequence[Correlation]) -> float | None:
+    """dB by which measured FRFs are larger than computed ones, where that is much and alike in all of them: no mode tells of it, but a unit, a sensitivity or a mass would
+    make it. None where it is little, or they differ."""
+    ratios = [
+        np.median(20 * np.log10(np.abs(c.measured[i, j]) / np.abs(c.computed[i, j]), where=np.abs(c.measured[i, j]) > 0, out=np.zeros(len(c.frequency))))
+        for c in tests
+        for pair, (i, j) in c.pairs.items()
+        if c.responds(pair)
+    ]
+    whole = float(np.median(ratios)) if ratios else 0.0
+    return whole if abs(whole) > LOUDER and np.abs(np.array(ratios) - whole).max() < LOUDER else None
 
 
 def _nothing(frequency: Array) -> Band:

@@ -9,7 +9,9 @@ from typing import Any
 from rich.console import Console
 
 from thermospindle.diagnosis.compare.before_after import BeforeAfter, errors, held_out
+from thermospindle.diagnosis.compare.compare import Comparison
 from thermospindle.diagnosis.compare.compare import compare as beside
+from thermospindle.diagnosis.compare.correlation import in_common
 from thermospindle.diagnosis.data.observe import observe
 from thermospindle.diagnosis.runout.compare import RunoutBeside, compare_runout, rms_residual
 from thermospindle.diagnosis.runout.lines import modal_tests
@@ -59,7 +61,16 @@ def compare(
             turning[1](console)
 
     write = write_json("comparison.json", lambda folder: _write(comparison, spindle, folder, *(turning[2:] if turning else ())))
-    return answered(values, show, out, asked, write, left_out(tests))
+    return answered(values, show, out, asked, write, [*left_out(tests), *_louder(comparison)])
+
+
+def _louder(c: Comparison) -> list[str]:
+    """A factor that all measured FRFs have beside the computed ones."""
+    by = in_common([t.correlation for t in c.tests if t.correlation])
+    if by is None:
+        return []
+    size = f"{abs(by):.0f} dB {'larger' if by > 0 else 'smaller'} than computed ones"
+    return [f"measured FRFs are {size}, all alike: a unit, a sensor's or the hammer's sensitivity, or the mass of the drawing is off by a factor of about {10 ** (abs(by) / 20):.2g}"]
 
 
 def _write(*what: Any) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from thermospindle.diagnosis.compare.correlation import DISTINCT, assurance, bands, correlate, scale_factor
+from thermospindle.diagnosis.compare.correlation import DISTINCT, assurance, bands, correlate, in_common, scale_factor
 from thermospindle.diagnosis.prediction.partners import BELIEVABLE
 from thermospindle.model.machine import Condition
 from thermospindle.sim.campaign.beside import Beside, beside
@@ -37,6 +37,15 @@ def test_a_scale_is_seen_by_csf_only(spindle, point):
         assert band.fdac == pytest.approx(1.0, abs=1e-4)  # lines stand up to half a step beside those of its axis
         assert [s.csf for s in band.by_frf.values()] == pytest.approx([0.6] * len(band.by_frf))
         assert min(s.frac for s in band.by_frf.values()) == pytest.approx(1.0)
+
+
+def test_a_factor_that_all_frfs_share_is_told_in_dB(spindle, point):
+    """Accelerations told in g for m/s^2, beside shapes and frequencies that are right: 25 dB that a page alone showed. One channel that is off is none."""
+    value = point.frf(LINES)
+    wrong = value.copy()
+    wrong[2] *= 0.1
+    by = [in_common([correlate(measured(spindle, point, factor * v)) for factor in (f, 1.2 * f)]) for f, v in ((1 / 9.81, value), (1.0, value), (0.1, wrong))]
+    assert by == [pytest.approx(-20 * np.log10(9.81) + 20 * np.log10(1.2) / 2, abs=0.01), None, None]
 
 
 def test_one_channel_off_is_seen_where_it_is(spindle, point):
