@@ -155,6 +155,7 @@ def check_frf(where: str | Path, frf: Frf, speed: float, limits: Limits = LIMITS
         for j, reference in enumerate(frf.reference_nodes):
             key, value = f"{where}: H({response},{reference})", frf.value[i, j]
             share = np.linalg.norm(value) / max(np.linalg.norm(frf.value[:, j], axis=-1).max(), np.finfo(float).tiny)
+            _check_axis(key, value)
             _check_gaps(key, frf.frequency, value)
             if frf.coherence is not None:
                 _check_coherence(key, frf.coherence[i, j], np.abs(value), limits if share > SILENT else replace(limits, coherence=0.0))
@@ -223,6 +224,12 @@ def _check_direction_of_time(key: str, frequency: np.ndarray, value: np.ndarray)
             f"{key}: {share:.0%} of the impulse response lies before the blow: the FRF is conjugated; allowed is {limit:.0%}, "
             "with time dependence exp(+i omega t)"
         )
+
+
+def _check_axis(key: str, value: np.ndarray) -> None:
+    steps = np.diff(value.real)
+    if len(steps) >= ENOUGH and not value.imag.any() and steps.min() > 0 and np.ptp(steps) < 1e-4 * steps.mean():
+        raise BadInput(f"{key}: real, and rising in even steps from {value.real[0]:g} to {value.real[-1]:g}: that is an axis, no FRF")
 
 
 def _check_driving_point(key: str, frequency: np.ndarray, mobility: np.ndarray, noise: np.ndarray, limits: Limits) -> None:

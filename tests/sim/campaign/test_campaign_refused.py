@@ -154,6 +154,7 @@ def put(key: object, value: Callable[[np.ndarray], object]) -> Callable[[np.ndar
     ("frf", "words"),
     [
         (part(put((1, 0), lambda v: v[1, 0].conj())), r"file: H\(3,1\): .*before the blow: the FRF is conjugated; allowed is"),
+        (part(put((0, 1), lambda v: 2 * np.pi * np.arange(v.shape[-1]))), r"H\(1,6\): real, and rising in even steps from 0 to .*: that is an axis, no FRF"),
         (part(put((0, 0), lambda v: -v[0, 0])), r"H\(1,1\): .*negative real part.*allowed is 1%"),
         (part(put((0, 0), lambda v: v[1, 0])), r"H\(1,1\): .*negative real part"),
         (part(put((0, 1), lambda v: 1.3 * v[0, 1])), r"H\(1,6\) and H\(6,1\) differ by 26% at rest; reciprocity allows 15%"),
