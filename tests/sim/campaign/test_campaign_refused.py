@@ -166,7 +166,7 @@ def put(key: object, value: Callable[[np.ndarray], object]) -> Callable[[np.ndar
         (part(put((1, 0, 7), lambda c: 1.2), "coherence"), r"H\(3,1\): coherence from .* to 1.2; allowed is 0 to 1"),
         (part(put((1, 0, 7), lambda s: 0.0), "sd"), r"H\(3,1\): standard error = 0: must be positive"),
     ],
-    ids=["conjugated", "polarity", "other-point", "gain", "sign", "zeros", "held", "dead", "coherence", "coherence-range", "sd"],
+    ids=["conjugated", "axis", "polarity", "other-point", "gain", "sign", "zeros", "held", "dead", "coherence", "coherence-range", "sd"],
 )  # fmt: skip
 def test_physics_refuses(frf: Frf, words: str) -> None:
     check_frf("file", rotor_frf(), 0.0)
