@@ -102,6 +102,11 @@ class CampaignModel:
         return [i for i, p in enumerate(self.parameters) if p.kind == kinds_of.DIRECTED]
 
     @cached_property
+    def flung(self) -> list[int]:
+        """The number of the parameter by which the balls' inertia loads are off, where the scene has these."""
+        return [i for i, p in enumerate(self.parameters) if p.kind == kinds_of.FLUNG]
+
+    @cached_property
     def uneven(self) -> list[int]:
         """Numbers of the parameters by which joints are uneven about the axis."""
         return [i for i, p in enumerate(self.parameters) if p.kind == kinds_of.UNEVEN]
@@ -158,7 +163,7 @@ class CampaignModel:
         """The operating point of test `t`, sizes within their limits; what differs in the measuring chain alone is not worked out again."""
         effects = within_limits(effects)
         acting = tuple((id(e), *v.values()) for e, v in effects if any(getattr(e, hook) for hook in MEASURING))
-        little = tuple(x[own].tobytes() for own in (self.expansion, self.apart, self.directed, self.uneven))
+        little = tuple(x[own].tobytes() for own in (self.expansion, self.apart, self.directed, self.flung, self.uneven))
         key = (t, x[: len(self.build)].tobytes(), float(x[self.temperature[t]]), little, acting)
         late = self._points.get(key)
         if late is None:
@@ -178,7 +183,10 @@ class CampaignModel:
                 every = [uneven(joints), *every]
             if x[self.expansion].any():
                 every = [stretched(*(1 + float(x[i]) * self.parameters[i].sd for i in self.expansion)), *every]
-            late = self._points[key] = operating_point(self._built(t, x), condition, every)
+            built = self._built(t, x)
+            for i in self.flung:
+                built = replace(built, ball_inertia=max(built.ball_inertia * (1 + float(x[i]) * self.parameters[i].sd), 0.0))
+            late = self._points[key] = operating_point(built, condition, every)
             late.chain  # noqa: B018 - worked out here, so that errors come here
             return late
         return replace_measuring(late, [*self.present, *effects])

@@ -33,6 +33,9 @@ from thermospindle.model.types import Array
 BUILD, TEMPERATURE, GAIN, DRIFT, EXPANSION = "build", "temperature", "gain", "gain drift", "thermal expansion"
 APART = "stiffness apart", "damping apart"  # of bearings
 DIRECTED = "bearing stiffness by direction"
+FLUNG, FLUNG_SD = "inertia loads of the balls", 0.1
+"""Relative, of centrifugal force and gyroscopic moment together: cage speeds by different assumptions (one race's control, both contact angles, the half sum) differ by some
+per cent, and forces by twice that (Harris, *Rolling Bearing Analysis*, 1991, ch. 8)."""
 DIRECTIONS = (("axial", (2,)), ("tilt", (3, 4)))
 UNEVEN = "stiffness of a joint uneven"  # about the axis
 RECORD = "end of records"
@@ -177,6 +180,8 @@ def nuisances(
             found += [Nuisance(kind, f"{kind.removesuffix(' apart')} of {b} beside the others", sd, index=every.index(b)) for b in own]
     if spindle.bearings:
         found += [Nuisance(DIRECTED, f"{name} stiffness of the balls", t.structure, index=i) for i, (name, _) in enumerate(DIRECTIONS)]
+    if spindle.bearings and spindle.ball_inertia:
+        found.append(Nuisance(FLUNG, FLUNG, FLUNG_SD))
     found += [Nuisance(UNEVEN, u.name, t.structure / np.sqrt(2), index=i) for i, u in enumerate(unevennesses(spindle))]  # of two that are off by as much each
     found += [Nuisance(TEMPERATURE, f"temperature of {name}", t.temperature, test=k) for k, name in enumerate(tests)]
     for i in range(modes.seen):

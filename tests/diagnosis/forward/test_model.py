@@ -18,6 +18,7 @@ from thermospindle.diagnosis.forward.nuisance import (
     DIRECTED,
     DRIFT,
     EXPANSION,
+    FLUNG,
     GAIN,
     RECORD,
     STIFFNESS,
@@ -35,7 +36,7 @@ from thermospindle.sim.campaign.campaign import Noise
 NOISELESS = Noise(0.0, 0.0)
 CONDITIONS = (Condition(20.0), Condition(45.0, 7200 * RPM))
 FREQUENCY = np.arange(400.0, 6000.1, 40.0)
-KINDS = (BUILD, EXPANSION, *APART, DIRECTED, TEMPERATURE, GAIN, DRIFT, STIFFNESS, DAMPING, RECORD)
+KINDS = (BUILD, EXPANSION, *APART, DIRECTED, FLUNG, TEMPERATURE, GAIN, DRIFT, STIFFNESS, DAMPING, RECORD)
 SCENES = {"reference": ROOT / "scenes" / "hdd_2003", "symmetric": ROOT / "tests" / "scenes" / "symmetric"}
 
 
@@ -82,7 +83,7 @@ def test_derivatives_of_lines(scene, quantity, decay):
     """Every nuisance parameter, at speed and warm: build, rings and temperature to the error of one-sided steps of matrices, the rest exactly."""
     model, x = made(scene, quantity=quantity, window_decay=decay)
     worst = worst_by_kind(model, 1, x)
-    assert set(worst) == set(KINDS)
+    assert set(worst) == set(KINDS) - {FLUNG}  # these scenes' balls have none
     for kind in (GAIN, DRIFT, STIFFNESS, DAMPING, RECORD):
         assert worst[kind] < 1e-4, kind
     for kind in (BUILD, EXPANSION, *APART, DIRECTED, TEMPERATURE):
@@ -113,12 +114,12 @@ def has_none(model, x):
 
 @pytest.mark.slow
 def test_derivatives_of_a_flexible_shaft():
-    """Of its reduced model, at speed and warm, against differences of residuals that have a basis of their own on either side."""
+    """Of its reduced model, at speed and warm, against differences of residuals that have a basis of their own on either side: what moves the basis is off by half a per cent."""
     model, x = made(load(ROOT / "scenes" / "five_bearing"), frequency=np.arange(300.0, 4000.1, 50.0))
     worst = worst_by_kind(model, 1, x)
-    for kind in (GAIN, DRIFT, STIFFNESS, DAMPING, RECORD):
-        assert worst[kind] < 3e-3, kind
-    for kind in (BUILD, EXPANSION, *APART, DIRECTED, TEMPERATURE):
+    for kind in (GAIN, DRIFT, RECORD):
+        assert worst[kind] < 1e-8, kind
+    for kind in (BUILD, EXPANSION, *APART, DIRECTED, FLUNG, TEMPERATURE, STIFFNESS, DAMPING):
         assert worst[kind] < 1e-2, kind
 
 
