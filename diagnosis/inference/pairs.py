@@ -31,7 +31,7 @@ from thermospindle.diagnosis.inference.singles import (
 
 LEADS = 2  # single mechanisms of the catalogue to which a second is joined, of those near the best
 SECONDS = 2  # of each kind, joined to each of them
-PAIRS = 6  # fitted at most
+PAIRS = 8  # fitted at most
 EXCHANGED = 8  # effects tried in either's place
 ENOUGH = 5.0  # ln evidence that a second mechanism must promise beside one that leaves a misfit
 
@@ -44,7 +44,7 @@ def joined(
     gains = [h for h in ranked if h.evidence.ln > none.evidence.ln + LITTLE]
     leads = [h for h in gains if not h.free and h.evidence.ln > gains[0].evidence.ln - CLOSE][:LEADS] or [h for h in gains if not h.free][:1]
     if leads and (leads[0] is not gains[0] or leads[0].evidence.learned.errors > 1.0):
-        leads += [h for h in gains if h.free][:1]  # two things that drift: where one of the catalogue does not do
+        leads += [h for h in gains if h.free][:1]  # two things that drift, or one beside an effect: where one of the catalogue does not do
     pairs = _beside(model, leads, mechanisms, most, expected, workers)
     if leads and not leads[0].free:
         pairs = better([*pairs, *lasting(model, leads[0], mechanisms, most, expected, workers)])
@@ -108,12 +108,12 @@ def exchanged(
 
 
 def _beside(model, leads: Sequence[Hypothesis], mechanisms: Sequence[Mechanism], most: float, expected: Learned, workers) -> list[Hypothesis]:
-    """One mechanism more, beside each of the `leads`: of the catalogue, and free beside what is not."""
+    """One mechanism more, beside each of the `leads`: of the catalogue, and free beside what is not free or free alone."""
     tasks, done = [], set()
     for lead in leads:
         asked = ENOUGH if lead.evidence.learned.errors > 1.0 else PLENTY
         drifts = all(m.free for m in lead.mechanisms)
-        others = [m for m in mechanisms if m.name not in lead.names and not (drifts and not m.free) and not (m.free and lead.free and not drifts)]
+        others = [m for m in mechanisms if m.name not in lead.names and not (m.free and lead.free and not drifts)]
         looked = screen(model, lead.fit, 1.0, undrifted(lead.evidence.learned), others, workers)
         for kind in MOST:
             for s in [s for s in promising(looked, kind) if s.gain > asked][:SECONDS]:
