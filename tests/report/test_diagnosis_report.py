@@ -6,6 +6,7 @@ import json
 import re
 from dataclasses import replace
 from html import unescape
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -28,7 +29,7 @@ from thermospindle.model.units import RPM
 from thermospindle.report.figures.diagnosis import errors, explanations, law
 from thermospindle.report.page.diagnosis import sections, write_diagnosis
 from thermospindle.report.text.diagnosis.answer import diagnosis_json
-from thermospindle.report.text.diagnosis.words import _drift_words, law_words, show_diagnosis, value_words
+from thermospindle.report.text.diagnosis.words import _drift_words, law_words, show_diagnosis, value_words, would_change
 from thermospindle.report.text.runout_diagnosis import runout_diagnosis_json
 from thermospindle.sim.campaign.simulated import runout_campaign
 from thermospindle.sim.effects import CATALOGUE, by_name, of_scene
@@ -221,3 +222,10 @@ def test_one_test_that_differs_from_all_others_is_told_by_itself():
     step = replace(alone, change=np.array([1.2, 1.35, 0.9, -6.75, -6.5]))
     assert " to " in _drift_words(step)
     assert "alone" not in _drift_words(step)
+
+
+@pytest.mark.parametrize(("names", "drafted"), [(("a light resonance",), False), (("preload", "flange stiffness"), True)])
+def test_a_draft_is_of_what_the_verdict_says_drifts(names, drafted):
+    verdict = SimpleNamespace(word="unexplained", free=[SimpleNamespace(names=names)])
+    said = would_change(SimpleNamespace(verdict=verdict, drifts=[SimpleNamespace(element="preload")], tests=()))
+    assert ("`spindle draft` writes one from the drift of preload" in said) == drafted

@@ -115,7 +115,8 @@ def would_change(d: Diagnosis) -> str:
     if v.word == "none":
         return "An effect larger than these data could have hidden would change that; how large that is, is listed for each."
     if v.word == "unexplained":
-        place = f"; `spindle draft` writes one from the drift of {d.drifts[0].element}" if d.drifts else ""
+        told = next((p.element for p in d.drifts if v.free and p.element in v.free[0].names), None)  # of what the verdict says drifts
+        place = f"; `spindle draft` writes one from the drift of {told}" if told else ""
         return f"An effect that the catalogue does not hold would change that{place}.{test}"
     rivals = [c for c in v.candidates if set(c.names) - set(v.effects)]
     if rivals and beyond_limits(rivals[0].hypothesis):
