@@ -85,7 +85,7 @@ def _unheld(
     kept = changing(found.base, alike), changing(best, same)
     gross = found.base.evidence.chi2 > GROSS * found.base.fit.count
     if moving(found.model, found.base):
-        little = [c for c in candidates if c.delta_evidence < MOSTLY * (c.delta_evidence + found.by_moving)]
+        little = [c for c in candidates if c.delta_evidence < MOSTLY * (c.delta_evidence + found.by_resonances)]
         free = (*free, Candidate(found.base, (MOVING,), True, 0.0, none + sum(c.probability for c in little)))
         candidates, none = tuple(replace(c, probability=0.0) if c in little else c for c in candidates), 0.0
     by_chance = SURE * np.sqrt(2 / found.base.fit.count)  # standard deviations of chi2 a number

@@ -31,14 +31,14 @@ WAYS = 8  # in which an effect of the best explanation may act too, at most, tho
 @dataclass(frozen=True, eq=False)
 class Search:
     """Everything tried: the model without effects, all hypotheses with the best first, what screening said, and which effects of the catalogue
-    are a free form's own change with a law; `by_moving` is what a light resonance that moves with temperature gains in ln evidence without effects."""
+    are a free form's own change with a law; `by_resonances` is what light resonances gain in ln evidence without effects."""
 
     model: CampaignModel
     base: Hypothesis
     hypotheses: tuple[Hypothesis, ...]
     screened: tuple[Screened, ...]
     alike: Mapping[str, frozenset[str]] = field(default_factory=dict)
-    by_moving: float = 0.0
+    by_resonances: float = 0.0
 
 
 def search(
@@ -52,11 +52,12 @@ def search(
         if (hit := hit_found(model, none.fit.nuisance, 2 * PLENTY * none.evidence.learned.errors**2)) is not None:
             model = hit
             none = _without_effects(model)
+        plain = none
         wider = with_resonance(model, none, workers)
         model, none = wider or (model, none)
         every = [*named, *own_laws(), *free]
     progress("fitted without effects")
-    tried, by_moving = fit_singles(model, none, every, progress, workers), 0.0
+    tried = fit_singles(model, none, every, progress, workers)
     best = max(tried.singles, key=lambda h: h.evidence.ln, default=none)
     wider = with_resonance(model, best, workers) if best.mechanisms else None
     if wider is not None:
@@ -69,7 +70,6 @@ def search(
     elif best.evidence.learned.errors > STRAIN:
         moves = with_resonance(model, none, workers, moves=True)
         if moves is not None and moves[1].evidence.ln > best.evidence.ln + PLENTY:
-            by_moving = moves[1].evidence.ln - none.evidence.ln
             model, none = moves
             tried = fit_singles(model, none, every, lambda done: None, workers)
     tried = replace(tried, singles=better([*tried.singles, *by_own_laws(model, none, tried, every, workers)]))
@@ -90,7 +90,7 @@ def search(
     laws = {m.name: m for m in reversed(named)}
     ranked = [h for h in ranked if not _against_its_law(model, none.fit.nuisance, h, laws)]
     hypotheses = tuple(sorted([none, *ranked], key=lambda h: -h.evidence.ln))
-    return Search(model, none, hypotheses, tried.screened, _alike(model, none.fit.nuisance, hypotheses), by_moving)
+    return Search(model, none, hypotheses, tried.screened, _alike(model, none.fit.nuisance, hypotheses), none.evidence.ln - plain.evidence.ln)
 
 
 def _without_effects(model: CampaignModel) -> Hypothesis:
