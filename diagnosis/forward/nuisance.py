@@ -53,9 +53,9 @@ DRIFTS_SD = {False: 0.005, True: 0.02}  # of what ln frequency changes by with t
 RANGE_K = 40.0  # over which that is told
 COINCIDE = 0.01  # of a frequency, within which modes are a pair or a cluster
 RIGID = 1e-6  # of the highest frequency, below which a mode is a rigid body's: rounding leaves some 1e-8 of it, and a beam's highest is in MHz
-EXPANSION_SD = {"radial motion of the rings": 0.02, "axial motion of the rings": 0.02, "growth of the grooves": 0.03}
-"""Relative errors of thermal motions, the same at all temperatures: coefficients of expansion are known to some per cent (100Cr6 by handbooks: 11.5 to 12 1e-6/K; two honest finite-element
-programs differ by a thousandth beside that), and programs differ in whether a groove grows with its ring's free strain or follows its face."""
+EXPANSION_SD = {"radial motion of the rings": 3e-3, "axial motion of the rings": 3e-3, "growth of the grooves": 0.03}
+"""Relative errors of thermal motions, the same at all temperatures: two honest finite-element programs differ by a thousandth in the motions, and
+in whether a groove grows with its ring's free strain or follows its face."""
 
 
 
