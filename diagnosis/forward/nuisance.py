@@ -36,6 +36,7 @@ DIRECTED = "bearing stiffness by direction"
 FLUNG, FLUNG_SD = "inertia loads of the balls", 0.1
 """Relative, of centrifugal force and gyroscopic moment together: cage speeds by different assumptions (one race's control, both contact angles, the half sum) differ by some
 per cent, and forces by twice that (Harris, *Rolling Bearing Analysis*, 1991, ch. 8)."""
+DIRECTED_SD = 0.01  # beside that across the axis
 DIRECTIONS = (("axial", (2,)), ("tilt", (3, 4)))
 UNEVEN = "stiffness of a joint uneven"  # about the axis
 RECORD = "end of records"
@@ -179,7 +180,7 @@ def nuisances(
         if len(own) > 1:
             found += [Nuisance(kind, f"{kind.removesuffix(' apart')} of {b} beside the others", sd, index=every.index(b)) for b in own]
     if spindle.bearings:
-        found += [Nuisance(DIRECTED, f"{name} stiffness of the balls", t.structure, index=i) for i, (name, _) in enumerate(DIRECTIONS)]
+        found += [Nuisance(DIRECTED, f"{name} stiffness of the balls", DIRECTED_SD, index=i) for i, (name, _) in enumerate(DIRECTIONS)]
     if spindle.bearings and spindle.ball_inertia:
         found.append(Nuisance(FLUNG, FLUNG, FLUNG_SD))
     found += [Nuisance(UNEVEN, u.name, t.structure / np.sqrt(2), index=i) for i, u in enumerate(unevennesses(spindle))]  # of two that are off by as much each
