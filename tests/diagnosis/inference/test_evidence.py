@@ -23,7 +23,7 @@ from thermospindle.diagnosis.forward.nuisance import (
     STIFFNESS_DRIFT_SD,
     Nuisance,
 )
-from thermospindle.diagnosis.inference.evidence import WIDER, WIDTHS, Learned, evidence, left_out
+from thermospindle.diagnosis.inference.evidence import OFFSET, WIDER, WIDTHS, Learned, evidence, left_out, own_grid
 from thermospindle.diagnosis.inference.gaussian import Quadratic, ln_integral, marginal, posterior, under
 from thermospindle.diagnosis.inference.prior import (
     ACTION,
@@ -34,6 +34,26 @@ from thermospindle.diagnosis.inference.prior import (
     nuisance_variances,
     precision_and_variances,
 )
+from thermospindle.model.machine import Condition
+
+
+@pytest.mark.parametrize(("hidden", "grows"), [((1.0, 1.8, 2.6), True), ((1.8, 1.8, 1.8), False)])
+def test_what_is_as_much_at_the_reference_does_not_grow_from_there(hidden, grows):
+    """A law of the data's own that starts at nothing at 20 C pays for sizes that are the same in every test, and none for those that go with temperature."""
+    free = toy(3, 0.0, hidden)
+    bound = toy(3, 0.0, hidden, reference=Condition(20.0))
+    gain = evidence(bound.model, bound.fit).ln - evidence(free.model, free.fit).ln
+    assert gain > -1 if grows else gain < -5
+
+
+@pytest.mark.parametrize(("free", "offsets"), [(True, {0.0, 1.0}), (False, {0.0})])
+def test_an_offset_is_a_drawing_that_is_off(free, offsets):
+    """Of an element alone, at the odds of one; the odds of all places add up to one."""
+    m = replace(toy(0, 0.0, 1.0).mechanisms[0], free=free, own_law=not free, reference=Condition(20.0))
+    grid = own_grid(m)
+    assert {o for *_, o in grid} == offsets
+    assert sum(np.exp(list(grid.values()))) == pytest.approx(1.0)
+    assert sum(np.exp(ln) for (*_, o), ln in grid.items() if o) == pytest.approx(np.exp(OFFSET) if free else 0.0, rel=1e-4)
 
 
 @pytest.mark.parametrize("errors", [1.0, 1.3])

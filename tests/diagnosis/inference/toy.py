@@ -63,9 +63,10 @@ def toy(
     errors: float = 1.0,
     confused: tuple[float, ...] = (0.0, 0.0, 0.0),
     build: float = 1.0,
+    reference: Condition | None = None,
 ) -> Toy:
     """Data drawn with a discrepancy of the size `stiffness`, build tolerances `build` times those stated, and, with a mechanism in the fit, a `hidden` size in every test, of which the first
-    tolerance cannot be told from `confused` times its change."""
+    tolerance cannot be told from `confused` times its change; with a `reference` its law is the data's own and grows from there."""
     random = np.random.default_rng(seed)
     parameters = [Nuisance(BUILD, f"b{i}", 0.01) for i in range(3)] + [
         Nuisance(STIFFNESS, f"k{i}", STIFFNESS_SD, modes=(i, i)) for i in range(8)
@@ -77,8 +78,9 @@ def toy(
     mechanisms, roots = (), ()
     if hidden is not None:
         size = Parameter("size", "1", 1.0, 1.5, 0.4, limits, "", "")
-        mechanisms = (Mechanism(Effect("toy", "", "", (size,), "", (), ""), {}, ()),)
-        roots = (np.linalg.cholesky(size_covariance(CONDITIONS, REFERENCE_WIDTH * size.prior_sd, REFERENCE_DEPARTURE)),)
+        mechanisms = (Mechanism(Effect("toy", "", "", (size,), "", (), ""), {}, (), own_law=reference is not None, reference=reference),)
+        offset = 1.0 if reference is None else 0.0
+        roots = (np.linalg.cholesky(size_covariance(CONDITIONS, REFERENCE_WIDTH * size.prior_sd, REFERENCE_DEPARTURE, offset, reference)),)
     n = len(parameters)
     sizes = {STIFFNESS: stiffness / STIFFNESS_SD, BUILD: build, TEMPERATURE: 1.0}
     p = np.array([sizes.get(q.kind, 0.0) for q in parameters])

@@ -144,6 +144,21 @@ def test_noise_that_is_not_known_is_taken_from_the_lines():
 # ---- closed forms
 
 
+@pytest.mark.parametrize(("damping", "every"), [(0.01, 4), (0.0015, 2), (0.0006, 1)])
+def test_of_very_many_lines_one_in_so_many_does(monkeypatch, damping, every):
+    """As long as they are closer than the modes are wide: 4000 lines where 1000 are many."""
+    monkeypatch.setattr("thermospindle.sim.identification.modal.MOST_LINES", 1000)
+    lines, at = np.arange(100.0, 900.0, 0.2), np.array([310.0, 540.0])
+    s = 2j * np.pi * lines
+    value = sum(s / (s**2 + 2 * damping * (w := 2 * np.pi * f) * s + w**2) for f in at)[None, None]
+    sd = np.full(value.shape, 1e-3 * np.abs(value).max())
+    modes = extract(lines, value + sd / np.sqrt(2) * (np.random.default_rng(1).standard_normal((2, *value.shape)).T @ [1, 1j]).T, sd)
+    assert np.all(np.abs(modes.frequency - at) < 4 * modes.frequency_sd)
+    assert len(modes.frequency) == 2
+    assert (f"one line in {every}," in modes.status) == (every > 1)
+    assert modes.lines[2] == 4000 // every
+
+
 @pytest.mark.parametrize("decay", [0.0, 15.0])
 @pytest.mark.parametrize(("kind", "power"), [("receptance", 0), ("mobility", 1), ("accelerance", 2)])
 def test_one_mass_on_a_spring(kind, power, decay):
