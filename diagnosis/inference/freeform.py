@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,7 @@ NEARLY = 0.1  # of them, likewise, where a fit of the effect may start from what
 FLAT = 0.1  # of the most that a law does, by which it does more in one test than in another
 OF_BEAMS: list[tuple[str, tuple[int, ...]]] = [("axial", (2,)), ("shear", (0, 1)), ("bending", (3, 4))]
 """What each stiffness of a beam element resists, as its moves are told in `model.rotor.beam`."""
+OF_EACH: list[tuple[str, tuple[int, ...]]] = [("radial", (0, 1)), ("axial", (2,))]
 OF_BEARINGS: list[tuple[str, tuple[int, ...]]] = [("radial", (0, 1)), ("x", (0,)), ("y", (1,)), ("axial", (2,)), ("tilt", (3, 4))]
 
 
@@ -69,6 +71,8 @@ def free_forms(spindle: Spindle, reference: Condition | None = None) -> list[Mec
         found.append(_form(f"{label} rings apart radially", "um", RING_WIDTH, motions=_moved(own, "outer_r")))
     for label, moves in OF_BEARINGS:
         found.append(_form(f"bearings {label} stiffness", "%", STIFFNESS_WIDTH, pair=_stiffened(names, moves)))
+    for name, (label, moves) in product(names if len(names) > 1 else (), OF_EACH):
+        found.append(_form(f"{name} {label} stiffness", "%", STIFFNESS_WIDTH, pair=_stiffened([name], moves)))
     found.append(_form("bearings damping", "%", DAMPING_WIDTH, pair=_damped(names)))
     of_sets = [s.name for s in spindle.sets]
     for label, own in [("preload", of_sets), *([(f"{name} preload", [name]) for name in of_sets] if len(of_sets) > 1 else [])]:

@@ -33,7 +33,9 @@ from thermospindle.sim.identification.poles import (
 
 KINDS = {"receptance": 0, "mobility": 1, "accelerance": 2}
 MOST_LINES = 6400
-"""Of an FRF: half a minute's record of a spindle has tens of thousands, which tell no more of where poles are."""
+"""Of an FRF: half a minute's record of a spindle has tens of thousands, which tell little more of where poles are."""
+STEP, SURE = 0.3, 5.0
+"""Of an FRF, from one line to the next, and of its standard errors, from which it changes much."""
 FAINT = 4.0
 """A mode is reported if its squared shape, weighted by its information, exceeds this many times what the information criterion asks."""
 
@@ -105,7 +107,7 @@ def extract(
 
     Without `frf_sd` it is taken from the `scatter` of neighbouring lines, as the status records. Lines at 0 Hz are left out. Records
     under an exponential window exp(-window_decay t), 1/s, give H at s = i w + window_decay, and are taken so. Of more than `MOST_LINES` one in so many
-    is taken, as long as they are closer than the narrowest mode is wide. Not reported
+    is taken where FRFs change little. Not reported
     are modes out of the band or with a damping that is not `BELIEVED`, not known better than to their half-width, or `FAINT`.
     Raises ValueError if shapes do not agree or numbers are unusable.
     """
@@ -124,20 +126,22 @@ def extract(
     if not (np.isfinite(frf).all() and np.isfinite(sd).all() and (sd > 0).all()):
         raise ValueError("the FRF must be finite and its noise finite and positive at every line")
     unit = 2 * np.pi * np.sqrt(frequency[0] * frequency[-1])
-    every = -(-len(frequency) // MOST_LINES)
-    while True:
-        lines = Lines((window_decay + 2j * np.pi * frequency[::every]) / unit, frf[..., ::every], np.sqrt(2) / sd[..., ::every], KINDS[kind])
-        accepted = _accepted(lines, search(lines))
-        if every == 1 or _resolved(*accepted[:2]):
-            return _modes(*accepted, unit, given, frf.shape[:2], every)
-        every = -(-every // 2)
+    told = _telling(frf, sd, -(-len(frequency) // MOST_LINES))
+    lines = Lines((window_decay + 2j * np.pi * frequency[told]) / unit, frf[..., told], np.sqrt(2) / sd[..., told], KINDS[kind])
+    return _modes(*_accepted(lines, search(lines)), unit, given, frf.shape[:2], len(frequency))
 
 
-def _resolved(lines: Lines, fit: Fit) -> bool:
-    """Whether lines stand closer than the half-width of every mode found."""
-    own = fit.poles[believed(lines, fit.poles)]
-    between = np.interp(np.abs(own), lines.s.imag[1:], np.diff(lines.s.imag))
-    return bool(np.all(between <= -own.real))
+def _telling(frf: ComplexArray, sd: Array, every: int) -> NDArray[np.intp]:
+    """Of lines (n,) one in `every`, and as many as it takes where some FRF changes by more than `STEP` of itself, and by more than its noise, from one to the next."""
+    if every == 1:
+        return np.arange(frf.shape[-1])
+    value, error = frf.reshape(-1, frf.shape[-1]).T, SURE * sd.reshape(-1, frf.shape[-1]).T
+    size, kept = STEP * np.abs(value), [0]
+    for i in range(1, len(value)):
+        last = kept[-1]
+        if i - last >= every or np.any(np.abs(value[i] - value[last]) > np.maximum(size[i], size[last]) + error[i]):
+            kept.append(i)
+    return np.array(kept)
 
 
 def _accepted(lines: Lines, found: Fit) -> tuple[Lines, Fit, float, list[tuple[complex, complex]]]:
@@ -232,7 +236,7 @@ def _modes(
     unit: float,
     given: bool,
     functions: tuple[int, int],
-    every: int,
+    measured: int,
 ) -> Modes:
     """Physical units, standard errors, and the choice of what is reported."""
     responses, references = functions
@@ -289,7 +293,7 @@ def _modes(
     kept = np.append(keep, a + keep)
     chi2 = fit.chi2 / (lines.count - fit.unknowns)
     words = ["noise as given" if given else "noise estimated from neighbouring lines"]
-    words += [f"one line in {every}, closer than the narrowest mode is wide"] if every > 1 else []
+    words += [f"{len(lines.s)} of {measured} lines, all of those where FRFs change much"] if measured > len(lines.s) else []
     words += [f"chi-square {chi2:.3g} per degree of freedom" + (", errors enlarged by its root" if chi2 > 1 else "")]
     words += [] if strain else ["residues of rank one refused by the data, left free"]
     words += [f"residues of rank one strained, errors enlarged by {np.sqrt(strain):.2g}"] if strain > 1 else []
