@@ -48,6 +48,15 @@ def test_the_form_is_written_and_filled_in(tmp_path, capsys):
     assert [p.node for p in read_campaign(tmp_path / "c").points] == [1, 3, 6]
 
 
+@pytest.mark.parametrize(("names", "roving"), [(("p1", "p2", "p3"), True), (("T20", "T40", "T60"), False)])
+def test_files_that_may_be_one_roving_test_are_said_to_be(tmp_path, names, roving):
+    """Nine numbered files of a shaft became nine tests without a word."""
+    heads, found = columns("real", "(m/s)/N", FRF.value)
+    files = [table(tmp_path / f"{name}.csv", ["Frequency", *heads], [FREQUENCY, *found]) for name in names]
+    said = bring(files, mapping=tmp_path / "m.toml").values["proposed"]
+    assert ("3 files, a test each: where hammer or sensor roved and they are one test, give them the same test" in said) == roving
+
+
 def test_points_of_a_scene(tmp_path):
     from tests.conftest import SCENE
 
