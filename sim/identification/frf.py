@@ -265,7 +265,7 @@ def _check_susceptance(key: str, frequency: np.ndarray, turned: np.ndarray, nois
     share = (counts & (step < 0)).sum() / max(counts.sum(), 1)
     if counts.sum() >= ENOUGH // 2 and share > limits.falling:
         raise BadInput(
-            f"{key}: between resonances the imaginary part of the driving point's mobility falls on {share:.0%} of the lines, as without antiresonances it does; "
+            f"{key}: between resonances the imaginary part of the driving point's mobility falls on {share:.0%} of the lines, as where antiresonances are missing; "
             f"allowed is {limits.falling:.0%}: this is the answer of another point than the hammer's"
         )
 
