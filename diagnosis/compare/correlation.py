@@ -31,7 +31,7 @@ from thermospindle.sim.campaign.beside import Beside
 
 SILENT = 1e-6  # of the largest FRF of the test; smaller computed ones are forbidden by symmetry and have no shape to compare
 FEWEST = 8  # lines of a band that is worth a number
-LOUDER = 3.0  # dB, from which a factor that all FRFs share is told, and within which they share it
+LOUDER, NEARLY = 3.0, 0.25  # dB, from which a factor that all FRFs share is told; within which, or within this part of it, they share it
 SHIFT_STEP = 5e-4  # relative, between the shifts tried
 DISTINCT = 0.05  # by how much FDAC must vary over the shifts tried for one of them to be the best
 THIRD = 10**0.1  # ratio of neighbouring third-octave band centres
@@ -164,7 +164,7 @@ def in_common(tests: Sequence[Correlation]) -> float | None:
         if c.responds(pair)
     ]
     whole = float(np.median(ratios)) if ratios else 0.0
-    return whole if abs(whole) > LOUDER and np.abs(np.array(ratios) - whole).max() < LOUDER else None
+    return whole if abs(whole) > LOUDER and np.abs(np.array(ratios) - whole).max() < max(LOUDER, NEARLY * abs(whole)) else None
 
 
 def _nothing(frequency: Array) -> Band:
