@@ -10,6 +10,7 @@ from thermospindle.diagnosis.decision.loss import NEGLIGIBLE, in_all
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.forward.nuisance import Resonance
+from thermospindle.diagnosis.inference.gaussian import apart_by
 from thermospindle.diagnosis.inference.hypothesis import LITTLE, STRAIN, Hypothesis
 from thermospindle.diagnosis.inference.remainder import ALIKE, Overlap
 from thermospindle.diagnosis.inference.resonance import moving, shown
@@ -97,8 +98,7 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
 def _same_in_all(h: Hypothesis) -> bool:
     """Whether what is free in an explanation is as much in every test, of two or more: an offset, and no drift."""
     rows = [(a, c) for m, a, c in zip(h.mechanisms, h.evidence.sizes, h.evidence.size_covariance, strict=True) if m.free]
-    apart = [np.abs(a[:, None] - a) - SAME * np.sqrt(np.maximum(np.diag(c)[:, None] + np.diag(c) - 2 * c, 0.0)) for a, c in rows]
-    return all(len(a) > 1 and np.all(np.abs(a) > SAME * np.sqrt(np.diag(c))) and np.all(by <= 0.0) for (a, c), by in zip(rows, apart, strict=True))
+    return all(len(a) > 1 and np.all(np.abs(a) > SAME * np.sqrt(np.diag(c))) and apart_by(a, c).max() <= SAME for a, c in rows)
 
 
 def _impossible(found: Search, drifting: Names) -> str:

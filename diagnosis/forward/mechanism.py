@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import product
 from typing import Any
 
@@ -21,6 +22,7 @@ import numpy as np
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
+from thermospindle.sim.effects import of_scene
 from thermospindle.sim.effects.effect import HOOKS, Effect, Parameter
 from thermospindle.sim.operating import operating_point
 
@@ -31,6 +33,9 @@ MEMORY_SOAK = 2.0  # of ln soak time
 LITTLE = 0.02  # of an effect's typical size, which is linear in all that it changes
 IDLE = 0.02  # of what an effect changes where it does most, by which it may change something where it does nothing
 SAME = 1e-6  # of the square of a change, by which it may differ from another that is the same
+FAILS = (ArithmeticError, LookupError, RuntimeError, TypeError, ValueError)
+"""What asking an effect at a condition may end in, some effects being a user's own."""
+Changes = Callable[[Condition, Effect, Mapping[str, float]], Array]
 REFERENCE_DEPARTURE = 0.5  # of the size, in the fit itself; evidence takes others into account
 REFERENCE_WIDTH = 2.0  # prior standard deviations of the size, likewise
 
@@ -103,14 +108,14 @@ def with_own_laws(mechanisms: Sequence[Mechanism], spindle: Spindle, conditions:
     """The same with laws of the data's own: every effect does at any condition what its formula gives where it does most, and what gives nothing at the reference
     grows from there. Of what lies between two ideal cases of a
     law one serves for all, and what there is but another size is no shape; what lasts, or asks for no condition, has no law but a constant, what is `exact` no other, and what changes the condition cannot be asked at another."""
-    at, reference = strongest(spindle, conditions), unmoved(spindle, conditions)
+    at, reference, changes = strongest(spindle, conditions), unmoved(spindle, conditions), _changes_of(spindle)
     found: dict[tuple, Mechanism] = {}
     for m in mechanisms:
         chosen = {p.name: m.choices[p.name] for p in m.effect.parameters if p.choices}
         if not (m.effect.lasting or m.effect.exact or m.effect.condition) and (m.name, *chosen.items()) not in found and _asks(m.effect, spindle, at):
-            grows = _idle(m.effect, spindle, reference, at)
+            grows = _idle(m.effect, changes, reference, at)
             own = replace(m, effect=asked_at(m.effect, at), own_law=True, reference=reference if grows else None)
-            found[m.name, *chosen.items()] = _without_scales(own, spindle, at)
+            found[m.name, *chosen.items()] = _without_scales(own, changes, at)
     return list(found.values())
 
 
@@ -127,33 +132,38 @@ def asked_at(effect: Effect, at: Any) -> Effect:
     return replace(effect, **hooks)
 
 
-def _without_scales(m: Mechanism, spindle: Spindle, at: Condition) -> Mechanism:
+def _changes_of(spindle: Spindle) -> Changes:
+    """What an effect changes at a condition beside those of the scene, in shares of the largest entry of each matrix; what is without it is worked out once a condition."""
+    present, plain = of_scene(spindle), cache(lambda at: operating_point(spindle, at).linear)
+
+    def changes(at: Condition, effect: Effect, values: Mapping[str, float]) -> Array:
+        before, found = plain(at), operating_point(spindle, at, [*present, (effect, values)]).linear
+        return np.concatenate([np.ravel(getattr(found, w) - getattr(before, w)) / np.abs(getattr(before, w)).max() for w in ("mass", "damping", "stiffness")])
+
+    return changes
+
+
+def _without_scales(m: Mechanism, changes: Changes, at: Condition) -> Mechanism:
     """Without the shape parameters that do no more than a size does where one condition alone is asked: a law's, such as the interference by which a fit
     opens with temperature. They stay where they are neutral."""
     try:
         neutral = m.values(m.size.neutral + LITTLE * (m.size.typical - m.size.neutral), [q.neutral for q in m.shape])
-        drawn = _changed(spindle, at, m.effect, neutral)
-        scales = [q for q in m.shape if _parallel(drawn, _changed(spindle, at, m.effect, {**neutral, q.name: _inside(q)}))]
-    except (ArithmeticError, LookupError, RuntimeError, TypeError, ValueError):
+        drawn = changes(at, m.effect, neutral)
+        scales = [q for q in m.shape if _parallel(drawn, changes(at, m.effect, {**neutral, q.name: _inside(q)}))]
+    except FAILS:
         return m
     return replace(m, choices={**m.choices, **{q.name: q.neutral for q in scales}}, shape=tuple(q for q in m.shape if q not in scales))
 
 
-def _idle(effect: Effect, spindle: Spindle, reference: Condition, at: Condition) -> bool:
+def _idle(effect: Effect, changes: Changes, reference: Condition, at: Condition) -> bool:
     """Whether an effect of typical size changes next to nothing at the `reference` of what it changes `at` another condition."""
     if effect.measurement is not None:
         return False
     try:
-        there, here = (_changed(spindle, c, effect, effect.typical()) for c in (reference, at))
-    except (ArithmeticError, LookupError, RuntimeError, TypeError, ValueError):
+        there, here = (changes(c, effect, effect.typical()) for c in (reference, at))
+    except FAILS:
         return False
     return bool(float(there @ there) < IDLE**2 * float(here @ here))
-
-
-def _changed(spindle: Spindle, at: Condition, effect: Effect, values: Mapping[str, float]) -> Array:
-    """What an effect changes of the matrices, in shares of the largest entry of each."""
-    plain, found = operating_point(spindle, at).linear, operating_point(spindle, at, [(effect, values)]).linear
-    return np.concatenate([np.ravel(getattr(found, w) - getattr(plain, w)) / np.abs(getattr(plain, w)).max() for w in ("mass", "damping", "stiffness")])
 
 
 def _inside(q: Parameter) -> float:
@@ -185,7 +195,7 @@ def _asks(effect: Effect, spindle: Spindle, at: Condition) -> bool:
     try:
         point = operating_point(spindle, at, [(asked_at(effect, watched), effect.typical())])
         point.chain, point.measurement  # noqa: B018 - worked out here
-    except (ArithmeticError, LookupError, RuntimeError, TypeError, ValueError):
+    except FAILS:
         return True
     return watched.asked
 

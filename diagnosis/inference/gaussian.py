@@ -190,6 +190,13 @@ def impossible(m: Mechanism, sizes: Array, covariance: Array) -> bool:
     return bool(2 * nearest.cost > CANNOT**2)
 
 
+def apart_by(sizes: Array, covariance: Array) -> Array:
+    """How far (n, n) every two of some sizes (n,) lie apart, in standard errors of their difference; of one from itself nothing."""
+    variance = np.diag(covariance)
+    sd = np.sqrt(np.maximum(variance[:, None] + variance - 2 * covariance, 1e-300))
+    return np.asarray(np.abs(sizes[:, None] - sizes) / sd)
+
+
 def opposite(m: Mechanism, sizes: Array, covariance: Array) -> bool:
     """Whether a mechanism would need the sign that it cannot have: in every test (tests,), by more than twice its standard error, or by more than `CANNOT` in one and the
     sign that it can have in none; where its law does nothing any sign would do."""

@@ -13,13 +13,11 @@ from numpy.typing import NDArray
 
 from thermospindle.model.errors import BadInput
 from thermospindle.model.types import Array
-from thermospindle.sim.identification.modal import scatter
+from thermospindle.sim.identification.modal import KINDS, scatter
 from thermospindle.sim.identification.running_lines import RunningLines, running_lines
 
 TO_POWER = {"receptance": 1j, "mobility": 1.0, "accelerance": -1j}
 """What an FRF may be, with the phase that turns it to mobility."""
-TO_SIZE = {"receptance": 1, "mobility": 0, "accelerance": -1}
-"""With the power of the angular frequency that does so."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +164,7 @@ def check_frf(where: str | Path, frf: Frf, speed: float, limits: Limits = LIMITS
             if response == reference:
                 mobility, noise = quiet.value[i, j] * TO_POWER[frf.quantity], _noise(frf, i, j)
                 _check_driving_point(key, frf.frequency, mobility, noise, limits)
-                _check_susceptance(key, frf.frequency, mobility, noise, TO_SIZE[frf.quantity], limits)
+                _check_susceptance(key, frf.frequency, mobility, noise, 1 - KINDS[frf.quantity], limits)
     if speed == 0:
         _check_reciprocity(where, frf, limits)
 

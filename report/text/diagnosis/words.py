@@ -9,6 +9,7 @@ from rich.console import Console
 
 from thermospindle.diagnosis.decision.explanations import beyond_limits
 from thermospindle.diagnosis.decision.loss import in_all
+from thermospindle.diagnosis.inference.gaussian import apart_by
 from thermospindle.diagnosis.inference.hypothesis import DEPARTS
 from thermospindle.diagnosis.verdict import Diagnosis, Drift
 from thermospindle.model.machine import Condition
@@ -70,11 +71,7 @@ def _odd_one(p: Drift) -> int | None:
     """The one test that differs from each of the others, by `ODD` of its errors, where these agree among themselves; None where there is none."""
     if len(p.change) < 4:
         return None
-    apart = np.abs(p.change[:, None] - p.change)
-    variance = np.diag(p.covariance)
-    sd = np.sqrt(np.maximum(variance[:, None] + variance - 2 * p.covariance, 1e-300))
-    np.fill_diagonal(sd, np.inf)
-    by = apart / sd
+    by = apart_by(p.change, p.covariance)
     odd = int(np.argmax(by.sum(axis=1)))
     rest = np.delete(np.arange(len(by)), odd)
     return odd if by[odd, rest].min() > ODD and by[np.ix_(rest, rest)].max() < AGREE else None

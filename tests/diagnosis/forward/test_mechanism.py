@@ -14,11 +14,11 @@ from thermospindle.diagnosis.forward.nuisance import RECORD
 from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.inference.freeform import alike, as_told_by, free_forms
 from thermospindle.diagnosis.inference.problem import Problem
-from thermospindle.model.machine import Condition
+from thermospindle.model.machine import Addition, Condition
 from thermospindle.model.rotor.chain import motion_rows
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
-from thermospindle.sim.effects import usable
+from thermospindle.sim.effects import by_name, usable
 from thermospindle.sim.operating import operating_point
 
 CONDITIONS = [Condition(20.0), Condition(20.0), Condition(40.0, 7200 * RPM), Condition(60.0), Condition(60.0, 0.0, 100.0), Condition(60.0, 0.0, 1.0, 60.0)]
@@ -105,6 +105,15 @@ def test_laws_of_the_datas_own_act_in_every_test_as_where_they_do_most(spindle):
     at_rest = warm.effect.temperatures(spindle, Condition(20.0), values, by_region)
     assert at_rest == next(m for m in named if m.name == "thermal_gradient").effect.temperatures(spindle, at, values, by_region)
     assert max(at_rest.values()) > 20.1
+
+
+def test_what_grows_does_so_beside_what_a_scene_has_already(spindle):
+    """A preload that is lost at the reference too changed matrices there, and not what was asked beside it."""
+    softer = by_name("modulus_softening")
+    worn = replace(spindle, effects=(Addition("preload_loss", by_name("preload_loss").typical() | {"thermal_share": 0.0}),))
+    for scene in (spindle, worn):
+        (own,) = with_own_laws(variants(softer)[:1], scene, CONDITIONS)
+        assert own.reference == Condition(20.0, 0.0, 0.0, np.inf)
 
 
 @pytest.fixture(scope="module")
