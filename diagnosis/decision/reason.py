@@ -28,10 +28,12 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
     n, chi2 = found.base.fit.count, found.base.evidence.chi2
     if word == "none":
         best = f"; the best effect, {' + '.join(candidates[0].names)}, has a probability of {candidates[0].probability:.1%}" if candidates else ""
-        wrong = found.base.evidence.learned.sizes.get(kinds_of.STIFFNESS, 0.0)
+        sizes = found.base.evidence.learned.sizes
+        wrong, change = sizes.get(kinds_of.STIFFNESS, 0.0), sizes.get(kinds_of.CHANGE, 0.0)
         which = "; one condition cannot tell that from a missing effect" if len(conditions_of(found.model.spindle, found.model.tests)) == 1 else ""
         constant = f", the model's frequencies being constantly wrong by about {wrong:.1g} of each{which}" if wrong > NUMERICS[0] else ""
-        return f"Tolerances and measuring errors explain the data: chi2 is {chi2 / n:.2f} a number for {n} numbers{constant}{best}."
+        otherwise = f", what temperature and speed do to the balls' stiffness being wrong by about {change:.0%} of it" if change else ""
+        return f"Tolerances and measuring errors explain the data: chi2 is {chi2 / n:.2f} a number for {n} numbers{constant}{otherwise}{best}."
     lead = candidates[0] if candidates else None
     if word == "unexplained":
         place = "nothing tried explains them, nor do tolerances and measuring errors: units, points, and noise that the files do not tell come first"

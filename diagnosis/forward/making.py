@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
-from thermospindle.diagnosis.forward.model import CampaignModel, TestData
-from thermospindle.diagnosis.forward.nuisance import nuisances, reference_modes
+from thermospindle.diagnosis.forward.model import FAILED, Applied, CampaignModel, TestData
+from thermospindle.diagnosis.forward.nuisance import RANGE_K, Nuisance, changes_of, nuisances, reference_modes
 from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import matrices
@@ -32,8 +33,29 @@ def campaign_model(spindle: Spindle, campaign: Campaign, tests: Sequence[TestDat
     lines = [d for d in tests if isinstance(d, LineData)]
     channels = len({node for d in lines for node in d.sensors})
     names = [d.test.id for d in tests]
-    parameters = nuisances(spindle, build, names, bool(lines), channels, modes)
+    parameters = nuisances(spindle, build, names, bool(lines), channels, modes, changes(spindle, present, names, [d.condition for d in tests]))
     return CampaignModel(spindle, tuple(tests), scenes, build, parameters, modes, present, lumped=campaign.lumped_shafts)
+
+
+def changes(spindle: Spindle, present: Applied, names: Sequence[str], conditions: Sequence[Condition]) -> list[Nuisance]:
+    """By what the change of the balls' stiffness with temperature and speed may be off, from how the drawing's changes across the axis; nothing of tests in which no spindle can be built."""
+
+    @cache
+    def across(temperature: float, speed: float) -> float:
+        return float(sum(b.stiffness[0, 0] for b in operating_point(spindle, Condition(temperature, speed), present).state.bearings))
+
+    def apart(at: tuple[float, float], of: tuple[float, float]) -> float:
+        try:
+            return across(*at) / across(*of) - 1.0
+        except FAILED:
+            return 0.0
+
+    if not spindle.bearings:
+        return []
+    reference = spindle.reference_temperature
+    warmer = [apart((c.temperature, 0.0), (reference, 0.0)) for c in conditions]
+    faster = [apart((c.temperature, c.speed), (c.temperature, 0.0)) for c in conditions]
+    return changes_of(names, warmer, faster, [(c.temperature - reference) / RANGE_K for c in conditions])
 
 
 def expected_noise(spindle: Spindle) -> Noise:

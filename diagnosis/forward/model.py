@@ -16,7 +16,7 @@ from thermospindle.diagnosis.data.mode_table import ModeData
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.linear import Linear, mass_between
 from thermospindle.diagnosis.forward.nuisance import Nuisance, ReferenceModes, Resonance, Unevenness, unevennesses
-from thermospindle.diagnosis.forward.points import Applied, apart, directed, replace_measuring, stretched, uneven
+from thermospindle.diagnosis.forward.points import Applied, apart, otherwise, replace_measuring, stretched, uneven
 from thermospindle.diagnosis.forward.response import Light, Response
 from thermospindle.diagnosis.forward.table import Table
 from thermospindle.model.built.tolerance import Toleranced
@@ -97,9 +97,10 @@ class CampaignModel:
         return [i for i, p in enumerate(self.parameters) if p.kind in kinds_of.APART]
 
     @cached_property
-    def directed(self) -> list[int]:
-        """Numbers of the parameters by which bearings are stiffer in one direction."""
-        return [i for i, p in enumerate(self.parameters) if p.kind == kinds_of.DIRECTED]
+    def balls(self) -> list[list[int]]:
+        """For every test the numbers of the parameters by which balls are stiffer: in one direction, with temperature, and in this test."""
+        kinds = (kinds_of.BALLS, kinds_of.CHANGE)
+        return [[i for i, p in enumerate(self.parameters) if p.kind in kinds and p.test in (None, t)] for t in range(len(self.tests))]
 
     @cached_property
     def flung(self) -> list[int]:
@@ -163,7 +164,7 @@ class CampaignModel:
         """The operating point of test `t`, sizes within their limits; what differs in the measuring chain alone is not worked out again."""
         effects = within_limits(effects)
         acting = tuple((id(e), *v.values()) for e, v in effects if any(getattr(e, hook) for hook in MEASURING))
-        little = tuple(x[own].tobytes() for own in (self.expansion, self.apart, self.directed, self.flung, self.uneven))
+        little = tuple(x[own].tobytes() for own in (self.expansion, self.apart, self.balls[t], self.flung, self.uneven))
         key = (t, x[: len(self.build)].tobytes(), float(x[self.temperature[t]]), little, acting)
         late = self._points.get(key)
         if late is None:
@@ -176,8 +177,8 @@ class CampaignModel:
             if x[self.apart].any():
                 names, own = [b.name for b in self.spindle.all_bearings], [(self.parameters[i], float(x[i])) for i in self.apart]
                 every = [apart(*({names[p.index]: v * p.sd for p, v in own if p.kind == kind} for kind in kinds_of.APART)), *every]
-            if x[self.directed].any():
-                every = [directed({self.parameters[i].index: float(x[i]) * self.parameters[i].sd for i in self.directed}), *every]
+            if x[self.balls[t]].any():
+                every = [self._otherwise(t, x), *every]
             if x[self.uneven].any():
                 joints = [(self.unevennesses[p.index], float(x[i]) * p.sd) for i in self.uneven for p in [self.parameters[i]]]
                 every = [uneven(joints), *every]
@@ -190,6 +191,14 @@ class CampaignModel:
             late.chain  # noqa: B018 - worked out here, so that errors come here
             return late
         return replace_measuring(late, [*self.present, *effects])
+
+    def _otherwise(self, t: int, x: Array) -> tuple[Effect, Values]:
+        """How stiff the balls are in test `t`, otherwise than drawn."""
+        rows = [(p, float(x[i]) * p.sd) for i in self.balls[t] for p in [self.parameters[i]]]
+        shares = {p.index: value for p, value in rows if p.kind == kinds_of.BALLS}
+        warmer = sum(value for p, value in rows if p.kind == kinds_of.CHANGE and p.test is None)
+        own = {p.index: value for p, value in rows if p.kind == kinds_of.CHANGE and p.test == t}
+        return otherwise(shares, warmer, (own.get(0, 0.0), own.get(1, 0.0)))
 
     @cached_property
     def _points(self) -> dict:

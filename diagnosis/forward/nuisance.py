@@ -10,7 +10,8 @@ mode in each test: what laws that hold only nearly leave. The size of each is le
 
 Bearings differ among themselves: each has a stiffness and a damping of its own about those that all share with the drawing, within the scene's tolerances. A
 constant discrepancy of modes cannot stand in for that: bearings soften with speed, and what one of two is off by with them. So it is with how stiff balls are along the axis and in
-tilt beside across it, in which two honest programs differ by a per cent or two: where the forces of a row are said to act, and what the races give.
+tilt beside across it, in which two honest programs differ by a per cent or two: where the forces of a row are said to act, and what the races give. And what temperature and speed do
+to that stiffness is known as far as the model of a bearing holds: a share of it is wrong, learned from the data, for the most part alike in proportion to temperature.
 
 A light resonance is one that the drawing lacks, of the table, a fixture or a cable: an oscillator on some point of the machine, wherever that is, and so
 given by how much of it each reference mode carries along. It is looked for where the data show the same misfit in every test.
@@ -32,12 +33,16 @@ from thermospindle.model.types import Array
 
 BUILD, TEMPERATURE, GAIN, DRIFT, EXPANSION = "build", "temperature", "gain", "gain drift", "thermal expansion"
 APART = "stiffness apart", "damping apart"  # of bearings
-DIRECTED = "bearing stiffness by direction"
+BALLS = "stiffness of the balls"
 FLUNG, FLUNG_SD = "inertia loads of the balls", 0.1
 """Relative, of centrifugal force and gyroscopic moment together: cage speeds by different assumptions (one race's control, both contact angles, the half sum) differ by some
 per cent, and forces by twice that (Harris, *Rolling Bearing Analysis*, 1991, ch. 8)."""
-DIRECTED_SD = 0.01  # beside that across the axis
+BALLS_SD = 0.01  # in one direction beside that across the axis
 DIRECTIONS = (("axial", (2,)), ("tilt", (3, 4)))
+CHANGE, CHANGE_SD = "change of the balls' stiffness", 0.03
+"""Relative, at the reference width, of what temperature does to the stiffness. Two honest programs keep the contact's constant, or let its groove grow away from its ball: of
+ceramic balls in steel that is a twentieth of all that temperature does."""
+CHANGE_APART = 0.3  # of it, by which what temperature does is off in each test by itself; of what speed does all of it, for balls' inertia loads are less sure
 UNEVEN = "stiffness of a joint uneven"  # about the axis
 RECORD = "end of records"
 RESONANCE = "light resonance"
@@ -168,10 +173,21 @@ def reference_modes(linear: Matrices, seen: float, highest: float, most: int) ->
     return ReferenceModes(omega[keep], np.maximum(damping, 1e-4), linear.mass @ modal, linear.dofs, int(np.sum(omega[keep] < seen)))
 
 
+def changes_of(tests: Sequence[str], warmer: Sequence[float], faster: Sequence[float], far: Sequence[float]) -> list[Nuisance]:
+    """By what the change of the balls' stiffness may be off, from how it changes in every test, relative, with temperature and with speed, `far` (`RANGE_K`) from the reference."""
+    furthest = max(range(len(tests)), key=lambda t: abs(far[t]))
+    found = []
+    if warmer[furthest]:
+        found.append(Nuisance(CHANGE, f"{CHANGE} with temperature", CHANGE_SD * abs(warmer[furthest] / far[furthest])))
+    apart = [CHANGE_APART * abs(w) + abs(f) for w, f in zip(warmer, faster, strict=True)]
+    ways = ((0, "across the axis"), (1, "along it and in tilt"))
+    return found + [Nuisance(CHANGE, f"{CHANGE} {way} in {n}", CHANGE_SD * a, t, i) for t, (n, a) in enumerate(zip(tests, apart, strict=True)) if a for i, way in ways]
+
+
 def nuisances(
-    spindle: Spindle, build: Sequence[Toleranced], tests: Sequence[str], with_lines: bool, channels: int, modes: ReferenceModes
+    spindle: Spindle, build: Sequence[Toleranced], tests: Sequence[str], with_lines: bool, channels: int, modes: ReferenceModes, changes: Sequence[Nuisance] = ()
 ) -> tuple[Nuisance, ...]:
-    """All nuisance parameters of a campaign with `tests` (ids): those of FRF lines only where a test has any."""
+    """All nuisance parameters of a campaign with `tests` (ids): those of FRF lines only where a test has any, `changes` of the balls' stiffness among them (`changes_of`)."""
     t = spindle.tolerances
     found = [Nuisance(BUILD, p.name, p.sd, index=i) for i, p in enumerate(build)]
     found += [Nuisance(EXPANSION, name, sd, index=i) for i, (name, sd) in enumerate(EXPANSION_SD.items())]
@@ -180,7 +196,8 @@ def nuisances(
         if len(own) > 1:
             found += [Nuisance(kind, f"{kind.removesuffix(' apart')} of {b} beside the others", sd, index=every.index(b)) for b in own]
     if spindle.bearings:
-        found += [Nuisance(DIRECTED, f"{name} stiffness of the balls", DIRECTED_SD, index=i) for i, (name, _) in enumerate(DIRECTIONS)]
+        found += [Nuisance(BALLS, f"{name} stiffness of the balls", BALLS_SD, index=i) for i, (name, _) in enumerate(DIRECTIONS)]
+    found += changes
     if spindle.bearings and spindle.ball_inertia:
         found.append(Nuisance(FLUNG, FLUNG, FLUNG_SD))
     found += [Nuisance(UNEVEN, u.name, t.structure / np.sqrt(2), index=i) for i, u in enumerate(unevennesses(spindle))]  # of two that are off by as much each

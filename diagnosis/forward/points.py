@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from thermospindle.diagnosis.forward.nuisance import DIRECTIONS, Unevenness
+from thermospindle.diagnosis.forward.nuisance import DIRECTIONS, RANGE_K, Unevenness
 from thermospindle.model.bearing.pair import PairState
 from thermospindle.model.machine import Condition, RingMotion, Spindle
 from thermospindle.model.rotor.chain import RotorBase
@@ -54,17 +54,19 @@ def apart(stiffness: Mapping[str, float], damping: Mapping[str, float]) -> tuple
     return Effect("apart", "", "", (), "", (), "", pair=pair), {}
 
 
-def directed(shares: Mapping[int, float]) -> tuple[Effect, Values]:
-    """Stiffness and damping of ball rows in each of `DIRECTIONS`, by number, off by these shares."""
-    d = np.ones(5)
+def otherwise(shares: Mapping[int, float], warmer: float = 0.0, own: tuple[float, float] = (0.0, 0.0)) -> tuple[Effect, Values]:
+    """Stiffness and damping of ball rows off by these shares, in each of `DIRECTIONS` by number; in all directions by `warmer` at `RANGE_K` from the reference temperature, in
+    proportion to that; and by `own` across the axis, and along it and in tilt."""
+    d = np.sqrt(np.maximum(1 + np.array(own), 0.0))[[0, 0, 1, 1, 1]]
     for i, share in shares.items():
-        d[list(DIRECTIONS[i][1])] = np.sqrt(max(1 + share, 0.0))
+        d[list(DIRECTIONS[i][1])] *= np.sqrt(max(1 + share, 0.0))
     square = np.outer(d, d)
 
     def pair(spindle: Spindle, condition: Condition, values: Values, state: PairState) -> PairState:
-        return replace(state, bearings=tuple(replace(b, stiffness=square * b.stiffness, damping=square * b.damping) for b in state.bearings))
+        factor = square * max(1 + warmer * (condition.temperature - spindle.reference_temperature) / RANGE_K, 0.0)
+        return replace(state, bearings=tuple(replace(b, stiffness=factor * b.stiffness, damping=factor * b.damping) for b in state.bearings))
 
-    return Effect("directed", "", "", (), "", (), "", pair=pair), {}
+    return Effect("otherwise", "", "", (), "", (), "", pair=pair), {}
 
 
 def uneven(shares: Sequence[tuple[Unevenness, float]]) -> tuple[Effect, Values]:

@@ -22,6 +22,7 @@ REFERENCE = {
     kinds_of.STIFFNESS_DRIFT: kinds_of.STIFFNESS_DRIFT_SD,
     kinds_of.DAMPING_DRIFT: kinds_of.DAMPING_DRIFT_SD,
     kinds_of.DRIFT: kinds_of.DRIFT_SD,
+    kinds_of.CHANGE: kinds_of.CHANGE_SD,
 }
 """Widths in which nuisances of unknown size are counted; build tolerances in those that the scene states."""
 ACTION = 3.0  # times the relative error of frequencies, which what the model says of an effect may be wrong by
@@ -50,19 +51,21 @@ class Learned:
 
 
 DRIFTING = (kinds_of.STIFFNESS_DRIFT, kinds_of.DAMPING_DRIFT)
+CHANGING = (*DRIFTING, kinds_of.CHANGE)
+"""What changes from test to test, of every mode, and of bearings."""
 
 
 def steady(learned: Learned, mechanisms: Sequence[Mechanism] = ()) -> Learned:
-    """What was learned of constant discrepancies and of gains, for a fit of `mechanisms`: how much modes drift, and a drawing is off, is left as it is on
-    paper, so that neither takes what the mechanisms should explain."""
-    on_paper = (*DRIFTING, kinds_of.BUILD)
+    """What was learned of constant discrepancies and of gains, for a fit of `mechanisms`: how much modes drift, bearings change otherwise, and a drawing is off, is left as it is on
+    paper, so that none takes what the mechanisms should explain."""
+    on_paper = (*CHANGING, kinds_of.BUILD)
     sizes = {kind: REFERENCE[kind] if kind in on_paper else max(REFERENCE[kind], size) for kind, size in learned.sizes.items() if kind in REFERENCE}
     return as_stated(sizes, mechanisms)
 
 
 def undrifted(learned: Learned) -> Learned:
-    """What was learned, but for modes that drift."""
-    return replace(learned, sizes={kind: 0.0 if kind in DRIFTING else size for kind, size in learned.sizes.items()})
+    """What was learned, but for modes that drift and bearings that change otherwise."""
+    return replace(learned, sizes={kind: 0.0 if kind in CHANGING else size for kind, size in learned.sizes.items()})
 
 
 def as_stated(sizes: Mapping[str, float], mechanisms: Sequence[Mechanism] = ()) -> Learned:

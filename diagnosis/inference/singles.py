@@ -23,7 +23,7 @@ from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit
 from thermospindle.diagnosis.inference.freeform import as_told_by
 from thermospindle.diagnosis.inference.hypothesis import EARLY, LITTLE, PLENTY, STRAIN, Hypothesis, Task, fitted, scan
-from thermospindle.diagnosis.inference.prior import DRIFTING, Learned, steady, undrifted
+from thermospindle.diagnosis.inference.prior import CHANGING, Learned, steady, undrifted
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.inference.resonance import with_more
 from thermospindle.diagnosis.inference.screening import Screened, screen
@@ -85,9 +85,9 @@ def fit_singles(
 
 
 def strained(h: Hypothesis) -> bool:
-    """Whether an explanation leaves more than errors, or has modes drift to leave no more."""
+    """Whether an explanation leaves more than errors, or has modes drift, or bearings change otherwise, to leave no more."""
     learned = h.evidence.learned
-    return learned.errors > STRAIN or any(learned.sizes.get(kind, 0.0) > 0 for kind in DRIFTING)
+    return learned.errors > STRAIN or any(learned.sizes.get(kind, 0.0) > 0 for kind in CHANGING)
 
 
 def _owed(

@@ -13,9 +13,10 @@ from thermospindle.diagnosis.forward.derivatives import column, nuisance_jacobia
 from thermospindle.diagnosis.forward.linear import products, together
 from thermospindle.diagnosis.forward.nuisance import (
     APART,
+    BALLS,
     BUILD,
+    CHANGE,
     DAMPING,
-    DIRECTED,
     DRIFT,
     EXPANSION,
     FLUNG,
@@ -36,7 +37,7 @@ from thermospindle.sim.campaign.campaign import Noise
 NOISELESS = Noise(0.0, 0.0)
 CONDITIONS = (Condition(20.0), Condition(45.0, 7200 * RPM))
 FREQUENCY = np.arange(400.0, 6000.1, 40.0)
-KINDS = (BUILD, EXPANSION, *APART, DIRECTED, FLUNG, TEMPERATURE, GAIN, DRIFT, STIFFNESS, DAMPING, RECORD)
+KINDS = (BUILD, EXPANSION, *APART, BALLS, CHANGE, FLUNG, TEMPERATURE, GAIN, DRIFT, STIFFNESS, DAMPING, RECORD)
 SCENES = {"reference": ROOT / "scenes" / "hdd_2003", "symmetric": ROOT / "tests" / "scenes" / "symmetric"}
 
 
@@ -86,7 +87,7 @@ def test_derivatives_of_lines(scene, quantity, decay):
     assert set(worst) == set(KINDS) - {FLUNG}  # these scenes' balls have none
     for kind in (GAIN, DRIFT, STIFFNESS, DAMPING, RECORD):
         assert worst[kind] < 1e-4, kind
-    for kind in (BUILD, EXPANSION, *APART, DIRECTED, TEMPERATURE):
+    for kind in (BUILD, EXPANSION, *APART, BALLS, CHANGE, TEMPERATURE):
         assert worst[kind] < 5e-3, kind
 
 
@@ -119,7 +120,7 @@ def test_derivatives_of_a_flexible_shaft():
     worst = worst_by_kind(model, 1, x)
     for kind in (GAIN, DRIFT, RECORD):
         assert worst[kind] < 1e-8, kind
-    for kind in (BUILD, EXPANSION, *APART, DIRECTED, FLUNG, TEMPERATURE, STIFFNESS, DAMPING):
+    for kind in (BUILD, EXPANSION, *APART, BALLS, CHANGE, FLUNG, TEMPERATURE, STIFFNESS, DAMPING):
         assert worst[kind] < 1e-2, kind
 
 

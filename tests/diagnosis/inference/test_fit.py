@@ -10,9 +10,21 @@ from scipy import optimize, stats
 
 from tests.conftest import ROOT
 from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, truth, virtual_campaign
+from thermospindle.diagnosis.decision.reason import NUMERICS
 from thermospindle.diagnosis.forward.mechanism import asked_at, variants, with_own_laws
 from thermospindle.diagnosis.forward.model import CampaignModel
-from thermospindle.diagnosis.forward.nuisance import APART, BUILD, DAMPING, DRIFT, GAIN, STIFFNESS, TEMPERATURE
+from thermospindle.diagnosis.forward.nuisance import (
+    APART,
+    BUILD,
+    DAMPING,
+    DAMPING_DRIFT,
+    DRIFT,
+    GAIN,
+    STIFFNESS,
+    STIFFNESS_DRIFT,
+    TEMPERATURE,
+)
+from thermospindle.diagnosis.forward.points import otherwise
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import AFAR, TEMPERS, _from_afar, fit
 from thermospindle.diagnosis.inference.freeform import free_forms
@@ -78,6 +90,25 @@ def test_bearings_that_differ_are_no_discrepancy_of_modes(spindle):
         others = [j for j, p in enumerate(model.parameters) if p.kind == APART[1] and j != i]
         apart = (found.mean[i] - found.mean[others].mean()) / 2 * model.parameters[i].sd
         assert apart == pytest.approx(share, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("name", "share", "hidden"),
+    [
+        ("axial stiffness of the balls", -0.02, otherwise({0: -0.02})),
+        ("tilt stiffness of the balls", 0.02, otherwise({1: 0.02})),
+        ("change of the balls' stiffness with temperature", 0.03, otherwise({}, 0.03)),
+    ],
+)
+def test_what_two_programs_differ_by_in_a_bearing_is_no_discrepancy_of_modes(spindle, name, share, hidden):
+    """What races give, where a row's forces act, whether a contact's constant is kept: found as that, without constant errors of modes, or modes that drift by what is told."""
+    model = model_of(spindle, virtual_campaign(spindle, THREE, 4, [hidden], noise=Noise(1e-3, 1e-4), frequency=np.arange(400.0, 6000.1, 8.0)))
+    found = evidence(model, fit(model))
+    assert found.learned.sizes[STIFFNESS] == found.learned.sizes[DAMPING] == found.learned.sizes[DAMPING_DRIFT] == 0.0
+    assert found.learned.sizes[STIFFNESS_DRIFT] < NUMERICS[0]
+    i = next(i for i, p in enumerate(model.parameters) if p.name == name)
+    sd = model.parameters[i].sd
+    assert found.mean[i] * sd == pytest.approx(share, abs=4 * sd * np.sqrt(found.covariance[i, i]))
 
 
 def test_a_fit_rests(spindle):
@@ -328,6 +359,6 @@ def test_a_part_of_its_own_may_go_and_come(spindle):
     rim = next(m for m in variants(effect("hub_flexibility")) if m.choices == {"seat_share": 0.0})
     problem = Problem(model, (rim,))
     found = [fit(model, (rim,), problem.start({0: size}), tempers=(1.0,)) for size in (3.0, 0.0)]
-    assert found[0].cost == pytest.approx(found[1].cost, abs=2.0)  # both may stand still a little above the end of a valley as bent as this one
+    assert found[0].cost == pytest.approx(found[1].cost, abs=4.0)  # both may stand still a little above the end of a valley as bent as this one
     dofs = [len(model.linear(0, f.nuisance, problem.effects_of(problem.start({0: size}))[0]).matrices.dofs) for f, size in zip(found, (3.0, 0.0), strict=True)]
     assert dofs[0] == dofs[1] + 2

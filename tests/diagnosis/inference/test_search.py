@@ -19,7 +19,7 @@ from thermospindle.diagnosis.inference.fit import TEMPERS, fit
 from thermospindle.diagnosis.inference.freeform import free_forms, runs_against
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
 from thermospindle.diagnosis.inference.pairs import exchanged, joined_early, without_one
-from thermospindle.diagnosis.inference.prior import DRIFTING, steady, undrifted
+from thermospindle.diagnosis.inference.prior import CHANGING, steady, undrifted
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.inference.screening import Screened, linearised, screen
 from thermospindle.diagnosis.inference.search import Search, _other_ways, _without_what_does_nothing, search
@@ -59,7 +59,7 @@ def test_a_fit_with_wide_priors_does_not_start_one_with_narrow_priors_from_a_wal
     model = model_of(spindle, virtual_campaign(spindle, TESTS[:2], 5, [], drawn(spindle, 3, 5), responses=(1, 3, 6), frequency=np.arange(400.0, 6000.1, 32.0)))
     first = fit(model)
     learned = undrifted(steady(evidence(model, first).learned))
-    drifting = np.array([q.kind in DRIFTING for q in model.parameters])
+    drifting = np.array([q.kind in CHANGING for q in model.parameters])
     p = first.point + 0.5 * drifting
     problem = Problem(model, (), learned)
     start = problem.within_prior(p)
