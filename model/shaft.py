@@ -43,6 +43,7 @@ class Shaft:
     shear: float = 1.0
     rotary: float = 1.0
     moves: tuple[str, ...] = ("x", "y", "z", "tilt_x", "tilt_y")  # of its nodes, in the order of `structure.MOVES`
+    loss_factor: float = 0.0  # of its elements, the same at all frequencies
 
     @cached_property
     def bodies(self) -> tuple[str, ...]:

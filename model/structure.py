@@ -38,6 +38,7 @@ class Joint:
     damping_ratio: float
     role: str = ""  # mount, plate or flange: what effects know it by; empty for none of these
     material: str = ""  # whose elastic modulus its stiffness follows; empty for none
+    loss_factor: float = 0.0  # the same at all frequencies, beside damping_ratio (`model.rotor.loss`)
 
 
 @dataclass(frozen=True)

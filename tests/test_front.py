@@ -100,4 +100,6 @@ def test_the_code_of_the_readme_runs(capsys):
     for name, found in list(names.items()):
         if name.startswith("test_") and callable(found):
             found()
-    assert capsys.readouterr().out.count("rocking") == 4
+    out = capsys.readouterr().out
+    assert out.count("rocking") == 4
+    assert re.findall(r"^\d+ C: .*", out, re.M) == ["20 C: 16.0 N preload", "60 C: 8.0 N preload"]  # no digits that mean nothing

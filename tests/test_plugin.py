@@ -1,6 +1,7 @@
 """The pytest plugin and its assertions, by pytest's own tool for plugins."""
 
 import os
+import re
 import subprocess
 import sys
 from importlib.metadata import entry_points
@@ -53,6 +54,15 @@ def test_a_users_tests(pytester):
         ]
     )
     assert "_pair(scene" not in result.stdout.str()
+
+
+def test_a_failure_shows_the_mode_and_its_neighbours():
+    """Of a flexible shaft's dozens of modes the one asked for, numbered among its kind, and two on each side."""
+    with pytest.raises(AssertionError) as failed:
+        assert_frequency_shift("mk7702", mode="lateral 6", from_C=20, to_C=30, shift_Hz=-1000, within=1)
+    rows = [line for line in str(failed.value).splitlines() if re.match(r"  [> ] (axial|rocking|lateral) \d+ ", line)]
+    assert len(rows) == 5
+    assert rows[2].startswith("  > lateral 6 ")
 
 
 def test_the_plugin_loads_nothing_that_computes():

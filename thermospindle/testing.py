@@ -35,6 +35,7 @@ __all__ = [
     "assert_split",
 ]
 MOST = 3  # elements named in a failure
+NEIGHBOURS = 2  # modes shown on each side of the one in question
 KEPT = 256  # conditions
 
 
@@ -243,11 +244,13 @@ def _at(speed: float) -> str:
 
 
 def _table(first: OperatingPoint, then: OperatingPoint, partners: Sequence[int], a: str, b: str, index: int) -> list[str]:
-    """All modes up to two above the one in question, before and after."""
+    """The mode in question and two on each side of it, before and after: of a flexible shaft there are dozens below an upper one."""
     rows = [f"    {'':14}{a:>10}{b:>10}{'change':>10} Hz"]
     counts: dict[str, int] = {}
-    for i, m in enumerate(first.modes[: index + 3]):
+    for i, m in enumerate(first.modes[: index + NEIGHBOURS + 1]):
         counts[m.kind] = counts.get(m.kind, 0) + 1
+        if i < index - NEIGHBOURS:
+            continue
         after = then.modes[partners[i]].frequency if partners[i] >= 0 else None
         change = "lost" if after is None else f"{after - m.frequency:+.2f}"
         rows.append(f"  {'>' if i == index else ' '} {m.kind + ' ' + str(counts[m.kind]):14}{m.frequency:10.2f}{'' if after is None else f'{after:10.2f}':>10}{change:>10}")

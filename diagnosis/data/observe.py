@@ -49,7 +49,8 @@ class Observation:
     @property
     def modes(self) -> ModeSet:
         """For pairing."""
-        return ModeSet(self.frequency, self.shape, self.kind or ())
+        strength = None if self.residue is None else 2 * np.pi * self.frequency * np.abs(self.residue).max(axis=1)
+        return ModeSet(self.frequency, self.shape, self.kind or (), strength)
 
     @property
     def channels(self) -> int | None:

@@ -43,7 +43,9 @@ class Predicted:
 
     def modes(self, channels: int | None = None) -> ModeSet:
         """For pairing, with shapes at the first `channels` points."""
-        return ModeSet(self.frequency, self.shape[:, :channels], self.kind)
+        shape = self.shape[:, :channels]
+        largest = [np.abs(x).max(axis=1, initial=0.0) for x in (shape, self.participation)]
+        return ModeSet(self.frequency, shape, self.kind, 2 * np.pi * self.frequency * largest[0] * largest[1])
 
 
 def predict(spindle: Spindle, observation: Observation, effects: Applied, warmer: float = 0.0, lumped: bool = False) -> Predicted:

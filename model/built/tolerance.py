@@ -144,7 +144,7 @@ def _scale_stiffness(index: int, moves: tuple[int, ...]) -> Callable[[Spindle, f
 def _scale_joint_damping(index: int) -> Callable[[Spindle, float], Spindle]:
     def apply(spindle: Spindle, x: float) -> Spindle:
         joint = spindle.structure.joints[index]
-        return _with_joint(spindle, index, replace(joint, damping_ratio=joint.damping_ratio * (1 + x)))
+        return _with_joint(spindle, index, replace(joint, damping_ratio=joint.damping_ratio * (1 + x), loss_factor=joint.loss_factor * (1 + x)))
 
     return apply
 
@@ -200,7 +200,7 @@ def _scale_shaft(shaft: Shaft, stiffness: bool = False, mass: bool = False, damp
                 k = [f * v for v in joint.stiffness]
                 joints[j] = replace(joint, stiffness=(k[0], k[1], k[2], k[3], k[4]))
             elif joint.name in shaft.elements and damping:
-                joints[j] = replace(joint, damping_ratio=f * joint.damping_ratio)
+                joints[j] = replace(joint, damping_ratio=f * joint.damping_ratio, loss_factor=f * joint.loss_factor)
         for b, body in enumerate(bodies):
             if body.name in shaft.bodies and mass:
                 bodies[b] = replace(body, mass=f * body.mass, inertia=(f * body.inertia[0], f * body.inertia[1], f * body.inertia[2]))

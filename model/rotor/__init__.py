@@ -7,6 +7,7 @@ elements     the bearing elements of the time simulation
 loaded       bearings under an external radial load: the whole spindle in equilibrium
 look         what a spindle looks like: cut-away bodies of its section, and the visual part of its MuJoCo model
 mjcf         the rotor-base chain as a MuJoCo model
+loss         constant loss factors as viscous damping, by the strain energy of each mode
 modes        modes and exact FRFs of a linearised spindle
 section      the axisymmetric section: which region owns which rectangle, and the mass and inertia that follow
 beam         beam elements of flexible shafts: nodes that are bodies, joined by elements that are joints

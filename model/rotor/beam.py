@@ -95,6 +95,7 @@ def elements(shaft: Shaft, materials: Mapping[str, Material], temperature: float
             z=z,
             stiffness=(lateral, lateral, 1 / drawn, 1 / bent, 1 / bent),
             damping_ratio=shaft.damping_ratio,
+            loss_factor=shaft.loss_factor,
             role="beam",
             material=material,
         )

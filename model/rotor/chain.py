@@ -17,6 +17,7 @@ import numpy as np
 from thermospindle.model.bearing.pair import BearingState, LinearState, PairState
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Point, Spindle
+from thermospindle.model.rotor.loss import damping_of_loss
 from thermospindle.model.structure import MOVES, Body, Structure
 from thermospindle.model.types import Array, Integers
 
@@ -37,6 +38,7 @@ class Element:
     stiffness: Array
     damping: Array
     slides: str = ""
+    loss_factor: float = 0.0  # of its stiffness, beside `damping` (`loss`)
 
 
 Layout = tuple[tuple[str, float, tuple[str, ...]], ...]
@@ -122,7 +124,7 @@ def joint_element(structure: Structure, index: int) -> Element:
     joint = structure.joints[index]
     stiffness = np.diag(joint.stiffness)
     damping = 2 * joint.damping_ratio / (2 * np.pi * structure.damping_frequency) * stiffness
-    return Element(joint.name, joint.group, *joint.bodies, joint.z, stiffness, damping)
+    return Element(joint.name, joint.group, *joint.bodies, joint.z, stiffness, damping, loss_factor=joint.loss_factor)
 
 
 def motion_rows(chain: RotorBase, name: str, position: Sequence[float]) -> Array:
@@ -188,7 +190,14 @@ def matrices(chain: RotorBase) -> Matrices:
         ):
             felt = rows.transpose(0, 2, 1) @ np.array(of_elements) @ rows
             whole += np.bincount(place, felt.ravel(), n * n).reshape(n, n)
+    if any(e.loss_factor for e in chain.elements):
+        damping += lost(chain, mass, stiffness)
     return Matrices(np.diag(mass), damping, stiffness, chain.dofs)
+
+
+def lost(chain: RotorBase, mass: Array, stiffness: Array) -> Array:
+    """Damping (n, n) of the loss factors of a chain's elements, in its masses (n,) and stiffness (n, n)."""
+    return damping_of_loss(mass, stiffness, [(e.loss_factor, e.stiffness, element_rows(chain, e)) for e in chain.elements if e.loss_factor])
 
 
 @lru_cache(maxsize=64)

@@ -2,7 +2,7 @@
 
 Every body moves on its own slides and hinges from the world; elements are fixed tendons. A positive 5x5 matrix between two bodies is
 exactly one tendon for each eigenvector, with the eigenvalue as stiffness; hammers pull and vibrometers look along tendons with the
-point's row. The turning body hangs by a spin hinge on a carrier that does not turn, which keeps spin out of the bearings and
+point's row; the dampers of loss factors (`loss`) are tendons over the whole chain. The turning body hangs by a spin hinge on a carrier that does not turn, which keeps spin out of the bearings and
 gives MuJoCo's own gyroscopic terms; probes look at the carrier, as a laser fixed in space does.
 
 Bearing elements: "linear" is the 5x5 stiffness; "ball-by-ball" has a spatial tendon for each ball (Hertz force, no push) and a linear
@@ -19,7 +19,7 @@ import numpy as np
 from thermospindle.model.bearing.pair import BearingState, PairState, check_centred
 from thermospindle.model.bearing.springs import ball_springs, tangent
 from thermospindle.model.machine import Spindle
-from thermospindle.model.rotor.chain import Element, Matrices, RotorBase, element_rows, point_row, rotor_base
+from thermospindle.model.rotor.chain import Element, Matrices, RotorBase, element_rows, lost, matrices, point_row, rotor_base
 from thermospindle.model.rotor.elements import ELEMENTS
 from thermospindle.model.rotor.look import dress
 from thermospindle.model.types import Array
@@ -65,6 +65,9 @@ def chain_spec(chain: RotorBase, step: float, stiff: tuple[str, ...] | None = No
     for e in chain.elements:
         stiffness = e.stiffness if stiff is None or e.name in stiff else np.zeros((5, 5))
         add_matrices(out, e.name, stiffness, e.damping, element_rows(chain, e), chain)
+    if any(e.loss_factor for e in chain.elements):
+        whole = matrices(chain)
+        add_matrices(out, "loss", np.zeros_like(whole.stiffness), lost(chain, np.diag(whole.mass), whole.stiffness), np.eye(len(whole.mass)), chain)
     turning = spin_speeds(chain, chain.speed)
     spin = [turning.get(name, 0.0) for name in joint_names(chain)]
     out.add_key(name="loaded", qpos=np.zeros(len(spin)), qvel=spin)

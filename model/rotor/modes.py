@@ -21,6 +21,8 @@ from thermospindle.model.structure import MOVES
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.model.units import HERTZ
 
+LINE, LESSER = 0.04, 0.05
+"""Of the largest motion, below which a mode moves along a line, and of the largest orbit's area, above which one of the other sense counts."""
 FREE = 5e-8
 """Of the largest pole: what oscillates slower is a free body's rounding error."""
 
@@ -30,7 +32,7 @@ class Mode:
     """One mode: pole = -damping_ratio w + i w sqrt(1 - damping_ratio^2) with w = 2 pi frequency.
 
     `shape` (n,) complex over the dofs, largest element 1; `energy`: share of the strain energy in every element, sum 1;
-    `kind`: axial, rocking or lateral; `whirl`: forward, backward or none, from the turning body's tilts.
+    `kind`: axial, rocking or lateral; `whirl`: forward, backward, mixed (forward at one place, backward at another) or none, of all that turns.
     """
 
     frequency: float  # Hz, undamped
@@ -238,15 +240,24 @@ def kinds(linear: Matrices, shapes: ComplexArray) -> tuple[str, ...]:
 
 
 def _whirl(chain: RotorBase, shape: ComplexArray) -> str:
-    """Sense in which the turning body's axis circulates: tilt_y a quarter period behind tilt_x is forward for +z speed."""
-    turning = next((b for b in chain.bodies if b.turns), None)
-    if turning is None:
+    """Sense in which the axis of what turns circulates: y a quarter period behind x is forward for +z speed.
+
+    Asked at the two places of every turning body, its radius of gyration below and above its centre, that have its inertia. Of an orbit 2 Im(x y*) is its area over pi / 2, and
+    |x|^2 + |y|^2 where it is a circle. None, where the largest area has less than `LINE` of the largest motion. On supports that differ in x and y one place may
+    go forward where another goes backward (Genta, 2005, 6.2; Friswell and others, *Dynamics of Rotating Machines*, 2010, 6.4): mixed, where the largest area of the
+    lesser sense has more than `LESSER` of the largest.
+    """
+    ends = [(b.name, b.z + side * np.sqrt((b.inertia[0] + b.inertia[1]) / (2 * b.mass))) for b in chain.bodies if b.turns for side in (-1.0, 1.0)]
+    if not ends:
         return "none"
-    tilt = motion_rows(chain, turning.name, (0.0, 0.0, turning.z))[3:] @ shape
-    circulation = -float(np.imag(np.conj(tilt[0]) * tilt[1])) * np.sign(chain.speed)
-    if abs(circulation) < 0.02 * float(np.sum(np.abs(tilt) ** 2)):
+    x, y = np.array([motion_rows(chain, name, (0.0, 0.0, float(z)))[:2] @ shape for name, z in ends]).T
+    area = 2 * np.imag(x * y.conj()) * np.sign(chain.speed)
+    forward, backward = max(float(area.max()), 0.0), max(-float(area.min()), 0.0)
+    if max(forward, backward) <= LINE * float(np.max(np.abs(x) ** 2 + np.abs(y) ** 2)):
         return "none"
-    return "forward" if circulation > 0 else "backward"
+    if min(forward, backward) > LESSER * max(forward, backward):
+        return "mixed"
+    return "forward" if forward > backward else "backward"
 
 
 def group_energy(chain: RotorBase, mode: Mode) -> dict[str, float]:

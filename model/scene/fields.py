@@ -104,6 +104,15 @@ def _constant(value: Any) -> Any:
     return value if isinstance(value, dict | LawTable) else {"temperature_C": [0.0], "value": [value]}
 
 
+def one_damping(damping_ratio: float | None, loss_factor: float | None) -> None:
+    """Refuses a shaft or joint that tells none or both of its two dampings."""
+    if (damping_ratio is None) == (loss_factor is None):
+        raise ValueError(
+            f"damping_ratio {'and loss_factor are both told' if loss_factor is not None else 'is missing'}; one of damping_ratio (viscous, at structure.damping_frequency_Hz) "
+            "and loss_factor (the same at all frequencies) is allowed"
+        )
+
+
 def format_of(kind: str) -> Any:
     """The type of the key `format` of a kind of file, once it is migrated."""
     return Annotated[int, Field(ge=1, le=CURRENT[kind])]

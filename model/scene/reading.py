@@ -133,6 +133,9 @@ def content_hash(spindle: Spindle) -> str:
         content.pop("radial_load_z")
     if not content["roller_bearings"]:
         content.pop("roller_bearings")
+    for damped in (*content["structure"]["joints"], *content["structure"]["shafts"]):
+        if not damped["loss_factor"]:
+            damped.pop("loss_factor")
     for addition in content["effects"]:
         addition.pop("definition")
     return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()[:12]

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, Strict, model_validator
 
-from thermospindle.model.scene.fields import Name, NotNegative, Place, Positive, Share, Table
+from thermospindle.model.scene.fields import Name, NotNegative, Place, Positive, Share, Table, one_damping
 from thermospindle.model.shaft import THEORIES, Segment, Shaft, mesh
 from thermospindle.model.structure import MOVES
 from thermospindle.model.units import MM
@@ -43,11 +43,13 @@ class ShaftForm(Table):
     speed_ratio: Annotated[float, Field(ge=-100, le=100)] = 1.0
     beam: Literal["timoshenko", "rayleigh", "euler-bernoulli"] = "timoshenko"
     longest_element_mm: Positive | None = None
-    damping_ratio: Share
+    damping_ratio: Share | None = None
+    loss_factor: Share | None = None
     role: Literal["shaft", "housing"] | None = None
 
     @model_validator(mode="after")
     def _drawn_whole(self) -> ShaftForm:
+        one_damping(self.damping_ratio, self.loss_factor)
         length = sum(p[-1] for p in self.outer_mm)
         for key in ("bore_mm", "mass_outer_mm"):
             pieces = getattr(self, key)
@@ -105,7 +107,8 @@ class ShaftForm(Table):
             nodes=mesh(segments, heights, longest),
             turns=self.turns,
             speed_ratio=self.speed_ratio,
-            damping_ratio=self.damping_ratio,
+            damping_ratio=self.damping_ratio or 0.0,
+            loss_factor=self.loss_factor or 0.0,
             role=self.role or "",
             shear=shear,
             rotary=rotary,

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, Strict, model_validator
 
 from thermospindle.model import structure as m
-from thermospindle.model.scene.fields import Both, Name, NotNegative, Place, Positive, Share, Table, TwoNames
+from thermospindle.model.scene.fields import Both, Name, NotNegative, Place, Positive, Share, Table, TwoNames, one_damping
 from thermospindle.model.shaft import Shaft
 from thermospindle.model.units import MM
 
@@ -75,9 +75,15 @@ class StructureJoint(Table):
     axial_stiffness_N_per_m: NotNegative = 0.0
     lateral_stiffness_N_per_m: Both = (0.0, 0.0)
     tilt_stiffness_N_m_per_rad: Both = (0.0, 0.0)
-    damping_ratio: Share
+    damping_ratio: Share | None = None
+    loss_factor: Share | None = None
     role: Literal["mount", "plate", "flange", "holder"] | None = None
     material: str = ""
+
+    @model_validator(mode="after")
+    def _damped_once(self) -> StructureJoint:
+        one_damping(self.damping_ratio, self.loss_factor)
+        return self
 
     def joint(self) -> m.Joint:
         stiffness = (*self.lateral_stiffness_N_per_m, self.axial_stiffness_N_per_m, *self.tilt_stiffness_N_m_per_rad)
@@ -87,7 +93,8 @@ class StructureJoint(Table):
             bodies=self.between,
             z=self.z_mm * MM,
             stiffness=stiffness,
-            damping_ratio=self.damping_ratio,
+            damping_ratio=self.damping_ratio or 0.0,
+            loss_factor=self.loss_factor or 0.0,
             role=self.role or "",
             material=self.material,
         )

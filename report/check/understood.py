@@ -63,6 +63,7 @@ def understood(point: OperatingPoint, catalogue: Sequence[Effect]) -> dict[str, 
                 "z_mm": _mm(j.z),
                 "stiffness": list(j.stiffness),
                 "damping_ratio": j.damping_ratio,
+                "loss_factor": j.loss_factor,
                 "role": j.role,
             }
             for j in structure.own_joints
@@ -186,6 +187,7 @@ def _shaft(spindle: Spindle, s: Shaft) -> dict[str, Any]:
         "speed_ratio": s.speed_ratio if s.turns else 0.0,
         "moves": list(s.moves),
         "damping_ratio": s.damping_ratio,
+        "loss_factor": s.loss_factor,
         "role": s.role,
     }
 

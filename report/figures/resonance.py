@@ -18,7 +18,8 @@ from thermospindle.sim.resonance.found import Coincidence, LineTrack, ResonanceM
 from thermospindle.sim.resonance.point import key
 from thermospindle.sim.running.runout import looked_at
 
-WHIRL = {"forward": "#c9371c", "backward": "#2166ac", "none": "#1f8a70"}
+WHIRL = {"forward": "#c9371c", "backward": "#2166ac", "mixed": "#7b3f99", "none": "#1f8a70"}
+WHIRLS = {"forward": "whirls forward", "backward": "whirls backward", "mixed": "forward at one place, backward at another", "none": "axial or standing"}
 CAUSES = {
     "unbalance": INK,
     "inner waviness": "#a0741a",
@@ -235,7 +236,7 @@ def _name_tops(axes: Axes, named: list[tuple[float, str, str]]) -> None:
 
 def _key(found: ResonanceMap, lines: Sequence[LineTrack], marked: bool) -> list[Line2D]:
     handles = [
-        Line2D([], [], color=WHIRL[w], lw=1.9, label=f"mode, {'whirls ' + w if w != 'none' else 'axial or standing'}")
+        Line2D([], [], color=WHIRL[w], lw=1.9, label=f"mode, {WHIRLS[w]}")
         for w in dict.fromkeys(m.whirl for m in found.modes)
     ]
     causes = dict.fromkeys(t.line.cause for t in lines)

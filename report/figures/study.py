@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -11,10 +12,11 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from thermospindle.model.types import Array
-from thermospindle.report.figures.common import INK, PALE, STYLE, colour
+from thermospindle.report.figures.common import BEARINGS, INK, PALE, STYLE, colour
 from thermospindle.sim.study.rows import OF_RUNOUT, Cases
 from thermospindle.sim.study.sensitivity import APART
 from thermospindle.sim.study.summary import at_conditions, frequencies, numbers
@@ -23,6 +25,13 @@ Told = dict[str, Any]
 SHOWN = 12  # parameters of a map of sensitivities, campaigns' numbers of a map of distances
 PANELS, COLUMNS = 6, 4  # half the modes drawn, and how many beside each other
 KEYED = 12  # lines named below a figure
+WIDTH, HANDLE, LETTER = 10.0, 0.6, 0.067  # inches: of a figure of panels, of a key's line, of a letter beside it
+CHANNELS: dict[str, list[dict[str, Any]]] = {
+    "dashes": [{"ls": "-"}, {"ls": (0, (3, 1.5)), "lw": 1.9, "zorder": 1.9}, {"ls": (0, (1, 1)), "lw": 3.4, "zorder": 1.8}, {"ls": (0, (6, 1, 1, 1)), "lw": 4.6, "zorder": 1.7}],
+    "marks": [{"marker": "o", "ms": 2.2}, {"marker": "o", "ms": 5.5, "mfc": "none"}, {"marker": "x", "ms": 5.0}, {"marker": "s", "ms": 7.5, "mfc": "none"}, {"marker": "+", "ms": 8.0}],
+    "colours": [{"color": paint} for paint, _, _ in BEARINGS],
+}
+"""What sets lines apart, value by value."""
 
 
 def sweep(of: Cases, table: pa.Table) -> dict[str, Figure]:
@@ -44,40 +53,60 @@ def sweep(of: Cases, table: pa.Table) -> dict[str, Figure]:
     panels += [(f"preload {b.name}, N", numbers(table, f"preload_N.{b.name}")) for b in of.spindle.bearings]
     with rc_context(STYLE):
         figure, grid = _grid(len(panels))
-        every = sorted(set(table["temperature_C"].to_pylist()))
+        looks, key = looks_of(others, list(lines))
         for axes, (title, y) in zip(grid, panels, strict=False):
-            for k, (told, rows) in enumerate(lines.items()):
+            for told, rows in lines.items():
                 rows = sorted(rows, key=lambda i: x[i])
-                hot = told[others.index("temperature_C")] if "temperature_C" in others else None
-                paint = colour(hot, every) if hot is not None else colour(k, range(len(lines)))
-                marker, dash = _mark([v for c, v in zip(others, told, strict=True) if c != "temperature_C"], lines, others)
-                axes.plot(x[rows], y[rows], dash, marker=marker, ms=2.5, lw=0.9, color=paint, label=", ".join(map(_said, others, told)))
+                axes.plot(x[rows], y[rows], **looks[told])
             axes.set_title(title)
         for axes in grid[max(0, len(panels) - COLUMNS) : len(panels)]:
             axes.set_xlabel(varied[along])
-        if 1 < len(lines) <= KEYED:
-            figure.legend(*grid[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+        if 1 < len(key) <= KEYED:
+            longest = max(len(str(line.get_label())) for line in key)
+            figure.legend(handles=key, loc="outside lower center", ncols=max(1, min(COLUMNS, len(key), int(WIDTH / (HANDLE + LETTER * longest)))))
     return {"sweep": figure}
 
 
+Look = dict[str, Any]
+
+
+def looks_of(others: Sequence[str], lines: Sequence[tuple[Any, ...]]) -> tuple[dict[tuple[Any, ...], Look], list[Line2D]]:
+    """How each line is drawn, whose values of `others` are its key, and the key of the figure: one entry for each value.
+
+    A quantity has a look of its own: temperature the colours from cold to hot, of the others the first that are free of dashes, marks, and, where temperature is none of them,
+    the colours of things. What is left shares the last. Lines that cover each other are told apart: wide dashes beneath thin ones, large open marks about small ones.
+    """
+    free = ["dashes", "marks"] if "temperature_C" in others else ["dashes", "marks", "colours"]
+    names = sorted((c for c in others if c != "temperature_C"), key=lambda c: c != "speed_rpm")  # speed dashed, wherever it varies
+    channels = {"colours": ["temperature_C"]} if "temperature_C" in others else {}
+    for k, name in enumerate(names):
+        channels.setdefault(free[min(k, len(free) - 1)], []).append(name)
+    looks: dict[tuple[Any, ...], Look] = {told: {"color": INK, "lw": 0.9, "marker": "o", "ms": 2.2} for told in lines}
+    key = []
+    for channel, own in channels.items():
+        at = [others.index(name) for name in own]
+        values = list(dict.fromkeys(tuple(told[i] for i in at) for told in lines))
+        for k, value in enumerate(values):
+            look = {"color": colour(value[0], [v[0] for v in values])} if own == ["temperature_C"] else CHANNELS[channel][k % len(CHANNELS[channel])]
+            key.append(Line2D([], [], **({"color": INK, "lw": 0.9} | look), label=", ".join(map(_said, own, value))))
+            for told in lines:
+                if tuple(told[i] for i in at) == value:
+                    looks[told] = looks[told] | look
+    return looks, key
+
+
 def _said(column: str, value: Any) -> str:
-    """What a line is at, by the last word of the key."""
+    """What a line is at, by the last two words of the key, of which the first says whose it is."""
     unit = {"temperature_C": "°C", "speed_rpm": "rpm"}.get(column)
-    number = f"{value:g}" if isinstance(value, float) else str(value)
-    return f"{number} {unit}" if unit else f"{column.rpartition('.')[2]} {number}"
-
-
-def _mark(own: Sequence[Any], lines: Mapping[tuple[Any, ...], Any], others: Sequence[str]) -> tuple[str, str]:
-    """Marker and dashes of a line by what sets it apart beside its temperature."""
-    rest = list(dict.fromkeys(tuple(v for c, v in zip(others, told, strict=True) if c != "temperature_C") for told in lines))
-    k = rest.index(tuple(own))
-    return "o^sDv"[k % 5], ("-", "--", ":", "-.")[k % 4]
+    told = value if isinstance(value, float) else json.loads(value)  # as a table of cases has what is no number
+    number = ", ".join(f"{v:g}" if isinstance(v, int | float) else str(v) for v in (told if isinstance(told, list) else [told]))
+    return f"{number} {unit}" if unit else f"{' '.join(column.removeprefix('vary.').split('.')[-2:])} {number}"
 
 
 def _grid(count: int) -> tuple[Figure, list[Axes]]:
     """Panels in rows of four, those beyond `count` empty."""
     rows = max(1, -(-count // COLUMNS))
-    figure = Figure(figsize=(10.0, 1.9 * rows + 0.9))
+    figure = Figure(figsize=(WIDTH, 1.9 * rows + 0.9))
     grid = list(figure.subplots(rows, COLUMNS, squeeze=False).flat)
     for axes in grid[count:]:
         axes.set_axis_off()

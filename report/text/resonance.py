@@ -166,7 +166,7 @@ def show_map(console: Console, found: ResonanceMap) -> None:
 
 def _cells(c: Coincidence) -> list[str]:
     cause = c.line.cause.replace("waviness", str(c.line.order)) if c.line.order else c.line.cause
-    mode = f"{c.mode.number} {c.mode.kind}" + {"none": "", "forward": " fw", "backward": " bw"}[c.mode.whirl]
+    mode = f"{c.mode.number} {c.mode.kind}" + {"none": "", "forward": " fw", "backward": " bw", "mixed": " mixed"}[c.mode.whirl]
     numbers = (
         f"{c.condition.temperature:.1f}",
         f"{c.condition.speed / RPM:.0f}",

@@ -116,9 +116,9 @@ def show_warmup(console: Console, warmup: Warmup) -> None:
     if lost:
         console.print(f"{lost[0].upper()}{lost[1:]}.\n", highlight=False)
     bearings, of_rollers = [b.name for b in warmup.spindle.bearings], roller_names(warmup)
-    unit, scale = power(most_friction(warmup))
+    unit, scale = power(max(max(m.friction.values()) for m in (*warmup.moments, warmup.steady)))
     columns = ["time\nmin", *(f"{b}\nC" for b in (*bearings, *of_rollers)), "coolest\nC", "hottest\nC", *(f"{b}\npreload\nN" for b in bearings[:1])]
-    columns += [*(f"{b}\nclearance\num" for b in of_rollers), f"friction\n{unit}"]
+    columns += [*(f"{b}\nclearance\num" for b in of_rollers), *(f"{b}\nfriction\n{unit}" for b in (*bearings, *of_rollers))]
     columns += [f"f{k}\nHz" for k in range(1, len(warmup.modes) + 1)]
     rows = [
         [f"{warmup.times[k] / MINUTE:.2f}", *_cells(warmup.moments[k], bearings, of_rollers, warmup.frequencies[k], scale)] for k in _shown(warmup.times)
@@ -178,7 +178,7 @@ def _cells(moment: Moment, bearings: Sequence[str], of_rollers: Sequence[str], f
         *(f"{t:.2f}" for t in temperatures),
         *(f"{moment.preload[b]:.3f}" for b in bearings[:1]),
         *(f"{c:.2f}" for c in clearances),
-        f"{scale * sum(moment.friction.values()):.0f}",
+        *(f"{scale * moment.friction[b]:.0f}" for b in (*bearings, *of_rollers)),
         *("-" if np.isnan(f) else f"{f:.1f}" for f in frequency),
     ]
 

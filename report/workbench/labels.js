@@ -70,7 +70,10 @@ dark.addEventListener("change", () => {
   for (const doc of window.Bokeh?.documents ?? []) for (const model of doc.roots()) window.Bokeh.index.get(model)?.request_paint?.()
 })
 // Said when the program behind the page has ended: nothing on it works then.
-addEventListener("spindle:lost", () => { document.getElementById("lost").hidden = false })
+addEventListener("spindle:lost", () => {
+  document.getElementById("lost").hidden = false
+  document.getElementById("loading").hidden = true
+})
 const started = setInterval(() => {
   const doc = window.Bokeh?.documents?.[0]
   const play = doc?.get_model_by_name("play")

@@ -7,7 +7,8 @@ Let a and b be modes with frequencies f and shapes phi. A pair costs
 and all pairs are chosen at once, so that their total cost, plus `alone` for every two modes that stay alone, is least (an assignment
 problem). S, the likeness of subspaces, counts only where a policy has a `mixing` distance: modes closer than that turn within the space
 they span with the least change of the structure, so that no single shape of a close pair can be trusted. A `Policy` holds these numbers;
-who needs others makes another one, with the reason beside it.
+who needs others makes another one, with the reason beside it. Where shapes at few points are alike, what all other pairs share decides between a paired
+mode and one without a partner (`by_common`).
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ class Policy:
     mixing: float = 0.0  # relative distance below which modes mix their shapes, so that the space they span counts too
     other_kind: float = 0.0  # penalty of a pair of which one mode is axial and the other is not; infinity forbids it
     kind: float = 0.0  # penalty of a pair of different kinds, where shapes are not known
+    alike: float = -1.0  # difference in shape cost up to which shapes tell nothing of two modes, and what pairs share decides; below zero they always tell
 
 
 FOLLOWED = Policy(width=0.1)
@@ -48,7 +50,7 @@ IDENTIFIED = Policy(width=0.02, limit=0.02)
 """Modes identified in a virtual test, and those of the model that was tested: they differ by the identification's error only."""
 MEASURED = Policy(width=0.3, alone=1.25, mixing=0.03)
 """Modes measured at two conditions, of which either may lack some; shapes without likeness in spaces without likeness cost 1.5."""
-COMPARED = Policy(width=0.08, power=1, alone=4.0, kind=3.0)
+COMPARED = Policy(width=0.08, power=1, alone=4.0, kind=3.0, alike=0.1)
 """Measured modes and those of a model that may be wrong."""
 COMPUTED = Policy(width=0.08, power=1, other_kind=3.0)
 """Computed modes from one test to the next; shapes may be missing, where tests have other measuring points."""
@@ -64,13 +66,23 @@ OF_A_TABLE = Policy(width=1.0, kind=9.0)
 the same either way in absolute differences, and would swap at random."""
 
 
+SHIFT, STRENGTH = 0.01, float(np.log(3))
+"""Standard deviations of ln frequency and ln strength about what all pairs share, at least: a model that is right but for what all modes share."""
+SHARED = 3
+"""Other pairs, at least, that tell what all share."""
+CLEARLY = 4.0
+"""Sum of squares by which another pair must lie nearer to what all share: two standard deviations."""
+
+
 @dataclass(frozen=True, eq=False)
 class ModeSet:
-    """Modes of one condition. m modes at n places: `frequency` (m,) Hz, `shape` (m, n) or None, `kind` (m,) or none known."""
+    """Modes of one condition. m modes at n places: `frequency` (m,) Hz, `shape` (m, n) or None, `kind` (m,) or none known, `strength` (m,) the
+    largest residue of the mobility or None."""
 
     frequency: Array
     shape: ComplexArray | None = None
     kind: Sequence[str] = ()
+    strength: Array | None = None
 
 
 def mac(a: ArrayLike, b: ArrayLike) -> Array:
@@ -94,7 +106,12 @@ def subspace_mac(frequency: Array, shape: ComplexArray, others: ComplexArray, mi
 def cost(a: ModeSet, b: ModeSet, policy: Policy) -> Array:
     """Cost (ma, mb) of every pair. Without shapes on either side, kinds stand for them."""
     ratio = np.log(b.frequency / np.asarray(a.frequency)[:, None])
-    total = np.abs(ratio / policy.width) ** policy.power
+    return np.asarray(np.abs(ratio / policy.width) ** policy.power + _unlike(a, b, policy), float)
+
+
+def _unlike(a: ModeSet, b: ModeSet, policy: Policy) -> Array:
+    """The part (ma, mb) of the cost that shapes and kinds have."""
+    total = np.zeros((len(a.frequency), len(b.frequency)))
     if a.shape is not None and b.shape is not None:
         total += 1 - mac(a.shape, b.shape)
         if policy.mixing:
@@ -122,8 +139,46 @@ def pairs(a: ModeSet, b: ModeSet, policy: Policy) -> NDArray[np.intp]:
     padded[:na, :nb], padded[na:, nb:] = cost(a, b, policy), 0.0
     rows, columns = linear_sum_assignment(padded)
     chosen = np.stack([rows, columns], 1)[(rows < na) & (columns < nb)]
+    if policy.alike >= 0:
+        chosen = by_common(chosen, a, b, policy)
     distance = np.abs(np.log(b.frequency[chosen[:, 1]] / a.frequency[chosen[:, 0]]))
     return np.asarray(chosen[distance < policy.limit], np.intp)
+
+
+def by_common(paired: NDArray[np.intp], a: ModeSet, b: ModeSet, policy: Policy) -> NDArray[np.intp]:
+    """Pairs (p, 2), in place of each that lies far from what all others share a nearer one of its mode of `a` or `b` with one of like shape that has no partner.
+
+    Of a pair u = ln(f_b / f_a), and the same of the strengths where both sets have them: an error of stiffness or mass moves all modes alike, another unit makes all
+    stronger, and a pole of a disturbance or of the noise is weak and stands anywhere. Far is the sum of the squares of (u - median) / s, s = 1.48 times the median
+    deviation of the other pairs, at least `SHIFT` and `STRENGTH` (Huber, *Robust Statistics*, 1981, 5.1). Alike are shapes whose cost differs by no more than
+    `alike`, as those of a bar that is measured at one end. No partner is one whose u in frequency is more than `width` from the median.
+    """
+    unlike, found = _unlike(a, b, policy), [(int(i), int(j)) for i, j in paired]
+    told = [(np.log(a.frequency), np.log(b.frequency), SHIFT)]
+    if a.strength is not None and b.strength is not None:
+        told.append((np.log(np.maximum(a.strength, 1e-300)), np.log(np.maximum(b.strength, 1e-300)), STRENGTH))
+
+    def squares(pair: tuple[int, int], others: NDArray[np.intp]) -> float:
+        total = 0.0
+        for of_a, of_b, least in told:
+            shared = of_b[others[:, 1]] - of_a[others[:, 0]]
+            middle = np.median(shared)
+            total += float(((of_b[pair[1]] - of_a[pair[0]] - middle) / max(least, 1.48 * np.median(np.abs(shared - middle)))) ** 2)
+        return total
+
+    for pair in tuple(found):
+        if pair not in found or len(found) <= SHARED:
+            continue
+        others = np.array([p for p in found if p != pair])
+        ratio = np.log(b.frequency[others[:, 1]] / a.frequency[others[:, 0]])
+        held = others[np.abs(ratio - np.median(ratio)) <= policy.width]
+        free = [np.setdiff1d(np.arange(len(modes.frequency)), held[:, side]).tolist() for side, modes in enumerate((a, b))]
+        rivals = [(i, pair[1]) for i in free[0]] + [(pair[0], j) for j in free[1]]
+        like = [p for p in rivals if unlike[p] <= unlike[pair] + policy.alike]
+        nearest = min(like, key=lambda p: squares(p, others))
+        if squares(nearest, others) + CLEARLY < squares(pair, others):
+            found = [p for p in found if p[0] != nearest[0] and p[1] != nearest[1]] + [nearest]
+    return np.array(sorted(found), np.intp).reshape(-1, 2)
 
 
 def partners(a: ModeSet, b: ModeSet, policy: Policy) -> NDArray[np.intp]:

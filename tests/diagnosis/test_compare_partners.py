@@ -67,7 +67,7 @@ def nothing(spindle, test):
 
 def computed(spindle, o, pole, shape, kind) -> Predicted:
     """Modes as if the model had these."""
-    return replace(predict(spindle, o, ()), pole=pole, shape=shape, kind=kind)
+    return replace(predict(spindle, o, ()), pole=pole, shape=shape, participation=np.ones((len(pole), 1)), kind=kind)
 
 
 def test_partners_cross_where_shapes_do(spindle):

@@ -42,6 +42,6 @@ def test_a_mode_that_nobody_predicts_is_no_ones_partner(spindle):
         m = len(o.frequency)
         order = [m, *range(m)]
         odd = np.array([[1.0, -1.0, 0.5, -0.5, 0.8, -0.8, 0.3]], complex)
-        strange = replace(o, frequency=np.append(o.frequency, 650.0)[order], shape=np.vstack([o.shape, odd])[order])
+        strange = replace(o, frequency=np.append(o.frequency, 650.0)[order], shape=np.vstack([o.shape, odd])[order], residue=o.residue[[0, *range(m)]])
         assert partners(strange, p)[0] == -1
         assert paired(strange, p)[1:].tolist() == paired(o, p).tolist()

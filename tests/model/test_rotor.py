@@ -6,13 +6,15 @@ import mujoco
 import numpy as np
 import pytest
 
+from tests.literature.test_rotors import chain as flexible
+from tests.literature.test_rotors import rotor
 from tests.mounting import sprung
 from thermospindle.model.bearing.pair import solve
 from thermospindle.model.bearing.row import reference_motion
 from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor import mjcf
-from thermospindle.model.rotor.chain import Element, RotorBase, matrices, rotor_base
+from thermospindle.model.rotor.chain import Element, RotorBase, matrices, motion_rows, rotor_base
 from thermospindle.model.rotor.elements import ELEMENTS
 from thermospindle.model.rotor.modes import frf, group_energy, modes, point_rows, poles
 from thermospindle.model.structure import Body
@@ -59,6 +61,27 @@ def test_forward_whirl_is_the_faster_one():
     assert (low.whirl, high.whirl) == ("backward", "forward")
     low, high = modes(tilting_rotor(-7200 * RPM))
     assert (low.whirl, high.whirl) == ("backward", "forward")
+
+
+def test_whirl_is_that_of_the_whole_axis():
+    """A rotor on bearings soft in y at one end and in x at the other: the sense of a mode is that of its orbits wherever they are large, and mixed where both senses are."""
+    spindle = rotor((211.0, 0.3, 7810.0), [(50, 1500)], [], [(500, 15.0, 0.1, 0.2), (1000, 25.0, 0.3, 0.6)], [(0, 1e7, 1e6), (1500, 1e6, 1e7)], longest=62.5)
+    shaken = flexible(spindle, 6000 * RPM)
+    found = [m for m in modes(shaken)[:9] if m.kind != "axial"]
+    assert [m.whirl for m in found[:6]] == ["backward", "forward", *["mixed"] * 4]
+    for mode in found[:6]:
+        x, y = np.array([motion_rows(shaken, b.name, (0.0, 0.0, b.z))[:2] @ mode.shape for b in shaken.bodies if b.turns]).T
+        area = 2 * (x * y.conj()).imag
+        senses = {"forward" if a > 0 else "backward" for a in area[np.abs(area) > 0.05 * np.abs(area).max()]}
+        assert senses == ({"forward", "backward"} if mode.whirl == "mixed" else {mode.whirl})
+    assert {m.whirl for m in modes(flexible(spindle, 0.0))[:9]} == {"none"}
+
+
+def test_one_end_does_not_tell_the_whirl():
+    """The lowest end of a rotor moves along a line in a mode that circulates forward."""
+    spindle = rotor((211.0, 0.3, 7810.0), [(50, 1500)], [], [(500, 15.0, 0.1, 0.2), (1000, 25.0, 0.3, 0.6)], [(400, 1e7, 1e6), (1100, 1e7, 1e6)], longest=62.5)
+    mode = min(modes(flexible(spindle, 6000 * RPM)), key=lambda m: abs(m.frequency - 174.9))
+    assert mode.whirl == "forward"
 
 
 EXPECTED = [

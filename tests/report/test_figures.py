@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import product
 
 import numpy as np
 import pytest
@@ -13,6 +14,8 @@ from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
 from thermospindle.report.figures import common
 from thermospindle.report.figures import report as plots
+from thermospindle.report.figures.common import colour
+from thermospindle.report.figures.study import looks_of
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.run import Run
 
@@ -44,6 +47,30 @@ def test_temperature_colours_go_from_cold_to_hot():
     assert common.colour(20, (20, 60)) == "#2166ac"
     assert common.colour(60, (20, 60)) == "#c9371c"
     assert common.colour(20, (20,)) == "#2166ac"
+
+
+def test_lines_of_a_sweep_have_a_look_for_each_quantity():
+    """Colours say the temperature alone, dashes the speed, marks what else is varied, which is named with what it is of; no two lines look the same."""
+    others = ["vary.structure.joints.cone.lateral_stiffness_N_per_m", "temperature_C", "speed_rpm"]
+    lines = list(product(["[200000000.0, 200000000.0]", "[300000000.0, 300000000.0]"], [20.0, 50.0], [0.0, 24000.0]))
+    looks, key = looks_of(others, lines)
+    assert len({str(look) for look in looks.values()}) == len(lines) == 8
+    for of, what in ((1, ("color",)), (2, ("ls", "lw")), (0, ("marker", "ms", "mfc"))):
+        by_value = {told[of]: {str([looks[t].get(w) for w in what]) for t in lines if t[of] == told[of]} for told in lines}
+        assert all(len(own) == 1 for own in by_value.values())
+        assert len(set.union(*by_value.values())) == 2
+    stiffness = "cone lateral_stiffness_N_per_m"
+    assert sorted(str(line.get_label()) for line in key) == ["0 rpm", "20 °C", "24000 rpm", "50 °C", f"{stiffness} 2e+08, 2e+08", f"{stiffness} 3e+08, 3e+08"]
+
+
+def test_without_temperatures_no_colour_means_one():
+    """Three keys varied at one temperature: dashes, marks, and colours that are not those from cold to hot; a fourth shares the last."""
+    others = [f"vary.{name}" for name in ("a.x", "b.x", "c.x", "d.x")]
+    lines = list(product((1.0, 2.0), repeat=4))
+    looks, key = looks_of(others, lines)
+    assert len({str(look) for look in looks.values()}) == 16
+    assert not {look["color"] for look in looks.values()} & {colour(t, (0, 1)) for t in (0, 1)}
+    assert [str(line.get_label()) for line in key][-1] == "c x 2, d x 2"
 
 
 def test_svg_for_a_page():

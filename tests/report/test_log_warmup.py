@@ -119,6 +119,17 @@ def test_a_lost_contact_is_said_before_anything_else(warm: Warmup) -> None:
     assert words.index("lost contact") < words.index("Warm-up of")
 
 
+def test_friction_of_the_table_is_that_of_each_bearing(warm: Warmup) -> None:
+    """Each under its own name, as the figure has it, and not the sum of all under the first."""
+    console = Console(width=200, record=True, file=StringIO())
+    show_warmup(console, warm)
+    lines = console.export_text().splitlines()
+    first = next(line.split() for line in lines if line.split()[:1] == ["0.00"])
+    assert lines[1].split() == ["lower", "lower", "upper"]
+    assert lines[2].split()[5:8] == ["preload", "friction", "friction"]
+    assert [float(x) for x in first[6:8]] == [round(1e3 * warm.moments[0].friction[b]) for b in ("lower", "upper")]
+
+
 def test_the_summary_says_start_end_and_steady(warm: Warmup) -> None:
     text = log.summary(warm)
     first, last = warm.moments[0], warm.moments[-1]

@@ -46,6 +46,22 @@ def errors_told(tab):
     return tab.run(f"{tab.model('status')}.text")
 
 
+def test_it_says_that_it_loads_until_the_document_is_there(chromium, served):
+    """A socket that never answers: a word, and no headings over empty boxes; with one that does, the word goes."""
+    shown = "getComputedStyle({}).{}"
+    word, body = shown.format("document.getElementById('loading')", "display"), shown.format("document.querySelector('main')", "visibility")
+    silent = chromium.call("Page.addScriptToEvaluateOnNewDocument", source="window.WebSocket = class { send() {} close() {} }")["identifier"]
+    chromium.open(served["address"])
+    chromium.wait("document.readyState === 'complete' && !!document.getElementById('loading')")
+    assert chromium.run("document.body.dataset.ready ?? null") is None
+    assert (chromium.run(word), chromium.run(body)) == ("block", "hidden")
+    assert chromium.run("document.getElementById('loading').textContent").startswith("Loading")
+    chromium.call("Page.removeScriptToEvaluateOnNewDocument", identifier=silent)
+    chromium.open(served["address"])
+    chromium.wait("document.body?.dataset.ready === 'yes'")
+    assert (chromium.run(word), chromium.run(body)) == ("none", "visible")
+
+
 def test_dragging_changes_curves_and_errors_while_dragging(tab):
     before = errors_told(tab)
     choose(tab, "add", "preload_loss")

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from tests.sim.identification.test_modal import eigen, sensors, spindle
 from thermospindle.model.units import RPM
@@ -117,6 +120,41 @@ def test_one_mode_far_off_does_not_move_all_by_one_place():
     a, b = known([100.0, 110.0, 121.0], shape[:3]), known([80.0, 110.0, 121.0, 133.1], shape)
     assert partners(a, b, COMPARED).tolist() == [0, 1, 2]
     assert partners(a, b, Policy(width=0.08)).tolist() == [1, 2, 3]
+
+
+BAR = np.array([51.5, 142.2, 278.7, 460.4, 687.2, 958.5])
+"""A free bar's measured frequencies, Hz; a model of it has all 1.1 to 1.5 % too low."""
+TOO_LOW = 1 - np.array([0.011, 0.0126, 0.0133, 0.0139, 0.0146, 0.0151])
+
+
+def bar(disturbance: float, strength: ArrayLike, above: ArrayLike = ()) -> tuple[ModeSet, ModeSet]:
+    """A bar measured at three points near one end, which all its modes move alike, with a pole that is none of its, and a model of it with modes above the band."""
+    f, computed = np.append(BAR, disturbance), np.append(BAR * TOO_LOW, above)
+    order = np.argsort(f)
+    measured = ModeSet(f[order], np.ones((7, 3), complex), (), np.append(np.ones(6), strength)[order])
+    return measured, ModeSet(computed, np.ones((len(computed), 3), complex), ["lateral"] * len(computed), np.full(len(computed), 40.0))
+
+
+def test_where_shapes_do_not_tell_what_all_modes_share_does():
+    """900.9 Hz lies 4.8 % from a computed mode, 958.5 Hz 1.5 % as all others, and would else be left to one 31 % above it."""
+    measured, computed = bar(900.9, 1.0, (1254.0, 1607.0))
+    assert partners(measured, computed, replace(COMPARED, alike=-1.0)).tolist() == list(range(7))
+    assert partners(measured, computed, COMPARED).tolist() == [0, 1, 2, 3, 4, -1, 5]
+
+
+def test_where_frequencies_do_not_tell_either_strength_does():
+    """0.2 % apart, one of them a hundred times weaker; another unit makes all stronger alike, and says nothing."""
+    for disturbance, partner in ((956.5, [0, 1, 2, 3, 4, -1, 5]), (960.5, [0, 1, 2, 3, 4, 5, -1])):
+        assert partners(*bar(disturbance, 0.01), COMPARED).tolist() == partner
+    assert partners(*bar(956.5, 0.9), COMPARED).tolist() == [0, 1, 2, 3, 4, 5, -1]  # as strong: the nearest stays
+
+
+def test_shapes_that_tell_are_not_overruled():
+    """The same frequencies, but the disturbance alone has the shape of the computed mode."""
+    measured, computed = bar(900.9, 1.0)
+    shape = np.array(measured.shape)
+    shape[6] = [1.0, -1.0, 0.0]
+    assert partners(replace(measured, shape=shape), computed, COMPARED).tolist() == [0, 1, 2, 3, 4, 5, -1]
 
 
 def test_close_modes_keep_their_order_unless_their_shapes_are_trusted():
