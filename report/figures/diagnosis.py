@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from thermospindle.diagnosis.decision.errors import as_drawn, fitted, predicted
 from thermospindle.diagnosis.decision.explanations import Candidate
+from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.verdict import Diagnosis
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
@@ -115,22 +116,31 @@ def _over_temperature(axes: Axes, conditions: Sequence[Condition], value: Array,
 
 @rc_context(STYLE)
 def errors(d: Diagnosis) -> Figure:
-    """chi2 per number of every test, with tolerances fitted and with what the verdict names."""
-    tests = d.search.model.tests
-    shown: list[tuple[str, Any, str]] = [("tolerances fitted", d.search.base, OTHER)]
-    if d.verdict.accepted is not d.search.base:
-        shown.append((" + ".join(d.verdict.accepted.names), d.verdict.accepted, NAMED))
-    figure = Figure(figsize=(8.6, 2.6), layout="constrained")
-    axes = figure.add_subplot()
-    width = 0.8 / len(shown)
-    for k, (label, h, paint) in enumerate(shown):
-        value = [b[0] / t.count for b, t in zip(h.fit.by_test, tests, strict=True)]
-        axes.bar(np.arange(len(tests)) + (k - (len(shown) - 1) / 2) * width, value, width=width, color=paint, label=label)
-    axes.axhline(1.0, color=INK, lw=0.8, ls="--")
-    axes.set_xticks(range(len(tests)), [t.test.id for t in tests], rotation=30 if len(tests) > 6 else 0)
-    axes.set_ylabel("chi² per number")
-    axes.set_title("Error left in every test (1 is noise alone)")
-    axes.set_ylim(0.0, 1.25 * axes.get_ylim()[1])  # room for the legend above the bars
-    axes.legend(frameon=False, fontsize=8, loc="upper left", ncols=len(shown))
-    axes.grid(visible=False, axis="x")
+    """Rms residual of every test, as drawn, with tolerances fitted and with what the verdict names: fitted to all tests, and predicted from all other conditions
+    where there are any."""
+    model, base, accepted = d.search.model, d.search.base, d.verdict.accepted
+    shown: list[tuple[str, Hypothesis, str, str]] = [("tolerances fitted", base, "s", OTHER)]
+    if accepted is not base:
+        shown.append((" + ".join(accepted.names), accepted, "D", NAMED))
+    unseen = [predicted(model, h) for _, h, _, _ in shown]
+    panels = 1 if np.isnan(unseen[0]).all() else 2
+    figure = Figure(figsize=(8.6, 3.0), layout="constrained")
+    every = figure.subplots(1, panels, sharey=True, squeeze=False)[0]
+    place, tests = np.arange(len(model.tests)), [t.test.id for t in model.tests]
+    every[0].plot(place, as_drawn(model), "o", mfc="none", color=INK, label="as drawn, nothing fitted")
+    for k, (label, h, marker, paint) in enumerate(shown):
+        for axes, value in zip(every, (fitted(model, h), unseen[k]), strict=False):
+            axes.plot(place, value, marker, ms=7 - 3 * k, color=paint, label=label)
+    for axes, title in zip(every, ("Error left, fitted to all tests", "Each condition predicted from all others"), strict=False):
+        axes.axhline(1.0, color=INK, lw=0.8, ls="--")
+        axes.set_xticks(place, tests, rotation=30 if len(tests) > 6 or panels > 1 else 0)
+        axes.set_xlim(-0.6, len(tests) - 0.4)
+        axes.set_title(title)
+        axes.grid(visible=False, axis="x")
+    every[0].set_yscale("log")
+    every[0].yaxis.set_major_formatter(lambda value, place: f"{value:g}")
+    low, high = every[0].get_ylim()
+    every[0].set_ylim(min(low, 0.5), max(high, 2.0))
+    every[0].set_ylabel("rms, standard errors")
+    figure.legend(*every[0].get_legend_handles_labels(), frameon=False, fontsize=8, loc="outside lower center", ncols=len(shown) + 1)
     return figure

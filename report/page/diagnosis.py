@@ -22,7 +22,8 @@ from thermospindle.report.text.diagnosis.words import beyond_words, hidden_words
 from thermospindle.report.typeset import minus, plain, prose, signed, table, unit_cell, with_error
 
 CAPTIONS = {
-    "errors": "Mean square of the whitened residuals of every test's FRF lines: one is noise alone.",
+    "errors": "Rms residuals of every test in standard errors of its data: one is noise alone. Fitted to all tests, tolerances and what a model may be constantly off by "
+    "can hide what is missing; a condition that is predicted from all others shows it.",
     "explanations": "Green: what the verdict names. Amber: free forms, which drift without a law. All tolerances are fitted anew with each.",
     "law": "The size of the effect as each test has it, with one standard error: where it is level, the effect's own law over temperature and "
     "speed holds; where it is not, this is the law that the data have.",
@@ -67,10 +68,13 @@ def _verdict(answer: dict[str, Any]) -> str:
     named = f": {', '.join(answer['effects'])}" if answer["effects"] else ""
     error = answer["error"]
     kinds = [("all tests", ""), ("temperatures left out one after the other", "held_out_")]
-    rows = [[name, *(f"{error[which + when]:.2f}" for when in ("before", "after"))] for name, which in kinds if error[which + "after"] is not None]
-    grid = table(["", "before", "after"], rows, caption="Error, rms in standard errors: with tolerances fitted, and with what the verdict names.")
+    whens = ("before", "after") if answer["effects"] else ("before",)
+    drawn = {"": f"{error['drawn']:.2f}", "held_out_": "–"}
+    rows = [[name, drawn[which], *(f"{error[which + when]:.2f}" for when in whens)] for name, which in kinds if error[which + "after"] is not None]
+    head = ["", "as drawn", "tolerances fitted", *(["with what is named"] if answer["effects"] else [])]
+    grid = table(head, rows, caption="Error, rms in standard errors. With the tolerances is fitted what a model may be constantly off by.")
     card = f'<div class="cards"><div class="card"><span>verdict</span><b>{escape(answer["verdict"] + named)}</b></div></div>'
-    said = "".join(f"<p>{prose(answer[key])}</p>" for key in ("reason", "would_change")) + "".join(f"<p>{prose(s)}</p>" for s in answer["law_departs"])
+    said = "".join(f"<p>{prose(answer[key])}</p>" for key in ("reason", "granted", "would_change") if answer[key]) + "".join(f"<p>{prose(s)}</p>" for s in answer["law_departs"])
     said += f"<p>{prose(hidden_words(answer['may_hide']))}</p>" if answer["may_hide"] else ""
     free = f"<p>Without any catalogue: {prose(answer['misfit']['words'][0])}</p>" if answer["misfit"]["rejected"] else ""
     return card + said + free + grid

@@ -149,14 +149,15 @@ def show_diagnosis(console: Console, answer: dict[str, Any], verbose: bool = Tru
     """The verdict in one sentence and why; with `verbose` every explanation, drift and next test, and what would have been seen."""
     console.print(f"{answer['verdict']}: {_sentence(answer)}", style="bold")
     console.print(answer["reason"])
+    if answer["granted"]:
+        console.print(answer["granted"])
     for sentence in answer["law_departs"]:
         console.print(sentence)
     console.print(answer["would_change"])
     if answer["may_hide"]:
         console.print(hidden_words(answer["may_hide"]))
     error = answer["error"]
-    unseen = f"on conditions left out {error['held_out_before']:.2f} -> {error['held_out_after']:.2f}, fitted " if error["held_out_after"] is not None else ""
-    console.print(f"Error, rms in standard errors: {unseen}{error['before']:.2f} -> {error['after']:.2f}")
+    console.print(f"Error, rms in standard errors: {error_words(error, bool(answer['effects']))}")
     if not verbose:
         _show_little(console, answer)
         return
@@ -187,6 +188,15 @@ def show_diagnosis(console: Console, answer: dict[str, Any], verbose: bool = Tru
         for name, row in small:
             console.print(f"  {name}: {row['parameter']} {row['size']:.2g}{unit_word(row['unit'], ' ')}")
         console.print(f"Not visible in these data at a typical size: {', '.join(answer['invisible']) or 'nothing'}")
+
+
+def error_words(error: dict[str, Any], named: bool) -> str:
+    """As drawn, with tolerances and what a model may be constantly off by fitted, and where effects are `named` with these."""
+    def of(which: str) -> str:
+        return f"{error[which + 'before']:.2f}" + (f", with what is named {error[which + 'after']:.2f}" if named else "")
+
+    unseen = f"; conditions left out {of('held_out_')}" if error["held_out_after"] is not None else ""
+    return f"as drawn {error['drawn']:.2f}, with tolerances and the model's constant errors fitted {of('')}{unseen}"
 
 
 def _show_little(console: Console, answer: dict[str, Any]) -> None:
