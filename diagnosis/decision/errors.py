@@ -1,4 +1,4 @@
-"""What is left of every test in standard errors of its data: as drawn, fitted to all tests, and predicted from all other conditions."""
+"""What is left of every test in standard errors of its data: as drawn, fitted to all tests, and predicted from all other conditions; and whether a fit has arrived."""
 
 from __future__ import annotations
 
@@ -12,6 +12,14 @@ from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.evidence import amplitudes_apart, at_one_size, left_out, turned
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.model.types import Array
+
+STILL_OWED = 0.1  # of chi2, up to which a fit that promises so much less has arrived
+
+
+def arrived(h: Hypothesis) -> bool:
+    """Whether an explanation stands where its fit has ended: no step promised much that none found, nor is its evidence more than data without any misfit give, which
+    only the rounding of a quadratic far from its minimum makes."""
+    return h.evidence.ln <= 0.0 and h.fit.owed <= max(STILL_OWED * h.fit.chi2, float(h.fit.count))
 
 
 def as_drawn(model: CampaignModel) -> Array:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from thermospindle.diagnosis.decision.errors import as_drawn, fitted, predicted
+from thermospindle.diagnosis.decision.errors import arrived, as_drawn, fitted, predicted
 from thermospindle.diagnosis.decision.explanations import Candidate
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.verdict import Diagnosis
@@ -45,25 +46,38 @@ def leading(d: Diagnosis) -> Candidate | None:
 def explanations(d: Diagnosis) -> Figure:
     """ln evidence of explanations over the model without effects; free forms beside those of the catalogue."""
     asked = [c for c in (*d.verdict.candidates[:MOST], *d.verdict.free[:4]) if c.hypothesis.mechanisms]
-    best = sorted(asked, key=lambda c: -c.delta_evidence)[: MOST + 2]
+    best = sorted(asked, key=lambda c: (not arrived(c.hypothesis), -c.delta_evidence))[: MOST + 2]
     value = np.array([c.delta_evidence for c in best])
     paint = [FREE if c.free else NAMED if d.verdict.effects and set(c.names) <= set(d.verdict.effects) else OTHER for c in best]
-    return evidence_bars([" + ".join(c.names) + (" (drifts)" if c.free else "") for c in best], value, paint)
+    drawn = evidence_bars([" + ".join(c.names) + (" (drifts)" if c.free else "") for c in best], value, paint, [arrived(c.hypothesis) for c in best])
+    if not arrived(d.search.base):
+        drawn.axes[0].set_xlabel("ln evidence over the model without effects, whose own fit has not arrived")
+    return drawn
 
 
 @rc_context(STYLE)
-def evidence_bars(names: Sequence[str], value: Array, paint: Sequence[str]) -> Figure:
-    """Bars of ln evidence `value` (n,) in the colours `paint`, with their numbers."""
+def evidence_bars(names: Sequence[str], value: Array, paint: Sequence[str], ended: Sequence[bool] | None = None) -> Figure:
+    """Bars of ln evidence `value` (n,) in the colours `paint`, with their numbers. The axis is that of fits that have `ended` where they arrive, others are hatched;
+    a bar that goes on beyond the axis ends in an arrow."""
+    ended = [True] * len(names) if ended is None else ended
     figure = Figure(figsize=(8.6, 0.85 + 0.27 * len(names)), layout="constrained")
     axes = figure.add_subplot()
-    axes.barh(range(len(names)), value, height=0.66, color=list(paint))
-    low, high = min(float(value.min()), 0.0), max(float(value.max()), 1.0)
+    shown = value[np.array(ended)] if any(ended) else value
+    low, high = min(float(shown.min()), 0.0), max(float(shown.max()), 1.0)
     low = max(low, -0.2 * high)
-    for y, v in enumerate(value):
-        axes.text(max(v, 0.0) + 0.012 * (high - low), y, f"{v:+.1f}".replace("-", "−") if abs(v) < 1000 else f"{v:+.0f}", va="center", fontsize=8, color=INK)
+    for y, (v, settled, colour) in enumerate(zip(value, ended, paint, strict=True)):
+        look: dict[str, Any] = {"color": colour} if settled else {"color": "none", "edgecolor": colour, "hatch": "////", "lw": 0.8}
+        axes.barh(y, v, height=0.66, **look)
+        end = float(np.clip(v, low, high))
+        beyond = v < low or v > high
+        if beyond:
+            axes.plot([1.02 * low if v < low else high], [y], marker="<" if v < low else ">", ms=6, color=INK, mec="white", zorder=4, clip_on=False)
+        told = f"{v:+.1f}" if abs(v) < 1000 else f"{v:+.0f}" if abs(v) < 1e9 else f"{v:+.1e}"
+        more = f"{', beyond the axis' if beyond else ''}{'' if settled else ', the fit has not arrived'}"
+        axes.text(max(end, 0.0) + 0.012 * (high - low), y, told.replace("-", "−") + more, va="center", fontsize=8, color=INK)
     axes.axvline(0, color=INK, lw=0.8)
     axes.set_yticks(range(len(names)), names)
-    axes.set(xlim=(1.05 * low, high + 0.14 * (high - low)), ylim=(len(names) - 0.4, -0.6))
+    axes.set(xlim=(1.05 * low, high + (0.14 if all(ended) else 0.3) * (high - low)), ylim=(len(names) - 0.4, -0.6))
     axes.set_xlabel("ln evidence over the model without effects")
     axes.set_title("How far every explanation leads")
     axes.grid(visible=False, axis="y")
@@ -119,7 +133,7 @@ def errors(d: Diagnosis) -> Figure:
     """Rms residual of every test, as drawn, with tolerances fitted and with what the verdict names: fitted to all tests, and predicted from all other conditions
     where there are any."""
     model, base, accepted = d.search.model, d.search.base, d.verdict.accepted
-    shown: list[tuple[str, Hypothesis, str, str]] = [("tolerances fitted", base, "s", OTHER)]
+    shown: list[tuple[str, Hypothesis, str, str]] = [("tolerances and constant errors fitted", base, "s", OTHER)]
     if accepted is not base:
         shown.append((" + ".join(accepted.names), accepted, "D", NAMED))
     unseen = [predicted(model, h) for _, h, _, _ in shown]

@@ -24,7 +24,7 @@ from thermospindle.report.typeset import minus, plain, prose, signed, table, uni
 CAPTIONS = {
     "errors": "Rms residuals of every test in standard errors of its data: one is noise alone. Fitted to all tests, tolerances and what a model may be constantly off by "
     "can hide what is missing; a condition that is predicted from all others shows it.",
-    "explanations": "Green: what the verdict names. Amber: free forms, which drift without a law. All tolerances are fitted anew with each.",
+    "explanations": "Green: what the verdict names. Amber: free forms, which drift without a law. Hatched: a fit that has not arrived at its least error, whose number says nothing yet. An arrow: the bar goes on beyond the axis. All tolerances are fitted anew with each.",
     "law": "The size of the effect as each test has it, with one standard error: where it is level, the effect's own law over temperature and "
     "speed holds; where it is not, this is the law that the data have.",
     "drift": "What would have to change in every test, with one standard error, where no effect is named.",
@@ -71,8 +71,8 @@ def _verdict(answer: dict[str, Any]) -> str:
     whens = ("before", "after") if answer["effects"] else ("before",)
     drawn = {"": f"{error['drawn']:.2f}", "held_out_": "–"}
     rows = [[name, drawn[which], *(f"{error[which + when]:.2f}" for when in whens)] for name, which in kinds if error[which + "after"] is not None]
-    head = ["", "as drawn", "tolerances fitted", *(["with what is named"] if answer["effects"] else [])]
-    grid = table(head, rows, caption="Error, rms in standard errors. With the tolerances is fitted what a model may be constantly off by.")
+    head = ["", "as drawn", "tolerances and constant errors fitted", *(["with what is named"] if answer["effects"] else [])]
+    grid = table(head, rows, caption="Error, rms in standard errors. Constant errors: what a model may be off by at all conditions alike, which the ladder's step \"tolerances fitted\" does not grant.")
     card = f'<div class="cards"><div class="card"><span>verdict</span><b>{escape(answer["verdict"] + named)}</b></div></div>'
     said = "".join(f"<p>{prose(answer[key])}</p>" for key in ("reason", "granted", "would_change") if answer[key]) + "".join(f"<p>{prose(s)}</p>" for s in answer["law_departs"])
     said += f"<p>{prose(hidden_words(answer['may_hide']))}</p>" if answer["may_hide"] else ""
@@ -106,7 +106,7 @@ def _candidates(answer: dict[str, Any]) -> str:
                     escape((name.split(".", 1)[1] if len(c["effects"]) == 1 else name) + mean),
                     value + (f" <small>{sd}" if sd else ""),
                     unit_cell(v["unit"]),
-                    ("yes" if c["believable"] else "no, at a limit") if first else "",
+                    ("no, its fit has not arrived" if not c["arrived"] else "yes" if c["believable"] else "no, at a limit") if first else "",
                 ]
             )
     return table(head, rows, (0, 4, 6, 7), CANDIDATES)

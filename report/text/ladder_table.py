@@ -27,7 +27,7 @@ COLUMNS = ("step", "error\ns.e.", "held out\ns.e.", "error\nHz", "shifts\nHz", "
 LEGEND = (
     "Errors are rms residuals; s.e. are standard errors of the data (of every FRF line, or of a table's numbers) or, held out, of the prediction "
     "by a fit that has not seen that temperature. Hz: of natural frequencies. Build: rms of the fitted build tolerances in their own "
-    "standard deviations."
+    "standard deviations. What `diagnose` calls fitted grants constant errors of the model beside the tolerances, as the step \"constant discrepancy\" does."
 )
 
 

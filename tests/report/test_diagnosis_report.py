@@ -15,7 +15,7 @@ from rich.console import Console
 from tests.conftest import SCENE
 from thermospindle.cli import main
 from thermospindle.diagnosis.decision.conditions import conditions_of
-from thermospindle.diagnosis.decision.errors import whole
+from thermospindle.diagnosis.decision.errors import arrived, whole
 from thermospindle.diagnosis.decision.explanations import Candidate
 from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.inference.evidence import evidence, left_out
@@ -28,7 +28,7 @@ from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import content_hash, load
 from thermospindle.model.units import RPM
-from thermospindle.report.figures.diagnosis import errors, explanations, law
+from thermospindle.report.figures.diagnosis import errors, evidence_bars, explanations, law
 from thermospindle.report.page.diagnosis import sections, write_diagnosis
 from thermospindle.report.text.diagnosis.answer import diagnosis_json
 from thermospindle.report.text.diagnosis.granted import granted_words
@@ -116,6 +116,35 @@ def test_bars_are_the_evidence(told):
     assert [bar.get_width() for bar in axes.patches] == sorted((c.delta_evidence for c in shown), reverse=True)[: len(axes.patches)]
 
 
+def test_a_fit_that_has_not_arrived_does_not_lead(told):
+    """One with a "+150103070226783" in ln evidence was drawn as the leader, beside which all else was a point at zero."""
+    found, _ = told
+    [best, *_] = found.verdict.candidates
+    assert arrived(best.hypothesis)
+    broken = replace(best.hypothesis, evidence=replace(best.hypothesis.evidence, ln=1.5e14))
+    stalled = replace(best.hypothesis, fit=replace(best.hypothesis.fit, owed=2.0 * best.hypothesis.fit.count))
+    others = [replace(best, hypothesis=h, names=(name,), delta_evidence=d) for h, name, d in ((broken, "broken", 1.5e14), (stalled, "stalled", 900.0))]
+    assert not any(arrived(c.hypothesis) for c in others)
+    verdict = replace(found.verdict, candidates=(others[0], replace(best, delta_evidence=500.0), others[1]))
+    axes = explanations(replace(found, verdict=verdict)).axes[0]
+    names = [label.get_text() for label in axes.get_yticklabels()]
+    assert names.index("soak_lag") == 0
+    assert names.index("broken") > names.index("soak_lag")
+    assert 500 < axes.get_xlim()[1] < 1000
+    hatched = {name for name, bar in zip(names, axes.patches, strict=True) if bar.get_hatch()}
+    assert {"broken", "stalled"} <= hatched
+    words = [text.get_text() for text in axes.texts]
+    assert words[names.index("broken")] == "+1.5e+14, beyond the axis, the fit has not arrived"
+
+
+def test_bars_that_are_cut_say_so():
+    """-1.7e6 and -1.1e7 were cut at -20000 and drawn of one length."""
+    axes = evidence_bars(["a", "b", "c"], np.array([116651.0, -15000.0, -1695833.0]), ["#111111"] * 3).axes[0]
+    assert [text.get_text() for text in axes.texts] == ["+116651", "−15000", "−1695833, beyond the axis"]
+    arrows = [line for line in axes.lines if line.get_marker() == "<"]
+    assert [line.get_ydata()[0] for line in arrows] == [2]
+
+
 def test_errors_are_those_of_the_answer(told):
     """The page of the tutorial had two equal bars a test, "before 1.00, after 1.00", for an effect that takes `compare` from 98.6 to 0.7: fitted tolerances hide it."""
     found, answer = told
@@ -131,7 +160,7 @@ def test_errors_are_those_of_the_answer(told):
     assert drawn == pytest.approx([np.sqrt(np.mean(r**2)) for r in residuals])
     assert error["drawn"] > 20 * error["before"]  # tolerances as small as they come
     rows = cells(dict(sections(*told))["Verdict"])
-    assert rows[0] == ["", "as drawn", "tolerances fitted", "with what is named"]
+    assert rows[0] == ["", "as drawn", "tolerances and constant errors fitted", "with what is named"]
     assert rows[1][1:] == [f"{error[k]:.2f}" for k in ("drawn", "before", "after")]
     assert rows[2][2:] == [f"{error[k]:.2f}" for k in ("held_out_before", "held_out_after")]
 

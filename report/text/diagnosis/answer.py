@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from thermospindle.diagnosis.decision.conditions import conditions_of
-from thermospindle.diagnosis.decision.errors import as_drawn, whole
+from thermospindle.diagnosis.decision.errors import arrived, as_drawn, whole
 from thermospindle.diagnosis.decision.explanations import Candidate
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import Mechanism
@@ -114,6 +114,7 @@ def _candidate(c: Candidate, d: Diagnosis) -> dict[str, Any]:
         "departure_from_law": {m.name: 1.0 if m.own_law else v for m, v in zip(c.hypothesis.mechanisms, own.learned.departures, strict=True)},
         "chi2_per_number": own.chi2 / n,
         "believable": _believable(c),
+        "arrived": arrived(c.hypothesis),
     }
 
 

@@ -164,7 +164,7 @@ def show_diagnosis(console: Console, answer: dict[str, Any], verbose: bool = Tru
     if answer["candidates"]:
         console.print("\nExplanations, ln evidence over the model without effects and posterior probability:")
     for c in answer["candidates"][:5]:
-        console.print(f"  {' + '.join(c['effects'])}: {c['delta_evidence']:+.1f}, {_percent(c['probability'])}; {_values(c)}")
+        console.print(f"  {' + '.join(c['effects'])}: {c['delta_evidence']:+.1f}, {_percent(c['probability'])}{'' if c['arrived'] else ', its fit has not arrived'}; {_values(c)}")
     best = answer["candidates"][0] if answer["candidates"] else None
     if best and answer["effects"]:
         for name, rows in best["law"].items():
