@@ -96,7 +96,8 @@ def law(d: Diagnosis, c: Candidate) -> Figure:
         own = c.hypothesis.evidence
         _over_temperature(axes, conditions, own.sizes[k], np.sqrt(np.maximum(np.diag(own.size_covariance[k]), 0.0)))
         axes.set_ylabel(", ".join(filter(None, (m.size.name, unit_cell(m.size.unit)))))
-        level = "with a law of the data's own" if m.own_law else "a level line is the law assumed"
+        shared = "one value, fitted to all tests together" if own.learned.departures[k] == 0.0 else "a level line is the law assumed"
+        level = "with a law of the data's own" if m.own_law else shared
         axes.set_title(f"{m.name}: its size in every test ({level})")
     return figure
 

@@ -77,17 +77,30 @@ def test_the_page_says_what_the_json_says(told):
     assert {row[0] for row in cells(by_title["What these data could have shown"])[1:]} == set(answer["detectable"])
 
 
-def test_a_size_that_is_a_mean_says_so(told, capsys):
-    """Another's taper opened by speed: 0.05, 0.20 and 0.45, and page and terminal told a share of 0.191 +- 0.011."""
+def test_a_size_that_differs_from_test_to_test_is_told_as_a_range(told, capsys):
+    """Of sizes from -0.113 to 0.033 the page told the mean alone, "0.000, at a limit", of an explanation that leads by 460."""
     found, answer = told
     [first, *rest] = answer["candidates"]
     name = first["effects"][0]
-    for departure, mean in ((0.1, False), (0.3, True)):
-        other = answer | {"candidates": [first | {"departure_from_law": {name: departure}}, *rest]}
+    law = [row | {"size": size, "sd": 0.008} for row, size in zip(first["law"][name], (0.011, 0.033, -0.113), strict=True)]
+    tests = [row["test"] for row in law]
+    for departure, spread in ((0.1, False), (0.3, True)):
+        other = answer | {"candidates": [first | {"departure_from_law": {name: departure}, "law": {name: law}}, *rest]}
         row = cells(dict(sections(found, other))["Explanations"])[1]
-        assert ("(mean of the tests)" in row[4]) == mean
+        assert ("(test by test)" in row[4]) == spread
+        assert row[5].startswith(f"from −0.1130 ± 0.0080 in {tests[2]} to 0.0330 ± 0.0080 in {tests[1]} (mean ") == spread
         show_diagnosis(Console(width=2000), other)
-        assert (f"the size of {name} in the mean: from " in capsys.readouterr().out) == mean
+        assert (f"hub_share from -0.1130 +- 0.0080 in {tests[2]} to 0.0330 +- 0.0080 in {tests[1]} (mean " in capsys.readouterr().out) == spread
+
+
+def test_one_value_for_all_tests_is_no_measurement_in_each(told):
+    """Seven equal points with equal bars stood as evidence that a law holds."""
+    found, _ = told
+    [c] = found.verdict.candidates
+    for departure, said in ((0.0, "one value, fitted to all tests together"), (0.3, "a level line is the law assumed")):
+        evidence = replace(c.hypothesis.evidence, learned=replace(c.hypothesis.evidence.learned, departures=(departure,)))
+        drawn = law(found, replace(c, hypothesis=replace(c.hypothesis, evidence=evidence)))
+        assert drawn.axes[0].get_title(loc="left") == f"soak_lag: its size in every test ({said})"
 
 
 def test_the_law_that_departs_is_told_where_something_drifts_beside_it(told):

@@ -220,9 +220,18 @@ def value_words(v: dict[str, Any]) -> str:
 
 def _values(candidate: dict[str, Any]) -> str:
     """Fitted parameters with their errors and units."""
-    values = ", ".join(f"{k.split('.', 1)[1]} {value_words(v)}" for k, v in candidate["parameters"].items())
-    means = [f"the size of {name} in the mean: {_range(candidate['law'][name])}" for name, departure in candidate["departure_from_law"].items() if departure >= DEPARTS]
-    return f"{values} ({'; '.join(means)})" if means else values
+    return ", ".join(f"{k.split('.', 1)[1]} {spread_words(candidate, k) or value_words(v)}" for k, v in candidate["parameters"].items())
+
+
+def spread_words(candidate: dict[str, Any], name: str) -> str:
+    """Of the size of an effect whose law the data do not have, by the `name` of its parameter: from which to which it goes over the tests, and its mean last, which says
+    little then; empty of all other parameters."""
+    effect = name.split(".", 1)[0]
+    first = next(k for k in candidate["parameters"] if k.startswith(f"{effect}."))  # an effect's size comes first
+    if name != first or candidate["departure_from_law"].get(effect, 0.0) < DEPARTS:
+        return ""
+    rows, mean = candidate["law"][effect], candidate["parameters"][name]
+    return _range(rows) + unit_word(mean["unit"], " ") + (f" (mean {plain_error(mean['value'], mean['sd'])})" if len(rows) > 1 else "")
 
 
 def _range(rows: list[dict[str, Any]]) -> str:
