@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -93,18 +94,18 @@ def _candidates(answer: dict[str, Any]) -> str:
         for k, (name, v) in enumerate(c["parameters"].items()):
             first = k == 0
             spread = spread_words(c | {"parameters": c["parameters"] | {name: v | {"unit": "1"}}}, name)  # units have a column of their own
-            words = prose(spread) if spread else escape(value_words(v)) if "called" in v or v.get("others") else ""
+            words = re.sub(r" (to [^ ]+ ±|\(mean )", r" <br>\1", prose(spread)) if spread else escape(value_words(v)) if "called" in v or v.get("others") else ""
             value, _, sd = (words, "", "") if words else _with_error(v["value"], v["sd"]).partition(" <small>")
             rows.append(
                 [
-                    escape(" + ".join(c["effects"])) if first else "",
+                    escape(" + ".join(c["effects"])).replace(" + ", " +<br>") if first else "",
                     minus(_evidence(c["delta_evidence"])) if first else "",
                     f"{c['probability']:.3f}" if first else "",
                     "" if not first else "–" if c["held_out_error_ratio"] is None else f"{100 * c['held_out_error_ratio']:.0f}",
-                    escape((name.split(".", 1)[1] if len(c["effects"]) == 1 else name) + (" (test by test)" if spread else "")),
+                    escape((name.split(".", 1)[1] if len(c["effects"]) == 1 else name) + (" (test by test)" if "<br>" in words else "")),
                     value + (f" <small>{sd}" if sd else ""),
                     unit_cell(v["unit"]),
-                    ("no, its fit has not arrived" if not c["arrived"] else "yes" if c["believable"] else "no, at a limit") if first else "",
+                    ("no,<br>not arrived" if not c["arrived"] else "yes" if c["believable"] else "no,<br>at a limit") if first else "",
                 ]
             )
     return table(head, rows, (0, 4, 6, 7), CANDIDATES)
