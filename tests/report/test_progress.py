@@ -5,12 +5,15 @@ from __future__ import annotations
 import json
 import re
 import time
+from typing import Any
 
 import pytest
 
 from tests.conftest import ROOT
 from thermospindle.cli import main
+from thermospindle.diagnosis.data.observe import observe
 from thermospindle.report import progress
+from thermospindle.report.verbs import compare
 
 
 @pytest.fixture
@@ -38,8 +41,14 @@ def test_long_work_tells_plain_lines_and_short_work_none(impatient: None, capsys
 
 
 @pytest.mark.parametrize("verb", ["compare", "ladder"])
-def test_a_verb_in_a_pipe_is_told_from_one_that_hangs(verb: str, impatient: None, capsys: pytest.CaptureFixture[str]):
+def test_a_verb_in_a_pipe_is_told_from_one_that_hangs(verb: str, impatient: None, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
     """On standard error alone: the answer stays one JSON object. The ladder's lines have its last step."""
+
+    def slowly(*asked: Any) -> Any:
+        time.sleep(0.3)
+        return observe(*asked)
+
+    monkeypatch.setattr(compare, "observe", slowly)  # whose modes another test may have had worked out
     scene = ROOT / "scenes" / "hdd_2003"
     chosen = ["--effects", "bond_softening"] if verb == "ladder" else []
     assert main([verb, str(scene), str(scene / "measured" / "jang_2003"), *chosen, "--json"]) == 0
