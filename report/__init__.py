@@ -2,6 +2,7 @@
 
 ============  ==========================================================================================================
 folder        output folders: replaced only where they hold nothing but what spindle wrote
+progress      what is being done, on standard error: a bar in a terminal, plain lines now and then elsewhere
 typeset       numbers as a page shows them: true minus signs, signs, standard errors to their own digit
 check/        what the program understands of a scene: words, picture, page
 figures/      figures, drawn with matplotlib's object-oriented interface as SVG and PNG

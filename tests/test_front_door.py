@@ -107,7 +107,7 @@ def test_stopped_while_it_is_loaded():
         (["warmup", SCENE, "--minutes", "1e12"], "at most 100000 min"),
         (["map", SCENE, "--multiples", "100000"], "up to 100"),
         (["modes", "n" * 5000], "File name too long"),
-        (["table", SCENE, "--temperatures", "20", "--out", "/proc/x"], "/proc"),
+        (["table", SCENE, "--temperatures", "20", "--out", "/proc/x"], "--out /proc/x: No such file or directory; name a place where you may write"),
         (["inspect", "nowhere.rrd"], "no such file"),
     ],
     ids=lambda a: " ".join(map(str, a))[-40:] if isinstance(a, list) else None,

@@ -11,16 +11,20 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: more threa
 os.environ["MPLBACKEND"] = "agg"  # pictures go to files; a backend that there is not would end in a traceback
 os.environ.setdefault("PYTHONSAFEPATH", "1")  # processes that this one starts import nothing from the folder one happens to stand in: it may be a stranger's
 
+import errno
 import json
 import shlex
 import sys
 from collections.abc import Iterator, Sequence
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from thermospindle.model.errors import BadInput, NoEquilibrium, NotConverged, OutsideRange, Unanswered, instead, visible
 from thermospindle.options import parsers
 from thermospindle.report.folder import COMMAND
+
+WRITTEN = ("out", "mapping")  # options that name what is written
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -72,6 +76,10 @@ def _run(arguments: list[str]) -> int:
     token = COMMAND.set(shlex.join(["spindle", *arguments]))
     try:
         answer = getattr(import_module(f"thermospindle.report.verbs.{module}"), function)(**asked)
+    except OSError as error:
+        if told := _not_writable(error, asked):
+            raise BadInput(told) from None
+        raise
     finally:
         COMMAND.reset(token)
     for doubt in answer.values["warnings"]:
@@ -84,6 +92,19 @@ def _run(arguments: list[str]) -> int:
         sys.stdout.flush()
     answer.then()
     return 0
+
+
+def _not_writable(error: OSError, asked: dict[str, Any]) -> str:
+    """What option names a place where nothing may be written, and what is allowed; empty of any other error."""
+    if error.errno not in (errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOENT) or error.filename is None:
+        return ""
+    place = Path(error.filename).absolute()
+    for name in WRITTEN:
+        if (value := asked.get(name)) is not None:
+            own = Path(value).absolute()
+            if place == own or place in own.parents or own in place.parents:
+                return f"--{name} {value}: {error.strerror}; name a place where you may write"
+    return ""
 
 
 def _terminal() -> Console:

@@ -96,3 +96,8 @@ RADIAL_EXPANSION = Effect(
 
 FORMS = (Form("fixed stiffness", (FIXED_STIFFNESS,)), Form("radial expansion only", (RADIAL_EXPANSION,)), Form("axial equilibrium", ()))
 """In the order in which the literature took them in."""
+
+
+def forms_of(spindle: Spindle) -> tuple[Form, ...]:
+    """The forms in which models of this spindle differ: of one without rolling bearings, which no thermal motion changes, there is one, as drawn."""
+    return FORMS if spindle.rolling else (Form("as drawn", ()),)

@@ -1,6 +1,7 @@
 """The ladder: model forms and effects taken in one after the other, and the error at every step.
 
-The first three steps are the model forms of the literature (`diagnosis.ladder.forms`) on the spindle as drawn, nothing fitted. Then the build
+The first three steps are the model forms of the literature (`diagnosis.ladder.forms`) on the spindle as drawn, nothing fitted (one without
+rolling bearings has but one). Then the build
 tolerances are fitted, with the measuring errors; then what the model misses at all conditions alike, its constant discrepancy, is
 learned; then effects join, everything fitted anew with each. Whoever adds an effect that the data do not ask for sees that the error stays
 where it was and the evidence falls. Where effects are not chosen by hand they are those that `diagnose` names.
@@ -24,7 +25,7 @@ from thermospindle.diagnosis.decision.explanations import Candidate
 from thermospindle.diagnosis.decision.verdict import Verdict
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.ladder.fitting import CONSTANT, FREE, Settled, predicted_squares, settled, unseen, without
-from thermospindle.diagnosis.ladder.forms import FORMS
+from thermospindle.diagnosis.ladder.forms import forms_of
 from thermospindle.diagnosis.ladder.step import MeasuredModes, Step, as_drawn, fitted, measured_modes
 from thermospindle.diagnosis.prediction.next_test import NextTest
 from thermospindle.diagnosis.verdict import Diagnosis, campaign_data, diagnose
@@ -64,6 +65,11 @@ class Ladder:
         return next(s for s in self.steps if s.name == name)
 
     @property
+    def drawn(self) -> Step:
+        """The scene as drawn, by the model of this project, nothing fitted."""
+        return [s for s in self.steps if s.fitted is None][-1]
+
+    @property
     def top(self) -> Step:
         """Where the ladder leads: the last step, the best of alternatives, or that without effects where none is accepted."""
         word = "" if self.diagnosis is None else self.diagnosis.verdict.word
@@ -97,7 +103,8 @@ def ladder(
         steps.append(step)
         seen(step)
 
-    for form in FORMS:
+    every = forms_of(spindle)
+    for form in every:
         climbed(as_drawn(plain, measured, form.name, form.applied, steps[-1].name if steps else ""))
     progress("fitting the tolerances")
     climbed(fits(plain).step(measured, TOLERANCES, steps[-1].name))
@@ -116,10 +123,11 @@ def ladder(
         progress(f"fitting {' and '.join(e.name for e in effects)}")
         found[name] = fits(model, found[under], effects)
         climbed(found[name].step(measured, name, under))
-    progress("fitting the tolerances of the other model forms")
+    if len(every) > 1:
+        progress("fitting the tolerances of the other model forms")
     lines = any(isinstance(d, LineData) for d in model.tests)  # each such fit takes minutes, to predict by a form that nobody defends
-    free = [fits(replace(model, present=(*model.present, *form.applied)), leave_out=not lines) for form in FORMS[:-1]]
-    forms = tuple((form.name, *own.errors()) for form, own in zip(FORMS, [*free, found[DISCREPANCY]], strict=True))
+    free = [fits(replace(model, present=(*model.present, *form.applied)), leave_out=not lines) for form in every[:-1]]
+    forms = tuple((form.name, *own.errors()) for form, own in zip(every, [*free, found[DISCREPANCY]], strict=True))
     return Ladder(spindle, campaign, model, measured, tuple(steps), forms, named, named.tests if named else ())
 
 

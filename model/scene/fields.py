@@ -155,7 +155,7 @@ def read_file(kind: str, file: Path) -> dict[str, Any]:
 def first_error(where: str | Path, raw: Any, form: type[BaseModel], error: ValidationError) -> str:
     """One sentence for the first thing pydantic found wrong in a file of `form`: a misspelt key before the one then missing.
 
-    Entries of a list of tables go by their id, node or name.
+    Entries of a list of tables go by their id, node or name; those of another list by their number, the first being 1.
     """
     problem = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
     location = problem["loc"]
@@ -168,7 +168,7 @@ def first_error(where: str | Path, raw: Any, form: type[BaseModel], error: Valid
         except (KeyError, IndexError, TypeError):
             value = None
         entry = value if isinstance(part, int) and isinstance(value, Mapping) else {}
-        called = next((entry[key] for key in ("id", "node", "name") if key in entry), part)
+        called = next((entry[key] for key in ("id", "node", "name") if key in entry), part + 1 if isinstance(part, int) else part)
         words.append(called if isinstance(called, str) else _shown(called))
     key = ".".join(words)
     match problem["type"]:

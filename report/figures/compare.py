@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import zip_longest
 
 import numpy as np
 from matplotlib import rc_context
@@ -18,6 +19,7 @@ from thermospindle.report.figures.common import INK, PALE, STYLE, cells, colour,
 from thermospindle.report.typeset import UNITS, signed_short
 from thermospindle.sim.identification.frf import decibel
 
+MOST, MOST_ALONE = 3, 6  # FRFs over each other, of every test and of one alone
 FDAC_LINES = 260  # about, of an FDAC map
 
 
@@ -84,14 +86,19 @@ def _grid(c: Comparison, modes: Sequence[int], value: Callable[[PairedMode], flo
 
 @rc_context(STYLE)
 def overlay(c: Comparison) -> Figure:
-    """Measured and computed FRFs over each other, a row a test, a column a driving point."""
+    """Measured and computed FRFs over each other, a row a test, a column an FRF; of one test alone more of them, in rows of their own."""
     tests = with_frfs(c)
     every = [t.test.temperature for t, _ in tests]
-    pairs = shown_pairs(tests[0][1])
-    figure = _figure(10.3, 0.9 + 1.35 * len(tests))
-    panels = figure.subplots(len(tests), len(pairs), squeeze=False, sharex=True, sharey="col")
-    for (t, found), row in zip(tests, panels, strict=True):
-        for pair, axes in zip(pairs, row, strict=True):
+    alone = len(tests) == 1
+    pairs = shown_pairs(tests[0][1], MOST_ALONE if alone else MOST)
+    columns = min(len(pairs), MOST)
+    rows = -(-len(pairs) // columns) if alone else len(tests)
+    figure = _figure(10.3, 0.9 + (2.1 if alone else 1.35) * rows)
+    panels = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=False if alone else "col")
+    every_row = [(*tests[0], pairs[k : k + columns]) for k in range(0, len(pairs), columns)] if alone else [(*row, pairs) for row in tests]
+    for (t, found, own), row in zip(every_row, panels, strict=True):
+        for axes, pair in zip_longest(row, own):
+            axes.tick_params(labelbottom=alone or row is panels[-1])
             ij = found.pairs.get(pair)
             if ij is None:
                 axes.set_axis_off()
@@ -100,9 +107,10 @@ def overlay(c: Comparison) -> Figure:
             axes.plot(found.frequency, decibel(found.computed[ij]), color=INK, lw=0.8, ls=(0, (4, 2)))
         row[0].set_ylabel(label(t.test))
     for k, pair in enumerate(pairs):
-        panels[0, k].set_title(f"H({pair[0]},{pair[1]})" + (" driving point" if pair[0] == pair[1] else ""))
-        panels[-1, k].set_xlabel("frequency, Hz")
-        panels[-1, k].set_xlim(tests[0][1].frequency[0], tests[0][1].frequency[-1])
+        panels.flat[k].set_title(f"H({pair[0]},{pair[1]})" + (" driving point" if pair[0] == pair[1] else ""))
+    for axes in panels[-1]:
+        axes.set_xlabel("frequency, Hz")
+        axes.set_xlim(tests[0][1].frequency[0], tests[0][1].frequency[-1])
     quantity = tests[0][1].beside.measured.quantity
     figure.supylabel(f"{quantity}, dB re 1 {UNITS[quantity]}", fontsize=8.5)
     handles = [Line2D([], [], color=colour(t, every), lw=2.4, alpha=0.55, label=f"measured, {t:g} °C") for t in sorted(set(every))]
@@ -111,11 +119,9 @@ def overlay(c: Comparison) -> Figure:
     return figure
 
 
-def shown_pairs(found: Correlation) -> list[Pair]:
-    """Driving points, or the loudest FRF where there is none."""
-    driving = [p for p in found.pairs if p[0] == p[1]]
-    loudest = max(found.pairs, key=lambda p: float(np.linalg.norm(found.measured[found.pairs[p]])))
-    return driving[:3] or [loudest]
+def shown_pairs(found: Correlation, most: int) -> list[Pair]:
+    """Driving points, then the loudest of the other FRFs, `most` of them."""
+    return sorted(found.pairs, key=lambda p: (p[0] != p[1], -float(np.linalg.norm(found.measured[found.pairs[p]])) if p[0] != p[1] else 0.0))[:most]
 
 
 def _share(value: float) -> str:
@@ -143,22 +149,22 @@ def by_band(c: Comparison) -> Figure:
             numbers = (b.csac, b.csf, np.nan if b.shift is None else 100 * b.shift)
             for grid, value in zip(values.values(), numbers, strict=True):
                 grid[place] = value
-    figure = _figure(10.3, 1.7 + 0.3 * len(tests))
-    panels = figure.subplots(1, 3, sharey=True)
+    figure = _figure(10.3, 1.0 + 3 * (0.45 + 0.3 * len(tests)))
+    panels = figure.subplots(3, 1, sharex=True)  # below each other, where there is room for numbers
     far = max(1.0, float(np.nanmax(np.abs(values["shift"]), initial=0.0)))
     looks: list[tuple[str, Normalize, str, Callable[[float], str]]] = [
         ("Shape: mean CSAC", Normalize(0, 1), "YlGnBu", _share),
         ("Amplitude: mean CSF", Normalize(0, 1), "YlGnBu", _share),
         ("Shift of the model, %, by FDAC", Normalize(-far, far), "RdBu_r", lambda v: "0" if abs(v) < 0.05 else f"{v:+.1f}"),
     ]
-    size = min(6.5, 62 / max(len(edges), 1))  # signed numbers stand side by side
+    size = min(7.5, 170 / max(len(edges), 1))  # signed numbers stand side by side
     for axes, grid, (title, norm, colours, text) in zip(panels, values.values(), looks, strict=True):
         picture = cells(axes, grid, norm, colours, text, size)
         axes.set_title(title)
         axes.set_xticks(range(len(edges)), [f"{a:.0f}–{b:.0f}" for a, b in edges.values()], fontsize=7, rotation=90)
-        axes.set_xlabel("band, Hz")
-        figure.colorbar(picture, ax=axes, shrink=0.9, pad=0.02, aspect=22).outline.set_visible(False)
-    panels[0].set_yticks(range(len(tests)), [label(t.test, ", ") for t, _ in tests])
+        axes.set_yticks(range(len(tests)), [label(t.test, ", ") for t, _ in tests])
+        figure.colorbar(picture, ax=axes, pad=0.01, aspect=3 + 2 * len(tests)).outline.set_visible(False)
+    panels[-1].set_xlabel("band, Hz")
     return figure
 
 

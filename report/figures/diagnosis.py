@@ -10,7 +10,9 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from thermospindle.diagnosis.decision.errors import arrived, as_drawn, fitted, predicted
 from thermospindle.diagnosis.decision.explanations import Candidate
+from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.verdict import Diagnosis
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
@@ -44,25 +46,38 @@ def leading(d: Diagnosis) -> Candidate | None:
 def explanations(d: Diagnosis) -> Figure:
     """ln evidence of explanations over the model without effects; free forms beside those of the catalogue."""
     asked = [c for c in (*d.verdict.candidates[:MOST], *d.verdict.free[:4]) if c.hypothesis.mechanisms]
-    best = sorted(asked, key=lambda c: -c.delta_evidence)[: MOST + 2]
+    best = sorted(asked, key=lambda c: (not arrived(c.hypothesis), -c.delta_evidence))[: MOST + 2]
     value = np.array([c.delta_evidence for c in best])
     paint = [FREE if c.free else NAMED if d.verdict.effects and set(c.names) <= set(d.verdict.effects) else OTHER for c in best]
-    return evidence_bars([" + ".join(c.names) + (" (drifts)" if c.free else "") for c in best], value, paint)
+    drawn = evidence_bars([" + ".join(c.names) + (" (drifts)" if c.free else "") for c in best], value, paint, [arrived(c.hypothesis) for c in best])
+    if not arrived(d.search.base):
+        drawn.axes[0].set_xlabel("ln evidence over the model without effects, whose own fit has not arrived")
+    return drawn
 
 
 @rc_context(STYLE)
-def evidence_bars(names: Sequence[str], value: Array, paint: Sequence[str]) -> Figure:
-    """Bars of ln evidence `value` (n,) in the colours `paint`, with their numbers."""
+def evidence_bars(names: Sequence[str], value: Array, paint: Sequence[str], ended: Sequence[bool] | None = None) -> Figure:
+    """Bars of ln evidence `value` (n,) in the colours `paint`, with their numbers. The axis is that of fits that have `ended` where they arrive, others are hatched;
+    a bar that goes on beyond the axis ends in an arrow."""
+    ended = [True] * len(names) if ended is None else ended
     figure = Figure(figsize=(8.6, 0.85 + 0.27 * len(names)), layout="constrained")
     axes = figure.add_subplot()
-    axes.barh(range(len(names)), value, height=0.66, color=list(paint))
-    low, high = min(float(value.min()), 0.0), max(float(value.max()), 1.0)
+    shown = value[np.array(ended)] if any(ended) else value
+    low, high = min(float(shown.min()), 0.0), max(float(shown.max()), 1.0)
     low = max(low, -0.2 * high)
-    for y, v in enumerate(value):
-        axes.text(max(v, 0.0) + 0.012 * (high - low), y, f"{v:+.1f}".replace("-", "−") if abs(v) < 1000 else f"{v:+.0f}", va="center", fontsize=8, color=INK)
+    for y, (v, settled, colour) in enumerate(zip(value, ended, paint, strict=True)):
+        look: dict[str, Any] = {"color": colour} if settled else {"color": "none", "edgecolor": colour, "hatch": "////", "lw": 0.8}
+        axes.barh(y, v, height=0.66, **look)
+        end = float(np.clip(v, low, high))
+        beyond = v < low or v > high
+        if beyond:
+            axes.plot([1.02 * low if v < low else high], [y], marker="<" if v < low else ">", ms=6, color=INK, mec="white", zorder=4, clip_on=False)
+        told = f"{v:+.1f}" if abs(v) < 1000 else f"{v:+.0f}" if abs(v) < 1e9 else f"{v:+.1e}"
+        more = f"{', beyond the axis' if beyond else ''}{'' if settled else ', the fit has not arrived'}"
+        axes.text(max(end, 0.0) + 0.012 * (high - low), y, told.replace("-", "−") + more, va="center", fontsize=8, color=INK)
     axes.axvline(0, color=INK, lw=0.8)
     axes.set_yticks(range(len(names)), names)
-    axes.set(xlim=(1.05 * low, high + 0.14 * (high - low)), ylim=(len(names) - 0.4, -0.6))
+    axes.set(xlim=(1.05 * low, high + (0.14 if all(ended) else 0.3) * (high - low)), ylim=(len(names) - 0.4, -0.6))
     axes.set_xlabel("ln evidence over the model without effects")
     axes.set_title("How far every explanation leads")
     axes.grid(visible=False, axis="y")
@@ -81,7 +96,8 @@ def law(d: Diagnosis, c: Candidate) -> Figure:
         own = c.hypothesis.evidence
         _over_temperature(axes, conditions, own.sizes[k], np.sqrt(np.maximum(np.diag(own.size_covariance[k]), 0.0)))
         axes.set_ylabel(", ".join(filter(None, (m.size.name, unit_cell(m.size.unit)))))
-        level = "with a law of the data's own" if m.own_law else "a level line is the law assumed"
+        shared = "one value, fitted to all tests together" if own.learned.departures[k] == 0.0 else "a level line is the law assumed"
+        level = "with a law of the data's own" if m.own_law else shared
         axes.set_title(f"{m.name}: its size in every test ({level})")
     return figure
 
@@ -115,22 +131,31 @@ def _over_temperature(axes: Axes, conditions: Sequence[Condition], value: Array,
 
 @rc_context(STYLE)
 def errors(d: Diagnosis) -> Figure:
-    """chi2 per number of every test, with tolerances fitted and with what the verdict names."""
-    tests = d.search.model.tests
-    shown: list[tuple[str, Any, str]] = [("tolerances fitted", d.search.base, OTHER)]
-    if d.verdict.accepted is not d.search.base:
-        shown.append((" + ".join(d.verdict.accepted.names), d.verdict.accepted, NAMED))
-    figure = Figure(figsize=(8.6, 2.6), layout="constrained")
-    axes = figure.add_subplot()
-    width = 0.8 / len(shown)
-    for k, (label, h, paint) in enumerate(shown):
-        value = [b[0] / t.count for b, t in zip(h.fit.by_test, tests, strict=True)]
-        axes.bar(np.arange(len(tests)) + (k - (len(shown) - 1) / 2) * width, value, width=width, color=paint, label=label)
-    axes.axhline(1.0, color=INK, lw=0.8, ls="--")
-    axes.set_xticks(range(len(tests)), [t.test.id for t in tests], rotation=30 if len(tests) > 6 else 0)
-    axes.set_ylabel("chi² per number")
-    axes.set_title("Error left in every test (1 is noise alone)")
-    axes.set_ylim(0.0, 1.25 * axes.get_ylim()[1])  # room for the legend above the bars
-    axes.legend(frameon=False, fontsize=8, loc="upper left", ncols=len(shown))
-    axes.grid(visible=False, axis="x")
+    """Rms residual of every test, as drawn, with tolerances fitted and with what the verdict names: fitted to all tests, and predicted from all other conditions
+    where there are any."""
+    model, base, accepted = d.search.model, d.search.base, d.verdict.accepted
+    shown: list[tuple[str, Hypothesis, str, str]] = [("tolerances and constant errors fitted", base, "s", OTHER)]
+    if accepted is not base:
+        shown.append((" + ".join(accepted.names), accepted, "D", NAMED))
+    unseen = [predicted(model, h) for _, h, _, _ in shown]
+    panels = 1 if np.isnan(unseen[0]).all() else 2
+    figure = Figure(figsize=(8.6, 3.0), layout="constrained")
+    every = figure.subplots(1, panels, sharey=True, squeeze=False)[0]
+    place, tests = np.arange(len(model.tests)), [t.test.id for t in model.tests]
+    every[0].plot(place, as_drawn(model), "o", mfc="none", color=INK, label="as drawn, nothing fitted")
+    for k, (label, h, marker, paint) in enumerate(shown):
+        for axes, value in zip(every, (fitted(model, h), unseen[k]), strict=False):
+            axes.plot(place, value, marker, ms=7 - 3 * k, color=paint, label=label)
+    for axes, title in zip(every, ("Error left, fitted to all tests", "Each condition predicted from all others"), strict=False):
+        axes.axhline(1.0, color=INK, lw=0.8, ls="--")
+        axes.set_xticks(place, tests, rotation=30 if len(tests) > 6 or panels > 1 else 0)
+        axes.set_xlim(-0.6, len(tests) - 0.4)
+        axes.set_title(title)
+        axes.grid(visible=False, axis="x")
+    every[0].set_yscale("log")
+    every[0].yaxis.set_major_formatter(lambda value, place: f"{value:g}")
+    low, high = every[0].get_ylim()
+    every[0].set_ylim(min(low, 0.5), max(high, 2.0))
+    every[0].set_ylabel("rms, standard errors")
+    figure.legend(*every[0].get_legend_handles_labels(), frameon=False, fontsize=8, loc="outside lower center", ncols=len(shown) + 1)
     return figure

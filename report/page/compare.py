@@ -25,7 +25,7 @@ WORDS = {
         "Computed less measured, in standard errors of the measurement: estimator, repeats, temperature and the model's own "
         "numerical floor. Grey: not paired with any mode within the believable error. Below: how many modes only one side has.",
     ),
-    "frfs": ("FRFs over each other", "Measured FRFs (coloured) and those of the model (dashed) at the same points, lines and window."),
+    "frfs": ("FRFs over each other", "Measured FRFs (coloured) and those of the model (dashed) at the same points, lines and window: driving points first, then the loudest."),
     "bands": (
         "Correlation by band",
         "Means over the lines of third-octave bands. CSAC compares the shape of all FRFs at a line and is blind to a scale, CSF amplitude "

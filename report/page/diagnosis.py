@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,6 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from thermospindle.diagnosis.forward.nuisance import TEMPERATURE
-from thermospindle.diagnosis.inference.hypothesis import DEPARTS
 from thermospindle.diagnosis.runout.verdict import RunoutDiagnosis
 from thermospindle.diagnosis.verdict import Diagnosis
 from thermospindle.model.machine import Spindle
@@ -18,14 +18,15 @@ from thermospindle.report.figures.diagnosis import figures
 from thermospindle.report.figures.runout_campaign import diagnosis_figures
 from thermospindle.report.page import runout_diagnosis
 from thermospindle.report.page.report import Section, write_page
-from thermospindle.report.text.diagnosis.words import beyond_words, hidden_words, plan_words, value_words
+from thermospindle.report.text.diagnosis.words import beyond_words, hidden_words, plan_words, spread_words, value_words
 from thermospindle.report.typeset import minus, plain, prose, signed, table, unit_cell, with_error
 
 CAPTIONS = {
-    "errors": "Mean square of the whitened residuals of every test's FRF lines: one is noise alone.",
-    "explanations": "Green: what the verdict names. Amber: free forms, which drift without a law. All tolerances are fitted anew with each.",
-    "law": "The size of the effect as each test has it, with one standard error: where it is level, the effect's own law over temperature and "
-    "speed holds; where it is not, this is the law that the data have.",
+    "errors": "Rms residuals of every test in standard errors of its data: one is noise alone. Fitted to all tests, tolerances and what a model may be constantly off by "
+    "can hide what is missing; a condition that is predicted from all others shows it.",
+    "explanations": "Green: what the verdict names. Amber: free forms, which drift without a law. Hatched: a fit that has not arrived at its least error, whose number says nothing yet. An arrow: the bar goes on beyond the axis. All tolerances are fitted anew with each.",
+    "law": "The size of the effect as each test has it, with one standard error: where it departs from a level line, this is the law that the data have. Where all tests have exactly "
+    "one value it was fitted to all of them together, since no departure from the law was likeliest: that is one number, and no measurement in every test.",
     "drift": "What would have to change in every test, with one standard error, where no effect is named.",
 }
 UNSEEN = 0.9  # standard error over that of the tolerance, from which the data say nothing of a parameter
@@ -67,10 +68,13 @@ def _verdict(answer: dict[str, Any]) -> str:
     named = f": {', '.join(answer['effects'])}" if answer["effects"] else ""
     error = answer["error"]
     kinds = [("all tests", ""), ("temperatures left out one after the other", "held_out_")]
-    rows = [[name, *(f"{error[which + when]:.2f}" for when in ("before", "after"))] for name, which in kinds if error[which + "after"] is not None]
-    grid = table(["", "before", "after"], rows, caption="Error, rms in standard errors: with tolerances fitted, and with what the verdict names.")
+    whens = ("before", "after") if answer["effects"] else ("before",)
+    drawn = {"": f"{error['drawn']:.2f}", "held_out_": "–"}
+    rows = [[name, drawn[which], *(f"{error[which + when]:.2f}" for when in whens)] for name, which in kinds if error[which + "after"] is not None]
+    head = ["", "as drawn", "tolerances and constant errors fitted", *(["with what is named"] if answer["effects"] else [])]
+    grid = table(head, rows, caption="Error, rms in standard errors. Constant errors: what a model may be off by at all conditions alike, which the ladder's step \"tolerances fitted\" does not grant.")
     card = f'<div class="cards"><div class="card"><span>verdict</span><b>{escape(answer["verdict"] + named)}</b></div></div>'
-    said = "".join(f"<p>{prose(answer[key])}</p>" for key in ("reason", "would_change")) + "".join(f"<p>{prose(s)}</p>" for s in answer["law_departs"])
+    said = "".join(f"<p>{prose(answer[key])}</p>" for key in ("reason", "granted", "would_change") if answer[key]) + "".join(f"<p>{prose(s)}</p>" for s in answer["law_departs"])
     said += f"<p>{prose(hidden_words(answer['may_hide']))}</p>" if answer["may_hide"] else ""
     free = f"<p>Without any catalogue: {prose(answer['misfit']['words'][0])}</p>" if answer["misfit"]["rejected"] else ""
     return card + said + free + grid
@@ -87,22 +91,21 @@ def _candidates(answer: dict[str, Any]) -> str:
     head = ["effects", "ln evidence", "probability", "left-out error, %", "value", "", "unit", "believable"]
     rows = []
     for c in answer["candidates"]:
-        told: set[str] = set()
         for k, (name, v) in enumerate(c["parameters"].items()):
-            first, effect = k == 0, name.split(".", 1)[0]
-            mean = " (mean of the tests)" if effect not in told and c["departure_from_law"].get(effect, 0.0) >= DEPARTS else ""  # an effect's size comes first
-            told.add(effect)
-            value, _, sd = _with_error(v["value"], v["sd"]).partition(" <small>") if not ("called" in v or v.get("others")) else (escape(value_words(v)), "", "")
+            first = k == 0
+            spread = spread_words(c | {"parameters": c["parameters"] | {name: v | {"unit": "1"}}}, name)  # units have a column of their own
+            words = re.sub(r" (to [^ ]+ ±|\(mean )", r" <br>\1", prose(spread)) if spread else escape(value_words(v)) if "called" in v or v.get("others") else ""
+            value, _, sd = (words, "", "") if words else _with_error(v["value"], v["sd"]).partition(" <small>")
             rows.append(
                 [
-                    escape(" + ".join(c["effects"])) if first else "",
+                    escape(" + ".join(c["effects"])).replace(" + ", " +<br>") if first else "",
                     minus(_evidence(c["delta_evidence"])) if first else "",
                     f"{c['probability']:.3f}" if first else "",
                     "" if not first else "–" if c["held_out_error_ratio"] is None else f"{100 * c['held_out_error_ratio']:.0f}",
-                    escape((name.split(".", 1)[1] if len(c["effects"]) == 1 else name) + mean),
+                    escape((name.split(".", 1)[1] if len(c["effects"]) == 1 else name) + (" (test by test)" if "<br>" in words else "")),
                     value + (f" <small>{sd}" if sd else ""),
                     unit_cell(v["unit"]),
-                    ("yes" if c["believable"] else "no, at a limit") if first else "",
+                    ("no,<br>not arrived" if not c["arrived"] else "yes" if c["believable"] else "no,<br>at a limit") if first else "",
                 ]
             )
     return table(head, rows, (0, 4, 6, 7), CANDIDATES)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -19,6 +19,7 @@ from thermospindle.diagnosis.ladder.ladder import Ladder
 from thermospindle.diagnosis.ladder.step import Step
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
+from thermospindle.report.progress import plain_lines
 from thermospindle.report.text.ladder import evidence, sentences
 from thermospindle.report.typeset import known
 
@@ -26,7 +27,7 @@ COLUMNS = ("step", "error\ns.e.", "held out\ns.e.", "error\nHz", "shifts\nHz", "
 LEGEND = (
     "Errors are rms residuals; s.e. are standard errors of the data (of every FRF line, or of a table's numbers) or, held out, of the prediction "
     "by a fit that has not seen that temperature. Hz: of natural frequencies. Build: rms of the fitted build tolerances in their own "
-    "standard deviations."
+    "standard deviations. What `diagnose` calls fitted grants constant errors of the model beside the tolerances, as the step \"constant discrepancy\" does."
 )
 
 
@@ -127,28 +128,33 @@ def cells(r: Step) -> tuple[str, ...]:
 
 
 class Growing:
-    """The table as it grows, with what is being done below it."""
+    """The steps as they are climbed, and what is being done beside them: each time `draw` is given both."""
 
-    def __init__(self, live: Live) -> None:
-        self.live, self.steps, self.doing = live, list[Step](), "reading the campaign"
+    def __init__(self, draw: Callable[[list[Step], str], object]) -> None:
+        self.draw, self.steps, self.doing = draw, list[Step](), "reading the campaign"
 
     def step(self, step: Step) -> None:
         self.steps.append(step)
-        self._draw()
+        self.draw(self.steps, self.doing)
 
     def progress(self, doing: str) -> None:
         self.doing = doing
-        self._draw()
-
-    def _draw(self) -> None:
-        self.live.update(Group(table(self.steps), Spinner("line", self.doing)))
+        self.draw(self.steps, doing)
 
 
 @contextmanager
 def growing(console: Console) -> Iterator[Growing]:
-    """A table that grows on the console and leaves it when it is done; on what is no terminal, nothing is written."""
+    """A table that grows in a terminal and leaves it when it is done; elsewhere a plain line now and then, with the last step."""
+    if not console.is_terminal:
+        with plain_lines() as told:
+            yield Growing(lambda steps, doing: told(_now(steps, doing)))
+        return
     with Live(console=console, transient=True, refresh_per_second=8) as live:
-        yield Growing(live)
+        yield Growing(lambda steps, doing: live.update(Group(table(steps), Spinner("line", doing))))
+
+
+def _now(steps: Sequence[Step], doing: str) -> str:
+    return f"step {len(steps)} ({steps[-1].name}) done, error {steps[-1].error:.2f} s.e.; now: {doing}" if steps else doing
 
 
 def show_ladder(console: Console, found: Ladder) -> None:

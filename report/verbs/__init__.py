@@ -4,7 +4,7 @@ A function takes what the options of its verb say, in the units people write (C,
 of `--json`, and how to print the same for a person. With `out` it writes a folder, whole or not at all. `cli` only parses and calls.
 
 =========  =============================================================================================================
-answer     what all verbs share: the answer, the scene with its effects, a progress bar, the output folder
+answer     what all verbs share: the answer, the scene with its effects, the output folder
 catalogue  effects, add
 chain      run, impact, simulate, report
 compare    compare

@@ -1,17 +1,15 @@
-"""What all verbs share: the answer, the scene with its effects, a progress bar, the output folder."""
+"""What all verbs share: the answer, the scene with its effects, the output folder."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from thermospindle.model import sense
 from thermospindle.model.errors import BadInput
@@ -81,16 +79,6 @@ def with_hammer(spindle: Spindle, hits: int | None, level: float | None) -> Spin
         raise BadInput(f"--level {level:g}: the hammer's peak force must be positive, {FAINTEST:g} N or more")
     changes = {key: value for key, value in (("hits", hits), ("level", level)) if value is not None}
     return replace(spindle, hammer=replace(spindle.hammer, **changes))  # type: ignore[arg-type]
-
-
-@contextmanager
-def progress_bar(steps: int) -> Iterator[Callable[[str], None]]:
-    """A function that takes what has been done, and moves a bar of so many steps on standard error."""
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn())
-    console = Console(stderr=True, markup=False)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("starting", total=steps)
-        yield lambda done: bar.update(task, advance=1, description=done)
 
 
 def write_json(name: str, more: Callable[[Path], None] = lambda folder: None) -> Callable[[Path, dict[str, Any]], None]:

@@ -15,12 +15,12 @@ from thermospindle.model.rotor.elements import ELEMENTS
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import NM, RPM
 from thermospindle.report.folder import mark, whole_folder
+from thermospindle.report.progress import progress_bar
 from thermospindle.report.text import run as text
 from thermospindle.report.verbs.answer import (
     Answer,
     answered,
     doubts,
-    progress_bar,
     temperature_or_reference,
     temperatures_or_range,
     with_effects,

@@ -16,9 +16,10 @@ from thermospindle.diagnosis.data.observe import observe
 from thermospindle.diagnosis.runout.compare import RunoutBeside, compare_runout, rms_residual
 from thermospindle.diagnosis.runout.lines import modal_tests
 from thermospindle.model.machine import Spindle
+from thermospindle.report.progress import progress_bar
 from thermospindle.report.text.compare import comparison_json, show_before_after, show_comparison
 from thermospindle.report.text.runout_compare import runout_comparison_json, show_errors, show_runout_comparison
-from thermospindle.report.verbs.answer import Answer, answered, progress_bar, with_effects, write_json
+from thermospindle.report.verbs.answer import Answer, answered, with_effects, write_json
 from thermospindle.sim.campaign.beside import left_out
 from thermospindle.sim.campaign.campaign import Campaign, read_campaign
 

@@ -21,10 +21,11 @@ from thermospindle.model.files.formats import CURRENT, DIAGNOSIS, KEY
 from thermospindle.model.files.whole import whole
 from thermospindle.model.machine import Spindle
 from thermospindle.model.scene.reading import content_hash
+from thermospindle.report.progress import progress_bar
 from thermospindle.report.text.diagnosis.answer import diagnosis_json
 from thermospindle.report.text.diagnosis.words import show_diagnosis
 from thermospindle.report.text.runout_diagnosis import runout_diagnosis_json, show_runout_diagnosis
-from thermospindle.report.verbs.answer import Answer, answered, progress_bar, with_effects, write_json
+from thermospindle.report.verbs.answer import Answer, answered, with_effects, write_json
 from thermospindle.sim.campaign.beside import left_out
 from thermospindle.sim.campaign.campaign import Campaign, read_campaign
 from thermospindle.sim.effects.effect import Effect

@@ -13,7 +13,8 @@ from thermospindle.model.errors import BadInput, Unanswered
 from thermospindle.model.files.whole import whole
 from thermospindle.model.machine import Spindle
 from thermospindle.model.units import RPM
-from thermospindle.report.verbs.answer import Answer, progress_bar, with_effects
+from thermospindle.report.progress import progress_bar
+from thermospindle.report.verbs.answer import Answer, with_effects
 from thermospindle.sim.campaign.beside import left_out
 from thermospindle.sim.campaign.campaign import Campaign, write_campaign
 from thermospindle.sim.importing.assemble import campaign_of, read, spoken

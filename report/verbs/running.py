@@ -13,6 +13,7 @@ from thermospindle.model.built.drawn import drawn
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import MINUTE, RPM
+from thermospindle.report.progress import progress_bar
 from thermospindle.report.text.resonance import map_json, show_map, write_map
 from thermospindle.report.text.runout import runout_json, show_runout, write_runout
 from thermospindle.report.text.warmup import lost_contact, show_warmup, warmup_json, write_warmup
@@ -20,7 +21,6 @@ from thermospindle.report.verbs.answer import (
     Answer,
     answered,
     doubts,
-    progress_bar,
     temperature_or_reference,
     temperatures_or_range,
     with_effects,

@@ -22,8 +22,9 @@ from thermospindle.report.figures import study as figures
 from thermospindle.report.figures.common import save_all
 from thermospindle.report.folder import digest
 from thermospindle.report.log.study.log import write_study_log
+from thermospindle.report.progress import progress_bar
 from thermospindle.report.text.grid import show_grid
-from thermospindle.report.verbs.answer import Answer, progress_bar, with_effects
+from thermospindle.report.verbs.answer import Answer, with_effects
 from thermospindle.sim.study.executors import Executor, on_cluster, on_this_machine
 from thermospindle.sim.study.form import FLEET, MONTE_CARLO, read_study
 from thermospindle.sim.study.parts import RESULTS, fill, opened, versions, write, write_table

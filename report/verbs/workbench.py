@@ -10,7 +10,8 @@ from typing import Any
 
 from rich.console import Console
 
-from thermospindle.report.verbs.answer import Answer, progress_bar
+from thermospindle.report.progress import progress_bar
+from thermospindle.report.verbs.answer import Answer
 from thermospindle.report.workbench import words
 from thermospindle.report.workbench.bench import open_bench
 from thermospindle.report.workbench.explanations import read_explanations

@@ -16,8 +16,8 @@ from thermospindle.sim.identification.frf import out_of
 from thermospindle.sim.importing import units
 from thermospindle.sim.importing.files.reading import content
 from thermospindle.sim.importing.frfs import Placed, frf_of
-from thermospindle.sim.importing.mapping import FileForm, MappingForm, TestForm, fits, settings_of
-from thermospindle.sim.importing.measured import Content, Curve, End, ModeLine, Motion, Question, listed, words_of
+from thermospindle.sim.importing.mapping import REST, FileForm, MappingForm, TestForm, fits, settings_of
+from thermospindle.sim.importing.measured import FORCE_NEEDED, Content, Curve, End, ModeLine, Motion, Question, listed, words_of
 from thermospindle.sim.importing.names import plain
 from thermospindle.sim.importing.peaks import from_peaks
 from thermospindle.sim.importing.places import place, points_of, unplaced
@@ -60,6 +60,7 @@ def read(
     for f in files:
         contents.append(content(f, settings[f]))
         progress(f.name)
+    _check_columns(form, contents, mapping)
     points, questions = points_of(form, scene)
     notes = [n for c in contents for n in c.notes]
     questions += [q for c in contents for q in (*c.questions, *open_units(c.file.name, c.motions))]
@@ -80,6 +81,8 @@ def read(
         coherence.setdefault(own, {}).update(c.coherence)
         for m in c.modes:
             modes.setdefault(m.test or own, []).append(m)
+    if not (curves or modes):
+        raise BadInput(f"{listed(f.name for f in files)}: no FRF, time record or mode in {'it' if len(files) == 1 else 'them'}; geometry, spectra or coherence alone are no campaign")
     curves = {test: [_with(x, coherence.get(test, {})) for x in every] for test, every in curves.items()}
     groups, open_records = _records(contents, settings)
     questions += open_records
@@ -109,6 +112,16 @@ def read(
     found = Read(tuple(contents), curves, modes, window, pretrigger, ends, points, tuple(notes), ())
     questions += _conditions(found, form, scene, mapping)
     return Read(tuple(contents), curves, modes, window, pretrigger, ends, points, tuple(notes), _together(questions))
+
+
+def _check_columns(form: MappingForm, contents: Sequence[Content], mapping: Path | None) -> None:
+    """`BadInput` for a column that the mapping tells and none of the files that it is about has."""
+    for table in form.files:
+        names = dict.fromkeys(n for c in contents if fits(table, c.file) for n in c.names)
+        known = {REST, *names, *(n.rsplit(".", 1)[-1] for n in names)}
+        if wrong := [name for name in table.columns if name not in known]:
+            there = listed((n for n in names if not n.isdigit()), 12) or "none, for UFF and tables of modes say themselves what they hold"
+            raise BadInput(f"{mapping}: files: columns: {wrong[0]!r} is no column of {table.file}; there are {there}")
 
 
 def _together(questions: Sequence[Question]) -> tuple[Question, ...]:
@@ -155,7 +168,8 @@ def _records(contents: Sequence[Content], settings: dict[Path, FileForm]) -> tup
             _add(groups, test, own[0].file, motions)
         else:
             lacking = "response" if all(m.force for m in motions) else "force"
-            questions.append(Question(names, "test", f"the {lacking} record that goes with them: files of one hit have the same test"))
+            alone = f"; {FORCE_NEEDED}" if lacking == "force" else ""
+            questions.append(Question(names, "test", f"the {lacking} record that goes with them: files of one hit have the same test{alone}"))
     return groups, questions
 
 
@@ -231,8 +245,6 @@ def campaign_of(found: Read, form: MappingForm, scene: Spindle | None, files: Se
         head = f"{count} thing{'s are' if count > 1 else ' is'} not told by the files:"
         tail = f"answer them in {mapping}" if mapping else "--mapping NEW.toml writes a form to answer them in"
         raise Unanswered(head, spoken(found, files), tail)
-    if not found.tests:
-        raise BadInput(f"{listed(f.name for f in files)}: no FRF, time record or mode in {'it' if len(files) == 1 else 'them'}; geometry, spectra or coherence alone are no campaign")
     forms = {t.id: t for t in form.tests}
     settings = {c.file: settings_of(form, c.file) for c in found.contents}
     notes = list(found.notes)

@@ -19,6 +19,8 @@ from thermospindle.model.scene.measuring import Point as PointForm
 from thermospindle.sim.campaign.form import PlainName, Table
 
 OPEN = "?"
+REST = "*"
+"""In `columns`: all columns that nothing else tells; they can only be ignored."""
 Quantity = Literal["receptance", "mobility", "accelerance"]
 Temperature = Annotated[float, Field(gt=-273.15, le=5000, allow_inf_nan=False)]
 Band = Annotated[list[NotNegative], Field(min_length=2, max_length=2)]
@@ -110,6 +112,9 @@ def read_mapping(path: Path | None) -> MappingForm:
         for name in names:
             if names.count(name) > 1:
                 raise BadInput(f"{path}: {key} = {name!r} stands {names.count(name)} times; each must be different")
+    for table in form.files:
+        if table.columns.get(REST, "ignore") != "ignore":
+            raise BadInput(f"{path}: files: columns: {REST!r} = {table.columns[REST]!r}: all columns that nothing else tells can only be \"ignore\"")
     for point in form.points:
         _check_point(path, point)
     return form

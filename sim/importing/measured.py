@@ -10,6 +10,8 @@ import numpy as np
 
 from thermospindle.model.types import Array
 
+FORCE_NEEDED = "answers alone, without the force that was hit with, are no measurement that can be used"
+
 
 @dataclass(frozen=True)
 class End:
@@ -93,6 +95,7 @@ class Content:
     coherence: dict[tuple[End, End], Array] = field(default_factory=dict)  # of FRFs that may be in another file of the test
     notes: tuple[str, ...] = ()
     questions: tuple[Question, ...] = ()
+    names: tuple[str, ...] = ()  # of the columns or arrays that a mapping's `columns` may tell
 
 
 def words_of(question: Question, every: Mapping[str, Sequence[str]]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -12,6 +13,8 @@ from thermospindle.model.units import MM
 from thermospindle.sim.importing.mapping import MadePoint, MappingForm
 from thermospindle.sim.importing.measured import End, Question, listed
 
+COUNTED = re.compile(r"(response|reference) \d+")
+"""What ends of an array without lists of nodes are called."""
 NEEDED = ("name", "body", "position_mm", "direction")
 
 
@@ -76,4 +79,6 @@ def unplaced(ends: Sequence[tuple[str, End]], points: dict[int, Point], scene: S
         return []
     there = f"; points there are {listed(f'{p.node} {p.name} {p.axis}' for p in points.values())}" if points else ""
     hint = "" if scene else "; --scene takes those of a scene"
+    counted = next((label for label in labels if COUNTED.fullmatch(label)), None)
+    hint += f"; {counted!r} is counted along an array that names no nodes" if counted else ""
     return [Question("points", "called", f'which points {listed(repr(n) for n in labels)} are: a [[points]] with called = ["{next(iter(labels))}"]{there}{hint}')]

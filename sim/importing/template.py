@@ -12,6 +12,7 @@ from thermospindle.model.units import MM
 from thermospindle.sim.campaign.form import in_unit, toml
 from thermospindle.sim.importing.assemble import Read
 from thermospindle.sim.importing.files.labels import ROLES
+from thermospindle.sim.importing.mapping import REST
 from thermospindle.sim.importing.measured import End, Question, listed
 from thermospindle.sim.importing.names import conditions_of, hit_at, plain, tests_of
 
@@ -89,6 +90,7 @@ def _asked(questions: Sequence[Question], hit: int | None = None) -> list[str]:
     if names:
         lines += ["[files.columns]", *(f"# {text}" for text in found["columns"]), f"# allowed are {ROLES}, with the unit in brackets behind it"]
         lines += [f"{toml(n)} = {toml('?')}" for n in dict.fromkeys(names)]
+        lines += [f'# {toml(REST)} = "ignore"    # instead of the lines of all that are not needed'] if len({*names}) > 1 else []
     return lines
 
 

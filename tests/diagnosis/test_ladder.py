@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from tests.conftest import SCENE
+from tests.conftest import ROOT, SCENE
 from tests.diagnosis.mode_tables import SD, tables
 from thermospindle.cli import main
 from thermospindle.diagnosis.decision.explanations import Candidate
@@ -19,7 +19,9 @@ from thermospindle.diagnosis.ladder.forms import FORMS
 from thermospindle.diagnosis.ladder.ladder import CLEAR, DISCREPANCY, TOLERANCES, ladder, named_by
 from thermospindle.diagnosis.prediction.next_test import ModePrediction, NextTest
 from thermospindle.model.machine import Condition
+from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
+from thermospindle.report.figures.ladder import figure as picture
 from thermospindle.report.figures.ladder import residual_map
 from thermospindle.report.log.ladder_content import response, shown
 from thermospindle.report.log.read import read_log
@@ -271,6 +273,38 @@ def test_json_of_the_command(capsys, tmp_path):
     assert answer["rungs"][-1]["parameters"]["expansion_mismatch.hub_expansion"]["unit"] == "1"
     assert {f.name for f in out.iterdir()} >= {"ladder.json", "ladder.png", "ladder.svg", "ladder.rrd", "report.html"}
     assert json.loads((out / "ladder.json").read_text()) == answer
+
+
+@pytest.fixture(scope="module")
+def shaft():
+    """A ladder of a shaft that hangs free, without bearings, of one test."""
+    scene = load(ROOT / "scenes" / "free_shaft")
+    return ladder(scene, read_campaign(ROOT / "scenes" / "free_shaft" / "measured" / "modelab"), [by_name("sensor_mass")])
+
+
+def test_what_says_nothing_is_left_out(shaft):
+    """It had three equal first steps, "fixed stiffness does not clearly lead radial expansion only by 0.0" and "held out nan -> nan"."""
+    drawn, tolerances, *_ = shaft.steps
+    assert (drawn.name, tolerances.name) == ("as drawn", TOLERANCES)
+    assert shaft.drawn is drawn
+    assert [row[0] for row in shaft.forms] == ["as drawn"]
+    words = " ".join(sentences(shaft))
+    assert "nan" not in words
+    assert "lead" not in words
+    assert words.startswith(f"As drawn, frequencies are wrong by {drawn.rms_Hz:.1f} Hz (rms). The tolerances")
+    labels = [line.get_label() for line in picture(shaft).axes[0].lines]
+    assert "all data" in labels
+    assert "temperatures left out" not in labels
+
+
+def test_frequencies_that_get_worse_are_said_to(lagging):
+    """Granting a constant error took the error of a beam's FRFs from 89 to 51, and that of its frequencies from 1.72 to 18.73 Hz, without a word."""
+    steps = tuple(replace(r, rms_Hz=18.73, error=0.5 * lagging.step(TOLERANCES).error) if r.name == DISCREPANCY else r for r in lagging.steps)
+    granted = replace(lagging, steps=steps)
+    was = lagging.step(TOLERANCES).rms_Hz
+    [said] = [s for s in sentences(granted) if "further off" in s]
+    assert f"natural frequencies are further off, 18.73 instead of {was:.2f} Hz rms" in said
+    assert not any("further off" in s for s in sentences(lagging))
 
 
 def test_unknown_effect_is_refused_by_name(capsys):

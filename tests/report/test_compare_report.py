@@ -228,4 +228,26 @@ def test_a_third_of_an_octave_is_one_column_wherever_lines_begin(found, spindle,
 
 def test_labels_and_pairs(found, campaign):
     assert [label(t.test, ", ") for t in found.tests] == ["20 °C", "60 °C, 7200 rpm"]
-    assert shown_pairs(found.tests[0].correlation) == [(n, n) for n in campaign.tests[0].frf.reference_nodes]
+    driving = [(n, n) for n in campaign.tests[0].frf.reference_nodes]
+    first = found.tests[0].correlation
+    assert shown_pairs(first, len(driving)) == driving
+    more = shown_pairs(first, len(driving) + 2)
+    assert more[: len(driving)] == driving
+    levels = [np.linalg.norm(first.measured[first.pairs[p]]) for p in more[len(driving) :]]
+    assert levels == sorted(levels, reverse=True)
+
+
+def test_numbers_can_be_read_and_one_test_shows_more_of_its_frfs(found):
+    """Numbers on the maps of bands were 4 points high, and of a beam's three FRFs one was drawn."""
+    alone = replace(found, tests=found.tests[:1])
+    drawn = figures(alone)
+    frfs = [axes.get_title(loc="left") for axes in drawn["frfs"].axes if axes.lines]
+    assert len(frfs) == min(6, len(alone.tests[0].correlation.pairs))
+    assert len([axes for axes in figures(found)["frfs"].axes if axes.lines]) == 3 * len(found.tests)
+    for one in (drawn["bands"], figures(found)["bands"]):
+        sizes = {text.get_fontsize() for axes in one.axes for text in axes.texts}
+        assert min(sizes) >= 6.5
+
+
+def test_labels_of_an_open_place_are_shown(found):
+    assert all(axes.xaxis.get_tick_params()["labelbottom"] for axes in figures(replace(found, tests=found.tests[:1]))["frfs"].axes if axes.lines)

@@ -1,7 +1,8 @@
 """The diagnosis of a campaign of hammer tests.
 
-======  =====================================
-answer  everything as one JSON object
-words   in sentences, and in the terminal
-======  =====================================
+=======  ====================================================================================
+answer   everything as one JSON object
+granted  what explains data that the drawing misses where no effect is missing
+words    in sentences, and in the terminal
+=======  ====================================================================================
 """

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from thermospindle.diagnosis.decision.conditions import conditions_of
+from thermospindle.diagnosis.decision.errors import arrived, as_drawn, whole
 from thermospindle.diagnosis.decision.explanations import Candidate
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import Mechanism
@@ -16,6 +17,7 @@ from thermospindle.diagnosis.inference.resonance import shown
 from thermospindle.diagnosis.verdict import Diagnosis, Drift
 from thermospindle.model.machine import Spindle
 from thermospindle.model.types import Array
+from thermospindle.report.text.diagnosis.granted import granted_words
 from thermospindle.report.text.diagnosis.words import condition, drift_words, law_words, would_change
 from thermospindle.report.typeset import known
 from thermospindle.sim.effects.effect import Effect, called
@@ -29,10 +31,12 @@ def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
     v, base = d.verdict, d.search.base
     n = base.fit.count
     before, after = (float(np.sqrt(h.evidence.chi2 / n)) for h in (base, v.accepted))
+    drawn = whole(as_drawn(d.search.model), d.search.model)
     return {
         "verdict": v.word,
         "effects": list(v.effects),
         "reason": v.reason,
+        "granted": granted_words(d, drawn),
         "would_change": would_change(d),
         "law_departs": law_words(d),
         "probability": {"none": v.probability_none, "unknown": v.probability_unknown},
@@ -42,7 +46,7 @@ def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
         "invisible": _invisible(d),
         "detectable": {name: size for name, (_, size) in d.detectable.items()},
         "detectable_in": {name: {"parameter": m.size.name, "unit": m.size.unit, "size": size} for name, (m, size) in d.detectable.items()},
-        "error": {"before": before, "after": after}
+        "error": {"drawn": drawn, "before": before, "after": after}
         | {key: known(getattr(v, key)) for key in ("held_out_before", "held_out_after", "held_out_gain")},
         "reference_temperature_C": d.spindle.reference_temperature,
         "where": [_place(p, d) for p in _places(d)],
@@ -110,6 +114,7 @@ def _candidate(c: Candidate, d: Diagnosis) -> dict[str, Any]:
         "departure_from_law": {m.name: 1.0 if m.own_law else v for m, v in zip(c.hypothesis.mechanisms, own.learned.departures, strict=True)},
         "chi2_per_number": own.chi2 / n,
         "believable": _believable(c),
+        "arrived": arrived(c.hypothesis),
     }
 
 

@@ -149,21 +149,22 @@ def show_diagnosis(console: Console, answer: dict[str, Any], verbose: bool = Tru
     """The verdict in one sentence and why; with `verbose` every explanation, drift and next test, and what would have been seen."""
     console.print(f"{answer['verdict']}: {_sentence(answer)}", style="bold")
     console.print(answer["reason"])
+    if answer["granted"]:
+        console.print(answer["granted"])
     for sentence in answer["law_departs"]:
         console.print(sentence)
     console.print(answer["would_change"])
     if answer["may_hide"]:
         console.print(hidden_words(answer["may_hide"]))
     error = answer["error"]
-    unseen = f"on conditions left out {error['held_out_before']:.2f} -> {error['held_out_after']:.2f}, fitted " if error["held_out_after"] is not None else ""
-    console.print(f"Error, rms in standard errors: {unseen}{error['before']:.2f} -> {error['after']:.2f}")
+    console.print(f"Error, rms in standard errors: {error_words(error, bool(answer['effects']))}")
     if not verbose:
         _show_little(console, answer)
         return
     if answer["candidates"]:
         console.print("\nExplanations, ln evidence over the model without effects and posterior probability:")
     for c in answer["candidates"][:5]:
-        console.print(f"  {' + '.join(c['effects'])}: {c['delta_evidence']:+.1f}, {_percent(c['probability'])}; {_values(c)}")
+        console.print(f"  {' + '.join(c['effects'])}: {c['delta_evidence']:+.1f}, {_percent(c['probability'])}{'' if c['arrived'] else ', its fit has not arrived'}; {_values(c)}")
     best = answer["candidates"][0] if answer["candidates"] else None
     if best and answer["effects"]:
         for name, rows in best["law"].items():
@@ -189,6 +190,15 @@ def show_diagnosis(console: Console, answer: dict[str, Any], verbose: bool = Tru
         console.print(f"Not visible in these data at a typical size: {', '.join(answer['invisible']) or 'nothing'}")
 
 
+def error_words(error: dict[str, Any], named: bool) -> str:
+    """As drawn, with tolerances and what a model may be constantly off by fitted, and where effects are `named` with these."""
+    def of(which: str) -> str:
+        return f"{error[which + 'before']:.2f}" + (f", with what is named {error[which + 'after']:.2f}" if named else "")
+
+    unseen = f"; conditions left out {of('held_out_')}" if error["held_out_after"] is not None else ""
+    return f"as drawn {error['drawn']:.2f}, with tolerances and the model's constant errors fitted {of('')}{unseen}"
+
+
 def _show_little(console: Console, answer: dict[str, Any]) -> None:
     """The explanations that the verdict names with their values, the test to make next, and where the rest is."""
     for c in answer["candidates"]:
@@ -210,9 +220,18 @@ def value_words(v: dict[str, Any]) -> str:
 
 def _values(candidate: dict[str, Any]) -> str:
     """Fitted parameters with their errors and units."""
-    values = ", ".join(f"{k.split('.', 1)[1]} {value_words(v)}" for k, v in candidate["parameters"].items())
-    means = [f"the size of {name} in the mean: {_range(candidate['law'][name])}" for name, departure in candidate["departure_from_law"].items() if departure >= DEPARTS]
-    return f"{values} ({'; '.join(means)})" if means else values
+    return ", ".join(f"{k.split('.', 1)[1]} {spread_words(candidate, k) or value_words(v)}" for k, v in candidate["parameters"].items())
+
+
+def spread_words(candidate: dict[str, Any], name: str) -> str:
+    """Of the size of an effect whose law the data do not have, by the `name` of its parameter: from which to which it goes over the tests, and its mean last, which says
+    little then; empty of all other parameters."""
+    effect = name.split(".", 1)[0]
+    first = next(k for k in candidate["parameters"] if k.startswith(f"{effect}."))  # an effect's size comes first
+    if name != first or candidate["departure_from_law"].get(effect, 0.0) < DEPARTS:
+        return ""
+    rows, mean = candidate["law"][effect], candidate["parameters"][name]
+    return _range(rows) + unit_word(mean["unit"], " ") + (f" (mean {plain_error(mean['value'], mean['sd'])})" if len(rows) > 1 else "")
 
 
 def _range(rows: list[dict[str, Any]]) -> str:

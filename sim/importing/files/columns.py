@@ -14,8 +14,8 @@ from thermospindle.model.types import Array
 from thermospindle.sim.identification.frf import even
 from thermospindle.sim.importing.files.labels import ROLES, Role, end, role_of
 from thermospindle.sim.importing.files.text import TextTable
-from thermospindle.sim.importing.mapping import FileForm
-from thermospindle.sim.importing.measured import Content, Curve, End, Motion, Question, listed
+from thermospindle.sim.importing.mapping import REST, FileForm
+from thermospindle.sim.importing.measured import FORCE_NEEDED, Content, Curve, End, Motion, Question, listed
 
 FULL_TURN = 2 * np.pi + 0.01
 MATRIX = ("h", "frf", "frfs", "h1", "h2", "hv", "g", "transfer", "fft.h")
@@ -46,13 +46,20 @@ def from_table(table: TextTable, settings: FileForm) -> Content:
         role = role_of(told or heading)
         if role is None and not told and unit in ("Hz", "s") and k == 0:
             role = Role("frequency" if unit == "Hz" else "time")
+        role = role or _rest(settings)
         if role and not role.unit and unit:
             role = replace(role, unit=unit)
         columns.append(Column(name, role, table.values[:, k]))
     unnamed = not any(table.heading)
     if table.values.shape[1] == 1 and (unnamed or columns[0].role is None) and np.iscomplexobj(table.values):
         columns = [Column(columns[0].name, Role("H", "complex"), table.values[:, 0])]
-    return _content(table.file, columns, settings, {})
+    names = (*table.heading, *(f"column {k + 1}" for k in range(len(columns))), *(str(k + 1) for k in range(len(columns))))
+    return replace(_content(table.file, columns, settings, {}), names=tuple(filter(None, names)))
+
+
+def _rest(settings: FileForm) -> Role | None:
+    """The role of a column that nothing tells: none, unless the mapping has the rest ignored."""
+    return Role("ignore") if REST in settings.columns else None
 
 
 def from_arrays(file: Path, arrays: Mapping[str, Any], settings: FileForm) -> Content:
@@ -60,7 +67,8 @@ def from_arrays(file: Path, arrays: Mapping[str, Any], settings: FileForm) -> Co
     lists: dict[str, list[End]] = {}
     columns: list[Column] = []
     rate = settings.sample_rate_Hz
-    axis_length = max((len(v) for n, v in arrays.items() if _is_axis(n, v, settings)), default=0)
+    axes = {kind: [len(v) for n, v in arrays.items() if _is_axis(n, v, kind, settings)] for kind in ("time", "frequency")}
+    axis_length = max(axes["frequency"] or axes["time"], default=0)
     for name, value in arrays.items():
         short = name.rsplit(".", 1)[-1]
         told = settings.columns.get(name) or settings.columns.get(short)
@@ -75,19 +83,20 @@ def from_arrays(file: Path, arrays: Mapping[str, Any], settings: FileForm) -> Co
             matrix = short.lower() in MATRIX or (role is not None and role.kind in ("H", "coherence", "sd") and np.ndim(value) > 1)
             if matrix and np.ndim(value) > 1 and not told:
                 role = role if role and role.kind in ("coherence", "sd") else Role("H", "complex" if np.iscomplexobj(value) else "magnitude")
+            role = role or _rest(settings)
             columns.append(Column(name, role, np.asarray(value)))
     widest = {kind: lists.get(kind) for kind in ("response", "reference")}
     force = next((c.values for c in columns if c.role and c.role.kind == "force"), None)
     hits = 0 if force is None else 1 if force.ndim == 1 else min(force.shape)
     columns = [piece for column in columns for piece in _pieces(column, widest, axis_length, hits)]
     own = settings if rate is None else settings.model_copy(update={"sample_rate_Hz": rate})
-    return _content(file, columns, own, arrays)
+    return replace(_content(file, columns, own, arrays), names=tuple(arrays))
 
 
-def _is_axis(name: str, value: Any, settings: FileForm) -> bool:
+def _is_axis(name: str, value: Any, kind: str, settings: FileForm) -> bool:
     short = name.rsplit(".", 1)[-1]
     role = role_of(settings.columns.get(name) or settings.columns.get(short) or short)
-    return role is not None and role.kind in ("frequency", "time") and np.ndim(value) == 1 and not isinstance(value, str | list)
+    return role is not None and role.kind == kind and np.ndim(value) == 1 and not isinstance(value, str | list)
 
 
 def _pieces(column: Column, lists: Mapping[str, list[End] | None], length: int, hits: int) -> list[Column]:
@@ -249,7 +258,7 @@ def _motions(file: Path, columns: Sequence[Column], moving: Sequence[Column], se
                 f"{hammer.value.shape[1]}; they must be the same: time records are (hits, samples), or (hits, responses, samples)"
             )
     if not any(m.force for m in found):
-        questions.append(Question(file.name, "columns", "which column is the hammer's force"))
+        questions.append(Question(file.name, "columns", f"which column is the hammer's force; {FORCE_NEEDED}"))
     elif all(m.force for m in found):
         questions.append(Question(file.name, "columns", "which column is a response"))
     return tuple(found), questions

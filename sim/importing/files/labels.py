@@ -53,8 +53,8 @@ def role_of(heading: str) -> Role | None:
 def _role(text: str, unit: str) -> Role | None:
     """The role that a heading without its unit tells."""
     low = text.lower().strip(" :_-")
-    if low in AXES:
-        return Role(AXES[low], unit=unit)
+    if (axis := re.sub(r"[ _-]+(domain|axis|vector)$", "", low)) in AXES:
+        return Role(AXES[axis], unit=unit)
     if low in ("hz", "s", "sec"):
         return Role("frequency" if low == "hz" else "time", unit=low)
     if low in ("ignore", ""):

@@ -25,17 +25,25 @@ KINDS = ("axial", "rocking", "lateral", "unknown")
 
 def headings(file: Path) -> tuple[list[str], str, int] | None:
     """What each column of a table of modes is, its separator and the line of its headings; None where the file is no such table."""
-    for number, line in enumerate(text_of(file).splitlines()):
+    every = text_of(file).splitlines()
+    for number, line in enumerate(every):
         plain = COMMENT.sub("", line)
         if not plain.strip():
             continue
         for separator in ("\t", ";", ","):
             named = [COLUMNS.get(re.sub(r"[\s()\[\]]+", "_", cell.strip().strip('"').lower()).strip("_"), "") for cell in plain.split(separator)]
-            if "frequency" in named and {"mode", "kind", "damping", "percent", "test", "sd"} & {*named}:
+            alone = named == ["frequency"] and _is_number(every[number + 1 :])
+            if "frequency" in named and (alone or {"mode", "kind", "damping", "percent", "test", "sd"} & {*named}):
                 return named, separator, number
         if not line.lstrip().startswith(("#", "%")):
             return None
     return None
+
+
+def _is_number(lines: list[str]) -> bool:
+    """Whether the first line that is not empty is one number: below `frequency` alone a mode a row, not the axis of something."""
+    first = next((line.strip() for line in lines if line.strip()), "")
+    return re.fullmatch(r"[-+\d.eE]+", first) is not None
 
 
 def from_modes(file: Path) -> Content:

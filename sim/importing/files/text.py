@@ -50,6 +50,7 @@ def read_table(file: Path) -> TextTable:
     rows, first = _numbers(file, lines, separator, comma)
     width = len(rows[0])
     above = [COMMENT.sub("", line) for _, line in lines[:first]]
+    _refuse_commas(file, above, separator, lines[first][1])
     told = [cells for line in above if len(cells := _headings(line, separator)) == width or _fits(cells, width)]
     rows_above = [(*cells, *[""] * width)[:width] for cells in told]
     unit: tuple[str, ...] = ("",) * width
@@ -64,6 +65,19 @@ def read_table(file: Path) -> TextTable:
     except (TypeError, ValueError):
         values = np.array(rows, complex)
     return TextTable(file, heading, unit, values)
+
+
+def _refuse_commas(file: Path, above: list[str], separator: str | None, line: str) -> None:
+    """`BadInput` where commas stand between columns and in numbers: as many headings as every two cells of whole numbers, none with a decimal point."""
+    cells = _cells(line, ",")
+    halves = {1: cells[::2], 0: cells[1::2]}  # of the first column whole numbers alone, maybe
+    count = len(_headings(above[-1], ",")) if above and separator == "," else 0
+    for first, parts in ((0, halves[0]), (1, halves[1][1:])):
+        if count > 1 and len(cells) == 2 * count - first and "." not in line and all(part.isdigit() for part in parts):
+            raise BadInput(
+                f"{file}: {count} headings stand over {len(cells)} numbers: with commas between columns and in numbers nobody can tell which is which; "
+                "export it with semicolons or tabs between columns, or with decimal points"
+            )
 
 
 def _headings(line: str, separator: str | None) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.conftest import ROOT
 from tests.made_campaign import FREQUENCY
 from tests.sim.importing.exported import FRF, HEAD, SPINDLE, columns, imported, table
 from thermospindle.model.errors import BadInput, Unanswered
@@ -55,6 +56,103 @@ def test_files_that_may_be_one_roving_test_are_said_to_be(tmp_path, names, rovin
     files = [table(tmp_path / f"{name}.csv", ["Frequency", *heads], [FREQUENCY, *found]) for name in names]
     said = bring(files, mapping=tmp_path / "m.toml").values["proposed"]
     assert ("3 files, a test each: where hammer or sensor roved and they are one test, give them the same test" in said) == roving
+
+
+def test_arrays_that_are_not_needed_are_ignored_by_one_key(tmp_path):
+    """Each of ten other arrays of a .mat had to be told "ignore" by itself; `Freq_domain` and `Time_domain` are axes, and that of time not the one of FRFs."""
+    others = {f"PSD_chan_{k}": np.ones(len(FREQUENCY)) for k in range(8)}
+    file = tmp_path / "T20.npz"
+    lists = {"response_nodes": FRF.response_nodes, "reference_nodes": FRF.reference_nodes}
+    np.savez(file, Freq_domain=FREQUENCY, Time_domain=np.arange(3 * len(FREQUENCY)) / 1000, H=FRF.value, **lists, **others)
+    mapping = tmp_path / "form.toml"
+    [asked, *_] = bring([file], mapping=mapping).values["open"]
+    assert "what PSD_chan_0" in asked
+    assert "domain" not in asked
+    assert '# "*" = "ignore"    # instead of the lines of all that are not needed' in mapping.read_text()
+    frf = imported(tmp_path, '[[files]]\nfile = "*"\nunit = "(m/s)/N"\ncolumns = { "*" = "ignore" }\n', file)
+    np.testing.assert_allclose(frf.frequency, FREQUENCY)
+    np.testing.assert_allclose(frf.value, FRF.value, rtol=1e-12)
+
+
+def test_ends_that_are_counted_along_an_array_say_so(tmp_path):
+    file = tmp_path / "T20.npz"
+    np.savez(file, frequency=FREQUENCY, H=FRF.value)
+    with pytest.raises(Unanswered) as caught:
+        bring([file], out=tmp_path / "c")
+    [asked] = [item for item in caught.value.items if "which points" in item]
+    assert asked.endswith("; 'response 1' is counted along an array that names no nodes")
+
+
+def test_a_table_ignores_the_rest_too(tmp_path):
+    heads, found = columns("real", "(m/s)/N")
+    file = table(tmp_path / "T20.csv", ["Frequency", *heads, "Ch 9"], [FREQUENCY, *found, np.ones(len(FREQUENCY))])
+    np.testing.assert_allclose(imported(tmp_path, '[[files]]\nfile = "*"\ncolumns = { "*" = "ignore" }\n', file).value, FRF.value, rtol=1e-8, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("told", "said"),
+    [
+        ('{ "Recep" = "H(1,1)" }', "files: columns: 'Recep' is no column of T20.csv; there are Frequency, "),
+        ('{ "*" = "H(1,1)" }', "files: columns: '\\*' = 'H\\(1,1\\)': all columns that nothing else tells can only be \"ignore\""),
+    ],
+)
+def test_a_column_that_is_not_there_is_refused(tmp_path, told, said):
+    """It was silently not used."""
+    heads, found = columns("real", "(m/s)/N")
+    file = table(tmp_path / "T20.csv", ["Frequency", *heads], [FREQUENCY, *found])
+    with pytest.raises(BadInput, match=said):
+        imported(tmp_path, f'[[files]]\nfile = "T20.csv"\ncolumns = {told}\n', file)
+
+
+def test_a_file_that_makes_no_campaign_asks_nothing(tmp_path):
+    """Coherence alone: its form had "1 answer is open", the scene's name."""
+    file = tmp_path / "coherence.unv"
+    file.write_bytes((ROOT / "tests" / "data" / "uff_files_jl" / "dataset58_coh.unv").read_bytes())
+    with pytest.raises(BadInput, match=r"coherence\.unv: no FRF, time record or mode in it; geometry, spectra or coherence alone are no campaign"):
+        bring([file], mapping=tmp_path / "form.toml")
+    assert not (tmp_path / "form.toml").exists()
+
+
+def test_tables_without_a_name_are_counted_from_one(tmp_path):
+    """`files.0.step_Hz` beside `points.1`, which was the first."""
+    told = tmp_path / "told.toml"
+    told.write_text('[[files]]\nfile = "*"\nstep_Hz = -1\n')
+    with pytest.raises(BadInput, match=r"told\.toml: files\.1\.step_Hz = -1: "):
+        bring([tmp_path / "x.csv"], mapping=told, out=tmp_path / "c")
+
+
+def test_answers_alone_are_said_to_be_of_no_use(tmp_path):
+    time = np.arange(4000) / 8000
+    file = table(tmp_path / "operating.csv", ["Time [s]", "acceleration 3 [g]"], [time, np.sin(900 * time)])
+    with pytest.raises(Unanswered) as caught:
+        bring([file], out=tmp_path / "c")
+    assert any("answers alone, without the force that was hit with, are no measurement that can be used" in item for item in caught.value.items), caught.value.items
+
+
+def test_frequencies_alone_are_modes(tmp_path):
+    """A frequency a row is enough, the documentation says; a table with the one heading `frequency` was asked which FRF it was."""
+    file = tmp_path / "picked.csv"
+    file.write_text("frequency\n1002.5\n1545.0\n")
+    told = tmp_path / "told.toml"
+    told.write_text('frequency_sd_Hz = 0.5\nspindle = "hdd_2003"\n[[tests]]\nid = "picked"\ntemperature_C = 20\nspeed_rpm = 0\n')
+    bring([file], mapping=told, out=tmp_path / "c")
+    assert [m.frequency for m in read_campaign(tmp_path / "c").tests[0].modes] == [1002.5, 1545.0]
+
+
+@pytest.mark.parametrize(("rows", "count"), [(("1,5,2,25,3,5", "2,5,2,35,3,6"), 6), (("1,2,25,3,5", "2,2,35,3,6"), 5)])
+def test_commas_for_columns_and_decimals_are_named(tmp_path, rows, count):
+    """It was asked what column 1 to column 6 are, under three headings."""
+    file = tmp_path / "german.csv"
+    file.write_text("\n".join(["Frequency,Re,Im", *rows]) + "\n")
+    with pytest.raises(BadInput, match=rf"german\.csv: 3 headings stand over {count} numbers: with commas between columns and in numbers nobody can tell"):
+        bring([file], out=tmp_path / "c")
+
+
+def test_a_title_above_numbers_is_no_row_of_headings(tmp_path):
+    file = tmp_path / "titled.csv"
+    file.write_text("cold, first\n100.5,2.5,3.0,1\n200.5,2.5,3.0,1\n")
+    with pytest.raises(Unanswered, match="not told by the files"):
+        bring([file], out=tmp_path / "c")
 
 
 def test_points_of_a_scene(tmp_path):

@@ -1,0 +1,69 @@
+"""What is being done, on standard error and never on standard output: a bar in a terminal, elsewhere now and then a plain line, so that long work in a
+pipe or a job's file is told from work that hangs."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from thermospindle.model.errors import visible
+
+FIRST, EVERY = 10.0, 30.0
+"""s before the first plain line, and between one and the next: short work says nothing."""
+
+
+@contextmanager
+def progress_bar(steps: int) -> Iterator[Callable[[str], None]]:
+    """A function that takes what has been done, and counts it as one of so many steps."""
+    console = Console(stderr=True, markup=False)
+    if not console.is_terminal:
+        with plain_lines(steps) as told:
+            yield told
+        return
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("starting", total=steps)
+        yield lambda done: bar.update(task, advance=1, description=done)
+
+
+@contextmanager
+def plain_lines(steps: int | None = None) -> Iterator[Callable[[str], None]]:
+    """The same in lines, told at their times however long a step takes; without `steps` where nobody knows how many there will be."""
+    began, done, last = time.monotonic(), 0, "starting"
+    ended = threading.Event()
+
+    def told(what: str) -> None:
+        nonlocal done, last
+        done, last = done + 1, what
+
+    def tell() -> None:
+        wait = FIRST
+        while not ended.wait(wait) and sys.stderr is not None:  # closed by the caller: `print` would take standard output
+            with suppress(OSError, ValueError):  # whoever read it has gone
+                print(_line(time.monotonic() - began, done, steps, last), file=sys.stderr, flush=True)
+            wait = EVERY
+
+    teller = threading.Thread(target=tell, daemon=True)
+    teller.start()
+    try:
+        yield told
+    finally:
+        ended.set()
+        teller.join()
+
+
+def _line(seconds: float, done: int, steps: int | None, last: str) -> str:
+    if steps is None:
+        return f"{_duration(seconds)}: {visible(last)}"
+    left = f", about {_duration(seconds / done * (steps - done))} left" if 0 < done < steps else ""
+    return f"{_duration(seconds)}: {min(done, steps)} of {steps} steps done{left}; last: {visible(last)}"
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min"

@@ -1,0 +1,58 @@
+"""Progress where standard error is no terminal."""
+
+from __future__ import annotations
+
+import json
+import re
+import time
+from typing import Any
+
+import pytest
+
+from tests.conftest import ROOT
+from thermospindle.cli import main
+from thermospindle.diagnosis.data.observe import observe
+from thermospindle.report import progress
+from thermospindle.report.verbs import compare
+
+
+@pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(progress, "FIRST", 0.05)
+    monkeypatch.setattr(progress, "EVERY", 0.05)
+
+
+def test_long_work_tells_plain_lines_and_short_work_none(impatient: None, capsys: pytest.CaptureFixture[str]):
+    """However long a step takes: that one runs is told before any has ended, and what is left once one has."""
+    with progress.progress_bar(4) as done:
+        time.sleep(0.2)
+        done("first\x1b[31m done")
+        time.sleep(0.2)
+    told = capsys.readouterr()
+    assert told.out == ""
+    lines = told.err.splitlines()
+    assert lines[0] == "0 s: 0 of 4 steps done; last: starting"
+    assert re.fullmatch(r"0 s: 1 of 4 steps done, about 1 s left; last: first\\x1b\[31m done", lines[-1])
+    assert 4 <= len(lines) <= 9
+    with progress.progress_bar(4) as done:
+        done("all")
+    time.sleep(0.1)
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize("verb", ["compare", "ladder"])
+def test_a_verb_in_a_pipe_is_told_from_one_that_hangs(verb: str, impatient: None, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
+    """On standard error alone: the answer stays one JSON object. The ladder's lines have its last step."""
+
+    def slowly(*asked: Any) -> Any:
+        time.sleep(0.3)
+        return observe(*asked)
+
+    monkeypatch.setattr(compare, "observe", slowly)  # whose modes another test may have had worked out
+    scene = ROOT / "scenes" / "hdd_2003"
+    chosen = ["--effects", "bond_softening"] if verb == "ladder" else []
+    assert main([verb, str(scene), str(scene / "measured" / "jang_2003"), *chosen, "--json"]) == 0
+    told = capsys.readouterr()
+    json.loads(told.out)
+    words = r"\d+ s: step \d \(.*\) done, error [\d.]+ s\.e\.; now: fitting .*" if verb == "ladder" else r"\d+ s: \d of 4 steps done.*; last: .*"
+    assert any(re.fullmatch(words, line) for line in told.err.splitlines()), told.err
