@@ -58,6 +58,7 @@ FREE_WIDTHS = (0.1, 0.3, 1.0, 3.0, 10.0)  # of what has no law: its width is to 
 OFFSET = -12.0
 """Prior odds (ln) that what drifts is off by as much in all tests as well: that is a drawing that is off (`WIDER`), and not what temperature and speed do."""
 FARTHEST = 3.0  # times what a shape parameter does at the fitted size of a test, of what it does at the size that all share
+ROUNDED = 1.0  # of chi2, which is never negative: what rounding may take from a quadratic that stands for a fit
 SWEEPS = 3  # at most, through the sizes of nuisances one after the other
 
 
@@ -75,6 +76,11 @@ class Evidence:
     size_covariance: Array
     chi2: float
     by_departing: float = 0.0
+
+    @property
+    def rounded(self) -> bool:
+        """Whether the fit stands so far from where its quadratic is least that nothing but rounding is left of that, and the evidence means nothing."""
+        return self.chi2 < -ROUNDED
 
 
 def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide: bool = False, kept: Sequence[Nuisances] = ()) -> Evidence:

@@ -87,7 +87,7 @@ def _fit_one(model: CampaignModel, rates, tempers, most: float, expected: Learne
             again = fit(model, mechanisms, loose, rates, TEMPERS[1:], learned=prior, beaten=beaten)
             if again.cost < found.cost:
                 reached = Hypothesis(again, evidence(model, again))
-        return reached
+        return None if reached.evidence.rounded else reached
     except FAILED:
         return None
 
@@ -120,6 +120,8 @@ def settled(model: CampaignModel, h: Hypothesis) -> Hypothesis:
                 found = min(found, refit(start=far), key=lambda f: f.cost)
                 told = evidence(model, found, wide=wide)
         except FAILED:
+            return h
+        if told.rounded:
             return h
         h = Hypothesis(found, told)
         if h.evidence.learned == before.learned and abs(h.evidence.ln - before.ln) < LITTLE:

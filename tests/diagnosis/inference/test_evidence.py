@@ -183,6 +183,16 @@ def test_rounding_does_not_end_an_evidence():
     assert (np.linalg.eigvalsh(posterior(q, kept, np.eye(2))[1]) > -1e-12).all()
 
 
+def test_a_quadratic_of_which_rounding_alone_is_left_is_told():
+    """Of a fit that stands where chi2 is 1e20, far from where its quadratic is least: its ln evidence was 1.5e14, and it led all others."""
+    t = toy(3, 0.0, (1.0, 1.8, 2.6))
+    assert not evidence(t.model, t.fit).rounded
+    off = 1e10 * np.ones(len(t.fit.point))
+    gradient = t.fit.information @ off * (1 + 1e-3)
+    far = replace(t.fit, chi2=float(off @ t.fit.information @ off), gradient=gradient)
+    assert evidence(t.model, far).rounded
+
+
 def test_errors_larger_than_stated_are_learned():
     for seed in range(5):
         made = toy(seed, 0.0, rows=200, errors=1.5)
