@@ -1,6 +1,6 @@
 """Beam elements of flexible shafts: nodes that are bodies, joined by elements that are joints.
 
-Between two nodes a beam of any section is exactly a diagonal 5x5 stiffness at its elastic centre, between rigid arms: with
+Between two nodes a beam of any section that is its own mirror image in x and y is exactly a diagonal 5x5 stiffness at its elastic centre, between rigid arms: with
 z_c = integral(z / EI) / integral(1 / EI) the two free-end flexibilities of bending no longer couple, and
 
     1 / k_tilt    = integral(dz / EI)
@@ -8,7 +8,7 @@ z_c = integral(z / EI) / integral(1 / EI) the two free-end flexibilities of bend
     1 / k_axial   = integral(dz / EA),
 
 for a uniform Timoshenko beam 12 EI / (l^3 (1 + phi)), EI / l and EA / l at its middle (Przemieniecki, *Theory of Matrix Structural
-Analysis*, 1968, 5.6). Static answers are exact on any mesh, steps and tapers inside an element included.
+Analysis*, 1968, 5.6), with an I of its own in each of the two planes. Static answers are exact on any mesh, steps and tapers inside an element included.
 
 The mass of an element goes to its nodes by its linear shape functions, each share with its centre of mass moved inward by the first
 moment (l / 2) integral(rho A x (1 - x) dz), x from 0 to 1: for a uniform element half of m, moved by l / 6. This is the Euler-Maclaurin
@@ -45,6 +45,23 @@ def shear_factor(bore: T, poisson: float) -> T:
     """Shear factor of a tube of radius ratio `bore` (a number or an array): Cowper, The shear coefficient in Timoshenko's beam theory, J. Appl. Mech., 1966."""
     m = (1 + bore**2) ** 2
     return 6 * (1 + poisson) * m / ((7 + 6 * poisson) * m + (20 + 12 * poisson) * bore**2)
+
+
+def second_moments(segment: Segment, ends: tuple[float, float], z: Array) -> tuple[Array, Array]:
+    """Area (m2), (m,), and the second moments of area (m4), (2, m), of x^2 and of y^2 at heights; `ends` are the outer radii at the segment's ends."""
+    if segment.sides is not None:
+        width, height = segment.sides
+        return np.full(len(z), width * height), np.repeat([[height * width**3 / 12], [width * height**3 / 12]], len(z), axis=1)
+    outer, bore = radii(segment, ends, z), radii(segment, segment.bore, z)
+    moment = np.pi / 4 * (outer**4 - bore**4)
+    return np.pi * (outer**2 - bore**2), np.stack([moment, moment])
+
+
+def shear_factors(segment: Segment, z: Array, poisson: float) -> Array:
+    """Shear factor (m,) at heights, of a rectangle 10 (1 + nu) / (12 + 11 nu) across both sides (Cowper 1966)."""
+    if segment.sides is not None:
+        return np.full(len(z), 10 * (1 + poisson) / (12 + 11 * poisson))
+    return shear_factor(radii(segment, segment.bore, z) / radii(segment, segment.outer, z), poisson)
 
 
 def with_shafts(structure: Structure, materials: Mapping[str, Material], temperature: float) -> Structure:
@@ -93,41 +110,42 @@ def elements(shaft: Shaft, materials: Mapping[str, Material], temperature: float
             group=shaft.name,
             bodies=(shaft.bodies[i], shaft.bodies[i + 1]),
             z=z,
-            stiffness=(lateral, lateral, 1 / drawn, 1 / bent, 1 / bent),
+            stiffness=(1 / (bending[0] + shear), 1 / (bending[1] + shear), 1 / drawn, 1 / bent[1], 1 / bent[0]),
             damping_ratio=shaft.damping_ratio,
             loss_factor=shaft.loss_factor,
             role="beam",
             material=material,
         )
         for i, (z, bending, sheared, drawn, bent, material) in enumerate(_flexibilities(shaft.segments, shaft.nodes, elastic))
-        for lateral in [1 / (bending + shaft.shear * sheared)]
+        for shear in [shaft.shear * sheared]
     ]
 
 
 @lru_cache(maxsize=64)
 def _flexibilities(
     segments: tuple[Segment, ...], heights: tuple[float, ...], elastic: tuple[tuple[str, float, float], ...]
-) -> tuple[tuple[float, float, float, float, float, str], ...]:
-    """Of every element its elastic centre (m), lateral flexibility in bending and in shear, axial and tilt flexibility, and its material where it
-    has but one; `elastic`: name, modulus and Poisson's ratio of every material. They do not know the beam theory, so that another one costs nothing."""
+) -> tuple[tuple[float, tuple[float, float], float, float, tuple[float, float], str], ...]:
+    """Of every element its elastic centre (m), lateral flexibility in bending (in the planes of x and of y) and in shear, axial flexibility and that of tilt (in both planes),
+    and its material where it has but one; `elastic`: name, modulus and Poisson's ratio of every material. They do not know the beam theory, so that another one costs nothing.
+    The centre is the same in both planes: rectangular segments have a node at each end."""
     properties, found = {name: row for name, *row in elastic}, []
     for low, high in pairwise(heights):
-        bent, sheared, drawn, about = 0.0, 0.0, 0.0, 0.0  # integrals of 1/EI, 1/kappa G A, 1/EA and z/EI
-        squares = 0.0  # of z^2 / EI, from the element's lower end
+        sheared, drawn = 0.0, 0.0  # integrals of 1/kappa G A and 1/EA
+        bent, about, squares = np.zeros((3, 2))  # of 1/EI, z/EI and z^2/EI, z from the element's lower end, in both planes
         used: list[str] = []
         for segment, z, dz in _slices(segments, low, high):
             used += [segment.material] if segment.material not in used else []
             modulus, poisson = properties[segment.material]
-            outer, bore = radii(segment, segment.outer, z), radii(segment, segment.bore, z)
-            area, moment = np.pi * (outer**2 - bore**2), np.pi / 4 * (outer**4 - bore**4)
-            factor = shear_factor(bore / outer, poisson)
-            bent += float(np.sum(dz / (modulus * moment)))
-            about += float(np.sum((z - low) * dz / (modulus * moment)))
-            squares += float(np.sum((z - low) ** 2 * dz / (modulus * moment)))
+            area, moments = second_moments(segment, segment.outer, z)
+            factor = shear_factors(segment, z, poisson)
+            bent += np.sum(dz / (modulus * moments), axis=1)
+            about += np.sum((z - low) * dz / (modulus * moments), axis=1)
+            squares += np.sum((z - low) ** 2 * dz / (modulus * moments), axis=1)
             sheared += float(np.sum(dz / (factor * modulus / (2 * (1 + poisson)) * area)))
             drawn += float(np.sum(dz / (modulus * area)))
         centre = about / bent
-        found.append((low + centre, squares - centre * about, sheared, drawn, bent, used[0] if len(used) == 1 else ""))
+        (in_x, in_y), (tilt_y, tilt_x) = (squares - centre * about).tolist(), bent.tolist()
+        found.append((low + float(centre[0]), (in_x, in_y), sheared, drawn, (tilt_y, tilt_x), used[0] if len(used) == 1 else ""))
     return tuple(found)
 
 
@@ -136,33 +154,33 @@ def nodes(shaft: Shaft, materials: Mapping[str, Material]) -> list[Body]:
     densities = tuple((name, materials[name].density) for name in dict.fromkeys(segment.material for segment in shaft.segments))
     found = []
     for name, (z, mass, rotary, least) in zip(shaft.bodies, _lumps(shaft.segments, shaft.nodes, densities), strict=True):
-        tilt = max(shaft.rotary * rotary, least)
-        found.append(Body(name, mass, (tilt, tilt, 2 * tilt), z, shaft.moves, shaft.turns, (), shaft.role, shaft.speed_ratio))
+        about_y, about_x = (max(shaft.rotary * r, least) for r in rotary)
+        found.append(Body(name, mass, (about_x, about_y, about_x + about_y), z, shaft.moves, shaft.turns, (), shaft.role, shaft.speed_ratio))
     return found
 
 
 @lru_cache(maxsize=64)
 def _lumps(
     segments: tuple[Segment, ...], heights: tuple[float, ...], densities: tuple[tuple[str, float], ...]
-) -> tuple[tuple[float, float, float, float], ...]:
-    """Of every node the height of its centre of mass (m), mass, rotary inertia of its sections, and the least inertia that it is given."""
-    mass, first, least, rotary = np.zeros((4, len(heights)))
+) -> tuple[tuple[float, float, tuple[float, float], float], ...]:
+    """Of every node the height of its centre of mass (m), mass, rotary inertia of its sections in the planes of x and of y, and the least inertia that it is given."""
+    mass, first, least = np.zeros((3, len(heights)))
+    rotary = np.zeros((len(heights), 2))
     density = dict(densities)
     for i, (low, high) in enumerate(pairwise(heights)):
         length = high - low
         for segment, z, dz in _slices(segments, low, high):
-            outer, bore = radii(segment, segment.mass_outer, z), radii(segment, segment.bore, z)
+            area, moments = second_moments(segment, segment.mass_outer, z)
             rho, x = density[segment.material], (z - low) / length
-            line = rho * np.pi * (outer**2 - bore**2) * dz
-            inertia = rho * np.pi / 4 * (outer**4 - bore**4) * dz
+            line, inertia = rho * area * dz, rho * moments * dz
             inward = length / 2 * float(np.sum(line * x * (1 - x)))
             for node, share, sign in ((i, 1 - x, 1.0), (i + 1, x, -1.0)):
                 mass[node] += float(np.sum(line * share))
-                rotary[node] += float(np.sum(inertia * share))
+                rotary[node] += np.sum(inertia * share, axis=1)
                 least[node] += SLIGHT * float(np.sum(line * share)) * length**2
                 first[node] += sign * inward
     rows = zip(heights, mass.tolist(), rotary.tolist(), least.tolist(), first.tolist(), strict=True)
-    return tuple((z + s / m, m, r, small) for z, m, r, small, s in rows)
+    return tuple((z + s / m, m, (in_x, in_y), small) for z, m, (in_x, in_y), small, s in rows)
 
 
 def _slices(segments: Sequence[Segment], low: float, high: float) -> Iterator[tuple[Segment, Array, Array]]:

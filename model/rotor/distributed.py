@@ -20,7 +20,7 @@ from itertools import pairwise
 import numpy as np
 
 from thermospindle.model.machine import Material
-from thermospindle.model.rotor.beam import nodes, radii, shear_factor
+from thermospindle.model.rotor.beam import nodes, second_moments, shear_factors
 from thermospindle.model.rotor.chain import Layout
 from thermospindle.model.shaft import Shaft
 from thermospindle.model.structure import Structure
@@ -48,13 +48,15 @@ def _spread(
     used = dict(materials)
     for shaft in shafts:
         for (a, b), (low, high) in zip(pairwise(shaft.bodies), pairwise(shaft.nodes), strict=True):
-            bent, turned, more, drawn, drawn_more = _element(shaft, low, high, used, temperature)
             levers = np.eye(4)  # from the motion of the nodes' centres of mass to that of the nodes
             levers[0, 1], levers[2, 3] = low - centres[a], high - centres[b]
-            turned = levers.T @ turned @ levers
-            across, more = levers.T @ bent @ levers + turned, levers.T @ more @ levers
             numbers: list[tuple[list[int], Array]] = []
-            for shift, tilt, sign in PLANES:
+            flat = any(segment.sides for segment in shaft.segments)
+            for plane, (shift, tilt, sign) in enumerate(PLANES):
+                if plane == 0 or flat:  # a round one is the same in both
+                    bent, turned, more, drawn, drawn_more = _element(shaft, low, high, used, temperature, plane)
+                    turned = levers.T @ turned @ levers
+                    across, more = levers.T @ bent @ levers + turned, levers.T @ more @ levers
                 own = [(name, move) for name in (a, b) for move in (shift, tilt)]
                 if shift in shaft.moves:
                     at, signs = [place[dof] for dof in own], np.array([1.0, sign, 1.0, sign])
@@ -73,7 +75,7 @@ def _spread(
         for lump in nodes(shaft, used):
             for move in shaft.moves:
                 i = place[lump.name, move]
-                mass[i, i] -= lump.inertia[0] if move.startswith("tilt") else lump.mass
+                mass[i, i] -= {"tilt_x": lump.inertia[0], "tilt_y": lump.inertia[1]}.get(move, lump.mass)
             if shaft.turns:
                 i, j = place[lump.name, "tilt_x"], place[lump.name, "tilt_y"]
                 gyroscopic[i, j] -= lump.inertia[2] * shaft.speed_ratio
@@ -83,8 +85,8 @@ def _spread(
     return mass, quartic, gyroscopic
 
 
-def _element(shaft: Shaft, low: float, high: float, materials: Mapping[str, Material], temperature: float) -> tuple[Array, ...]:
-    """Consistent mass (4, 4) of the deflections and slopes (w, w', ...) of both ends in one plane, rotary inertia alike, and N of both; mass (2, 2)
+def _element(shaft: Shaft, low: float, high: float, materials: Mapping[str, Material], temperature: float, plane: int) -> tuple[Array, ...]:
+    """Consistent mass (4, 4) of the deflections and slopes (w, w', ...) of both ends in one of `PLANES`, rotary inertia alike, and N of both; mass (2, 2)
     along the axis, and N of it.
 
     Between its ends a beam without load has the shear force Q and the moment M - Q x, and EI slope' is the moment, w' = slope + shear force / (kappa G A).
@@ -94,13 +96,13 @@ def _element(shaft: Shaft, low: float, high: float, materials: Mapping[str, Mate
         a, b = max(low, segment.z[0]), min(high, segment.z[1])
         if b - a > 1e-12:
             z = a + (b - a) * (np.arange(PIECES) + 0.5) / PIECES
-            outer, heavy, bore = (radii(segment, ends, z) for ends in (segment.outer, segment.mass_outer, segment.bore))
             material = materials[segment.material]
             modulus, poisson, density = material.youngs_modulus(temperature), material.poisson_ratio, material.density
-            area, moment = np.pi * (outer**2 - bore**2), np.pi / 4 * (outer**4 - bore**4)
-            sheared = shaft.shear / (shear_factor(bore / outer, poisson) * modulus / (2 * (1 + poisson)) * area)
-            line, rotary = density * np.pi * (heavy**2 - bore**2), density * np.pi / 4 * (heavy**4 - bore**4)
-            rows.append(np.array([z - low, np.full(PIECES, (b - a) / PIECES), 1 / (modulus * moment), sheared, 1 / (modulus * area), line, shaft.rotary * rotary]))
+            area, moments = second_moments(segment, segment.outer, z)
+            heavy, rotary = second_moments(segment, segment.mass_outer, z)
+            sheared = shaft.shear / (shear_factors(segment, z, poisson) * modulus / (2 * (1 + poisson)) * area)
+            given = np.full(PIECES, (b - a) / PIECES), 1 / (modulus * moments[plane]), sheared, 1 / (modulus * area), density * heavy, shaft.rotary * density * rotary[plane]
+            rows.append(np.array([z - low, *given]))
     x, dz, bent, sheared, drawn, line, rotary = np.concatenate(rows, axis=1)
 
     def up_to(f: Array) -> Array:

@@ -21,7 +21,7 @@ from thermospindle.model.bearing.pair import BearingState, PairState
 from thermospindle.model.bearing.springs import ball_springs
 from thermospindle.model.machine import PARTS, Region, Spindle
 from thermospindle.model.rotor.section import Cell, cells
-from thermospindle.model.rotor.shaft_look import drawn_by_shaft, extent, host, slices
+from thermospindle.model.rotor.shaft_look import boxes, drawn_by_shaft, extent, host, slices
 from thermospindle.model.structure import Body
 from thermospindle.model.types import Array
 
@@ -82,10 +82,9 @@ def region_meshes(spindle: Spindle) -> list[RegionMesh]:
 def shaft_meshes(spindle: Spindle) -> list[RegionMesh]:
     """A slice for every node of every flexible shaft, neighbours in different shades."""
     return [
-        RegionMesh(name, name, *revolve(tiles), (*(SHADES[k % 2] * np.array(colour(shaft.segments[0].material))).tolist(), 1.0))
+        RegionMesh(name, name, *mesh, (*(SHADES[k % 2] * np.array(colour(shaft.segments[0].material))).tolist(), 1.0))
         for shaft in spindle.structure.shafts
-        for k, (name, tiles) in enumerate(slices(shaft).items())
-        if tiles
+        for k, (name, mesh) in enumerate((boxes(shaft) if shaft.segments[0].sides else {n: revolve(t) for n, t in slices(shaft).items() if t}).items())
     ]
 
 

@@ -10,8 +10,9 @@ Phi^T K Phi = W^2, the matrix that has this on its diagonal is
 
     C = (M Phi) W^-1/2 (sum over e of eta_e Phi^T K_e Phi) W^-1/2 (M Phi)^T,
 
-symmetric and never negative, eta M^1/2 (M^-1/2 K M^-1/2)^1/2 M^1/2 where everything is lossy alike. It is a constant matrix of dampers, so that FRFs are causal and MuJoCo steps them. What
-it is not: between resonances the loss is that of the nearest modes and not eta; the modes of a turning rotor have the damper of those at rest, eta f / f_0 of one that has moved
+symmetric and never negative, eta M^1/2 (M^-1/2 K M^-1/2)^1/2 M^1/2 where everything is lossy alike. It is a constant
+matrix of dampers, so that FRFs are causal, and so are records in time: those of `model.rotor.reduced` for a flexible shaft, between all of whose nodes the
+dampers lie, and MuJoCo's for a few rigid bodies. What it is not: between resonances the loss is that of the nearest modes and not eta; the modes of a turning rotor have the damper of those at rest, eta f / f_0 of one that has moved
 from f_0 to f; and it acts in the fixed frame, as all damping of a chain. A free body's modes, of the frequency 0, lose nothing.
 """
 

@@ -5,16 +5,18 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thermospindle.model.machine import Region, Spindle
 from thermospindle.model.rotor.section import Cell
 from thermospindle.model.shaft import Segment, Shaft
+from thermospindle.model.types import Array
 
 STEPS = 3  # cylinders that draw a cone
 
 
 def slices(shaft: Shaft) -> dict[str, list[Cell]]:
-    """Rectangles of every node's slice, from half way to its neighbours on both sides, by the node's body; cones in `STEPS` cylinders."""
+    """Rectangles of every node's slice, from half way to its neighbours on both sides, by the node's body; cones in `STEPS` cylinders, rectangular sections (`boxes`) by half their width."""
     middles = [(a + b) / 2 for a, b in zip(shaft.nodes, shaft.nodes[1:], strict=False)]
     edges = [shaft.nodes[0], *middles, shaft.nodes[-1]]
     found: dict[str, list[Cell]] = {}
@@ -34,6 +36,20 @@ def _cells(name: str, segment: Segment, low: float, high: float) -> list[Cell]:
         share = ((z0 + z1) / 2 - segment.z[0]) / (segment.z[1] - segment.z[0])
         r0, r1 = (ends[0] + share * (ends[1] - ends[0]) for ends in (segment.bore, segment.outer))
         found.append(Cell(name, (float(r0), float(r1)), (float(z0), float(z1))))
+    return found
+
+
+def boxes(shaft: Shaft) -> dict[str, tuple[Array, NDArray[np.int64], NDArray[np.int64]]]:
+    """Vertices (8 k, 3), triangles (12 k, 3) and patches (12 k,) of every node's slice of a rectangular section, by the node's body."""
+    corners = np.array(list(itertools.product((-0.5, 0.5), (-0.5, 0.5), (0.0, 1.0))))  # x, y, z; number 4 x + 2 y + z
+    faces = np.array([(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)])
+    triangles = np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
+    found = {}
+    for name, tiles in slices(shaft).items():
+        own = [(t.z, s.sides) for t in tiles for s in shaft.segments if s.sides and s.z[0] <= sum(t.z) / 2 <= s.z[1]]
+        vertices = [corners * [w, h, z1 - z0] + [0.0, 0.0, z0] for (z0, z1), (w, h) in own]
+        numbers = [triangles + 8 * k for k in range(len(own))]
+        found[name] = np.concatenate(vertices), np.concatenate(numbers), np.concatenate([np.tile(np.arange(6), 2) + 6 * k for k in range(len(own))])
     return found
 
 

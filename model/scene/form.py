@@ -171,7 +171,7 @@ class Scene(Table):
             return []
         own = next((b for b in moving if b.turns), moving[0])
         if isinstance(own, ShaftForm):
-            ends = own.start_z_mm, own.start_z_mm + sum(p[-1] for p in own.outer_mm)
+            ends = own.start_z_mm, own.start_z_mm + own.length_mm
         else:
             heights = [z for g in self.section.regions if g.name in own.regions for z in g.z_mm] or [own.z_mm or 0.0]
             ends = min(heights), max(heights)
@@ -257,5 +257,5 @@ class Scene(Table):
             return self.nominal_speed_rpm
         rows: dict[str, BallRow | RollerRow] = {**self.ball_rows, **self.roller_rows}
         diameters = [rows[b.row].pitch_diameter_mm for b in self.bearings.values() if b.row is not None]
-        diameters = diameters or [max(p[:-1]) for s in self.shafts for p in s.outer_mm] or [100.0]
+        diameters = diameters or [max(p[:-1]) for s in self.shafts for p in s.outer_mm or s.width_mm] or [100.0]
         return float(f"{GENTLE / max(diameters):.1e}")

@@ -136,6 +136,9 @@ def content_hash(spindle: Spindle) -> str:
     for damped in (*content["structure"]["joints"], *content["structure"]["shafts"]):
         if not damped["loss_factor"]:
             damped.pop("loss_factor")
+    for segment in (s for shaft in content["structure"]["shafts"] for s in shaft["segments"]):
+        if segment["sides"] is None:
+            segment.pop("sides")
     for addition in content["effects"]:
         addition.pop("definition")
     return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()[:12]

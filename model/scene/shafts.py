@@ -1,4 +1,4 @@
-"""The form of a scene file: flexible shafts, as the diameters and lengths of a drawing from one end to the other."""
+"""The form of a scene file: flexible shafts, as the diameters, or widths and heights, and lengths of a drawing from one end to the other."""
 
 from __future__ import annotations
 
@@ -25,6 +25,15 @@ def _piece(numbers: tuple[float, ...]) -> tuple[float, ...]:
 Piece = Annotated[tuple[NotNegative, ...], Strict(False), AfterValidator(_piece)]
 """[diameter, length], or [diameter at its start, diameter at its end, length] of a cone, in mm."""
 
+def _side(numbers: tuple[float, ...]) -> tuple[float, ...]:
+    if len(numbers) != 2:
+        raise ValueError("a piece of a rectangular section is [side, length] in mm, without taper")
+    return _piece(numbers)
+
+
+Side = Annotated[tuple[Positive, ...], Strict(False), AfterValidator(_side)]
+"""[side, length] of a rectangular section, in mm."""
+
 COARSE = 0.05
 """Longest element over the shaft's length where nobody says: twenty over a shaft, and the nodes that bearings and points need."""
 FINEST = 500
@@ -35,9 +44,11 @@ class ShaftForm(Table):
     name: Name
     material: str
     start_z_mm: Place = 0.0
-    outer_mm: Annotated[list[Piece], Field(min_length=1, max_length=300)]
+    outer_mm: Annotated[list[Piece], Field(max_length=300)] = Field(default_factory=list)
     bore_mm: Annotated[list[Piece], Field(max_length=300)] = Field(default_factory=list)
     mass_outer_mm: Annotated[list[Piece], Field(max_length=300)] = Field(default_factory=list)
+    width_mm: Annotated[list[Side], Field(max_length=300)] = Field(default_factory=list)
+    height_mm: Annotated[list[Side], Field(max_length=300)] = Field(default_factory=list)
     moves: Annotated[list[Literal["x", "y", "z", "tilt_x", "tilt_y"]], Field(min_length=1)] = Field(default=["x", "y", "z", "tilt_x", "tilt_y"])
     turns: bool = False
     speed_ratio: Annotated[float, Field(ge=-100, le=100)] = 1.0
@@ -50,12 +61,14 @@ class ShaftForm(Table):
     @model_validator(mode="after")
     def _drawn_whole(self) -> ShaftForm:
         one_damping(self.damping_ratio, self.loss_factor)
-        length = sum(p[-1] for p in self.outer_mm)
-        for key in ("bore_mm", "mass_outer_mm"):
+        self._one_section()
+        length = self.length_mm
+        whole, other = ("width_mm", "") if self.width_mm else ("outer_mm", ", with diameter 0 where there is no bore")
+        for key in ("bore_mm", "mass_outer_mm", "height_mm"):
             pieces = getattr(self, key)
             own = sum(p[-1] for p in pieces)
             if pieces and abs(own - length) > 1e-6 * length:
-                raise ValueError(f"{key} is {own:g} mm long and outer_mm {length:g} mm; both must tell the whole shaft, with diameter 0 where there is no bore")
+                raise ValueError(f"{key} is {own:g} mm long and {whole} {length:g} mm; both must tell the whole shaft{other}")
         for key in ("outer_mm", "mass_outer_mm"):
             for piece in getattr(self, key):
                 if min(piece[:-1]) <= 0:
@@ -77,10 +90,30 @@ class ShaftForm(Table):
             raise ValueError("speed_ratio = 0 does not turn; without turns = true the shaft stands")
         return self
 
+    def _one_section(self) -> None:
+        """Refuses a shaft that is neither round nor rectangular, or both, and one that turns and is not as stiff in all directions."""
+        if bool(self.outer_mm) == bool(self.width_mm) or bool(self.width_mm) != bool(self.height_mm):
+            told = [key for key in ("outer_mm", "width_mm", "height_mm") if getattr(self, key)]
+            raise ValueError(f"{' and '.join(told) or 'no section'} told; allowed are outer_mm alone, or width_mm (along x) with height_mm (along y) of a rectangular section")
+        for key in ("bore_mm", "mass_outer_mm"):
+            if self.width_mm and getattr(self, key):
+                raise ValueError(f"{key} is of a round section; a rectangular one, of width_mm and height_mm, is solid")
+        if self.width_mm and self.turns and any(s.sides is None or s.sides[0] != s.sides[1] for s in self._segments()):
+            raise ValueError(
+                "width_mm and height_mm of a shaft that turns must be the same: a flat one is stiffer one way than the other, which turns with it, "
+                "and here stiffness stands still; allowed is a flat shaft without turns = true"
+            )
+
+    @property
+    def length_mm(self) -> float:
+        return sum(p[-1] for p in self.outer_mm or self.width_mm)
+
     def _segments(self) -> tuple[Segment, ...]:
-        """The pieces of all three lists, cut where any of them changes."""
-        lists = {"outer": self.outer_mm, "bore": self.bore_mm or [(0.0, sum(p[-1] for p in self.outer_mm))]}
-        lists["mass_outer"] = self.mass_outer_mm or self.outer_mm
+        """The pieces of all lists, cut where any of them changes; of a rectangular section the radii are half of the width."""
+        lists: dict[str, Sequence[tuple[float, ...]]] = {"outer": self.outer_mm or self.width_mm, "bore": self.bore_mm or [(0.0, self.length_mm)]}
+        lists["mass_outer"] = self.mass_outer_mm or lists["outer"]
+        if self.height_mm:
+            lists["height"] = self.height_mm
         spans = {key: _spans(pieces) for key, pieces in lists.items()}
         cuts = sorted({round(z, 9) for pieces in spans.values() for a, b, _, _ in pieces for z in (a, b)})
         found = []
@@ -89,22 +122,23 @@ class ShaftForm(Table):
                 continue
             at = {key: _at(pieces, low, high) for key, pieces in spans.items()}
             z = (self.start_z_mm + low) * MM, (self.start_z_mm + high) * MM
-            found.append(Segment(z, at["outer"], at["bore"], at["mass_outer"], self.material))
+            sides = (2 * at["outer"][0], 2 * at["height"][0]) if self.height_mm else None
+            found.append(Segment(z, at["outer"], at["bore"], at["mass_outer"], self.material, sides))
         return tuple(found)
 
     def ends(self) -> tuple[float, float]:
         """Heights (m) of its ends."""
-        return self.start_z_mm * MM, (self.start_z_mm + sum(p[-1] for p in self.outer_mm)) * MM
+        return self.start_z_mm * MM, (self.start_z_mm + self.length_mm) * MM
 
     def shaft(self, heights: Sequence[float]) -> Shaft:
-        """The shaft, with nodes at all of `heights` (m) that lie on it."""
+        """The shaft, with nodes at all of `heights` (m) that lie on it, and where a rectangular section changes."""
         segments, (low, high) = self._segments(), self.ends()
         longest = COARSE * (high - low) if self.longest_element_mm is None else self.longest_element_mm * MM
         shear, rotary = THEORIES[self.beam]
         return Shaft(
             name=self.name,
             segments=segments,
-            nodes=mesh(segments, heights, longest),
+            nodes=mesh(segments, [*heights, *(s.z[1] for s in segments if s.sides)], longest),
             turns=self.turns,
             speed_ratio=self.speed_ratio,
             damping_ratio=self.damping_ratio or 0.0,

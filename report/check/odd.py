@@ -223,6 +223,8 @@ def off(spindle: Spindle, p: Point) -> float:
     shaft = next((s for s in spindle.structure.shafts if p.body in s.bodies), None)
     if r == 0.0:
         return 0.0
+    if shaft is not None and (sides := [s.sides for s in shaft.segments if s.sides and s.z[0] - SAME_HEIGHT <= z <= s.z[1] + SAME_HEIGHT]):
+        return min(float(np.hypot(max(abs(p.position[0]) - w / 2, 0.0), max(abs(p.position[1]) - h / 2, 0.0))) for w, h in sides)
     if shaft is not None:
         inner, outer = _radii(shaft, z)
         return max(r - max(outer), min(inner) - r, 0.0)

@@ -179,6 +179,7 @@ def _shaft(spindle: Spindle, s: Shaft) -> dict[str, Any]:
         "z_mm": [_mm(s.nodes[0]), _mm(s.nodes[-1])],
         "length_mm": _mm(s.nodes[-1] - s.nodes[0]),
         "outer_diameter_mm": [_mm(2 * d) for d in (min(min(g.outer) for g in s.segments), max(max(g.outer) for g in s.segments))],
+        "sides_mm": [[_mm(x) for x in g.sides] for g in s.segments if g.sides] or None,
         "segments": len(s.segments),
         "elements": len(s.elements),
         "beam": next((name for name, shares in THEORIES.items() if shares == (s.shear, s.rotary)), "of its own"),

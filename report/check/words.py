@@ -68,7 +68,7 @@ def grids(values: Mapping[str, Any]) -> list[tuple[str, list[str], list[list[str
     ]  # fmt: skip
     shafts = [
         [
-            name, f"{s['z_mm'][0]:g} - {s['z_mm'][1]:g}", f"{s['outer_diameter_mm'][0]:g} - {s['outer_diameter_mm'][1]:g}", f"{s['mass_kg']:.4g}",
+            name, f"{s['z_mm'][0]:g} - {s['z_mm'][1]:g}", _across_axis(s), f"{s['mass_kg']:.4g}",
             str(s["elements"]), s["beam"], "yes" if s["turns"] else "no",
         ]
         for name, s in values["shafts"].items()
@@ -87,7 +87,7 @@ def grids(values: Mapping[str, Any]) -> list[tuple[str, list[str], list[list[str
     ]
     every = [
         ("Bearings at the reference", ["bearing", "z\nmm", "between", "sense", "preload\nN", "angle\ndeg", "meets\naxis, mm", "radial\nN/um", "axial\nN/um"], bearings),
-        ("Flexible shafts", ["shaft", "z\nmm", "diameter\nmm", "mass\nkg", "elements", "beam", "turns"], shafts),
+        ("Flexible shafts", ["shaft", "z\nmm", "section\nmm", "mass\nkg", "elements", "beam", "turns"], shafts),
         ("Rigid bodies", ["body", "z\nmm", "mass\nkg", "tilt\nkg m2", "polar\nkg m2", "turns", "moves"], bodies),
         ("Joints", ["joint", "between", "z\nmm", "lateral\nN/m", "axial\nN/m", "tilt\nN m/rad"], joints),
         ("Points", ["node", "point", "on", "x, y, z\nmm", "along", "hammer"], points),
@@ -106,6 +106,13 @@ def _across(values: list[float]) -> str:
     """Stiffness along or about x and y, once where they are the same."""
     shown = [f"{k:.3g}" if k else "-" for k in values]
     return shown[0] if len(set(shown)) == 1 else ", ".join(shown)
+
+
+def _across_axis(s: Mapping[str, Any]) -> str:
+    """Least and largest diameter of a shaft, or the width and height of a rectangular section, wherever it changes."""
+    if s["sides_mm"] is None:
+        return f"{s['outer_diameter_mm'][0]:g} - {s['outer_diameter_mm'][1]:g}"
+    return ", ".join(dict.fromkeys(f"{w:g} x {h:g}" for w, h in s["sides_mm"]))
 
 
 def _spring(s: Mapping[str, Any]) -> str:

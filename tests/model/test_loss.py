@@ -11,11 +11,14 @@ import pytest
 from tests.conftest import ROOT
 from tests.literature.test_rotors import chain, rotor
 from thermospindle.model.errors import BadInput
+from thermospindle.model.machine import Condition
 from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.chain import Matrices, RotorBase, matrices
 from thermospindle.model.rotor.modes import frf, modes
 from thermospindle.model.scene.reading import build
 from thermospindle.model.units import RPM
+from thermospindle.sim.hammer.test import impact_tests
+from thermospindle.sim.operating import operating_point
 
 ETA = 0.02
 
@@ -75,6 +78,20 @@ def test_mujoco_has_the_same_dampers(speed):
     own, linear = matrices(made), mjcf.linearise(mjcf.chain_spec(made, 1e-6).compile())
     assert np.abs(linear.damping - own.damping).max() < 1e-9 * np.abs(own.damping).max()
     assert np.linalg.eigvalsh((own.damping + own.damping.T) / 2)[0] > -1e-12 * np.abs(own.damping).max()
+
+
+def test_a_shaft_is_hit_without_mujoco_or_refused():
+    """Dampers between all nodes: the reduced model's record has the peaks of the exact FRFs; MuJoCo's steps are refused, with what is allowed."""
+    path = ROOT / "scenes" / "mk7702" / "spindle.toml"
+    raw = tomllib.loads(path.read_text())
+    del raw["shafts"][0]["damping_ratio"], raw["shafts"][0]["origins"]["damping_ratio"]
+    raw["shafts"][0]["loss_factor"] = 0.05
+    point = operating_point(build(raw, path), Condition(20.0, 0.0))
+    with pytest.raises(BadInput, match=r"loss_factor of \w+: makes dampers between all \d+ degrees of freedom.*--element reduced.*damping_ratio"):
+        impact_tests([point])
+    found = impact_tests([point], element="reduced", noise=False)[0].estimate
+    exact = point.frf(found.h1.frequency, found.window_decay)
+    assert np.abs(found.h1.value - exact).max() < 5e-3 * np.abs(exact).max()
 
 
 def test_planes_stay_apart():
