@@ -67,7 +67,7 @@ BROKEN = [
     ('["front1", "front2", "front3"]', '["front1", "front3"]', "bearings.front2: is in no set"),
     ('name = "nose_y"', 'name = "nose"', "measuring.points: name = 'nose' stands twice"),
     ("preload_N = 382.0", 'preload_N = "16"', "sets.front.preload_N = '16'"),
-    ("[133, 23]", "[133, 0]", "shafts.spindle.outer_mm.1"),
+    ("[133, 23]", "[133, 0]", "shafts.spindle.outer_mm.2"),
     ("z_mm = 330.5", "z_mm = 630.5", "beyond the shaft 'spindle', which spans 0 to 440"),
 ]
 

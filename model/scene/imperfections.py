@@ -66,7 +66,7 @@ class RowImperfections(Table):
             raise ValueError(f"{'inner' if self.inner_axial else 'outer'}_axial: cylindrical rollers do not feel it; allowed are inner_radial and outer_radial")
         for key, values in (
             ("ball_diameter_nm", self.ball_diameter_nm),
-            *((f"ball_waves.{n}.{key}", getattr(w, key)) for n, w in enumerate(self.ball_waves) for key in ("amplitude_nm", "phase_deg")),
+            *((f"ball_waves.{n}.{key}", getattr(w, key)) for n, w in enumerate(self.ball_waves, 1) for key in ("amplitude_nm", "phase_deg")),
         ):
             if len(values) != balls and (values or key != "ball_diameter_nm"):
                 raise ValueError(f"{key}: has {len(values)} values; allowed is one for each of the {balls} {'rollers, row by row' if rollers else 'balls'}")

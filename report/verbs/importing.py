@@ -17,7 +17,7 @@ from thermospindle.report.progress import progress_bar
 from thermospindle.report.verbs.answer import Answer, with_effects
 from thermospindle.sim.campaign.beside import left_out
 from thermospindle.sim.campaign.campaign import Campaign, write_campaign
-from thermospindle.sim.importing.assemble import campaign_of, read, spoken
+from thermospindle.sim.importing.assemble import campaign_of, check_tests, read, spoken
 from thermospindle.sim.importing.mapping import MappingForm, read_mapping
 from thermospindle.sim.importing.template import template
 
@@ -44,6 +44,7 @@ def bring(
     steps = len(files) * (2 if fresh and out is None else 1)
     with progress_bar(steps) as done:
         found = read(files, form, spindle, mapping, done)
+        check_tests(found, files)
         if fresh and mapping is not None:
             with whole(Path(mapping)) as file:
                 file.write_text(template(found, files, spindle), encoding="utf-8")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -81,8 +82,6 @@ def read(
         coherence.setdefault(own, {}).update(c.coherence)
         for m in c.modes:
             modes.setdefault(m.test or own, []).append(m)
-    if not (curves or modes):
-        raise BadInput(f"{listed(f.name for f in files)}: no FRF, time record or mode in {'it' if len(files) == 1 else 'them'}; geometry, spectra or coherence alone are no campaign")
     curves = {test: [_with(x, coherence.get(test, {})) for x in every] for test, every in curves.items()}
     groups, open_records = _records(contents, settings)
     questions += open_records
@@ -120,7 +119,8 @@ def _check_columns(form: MappingForm, contents: Sequence[Content], mapping: Path
         names = dict.fromkeys(n for c in contents if fits(table, c.file) for n in c.names)
         known = {REST, *names, *(n.rsplit(".", 1)[-1] for n in names)}
         if wrong := [name for name in table.columns if name not in known]:
-            there = listed((n for n in names if not n.isdigit()), 12) or "none, for UFF and tables of modes say themselves what they hold"
+            called = [n for n in names if not re.fullmatch(r"(column )?\d+", n)] or [n for n in names if not n.isdigit()]
+            there = listed(called, 12) or "none, for UFF and tables of modes say themselves what they hold"
             raise BadInput(f"{mapping}: files: columns: {wrong[0]!r} is no column of {table.file}; there are {there}")
 
 
@@ -233,6 +233,12 @@ def _conditions(found: Read, form: MappingForm, scene: Spindle | None, mapping: 
     return questions
 
 
+def check_tests(found: Read, files: Sequence[Path]) -> None:
+    """`BadInput` for files that make no test, whatever is answered: there is nothing to ask of them."""
+    if not found.tests:
+        raise BadInput(f"{listed(f.name for f in files)}: no FRF, time record or mode in {'it' if len(files) == 1 else 'them'}; geometry, spectra or coherence alone are no campaign")
+
+
 def spoken(found: Read, files: Sequence[Path]) -> list[str]:
     """The open questions as sentences."""
     return [words_of(q, {"files": [f.name for f in files], "tests": found.tests}) for q in found.questions]
@@ -240,6 +246,7 @@ def spoken(found: Read, files: Sequence[Path]) -> list[str]:
 
 def campaign_of(found: Read, form: MappingForm, scene: Spindle | None, files: Sequence[Path], mapping: Path | None) -> tuple[Campaign, list[str]]:
     """The campaign of all files, and what was done to them. Raises `Unanswered` with all that is open, `BadInput` for FRFs that no structure has."""
+    check_tests(found, files)
     if found.questions:
         count = len(found.questions)
         head = f"{count} thing{'s are' if count > 1 else ' is'} not told by the files:"

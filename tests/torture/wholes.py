@@ -41,7 +41,7 @@ band_Hz = [100.0, 3000.0]
 file = "*.csv"
 test = "T20"
 unit = "m/s/N"
-columns = { "f" = "frequency", "H(3,1) real" = "H(3,1) real" }
+columns = { "frequency [Hz]" = "frequency [Hz]", "H(3,1) real [m/s/N]" = "H(3,1) real [m/s/N]" }
 leave_out = []
 [[tests]]
 id = "T20"
