@@ -116,6 +116,13 @@ def test_refused_in_one_sentence(capsys, arguments, said):
     assert said in refused(capsys, *arguments)
 
 
+def test_what_cannot_be_written_is_refused_before_anything_is_worked_out(capsys, monkeypatch):
+    """A simulation of a minute came first."""
+    monkeypatch.setattr("thermospindle.report.verbs.chain.simulate", lambda **asked: pytest.fail("computed"))
+    said = refused(capsys, "simulate", SCENE, "--out", "/proc/x")
+    assert "--out /proc/x: No such file or directory; name a place where you may write" in said
+
+
 def test_lines_faster_than_the_integration_step_show_by_the_linear_path(capsys, scene):
     """At a million rpm the balls' lines lie at 289 kHz; nothing is integrated there, so the step does not matter."""
     assert main(["runout", str(scene()), "--speed", "1e6", "--path", "linear", "--seconds", "0.001", "--json"]) == 0

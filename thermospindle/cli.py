@@ -15,6 +15,7 @@ import errno
 import json
 import shlex
 import sys
+import tempfile
 from collections.abc import Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
@@ -75,6 +76,7 @@ def _run(arguments: list[str]) -> int:
     as_json, (module, function) = asked.pop("json", False), asked.pop("verb")
     token = COMMAND.set(shlex.join(["spindle", *arguments]))
     try:
+        _ask_to_write(asked.get("out"))
         answer = getattr(import_module(f"thermospindle.report.verbs.{module}"), function)(**asked)
     except OSError as error:
         if told := _not_writable(error, asked):
@@ -92,6 +94,15 @@ def _run(arguments: list[str]) -> int:
         sys.stdout.flush()
     answer.then()
     return 0
+
+
+def _ask_to_write(out: Path | None) -> None:
+    """OSError, before anything is worked out, where nothing can be written at `out`: a file without a name is made beside it, and gone."""
+    if out is not None:
+        try:
+            tempfile.TemporaryFile(dir=next(p for p in Path(out).absolute().parents if p.is_dir())).close()
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(out)) from None
 
 
 def _not_writable(error: OSError, asked: dict[str, Any]) -> str:
