@@ -32,7 +32,7 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
         wrong, change = sizes.get(kinds_of.STIFFNESS, 0.0), sizes.get(kinds_of.CHANGE, 0.0)
         which = "; one condition cannot tell that from a missing effect" if len(conditions_of(found.model.spindle, found.model.tests)) == 1 else ""
         constant = f", the model's frequencies being constantly wrong by about {wrong:.1g} of each{which}" if wrong > NUMERICS[0] else ""
-        otherwise = f", what temperature and speed do to the balls' stiffness being wrong by about {change:.0%} of it" if change else ""
+        otherwise = f", what speed does to the balls' stiffness being wrong by about {change:.0%} of it, and what temperature does by a little" if change else ""
         return f"Tolerances and measuring errors explain the data: chi2 is {chi2 / n:.2f} a number for {n} numbers{constant}{otherwise}{best}."
     lead = candidates[0] if candidates else None
     if word == "unexplained":

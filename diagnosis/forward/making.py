@@ -38,24 +38,21 @@ def campaign_model(spindle: Spindle, campaign: Campaign, tests: Sequence[TestDat
 
 
 def changes(spindle: Spindle, present: Applied, names: Sequence[str], conditions: Sequence[Condition]) -> list[Nuisance]:
-    """By what the change of the balls' stiffness with temperature and speed may be off, from how the drawing's changes across the axis; nothing of tests in which no spindle can be built."""
+    """By what the change of the balls' stiffness with temperature and speed may be off, from how speed changes the drawing's across the axis; nothing of a speed at which no spindle can be built."""
 
     @cache
-    def across(temperature: float, speed: float) -> float:
-        return float(sum(b.stiffness[0, 0] for b in operating_point(spindle, Condition(temperature, speed), present).state.bearings))
+    def across(at: Condition) -> float:
+        return float(sum(b.stiffness[0, 0] for b in operating_point(spindle, at, present).state.bearings))
 
-    def apart(at: tuple[float, float], of: tuple[float, float]) -> float:
+    def faster(c: Condition) -> float:
         try:
-            return across(*at) / across(*of) - 1.0
+            return across(Condition(c.temperature, c.speed)) / across(Condition(c.temperature)) - 1.0
         except FAILED:
             return 0.0
 
     if not spindle.bearings:
         return []
-    reference = spindle.reference_temperature
-    warmer = [apart((c.temperature, 0.0), (reference, 0.0)) for c in conditions]
-    faster = [apart((c.temperature, c.speed), (c.temperature, 0.0)) for c in conditions]
-    return changes_of(names, warmer, faster, [(c.temperature - reference) / RANGE_K for c in conditions])
+    return changes_of(names, [(c.temperature - spindle.reference_temperature) / RANGE_K for c in conditions], [faster(c) for c in conditions])
 
 
 def expected_noise(spindle: Spindle) -> Noise:

@@ -10,8 +10,8 @@ mode in each test: what laws that hold only nearly leave. The size of each is le
 
 Bearings differ among themselves: each has a stiffness and a damping of its own about those that all share with the drawing, within the scene's tolerances. A
 constant discrepancy of modes cannot stand in for that: bearings soften with speed, and what one of two is off by with them. So it is with how stiff balls are along the axis and in
-tilt beside across it, in which two honest programs differ by a per cent or two: where the forces of a row are said to act, and what the races give. And what temperature and speed do
-to that stiffness is known as far as the model of a bearing holds: a share of it is wrong, learned from the data, for the most part alike in proportion to temperature.
+tilt beside across it, in which two honest programs differ by a per cent or two: where the forces of a row are said to act, and what the races give. And what temperature does to a contact,
+and speed to its balls, is known as far as the model of a bearing holds: a little of it is wrong, as much as the data ask for.
 
 A light resonance is one that the drawing lacks, of the table, a fixture or a cable: an oscillator on some point of the machine, wherever that is, and so
 given by how much of it each reference mode carries along. It is looked for where the data show the same misfit in every test.
@@ -40,9 +40,11 @@ per cent, and forces by twice that (Harris, *Rolling Bearing Analysis*, 1991, ch
 BALLS_SD = 0.01  # in one direction beside that across the axis
 DIRECTIONS = (("axial", (2,)), ("tilt", (3, 4)))
 CHANGE, CHANGE_SD = "change of the balls' stiffness", 0.03
-"""Relative, at the reference width, of what temperature does to the stiffness. Two honest programs keep the contact's constant, or let its groove grow away from its ball: of
-ceramic balls in steel that is a twentieth of all that temperature does."""
-CHANGE_APART = 0.3  # of it, by which what temperature does is off in each test by itself; of what speed does all of it, for balls' inertia loads are less sure
+"""Relative, at the reference width, of what the balls' inertia does to their stiffness at speed: where centrifugal force and gyroscopic moment are put, beside how large they are."""
+CONTACT_SD = 1e-3
+"""Relative, over `RANGE_K` and at the reference width of `CHANGE`, of what temperature does to the contact itself, beside the load on it. Two honest programs keep the contact's constant, or
+let its groove grow away from its ball: of ceramic balls in steel that is a thousandth."""
+CONTACT_APART = 0.3  # of it, in each test by itself
 UNEVEN = "stiffness of a joint uneven"  # about the axis
 RECORD = "end of records"
 RESONANCE = "light resonance"
@@ -173,15 +175,14 @@ def reference_modes(linear: Matrices, seen: float, highest: float, most: int) ->
     return ReferenceModes(omega[keep], np.maximum(damping, 1e-4), linear.mass @ modal, linear.dofs, int(np.sum(omega[keep] < seen)))
 
 
-def changes_of(tests: Sequence[str], warmer: Sequence[float], faster: Sequence[float], far: Sequence[float]) -> list[Nuisance]:
-    """By what the change of the balls' stiffness may be off, from how it changes in every test, relative, with temperature and with speed, `far` (`RANGE_K`) from the reference."""
-    furthest = max(range(len(tests)), key=lambda t: abs(far[t]))
-    found = []
-    if warmer[furthest]:
-        found.append(Nuisance(CHANGE, f"{CHANGE} with temperature", CHANGE_SD * abs(warmer[furthest] / far[furthest])))
-    apart = [CHANGE_APART * abs(w) + abs(f) for w, f in zip(warmer, faster, strict=True)]
+def changes_of(tests: Sequence[str], far: Sequence[float], faster: Sequence[float]) -> list[Nuisance]:
+    """By what the change of the balls' stiffness may be off in tests so `far` (`RANGE_K`) from the reference temperature, where speed makes it `faster` (relative) another."""
+    found = [Nuisance(CHANGE, f"{CHANGE} with temperature", CONTACT_SD)] if any(far) else []
     ways = ((0, "across the axis"), (1, "along it and in tilt"))
-    return found + [Nuisance(CHANGE, f"{CHANGE} {way} in {n}", CHANGE_SD * a, t, i) for t, (n, a) in enumerate(zip(tests, apart, strict=True)) if a for i, way in ways]
+    for t, (name, f, n) in enumerate(zip(tests, far, faster, strict=True)):
+        if sd := CONTACT_APART * CONTACT_SD * abs(f) + CHANGE_SD * abs(n):
+            found += [Nuisance(CHANGE, f"{CHANGE} {way} in {name}", sd, t, i) for i, way in ways]
+    return found
 
 
 def nuisances(

@@ -24,6 +24,7 @@ from thermospindle.diagnosis.forward.nuisance import (
     RECORD,
     STIFFNESS,
     TEMPERATURE,
+    changes_of,
 )
 from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.forward.response import Response
@@ -89,6 +90,14 @@ def test_derivatives_of_lines(scene, quantity, decay):
         assert worst[kind] < 1e-4, kind
     for kind in (BUILD, EXPANSION, *APART, BALLS, CHANGE, TEMPERATURE):
         assert worst[kind] < 5e-3, kind
+
+
+def test_what_a_bearing_may_change_by_otherwise():
+    """With temperature in all tests alike, a third of that in each by itself, and there a share of what speed does; nothing where nothing changes."""
+    found = changes_of(["cold", "warm", "fast"], [0.0, 1.0, 0.5], [0.0, 0.0, -0.1])
+    assert [p.test for p in found] == [None, 1, 1, 2, 2]
+    assert [p.sd for p in found] == pytest.approx([1e-3, 3e-4, 3e-4, 1.5e-4 + 3e-3, 1.5e-4 + 3e-3])
+    assert changes_of(["cold"], [0.0], [0.0]) == []
 
 
 @pytest.mark.parametrize("rows", [None, 0])
