@@ -1,4 +1,4 @@
-"""Fits of the ladder: a model beside all tests, and beside all but those of one temperature, which it then has to predict.
+"""Fits of the ladder: a model beside all tests, and beside all but a part of them (`diagnosis.ladder.left_out`), which it then has to predict.
 
 Both are fitted afresh, from the drawing and with errors enlarged at first, so that nothing of a test left out is in the fit that predicts
 it. Unlike in `diagnose`, no mode may drift freely from test to test: what drifts is what the steps of the ladder are to explain.
@@ -13,11 +13,9 @@ from itertools import product
 
 import numpy as np
 
-from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import Mechanism, variants
-from thermospindle.diagnosis.forward.model import FAILED, CampaignModel, TestData
-from thermospindle.diagnosis.forward.rates import rates_of
+from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.evidence import GRIDS, Evidence, evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit
 from thermospindle.diagnosis.inference.prior import Learned, as_stated, precision_and_variances
@@ -37,17 +35,6 @@ HOLDS = 1.5  # times the chi2 that the quadratic promises, up to which it is bel
 def without(model: CampaignModel, kinds: Sequence[str]) -> CampaignModel:
     """The model without nuisance parameters of some kinds."""
     return replace(model, parameters=tuple(p for p in model.parameters if p.kind not in kinds))
-
-
-def unseen(model: CampaignModel, group: Sequence[int]) -> CampaignModel:
-    """The model with the data of the tests in `group` taken away; their conditions and parameters stay."""
-    return replace(model, tests=tuple(_empty(model, t) if t in group else data for t, data in enumerate(model.tests)))
-
-
-def _empty(model: CampaignModel, t: int) -> TestData:
-    nothing = np.zeros((0 if not isinstance(d := model.tests[t], LineData) else len(d.value), len(model.scenes[t].hammer.hammer_nodes), 0))
-    quantity = d.quantity if isinstance(d, LineData) else "receptance"
-    return LineData(d.test, d.condition, np.zeros(0), nothing.astype(complex), nothing, quantity, "left out", 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,29 +157,3 @@ def _at_learned(model: CampaignModel, first: Fit) -> Settled:
     learned = as_stated(evidence(model, first, tried).learned.sizes, first.mechanisms)
     found = fit(model, first.mechanisms, first.point, tempers=TEMPERS[-2:], learned=learned, moved=first.moved)
     return Settled(model, found, evidence(model, found, [learned]), first, learned)
-
-
-# ---------------------------------------------------------------- what was left out
-
-
-def predicted_squares(found: Settled, tests: Sequence[TestData], group: Sequence[int]) -> tuple[float, int]:
-    """Squares, and number, of the residuals of tests that `found` has not seen, in standard errors of its prediction.
-
-    With r the residuals there in standard errors of the data, J their derivatives by all parameters and S the covariance of these, it is
-    r (1 + J S J^T)^-1 r: what is not known of the left-out test itself (its temperature, its gains) is part of S, with its prior.
-    """
-    model = replace(found.model, tests=tuple(tests))
-    problem = Problem(model, found.mechanisms)
-    point, covariance = found.posterior
-    rates = rates_of(model, problem.parts(point)[0], problem.effects_of(point))
-    information, gradient, total, count = np.zeros((problem.length,) * 2), np.zeros(problem.length), 0.0, 0
-    for t in group:
-        r, jacobian, numbers = problem.linearised(t, point, rates)
-        information[np.ix_(numbers, numbers)] += jacobian @ jacobian.T
-        gradient[numbers] += jacobian @ r
-        total += float(r @ r)
-        count += len(r)
-    size, directions = np.linalg.eigh(covariance)
-    root = directions * np.sqrt(np.maximum(size, 0.0))
-    half = root.T @ gradient
-    return total - float(half @ np.linalg.solve(np.eye(len(half)) + root.T @ information @ root, half)), count

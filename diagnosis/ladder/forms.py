@@ -96,8 +96,13 @@ RADIAL_EXPANSION = Effect(
 
 FORMS = (Form("fixed stiffness", (FIXED_STIFFNESS,)), Form("radial expansion only", (RADIAL_EXPANSION,)), Form("axial equilibrium", ()))
 """In the order in which the literature took them in."""
+AS_DRAWN, EULER_BERNOULLI = "as drawn", "Euler-Bernoulli beam"
 
 
 def forms_of(spindle: Spindle) -> tuple[Form, ...]:
     """The forms in which models of this spindle differ: of one without rolling bearings, which no thermal motion changes, there is one, as drawn."""
-    return FORMS if spindle.rolling else (Form("as drawn", ()),)
+    if spindle.rolling:
+        return FORMS
+    shafts = spindle.structure.shafts
+    plain = bool(shafts) and all(s.shear == s.rotary == 0.0 for s in shafts)
+    return (Form(EULER_BERNOULLI if plain else AS_DRAWN, ()),)

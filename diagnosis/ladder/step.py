@@ -38,8 +38,9 @@ class MeasuredModes:
 class Step:
     """One model beside all data.
 
-    `error` and `held_out` are rms residuals: of all data in their standard errors, and of each temperature predicted from the others in standard
-    errors of that prediction (with nothing fitted there is nothing to leave out, and the two are the same). `frequency` and `damping` (n,)
+    `error` and `held_out` are rms residuals: of all data in their standard errors, and of each temperature predicted from the others, at one condition of
+    each mode, in standard errors of that prediction (with nothing fitted there is nothing to leave out, and the two are the same);
+    `held_out_percent` are the frequencies of tables predicted so, NaN without any. `frequency` and `damping` (n,)
     are computed for every measured mode, NaN without a partner; `rms_Hz` and `rms_percent` are of frequencies, `rms_shift_Hz` the error of
     the shifts from the coldest test of each speed, None without a second temperature. `stretch` is the rms of the fitted tolerances in their
     own standard deviations: about one or less is believable, and a small error with a large stretch is bought, not explained. `evidence`
@@ -57,6 +58,7 @@ class Step:
     damping: Array  # (n,)
     error: float
     held_out: float
+    held_out_percent: float
     rms_Hz: float
     rms_percent: float
     rms_shift_Hz: float | None
@@ -84,7 +86,8 @@ def as_drawn(model: CampaignModel, measured: MeasuredModes, name: str, applied: 
         else:
             squares += float(np.sum(model.residual(t, nothing, applied) ** 2))
     error = float(np.sqrt(squares / sum(d.count for d in model.tests)))
-    return _step(model, measured, name, (), {}, nothing, everywhere, None, error, error, -0.5 * squares, above)
+    relative = _rms(frequency / measured.frequency - 1) if any(isinstance(d, ModeData) for d in model.tests) else float("nan")
+    return _step(model, measured, name, (), {}, nothing, everywhere, None, error, (error, 100 * relative), -0.5 * squares, above)
 
 
 def _of_table(computed: Array, measured: Array, sd: Array) -> float:
@@ -94,8 +97,8 @@ def _of_table(computed: Array, measured: Array, sd: Array) -> float:
     return float(off @ off)
 
 
-def fitted(found: Settled, measured: MeasuredModes, name: str, held_out: float, above: str) -> Step:
-    """A fit of tolerances and effects, beside the scene's own effects."""
+def fitted(found: Settled, measured: MeasuredModes, name: str, held_out: tuple[float, float], above: str) -> Step:
+    """A fit of tolerances and effects, beside the scene's own effects, and how far what is `held_out` is missed: in standard errors, in per cent."""
     applied = [found.applied(t) for t in range(len(found.model.tests))]
     error = float(np.sqrt(found.fit.chi2 / found.fit.count))
     names = tuple(m.name for m in found.mechanisms)
@@ -106,7 +109,7 @@ def fitted(found: Settled, measured: MeasuredModes, name: str, held_out: float, 
 
 def _step(
     model: CampaignModel, measured: MeasuredModes, name: str, effects: tuple[str, ...], values: Mapping, nuisance: Array,
-    applied: Sequence[Applied], best: Settled | None, error: float, held_out: float, evidence: float, above: str,
+    applied: Sequence[Applied], best: Settled | None, error: float, held_out: tuple[float, float], evidence: float, above: str,
 ) -> Step:  # fmt: skip
     frequency, damping = _computed(model, measured, nuisance, applied)
     off = frequency - measured.frequency
@@ -115,7 +118,7 @@ def _step(
     lost = tuple(f"{test}: {state.status}" for test, state in states if not all(b.in_contact for b in state.bearings))
     shifts = shift_errors(measured, off)
     return Step(
-        name, effects, values, model, nuisance, tuple(applied), best, frequency, damping, error, held_out,
+        name, effects, values, model, nuisance, tuple(applied), best, frequency, damping, error, *held_out,
         _rms(off), 100 * _rms(off / measured.frequency), _rms(shifts) if len(shifts) else None, _rms(nuisance[build]), evidence, lost, above,
     )  # fmt: skip
 

@@ -35,7 +35,7 @@ def _errors(axes: Axes, found: Ladder) -> None:
     place = np.arange(len(found.steps))
     rows = [([r.error for r in found.steps], ERROR, "o", "all data", False)]
     if any(r.fitted and np.isfinite(r.held_out) for r in found.steps):
-        rows.insert(0, ([r.held_out for r in found.steps], HELD_OUT, "s", "temperatures left out", True))
+        rows.insert(0, ([r.held_out for r in found.steps], HELD_OUT, "s", f"{found.left_out} left out", True))
     for values, colour, marker, label, up in rows:
         axes.plot(place, values, color=colour, marker=marker, label=label, zorder=3)
         for x, r in enumerate(found.steps):

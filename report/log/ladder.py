@@ -74,6 +74,7 @@ class ShownLadder:
     top: int  # index of the step that the ladder leads to
     sentences: tuple[str, ...]
     peaks: tuple[Peak, ...]  # measured, and computed on the top step
+    left_out: str  # temperatures or modes
 
 
 def write_ladder_log(content: ShownLadder, path: Path) -> None:
@@ -88,9 +89,9 @@ def write_ladder_log(content: ShownLadder, path: Path) -> None:
             for name, figure in (("error", errors(content, k - 1)), ("residuals", residuals(content, step)), ("responses", responses(content, step))):
                 log_figure(recording, f"charts/{name}", figure, static=False)
             log_words(recording, "step", words(content, k - 1), static=False)
-            for name, value in (("all data", step.error), ("temperatures left out", step.held_out)):
+            for name, value in (("all data", step.error), (f"{content.left_out} left out", step.held_out)):
                 recording.log(at("error", name), rr.Scalars(value))
-        for name, colour in (("all data", COMPUTED), ("temperatures left out", HELD_OUT)):
+        for name, colour in (("all data", COMPUTED), (f"{content.left_out} left out", HELD_OUT)):
             recording.log(at("error", name), rr.SeriesLines(colors=[colour], names=name), static=True)
         log_levels(recording, content)
 
@@ -117,7 +118,7 @@ def errors(content: ShownLadder, now: int) -> Figure:
     axes = figure.subplots()
     place = np.arange(len(content.steps))
     axes.axvline(now, color=PALE, lw=6, alpha=0.4)
-    for key, label, colour in (("held_out", "temperatures left out", HELD_OUT), ("error", "all data", COMPUTED)):
+    for key, label, colour in (("held_out", f"{content.left_out} left out", HELD_OUT), ("error", "all data", COMPUTED)):
         axes.plot(place, [getattr(r, key) for r in content.steps], marker="o", color=for_dark(colour), label=label)
     logarithmic(axes)
     axes.set_xticks(place, [broken(r.name) for r in content.steps], fontsize=6.5)

@@ -36,6 +36,7 @@ def shown(found: Ladder) -> ShownLadder:
         found.steps.index(found.top),
         tuple(sentences(found)),
         tuple(_peaks(found)),
+        found.left_out,
     )
 
 

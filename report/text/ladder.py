@@ -8,7 +8,8 @@ from itertools import pairwise
 import numpy as np
 
 from thermospindle.diagnosis.forward import nuisance as kinds_of
-from thermospindle.diagnosis.ladder.ladder import CLEAR, DISCREPANCY, TOLERANCES, Ladder
+from thermospindle.diagnosis.ladder.forms import AS_DRAWN
+from thermospindle.diagnosis.ladder.ladder import CLEAR, DISCREPANCY, MODES, TOLERANCES, Ladder
 from thermospindle.diagnosis.ladder.step import Step
 from thermospindle.diagnosis.prediction.next_test import in_words
 from thermospindle.report.typeset import plain, plain_error
@@ -18,6 +19,7 @@ STRETCHED = 2.0  # standard deviations from which a tolerance is named
 MOST = 5  # things named in one sentence
 CLOSE = 0.05  # relative distance of two modes that are called a pair
 FURTHER = 1.5  # times the error of natural frequencies, from which it is said to rise
+NAMING = ("identified", "two effects")  # verdicts that stand by their effects
 WRONG = 3.0  # standard errors from which a shift or a split is called wrong
 MISSED = {kinds_of.STIFFNESS: "natural frequencies", kinds_of.DAMPING: "damping ratios"}
 
@@ -37,7 +39,7 @@ def _forms(found: Ladder) -> str:
     ]
     wrong = f"As drawn, {'shifts' if shifts else 'frequencies'} are wrong by {', '.join(errors)} (rms)."
     if len(found.forms) == 1:
-        return wrong.replace(" with as drawn", "")
+        return wrong.replace(f" with {AS_DRAWN}", "")
     ranked = sorted(found.forms, key=lambda f: -f[3])
     lead = ranked[0][3] - ranked[1][3]
     verb = "leads" if lead > CLEAR else "does not clearly lead"
@@ -77,22 +79,44 @@ def _further(below: Step, r: Step) -> str:
 
 
 def _effects(found: Ladder) -> Iterator[str]:
+    diagnosed = () if found.diagnosis is None or found.diagnosis.verdict.word not in NAMING else found.diagnosis.verdict.effects
     for r in (r for r in found.steps if r.effects):
         below = found.step(r.above)
         gain = r.evidence - below.evidence
         unseen = f"held out {below.held_out:.2f} -> {r.held_out:.2f}, " if np.isfinite(r.held_out) else ""
         change = f"error {below.error:.2f} -> {r.error:.2f}, {unseen}tolerances "
         change += f"{below.stretch:.2f} -> {r.stretch:.2f} s.d., ln evidence {evidence(gain, '+')}"
-        if gain > CLEAR:
+        own = r.effects[-1:] if r.name.startswith("+") else r.effects
+        constant = r.evidence - found.step(DISCREPANCY).evidence
+        if found.left_out == MODES and gain > 0 and constant < 0:
+            verdict = f"is not established: a constant error of every frequency is likelier by {evidence(-constant)} in ln evidence"
+        elif gain > CLEAR:
             verdict = "is supported"
+        elif gain > 0 and set(own) <= set(diagnosed):
+            verdict = f"is what the diagnosis names, which weighs it against all others; the {CLEAR:g} in ln evidence asked of a step alone it does not reach"
         elif gain > 0:
             verdict = f"is not established: {CLEAR:g} in ln evidence is asked"
         else:
             verdict = "is not asked for by these data"
-        name = r.effects[-1] if r.name.startswith("+") else " + ".join(r.effects)
-        yield f"{name} {verdict} ({change})."
+        yield f"{' + '.join(own)} {verdict} ({change}){_at_limits(r)}."
+    if found.left_out == MODES:
+        yield from _modes_left_out(found)
     if found.diagnosis is not None:
         yield f"Diagnosis: {found.diagnosis.verdict.word}. {found.diagnosis.verdict.reason}"
+
+
+def _at_limits(r: Step) -> str:
+    """Sizes that stand at the limit of what they may be, where an effect does the work of another."""
+    sizes = [(m.name, m.size, r.values[m.name][m.size.name][0]) for m in (r.fitted.mechanisms if r.fitted else ()) if m.name == r.effects[-1]]
+    at = [f"{name}.{q.name} = {value:g}" for name, q, value in sizes if value in q.limits and value != q.neutral]
+    return f", at the limit of what it may be, {' and '.join(at)}: it does the work of something else" if at else ""
+
+
+def _modes_left_out(found: Ladder) -> Iterator[str]:
+    """How well each mode is predicted from the others, at one condition."""
+    rows = [f"{r.held_out_percent:.2g} % with {r.name}" for r in found.steps if r.fitted and np.isfinite(r.held_out_percent)]
+    if rows:
+        yield f"Frequencies of modes predicted from the others by fits that have not seen them are off by {', '.join(rows)} (rms)."
 
 
 def _counted(found: Ladder) -> str:

@@ -26,7 +26,7 @@ from thermospindle.report.typeset import known
 COLUMNS = ("step", "error\ns.e.", "held out\ns.e.", "error\nHz", "shifts\nHz", "build\ns.d.", "ln\nevidence")
 LEGEND = (
     "Errors are rms residuals; s.e. are standard errors of the data (of every FRF line, or of a table's numbers) or, held out, of the prediction "
-    "by a fit that has not seen that temperature. Hz: of natural frequencies. Build: rms of the fitted build tolerances in their own "
+    "by a fit that has not seen that temperature, or, at one condition, that mode. Hz: of natural frequencies. Build: rms of the fitted build tolerances in their own "
     "standard deviations. What `diagnose` calls fitted grants constant errors of the model beside the tolerances, as the step \"constant discrepancy\" does."
 )
 
@@ -76,6 +76,7 @@ def ladder_json(found: Ladder) -> dict[str, Any]:
         "parameters": len(found.model.parameters),
         "verdict": None if found.diagnosis is None else found.diagnosis.verdict.word,
         "top": found.top.name,
+        "left_out": found.left_out,
         "rungs": [_step_json(r) for r in found.steps],
         "forms": [{"name": f[0], "error": f[1], "held_out": known(f[2]), "evidence": f[3]} for f in found.forms],
         "pulls": {"modes": first.modes, "tests": first.tests, "first": _lists(first), "top": _lists(top)},  # residuals in standard errors
@@ -91,6 +92,7 @@ def _step_json(r: Step) -> dict[str, Any]:
         "effects": list(r.effects),
         "error": r.error,
         "held_out": known(r.held_out),
+        "held_out_percent": known(r.held_out_percent),
         "rms_Hz": r.rms_Hz,
         "rms_percent": r.rms_percent,
         "rms_shift_Hz": r.rms_shift_Hz,

@@ -7,9 +7,10 @@ import pytest
 
 from tests.diagnosis.mode_tables import tables
 from thermospindle.diagnosis.decision.conditions import conditions_of
-from thermospindle.diagnosis.ladder.fitting import FREE, predicted_squares, settled, unseen, without
+from thermospindle.diagnosis.ladder.fitting import FREE, settled, without
 from thermospindle.diagnosis.ladder.forms import FORMS
 from thermospindle.diagnosis.ladder.ladder import CLEAR, DISCREPANCY, ladder
+from thermospindle.diagnosis.ladder.left_out import LeftOut, missed, unseen
 from thermospindle.diagnosis.ladder.step import as_drawn
 from thermospindle.diagnosis.verdict import campaign_data
 from thermospindle.model.errors import BadInput
@@ -37,8 +38,9 @@ def test_a_temperature_left_out_is_not_in_the_fit_that_predicts_it(spindle):
     for campaign in (plain, wrong):
         model = without(campaign_data(spindle, campaign), FREE)
         assert conditions_of(spindle, model.tests) == [[0], [1]]
-        blind = settled(unseen(model, [1]))
-        found.append((blind.fit.point, *predicted_squares(blind, model.tests, [1])))
+        blind = settled(unseen(model, LeftOut((1,))))
+        off = missed(blind, model.tests, LeftOut((1,)))
+        found.append((blind.fit.point, off.squares, off.count))
     assert np.array_equal(found[0][0], found[1][0])
     assert found[0][2] == found[1][2] == 8
     assert found[0][1] < 25
@@ -51,11 +53,11 @@ def test_a_mean_where_no_spindle_can_be_built_predicts_nothing(spindle):
     ending = replace(steel, thermal_expansion=Law((20.0, 60.0), (11.5e-6, 11.5e-6)))
     measured = replace(spindle, materials={**spindle.materials, "steel": ending})
     model = without(campaign_data(measured, tables(measured, ())), FREE)
-    blind = settled(unseen(model, [1]))
+    blind = settled(unseen(model, LeftOut((1,))))
     colder = np.where(np.arange(len(blind.fit.point)) == model.temperature[0], -1.0, blind.evidence.mean)
     outside = replace(blind, evidence=replace(blind.evidence, mean=colder))
     assert np.array_equal(outside.posterior[0], outside.fit.point)
-    assert predicted_squares(outside, model.tests, [1])[1] == 8
+    assert missed(outside, model.tests, LeftOut((1,))).count == 8
 
 
 @pytest.mark.slow

@@ -17,7 +17,7 @@ def content() -> ShownLadder:
                   tuple(Track(f"{k} axial", WARM, 10 * WARM, 10 * WARM + error) for k in range(5)))
         for name, error in (("fixed stiffness", 45.0), ("as drawn: tolerances fitted", 1.2))
     )  # fmt: skip
-    return ShownLadder({}, "made up", ("1 axial", "2 rocking"), ("20 °C, 0 rpm", "60 °C, 0 rpm"), "dB", steps, 1, (), ())
+    return ShownLadder({}, "made up", ("1 axial", "2 rocking"), ("20 °C, 0 rpm", "60 °C, 0 rpm"), "dB", steps, 1, (), (), "temperatures")
 
 
 def test_the_error_axis_names_its_steps_and_has_plain_numbers(content):

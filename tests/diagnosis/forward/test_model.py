@@ -28,7 +28,7 @@ from thermospindle.diagnosis.forward.nuisance import (
 )
 from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.forward.response import Response
-from thermospindle.diagnosis.ladder.fitting import unseen
+from thermospindle.diagnosis.ladder.left_out import LeftOut, unseen
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.modes import poles
 from thermospindle.model.scene.reading import load
@@ -104,7 +104,7 @@ def test_what_a_bearing_may_change_by_otherwise():
 def test_a_test_that_is_left_out_has_no_derivatives(scene, rows):
     """Neither lines nor, of a table of modes, responses: what `spindle ladder` holds out. Every ladder over two temperatures once ended here."""
     model, x = made(scene)
-    left = unseen(model, [1])
+    left = unseen(model, LeftOut((1,)))
     if rows == 0:
         left = replace(left, tests=(left.tests[0], replace(left.tests[1], value=left.tests[1].value[:0], sd=left.tests[1].sd[:0])))
     has_none(left, x)
@@ -113,7 +113,7 @@ def test_a_test_that_is_left_out_has_no_derivatives(scene, rows):
 def test_a_test_of_a_flexible_shaft_that_is_left_out_has_none_either():
     """Its reduced model asks for the highest line: no ladder of such a shaft had an end."""
     model, x = made(load(ROOT / "scenes" / "five_bearing"), frequency=np.arange(500.0, 4000.1, 500.0))
-    has_none(unseen(model, [1]), x)
+    has_none(unseen(model, LeftOut((1,))), x)
 
 
 def has_none(model, x):
