@@ -156,7 +156,7 @@ def parsers() -> tuple[_Parser, dict[str, argparse.ArgumentParser]]:
 
     def hammer(added: argparse.ArgumentParser) -> None:
         speed(added)
-        text = "bearing element of the time simulation; reduced computes the linear model's records without it, for long records and stiff beams"
+        text = "bearing element of the time simulation; reduced computes the linear model's records without it, for long records and stiff beams (linear by default, reduced where that takes too many steps)"
         added.add_argument("--element", choices=HAMMER, help=text)
         added.add_argument("--hits", type=_count(HITS), help="hits on each hammer point (the scene's by default)")
         added.add_argument("--level", type=_up_to(NEWTONS, unit=" N"), metavar="N", help="peak force of the hammer (the scene's by default)")

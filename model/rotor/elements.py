@@ -1,6 +1,7 @@
 """The bearing elements of the time simulation, and what else a hammer test can be computed with."""
 
-ELEMENTS = ("linear", "ball-by-ball")
+LINEAR = "linear"
+ELEMENTS = (LINEAR, "ball-by-ball")
 """The tangent stiffness at the operating point, or every ball by itself."""
 
 REDUCED = "reduced"

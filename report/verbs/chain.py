@@ -11,7 +11,7 @@ from rich.console import Console
 from thermospindle.model import sense
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition, Spindle
-from thermospindle.model.rotor.elements import ELEMENTS
+from thermospindle.model.rotor.elements import ELEMENTS, LINEAR, REDUCED
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import NM, RPM
 from thermospindle.report.folder import mark, whole_folder
@@ -39,7 +39,7 @@ def run(
     scene: Path,
     temperatures: Sequence[float] | None = None,
     speed_rpm: float = 0.0,
-    element: str = "linear",
+    element: str | None = None,
     hits: int | None = None,
     level: float | None = None,
     seed: int = 0,
@@ -54,7 +54,7 @@ def run(
     with whole_folder(out) as folder, progress_bar(2 * len(steps) + stages(spindle.hammer, len(steps)) + 4) as progress:
         result = whole_chain(spindle, steps, speed_rpm * RPM, element, seed, progress)
         text.write_run(result, folder, progress)
-        values = text.run_json(result) | {"out": str(out), "warnings": _doubts(result)}
+        values = text.run_json(result) | {"out": str(out), "warnings": _doubts(result, element)}
         mark(folder, {"verb": "run"} | asked, values)
     return Answer(values, lambda console: text.show_run(console, result, out))
 
@@ -63,7 +63,7 @@ def impact(
     scene: Path,
     temperature: float | None = None,
     speed_rpm: float = 0.0,
-    element: str = "linear",
+    element: str | None = None,
     hits: int | None = None,
     level: float | None = None,
     seed: int = 0,
@@ -80,7 +80,7 @@ def impact(
         out,
         {"verb": "impact"} | asked,
         lambda folder, _: _write_impact(result, folder),
-        _doubts(result),
+        _doubts(result, element),
     )
 
 
@@ -88,7 +88,7 @@ def simulate(
     scene: Path,
     temperatures: Sequence[float] | None = None,
     speed_rpm: float = 0.0,
-    element: str = "linear",
+    element: str | None = None,
     hits: int | None = None,
     level: float | None = None,
     seed: int = 0,
@@ -104,7 +104,7 @@ def simulate(
         raise BadInput("--out: simulate needs the campaign folder to write")
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise BadInput(f"--out {out}: is not empty; a campaign is written to a new or empty folder")
-    if runout and element not in ELEMENTS:
+    if runout and (element or LINEAR) not in ELEMENTS:
         raise BadInput(f"--element {element}: is for hammer tests; a turning spindle is stepped with {' or '.join(ELEMENTS)}")
     if speeds_rpm is not None and not runout:
         raise BadInput("--speeds: is for --runout; hammer tests take one --speed")
@@ -117,11 +117,11 @@ def simulate(
         speeds = speeds_rpm or ([speed_rpm] if speed_rpm else [nominal / 2, 0.75 * nominal, nominal])
         conditions = [Condition(t, s * RPM) for t in steps for s in speeds]
         with progress_bar(int(seconds / RECORD) + 2) as progress:
-            campaign = runout_campaign(spindle, conditions, seconds, element, seed, NM * noise_nm, progress=progress)
+            campaign = runout_campaign(spindle, conditions, seconds, element or LINEAR, seed, NM * noise_nm, progress=progress)
         odd, kind = sense.of_conditions(spindle, conditions), "runout tests"
     else:
         result = _virtual_tests(spindle, steps, speed_rpm, element, seed)
-        campaign, odd, kind = text.campaign_of(result), _doubts(result), "tests"
+        campaign, odd, kind = text.campaign_of(result), _doubts(result, element), "tests"
     write_campaign(campaign, out)
     tests = [t.id for t in campaign.tests]
     values = {"campaign": str(out), "tests": tests, "warnings": odd}
@@ -132,7 +132,7 @@ def report(
     scene: Path,
     temperatures: Sequence[float] | None = None,
     speed_rpm: float = 0.0,
-    element: str = "linear",
+    element: str | None = None,
     hits: int | None = None,
     level: float | None = None,
     seed: int = 0,
@@ -154,12 +154,12 @@ def report(
             more = list(whole_report.more_sections(result, turning, catalogue, progress))
             write_report(result, folder / "report.html", more)
         page = out / "report.html"
-        values: dict[str, Any] = {"report": str(page), "added": [title for title, _ in more], "warnings": _doubts(result)}
+        values: dict[str, Any] = {"report": str(page), "added": [title for title, _ in more], "warnings": _doubts(result, element)}
         mark(folder, asked, values)
     return Answer(values, _line(f"{page}: one page that needs no network; open it in a browser: {page.resolve().as_uri()}"))
 
 
-def _virtual_tests(spindle: Spindle, temperatures: Sequence[float], speed_rpm: float, element: str, seed: int) -> Run:
+def _virtual_tests(spindle: Spindle, temperatures: Sequence[float], speed_rpm: float, element: str | None, seed: int) -> Run:
     with progress_bar(2 * len(temperatures) + stages(spindle.hammer, len(temperatures))) as progress:
         return whole_chain(spindle, temperatures, speed_rpm * RPM, element, seed, progress)
 
@@ -171,8 +171,13 @@ def _write_impact(result: Run, folder: Path) -> None:
     write_impact_log(result, folder / "impact.rrd")
 
 
-def _doubts(result: Run) -> list[str]:
-    return doubts(result.spindle, [s.point for s in result.steps])
+def _doubts(result: Run, asked: str | None) -> list[str]:
+    """What is odd at the operating points; and that the reduced model was taken, where nobody asked for an element."""
+    found = doubts(result.spindle, [s.point for s in result.steps])
+    if asked is None and any(s.test.element == REDUCED for s in result.steps):
+        step = 1e6 * result.spindle.hammer.step
+        found.append(f"the stiffest mode asks for steps of {step:.3g} us, too many for a record: it is that of the reduced model, as with --element {REDUCED}, without MuJoCo")
+    return found
 
 
 def _line(sentence: str) -> Callable[[Console], None]:

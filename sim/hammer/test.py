@@ -23,7 +23,7 @@ import numpy as np
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import HammerTest
 from thermospindle.model.parallel import cores
-from thermospindle.model.rotor.elements import REDUCED
+from thermospindle.model.rotor.elements import LINEAR, REDUCED
 from thermospindle.model.rotor.modes import LARGE
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import Measurement
@@ -63,18 +63,19 @@ class ImpactTest:
 def impact_tests(
     points: Sequence[OperatingPoint],
     settings: HammerTest | None = None,
-    element: str = "linear",
+    element: str | None = None,
     seed: int = 0,
     noise: bool = True,
     progress: Callable[[str], None] = lambda done: None,
 ) -> list[ImpactTest]:
     """Impact tests at several operating points of one spindle, with as many hits side by side as there are cores.
 
-    `settings` default to the scene's. `element` is one of `model.rotor.elements.HAMMER`. The same seed gives the same test.
+    `settings` default to the scene's. `element` is one of `model.rotor.elements.HAMMER`, by default the `usual` one. The same seed gives the same test.
     `progress` is told of every piece of the records and of every point, `stages` times in all.
     """
     test = settings or points[0].spindle.hammer
     check_band(test, str(points[0].spindle.file or points[0].spindle.name))
+    element = element or usual(test)
     if element == REDUCED:
         test = with_long_step(test)
     every, steps = sampling(test)
@@ -99,6 +100,11 @@ def impact_tests(
     return results
 
 
+def usual(test: HammerTest) -> str:
+    """The element of a hammer test for which none is asked: linear; reduced where the steps of a record are more than can be computed, of beams whose stiffest mode is far above the band."""
+    return LINEAR if sampling(test)[1] <= MOST_STEPS else REDUCED
+
+
 def batched(items: Iterable[T], size: int) -> Iterator[list[T]]:
     """Lists of up to `size` items, in order."""
     iterator = iter(items)
@@ -116,7 +122,7 @@ def _simulated(
     if element == REDUCED:
         found = [simulate_reduced(point, test, own, steps) for point, own in zip(points[:-1], hits[:-1], strict=True)]
         return [*found, simulate_reduced(points[-1], test, hits[-1], steps, progress)]
-    models = [p.model if element == "linear" else p.spec(element).compile() for p in points]
+    models = [p.model if element == LINEAR else p.spec(element).compile() for p in points]
     return simulate([_with_step(model, test.step) for model in models], test, hits, steps, progress)
 
 
