@@ -32,6 +32,7 @@ def made(tmp_path_factory) -> Path:
     shutil.copytree(MEASURED, folder / "fleet" / "one")
     shutil.copytree(MEASURED, folder / "fleet" / "two")
     (folder / "fleet.toml").write_text('title = "t"\nkind = "fleet"\nscene = "hdd_2003"\ncampaigns = ["fleet/*"]\n')
+    (folder / "designs.toml").write_text('title = "t"\nkind = "comparison"\nscenes = ["hdd_2003", "mk7702"]\ntemperatures_C = [20]\n')
     drift = [{"temperature_C": t, "speed_rpm": 0.0, "relative": -0.001 * (t - 20), "sd": 0.001} for t in (20.0, 30.0, 40.0, 50.0, 60.0)]
     (folder / "drift.json").write_text(json.dumps({"where": [{"element": "mount axial stiffness", "unit": "%", "change": drift}]}))
     return folder
@@ -62,6 +63,7 @@ QUICK: dict[str, tuple[list[object], list[str]]] = {
     "compare runout": (["compare", SCENE, "MADE/runout"], ["compare, of runout alone"]),
     "draft": (["draft", "MADE/drift.json", "--out", "OUT.py"], ["draft"]),
     "study": (["study", "MADE/study.toml", "--out", "OUT"], ["study"]),
+    "study of designs": (["study", "MADE/designs.toml", "--out", "OUT"], ["study, of a comparison"]),
     "study of a fleet": (["study", "MADE/fleet.toml", "--out", "OUT"], ["study, of a fleet"]),
     "diagnose runout": (["diagnose", SCENE, "MADE/runout"], ["diagnose, of runout alone"]),
 }

@@ -23,11 +23,14 @@ from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
 from thermospindle.report.verbs.study import _line
 from thermospindle.sim.operating import operating_point
+from thermospindle.sim.study.comparison import better
 from thermospindle.sim.study.form import Steps
+from thermospindle.sim.study.indices import indices
 from thermospindle.sim.study.sensitivity import robust_z, sensitivity
 from thermospindle.sim.study.variants import combination
 
 DRAWN = 'title = "t"\nkind = "monte-carlo"\nscene = "hdd_2003"\ntemperatures_C = [20, 60]\n'
+COMPARED = 'title = "t"\nkind = "comparison"\nscenes = ["hdd_2003", "mk7702"]\ntemperatures_C = [20]\nspeeds_rpm = [7200]\n'
 
 
 @pytest.fixture
@@ -154,6 +157,120 @@ def test_sensitivities_are_those_of_a_linear_answer():
     assert sensitivity(["a", "b", "c"], x[:8], x[:8, 0]) is None  # too few draws to know an error
 
 
+def test_what_fits_noise_names_nothing():
+    """Thirty draws of twenty inputs that have nothing to do with the answer: without a look at draws left out, some coefficient of nearly every such regression is above 0.4."""
+    named = largest = 0
+    for seed in range(200):
+        rng = np.random.default_rng(seed)
+        found = sensitivity([str(k) for k in range(20)], rng.normal(size=(30, 20)), rng.normal(size=30))
+        named += bool(found.clear)
+        largest += max(abs(v) for v in found.coefficient.values()) > 0.4
+        assert found.unseen < 0.5
+    assert largest > 150
+    assert named == 0
+
+
+def test_what_is_seen_in_draws_left_out_is_told_as_computed_one_by_one():
+    rng = np.random.default_rng(3)
+    x = rng.normal(size=(40, 3))
+    y = x[:, 0] + 0.5 * rng.normal(size=40)
+    missed, about = [], []
+    for k in range(40):
+        rest = np.arange(40) != k
+        design = np.column_stack([np.ones(40), x])
+        missed.append(y[k] - design[k] @ np.linalg.lstsq(design[rest], y[rest])[0])
+        about.append(y[k] - y[rest].mean())
+    found = sensitivity(["a", "b", "c"], x, y)
+    assert found.unseen == pytest.approx(1 - np.sum(np.square(missed)) / np.sum(np.square(about)), rel=1e-9)
+    assert found.clear == {"a"}
+
+
+def ishigami(x):
+    """Of (n, 3) uniform in -pi to pi (Ishigami, Homma 1990)."""
+    return np.sin(x[:, 0]) + 7 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0])
+
+
+def two_sets(n, seed):
+    """Ishigami's function of a set, another, and the first with one input of the other each."""
+    a, b = np.random.default_rng(seed).uniform(-np.pi, np.pi, size=(2, n, 3))
+    mixed = [np.column_stack([b[:, j] if j == i else a[:, j] for j in range(3)]) for i in range(3)]
+    return ishigami(a), ishigami(b), np.array([ishigami(m) for m in mixed])
+
+
+def test_indices_are_those_of_ishigamis_function():
+    """Closed form: V1 = (1 + 0.1 pi^4/5)^2 / 2, V2 = 49/8, V13 = 0.01 pi^8 (1/18 - 1/50), the third acts through the first alone; and their errors come true."""
+    v1, v2, v13 = (1 + 0.1 * np.pi**4 / 5) ** 2 / 2, 49 / 8, 0.01 * np.pi**8 * (1 / 18 - 1 / 50)
+    first, total = np.array([v1, v2, 0]) / (v1 + v2 + v13), np.array([v1 + v13, v2, v13]) / (v1 + v2 + v13)
+    off = []
+    for seed in range(40):
+        found = indices(["a", "b", "c"], *two_sets(300, seed)).of
+        off.append([(found[n].first - s) / found[n].first_sd for n, s in zip("abc", first, strict=True)] + [(found[n].total - t) / found[n].total_sd for n, t in zip("abc", total, strict=True)])
+    assert np.sqrt(np.mean(np.square(off), axis=0)) == pytest.approx(np.ones(6), abs=0.35)
+    assert np.abs(np.mean(off, axis=0)).max() < 0.5  # of a standard error, from 40
+
+
+def test_indices_are_scipys():
+    from scipy.stats import sobol_indices
+
+    a, b, mixed = two_sets(256, 4)
+    theirs = sobol_indices(func={"f_A": a[None], "f_B": b[None], "f_AB": mixed[:, None]}, n=256)
+    ours = indices(["a", "b", "c"], a, b, mixed).of
+    assert [ours[n].first for n in "abc"] == pytest.approx(theirs.first_order.ravel(), abs=1e-9)
+    assert [ours[n].total for n in "abc"] == pytest.approx(theirs.total_order.ravel(), abs=1e-9)
+
+
+def test_a_mixture_has_one_input_of_the_second_set_and_all_else_of_the_first(tmp_path):
+    from thermospindle.sim.study.draws import count, draw, inputs
+    from thermospindle.sim.study.form import read_study
+
+    (tmp_path / "s.toml").write_text(TURNING + 'draws = 3\nsobol = true\ngrade = "precision"\n', encoding="utf-8")
+    asked, spindle = read_study(tmp_path / "s.toml"), load(SCENE)
+    names = inputs(asked, spindle)
+    assert count(asked, spindle) == 3 * (2 + len(names))
+    assert names[-5:] == ["unbalance", "lower races", "lower balls", "upper races", "upper balls"]
+
+    def told(own):
+        """Everything that is drawn, by input."""
+        i = own.imperfections
+        found = dict(zip(names, own.deviations.tolist(), strict=False)) | {"unbalance": (i.unbalance, i.unbalance_phase, i.couple_unbalance, i.couple_phase)}
+        for b in ("upper", "lower"):
+            r = i.row(b)
+            found |= {f"{b} races": (r.inner_radial, r.inner_axial, r.outer_radial, r.outer_axial), f"{b} balls": (r.ball_diameter, r.ball_waves)}
+        return found
+
+    first, second = told(draw(asked, spindle, 1)), told(draw(asked, spindle, 4))
+    assert all(first[n] != second[n] for n in names)
+    for block, name in enumerate(names, 2):
+        own = draw(asked, spindle, 3 * block + 1)
+        assert (own.k, own.taken) == (1, name)
+        assert told(own) == {**first, name: second[name]}
+
+
+@pytest.mark.slow
+def test_runout_is_by_the_imperfections_that_were_drawn(tmp_path, capsys):
+    """RRO by the unbalance, a Monte Carlo of a shaft on bearings given by numbers: before, of the spindle's stiffness, which is noise."""
+    text = TURNING.replace("hdd_2003", "mk7702").replace("[0, 7200]", "[12000]") + 'grade = "precision"\ndraws = 30\n'
+    study(tmp_path, text)
+    rro = json.loads(capsys.readouterr().out)["conditions"][0]["rro_um"]["x"]["sensitivity"]
+    assert [n for n, c in rro["coefficients"].items() if c["clear"]] == ["couple unbalance"]
+    assert rro["cross_validated"]["r2"] > 3 * rro["cross_validated"]["sd"]
+
+
+@pytest.mark.slow
+def test_indices_of_a_study_name_what_moves_it(tmp_path, capsys):
+    out, rows = study(tmp_path, TURNING.replace("[0, 7200]", "[7200]") + 'grade = "precision"\ndraws = 24\nsobol = true\n')
+    told = json.loads(capsys.readouterr().out)["conditions"][0]
+    assert (out / "indices.png").is_file()
+    assert sum(r["taken"] == "" for r in rows) == sum(r["taken"] == "all" for r in rows) == 24
+    assert told["preload_N"]["upper"]["indices"]["of"]["preload"]["total"] == pytest.approx(1.0, abs=0.5)
+    assert all(i["total"] == 0 for n, i in told["preload_N"]["upper"]["indices"]["of"].items() if n != "preload")
+    moved = told["rro_um"]["x"]["indices"]["of"]
+    assert next(iter(moved)) == "unbalance"
+    assert moved["unbalance"]["clear"]
+    races = told["nrro_six_sigma_um"]["axial"]["indices"]["of"]
+    assert {next(iter(races))} <= {"upper races", "lower races", "upper balls", "lower balls"}
+
+
 def test_one_that_differs_stands_apart_even_where_all_others_are_equal():
     assert list(robust_z(np.array([1.0, 1, 1, 1, 1, 1, 1, 1, 1, 2]))) == pytest.approx([0.0] * 9 + [1 / (1.2533 * 0.1)])
     assert list(robust_z(np.array([1.0, 1.0, 1.0]))) == [0.0, 0.0, 0.0]
@@ -165,6 +282,60 @@ def test_every_combination_comes_once():
     assert len({tuple(c.items()) for c in every}) == 6
     assert every[1] == {"a": 1, "b": "y"}
     assert Steps.model_validate({"from": 1.0, "to": 100.0, "steps": 3, "spacing": "log"}).values() == pytest.approx((1.0, 10.0, 100.0))
+
+
+def test_designs_stand_side_by_side_as_each_is_alone(tmp_path, capsys):
+    out, rows = study(tmp_path, COMPARED + "runout = true\n")
+    told = json.loads(capsys.readouterr().out)
+    figures = told["conditions"][0]["figures"]
+    assert [d["design"] for d in told["designs"]] == ["hdd_2003", "mk7702"] == [r["design"] for r in rows]
+    for name in ("hdd_2003", "mk7702"):
+        own = operating_point(load(ROOT / "scenes" / name), Condition(20.0, 7200 * RPM))
+        lowest = own.modes_below(1e5)[0]
+        assert figures["lowest_Hz"]["designs"][name] == {"nominal": pytest.approx(lowest.frequency, rel=1e-12)}
+        assert figures["lowest_damping_ratio"]["designs"][name]["nominal"] == pytest.approx(lowest.damping_ratio, rel=1e-9)
+    assert figures["stiffness_N_per_um.x"]["designs"]["mk7702"]["nominal"] == pytest.approx(235.6035, rel=1e-6)  # the nose, with shear, as `model.rotor.static` tells it
+    assert (figures["lowest_Hz"]["better"], figures["rro_um.x"]["better"]) == ("higher", "lower")
+    assert (out / "comparison.png").is_file()
+    assert main(["inspect", str(out / "study.rrd"), "--json"]) == 0
+    log = json.loads(capsys.readouterr().out)
+    assert log["columns"]["lowest_Hz"] == [r["lowest_Hz"] for r in rows]
+    assert log["scene"] == told["scene"]
+    assert main(["study", str(tmp_path / "study.toml"), "--out", str(tmp_path / "again")]) == 0
+    assert "7200 rpm" in capsys.readouterr().out
+    assert files(out) == files(tmp_path / "again")
+
+
+def test_drawn_designs_are_drawn_apart_and_gone_on_with(tmp_path, capsys):
+    out, rows = study(tmp_path, COMPARED + "draws = 10\nchunk = 4\n")
+    told = json.loads(capsys.readouterr().out)
+    own = told["conditions"][0]["figures"]["lowest_Hz"]
+    of = {name: [r["lowest_Hz"] for r in rows if r["design"] == name] for name in ("hdd_2003", "mk7702")}
+    assert [len(v) for v in of.values()] == [10, 10]
+    assert own["pairs"] == [{"design": "hdd_2003", "than": "mk7702", "probability": 1.0, "sd": 0.0}]
+    relative = [np.array(v) / np.mean(v) - 1 for v in of.values()]
+    assert abs(np.corrcoef(relative)[0, 1]) < 0.8
+    before = files(out)
+    (out / "parts" / "part-000002.parquet").unlink()
+    (out / "results.parquet").unlink()
+    assert main(["study", str(tmp_path / "study.toml"), "--out", str(out), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["parts_found"] == 4
+    assert files(out) == before
+
+
+def test_probability_of_being_better_is_that_of_normal_ones_and_its_error_comes_true():
+    """Closed form: P(A > B) of means 1 and 0, standard deviations 1 and 2, is Phi(1 / sqrt(5)) = 0.6726."""
+    off = []
+    for seed in range(300):
+        rng = np.random.default_rng(seed)
+        found = better(rng.normal(1, 1, 40), rng.normal(0, 2, 60), higher=True)
+        off.append((found.probability - 0.672640) / found.sd)
+    assert np.std(off) == pytest.approx(1.0, abs=0.15)
+    assert abs(np.mean(off)) < 0.2
+    one, other = np.array([1.0, 2.0, np.nan, 2.0]), np.array([2.0, 3.0])
+    assert better(one, other, higher=False).probability == pytest.approx(1 - 1 / 6)  # of six pairs two are equal
+    assert better(one, other, higher=True).probability == pytest.approx(1 / 6)
+    assert better(one, np.array([1.0]), higher=True) is None
 
 
 @pytest.fixture
@@ -267,6 +438,16 @@ def test_two_runs_do_not_write_into_one_folder(tmp_path, capsys, undrawn):
         (DRAWN + "draws = 1\n", "draws = 1"),
         (DRAWN + "draws = 5\nrunout = true\n", "speeds_rpm needs a speed"),
         (DRAWN + 'draws = 5\ngrade = "precision"\n', "it needs runout = true"),
+        (DRAWN + "draws = 1000000\nsobol = true\n", "at most 10000000 are allowed"),
+        (DRAWN.replace("monte-carlo", "sweep") + "sobol = true\n", "sobol: is for kind = 'monte-carlo'"),
+        (DRAWN.replace('scene = "hdd_2003"\n', "") + "draws = 5\n", "scene: missing"),
+        (DRAWN + 'draws = 5\nscenes = ["hdd_2003", "mk7702"]\n', "scenes: is for kind = 'comparison'"),
+        (COMPARED.replace('"mk7702"', ""), "needs at least two"),
+        (COMPARED.replace('"mk7702"', '"hdd_2003"'), "scenes: a value stands twice"),
+        (COMPARED.replace('"mk7702"', '"nowhere"'), "nowhere: no scene there"),
+        (COMPARED.replace("temperatures_C = [20]\n", ""), "temperatures_C: missing"),
+        (COMPARED + 'grade = "precision"\nrunout = true\n', "it needs draws"),
+        (COMPARED + "draws = 6000000\n", "12000000 cases of 2 scenes"),
         (DRAWN + "draw = 5\n", "did you mean draws"),
         (DRAWN + "draws = 5\n[vary]\nspeed = [1]\n", "vary: is for kind = 'sweep'"),
         (DRAWN.replace("hdd_2003", "nowhere") + "draws = 5\n", "nowhere: no scene there"),
@@ -320,6 +501,6 @@ def test_the_command_line_alone_imports_no_parquet():
 
 def test_numbers_of_a_row_have_the_same_decimals_and_what_is_nothing_is_not_named():
     spread = {"mean": 1000.96, "sd": 5.9619, "quantiles": [990.17, 1011.6]}
-    own = {"spread": spread, "sensitivity": {"coefficients": {"preload": {"value": 0.9991}, "mount damping": {"value": -0.0004}}, "r2": 1.0}}
+    own = {"spread": spread, "sensitivity": {"coefficients": {"preload": {"value": 0.9991, "clear": True}, "mount damping": {"value": -0.0004, "clear": True}}, "r2": 1.0}}
     assert _line("1 axial, Hz", 1002.0, own) == ["1 axial, Hz", "1002.0", "1001.0", "6.0", "990.2", "1011.6", "preload +1.00", "1.000"]
     assert _line("lower, N", 16.0, {"least": 9.99999, "most": 20.0})[1:] == ["16.000", "10.000", "20.000"]

@@ -270,7 +270,7 @@ def parsers() -> tuple[_Parser, dict[str, argparse.ArgumentParser]]:
     resonances.add_argument("--temperatures", type=_temperature, nargs="+", metavar="C", help="the scene's range in 21 steps by default")
     speeds(resonances, "0 to twice the nominal speed in 41 steps by default")
     resonances.add_argument("--multiples", type=_count(MULTIPLES), metavar="K", help="of the number of balls, and even ball orders")
-    studies = verb("study", ("study", "study"), "a study from its file: a sweep, a Monte Carlo of build tolerances, or a fleet of campaigns; run again it goes on", what="file")
+    studies = verb("study", ("study", "study"), "a study from its file: a sweep, a Monte Carlo of build tolerances, a comparison of designs, or a fleet of campaigns; run again it goes on", what="file")
     studies.add_argument("--cluster", metavar="ADDRESS", help="of a Dask scheduler whose workers do the work, as in tcp://127.0.0.1:8786 (this machine's cores by default)")
     new = verb("new", ("starting", "new"), "a commented scene of your own to start from, which every verb takes", what="name")
     new.add_argument("--like", choices=("hdd", "machine-tool", "grinding", "rotor"), required=True, help="the machine it is like; --out is the new folder, ./NAME by default")

@@ -4,6 +4,7 @@
 common           what all figures share: style, colours, inline SVG, maps of residuals in standard errors
 compare          pictures of a comparison: map of residuals, FRFs over each other, FDAC, correlation by band and by FRF.
                  Every function returns a figure
+designs          designs side by side: every figure of each, with where 95 % of drawn ones lie
 diagnosis        pictures of a diagnosis: how far every explanation leads, its law as the data have it, what would have
                  to drift, and the error left
 ladder           pictures of the ladder: the error at every step, and the map of residuals (mode x test) at the first

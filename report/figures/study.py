@@ -19,7 +19,7 @@ from thermospindle.model.types import Array
 from thermospindle.report.figures.common import BEARINGS, INK, PALE, STYLE, colour
 from thermospindle.sim.study.rows import OF_RUNOUT, Cases
 from thermospindle.sim.study.sensitivity import APART
-from thermospindle.sim.study.summary import at_conditions, frequencies, numbers
+from thermospindle.sim.study.summary import at_conditions, first_set, frequencies, numbers
 
 Told = dict[str, Any]
 SHOWN = 12  # parameters of a map of sensitivities, campaigns' numbers of a map of distances
@@ -116,9 +116,12 @@ def _grid(count: int) -> tuple[Figure, list[Axes]]:
 def monte_carlo(of: Cases, table: pa.Table, told: Told) -> dict[str, Figure]:
     """Spread of modes and preload at every condition, and sensitivities at the last."""
     with rc_context(STYLE):
-        found = {"spread": _spreads(of, table)}
-        if any(m.get("sensitivity") for m in told["conditions"][-1]["modes"]):
-            found["sensitivity"] = _sensitivities(told["conditions"][-1])
+        found = {"spread": _spreads(of, first_set(of, table))}
+        last = told["conditions"][-1]
+        if any(own.get("sensitivity") for _, own in _answers(last)):
+            found["sensitivity"] = _sensitivities(last)
+        if any(own.get("indices") for _, own in _answers(last)):
+            found["indices"] = _indices(last)
     return found
 
 
@@ -148,17 +151,33 @@ def _spreads(of: Cases, table: pa.Table) -> Figure:
     return figure
 
 
+def _answers(told: Told) -> list[tuple[str, Told]]:
+    """What a condition tells, and of what: modes, preloads, runout."""
+    own = [(f"{m['mode']} {m['kind']}", m) for m in told["modes"]] + [(f"preload {name}", p) for name, p in told["preload_N"].items()]
+    return own + [(f"{key.split('_')[0].upper()} {probe}", v) for key in OF_RUNOUT for probe, v in told.get(key, {}).items()]
+
+
 def _sensitivities(told: Told) -> Figure:
-    own = [(f"{m['mode']} {m['kind']}", m["sensitivity"]) for m in told["modes"] if m.get("sensitivity")]
-    own += [(f"preload {name}", p["sensitivity"]) for name, p in told["preload_N"].items() if p.get("sensitivity")]
-    names = list(dict.fromkeys(n for _, s in own for n in s["coefficients"]))
-    names.sort(key=lambda n: -max(abs(s["coefficients"][n]["value"]) for _, s in own))
-    shown = names[:SHOWN]
-    values = np.array([[s["coefficients"][n]["value"] for _, s in own] for n in shown])
+    """Coefficients that are clear; the others are left blank."""
+    own = [(f"{label}\nr² {s['r2']:.2f}", {n: c["value"] if c["clear"] else np.nan for n, c in s["coefficients"].items()}) for label, a in _answers(told) if (s := a.get("sensitivity"))]
+    return _inputs_map(own, 1.0, "Standardised regression coefficients", told)
+
+
+def _indices(told: Told) -> Figure:
+    """Total indices that are clear."""
+    own = [(label, {n: i["total"] if i["clear"] else np.nan for n, i in s["of"].items()}) for label, a in _answers(told) if (s := a.get("indices"))]
+    return _inputs_map(own, 1.0, "Shares of variance with all interactions (total Sobol indices)", told)
+
+
+def _inputs_map(own: Sequence[tuple[str, Mapping[str, float]]], largest: float, title: str, told: Told) -> Figure:
+    """The inputs that matter most somewhere, against what they move."""
+    most = {n: max(float(np.nan_to_num(abs(values.get(n, np.nan)))) for _, values in own) for n in dict.fromkeys(n for _, values in own for n in values)}
+    shown = sorted(most, key=lambda n: -most[n])[:SHOWN]
+    values = np.array([[by.get(n, np.nan) for _, by in own] for n in shown])
     figure = Figure(figsize=(2.8 + 0.62 * len(own), 1.5 + 0.3 * len(shown)))
     axes = figure.subplots()
-    _map(axes, values, 1.0, shown, [f"{label}\nr² {s['r2']:.2f}" for label, s in own], ".2f", 0.05)
-    axes.set_title(f"Standardised regression coefficients, {told['temperature_C']:g} °C, {told['speed_rpm']:g} rpm")
+    _map(axes, values, largest, shown, [label for label, _ in own], ".2f", 0.05)
+    axes.set_title(f"{title}, {told['temperature_C']:g} °C, {told['speed_rpm']:g} rpm")
     return figure
 
 

@@ -3,6 +3,7 @@
 ================  ======================================================================================================
 compare           a comparison as JSON and in terminal tables
 effects           the catalogue of effects in words: the list, and one effect explained
+designs           designs side by side, a table a condition
 diagnosis/        the diagnosis of a campaign, as JSON and in sentences
 grid              tables of the terminal, in as many pieces as its width asks for
 ladder_table      a ladder as JSON, and as the table that grows in the terminal

@@ -1,4 +1,4 @@
-"""The verb `study`: many computations of one scene, kept as they come and gone on with after any interruption."""
+"""The verb `study`: many computations of one scene or several, kept as they come and gone on with after any interruption."""
 
 from __future__ import annotations
 
@@ -20,13 +20,16 @@ from thermospindle.model.scene.fields import read_file
 from thermospindle.model.scene.reading import content_hash, scene_path
 from thermospindle.report.figures import study as figures
 from thermospindle.report.figures.common import save_all
+from thermospindle.report.figures.designs import compared
 from thermospindle.report.folder import digest
 from thermospindle.report.log.study.log import write_study_log
 from thermospindle.report.progress import progress_bar
+from thermospindle.report.text.designs import show_designs
 from thermospindle.report.text.grid import show_grid
 from thermospindle.report.verbs.answer import Answer, with_effects
+from thermospindle.sim.study.comparison import Designs, comparison, designs
 from thermospindle.sim.study.executors import Executor, on_cluster, on_this_machine
-from thermospindle.sim.study.form import FLEET, MONTE_CARLO, read_study
+from thermospindle.sim.study.form import COMPARISON, FLEET, MONTE_CARLO, read_study
 from thermospindle.sim.study.parts import RESULTS, fill, opened, versions, write, write_table
 from thermospindle.sim.study.rows import Cases, cases
 from thermospindle.sim.study.sensitivity import APART
@@ -42,33 +45,39 @@ def study(file: Path, cluster: str | None = None, effect_files: Sequence[Path] =
     asked = read_study(Path(file))
     spindle, catalogue = with_effects(asked.scene, effect_files)
     scene = scene_path(asked.scene)
-    of: Cases | Fleet
+    spindles = [spindle, *(with_effects(other, effect_files)[0] for other in asked.scenes[1:])]
+    of: Cases | Fleet | Designs
     if asked.kind == FLEET:
         of = Fleet(spindle, asked.campaigns, catalogue, asked.work == "diagnose")
+    elif asked.kind == COMPARISON:
+        of = designs(asked, spindles, catalogue)
     else:
         raw = read_file(SCENE, scene)
         check(asked, raw, scene, spindle, catalogue)
         of = cases(asked, raw, scene, spindle, catalogue)
+    scenes = ", ".join(s.name for s in spindles)
     place = Path("out") / asked.file.stem if out is None else Path(out)
     key: dict[str, Any] = {"study": asked.digest, "scene": content_hash(spindle), "effects": [digest(Path(f)) for f in effect_files]}
     if asked.kind == FLEET:
         key["campaigns"] = {str(k): _content(folder) for k, folder in enumerate(asked.campaigns)}
+    if asked.kind == COMPARISON:
+        key["scenes"] = {name: content_hash(s) for name, s in zip(asked.designs, spindles, strict=True)}
     with opened(place, key, of.count, asked.chunk, of.schema()) as folder, _executor(cluster) as run:
         there = folder.count - len(folder.missing())
         with progress_bar(folder.count - there) as progress:
             fill(folder, of.rows, run, progress)
         table = folder.table()
-        told, drawn = _fleet_told(table) if isinstance(of, Fleet) else _told(of, table)
-        values = {"title": asked.title, "kind": asked.kind, "scene": spindle.name, "cases": of.count, **told}
+        told, drawn = _told(of, table)
+        values = {"title": asked.title, "kind": asked.kind, "scene": scenes, "cases": of.count, **told}
         write_table(table, folder.path / RESULTS)
         write(folder.path / SUMMARY, json.dumps(values, indent=1))
         save_all(drawn, folder.path, 140)
-        write_study_log(spindle, values, table, drawn, folder.path / LOG)
+        write_study_log(spindles, values, table, drawn, folder.path / LOG)
     values |= {"out": str(place), "parts": folder.count, "parts_found": there, "warnings": _warnings(values)}
 
     def show(console: Console) -> None:
-        console.print(f"{asked.title}: {of.count} cases of {spindle.name}" + (f", {there} of {folder.count} parts found there" if there else ""))
-        (_show_fleet if isinstance(of, Fleet) else _show)(console, values)
+        console.print(f"{asked.title}: {of.count} cases of {scenes}" + (f", {there} of {folder.count} parts found there" if there else ""))
+        {FLEET: _show_fleet, COMPARISON: show_designs}.get(asked.kind, _show)(console, values)
         console.print(f"\n{place}: {RESULTS}, {SUMMARY}, {LOG}, {', '.join(f'{name}.png' for name in drawn)}", soft_wrap=True)
 
     return Answer(values, show)
@@ -89,7 +98,12 @@ def _content(campaign: Path) -> str:
     return hashlib.sha256(json.dumps([campaign.name, parts]).encode()).hexdigest()[:16]
 
 
-def _told(of: Cases, table: pa.Table) -> tuple[dict[str, Any], dict[str, Figure]]:
+def _told(of: Cases | Fleet | Designs, table: pa.Table) -> tuple[dict[str, Any], dict[str, Figure]]:
+    if isinstance(of, Fleet):
+        return _fleet_told(table)
+    if isinstance(of, Designs):
+        told = comparison(of, table)
+        return told, compared(told)
     told = summary(of, table)
     return told, figures.monte_carlo(of, table, told) if of.study.kind == MONTE_CARLO else figures.sweep(of, table)
 
@@ -122,13 +136,14 @@ def _warnings(values: dict[str, Any]) -> list[str]:
 
 
 def _show(console: Console, values: dict[str, Any]) -> None:
+    sobol = any("indices" in m for c in values["conditions"] for m in c["modes"])
     for c in values["conditions"][:CONDITIONS]:
         rows = [_line(f"{m['mode']} {m['kind']}, Hz", m["nominal_Hz"], m) for m in c["modes"]]
         rows += [_line(f"preload {name}, N", p["nominal"], p) for name, p in c["preload_N"].items()]
         for key, label in (("rro_um", "RRO"), ("nrro_six_sigma_um", "NRRO, 6 s.d.")):
             rows += [_line(f"{label} {probe}, um", own["nominal"], own) for probe, own in c.get(key, {}).items()]
         lost = {name: share for name, share in c["in_contact"].items() if share is not None and share < 1}
-        head = ["", "scene", *(["mean", "s.d.", "2.5 %", "97.5 %", "most by", "r2"] if values["kind"] == MONTE_CARLO else ["least", "most"])]
+        head = ["", "scene", *(["mean", "s.d.", "2.5 %", "97.5 %", "most by", "first orders" if sobol else "r2"] if values["kind"] == MONTE_CARLO else ["least", "most"])]
         show_grid(console, f"{c['temperature_C']:g} C, {c['speed_rpm']:g} rpm", head, rows, ("", "most by"))
         for name, share in lost.items():
             console.print(f"{name} has contact in {100 * share:.1f} % of them")
@@ -146,10 +161,13 @@ def _line(label: str, nominal: float, own: dict[str, Any]) -> list[str]:
         return [label, *_alike(nominal, own["least"], own["most"])]
     s = own["spread"]
     cells = [label, *(_alike(nominal, *[None] * 4) if s is None else _alike(nominal, s["mean"], s["sd"], s["quantiles"][0], s["quantiles"][-1]))]
+    if shares := own.get("indices"):
+        named = [f"{name} {c['total']:.2f}" for name, c in shares["of"].items() if c["clear"]][:2]
+        return [*cells, ", ".join(named) or "-", f"{sum(c['first'] for c in shares['of'].values()):.2f}"]
     if (sensitive := own.get("sensitivity")) is None:
         return [*cells, "-", "-"]
-    most = [f"{name} {c['value']:+.2f}" for name, c in list(sensitive["coefficients"].items())[:2] if abs(c["value"]) >= 0.005]
-    return [*cells, ", ".join(most), f"{sensitive['r2']:.3f}"]
+    most = [f"{name} {c['value']:+.2f}" for name, c in sensitive["coefficients"].items() if c["clear"] and abs(c["value"]) >= 0.005][:2]
+    return [*cells, ", ".join(most) or "-", f"{sensitive['r2']:.3f}"]
 
 
 def _show_fleet(console: Console, values: dict[str, Any]) -> None:

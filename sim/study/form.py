@@ -16,7 +16,7 @@ from thermospindle.model.files.formats import CURRENT, STUDY
 from thermospindle.model.scene.fields import Name, Temperature, Title, first_error, format_of, read_file
 from thermospindle.sim.campaign.form import Table
 
-SWEEP, MONTE_CARLO, FLEET = "sweep", "monte-carlo", "fleet"
+SWEEP, MONTE_CARLO, FLEET, COMPARISON = "sweep", "monte-carlo", "fleet", "comparison"
 MOST = 10_000_000
 """Cases of a study: more would fill a disk before they could be looked at."""
 
@@ -45,8 +45,9 @@ class Steps(Table):
 class StudyForm(Table):
     format: format_of(STUDY) = CURRENT[STUDY]  # type: ignore[valid-type]
     title: Title
-    kind: Literal["sweep", "monte-carlo", "fleet"]
-    scene: Name
+    kind: Literal["sweep", "monte-carlo", "fleet", "comparison"]
+    scene: Name | None = None
+    scenes: list[Name] = Field(default_factory=list, max_length=100)
     temperatures_C: list[Temperature] | None = Field(None, min_length=1, max_length=100_000)
     speeds_rpm: list[Rpm] | None = Field(None, min_length=1, max_length=100_000)
     highest_Hz: Annotated[float, Field(gt=0, le=1e9)] | None = None
@@ -56,6 +57,7 @@ class StudyForm(Table):
     vary: dict[Name, Steps | Annotated[list[Any], Field(min_length=1, max_length=100_000)]] = Field(default_factory=dict)
     draws: Annotated[int, Field(ge=2, le=MOST)] | None = None
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
+    sobol: bool = False
     campaigns: list[Name] = Field(default_factory=list)
     work: Literal["compare", "diagnose"] = "compare"
 
@@ -65,14 +67,19 @@ class StudyForm(Table):
             kinds = ONLY.get(key, (self.kind,))
             if self.kind not in kinds:
                 raise ValueError(f"{key}: is for kind = {' or '.join(map(repr, kinds))}, and this study is a {self.kind}")
-        for key, kind in (("draws", MONTE_CARLO), ("campaigns", FLEET)):
+        needed = [("scene", SWEEP), ("scene", MONTE_CARLO), ("scene", FLEET), ("draws", MONTE_CARLO), ("campaigns", FLEET), ("scenes", COMPARISON), ("temperatures_C", COMPARISON)]
+        for key, kind in needed:
             if self.kind == kind and not getattr(self, key):
                 raise ValueError(f"{key}: missing, and a {kind} study has no default for it")
         if self.runout and not any(self.speeds_rpm or ()):
             raise ValueError("runout = true: at rest there is none; speeds_rpm needs a speed")
         if self.grade and not self.runout:
             raise ValueError(f"grade = {self.grade!r}: imperfections show in the runout alone; it needs runout = true")
-        for key in ("temperatures_C", "speeds_rpm", "campaigns"):
+        if self.kind == COMPARISON and len(self.scenes) < 2:
+            raise ValueError(f"scenes = {self.scenes!r}: a comparison needs at least two")
+        if self.grade and not self.draws:
+            raise ValueError(f"grade = {self.grade!r}: imperfections are drawn with spindles; it needs draws")
+        for key in ("temperatures_C", "speeds_rpm", "campaigns", "scenes"):
             values = getattr(self, key) or []
             if len(set(values)) < len(values):
                 raise ValueError(f"{key}: a value stands twice")
@@ -80,25 +87,28 @@ class StudyForm(Table):
 
 
 ONLY = {
+    "scene": (SWEEP, MONTE_CARLO, FLEET),
+    "scenes": (COMPARISON,),
     "vary": (SWEEP,),
-    "draws": (MONTE_CARLO,),
-    "seed": (MONTE_CARLO,),
+    "draws": (MONTE_CARLO, COMPARISON),
+    "seed": (MONTE_CARLO, COMPARISON),
+    "sobol": (MONTE_CARLO,),
     "campaigns": (FLEET,),
     "work": (FLEET,),
-    "temperatures_C": (SWEEP, MONTE_CARLO),
-    "speeds_rpm": (SWEEP, MONTE_CARLO),
-    "highest_Hz": (SWEEP, MONTE_CARLO),
-    "runout": (SWEEP, MONTE_CARLO),
-    "grade": (MONTE_CARLO,),
+    "temperatures_C": (SWEEP, MONTE_CARLO, COMPARISON),
+    "speeds_rpm": (SWEEP, MONTE_CARLO, COMPARISON),
+    "highest_Hz": (SWEEP, MONTE_CARLO, COMPARISON),
+    "runout": (SWEEP, MONTE_CARLO, COMPARISON),
+    "grade": (MONTE_CARLO, COMPARISON),
 }
 """Keys that only some kinds of study have."""
-CHUNK = {SWEEP: 64, MONTE_CARLO: 64, FLEET: 1}
+CHUNK = {SWEEP: 64, MONTE_CARLO: 64, FLEET: 1, COMPARISON: 64}
 """Cases a part file, where the study does not say: some seconds of work, which is what a kill can cost."""
 
 
 @dataclass(frozen=True)
 class Study:
-    """A study file, read: `scene` a path or the name of a shipped one, `vary` values by key, `campaigns` folders, `digest` that of the file."""
+    """A study file, read: `scene` a path or the name of a shipped one (of a comparison the first of `scenes`, called as in `designs`), `vary` values by key, `campaigns` folders, `digest` that of the file."""
 
     file: Path
     title: str
@@ -115,6 +125,9 @@ class Study:
     work: str
     digest: str
     runout: bool = False
+    sobol: bool = False  # variance-based sensitivities, at (2 + inputs) times the cases
+    scenes: tuple[Path, ...] = ()
+    designs: tuple[str, ...] = ()
     grade: str | None = None  # of the imperfections that are drawn with each spindle; None: those of the scene
 
     def combinations(self) -> int:
@@ -135,7 +148,9 @@ def read_study(file: Path) -> Study:
         file=file,
         title=form.title,
         kind=form.kind,
-        scene=_beside(file, form.scene),
+        scene=_beside(file, form.scene or form.scenes[0]),
+        scenes=tuple(_beside(file, name) for name in form.scenes),
+        designs=tuple(form.scenes),
         temperatures=None if form.temperatures_C is None else tuple(form.temperatures_C),
         speeds=tuple(form.speeds_rpm or (0.0,)),
         highest=form.highest_Hz,
@@ -147,6 +162,7 @@ def read_study(file: Path) -> Study:
         work=form.work,
         runout=form.runout,
         grade=form.grade,
+        sobol=form.sobol,
         digest=hashlib.sha256(file.read_bytes()).hexdigest()[:16],
     )
     if (count := study.combinations() * len(study.temperatures or ()) * len(study.speeds)) > MOST:

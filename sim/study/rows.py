@@ -12,27 +12,28 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from thermospindle.model.built.drawn import GRADES, drawn
 from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.errors import BadInput, NoEquilibrium, NotConverged, OutsideRange
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.modes import Mode
+from thermospindle.model.rotor.static import displacement
 from thermospindle.model.units import RPM, TO_UM
 from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.identification.pairing import follow
 from thermospindle.sim.operating import OperatingPoint, operating_point, unloads
-from thermospindle.sim.running.runout import AXIAL, X, Y
+from thermospindle.sim.running.runout import AXIAL, X, Y, hub_probes, probe_rows
 from thermospindle.sim.running.steady import steady_runout
-from thermospindle.sim.study.form import MONTE_CARLO, Study
+from thermospindle.sim.study.draws import count, draw, imperfection_columns, known_of
+from thermospindle.sim.study.form import MONTE_CARLO, MOST, Study
 from thermospindle.sim.study.variants import combination, variant
 
-IMPERFECT = 1  # of the seeds of a draw: imperfections, beside the deviations
 BEYOND = 1.5  # of the band, up to which partners of the scene's own modes are looked for
 NAMED = (BadInput, OutsideRange, NoEquilibrium, NotConverged)
 """What is a result of a case rather than the end of the study: the sentence stands in its row."""
 OF_ROW = {"preload_N": "preload", "contact_angle_deg": "contact_angle", "deformation_um": "deformation"}
 OF_BEARING = {"radial_stiffness_N_per_m": "radial_stiffness", "axial_stiffness_N_per_m": "axial_stiffness"}
 OF_RUNOUT = ("rro_um", "nrro_six_sigma_um")  # peak to valley, and six standard deviations
+STIFFNESS = "stiffness_N_per_um"
 UNITS = {"contact_angle_deg": np.degrees(1.0), "deformation_um": 1e6}
 MODES = {"frequency_Hz": pa.float64(), "damping_ratio": pa.float64(), "kind": pa.string(), "whirl": pa.string(), "mode": pa.int64()}
 
@@ -44,7 +45,7 @@ class Cases:
     """The cases of a sweep or a Monte Carlo study: `rows(k)` of case k; `schema` of all rows.
 
     `own` holds the modes of the scene as it stands by condition: a mode of a case has the `mode` number of its partner by shape there, 0
-    where it has none.
+    where it has none. With `stiffness` rows tell that of the hub too.
     """
 
     study: Study
@@ -53,6 +54,7 @@ class Cases:
     spindle: Spindle
     catalogue: tuple[Effect, ...]
     own: Mapping[Condition, tuple[OperatingPoint, list[Mode]]]
+    stiffness: bool = False
 
     @property
     def conditions(self) -> tuple[Condition, ...]:
@@ -61,7 +63,7 @@ class Cases:
     @property
     def count(self) -> int:
         """Draws, or combinations of keys at a condition each."""
-        return self.study.draws if self.study.kind == MONTE_CARLO else self.study.combinations() * len(self.own)
+        return count(self.study, self.spindle) if self.study.kind == MONTE_CARLO else self.study.combinations() * len(self.own)
 
     @property
     def highest(self) -> float:
@@ -79,26 +81,18 @@ class Cases:
             spindle = _variant(self, index)
         except NAMED as error:
             return [self._empty(known, condition, error)]
-        return [self._row(known, spindle, condition)[0]]
-
-    def _with_imperfections(self, case: int) -> Spindle:
-        """The scene's spindle; where the study names a grade, with imperfections of its own for every draw."""
-        if self.study.grade is None:
-            return self.spindle
-        own = int(np.random.default_rng([self.study.seed, case, IMPERFECT]).integers(2**62))
-        return replace(self.spindle, imperfections=drawn(self.spindle, own, GRADES[self.study.grade]))
+        return [self.row(known, spindle, condition)[0]]
 
     def _drawn(self, case: int) -> list[Row]:
-        parameters = toleranced(self.spindle)
-        off = draw(self.study.seed, case, [p.sd for p in parameters])
-        known: Row = {"case": case, **{f"deviation.{p.name}": float(x) for p, x in zip(parameters, off, strict=True)}}
-        spindle = self._with_imperfections(case)
+        parameters, own = toleranced(self.spindle), draw(self.study, self.spindle, case)
+        known: Row = {"case": case, **known_of(self.spindle, own)} | ({"draw": own.k, "taken": own.taken} if self.study.sobol else {})
+        spindle = self.spindle if own.imperfections is None else replace(self.spindle, imperfections=own.imperfections)
         try:
-            for p, x in zip(parameters, off, strict=True):
+            for p, x in zip(parameters, own.deviations, strict=True):
                 spindle = p.apply(spindle, float(x))
         except (ValueError, *NAMED) as error:
             return [self._empty(known, c, error) for c in self.conditions]
-        found = [self._row(known, spindle, c) for c in self.conditions]
+        found = [self.row(known, spindle, c) for c in self.conditions]
         points = {c: p for c, (_, p) in zip(self.conditions, found, strict=True) if p is not None}
         try:
             lost: Row = {f"unloads_C.{b.name}": _unloads(spindle, points, b.name) for b in self.spindle.bearings}
@@ -106,7 +100,8 @@ class Cases:
             lost = {"error": f"where it unloads: {' '.join(str(error).split())}"}
         return [row | lost for row, _ in found]
 
-    def _row(self, known: Row, spindle: Spindle, condition: Condition) -> tuple[Row, OperatingPoint | None]:
+    def row(self, known: Row, spindle: Spindle, condition: Condition) -> tuple[Row, OperatingPoint | None]:
+        """What is known of a spindle and what comes out at a condition, with the state there; the error where there is none."""
         try:
             point = operating_point(spindle, condition)
             modes = point.modes_below(BEYOND * self.highest)
@@ -128,6 +123,7 @@ class Cases:
             row |= {f"{key}.{bearing.name}": float(getattr(bearing, name)) * UNITS.get(key, 1.0) for key, name in told.items()}
         row |= {f"rro_um.{_plain(probe)}": TO_UM * r.repeatable for probe, r in seen.items()}
         row |= {f"nrro_six_sigma_um.{_plain(probe)}": TO_UM * r.six_sigma for probe, r in seen.items()}
+        row |= _stiffness(point) if self.stiffness else {}
         row |= {f"in_contact.{b.name}": bool(b.in_contact) for b in point.state.bearings}
         row |= {"frequency_Hz": [modes[i].frequency for i in kept], "damping_ratio": [modes[i].damping_ratio for i in kept]}
         row |= {"kind": [modes[i].kind for i in kept], "whirl": [modes[i].whirl for i in kept], "mode": [number[i] for i in kept]}
@@ -153,6 +149,10 @@ class Cases:
             fields[f"vary.{key}"] = pa.float64() if numbers else pa.string()
         if self.study.kind == MONTE_CARLO:
             fields |= {f"deviation.{p.name}": pa.float64() for p in toleranced(self.spindle)}
+            if self.study.sobol:
+                fields |= {"draw": pa.int64(), "taken": pa.string()}
+            if self.study.grade is not None:
+                fields |= {name: pa.float64() for name in imperfection_columns(self.spindle)}
         fields |= {"temperature_C": pa.float64(), "speed_rpm": pa.float64(), "status": pa.string(), "error": pa.string()}
         for b in self.spindle.bearings:
             fields |= {f"{key}.{b.name}": pa.float64() for key in OF_ROW} | {f"in_contact.{b.name}": pa.bool_()}
@@ -173,7 +173,10 @@ def cases(study: Study, raw: Mapping[str, Any], file: Path, spindle: Spindle, ca
         for rpm in study.speeds:
             point = operating_point(spindle, condition := Condition(t, rpm * RPM))
             own[condition] = point, point.modes_below(study.highest or spindle.hammer.band[1])
-    return Cases(study, raw, file, spindle, catalogue, own)
+    found = Cases(study, raw, file, spindle, catalogue, own)
+    if found.count > MOST:
+        raise BadInput(f"{study.file}: draws = {study.draws}: with sobol = true that is {found.count} cases; at most {MOST} are allowed")
+    return found
 
 
 def _plain(probe: str) -> str:
@@ -181,9 +184,14 @@ def _plain(probe: str) -> str:
     return probe.removeprefix("hub ")
 
 
-def draw(seed: int, case: int, sd: Sequence[float]) -> Any:
-    """Relative deviations (p,) of draw `case`: normal, and the same whichever other draws there are."""
-    return np.random.default_rng([seed, case]).normal(0.0, sd)
+def _stiffness(point: OperatingPoint) -> Row:
+    """Static stiffness (N/um) by probe of the hub, of a force where and along which it looks; None where nothing holds it or it cannot move."""
+    probes, found = hub_probes(point.spindle), {}
+    for probe, row in zip(probes, probe_rows(point, probes), strict=True):
+        moved = displacement(point.linear.stiffness, np.diag(point.linear.mass), row)
+        compliance = 0.0 if moved is None else TO_UM * float(row @ moved)
+        found[f"{STIFFNESS}.{_plain(probe.name)}"] = 1 / compliance if compliance > 0 else None
+    return found
 
 
 def _told(condition: Condition) -> Row:

@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,11 +31,12 @@ CASE = "case"
 Told = dict[str, Any]
 
 
-def write_study_log(spindle: Spindle, told: Mapping[str, Any], table: pa.Table, drawn: Mapping[str, Figure], path: Path) -> None:
+def write_study_log(spindles: Sequence[Spindle], told: Mapping[str, Any], table: pa.Table, drawn: Mapping[str, Figure], path: Path) -> None:
     """Write the log, whole or not at all; `told` is the study's summary, `drawn` its figures by name. BadInput if its folder does not exist."""
     series = series_of(table)
-    about = {key: told[key] for key in ("title", "kind", "cases", "rows", "errors")} | provenance(spindle)
-    with whole_log(path, "study", f"{told['title']}, {spindle.name}", about, blueprint(series, drawn)) as recording:
+    about = {key: told[key] for key in ("title", "kind", "cases", "rows", "errors")} | provenance(spindles[0])
+    about |= {key: ", ".join(provenance(s)[key] for s in spindles) for key in ("scene", "scene_hash")}
+    with whole_log(path, "study", f"{told['title']}, {about['scene']}", about, blueprint(series, drawn)) as recording:
         _log_series(recording, series)
         _log_rows(recording, table)
         for name, figure in drawn.items():
@@ -63,7 +64,11 @@ def _summary(told: Mapping[str, Any]) -> str:
     """Markdown: what the study says, a table a condition, or campaigns with the largest error first."""
     lines = [f"# {told['title']}", "", f"{told['kind']}, {told['cases']} cases, {told['rows']} rows, {told['errors']} without a result", ""]
     for c in told.get("conditions", []):
-        lines += [f"## {c['temperature_C']:g} °C, {c['speed_rpm']:g} rpm", "", "| | scene | from | to |", "|---|---|---|---|"]
+        lines += [f"## {c['temperature_C']:g} °C, {c['speed_rpm']:g} rpm", ""]
+        if "figures" in c:
+            lines += [*_designs(c["figures"]), ""]
+            continue
+        lines += ["| | scene | from | to |", "|---|---|---|---|"]
         for m in c["modes"]:
             lines.append(_row(f"mode {m['mode']} {m['kind']}, Hz", m["nominal_Hz"], m))
         for name, p in c["preload_N"].items():
@@ -75,6 +80,15 @@ def _summary(told: Mapping[str, Any]) -> str:
         lines += ["| campaign | rms residual |", "|---|---|"]
         lines += [f"| {_cell(r['campaign'])} | {'-' if r['rms_residual'] is None else format(r['rms_residual'], '.4g')} |" for r in told["ranking"]]
     return "\n".join(lines) + "\n"
+
+
+def _designs(figures: Mapping[str, Any]) -> list[str]:
+    names = list(next(iter(figures.values()))["designs"])
+    lines = ["| | " + " | ".join(map(_cell, names)) + " |", "|---" * (1 + len(names)) + "|"]
+    for figure, own in figures.items():
+        values = [(d.get("spread") or {}).get("mean", d["nominal"]) for d in own["designs"].values()]
+        lines.append(f"| {_cell(figure)} | " + " | ".join("-" if v is None else f"{v:.6g}" for v in values) + " |")
+    return lines
 
 
 def _cell(text: str) -> str:

@@ -9,7 +9,7 @@ from thermospindle.model.types import Array
 from thermospindle.sim.study.summary import frequencies
 
 SHOWN = 12  # kinds of series
-OTHERS = ("preload_N", "rro_um", "nrro_six_sigma_um", "rms_residual", "worst_residual")
+OTHERS = ("preload_N", "rro_um", "nrro_six_sigma_um", "rms_residual", "worst_residual", "lowest_", "stiffness_")
 """Columns, by the beginning of their names, that are shown beside frequencies."""
 
 
@@ -33,4 +33,5 @@ def _conditions(table: pa.Table) -> list[str]:
     if "temperature_C" not in table.column_names:
         return ["campaigns"] * len(table)
     rows = zip(table["temperature_C"].to_pylist(), table["speed_rpm"].to_pylist(), strict=True)
-    return [f"{t:g} C" + (f", {rpm:g} rpm" if rpm else "") for t, rpm in rows]
+    found = [f"{t:g} C" + (f", {rpm:g} rpm" if rpm else "") for t, rpm in rows]
+    return [f"{design}, {c}" for design, c in zip(table["design"].to_pylist(), found, strict=True)] if "design" in table.column_names else found
