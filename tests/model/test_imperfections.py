@@ -157,7 +157,7 @@ REFUSED = [
         "imperfections.bearings.middle: names no bearing",
         "lower, upper",
     ),
-    ("order-zero", lambda r: upper(r)["outer_radial"]["order"].__setitem__(0, 0), "outer_radial.order.0 = 0", "greater than or equal to 1"),
+    ("order-zero", lambda r: upper(r)["outer_radial"]["order"].__setitem__(0, 0), "outer_radial.order.1 = 0", "greater than or equal to 1"),
     ("columns", lambda r: upper(r)["outer_radial"]["phase_deg"].pop(), "imperfections.bearings.upper.outer_radial", "one entry each"),
     ("twice", lambda r: upper(r)["outer_radial"]["order"].__setitem__(0, 2), "imperfections.bearings.upper.outer_radial", "stands once"),
     ("balls", lambda r: upper(r)["ball_diameter_nm"].pop(), "imperfections.bearings.upper.ball_diameter_nm: has 9", "the 10 balls"),

@@ -209,7 +209,7 @@ def test_balls_by_themselves_are_for_centred_rings(pair: Spindle) -> None:
     [
         ({"radial_load_N": [1.0, 0.0]}, "radial_load_z_mm is missing"),
         ({"radial_load_N": [1.0], "radial_load_z_mm": 0.0}, "radial_load_N"),
-        ({"radial_load_N": ["1", 0.0], "radial_load_z_mm": 0.0}, "radial_load_N.0 = '1': input should be a valid number"),
+        ({"radial_load_N": ["1", 0.0], "radial_load_z_mm": 0.0}, "radial_load_N.1 = '1': input should be a valid number"),
     ],
 )
 def test_a_load_is_told_whole(change: dict, why: str) -> None:
