@@ -106,6 +106,21 @@ def test_an_argument_that_is_none_is_told_in_one_sentence(call, sentence):
     assert str(error.value) == sentence
 
 
+def test_a_scene_that_is_none_is_told_the_nearest(tmp_path, monkeypatch):
+    """Of the shipped scenes for a bare name, and of the folders beside; nothing where none is like it."""
+    with pytest.raises(ts.BadInput, match=r"^hdd2003: no scene there; did you mean hdd_2003\?"):
+        ts.load("hdd2003")
+    (tmp_path / "my_motor").mkdir()
+    (tmp_path / "my_motor" / "spindle.toml").touch()
+    with pytest.raises(ts.BadInput, match=r"did you mean .*my_motor\?"):
+        ts.load(tmp_path / "my_moter")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ts.BadInput, match=r"did you mean my_motor\?"):
+        ts.load("mymotor")
+    with pytest.raises(ts.BadInput, match=r"^zzz: no scene there; expected a folder"):
+        ts.load("zzz")
+
+
 def test_there_are_ten_in_the_gallery():
     assert len(GALLERY) == 10
     assert all(f.read_text(encoding="utf-8").startswith('"""') for f in GALLERY)
