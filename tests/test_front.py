@@ -80,6 +80,47 @@ def test_frequencies_that_are_none_are_refused(wrong):
         ts.frf(ts.point("hdd_2003", 20), wrong)
 
 
+@pytest.mark.parametrize(
+    ("call", "sentence"),
+    [
+        (lambda p: ts.point("hdd_2003", float("nan")), "temperature_C = nan: must be a finite number above -273.15 and up to 10000"),
+        (lambda p: ts.point("hdd_2003", "hot"), "temperature_C = 'hot': must be a finite number above -273.15 and up to 10000"),
+        (lambda p: ts.point("hdd_2003", -300.0), "temperature_C = -300.0: must be a finite number above -273.15 and up to 10000"),
+        (lambda p: ts.point("hdd_2003", 20.0, speed_rpm=float("nan")), "speed_rpm = nan: must be a finite number above -1e+08 and up to 1e+08"),
+        (lambda p: ts.modes(p, highest_Hz=float("nan")), "highest_Hz = nan: must be a finite number above 0"),
+        (lambda p: ts.modes(p, highest_Hz="x"), "highest_Hz = 'x': must be a finite number above 0"),
+        (lambda p: ts.frf(p, ["x"]), "frequency_Hz = ['x']: must be one row of positive numbers"),
+        (lambda p: ts.impact(p, hits=0), "hits = 0: must be a whole number from 1 to 1000"),
+        (lambda p: ts.impact(p, hits=1.5), "hits = 1.5: must be a whole number from 1 to 1000"),
+        (lambda p: ts.impact(p, level_N=-1), "level_N = -1: must be a finite number above 0 and up to 1e+06"),
+        (lambda p: ts.impact(p, element="x"), "element = 'x': allowed are linear, ball-by-ball, reduced"),
+        (lambda p: ts.impact(p, element="ball"), "element = 'ball': did you mean ball-by-ball?"),
+        (lambda p: ts.impact(p, seed=-1), "seed = -1: must be a whole number from 0 to 999999999999999999"),
+        (lambda p: ts.add("hdd_2003", "preload_loss", loss="x"), "loss = 'x': must be a finite number"),
+        (lambda p: ts.deviate("hdd_2003", {"preload": float("nan")}), "preload = nan: must be a finite number"),
+    ],
+)
+def test_an_argument_that_is_none_is_told_in_one_sentence(call, sentence):
+    with pytest.raises(ts.BadInput) as error:
+        call(ts.point("hdd_2003", 20))
+    assert str(error.value) == sentence
+
+
+def test_a_scene_that_is_none_is_told_the_nearest(tmp_path, monkeypatch):
+    """Of the shipped scenes for a bare name, and of the folders beside; nothing where none is like it."""
+    with pytest.raises(ts.BadInput, match=r"^hdd2003: no scene there; did you mean hdd_2003\?"):
+        ts.load("hdd2003")
+    (tmp_path / "my_motor").mkdir()
+    (tmp_path / "my_motor" / "spindle.toml").touch()
+    with pytest.raises(ts.BadInput, match=r"did you mean .*my_motor\?"):
+        ts.load(tmp_path / "my_moter")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ts.BadInput, match=r"did you mean my_motor\?"):
+        ts.load("mymotor")
+    with pytest.raises(ts.BadInput, match=r"^zzz: no scene there; expected a folder"):
+        ts.load("zzz")
+
+
 def test_there_are_ten_in_the_gallery():
     assert len(GALLERY) == 10
     assert all(f.read_text(encoding="utf-8").startswith('"""') for f in GALLERY)

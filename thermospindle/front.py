@@ -1,7 +1,8 @@
 """The functions of `import thermospindle as ts`: one line each from a scene to its modes, FRFs, tests, comparison and diagnosis.
 
 Arguments carry the units people write in their names (C, rpm, Hz, N); what comes back is SI, with the units at its fields. Everything raises
-`BadInput`, one sentence that names file, key, value and what is allowed, for what cannot be used.
+`BadInput`, one sentence that names file, key or argument, value and what is allowed, for what cannot be used; what can be asked and has no answer
+is `NoEquilibrium`, of bearings that find no balance.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does, 
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from math import isfinite
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
@@ -19,11 +22,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from thermospindle.model.built.tolerance import deviated
-from thermospindle.model.errors import BadInput
+from thermospindle.model.errors import BadInput, instead
 from thermospindle.model.machine import Addition, Condition, Spindle
+from thermospindle.model.rotor.elements import HAMMER
 from thermospindle.model.rotor.modes import Mode
 from thermospindle.model.scene.reading import load as load_scene
 from thermospindle.model.units import RPM
+from thermospindle.options import FASTEST, HITS, HOTTEST, NEWTONS
 from thermospindle.sim.campaign.beside import POWER
 from thermospindle.sim.campaign.campaign import Campaign, read_campaign
 from thermospindle.sim.effects import CATALOGUE, by_name, checked
@@ -57,7 +62,8 @@ def point(spindle: Spindle | str | Path, temperature_C: float, *, speed_rpm: flo
 
     Raises `NoEquilibrium` where the bearings find no balance.
     """
-    return operating_point(_spindle(spindle), Condition(float(temperature_C), speed_rpm * RPM))
+    temperature = _number("temperature_C", temperature_C, -273.15, HOTTEST)
+    return operating_point(_spindle(spindle), Condition(temperature, _number("speed_rpm", speed_rpm, -FASTEST, FASTEST) * RPM))
 
 
 @overload
@@ -71,6 +77,8 @@ def modes(source: OperatingPoint | ImpactTest | Frf, *, highest_Hz: float = np.i
     strain energy by element), `.shape` (n,). Of an impact test or measured FRFs those identified by maximum likelihood: `Modes` with `.frequency` (m,)
     Hz, `.damping` (m,), `.shape` (m, responses), and `.frequency_sd` (m,) and so on, their standard errors.
     """
+    if highest_Hz != np.inf:
+        _number("highest_Hz", highest_Hz, 0.0, np.inf)
     if isinstance(source, OperatingPoint):
         return source.modes_below(highest_Hz)
     if isinstance(source, Frf):
@@ -98,7 +106,10 @@ def frf(source: OperatingPoint | ImpactTest, frequency_Hz: ArrayLike | None = No
         factor = (2j * np.pi * found.frequency) ** POWER[quantity]
         sd = None if found.sd is None or not np.all(np.isfinite(found.sd)) else found.sd * np.abs(factor)
         return replace(found, value=found.value * factor, sd=sd, quantity=quantity, names=names)
-    lines = np.linspace(*spindle.hammer.band, LINES) if frequency_Hz is None else np.atleast_1d(np.asarray(frequency_Hz, float))
+    try:
+        lines = np.linspace(*spindle.hammer.band, LINES) if frequency_Hz is None else np.atleast_1d(np.asarray(frequency_Hz, float))
+    except (TypeError, ValueError):
+        raise BadInput(f"frequency_Hz = {frequency_Hz!r}: must be one row of positive numbers") from None
     if lines.ndim != 1 or not np.all(np.isfinite(lines)) or np.any(lines <= 0):
         raise BadInput("frequency_Hz: must be one row of positive numbers")
     value = source.frf(lines) * (2j * np.pi * lines) ** POWER[quantity]
@@ -117,8 +128,15 @@ def impact(
     """A virtual impact-hammer test in MuJoCo's time domain, half a second to some seconds of computing a hit.
 
     `hits` on each hammer point and their peak force `level_N` are the scene's by default; `element` "ball-by-ball" takes contact laws instead of
-    linear bearings. `.record` is what the analyser sampled; `ts.frf(test)` and `ts.modes(test)` follow from it.
+    linear bearings, "reduced" is computed with the modes alone. `.record` is what the analyser sampled; `ts.frf(test)` and `ts.modes(test)` follow from it.
     """
+    if hits is not None:
+        _whole("hits", hits, 1, HITS)
+    if level_N is not None:
+        _number("level_N", level_N, 0.0, NEWTONS)
+    if element not in HAMMER:
+        raise BadInput(f"element = {element!r}: {instead(str(element), HAMMER)}")
+    _whole("seed", seed, 0, 10**18 - 1)
     changes = {key: value for key, value in (("hits", hits), ("level", level_N)) if value is not None}
     settings = replace(point.spindle.hammer, **changes)  # type: ignore[arg-type]
     return impact_tests([point], settings, element, seed, noise)[0]
@@ -166,6 +184,8 @@ def add(spindle: Spindle | str | Path, effect: str | Path, **values: float) -> S
         raise BadInput(f"effect {found.name}: {why}")
     if any(a.effect == found.name for a in drawing.effects):
         raise BadInput(f"effect {found.name}: {drawing.name} has it already")
+    for name, value in values.items():
+        _number(name, value)
     own = checked(found, found.typical() | values)
     return replace(drawing, effects=(*drawing.effects, Addition(found.name, own, found)))
 
@@ -175,6 +195,8 @@ def deviate(spindle: Spindle | str | Path, deviations: Mapping[str, float]) -> S
 
     The names are those of `[build.deviations]` of a scene; nothing is written.
     """
+    for name, value in deviations.items():
+        _number(name, value)
     return deviated(_spindle(spindle), deviations)
 
 
@@ -191,3 +213,16 @@ def _spindle(spindle: Spindle | str | Path) -> Spindle:
 
 def _campaign(tests: Campaign | str | Path) -> Campaign:
     return tests if isinstance(tests, Campaign) else campaign(tests)
+
+
+def _number(name: str, value: float, above: float = -np.inf, most: float = np.inf) -> float:
+    """The number that an argument is, above `above` and up to `most`; `BadInput` for any other."""
+    if isinstance(value, bool) or not isinstance(value, Real) or not isfinite(value) or not above < value <= most:
+        bounds = [f"above {above:g}"] * bool(isfinite(above)) + [f"up to {most:g}"] * bool(isfinite(most))
+        raise BadInput(f"{name} = {value!r}: must be a finite number {' and '.join(bounds)}".rstrip())
+    return float(value)
+
+
+def _whole(name: str, value: int, least: int, most: int) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= most:
+        raise BadInput(f"{name} = {value!r}: must be a whole number from {least} to {most}")

@@ -10,6 +10,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, replace
+from difflib import get_close_matches
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -58,8 +59,16 @@ def scene_path(path: str | Path) -> Path:
     file = path / "spindle.toml" if path.is_dir() else path
     if not file.is_file():
         names = ", ".join(shipped())
-        raise BadInput(f"{path}: no scene there; expected a folder with spindle.toml, that file, or the name of a shipped scene ({names})")
+        meant = f"; did you mean {near}?" if (near := _nearest(path)) else ""
+        raise BadInput(f"{path}: no scene there{meant}; expected a folder with spindle.toml, that file, or the name of a shipped scene ({names})")
     return file
+
+
+def _nearest(path: Path) -> str:
+    """The scene in the folder asked for, or the shipped one, whose name is most like the last part of `path`; empty where none is like it."""
+    beside = {f.parent.name: str(f.parent) for f in sorted(path.parent.glob("*/spindle.toml"))} if path.parent.is_dir() else {}
+    known = {**({name: name for name in shipped()} if path.parts == (path.name,) else {}), **beside}
+    return next((known[name] for name in get_close_matches(path.name, known, n=1)), "")
 
 
 def shipped() -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from thermospindle.diagnosis.ladder.forms import AS_DRAWN
 from thermospindle.diagnosis.ladder.ladder import CLEAR, DISCREPANCY, MODES, TOLERANCES, Ladder
 from thermospindle.diagnosis.ladder.step import Step
 from thermospindle.diagnosis.prediction.next_test import in_words
+from thermospindle.diagnosis.verdict import Diagnosis
 from thermospindle.report.typeset import plain, plain_error
 
 CERTAIN = 1000.0  # odds, beyond which models are not to be trusted so far
@@ -102,7 +103,16 @@ def _effects(found: Ladder) -> Iterator[str]:
     if found.left_out == MODES:
         yield from _modes_left_out(found)
     if found.diagnosis is not None:
-        yield f"Diagnosis: {found.diagnosis.verdict.word}. {found.diagnosis.verdict.reason}"
+        yield diagnosed(found.diagnosis)
+
+
+def diagnosed(found: Diagnosis) -> str:
+    return f"Diagnosis: {found.verdict.word}. {found.verdict.reason}"
+
+
+def leading(found: Ladder) -> str:
+    """What is said before the table: the diagnosis, or of a ladder of named effects what each of them does; without any, what is wrong as drawn."""
+    return diagnosed(found.diagnosis) if found.diagnosis is not None else next(_effects(found), _forms(found))
 
 
 def _at_limits(r: Step) -> str:

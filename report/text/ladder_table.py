@@ -20,7 +20,7 @@ from thermospindle.diagnosis.ladder.step import Step
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 from thermospindle.report.progress import plain_lines
-from thermospindle.report.text.ladder import evidence, sentences
+from thermospindle.report.text.ladder import evidence, leading, sentences
 from thermospindle.report.typeset import known
 
 COLUMNS = ("step", "error\ns.e.", "held out\ns.e.", "error\nHz", "shifts\nHz", "build\ns.d.", "ln\nevidence")
@@ -161,8 +161,10 @@ def _now(steps: Sequence[Step], doing: str) -> str:
 
 def show_ladder(console: Console, found: Ladder) -> None:
     console.print(f"{found.campaign.title} against scene {found.spindle.name}", style="bold", markup=False, highlight=False)
+    console.print(f"{(lead := leading(found))}\n", markup=False, highlight=False)
     console.print(table(found.steps))
     console.print(LEGEND, style="dim", highlight=False)
     for sentence in sentences(found):
-        console.print(f"\n{sentence}", markup=False, highlight=False)
+        if sentence != lead:
+            console.print(f"\n{sentence}", markup=False, highlight=False)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,7 @@ from rich.console import Console
 from thermospindle.model.bearing.stiffness_table import write_table
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor import mjcf
-from thermospindle.model.rotor.modes import group_energy
+from thermospindle.model.rotor.modes import Mode, group_energy
 from thermospindle.model.units import RPM
 from thermospindle.report.text.grid import show_grid
 from thermospindle.report.text.states import modes_json, show_table, write_modes_csv
@@ -103,11 +103,24 @@ def show_impact(console: Console, step: Step) -> None:
         exact = computed.get(i)
         own = ("-", "-") if exact is None else (f"{exact.frequency:.2f}", f"{100 * exact.damping_ratio:.3f}")
         rows.append([f"{f:.2f}", _error(sf, 2), f"{100 * z:.3f}", _error(100 * sz, 3), *own])
+    console.print(f"{_found(step, computed)}\n", highlight=False, markup=False)
     show_grid(console, title, ("f\nHz", "+-", "damping\n%", "+-", "model f\nHz", "model damping\n%"), rows)
     low, high = step.point.spindle.hammer.band
     unseen = [mode for i, mode in enumerate(step.point.modes) if low <= mode.frequency <= high and i not in identified(step)]
     if unseen:
         console.print(f"No peak was found of {', '.join(f'{m.frequency:.2f} Hz ({m.kind})' for m in unseen)}. {_struck(step.point.spindle)}")
+
+
+def _found(step: Step, computed: Mapping[int, Mode]) -> str:
+    """How many modes the test shows of those that the model has in the band, and where it is furthest off."""
+    low, high = step.point.spindle.hammer.band
+    count = sum(low <= mode.frequency <= high for mode in step.point.modes)
+    found = f"{len(step.identified.frequency)} modes were found, {len(computed)} of the {count} that the model has from {low:g} to {high:g} Hz"
+    if not computed:
+        return f"{found}."
+    k, mode = max(computed.items(), key=lambda row: abs(step.identified.frequency[row[0]] / row[1].frequency - 1))
+    off, sd = step.identified.frequency[k] - mode.frequency, step.identified.frequency_sd[k]
+    return f"{found}; furthest off is that at {mode.frequency:.2f} Hz, by {off:+.2g} Hz ({100 * off / mode.frequency:+.2g} %, {abs(off) / sd:.1f} of its standard errors)."
 
 
 def _error(value: float, digits: int) -> str:

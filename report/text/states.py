@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from thermospindle.model.bearing.stiffness_table import OF_ROLLERS, StiffnessTab
 from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.modes import Mode, group_energy
 from thermospindle.model.rotor.static import Static
+from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 from thermospindle.report.text.grid import show_grid
 from thermospindle.report.typeset import write_csv
@@ -104,6 +105,26 @@ def show_table(console: Console, table: StiffnessTable) -> None:
     for name, where in table.unloads.items():
         if where is not None:
             console.print(f"{name} bearing loses contact at {where:.2f} C")
+
+
+def show_told_table(console: Console, table: StiffnessTable) -> None:
+    """In one sentence how far each bearing's preload and radial stiffness go, then the table."""
+    ends = [f"{name} {said}" for name, values in table.values.items() if (said := _range_of(values))]
+    if ends:
+        span = f"From {table.temperature[0]:g} to {table.temperature[-1]:g} C" if len(table.temperature) > 1 else f"At {table.temperature[0]:g} C"
+        rpm = f" at {table.speed[0] / RPM:g} rpm" if len(table.speed) == 1 else f" and {table.speed[0] / RPM:g} to {table.speed[-1] / RPM:g} rpm"
+        console.print(f"{span}{rpm}: {'; '.join(ends)}.\n", highlight=False, markup=False)
+    show_table(console, table)
+
+
+def _range_of(values: Mapping[str, Array]) -> str:
+    """From the first condition to the last, of what the bearing has; empty where its table tells neither."""
+    told = []
+    for column, words, unit, scale in (("preload_N", "preload", "N", 1.0), ("radial_stiffness_N_per_m", "radial stiffness", "N/um", 1e-6)):
+        if column in values and np.all(np.isfinite(ends := values[column][[0, -1], [0, -1]] * scale)):
+            first, last = (f"{x:.2f}" for x in ends)
+            told.append(f"{words} {first} {unit}" if first == last else f"{words} {first} to {last} {unit}")
+    return ", ".join(told)
 
 
 def show_modes(console: Console, answer: dict[str, Any], point: OperatingPoint) -> None:

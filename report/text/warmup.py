@@ -115,6 +115,7 @@ def show_warmup(console: Console, warmup: Warmup) -> None:
     lost = lost_contact(warmup)
     if lost:
         console.print(f"{lost[0].upper()}{lost[1:]}.\n", highlight=False)
+    console.print(f"{told(warmup)}\n", highlight=False, markup=False)
     bearings, of_rollers = [b.name for b in warmup.spindle.bearings], roller_names(warmup)
     unit, scale = power(max(max(m.friction.values()) for m in (*warmup.moments, warmup.steady)))
     columns = ["time\nmin", *(f"{b}\nC" for b in (*bearings, *of_rollers)), "coolest\nC", "hottest\nC", *(f"{b}\npreload\nN" for b in bearings[:1])]
@@ -135,6 +136,18 @@ def show_warmup(console: Console, warmup: Warmup) -> None:
         console.print(f"Near runaway: of bearing loads that are added, {warmup.feedback:.0%} come back through the heat they make; at 100% there is no steady state. It warms up more slowly than the time constant says, which is that of loads that stay.")
     if warmup.left_out:
         console.print(f"Left out, since region temperatures are computed here: {', '.join(warmup.left_out)}.")
+
+
+def told(warmup: Warmup) -> str:
+    """In one sentence where a warm-up ends: temperatures, preload, frequencies, and how near to running away."""
+    end, first = warmup.steady, first_row(warmup)
+    warm = ", ".join(f"{name} {t:.1f} C" for name, t in end.bearing_temperatures.items()) or f"the hottest region {max(end.temperatures.values()):.1f} C"
+    pressed = "" if first is None else f", the preload of {first} goes from {warmup.moments[0].preload[first]:.2f} to {end.preload[first]:.2f} N"
+    shifts = warmup.steady_frequencies - warmup.frequencies[0]
+    known_shifts = np.flatnonzero(np.isfinite(shifts))
+    most = f", no natural frequency moves by more than {np.abs(shifts[known_shifts]).max():.1f} Hz" if len(known_shifts) else ""
+    near = f"; it is near runaway, {warmup.feedback:.0%} of a load that is added come back as heat" if warmup.feedback > NEAR else "; it does not run away"
+    return f"In the steady state the bearings are at {warm}{pressed}{most}{near}."
 
 
 def lost_contact(warmup: Warmup) -> str:

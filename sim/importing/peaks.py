@@ -14,10 +14,12 @@ from thermospindle.sim.importing.measured import Curve, ModeLine
 
 PROMINENCE = 2.0  # of a peak over the valleys beside it, as a ratio
 SHARED = 0.2  # of the FRFs of a test that must show a peak at one place, two at least where there are several
-TOGETHER = 1.5  # lines between peaks of different FRFs that are one mode's
+TOGETHER = 0.25  # half-power widths between peaks of different FRFs that are one mode's, but one and a half lines at least
 ABOVE_NOISE = 7.0  # standard deviations of the lines' own scatter, by which a peak stands over the valleys beside it
-AROUND = 12  # lines on each side of a peak that its fit sees, at most
+AROUND = 12  # lines on each side of a peak that its fit sees at least
+LOWEST = 0.3  # of a peak's height, down to which its fit sees lines
 LEAST_SD = 0.05  # of a line: what one number a line can tell of a frequency at best
+NEIGHBOURS = 0.05  # half-power widths by which the flanks of other modes move the peak of one FRF: 0.02 to 0.07 in the models shipped
 HEAVY = 0.2  # damping ratio from which a hump is no mode
 
 
@@ -25,29 +27,30 @@ def from_peaks(curves: Sequence[Curve], speed: float) -> tuple[list[ModeLine], l
     """Modes of a test's magnitudes: each peak is fitted by |a / (1 - r^2 + 2 i z r) + b|, r = f / f0, in every FRF that shows it.
 
     Frequency and damping are the medians over these FRFs, standard errors their scatter over the root of their number, 0.05 of a line at
-    least; of a peak in fewer than three FRFs those of the fit. Shapes and close pairs are beyond magnitudes. At a speed (rad/s) peaks at its
-    multiples are no modes: the notes name them.
+    least; of a peak in fewer than three FRFs those of the fit, and 0.05 half-power widths at least, and such a peak has a damping or is none.
+    What is one peak is told by half-power widths, not by lines, so that finer lines lose no mode. Shapes and close pairs are beyond magnitudes.
+    At a speed (rad/s) peaks at its multiples are no modes: the notes name them.
     """
-    found: dict[float, list[tuple[float, float, ModeLine]]] = {}
+    found: list[ModeLine] = []
     step = float(np.median(np.diff(curves[0].frequency)))
     for curve in curves:
         size = np.asarray(curve.value, float)
         tops, of = find_peaks(np.log(np.maximum(size, 1e-9 * size.max())), prominence=np.log(PROMINENCE))
         noise = scatter(size[None, None])[0, 0]
         for top, drop in zip(tops.tolist(), of["prominences"], strict=True):
-            if size[top] * -np.expm1(-drop) > ABOVE_NOISE * noise[top] and (mode := _fitted(curve.frequency, size, top, step)) is not None:
-                found.setdefault(mode.frequency, []).append((mode.frequency, size[top], mode))
-    every = [row for key in sorted(found) for row in found[key]]
+            if size[top] * -np.expm1(-drop) > ABOVE_NOISE * noise[top] and (mode := _peak(curve.frequency, size, top, drop, step)) is not None:
+                found.append(mode)
     groups: list[list[ModeLine]] = []
-    for frequency, _, mode in every:
-        if groups and frequency - groups[-1][-1].frequency <= TOGETHER * step and frequency - groups[-1][0].frequency <= 3 * step:
-            groups[-1].append(mode)
-        else:
+    for mode in sorted(found, key=lambda m: m.frequency):
+        own = next((g for g in reversed(groups) if _together(mode, g, step)), None)
+        if own is None:
             groups.append([mode])
+        else:
+            own.append(mode)
     least = max(min(2, len(curves)), SHARED * len(curves))
     modes, notes, turning = [], [], abs(speed) / (2 * np.pi)
     for group in groups:
-        if len(group) < least:
+        if len(group) < least or (len(group) < 3 and any(m.damping_ratio is None for m in group)):  # one spike of noise has no width
             continue
         mode = _median(group, step)
         nearest = turning * max(round(mode.frequency / turning), 1) if turning else -np.inf
@@ -63,17 +66,48 @@ def _median(group: Sequence[ModeLine], step: float) -> ModeLine:
     frequency = np.array([m.frequency for m in group])
     damping = np.array([m.damping_ratio for m in group if m.damping_ratio is not None])
     n = len(group)
-    sd = 1.25 * float(np.std(frequency, ddof=1)) / np.sqrt(n) if n >= 3 else max(m.frequency_sd or 0.0 for m in group)
+    sd = 1.25 * float(np.std(frequency, ddof=1)) / np.sqrt(n) if n >= 3 else max(max(m.frequency_sd or 0.0, NEIGHBOURS * _width(m)) for m in group)
     told = len(damping) >= 3 or (n < 3 and len(damping) == n)
     spread = 1.25 * float(np.std(damping, ddof=1)) / np.sqrt(len(damping)) if len(damping) >= 3 else max((m.damping_ratio_sd or 0.0 for m in group), default=0.0)
     ratio = float(np.median(damping)) if told else None
     return ModeLine("", "unknown", float(np.median(frequency)), max(sd, LEAST_SD * step), ratio, max(spread, 0.02 * ratio) if ratio else None)
 
 
-def _fitted(frequency: Array, size: Array, top: int, step: float) -> ModeLine | None:
-    """One mode on a constant through the lines about a peak above a third of it, seven at least."""
-    near = np.arange(max(top - AROUND, 0), min(top + AROUND + 1, len(size)))
-    lines = [k for k in near if size[k] > 0.3 * size[top] or abs(k - top) <= 3]
+def _together(mode: ModeLine, group: Sequence[ModeLine], step: float) -> bool:
+    away = mode.frequency - float(np.median([m.frequency for m in group]))
+    return away <= min(_reach(mode, step), max(_reach(m, step) for m in group))
+
+
+def _reach(mode: ModeLine, step: float) -> float:
+    """How far (Hz) another FRF's peak may stand from this one and be the same mode's."""
+    return max(1.5 * step, TOGETHER * _width(mode))
+
+
+def _width(mode: ModeLine) -> float:
+    """Half-power width, Hz; 0 where no damping was found."""
+    return 2 * (mode.damping_ratio or 0.0) * mode.frequency
+
+
+def _peak(frequency: Array, size: Array, top: int, drop: float, step: float) -> ModeLine | None:
+    """The mode of a peak, from its flanks up to a half-power width on each side, or where that is a hump of several from twelve lines.
+
+    The half-power width w is that of the steeper flank, which a mode alone leaves at the share h of its height at w / 2 sqrt(1/h^2 - 1) off its peak;
+    h is that of the higher of the valleys beside it, if that is above a third.
+    """
+    height = max(LOWEST, float(np.exp(-drop)))
+    low = np.flatnonzero(size <= height * size[top])
+    k = int(np.searchsorted(low, top))
+    steeper = min(np.abs(low[max(k - 1, 0) : k + 1] - top), default=len(size))
+    reach = round(2 * steeper / np.sqrt(1 / height**2 - 1))
+    wide = _fitted(frequency, size, top, reach, step) if reach > AROUND else None
+    return wide or _fitted(frequency, size, top, AROUND, step)
+
+
+def _fitted(frequency: Array, size: Array, top: int, reach: int, step: float) -> ModeLine | None:
+    """One mode on a constant through the lines within `reach` of a peak that stand above a third of it, seven at least; None where that is no mode, or lies off the peak by half
+    its half-power width."""
+    near = np.arange(max(top - reach, 0), min(top + reach + 1, len(size)))
+    lines = near[(size[near] > LOWEST * size[top]) | (np.abs(near - top) <= 3)]
     x, y = frequency[lines], size[lines] / size[top]
 
     def left(p: Array) -> Array:
@@ -83,7 +117,7 @@ def _fitted(frequency: Array, size: Array, top: int, step: float) -> ModeLine | 
     limits = np.array([[0.5, -20.0, -np.inf, -np.inf, -np.inf], [2.0, 3.0, np.inf, np.inf, np.inf]])  # ln damping of 1e-9 to 20
     fit = least_squares(left, [1.0, np.log(0.01), 0.02, 0.0, 0.0], x_scale=[1e-3, 1.0, 0.1, 0.1, 0.1], bounds=limits, max_nfev=200)
     damping, found = float(np.exp(fit.x[1])), float(fit.x[0] * frequency[top])
-    if abs(found - frequency[top]) > 2 * step or not 1e-6 < damping < HEAVY or len(lines) < 7:
+    if abs(found - frequency[top]) > max(2 * step, damping * found) or not 1e-6 < damping < HEAVY or len(lines) < 7:
         return None
     covariance = np.linalg.pinv(fit.jac.T @ fit.jac) * 2 * fit.cost / max(len(lines) - 5, 1)
     sd, relative = float(np.sqrt(covariance[0, 0]) * frequency[top]), float(np.sqrt(covariance[1, 1]))

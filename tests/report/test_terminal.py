@@ -32,6 +32,22 @@ def test_the_terminal_promises_what_there_is(run: Run):
     assert "-: no peak was found. The hammer strikes node" in said[1]
 
 
+@pytest.mark.parametrize(
+    ("verb", "sentence"),
+    [
+        (("table", "hdd_2003"), "From 20 to 60 C at 0 rpm: lower preload 16.00 to 8.00 N, radial stiffness"),
+        (("table", "hdd_2003", "--temperatures", "20"), "At 20 C at 0 rpm: lower preload 16.00 N, radial stiffness"),
+        (("warmup", "hdd_2003"), "In the steady state the bearings are at lower 27.0 C, upper 28.0 C, the preload of lower goes from 16.00 to 14.76 N"),
+        (("impact", "hdd_2003", "--element", "reduced"), "8 modes were found, 8 of the 8 that the model has from 400 to 6000 Hz; furthest off is that at 5551.47 Hz"),
+    ],
+    ids=lambda x: x[0] if isinstance(x, tuple) else "",
+)
+def test_a_sentence_comes_before_the_table(verb, sentence, capsys):
+    """What came out, in one sentence, and then the numbers."""
+    assert main(list(verb)) == 0
+    assert " ".join(capsys.readouterr().out.split()).startswith(sentence)
+
+
 # ---------------------------------------------------------------- pictures
 
 
