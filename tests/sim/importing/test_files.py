@@ -14,6 +14,8 @@ from thermospindle.report.verbs.importing import bring
 from thermospindle.sim.campaign.campaign import read_campaign
 from thermospindle.sim.campaign.uff import write_frf
 from thermospindle.sim.identification.frf import out_of
+from thermospindle.sim.importing.files.reading import content
+from thermospindle.sim.importing.mapping import FileForm
 
 
 @pytest.mark.parametrize("form", ["real", "phase", "decibel"])
@@ -231,3 +233,34 @@ def test_standard_errors_of_coherence_and_averages(tmp_path):
         sizes.append(read_campaign(tmp_path / f"c{n}").tests[0].frf.sd)
     np.testing.assert_allclose(sizes[0], np.abs(FRF.value) * np.sqrt(0.1 / 0.9 / 4), rtol=1e-6)
     np.testing.assert_allclose(sizes[1], sizes[0] / 10, rtol=1e-6)
+
+
+UNITS_MM = """    -1
+   164
+         5SI - mm/milli-newton         2
+  1.0000000000000000D+03  1.0000000000000000D+03  1.0000000000000000D+00
+  2.7314999999999998D+02
+    -1
+"""
+GEOMETRY_2411 = """    -1
+  2411
+         1         1         1        11
+   1.2000000000000000D+01   0.0000000000000000D+00   2.0000000000000000D+01
+       305         1         1        11
+   0.0000000000000000D+00  -1.2500000000000000D+01   1.5000000000000000D+01
+    -1
+"""
+
+
+def test_geometry_of_data_set_2411(tmp_path):
+    """Nodes in double precision, as newer programs write them: in metres where data set 164 has told the unit, and untaken where none has."""
+    (tmp_path / "mm.unv").write_text(UNITS_MM + GEOMETRY_2411)
+    (tmp_path / "bare.unv").write_text(GEOMETRY_2411)
+    told = content(tmp_path / "mm.unv", FileForm(file="x"))
+    assert sorted(told.places) == [1, 305]
+    assert told.places[1] == pytest.approx((0.012, 0.0, 0.020))
+    assert told.places[305] == pytest.approx((0.0, -0.0125, 0.015))
+    assert told.unscaled == {}
+    bare = content(tmp_path / "bare.unv", FileForm(file="x"))
+    assert bare.places == {}
+    assert bare.unscaled[305] == pytest.approx((0.0, -12.5, 15.0))
