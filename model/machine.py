@@ -79,10 +79,11 @@ class HammerTest:
 
 @dataclass(frozen=True)
 class Convection:
-    """Convection to the chamber air on the exposed faces of `regions`."""
+    """Convection on the exposed faces of `regions`, to the chamber air, or to a coolant at a temperature of its own."""
 
     regions: tuple[str, ...]
     coefficient: float  # W/(m2 K)
+    coolant: float | None = None  # C
 
 
 @dataclass(frozen=True)

@@ -107,7 +107,7 @@ def warm_up(
     left_out = tuple(effect.name for effect, _ in of_scene(spindle) if effect.temperatures)
     drawn = drawing(spindle, Condition(start, speed), effects)
     model = conduction.model(drawn, influence(drawn).sections)
-    if not model.film.any():
+    if not model.cooled.any():
         raise BadInput(f"{spindle.file or spindle.name}: thermal.convection: cools no face, so the spindle would heat up without end")
     machine = _Machine(spindle, speed, effects, reading(model))
 

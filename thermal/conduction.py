@@ -1,6 +1,6 @@
 """The discrete heat equation of both parts together, with second-order elements.
 
-C dT/dt + K T = motor loss + bearing friction + film x air temperature. K couples the parts: by rank one through each bearing,
+C dT/dt + K T = motor loss + bearing friction + film x air temperature + bath. K couples the parts: by rank one through each bearing,
 its conductance times the difference of the two mean raceway temperatures, and point by point at equal height (or radius)
 across air gaps. Half of a bearing's friction heat enters each raceway face, motor loss the volume of its regions, both evenly.
 Chamber air reaches neither the raceways nor those parts of exposed faces that look at each other across a gap.
@@ -45,7 +45,7 @@ class HeatModel:
     """Discrete heat equation over the nodes of all parts, in the order of `sections`; W, K, J, whole turns (2 pi included).
 
     `conduction`, `convection`, `exchange` (bearings and gaps) add up to K; `capacity` is C. `film` is convection's load for air
-    1 K above zero, `motor[s]` the load of heat source s for 1 W, `bearing[b]` that of 1 W of friction in bearing b. The same
+    1 K above zero, `bath` that of coolants at their own temperatures, `motor[s]` the load of heat source s for 1 W, `bearing[b]` that of 1 W of friction in bearing b. The same
     vector reads a bearing's temperature, the mean of its two raceway means.
     """
 
@@ -57,12 +57,18 @@ class HeatModel:
     exchange: csr_array
     capacity: csr_array
     film: np.ndarray  # (nodes,)
+    bath: np.ndarray  # (nodes,)
     motor: np.ndarray  # (sources, nodes)
     bearing: np.ndarray  # (bearings, nodes)
 
     @cached_property
     def conductance(self) -> csr_array:
         return self.conduction + self.convection + self.exchange
+
+    @cached_property
+    def cooled(self) -> np.ndarray:
+        """Convection (nodes,) in W/K, to air and coolants alike; all zero of a spindle that nothing cools."""
+        return np.asarray(self.convection.sum(axis=1)).ravel()
 
     @cached_property
     def lumped_capacity(self) -> np.ndarray:
@@ -91,8 +97,8 @@ def model(spindle: Spindle, sections: Mapping[str, PartMesh]) -> HeatModel:
     size = int(ends[-1])
     inside = [_conduction(spindle, sections[part], basis) for part, basis in bases.items()]
     films = [_film(spindle, section) for section in sections.values()]
-    convection: csr_array = csr_array(block_diag([matrix for matrix, _ in films]))
-    film = np.concatenate([load for _, load in films])
+    convection: csr_array = csr_array(block_diag([matrix for matrix, _, _ in films]))
+    film, bath = (np.concatenate([loads[k] for loads in films]) for k in (1, 2))
     faces = [_raceways(spindle, bearing, sections, spans) for bearing in spindle.ringed]
     through = [spindle.thermal.friction.conductance * _square(outer - inner) for inner, outer in faces]
     across: list[csr_array] = []
@@ -101,8 +107,8 @@ def model(spindle: Spindle, sections: Mapping[str, PartMesh]) -> HeatModel:
         exchange, faces_of_gap = _gap(spindle, gap, sections, spans)
         across.append(exchange)
         hidden += faces_of_gap
-    for matrix, load in (_film_behind(spindle, face) for face in _apart(hidden)):
-        convection, film = convection - matrix, film - load
+    for matrix, of_air, of_coolant in (_film_behind(spindle, face) for face in _apart(hidden)):
+        convection, film, bath = convection - matrix, film - of_air, bath - of_coolant
     sources = [np.concatenate([_volume(s, h.regions) for s in sections.values()]) for h in spindle.thermal.sources]
     return HeatModel(
         spindle,
@@ -113,6 +119,7 @@ def model(spindle: Spindle, sections: Mapping[str, PartMesh]) -> HeatModel:
         exchange=csr_array(sum([*through, *across], start=csr_array((size, size)))),
         capacity=csr_array(block_diag([c for _, c in inside])),
         film=film,
+        bath=bath,
         motor=np.array([s / s.sum() for s in sources]).reshape(-1, size),
         bearing=np.array([(inner + outer) / 2 for inner, outer in faces]).reshape(-1, size),
     )
@@ -130,16 +137,20 @@ def _conduction(spindle: Spindle, section: PartMesh, basis: Basis) -> tuple[csr_
     return 2 * np.pi * conduct.assemble(basis, coefficient=conductivity), 2 * np.pi * mass.assemble(basis, coefficient=capacity)
 
 
-def _film(spindle: Spindle, section: PartMesh) -> tuple[csr_array, np.ndarray]:
-    """Convection matrix (W/K) of one part and its load (W) for air 1 K above zero, as if there were no air gaps."""
+def _film(spindle: Spindle, section: PartMesh) -> tuple[csr_array, np.ndarray, np.ndarray]:
+    """Convection matrix (W/K) of one part and its loads (W) for air 1 K above zero and of coolants, as if there were no air gaps."""
     size = Basis(section.mesh, element(section.mesh)).N
     races = [section.race(race.ring, race.r, race.z) for race in influence.races(spindle, section.part)]
-    matrix, load = csr_array((size, size)), np.zeros(size)
+    matrix, film, bath = csr_array((size, size)), np.zeros(size), np.zeros(size)
     for c in spindle.thermal.convections:
         if (facets := np.setdiff1d(section.exposed(c.regions), np.concatenate([[], *races]).astype(int))).size:
             matrix = matrix + 2 * np.pi * mass.assemble(_face(section, facets), coefficient=c.coefficient)
-            load += 2 * np.pi * supply.assemble(_face(section, facets), coefficient=c.coefficient)
-    return matrix, load
+            load = 2 * np.pi * supply.assemble(_face(section, facets), coefficient=c.coefficient)
+            if c.coolant is None:
+                film += load
+            else:
+                bath += c.coolant * load
+    return matrix, film, bath
 
 
 def _raceways(
@@ -186,10 +197,13 @@ class GapFace:
     area: np.ndarray
 
 
-def _film_behind(spindle: Spindle, face: GapFace) -> tuple[csr_array, np.ndarray]:
-    """Convection matrix and load of a gap's face, which chamber air does not reach."""
-    film = sum(c.coefficient for c in spindle.thermal.convections if face.region in c.regions)
-    return csr_array(face.rows.T @ diags_array(film * face.area) @ face.rows), film * face.area @ face.rows
+def _film_behind(spindle: Spindle, face: GapFace) -> tuple[csr_array, np.ndarray, np.ndarray]:
+    """Convection matrix and loads of a gap's face, which neither chamber air nor a coolant reaches."""
+    own = [c for c in spindle.thermal.convections if face.region in c.regions]
+    air = sum(c.coefficient for c in own if c.coolant is None)
+    coolant = sum(c.coefficient * c.coolant for c in own if c.coolant is not None)
+    matrix = csr_array(face.rows.T @ diags_array(sum(c.coefficient for c in own) * face.area) @ face.rows)
+    return matrix, air * face.area @ face.rows, coolant * face.area @ face.rows
 
 
 def _apart(faces: Sequence[GapFace]) -> Sequence[GapFace]:

@@ -107,7 +107,7 @@ def steady(model: HeatModel, drive: Running) -> TemperatureField:
 
 def settled(model: HeatModel, drive: Callable[[np.ndarray], Running], start: float) -> TemperatureField:
     """The steady temperature under loads that follow it, sought from a uniform `start` (C): raises as `steady`, and NotSettled where the two do not meet."""
-    if not model.film.any():
+    if not model.cooled.any():
         raise ValueError("a spindle without convection has no steady temperature")
     nothing = np.zeros(model.film.size)
     return model.field(_agreed(model, 0.0, nothing, nothing + start, drive)[0])
@@ -189,7 +189,7 @@ def slowest(model: HeatModel, temperature: TemperatureField, drive: Running) -> 
         csr_array(model.conductance.shape),
     )
     value = eigsh(
-        csc_array(model.conductance + feedback), k=1, M=csc_array(model.capacity), sigma=0.0, v0=model.film, return_eigenvectors=False
+        csc_array(model.conductance + feedback), k=1, M=csc_array(model.capacity), sigma=0.0, v0=model.cooled, return_eigenvectors=False
     )
     return float(1 / value[0])
 
@@ -269,7 +269,7 @@ def flows(model: HeatModel, temperature: np.ndarray | TemperatureField, drive: R
     return HeatFlows(
         motor=float(motor_heat(model, drive).sum()),
         friction=float(friction_heat(model, nodal, drive).sum()),
-        convection=float((model.convection @ nodal - model.film * drive.air).sum()),
+        convection=float((model.convection @ nodal - model.film * drive.air - model.bath).sum()),
         crossing=float(crossing[model.spans["rotating"]].sum()) if "rotating" in model.spans else 0.0,
     )
 
@@ -289,7 +289,7 @@ def friction_heat(model: HeatModel, nodal: np.ndarray, drive: Running) -> np.nda
 
 
 def _outer_load(model: HeatModel, drive: Running) -> np.ndarray:
-    return model.film * drive.air + motor_heat(model, drive) @ model.motor
+    return model.film * drive.air + model.bath + motor_heat(model, drive) @ model.motor
 
 
 def _values(flow: HeatFlows) -> tuple[float, float, float, float]:

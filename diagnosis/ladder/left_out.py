@@ -73,9 +73,9 @@ def unseen(model: CampaignModel, group: LeftOut) -> CampaignModel:
 def _without(model: CampaignModel, t: int, group: LeftOut) -> TestData:
     data = model.tests[t]
     if isinstance(data, ModeData) and t in group.modes and not group.modes[t].all():
-        kept = ~group.modes[t]
-        columns = (data.frequency, data.frequency_sd, data.damping, data.damping_sd)
-        return ModeData(data.test, data.condition, *(column[kept] for column in columns), tuple(np.array(data.kind)[kept].tolist()))
+        kept = np.flatnonzero(np.logical_not(group.modes[t]))
+        frequency, frequency_sd, damping, damping_sd = (column[kept] for column in (data.frequency, data.frequency_sd, data.damping, data.damping_sd))
+        return ModeData(data.test, data.condition, frequency, frequency_sd, damping, damping_sd, tuple(data.kind[i] for i in kept.tolist()))
     nothing = np.zeros((0 if not isinstance(data, LineData) else len(data.value), len(model.scenes[t].hammer.hammer_nodes), 0))
     quantity = data.quantity if isinstance(data, LineData) else "receptance"
     return LineData(data.test, data.condition, np.zeros(0), nothing.astype(complex), nothing, quantity, "left out", 0)

@@ -142,6 +142,9 @@ def content_hash(spindle: Spindle) -> str:
         content.pop("radial_load_z")
     if not content["roller_bearings"]:
         content.pop("roller_bearings")
+    for film in content["thermal"]["convections"]:
+        if film["coolant"] is None:
+            film.pop("coolant")
     for damped in (*content["structure"]["joints"], *content["structure"]["shafts"]):
         if not damped["loss_factor"]:
             damped.pop("loss_factor")
@@ -227,7 +230,8 @@ def _with_shafts(file: Path, spindle: Spindle) -> Spindle:
     for shaft in spindle.structure.shafts:
         for segment in shaft.segments:
             if segment.material not in spindle.materials:
-                raise BadInput(f"{file}: shafts.{shaft.name}.material = {segment.material!r}: allowed are {', '.join(spindle.materials)}")
+                key = "material" if len({s.material for s in shaft.segments}) == 1 else "materials"
+                raise BadInput(f"{file}: shafts.{shaft.name}.{key} = {segment.material!r}: allowed are {', '.join(spindle.materials)}")
     names = [s.name for s in spindle.structure.shafts]
     for name in names:
         if names.count(name) > 1:

@@ -42,7 +42,8 @@ FINEST = 500
 
 class ShaftForm(Table):
     name: Name
-    material: str
+    material: str = ""
+    materials: Annotated[list[str], Field(max_length=300)] = Field(default_factory=list)
     start_z_mm: Place = 0.0
     outer_mm: Annotated[list[Piece], Field(max_length=300)] = Field(default_factory=list)
     bore_mm: Annotated[list[Piece], Field(max_length=300)] = Field(default_factory=list)
@@ -62,6 +63,7 @@ class ShaftForm(Table):
     def _drawn_whole(self) -> ShaftForm:
         one_damping(self.damping_ratio, self.loss_factor)
         self._one_section()
+        self._one_material()
         length = self.length_mm
         whole, other = ("width_mm", "") if self.width_mm else ("outer_mm", ", with diameter 0 where there is no bore")
         for key in ("bore_mm", "mass_outer_mm", "height_mm"):
@@ -104,6 +106,14 @@ class ShaftForm(Table):
                 "and here stiffness stands still; allowed is a flat shaft without turns = true"
             )
 
+    def _one_material(self) -> None:
+        """Refuses a shaft that is neither of one material nor of one for each of its pieces, or both."""
+        key, pieces = ("width_mm", self.width_mm) if self.width_mm else ("outer_mm", self.outer_mm)
+        if bool(self.material) == bool(self.materials):
+            raise ValueError(f"material and materials: {'both' if self.material else 'neither'} told; allowed is material of the whole shaft, or materials with a name for each piece of {key}")
+        if self.materials and len(self.materials) != len(pieces):
+            raise ValueError(f"materials has {len(self.materials)} names; allowed is one for each of the {len(pieces)} pieces of {key}")
+
     @property
     def length_mm(self) -> float:
         return sum(p[-1] for p in self.outer_mm or self.width_mm)
@@ -115,6 +125,7 @@ class ShaftForm(Table):
         if self.height_mm:
             lists["height"] = self.height_mm
         spans = {key: _spans(pieces) for key, pieces in lists.items()}
+        ends = [b for _, b, _, _ in spans["outer"]]
         cuts = sorted({round(z, 9) for pieces in spans.values() for a, b, _, _ in pieces for z in (a, b)})
         found = []
         for low, high in pairwise(cuts):
@@ -123,7 +134,8 @@ class ShaftForm(Table):
             at = {key: _at(pieces, low, high) for key, pieces in spans.items()}
             z = (self.start_z_mm + low) * MM, (self.start_z_mm + high) * MM
             sides = (2 * at["outer"][0], 2 * at["height"][0]) if self.height_mm else None
-            found.append(Segment(z, at["outer"], at["bore"], at["mass_outer"], self.material, sides))
+            piece = next((k for k, end in enumerate(ends) if (low + high) / 2 < end), len(ends) - 1)
+            found.append(Segment(z, at["outer"], at["bore"], at["mass_outer"], self.material or self.materials[piece], sides))
         return tuple(found)
 
     def ends(self) -> tuple[float, float]:

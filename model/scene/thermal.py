@@ -8,13 +8,14 @@ from typing import Annotated
 from pydantic import Field
 
 from thermospindle.model import machine as m
-from thermospindle.model.scene.fields import LawTable, LawValue, Name, NotNegative, Positive, Table, TwoNames
+from thermospindle.model.scene.fields import LawTable, LawValue, Name, NotNegative, Positive, Table, Temperature, TwoNames
 from thermospindle.model.units import RPM
 
 
 class Convection(Table):
     regions: list[str] = Field(min_length=1)
     coefficient_W_per_m2_K: Positive
+    coolant_temperature_C: Temperature | None = None
 
 
 class Source(Table):
@@ -58,7 +59,7 @@ class Thermal(Table):
     def thermal(self, regions: Sequence[m.Region]) -> m.Thermal:
         """`regions` are those of the section, cooled as assumed where no convection is told."""
         f = self.friction
-        told = tuple(m.Convection(regions=tuple(c.regions), coefficient=c.coefficient_W_per_m2_K) for c in self.convection)
+        told = tuple(m.Convection(regions=tuple(c.regions), coefficient=c.coefficient_W_per_m2_K, coolant=c.coolant_temperature_C) for c in self.convection)
         assumed = tuple(
             m.Convection(regions=tuple(g.name for g in regions if g.part == part), coefficient=film)
             for part, film in (("stationary", STILL_AIR), ("rotating", MOVED_AIR))

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import re
+import tomllib
+
 import numpy as np
 import pytest
 from scipy.linalg import eigh
 from scipy.optimize import brentq
 
+from tests.conftest import ROOT
+from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Law, Material
 from thermospindle.model.rotor.beam import elements, nodes, shear_factor, with_shafts, with_theory
 from thermospindle.model.rotor.chain import RotorBase, joint_element, matrices, motion_rows
 from thermospindle.model.rotor.static import displacement
+from thermospindle.model.scene.reading import build
 from thermospindle.model.shaft import Segment, Shaft, mesh
 from thermospindle.model.structure import Structure
 
@@ -147,3 +153,39 @@ def test_a_force_on_what_nothing_holds_has_no_static_answer():
     moved = displacement(k, np.diag(m), bend)
     assert moved is not None
     assert k @ moved == pytest.approx(bend, abs=1e-6)
+
+
+def two_metals(**keys):
+    """The shipped free shaft in two pieces, 500 mm of steel and 800 mm of a metal half as heavy and a third as stiff, in elements over which that change lies."""
+    path = ROOT / "scenes" / "free_shaft" / "spindle.toml"
+    raw = tomllib.loads(path.read_text(encoding="utf-8"))
+    raw["materials"]["light"] = raw["materials"]["steel"] | {"youngs_modulus_GPa": 69.0, "density_kg_per_m3": 3925.0}
+    raw["measuring"]["points"] = [p for p in raw["measuring"]["points"] if p["position_mm"][2] in (100.0, 1200.0)]
+    shaft = raw["shafts"][0]
+    del shaft["material"]
+    raw["shafts"][0] = shaft | {"outer_mm": [[40.0, 500.0], [40.0, 800.0]], "materials": ["steel", "light"], "longest_element_mm": 2000.0} | keys
+    raw["shafts"][0] = {k: v for k, v in raw["shafts"][0].items() if v is not None}
+    return build(raw, path)
+
+
+def test_each_piece_of_a_shaft_has_its_material():
+    """Mass, and the bending of the middle element, 400 mm of steel and 700 mm of the other, by sums over the pieces: one material a shaft was all that a scene could say."""
+    spindle = two_metals()
+    area, moment = np.pi / 4 * 0.04**2, np.pi / 64 * 0.04**4
+    assert sum(b.mass for b in spindle.structure.bodies) == pytest.approx(area * (7850.0 * 0.5 + 3925.0 * 0.8), rel=1e-12)
+    [middle] = [j for j in spindle.structure.joints if j.name == "shaft 1-2"]
+    assert 1 / middle.stiffness[4] == pytest.approx((0.4 / 207e9 + 0.7 / 69e9) / moment, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({"materials": ["steel"]}, "materials has 1 names; allowed is one for each of the 2 pieces of outer_mm"),
+        ({"material": "steel"}, "material and materials: both told"),
+        ({"materials": None}, "material and materials: neither told"),
+        ({"materials": ["steel", "wood"]}, "shafts.shaft.materials = 'wood': allowed are steel, light"),
+    ],
+)
+def test_materials_that_do_not_fit_the_pieces_are_refused(keys, words):
+    with pytest.raises(BadInput, match=re.escape(words)):
+        two_metals(**keys)

@@ -240,6 +240,38 @@ def test_balance_of_heat_in_time(spindle, reference):
     assert history.heat[-1].friction == 0.0
 
 
+def test_a_jacket_takes_heat_at_its_own_temperature(spindle, reference):
+    """Motor, friction and what a coolant 15 K below the air takes in balance, steady and in every step; a coolant as warm as the air is air; what lies behind an air gap feels neither."""
+    drive = heat.running(spindle, 25.0, 7200 * RPM)
+
+    def jacketed(coolant):
+        films = tuple(replace(c, coolant=coolant) for c in spindle.thermal.convections[:1])
+        own = replace(spindle, thermal=replace(spindle.thermal, convections=(*films, *spindle.thermal.convections[1:])))
+        return conduction.model(own, reference.sections)
+
+    air, same, cold = (jacketed(c) for c in (None, 25.0, 10.0))
+    fields = [m.nodal(heat.steady(m, drive)) for m in (air, same, cold)]
+    assert fields[1] == pytest.approx(fields[0], abs=1e-9)
+    assert np.all(fields[2] < fields[0])
+    assert heat.flows(cold, fields[2], drive).stored == pytest.approx(0.0, abs=1e-9)
+    area = float((air.film - cold.film).sum())  # W/K of the jacket
+    assert cold.bath.sum() == pytest.approx(10.0 * area, rel=1e-12)
+    assert area > 0
+    history = heat.transient(cold, drive, 25.0, [0, 20, 60, 140, 300])
+    stored = np.diff(history.nodal @ cold.capacity.sum(axis=1))
+    assert [h.stored for h in history.heat] == pytest.approx(stored, abs=1e-7 * np.abs(stored).max())
+    assert heat.transient(cold, drive, 25.0, np.linspace(0, 7200, 21)).nodal[-1] == pytest.approx(fields[2], abs=1e-3)
+
+
+def test_a_coolant_at_zero_cools(spindle):
+    """All faces at 0 C of water, whatever the air: a disc without heat goes there."""
+    part = Region("body", "stationary", "metal", (0, 10e-3), (0, 16e-3))
+    own = bare(spindle, part, metal=material())
+    own = replace(own, thermal=replace(own.thermal, convections=(Convection(("body",), 50.0, coolant=0.0),)))
+    model = conduction.model(own, {"stationary": section_mesh(own, "stationary", 4e-3)})
+    assert model.nodal(heat.steady(model, heat.Running(air=30.0, speed=0.0, loads={}))) == pytest.approx(0.0, abs=1e-9)
+
+
 def test_running_up_ends_steady_and_is_second_order_with_friction(spindle, reference):
     drive = heat.running(spindle, 25.0, 7200 * RPM)
     steady = reference.nodal(heat.steady(reference, drive))

@@ -18,14 +18,15 @@ def measurement(spindle: Spindle, condition: Condition, values: Values, chain: R
     if channel:
         meant = np.arange(len(spindle.points)) + 1 == channel
     else:
-        meant = np.array([spindle.structure.body(p.body).turns for p in spindle.points])
+        turning = np.array([spindle.structure.body(p.body).turns for p in spindle.points])
+        meant = turning if turning.any() else np.ones(len(turning), bool)
     return replace(measurement, gain=measurement.gain * np.where(meant, 1 + gain, 1 + rest))
 
 
 EFFECT = Effect(
     name="sensor_gain",
     title="Gain of the response channels off by more than their tolerance",
-    equation="Y_i(omega) -> (1 + g_i) Y_i(omega), g = gain on points of the turning body, or on one channel, rest_gain on all others",
+    equation="Y_i(omega) -> (1 + g_i) Y_i(omega), g = gain on points of the turning body (on all, where no point is on one), or on one channel, rest_gain on all others",
     parameters=(
         Parameter(
             "gain",
@@ -47,7 +48,7 @@ EFFECT = Effect(
             meaning="relative gain error of all other channels",
             source="calibration of the other sensor type, same size",
         ),
-        channel_parameter("which channel reads gain: 0 all on the turning part, 1 the first in the order of the points, and so on"),
+        channel_parameter("which channel reads gain: 0 all on the turning part (all, where none is there), 1 the first in the order of the points, and so on"),
     ),
     sees=(
         "shapes of all modes show too much or too little at one group of points, by the same factor in every test; frequencies and "

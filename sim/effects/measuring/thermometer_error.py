@@ -13,6 +13,13 @@ def condition(spindle: Spindle, condition: Condition, values: Values) -> Conditi
     return replace(condition, temperature=condition.temperature + offset) if offset else condition
 
 
+def idle(spindle: Spindle) -> str | None:
+    """Rings that move, bearings told over temperature and effects of the scene depend on it; parts are at the reference otherwise, their moduli too."""
+    if spindle.rolling or spindle.effects or any(len(b.temperature) > 1 for b in spindle.linear_bearings):
+        return None
+    return "nothing of this scene depends on temperature"
+
+
 EFFECT = Effect(
     name="thermometer_error",
     title="Thermometers read wrong by more than their tolerance",
@@ -36,4 +43,5 @@ EFFECT = Effect(
     resembles=("soak_lag", "expansion_mismatch", "modulus_softening"),
     valid="the whole spindle at one temperature; the offset changes from test to test as the data have it, and not within one",
     condition=condition,
+    idle=idle,
 )

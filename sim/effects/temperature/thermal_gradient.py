@@ -90,7 +90,7 @@ def _unit_rise(question: Conduction) -> UnitRise:
     from thermospindle.thermal.influence import influence  # finite elements, which the catalogue is read without
 
     model = conduction.model(question.spindle, influence(question.spindle).sections)
-    if not model.film.any():
+    if not model.cooled.any():
         raise ValueError("a spindle without convection has no steady temperature")
     rise = scipy.sparse.linalg.splu(scipy.sparse.csc_array(model.conductance), permc_spec="MMD_AT_PLUS_A").solve(np.ascontiguousarray(model.bearing.T)).T
     means = [model.field(r).region_means() for r in rise]

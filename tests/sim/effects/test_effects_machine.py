@@ -187,6 +187,10 @@ def test_a_spindle_without_hub_expands_in_its_housing(machine):
         ("ball_material", "templates/grinding", "nothing to act on here: its balls are ceramic already"),
         ("taper_contact", "five_bearing", "nothing to act on here: the scene has no joint with role 'holder'"),
         ("shaft_bending", "five_bearing", "outside its validity here"),
+        ("thermometer_error", "mk7702", "nothing to act on here: nothing of this scene depends on temperature"),
+        ("thermometer_error", "free_shaft", "nothing to act on here: nothing of this scene depends on temperature"),
+        ("thermometer_error", "tailstock", None),
+        ("sensor_gain", "free_shaft", None),
     ],
 )
 def test_an_effect_says_where_it_has_nothing_to_act_on(name, scene, words):

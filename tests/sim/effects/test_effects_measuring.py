@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
+from tests.conftest import ROOT
 from tests.effect_points import RUNNING, at
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.chain import matrices
 from thermospindle.model.rotor.modes import frf, point_rows, poles
+from thermospindle.model.scene.reading import load
 from thermospindle.sim.effects.bearing import bond_softening
 from thermospindle.sim.effects.measuring import channel_delay, hammer_position, sensor_gain, thermometer_error, window_damping
 from thermospindle.sim.operating import operating_point
@@ -122,3 +124,11 @@ def test_hammer_position_breaks_reciprocity(spindle):
     assert np.abs(b[first] - b[second]).max() > 0.01 * np.abs(b[first]).max()
     rows = (missed.measurement.response_rows, missed.measurement.reference_rows)
     assert b == pytest.approx(frf(matrices(still.chain), *rows, LINES, "mobility"), rel=1e-6)
+
+
+def test_a_gain_is_that_of_all_channels_where_nothing_turns():
+    """Typical gain on a shaft that hangs free was added and changed nothing: no channel is on a turning part."""
+    shaft = load(ROOT / "scenes" / "free_shaft")
+    frequency = np.array([200.0])
+    read = operating_point(shaft, Condition(20.0), [(sensor_gain.EFFECT, sensor_gain.EFFECT.typical())]).frf(frequency)
+    assert read == pytest.approx(1.05 * operating_point(shaft, Condition(20.0), ()).frf(frequency), rel=1e-12)
