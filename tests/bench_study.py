@@ -17,9 +17,7 @@ import argparse
 import os
 import tempfile
 import time
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +27,7 @@ from rich.console import Console
 from rich.table import Table
 
 from tests.conftest import SCENE
+from thermospindle.model import parallel
 from thermospindle.model.scene.fields import read_file
 from thermospindle.model.scene.reading import load
 from thermospindle.sim.effects import CATALOGUE
@@ -105,12 +104,11 @@ def on_cores(workers: int, draws: int, folder: Path) -> tuple[float, float, floa
     time (s) of its cases done here one by one."""
     of = small_study(folder)
     parts = range(draws // PER_PART)
-    with pool(workers) as at_once:
-        list(at_once.map(partial(part, of), range(2 * workers)))  # imports, and what is computed once
-        share, began = share_of_a_core(), time.perf_counter()
-        list(at_once.map(partial(part, of), parts))
-        wall = time.perf_counter() - began
-        share = (share + share_of_a_core()) / 2
+    parallel.in_parallel(partial(part, of), range(2 * workers), workers)  # imports, and what is computed once
+    share, began = share_of_a_core(), time.perf_counter()
+    parallel.in_parallel(partial(part, of), parts, workers)
+    wall = time.perf_counter() - began
+    share = (share + share_of_a_core()) / 2
     busy = time.process_time()
     for k in parts:
         part(of, k)
@@ -119,11 +117,6 @@ def on_cores(workers: int, draws: int, folder: Path) -> tuple[float, float, floa
 
 def part(of: Cases, k: int) -> int:
     return sum(len(of.rows(case)) for case in range(k * PER_PART, (k + 1) * PER_PART))
-
-
-def pool(workers: int) -> ProcessPoolExecutor:
-    """Of processes started afresh, as the program's own are."""
-    return ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
 
 
 def cores_told(console: Console, draws: int) -> None:
