@@ -1,6 +1,7 @@
 """What a study costs on many workers: measured parts, a model of the whole, and the model against a simulated cluster.
 
     python -m tests.bench_study [--picture FILE.png]
+    python -m tests.bench_study --cores [--draws N]      # the same study by 1 and by 2 worker processes of this machine, and nothing else
 
 The model. A study of N parts on n workers takes, with t the work of a part and s what the one process that hands out and writes needs for it,
 
@@ -13,6 +14,7 @@ scheduler, client and writing, with threads that sleep instead of computing: a s
 from __future__ import annotations
 
 import argparse
+import os
 import tempfile
 import time
 from functools import partial
@@ -25,6 +27,7 @@ from rich.console import Console
 from rich.table import Table
 
 from tests.conftest import SCENE
+from thermospindle.model import parallel
 from thermospindle.model.scene.fields import read_file
 from thermospindle.model.scene.reading import load
 from thermospindle.sim.effects import CATALOGUE
@@ -36,6 +39,7 @@ from thermospindle.sim.study.rows import Cases, cases
 STUDY = 'title = "t"\nkind = "monte-carlo"\nscene = "hdd_2003"\ntemperatures_C = [20, 60]\ndraws = 1000\n'
 WORKERS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1000)
 CHUNKS = (1, 64, 1000)
+PER_PART = 64  # cases, as a study has by default
 START = 3.0  # s: a worker process with its imports, measured 1.6 to 3.1 s
 
 
@@ -95,10 +99,48 @@ def model(workers: int, parts: int, work: float, serial: float, start: float = 0
     return start + max(parts * serial, -(-parts // workers) * work) + min(serial, work)
 
 
+def on_cores(workers: int, draws: int, folder: Path) -> tuple[float, float, float]:
+    """Wall time (s) of a study by so many processes that have started and imported, the share of a core that one process got before and after, and the processor
+    time (s) of its cases done here one by one."""
+    of = small_study(folder)
+    parts = range(draws // PER_PART)
+    parallel.in_parallel(partial(part, of), range(2 * workers), workers)  # imports, and what is computed once
+    share, began = share_of_a_core(), time.perf_counter()
+    parallel.in_parallel(partial(part, of), parts, workers)
+    wall = time.perf_counter() - began
+    share = (share + share_of_a_core()) / 2
+    busy = time.process_time()
+    for k in parts:
+        part(of, k)
+    return wall, share, time.process_time() - busy
+
+
+def part(of: Cases, k: int) -> int:
+    return sum(len(of.rows(case)) for case in range(k * PER_PART, (k + 1) * PER_PART))
+
+
+def cores_told(console: Console, draws: int) -> None:
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
+    table = Table("processes", "wall, s", "speed-up", "share of a core for one process", "processor time of the cases, s", show_edge=False)
+    first = None
+    for workers in (1, 2):
+        with tempfile.TemporaryDirectory() as place:
+            wall, share, busy = on_cores(workers, draws, Path(place))
+        first = first or wall
+        table.add_row(str(workers), f"{wall:.1f}", f"{first / wall:.2f}", f"{share:.2f}", f"{busy:.1f}")
+    console.print(f"{draws} draws of hdd_2003 at two conditions, {PER_PART} a part; {os.cpu_count()} cores, load {load:.1f} at the start (0 on a quiet machine)")
+    console.print(table)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser()
+    parser.add_argument("--cores", action="store_true")
+    parser.add_argument("--draws", type=int, default=1024)
     parser.add_argument("--picture", type=Path)
     asked, console = parser.parse_args(), Console()
+    if asked.cores:
+        cores_told(console, asked.draws)
+        return
     with tempfile.TemporaryDirectory() as place:
         of = small_study(Path(place))
         case, rows = of_a_case(of)

@@ -1,7 +1,8 @@
-"""`python -m tests.blind.study --seeds A B [--out FILE.jsonl]`: campaigns A to B - 1, made and diagnosed, a line of JSON each.
+"""`python -m tests.blind.study --seeds A B [--out FILE.jsonl] [--cluster ADDRESS]`: campaigns A to B - 1, made and diagnosed, a line of JSON each.
 
 A seed is a campaign, wherever and whenever it is run: scene, tests, world, hidden physics and noise follow from it. Seeds that are in the file
-already are passed over, so that the study can be stopped and goes on where it was.
+already are passed over, so that the study can be stopped and goes on where it was. On a Dask cluster a campaign is a task: its workers are started in this
+repository (`PYTHONPATH=. dask worker ...`), at the same commit; rows come in the order in which they are done.
 """
 
 from __future__ import annotations
@@ -15,8 +16,10 @@ import json
 import subprocess
 import time
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -45,6 +48,8 @@ from thermospindle.model.scene.reading import load
 from thermospindle.report.text.diagnosis.answer import diagnosis_json
 from thermospindle.sim.effects import CATALOGUE, usable
 from thermospindle.sim.effects.own import effect_of
+from thermospindle.sim.study.executors import on_cluster
+from thermospindle.sim.study.parts import versions
 
 ROOT = Path(__file__).parents[2]
 SCENES = ("scenes/hdd_2003", "tests/scenes/symmetric", "tests/scenes/inner_turning_spring")
@@ -217,20 +222,35 @@ def main() -> None:
     parser.add_argument(
         "--without", nargs="+", default=[], choices=[f.name for f in fields(World) if f.name != "seed"], help="of the world"
     )
+    parser.add_argument("--cluster", metavar="ADDRESS", help="of a Dask scheduler, as of `spindle study`")
     options = parser.parse_args()
     options.out.parent.mkdir(parents=True, exist_ok=True)
+    from tests.blind import study as own  # workers find it by this name, not as __main__
+
     at = commit()
     done = {(r["seed"], tuple(r["without"])) for r in read([options.out])}
-    for seed in range(*options.seeds):
-        if (seed, tuple(options.without)) in done:
-            continue
-        row = judge(seed, options.without) | {"commit": at}
+    seeds = [seed for seed in range(*options.seeds) if (seed, tuple(options.without)) not in done]
+
+    def take(seed: int, row: dict[str, Any]) -> None:
         with options.out.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(row) + "\n")
+            file.write(json.dumps(row | {"commit": at}) + "\n")
         hidden = " + ".join(f"{h} {s:.3g} {u}" for h, s, u in zip(row["hidden"], row["sizes"], row["units"], strict=True)) or "nothing"
         print(
             f"{seed} {Path(row['scene']).name}: {hidden}: {row['verdict']} {' '.join(row['effects'])} ({row['seconds']:.0f} s)", flush=True
         )
+
+    with on_cluster(options.cluster, own.versions_and_commit) if options.cluster else nullcontext(one_by_one) as run:
+        run(partial(own.judge, without=options.without), seeds, take)
+
+
+def one_by_one(function: Callable[[int], Any], numbers: Sequence[int], done: Callable[[int, Any], None]) -> None:
+    """An executor of `sim.study` that does them here: a diagnosis takes all cores itself."""
+    for k in numbers:
+        done(k, function(k))
+
+
+def versions_and_commit() -> dict[str, str]:
+    return versions() | {"commit": commit()}
 
 
 if __name__ == "__main__":
