@@ -80,7 +80,7 @@ def _further(below: Step, r: Step) -> str:
 
 
 def _effects(found: Ladder) -> Iterator[str]:
-    diagnosed = () if found.diagnosis is None or found.diagnosis.verdict.word not in NAMING else found.diagnosis.verdict.effects
+    named = () if found.diagnosis is None or found.diagnosis.verdict.word not in NAMING else found.diagnosis.verdict.effects
     for r in (r for r in found.steps if r.effects):
         below = found.step(r.above)
         gain = r.evidence - below.evidence
@@ -93,7 +93,7 @@ def _effects(found: Ladder) -> Iterator[str]:
             verdict = f"is not established: a constant error of every frequency is likelier by {evidence(-constant)} in ln evidence"
         elif gain > CLEAR:
             verdict = "is supported"
-        elif gain > 0 and set(own) <= set(diagnosed):
+        elif gain > 0 and set(own) <= set(named):
             verdict = f"is what the diagnosis names, which weighs it against all others; the {CLEAR:g} in ln evidence asked of a step alone it does not reach"
         elif gain > 0:
             verdict = f"is not established: {CLEAR:g} in ln evidence is asked"
