@@ -48,7 +48,7 @@ def test_every_bearing_has_an_entry(capsys: pytest.CaptureFixture[str]) -> None:
         (f"warmup {FREE}", "section: there are none"),
         (f"runout {FREE} --speed 100", "nothing turns"),
         (f"map {FREE}", "nothing turns"),
-        (f"impact {FREE}", "steps of"),
+        (f"impact {FREE} --element linear", "steps of"),
         (f"static {ROOT / 'scenes' / 'hdd_2003'} --beam timoshenko", "shafts: there are none"),
         (f"static {ROOT / 'scenes' / 'hdd_2003'} --bearings rated", "has no rated_radial_stiffness_N_per_um"),
     ],

@@ -19,7 +19,7 @@ ABOVE_NOISE = 7.0  # standard deviations of the lines' own scatter, by which a p
 AROUND = 12  # lines on each side of a peak that its fit sees at least
 LOWEST = 0.3  # of a peak's height, down to which its fit sees lines
 LEAST_SD = 0.05  # of a line: what one number a line can tell of a frequency at best
-NEIGHBOURS = 0.05  # half-power widths by which the flanks of other modes move the peak of one FRF: 0.02 to 0.07 in the models shipped
+NEIGHBOURS = 0.05  # half-power widths by which the flanks of other modes move the peak of one FRF: 0.02 to 0.07 where those of hdd_2003 were taken alone
 HEAVY = 0.2  # damping ratio from which a hump is no mode
 
 

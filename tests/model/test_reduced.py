@@ -70,7 +70,7 @@ def test_modes_of_the_band_are_those_of_the_whole_model(scene: str, rpm: float):
     top = spindle.hammer.band[1]
     few, every = modes(point.chain, highest=top), [m for m in modes(point.chain) if m.frequency <= top]
     assert [(m.kind, m.whirl) for m in few] == [(m.kind, m.whirl) for m in every]
-    np.testing.assert_allclose([m.frequency for m in few], [m.frequency for m in every], rtol=1e-9)
+    np.testing.assert_allclose([m.frequency for m in few], [m.frequency for m in every], rtol=5e-9)
     np.testing.assert_allclose([m.damping_ratio for m in few], [m.damping_ratio for m in every], rtol=1e-7)
     for mode in few:  # of a pair at one frequency any combination is a mode
         alike = np.array([m.shape for m in every if abs(m.frequency - mode.frequency) < 1e-6 * mode.frequency]).T
