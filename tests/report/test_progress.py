@@ -40,7 +40,7 @@ def test_long_work_tells_plain_lines_and_short_work_none(impatient: None, capsys
     assert capsys.readouterr().err == ""
 
 
-@pytest.mark.parametrize("verb", ["compare", "ladder"])
+@pytest.mark.parametrize("verb", ["compare", pytest.param("ladder", marks=pytest.mark.slow)])
 def test_a_verb_in_a_pipe_is_told_from_one_that_hangs(verb: str, impatient: None, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
     """On standard error alone: the answer stays one JSON object. The ladder's lines have its last step."""
 
