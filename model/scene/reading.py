@@ -59,8 +59,8 @@ def scene_path(path: str | Path) -> Path:
     file = path / "spindle.toml" if path.is_dir() else path
     if not file.is_file():
         names = ", ".join(shipped())
-        meant = f"; did you mean {near}?" if (near := _nearest(path)) else ""
-        raise BadInput(f"{path}: no scene there{meant}; expected a folder with spindle.toml, that file, or the name of a shipped scene ({names})")
+        meant = f"; did you mean {near}?" if (near := _nearest(path)) else f"; expected a folder with spindle.toml, that file, or the name of a shipped scene ({names})"
+        raise BadInput(f"{path}: no scene there{meant}")
     return file
 
 
