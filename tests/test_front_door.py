@@ -66,6 +66,18 @@ def test_version_and_help_start_quickly():
     assert subprocess.run([sys.executable, "-c", script], cwd=ROOT, env=HERE, capture_output=True, text=True).stdout == "\n"
 
 
+def test_a_scene_is_begun_without_what_computes(tmp_path):
+    """`new` took a second of processor time, nearly all of it for libraries that it does not ask."""
+    script = (
+        "import sys; from thermospindle.cli import main\n"
+        f"assert main(['new', 'mine', '--like', 'hdd', '--out', {str(tmp_path / 'mine')!r}]) == 0\n"
+        "print(*({'scipy.optimize', 'mujoco', 'skfem', 'matplotlib'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, env=HERE, capture_output=True, text=True)
+    assert done.stdout.splitlines()[-1] == ""
+    assert (tmp_path / "mine" / "spindle.toml").is_file()
+
+
 def test_stopped_while_it_is_loaded():
     """Ctrl-C before the command line stands is no traceback either."""
     script = (

@@ -10,17 +10,11 @@ from typing import Any
 from rich.console import Console
 
 from thermospindle.model.errors import BadInput
-from thermospindle.model.machine import Condition
 from thermospindle.model.scene.fields import read_toml
-from thermospindle.model.scene.reading import SCENES
-from thermospindle.report.check.odd import looked, odd
-from thermospindle.report.check.understood import understood
-from thermospindle.report.check.words import show_check
 from thermospindle.report.folder import whole_folder
 from thermospindle.report.verbs.answer import Answer, answered, with_effects, write_json
-from thermospindle.sim.operating import operating_point
 
-TEMPLATES = SCENES / "templates"
+TEMPLATES = Path(__file__).parents[2] / "scenes" / "templates"
 """Commented scenes to start from, a file each."""
 
 
@@ -50,6 +44,12 @@ def new(name: str, like: str, out: Path | None = None) -> Answer:
 def check(scene: Path, effect_files: Sequence[Path] = (), out: Path | None = None) -> Answer:
     """What the program understands of a scene, assumes and finds odd; a folder holds `check.json`, `check.html` and the picture."""
     asked = dict(locals())
+    from thermospindle.model.machine import Condition  # `new` computes nothing, and waits for nothing that does
+    from thermospindle.report.check.odd import looked, odd
+    from thermospindle.report.check.understood import understood
+    from thermospindle.report.check.words import show_check
+    from thermospindle.sim.operating import operating_point
+
     spindle, catalogue = with_effects(scene, effect_files)
     point = operating_point(spindle, Condition(spindle.reference_temperature))
     values: dict[str, Any] = understood(point, catalogue) | {"odd": odd(looked(spindle, point))}
