@@ -39,7 +39,7 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
         place = "nothing tried explains them, nor do tolerances and measuring errors: units, points, and noise that the files do not tell come first"
         if free and free[0].names == (LEFT,):
             left = likeliest(found).fit
-            of = f" of {np.sqrt(chi2 / n):.1f}" if left.mechanisms else ""
+            of = f" of {np.sqrt(found.base.fit.chi2 / n):.1f}" if left.mechanisms else ""  # where fits have ended, not what their quadratics promise
             apart = ", and not the same in every test" if len(found.model.tests) > 1 else ""
             place = f"the best leaves {np.sqrt(left.chi2 / left.count):.1f} standard errors{of}{apart}"
         elif free and free[0].names == (MOVING,):
@@ -60,7 +60,7 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
             place = f"every mode drifts from test to test, {by}, more than two honest programs differ by"
         if not free or free[0].names == (UNTOLD,):
             return f"No effect of the catalogue explains the data: {place} (chi2 without effects: {chi2 / n:.2f} a number)."
-        rival = f"; the best of the catalogue, {' + '.join(lead.names)}, reaches {lead.delta_evidence:.0f}" if lead else ""
+        rival = f"; the best of the catalogue, {' + '.join(lead.names)}, gains {lead.delta_evidence:.0f} in ln evidence" if lead else ""
         no_better = not lead or free[0].delta_evidence >= lead.delta_evidence
         says = "No effect of the catalogue explains the data as well as free drift does" if no_better else "No effect of the catalogue is probable enough beside free drift"
         return f"{says}: {place}{rival} (chi2 without effects: {chi2 / n:.2f} a number)."

@@ -223,7 +223,7 @@ def test_what_does_what_an_effect_cannot_is_something_unknown(best, word):
     assert v.word == word
     assert total(v) == pytest.approx(1.0)
     if word == "unexplained":
-        assert "what a does would have to drift, by sizes that it cannot have (66 in ln evidence); the best of the catalogue, b, reaches 40" in v.reason
+        assert "what a does would have to drift, by sizes that it cannot have (66 in ln evidence); the best of the catalogue, b, gains 40 in ln evidence" in v.reason
 
 
 def test_an_effect_and_what_does_what_it_cannot_are_two():
