@@ -328,8 +328,7 @@ def test_peaks_that_move_by_many_widths_are_followed(spindle, compliance, scanne
 def test_errors_come_true_over_many_seeds(name):
     """Chi2 at the truth has its distribution; what was drawn comes back with errors of mean square 1, over ten campaigns of three tests.
 
-    Measured on the symmetric scene: chi2/n at the fit 0.971 to 1.025, at the truth 0.67 of its standard deviation high in the mean, mean
-    square of z 1.59, nearly all of it from one campaign: where a tolerance is drawn two to three standard deviations off, the
+    Measured on the symmetric scene: chi2/n at the fit 0.966 to 0.995, mean square of z 1.47, nearly all of it from one campaign: where a tolerance is drawn two to three standard deviations off, the
     evidence's mean is a quadratic's about a fit with the discrepancy at its reference width, too far away (chi2 there 40 above promised).
     """
     scene = load(SCENES[name])
@@ -347,7 +346,7 @@ def test_errors_come_true_over_many_seeds(name):
     assert max(ratios) < 1.07
     assert abs(np.mean(shares)) < 1.5
     assert np.std(shares) < 2
-    assert 0.7 < squares / free < 2.0  # the largest measured is 1.59, told above; from 2 on errors are told too small by more than 1.4
+    assert 0.7 < squares / free < 1.6  # 1.47, 0.79 and 1.38 today: errors a fifth too small where they are worst
 
 
 def test_a_part_of_its_own_may_go_and_come(spindle):
