@@ -135,7 +135,7 @@ def cores_told(console: Console, draws: int) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--cores", action="store_true")
-    parser.add_argument("--draws", type=int, default=1024)
+    parser.add_argument("--draws", type=int, default=8192)
     parser.add_argument("--picture", type=Path)
     asked, console = parser.parse_args(), Console()
     if asked.cores:
