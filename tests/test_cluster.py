@@ -90,6 +90,16 @@ def worker_behind(cables: list[Cable], port: int):
         process.wait()
 
 
+def studied_while(harm, file, out, address):
+    """A study on a cluster, well to its end, with `harm` done meanwhile by a thread of its own."""
+    thread = threading.Thread(target=harm)
+    thread.start()
+    try:
+        assert main(["study", str(file), "--out", str(out), "--cluster", address]) == 0
+    finally:
+        thread.join()
+
+
 def test_a_worker_cut_off_goes_on_and_delivers_again(tmp_path, capsys, monkeypatch):
     """The connections stay up and carry nothing, as when a switch is off: the scheduler gives the worker up, another does its work, and then all that it had sent arrives."""
     import dask
@@ -122,12 +132,7 @@ def test_a_worker_cut_off_goes_on_and_delivers_again(tmp_path, capsys, monkeypat
                     cable.whole.set()
                 done.append("mended")
 
-            thread = threading.Thread(target=cut)
-            thread.start()
-            try:
-                assert main(["study", str(tmp_path / "study.toml"), "--out", str(there), "--cluster", cluster.scheduler_address]) == 0
-            finally:
-                thread.join()
+            studied_while(cut, tmp_path / "study.toml", there, cluster.scheduler_address)
     assert [d.split()[0] for d in done] == ["cut", "given", "mended"]
     assert b"task-finished" in cables[0].held, "it had nothing to deliver"
     capsys.readouterr()
@@ -179,12 +184,9 @@ def test_one_worker_killed_and_one_cut_off(tmp_path, capsys, monkeypatch):
             os.kill(pids[1], signal.SIGSTOP)
             done.append(f"after {len(list(there.glob('parts/part-*.parquet')))} parts")
 
-        thread = threading.Thread(target=harm)
-        thread.start()
         try:
-            assert main(["study", str(tmp_path / "study.toml"), "--out", str(there), "--cluster", cluster.scheduler_address]) == 0
+            studied_while(harm, tmp_path / "study.toml", there, cluster.scheduler_address)
         finally:
-            thread.join()
             with suppress(ProcessLookupError):  # given up, and replaced by another
                 os.kill(pids[1], signal.SIGCONT)
     assert done

@@ -24,7 +24,6 @@ from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import Effect, Values
 
-FREE = (kinds_of.STIFFNESS_DRIFT, kinds_of.DAMPING_DRIFT, kinds_of.CHANGE)
 CONSTANT = (kinds_of.STIFFNESS, kinds_of.DAMPING)
 BEGINNING = 2  # of the tempers, after which one variant and start of an effect is followed
 FEW = 4  # variants of an effect up to which each is also begun at its typical size

@@ -27,7 +27,8 @@ from thermospindle.diagnosis.data.observe import observe
 from thermospindle.diagnosis.decision.explanations import Candidate
 from thermospindle.diagnosis.decision.verdict import Verdict
 from thermospindle.diagnosis.forward.model import CampaignModel
-from thermospindle.diagnosis.ladder.fitting import CONSTANT, FREE, Settled, settled, without
+from thermospindle.diagnosis.inference.prior import CHANGING
+from thermospindle.diagnosis.ladder.fitting import CONSTANT, Settled, settled, without
 from thermospindle.diagnosis.ladder.forms import forms_of
 from thermospindle.diagnosis.ladder.left_out import LeftOut, Missed, at_one_condition, groups_of, missed, unseen
 from thermospindle.diagnosis.ladder.step import MeasuredModes, Step, as_drawn, fitted, measured_modes
@@ -102,7 +103,7 @@ def ladder(
     """
     own = [e.name for e, _ in of_scene(spindle)]
     _check(chosen or (), own, spindle)
-    model = without(campaign_data(spindle, campaign, progress), FREE)
+    model = without(campaign_data(spindle, campaign, progress), CHANGING)
     plain = without(model, CONSTANT)
     measured = measured_modes(model, observe(campaign, spindle, progress))
     steps: list[Step] = []
