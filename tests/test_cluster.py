@@ -11,6 +11,7 @@ import threading
 import time
 from contextlib import contextmanager, suppress
 from importlib.util import find_spec
+from queue import SimpleQueue
 
 import pytest
 
@@ -61,14 +62,24 @@ class Cable:
                     threading.Thread(target=self._carry, args=(a, b), daemon=True).start()
 
     def _carry(self, a: socket.socket, b: socket.socket) -> None:
+        under_way: SimpleQueue[bytes] = SimpleQueue()
+        threading.Thread(target=self._deliver, args=(under_way, b), daemon=True).start()
+        data = b"-"
+        while data:  # also while it is cut: what waits is seen here, not left with the system
+            try:
+                data = a.recv(1 << 16)
+            except OSError:
+                data = b""
+            self.held += b"" if self.whole.is_set() else data
+            under_way.put(data)
+
+    def _deliver(self, under_way: SimpleQueue, b: socket.socket) -> None:
         with suppress(OSError):
-            while data := a.recv(1 << 16):
-                self.held += b"" if self.whole.is_set() else data
+            while data := under_way.get():
                 self.whole.wait()
                 b.sendall(data)
-        for end in (a, b):
-            with suppress(OSError):
-                end.shutdown(socket.SHUT_RDWR)
+            self.whole.wait()
+            b.shutdown(socket.SHUT_WR)
 
 
 def free_port() -> int:

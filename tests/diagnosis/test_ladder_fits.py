@@ -7,7 +7,8 @@ import pytest
 
 from tests.diagnosis.mode_tables import tables
 from thermospindle.diagnosis.decision.conditions import conditions_of
-from thermospindle.diagnosis.ladder.fitting import FREE, settled, without
+from thermospindle.diagnosis.inference.prior import CHANGING
+from thermospindle.diagnosis.ladder.fitting import settled, without
 from thermospindle.diagnosis.ladder.forms import FORMS
 from thermospindle.diagnosis.ladder.ladder import CLEAR, DISCREPANCY, ladder
 from thermospindle.diagnosis.ladder.left_out import LeftOut, missed, unseen
@@ -36,7 +37,7 @@ def test_a_temperature_left_out_is_not_in_the_fit_that_predicts_it(spindle):
     wrong = replace(plain, tests=(cold, replace(hot, modes=tuple(replace(m, frequency=1.05 * m.frequency) for m in hot.modes))))
     found = []
     for campaign in (plain, wrong):
-        model = without(campaign_data(spindle, campaign), FREE)
+        model = without(campaign_data(spindle, campaign), CHANGING)
         assert conditions_of(spindle, model.tests) == [[0], [1]]
         blind = settled(unseen(model, LeftOut((1,))))
         off = missed(blind, model.tests, LeftOut((1,)))
@@ -52,7 +53,7 @@ def test_a_mean_where_no_spindle_can_be_built_predicts_nothing(spindle):
     steel = spindle.materials["steel"]
     ending = replace(steel, thermal_expansion=Law((20.0, 60.0), (11.5e-6, 11.5e-6)))
     measured = replace(spindle, materials={**spindle.materials, "steel": ending})
-    model = without(campaign_data(measured, tables(measured, ())), FREE)
+    model = without(campaign_data(measured, tables(measured, ())), CHANGING)
     blind = settled(unseen(model, LeftOut((1,))))
     colder = np.where(np.arange(len(blind.fit.point)) == model.temperature[0], -1.0, blind.evidence.mean)
     outside = replace(blind, evidence=replace(blind.evidence, mean=colder))
