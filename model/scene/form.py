@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from thermospindle.model import machine as m
 from thermospindle.model.bearing.definitions import SENSE
@@ -80,6 +80,18 @@ class Build(Table):
         return m.Build(deviations=dict(self.deviations), tests=tuple(self.tests))
 
 
+def _of_section(shaft: ShaftForm, section: Section, densities: dict[str, float]) -> ShaftForm:
+    unknown = [r for r in section.regions if r.name in (*shaft.regions, *shaft.mass_regions) and r.material not in densities]
+    if unknown:
+        raise ValueError(f"section.regions.{unknown[0].name}.material = {unknown[0].material!r}: allowed are {', '.join(densities)}")
+    try:
+        return shaft.from_section(section, densities)
+    except ValidationError as error:
+        raise ValueError(f"shafts.{shaft.name}: {error.errors()[0]['msg'].removeprefix('Value error, ')}") from None
+    except ValueError as error:
+        raise ValueError(f"shafts.{shaft.name}.{error}") from None
+
+
 class Scene(Table):
     format: format_of(SCENE) = CURRENT[SCENE]  # type: ignore[valid-type]
     title: Title
@@ -106,6 +118,11 @@ class Scene(Table):
     effects: list[Effect] = Field(default_factory=list)
     build: Build | None = None
     imperfections: Imperfections = Imperfections()
+
+    @model_validator(mode="after")
+    def _shafts_of_the_section(self) -> Scene:
+        densities = {name: material.density_kg_per_m3 for name, material in self.materials.items()}
+        return self.model_copy(update={"shafts": [_of_section(shaft, self.section, densities) for shaft in self.shafts]})
 
     @model_validator(mode="after")
     def _rows_exist(self) -> Scene:

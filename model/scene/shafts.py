@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, Strict, model_validator
 
 from thermospindle.model.scene.fields import Name, NotNegative, Place, Positive, Share, Table, one_damping
+from thermospindle.model.scene.section import Section, slabs
 from thermospindle.model.shaft import THEORIES, Segment, Shaft, mesh
 from thermospindle.model.structure import MOVES
 from thermospindle.model.units import MM
@@ -36,6 +37,8 @@ Side = Annotated[tuple[Positive, ...], Strict(False), AfterValidator(_side)]
 
 COARSE = 0.05
 """Longest element over the shaft's length where nobody says: twenty over a shaft, and the nodes that bearings and points need."""
+DRAWN = ("material", "materials", "start_z_mm", "outer_mm", "bore_mm", "mass_outer_mm", "width_mm", "height_mm")
+"""What draws a shaft, where regions of the section do not."""
 FINEST = 500
 """Elements over a shaft's length that a scene may ask for: matrices are dense, and a frequency is exact to all digits that are printed long before."""
 
@@ -44,6 +47,8 @@ class ShaftForm(Table):
     name: Name
     material: str = ""
     materials: Annotated[list[str], Field(max_length=300)] = Field(default_factory=list)
+    regions: Annotated[list[str], Field(max_length=300)] = Field(default_factory=list)
+    mass_regions: Annotated[list[str], Field(max_length=300)] = Field(default_factory=list)
     start_z_mm: Place = 0.0
     outer_mm: Annotated[list[Piece], Field(max_length=300)] = Field(default_factory=list)
     bore_mm: Annotated[list[Piece], Field(max_length=300)] = Field(default_factory=list)
@@ -62,6 +67,9 @@ class ShaftForm(Table):
     @model_validator(mode="after")
     def _drawn_whole(self) -> ShaftForm:
         one_damping(self.damping_ratio, self.loss_factor)
+        if self.regions:
+            self._section_alone()
+            return self
         self._one_section()
         self._one_material()
         length = self.length_mm
@@ -92,11 +100,37 @@ class ShaftForm(Table):
             raise ValueError("speed_ratio = 0 does not turn; without turns = true the shaft stands")
         return self
 
+    def _section_alone(self) -> None:
+        """Refuses a shaft that is drawn twice, by regions of the section and by numbers of its own."""
+        told = [key for key in DRAWN if key in self.model_fields_set]
+        if told:
+            raise ValueError(f"regions and {told[0]}: both told; a shaft of section regions has its heights, diameters and materials from there")
+
+    def from_section(self, section: Section, densities: dict[str, float]) -> ShaftForm:
+        """A shaft told by regions as one told by diameters and lengths; any other as it is. Densities (kg/m3) are by material."""
+        if not self.regions:
+            if self.mass_regions:
+                raise ValueError("mass_regions goes with regions; beside outer_mm the diameters that carry mass are mass_outer_mm")
+            return self
+        cut = slabs(section, densities, self.regions, self.mass_regions)
+        drawn = {
+            "start_z_mm": cut[0].z[0],
+            "outer_mm": [[s.outer, s.length] for s in cut],
+            "bore_mm": [[s.bore, s.length] for s in cut],
+            "mass_outer_mm": [[s.mass_outer, s.length] for s in cut],
+            "materials": [s.material for s in cut],
+        }
+        told = self.model_dump(include=self.model_fields_set - {"regions", "mass_regions"})
+        return ShaftForm.model_validate(told | drawn)
+
     def _one_section(self) -> None:
         """Refuses a shaft that is neither round nor rectangular, or both, and one that turns and is not as stiff in all directions."""
         if bool(self.outer_mm) == bool(self.width_mm) or bool(self.width_mm) != bool(self.height_mm):
             told = [key for key in ("outer_mm", "width_mm", "height_mm") if getattr(self, key)]
-            raise ValueError(f"{' and '.join(told) or 'no section'} told; allowed are outer_mm alone, or width_mm (along x) with height_mm (along y) of a rectangular section")
+            raise ValueError(
+                f"{' and '.join(told) or 'no section'} told; allowed are outer_mm alone, or width_mm (along x) with height_mm (along y) of a rectangular section, "
+                "or regions of the drawn section"
+            )
         for key in ("bore_mm", "mass_outer_mm"):
             if self.width_mm and getattr(self, key):
                 raise ValueError(f"{key} is of a round section; a rectangular one, of width_mm and height_mm, is solid")
