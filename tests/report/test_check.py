@@ -145,7 +145,7 @@ ODD = [
     ("five_bearing", "position_mm = [66.5, 0.0, 36.0]", "position_mm = [80.5, 0.0, 36.0]", "point flange: lies 14 mm off 'spindle'"),
     ("hdd_2003", "position_mm = [12.5, 0.0, 15.0]", "position_mm = [15.5, 0.0, 15.0]", "point hub_side0: lies 3 mm off 'hub'"),
     ("mk7702", "z_mm = 101.0", "z_mm = 81.0", "bearings front1 and front2 sit at the same place, z_mm = 81, between the same parts"),
-    ("mk7702", "damping_ratio = 0.03\norigins = { damping_ratio = \"assumed\", axial", "damping_ratio = 0.9\norigins = { damping_ratio = \"assumed\", axial", "of critical"),
+    ("mk7702", "damping_ratio = 0.015\norigins = { damping_ratio = \"assumed\", axial", "damping_ratio = 0.9\norigins = { damping_ratio = \"assumed\", axial", "of critical"),
     ("five_bearing", "temperature_range_C = [20.0, 60.0]", "temperature_range_C = [20.0, 160.0]", "160 C lies outside"),
     ("five_bearing", "nominal_speed_rpm = 8000.0", "nominal_speed_rpm = 40000.0", "means a speed factor n dm of 3.8e+06"),
     ("five_bearing", "[[82, 13], [133, 23], [120, 8], [75, 100]", "[[82, 13], [133, 23], [120, 8], [90, 100]", "begins at a radius of 37.5 mm, and the shaft 'spindle' has 45 mm there"),
