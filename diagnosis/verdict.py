@@ -92,6 +92,9 @@ class Diagnosis:
     may_hide: tuple[str, ...] = ()
     unable: Mapping[str, str] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {self.campaign.title!r} beside {self.spindle.name}: {self.verdict.reason}>"
+
 
 def diagnose(
     spindle: Spindle, campaign: Campaign, catalogue: tuple[Effect, ...] = CATALOGUE, progress: Callable[[str], None] = lambda done: None

@@ -194,6 +194,9 @@ class Spindle:
     provenance: Mapping[str, Provenance] = field(default_factory=dict, repr=False)  # by dotted key of the file
     file: Path | None = field(default=None, compare=False)
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.name}: {len(self.all_bearings)} bearings, {len(self.structure.bodies)} bodies, {len(self.points)} points>"
+
     @property
     def all_bearings(self) -> tuple[Bearing | LinearBearing | RollerBearing, ...]:
         """Ball rows, bearings given by numbers and roller bearings, lowest first."""

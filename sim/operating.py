@@ -22,6 +22,7 @@ from thermospindle.model.rotor.loaded import loaded
 from thermospindle.model.rotor.modes import Mode, frf, modes, point_rows
 from thermospindle.model.scene.reading import content_hash
 from thermospindle.model.types import Array, ComplexArray
+from thermospindle.model.units import RPM
 from thermospindle.sim.effects import of_scene
 from thermospindle.sim.effects.effect import Effect, Measurement, Values
 from thermospindle.thermal.expansion import expand
@@ -38,6 +39,10 @@ class OperatingPoint:
     condition: Condition
     state: PairState
     effects: tuple[tuple[Effect, Values], ...] = ()
+
+    def __repr__(self) -> str:
+        speed = self.condition.speed / RPM
+        return f"<{type(self).__name__} {self.spindle.name} at {self.condition.temperature:g} C, {speed:.6g} rpm, {self.state.words}>"
 
     @cached_property
     def chain(self) -> RotorBase:

@@ -74,6 +74,22 @@ def test_compare_takes_folders_and_campaigns():
     assert ts.compare(SCENE, folder).rms_residual == ts.compare(ts.load("hdd_2003"), read_campaign(folder)).rms_residual
 
 
+def test_what_is_shown_of_an_object_is_a_line(tmp_path):
+    """In a session, a notebook or a failed assertion: a diagnosis whose every number was shown filled megabytes."""
+    point = ts.point("hdd_2003", 60, speed_rpm=7200)
+    tests = ts.campaign(DATA / "foreign_bond")
+    compared = ts.compare("hdd_2003", tests)
+    shown = [repr(x) for x in (ts.load("hdd_2003"), point, ts.modes(point)[1], ts.frf(point), tests, tests.tests[0], compared, compared.tests[0])]
+    assert all(len(words) < 200 for words in shown)
+    assert shown[0] == "<Spindle hdd_2003: 2 bearings, 4 bodies, 7 points>"
+    assert shown[1] == "<OperatingPoint hdd_2003 at 60 C, 7200 rpm, in contact, preload 8.00 N>"
+    assert shown[2].startswith("<Mode axial, 1542.1")
+    assert shown[3].startswith("<Frf mobility: 7 responses, 2 references, 2000 lines from 400 to 6000 Hz")
+    assert "7 tests" in shown[4]
+    assert shown[5].startswith("<Test T20_n0: 20 C, 0 rpm, <Frf")
+    assert "rms error 98" in shown[6]
+
+
 @pytest.mark.parametrize("wrong", [[-1.0], [[1.0]], [np.nan]])
 def test_frequencies_that_are_none_are_refused(wrong):
     with pytest.raises(ts.BadInput, match="frequency_Hz"):

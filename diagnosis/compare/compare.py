@@ -75,6 +75,9 @@ class TestComparison:
     residuals: Array  # (2m,) of measured [frequency, damping], whitened; a missing mode's in place of its frequency, 0 where there is none
     count: int  # of those there are
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.test.id}: {len(self.modes)} modes paired, {len(self.missing)} missing, {len(self.extra)} more computed>"
+
     @property
     def squares(self) -> float:
         """r^T C^-1 r of all frequencies and dampings, and of the missing modes."""
@@ -99,6 +102,9 @@ class Comparison:
     tests: tuple[TestComparison, ...]
     comac: Mapping[int, float | None]
     crossings: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.campaign!r} beside {self.spindle}: {len(self.tests)} tests, rms error {self.rms_residual:.3g} standard errors>"
 
     @property
     def rms_residual(self) -> float:

@@ -45,6 +45,9 @@ class Candidate:
     by_law: Hypothesis | None = None
     ways: tuple[tuple[Hypothesis, float], ...] = ()
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {' + '.join(self.names) or 'none'}: ln evidence {self.delta_evidence:+.1f}, probability {self.probability:.3g}>"
+
     @property
     def told(self) -> Hypothesis:
         """The explanation whose sizes are those of the effects' own formulas, as far as there is one."""

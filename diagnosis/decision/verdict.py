@@ -53,6 +53,9 @@ class Verdict:
     accepted: Hypothesis
     told: Hypothesis
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {' '.join((self.word, *self.effects))}: {self.reason}>"
+
 
 def decide(found: Search) -> Verdict:
     """The verdict with the least expected loss."""

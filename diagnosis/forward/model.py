@@ -51,6 +51,9 @@ class CampaignModel:
     resonances: tuple[Resonance, ...] = ()  # whose parameters are the last
     lumped: bool = False  # of tests of a spindle whose shafts have their masses at nodes
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {self.spindle.name}: {len(self.tests)} tests, {len(self.parameters)} nuisances>"
+
     def __getstate__(self) -> dict:
         """Without what was worked out: it is on its way to another process."""
         return {k: v for k, v in self.__dict__.items() if k not in ("_points", "_responses", "_spindles", "kept", "thinned")}

@@ -77,6 +77,9 @@ class Evidence:
     chi2: float
     by_departing: float = 0.0
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.ln:.1f}: chi2 {self.chi2:.6g}>"
+
     @property
     def rounded(self) -> bool:
         """Whether the fit stands so far from where its quadratic is least that nothing but rounding is left of that, and the evidence means nothing."""

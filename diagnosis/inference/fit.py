@@ -69,6 +69,9 @@ class Fit:
     cost: float = np.nan  # chi2, its errors 1 / temper times the data's, and priors: those that it was fitted with
     owed: float = 0.0  # by how much less the quadratic promises, which no step has found
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {' + '.join(m.name for m in self.mechanisms) or 'none'}: chi2 {self.chi2:.6g} of {self.count} numbers>"
+
     @property
     def nuisance(self) -> Array:
         return self.point[: len(self.point) - sum(len(r) + len(m.shape) for r, m in zip(self.roots, self.mechanisms, strict=True))]

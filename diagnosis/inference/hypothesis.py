@@ -34,6 +34,9 @@ class Hypothesis:
     fit: Fit
     evidence: Evidence
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {' + '.join(self.names) or 'none'}: ln evidence {self.evidence.ln:.1f}>"
+
     @property
     def mechanisms(self) -> tuple[Mechanism, ...]:
         return self.fit.mechanisms

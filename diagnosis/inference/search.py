@@ -40,6 +40,9 @@ class Search:
     alike: Mapping[str, frozenset[str]] = field(default_factory=dict)
     by_resonances: float = 0.0
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {len(self.hypotheses)} explanations, the likeliest {self.hypotheses[0]!r}>"
+
 
 def search(
     model: CampaignModel, named: Sequence[Mechanism], free: Sequence[Mechanism], progress: Callable[[str], None] = lambda done: None,

@@ -56,6 +56,9 @@ class RunoutDiagnosis:
     next: tuple[NextRunout, ...] = ()
     no_next: str = ""
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {' '.join((self.verdict, *self.effects))}: {self.reason}>"
+
     @property
     def chi2(self) -> float:
         return sum(f.chi2 for f in self.base)

@@ -49,6 +49,9 @@ class Log:
     entities: Mapping[str, int]
     timelines: tuple[str, ...]
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.path}: {len(self.entities)} entities by {self.application}>"
+
     def array(self, entity: str, component: str) -> Any:
         """All values (n,) of a component, in the order in which they were written."""
         try:

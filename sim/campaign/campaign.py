@@ -70,6 +70,10 @@ class Test:
     runout: RunoutRecord | None = field(default=None, compare=False)
     pretrigger: float = 0.0  # s from the start of a record to the middle of the hit
 
+    def __repr__(self) -> str:
+        told = [f"{self.temperature:g} C", f"{self.speed / RPM:.6g} rpm"] + [repr(self.frf)] * (self.frf is not None) + [f"{len(self.modes)} modes"] * bool(self.modes)
+        return f"<{type(self).__name__} {self.id}: {', '.join(told + ['runout'] * (self.runout is not None))}>"
+
 
 @dataclass(frozen=True)
 class Campaign:
@@ -82,6 +86,9 @@ class Campaign:
     note: str = ""
     lumped_shafts: bool = False  # of this program's virtual tests, whose flexible shafts have their masses at nodes
     folder: Path | None = field(default=None, compare=False)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.title!r} of {self.spindle}: {len(self.tests)} tests, {len(self.points)} points, {self.quantity}>"
 
 
 # ---------------------------------------------------------------- reading

@@ -59,6 +59,9 @@ class ImpactTest:
     record: Record
     estimate: Estimate
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {self.point!r}: {self.estimate.h1!r}>"
+
 
 def impact_tests(
     points: Sequence[OperatingPoint],

@@ -36,6 +36,10 @@ class Frf:
     sd: np.ndarray | None = None  # like value, real, its unit: standard error sqrt(E |error|^2) of each complex value
     names: Mapping[int, str] = field(default_factory=dict, compare=False)  # of the nodes, where they are known
 
+    def __repr__(self) -> str:
+        lines = f"{len(self.frequency)} lines" + (f" from {self.frequency[0]:g} to {self.frequency[-1]:g} Hz" if len(self.frequency) else "")
+        return f"<{type(self).__name__} {self.quantity}: {len(self.response_nodes)} responses, {len(self.reference_nodes)} references, {lines}>"
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "value", self.value + 0.0)
 

@@ -59,6 +59,9 @@ class Modes:
     rank_one: bool  # whether residues are shape x participation; else each is free
     status: str
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {', '.join(f'{f:.2f}' for f in self.frequency)} Hz: {self.status}>"
+
     @property
     def frequency_sd(self) -> Array:
         """(m,) Hz."""

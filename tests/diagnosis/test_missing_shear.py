@@ -46,6 +46,14 @@ def test_the_missing_shear_is_named(measured):
     assert "constantly wrong by about 0.01 of each" in verdict.reason
 
 
+def test_what_is_shown_of_a_diagnosis_is_a_line(measured):
+    """Every number that a search went through was, before."""
+    assert repr(measured) == f"<Diagnosis of {measured.campaign.title!r} beside {measured.spindle.name}: {measured.verdict.reason}>"
+    assert repr(measured.verdict) == f"<Verdict identified shear: {measured.verdict.reason}>"
+    assert repr(measured.verdict.candidates[0]).startswith("<Candidate shear: ln evidence +")
+    assert max(len(repr(x)) for x in (measured.search, measured.search.model, measured.verdict.accepted, measured.verdict.accepted.fit)) < 200
+
+
 def test_one_condition_shows_no_drift(measured):
     assert not {kinds_of.STIFFNESS_DRIFT, kinds_of.DAMPING_DRIFT} & {p.kind for p in measured.search.model.parameters}
     assert np.isnan(measured.verdict.held_out_after)  # nothing can be left out of one condition
