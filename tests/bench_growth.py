@@ -3,7 +3,8 @@
     python -m tests.bench_growth [--picture FILE.png]
 
 Processor time of one core, the least of a few calls after one to warm up (a diagnosis: one call), so that other programs on the machine hardly count. Peers:
-MuJoCo's own stepping; ROSS where `ROSS_PYTHON`, sdypy-EMA where `EMA_PYTHON` names a Python that has it (`pip install sdypy-EMA`, in an environment of its own).
+MuJoCo's own stepping; its system identification where what that needs is installed (`bench_sysid`); CalculiX where `ccx` is on the path; ROSS where `ROSS_PYTHON`, sdypy-EMA where
+`EMA_PYTHON` names a Python that has it (`pip install sdypy-EMA`, in an environment of its own).
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ os.environ.update(OPENBLAS_NUM_THREADS="1", LOKY_MAX_CPU_COUNT="1")  # all of th
 
 import argparse
 import json
+import resource
+import shutil
 import subprocess
 import tempfile
 import time
@@ -28,13 +31,16 @@ from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
+from tests import bench_sysid
 from tests.bench_beams import FULL, OF_ROWS, best, condition, for_ross, meshed, rowed
 from tests.bench_study import small_study
 from tests.conftest import DATA, SCENE
+from tests.literature.calculix import deck, solved
 from thermospindle.diagnosis.verdict import diagnose
 from thermospindle.model.machine import Addition, Condition, Spindle
 from thermospindle.model.rotor.modes import modes
 from thermospindle.model.scene.reading import load
+from thermospindle.model.shaft import Segment
 from thermospindle.sim.campaign.campaign import read_campaign
 from thermospindle.sim.effects import CATALOGUE, by_name, resolved
 from thermospindle.sim.effects.effect import fitted_to, refusal
@@ -56,9 +62,13 @@ class Curve:
     note: str = ""
 
 
-def least(work: Callable[[], object], repeat: int = 2) -> float:
-    """Least processor time (s) after one call to warm up."""
-    return best(work, repeat, time.process_time)
+def least(work: Callable[[], object], repeat: int = 2, warm: bool = True) -> float:
+    """Least processor time (s), after one call to warm up where asked."""
+    if warm:
+        return best(work, repeat, time.process_time)
+    start = time.process_time()
+    work()
+    return time.process_time() - start
 
 
 def of_beams(folder: Path) -> Curve:
@@ -68,7 +78,27 @@ def of_beams(folder: Path) -> Curve:
     lines.append(("here", sizes, [least(lambda p=p: modes(p.chain, p.linear, 4000.0)) for p in chains]))
     if python := os.environ.get("ROSS_PYTHON"):
         lines.append(("ROSS", *ross(python)))
-    return Curve("beam elements", "natural frequencies at one speed", tuple(lines))
+    if ccx := shutil.which("ccx"):
+        lines.append(("CalculiX, solid, at rest", *calculix(ccx, folder)))
+    return Curve("elements along the shaft", "natural frequencies at one speed", tuple(lines))
+
+
+def calculix(ccx: str, folder: Path) -> tuple[list[float], list[float]]:
+    """The free shaft as a solid of bricks, four bending modes."""
+    [shaft], steel = load("mk7702").structure.shafts, load("mk7702").materials["steel"]
+    sizes, seconds = [], []
+    for longest in (60e-3, 30e-3, 15e-3):
+        text = deck(shaft.segments, steel.youngs_modulus(20.0), steel.poisson_ratio, steel.density, longest)
+        before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+        solved(ccx, folder, text)
+        seconds.append(resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before)
+        sizes.append(float(along(shaft.segments, longest)))
+    return sizes, seconds
+
+
+def along(segments: Sequence[Segment], longest: float) -> int:
+    """Elements of a deck from one end of the shaft to the other."""
+    return sum(max(1, int(np.ceil((s.z[1] - s.z[0]) / longest - 1e-9))) for s in segments)
 
 
 def ross(python: str) -> tuple[list[float], list[float]]:
@@ -130,6 +160,20 @@ def of_records(point: OperatingPoint) -> Curve:
     return Curve("record length, s", "one hit in the time domain", (("here", lengths, ours), ("MuJoCo's own stepping", lengths, own)))
 
 
+def of_fits(spindle: Spindle) -> Curve:
+    """The preload from one virtual test, by FRFs and by the toolbox of MuJoCo that simulates records with trial values."""
+    lengths, ours, theirs, off, others = (0.1, 0.2, 0.4), [], [], [], []
+    for s in lengths:
+        own = replace(spindle, hammer=replace(spindle.hammer, record_length=s, hits=1, hammer_nodes=(1,)))
+        test = bench_sysid.measured(own, "preload", 0)
+        ours.append(least(lambda own=own, test=test: off.append(bench_sysid.ours(own, "preload", test).value - bench_sysid.TRUE)))
+        if bench_sysid.available():
+            theirs.append(least(lambda own=own, test=test: others.append(bench_sysid.toolbox(own, "preload", test).value - bench_sysid.TRUE), 1, warm=False))
+    lines: tuple[Line, ...] = (("here, by FRFs", lengths, ours), *([("MuJoCo's sysid", lengths, theirs)] if theirs else []))
+    note = f"errors of it, ppm\nhere {told_ppm(off[::3])}" + (f"\nsysid {told_ppm(others)}" if others else "")
+    return Curve("record length, s", "the preload from one hit", lines, note)
+
+
 def diagnosed(tests: int, effects: int) -> float:
     """Processor time (s) of the diagnosis of the first tests of another program's campaign, offered so many effects, the hidden one first."""
     spindle, campaign = load(SCENE), read_campaign(DATA / "foreign_bond")
@@ -167,6 +211,7 @@ def curves(folder: Path) -> Iterator[Curve]:
     yield Curve("lines", "exact FRFs, 7 x 2", (("here", lines, [least(lambda n=n: point.frf(np.linspace(400, 6000 + next(others), n)), 4) for n in lines]),))
     yield of_responses(point, folder)
     yield of_records(point)
+    yield of_fits(spindle)
     yield of_tests(spindle)
     yield of_effects(spindle)
     (folder / "study").mkdir()
@@ -180,8 +225,8 @@ def slope(x: Sequence[float], y: Sequence[float]) -> float:
 
 
 def drawn(found: Sequence[Curve], caption: str) -> Figure:
-    figure = Figure(figsize=(12, 6.2), layout="constrained")
-    for axes, curve in zip(figure.subplots(2, 4).flat, found, strict=True):
+    figure = Figure(figsize=(12, 9), layout="constrained")
+    for axes, curve in zip(figure.subplots(3, 3).flat, found, strict=True):
         for name, x, y in curve.lines:
             axes.loglog(x, y, "o-", ms=4, label=f"{name}, $n^{{{slope(x, y):.1f}}}$")
         axes.set_title(curve.work, fontsize=8.5)

@@ -17,7 +17,7 @@ import numpy as np
 from thermospindle.diagnosis.compare.correlation import Correlation, assurance, comac, correlate, frac
 from thermospindle.diagnosis.data.observe import Observation, observe
 from thermospindle.diagnosis.prediction.modes import Predicted, predict
-from thermospindle.diagnosis.prediction.partners import BELIEVABLE, crossings, expected_shapes, group, numbered, partners
+from thermospindle.diagnosis.prediction.partners import BELIEVABLE, by_hammer, crossings, group, numbered, partners, shapes
 from thermospindle.diagnosis.prediction.temperature import temperature_slope, whitened, with_temperature
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array, ComplexArray, Integers
@@ -28,7 +28,8 @@ from thermospindle.sim.effects import of_scene
 
 @dataclass(frozen=True)
 class PairedMode:
-    """A measured mode and the computed one behind it; damping ratios are None where not measured, `mac` without shapes.
+    """A measured mode and the computed one behind it; damping ratios are None where not measured, `mac` where no shape
+    can be compared (`partners.shapes`).
 
     `number` counts the computed modes at the coldest test at rest and follows them from there by shape. Modes closer than
     `partners.ALONE` (`close`) turn in their plane at the slightest asymmetry: their `mac` is the share of the measured shape in
@@ -140,15 +141,20 @@ def compare(
     numbers = numbered(observed, predicted)
     scatter = _repeat_variance(observed, chosen, numbers)
     tests = []
-    nodes = next((o.test.frf.response_nodes for o in observed if o.test.frf is not None), ())
+    nodes = next((nodes for o in observed if (nodes := _shape_nodes(o))), ())
     pairs: list[tuple[ComplexArray, ComplexArray]] = []  # at these points
     for o, p, partner, number, extra in zip(observed, predicted, chosen, numbers, scatter, strict=True):
         tests.append(_test(spindle, campaign, o, p, partner, number, extra, frfs))
-        if o.shape is not None and o.test.frf is not None and o.test.frf.response_nodes == nodes:
-            pairs += [(o.shape[i], expected) for i, expected in expected_shapes(o, p, partner).items()]
+        if nodes and _shape_nodes(o) == nodes:
+            pairs += shapes(o, p, partner).values()
         progress(f"{o.test.id}: compared")
     by_node = comac(nodes, pairs)
     return Comparison(spindle.name, campaign.title, tuple(tests), by_node, crossings(observed, predicted, numbers))
+
+
+def _shape_nodes(o: Observation) -> tuple[int, ...]:
+    """The nodes at which a test shows shapes; none of a table."""
+    return () if o.test.frf is None else o.test.frf.reference_nodes if by_hammer(o) else o.test.frf.response_nodes
 
 
 def _as_measured(spindle: Spindle, campaign: Campaign, o: Observation) -> Predicted:
@@ -202,7 +208,7 @@ def _test(
 ) -> TestComparison:
     m = len(o.frequency)
     relative = np.sqrt(np.diag(o.covariance) + extra)
-    expected = expected_shapes(o, p, partner)
+    shown = shapes(o, p, partner)
     modes = []
     for i in np.flatnonzero(partner >= 0).tolist():
         j, known = int(partner[i]), bool(np.isfinite(relative[m + i]))
@@ -216,7 +222,7 @@ def _test(
                 float(o.damping[i]) if known else None,
                 float(p.damping[j]),
                 float(o.damping[i] * relative[m + i]) if known else None,
-                None if o.shape is None else assurance(o.shape[i], expected[i]),
+                assurance(*shown[i]) if i in shown else None,
                 len(group(o, p, partner, i)) > 1,
             )
         )
@@ -230,13 +236,13 @@ def _test(
     frf = o.test.frf
     low, high = spindle.hammer.band if frf is None else (frf.frequency[0], frf.frequency[-1])
     found = set(partner.tolist())
-    shown = beside(spindle, campaign.points, o.test, o.condition) if frfs else None
+    correlated = beside(spindle, campaign.points, o.test, o.condition) if frfs else None
     return TestComparison(
         o.test,
         tuple(modes),
         tuple(o.frequency[lost].tolist()),
         tuple(float(f) for j, f in enumerate(p.frequency) if low <= f <= high and j not in found),
-        None if shown is None else correlate(shown),
+        None if correlated is None else correlate(correlated),
         residuals,
         len(rows) + len(lost),
     )

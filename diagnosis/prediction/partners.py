@@ -84,12 +84,20 @@ def group(o: Observation, p: Predicted, partner: Integers, mode: int) -> list[in
     return [i for i in near if axial(i) == axial(mode)]
 
 
-def expected_shapes(o: Observation, p: Predicted, partner: Integers) -> dict[int, ComplexArray]:
-    """Computed shape (n_resp,) for every paired measured mode: its partner's, in a close group the combination nearest to it."""
-    if o.shape is None:
+def shapes(o: Observation, p: Predicted, partner: Integers) -> dict[int, tuple[ComplexArray, ComplexArray]]:
+    """Measured and computed shape (n,) of the paired measured modes: the computed one is its partner's, in a close group the combination nearest to it. They are at the responses, or of a
+    roving hammer at the references; of a mode whose group has as many members as there are points any shape is a combination, and there is none to compare."""
+    if o.shape is None or o.residue is None:
         return {}
+    measured, computed = (o.residue, p.participation) if by_hammer(o) else (o.shape, p.shape)
     found = {}
     for i in np.flatnonzero(partner >= 0).tolist():
-        basis = p.shape[partner[group(o, p, partner, i)]].T
-        found[i] = basis @ np.linalg.lstsq(basis, o.shape[i], rcond=None)[0]
+        basis = computed[partner[group(o, p, partner, i)]].T
+        if basis.shape[1] < len(basis):
+            found[i] = measured[i], basis @ np.linalg.lstsq(basis, measured[i], rcond=None)[0]
     return found
+
+
+def by_hammer(o: Observation) -> bool:
+    """Whether the hammer went from point to point rather than the sensors: shapes are then those at its points, where left vectors of the model stand for right ones."""
+    return o.shape is not None and o.residue is not None and o.shape.shape[1] < o.residue.shape[1]

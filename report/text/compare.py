@@ -115,8 +115,8 @@ def show_comparison(console: Console, c: Comparison, verbose: bool = True) -> No
     if c.comac:
         references = sorted({reference for t in c.tests for _, reference in t.frac})
         rows = []
-        for node, comac in c.comac.items():
-            cells = []
+        for node in dict.fromkeys([*c.comac, *(response for t in c.tests for response, _ in t.frac)]):
+            cells, comac = [], c.comac.get(node)
             for r in references:
                 found = [v for t in c.tests if (v := t.frac.get((node, r))) is not None]
                 cells.append(f"{min(found):.3f}" if found else "-")

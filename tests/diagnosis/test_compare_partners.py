@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.conftest import SCENE
+from tests.conftest import DATA, SCENE
 from tests.diagnosis.exact_campaign import table
 from thermospindle.diagnosis.compare.compare import compare
 from thermospindle.diagnosis.data.observe import DAMPING_FLOOR, observe
@@ -170,3 +170,37 @@ def test_more_modes_measured_than_computed(spindle):
     found = compare(spindle, table(spindle, 20.0, *rows)).tests[0]
     assert len(found.modes) + len(found.missing) == 30
     assert len(found.missing) >= 27  # three axial modes are computed
+
+
+def roved(frf, sensor=None):
+    """FRFs of one hammer point as of a hammer that went to every sensor's, by reciprocity; or of the one sensor alone."""
+    of = slice(None) if sensor is None else [sensor]
+    turn = (lambda v: None if v is None else v[of, :1].transpose(1, 0, 2)) if sensor is None else (lambda v: None if v is None else v[of, :1])
+    nodes = frf.reference_nodes[:1], tuple(np.array(frf.response_nodes)[of].tolist())
+    return replace(frf, value=turn(frf.value), sd=turn(frf.sd), coherence=turn(frf.coherence), response_nodes=nodes[sensor is not None], reference_nodes=nodes[sensor is None])
+
+
+def test_a_roving_hammers_shapes_are_those_at_its_points(spindle):
+    """One sensor and seven hammer points: MAC and COMAC as of seven sensors and one hammer point. They were those of single numbers, 1 always."""
+    tests = read_campaign(DATA / "foreign_bond")
+    rest = [t for t in tests.tests if t.speed == 0 and t.frf is not None][:2]
+    sensors = replace(tests, tests=tuple(replace(t, frf=replace(t.frf, value=t.frf.value[:, :1], sd=None, coherence=None, reference_nodes=t.frf.reference_nodes[:1])) for t in rest))
+    hammer = replace(tests, tests=tuple(replace(t, frf=replace(roved(t.frf), sd=None, coherence=None)) for t in rest))
+    one, other = compare(spindle, sensors, frfs=False), compare(spindle, hammer, frfs=False)
+    for a, b in zip(one.tests, other.tests, strict=True):
+        assert [m.number for m in a.modes] == [m.number for m in b.modes]
+        assert [m.mac for m in b.modes] == pytest.approx([m.mac for m in a.modes], abs=1e-4)
+    assert min(m.mac for t in one.tests for m in t.modes) < 0.9995
+    assert list(other.comac) == list(one.comac)
+    moving = [node for node, v in one.comac.items() if v > 0.9]  # noise is what the others show
+    assert len(moving) == 6
+    assert [other.comac[node] for node in moving] == pytest.approx([one.comac[node] for node in moving], abs=1e-3)
+
+
+def test_one_sensor_and_one_hammer_show_no_shape(spindle):
+    tests = read_campaign(DATA / "foreign_bond")
+    alone = replace(tests, tests=tuple(replace(t, frf=roved(t.frf, 0)) for t in tests.tests[:1]))
+    found = compare(spindle, alone, frfs=False)
+    assert found.tests[0].modes
+    assert all(m.mac is None for m in found.tests[0].modes)
+    assert found.comac == {}
