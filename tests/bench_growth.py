@@ -239,7 +239,8 @@ def drawn(found: Sequence[Curve], caption: str) -> Figure:
         axes.tick_params(axis="y", labelsize=7)
         axes.minorticks_off()
         low, high = (f(f(y) for _, _, y in curve.lines) for f in (min, max))
-        axes.set_ylim(bottom=(0.2 if curve.note else 0.5) * low, top=6 * high * (high / low) ** 0.15)
+        top = 6 * high * (high / low) ** 0.15
+        axes.set_ylim(bottom=low / (1.3 * (top / low) ** 0.4) if curve.note else 0.5 * low, top=top)
         axes.legend(frameon=False, fontsize=7.5, loc="upper left")
         axes.grid(alpha=0.3)
     figure.supxlabel(caption, fontsize=8)
