@@ -30,7 +30,5 @@ def test_a_machine_tool_spindle_is_diagnosed(hidden, nose):
     if not hidden:
         assert (verdict.word, verdict.effects) == ("none", ())
     else:
-        assert verdict.word in ("identified", "ambiguous")
-        assert hidden in verdict.effects
-        assert len(verdict.effects) <= 3
-        assert verdict.held_out_after < verdict.held_out_before
+        assert (verdict.word, verdict.effects) == ("identified", (hidden,))
+        assert verdict.held_out_gain > 20  # in ln probability density; 132 from all points, 78 from the nose alone
