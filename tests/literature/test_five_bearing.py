@@ -127,11 +127,11 @@ def mounted(five, below, above, preload):
 )  # fmt: skip
 def test_rigidity_of_sets(five, below, above, hertz, printed):
     """At the preload at which each row of the larger group has the pair's: sum of n (F/n)^(1/3) / 2 at constant angle, which the catalogue prints within
-    1 %; as angles rise with load, rows at a higher one are stiffer still, by up to 5 % at 15 degrees."""
+    1 %; as angles rise with load, rows at a higher one are stiffer still, and ratios at 283 N up to 3 % above the printed."""
     pair = mounted(five, 1, 1, 20.0)
     found = mounted(five, below, above, 20.0 * below) / pair
     assert found == pytest.approx(hertz, rel=0.01)
-    assert found == pytest.approx(printed, rel=0.02)
+    assert found == pytest.approx(printed, rel=0.01)
 
 
 def test_a_spring_set_keeps_its_force(five):
