@@ -20,7 +20,7 @@ from thermospindle.model.rotor.chain import matrices
 from thermospindle.model.rotor.elements import ELEMENTS
 from thermospindle.sim.effects import CATALOGUE, checked
 from thermospindle.sim.effects.effect import HOOKS, Effect, Parameter
-from thermospindle.sim.effects.trial import Broken, Trial, moved, told, trial
+from thermospindle.sim.effects.trial import Broken, Trial, every_word, moved, told, trial
 from thermospindle.sim.operating import operating_point
 from thermospindle.thermal.expansion import expand
 
@@ -167,7 +167,7 @@ def refuses_what_is_beyond_its_limits(t: Trial) -> None:
 
 def leaves_its_arguments_alone(t: Trial) -> None:
     t.seen(t.effect.typical())
-    if repr(t.spindle) != t.words:
+    if every_word(t.spindle) != t.words:
         raise Broken("changes the spindle it is given; a function of an effect must return a changed copy")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from math import inf
 
 import numpy as np
@@ -30,7 +30,7 @@ class Broken(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """An effect under guard, and a spindle to try it on: its words, conditions it bears, and what is seen of it without the effect."""
+    """An effect under guard, and a spindle to try it on: its words (`every_word`), conditions it bears, and what is seen of it without the effect."""
 
     effect: Effect
     spindle: Spindle
@@ -70,7 +70,12 @@ def trial(effect: Effect, spindle: Spindle, where: str = "") -> Trial:
         conditions.append(c)
     if not conditions:
         raise BadInput(f"{spindle.name}: the spindle has no bearing equilibrium at any condition on which to try an effect")
-    return Trial(guarded(effect, where or f"effect {effect.name}"), spindle, tuple(conditions), tuple(before), repr(spindle))
+    return Trial(guarded(effect, where or f"effect {effect.name}"), spindle, tuple(conditions), tuple(before), every_word(spindle))
+
+
+def every_word(spindle: Spindle) -> str:
+    """All that a spindle is, in words: what changes it changes them."""
+    return repr([getattr(spindle, f.name) for f in fields(spindle)])
 
 
 def observables(point: OperatingPoint) -> Observables:

@@ -49,6 +49,7 @@ def test_adding_dragging_undoing(page):
     assert page.session.now.effects["preload_loss"]["loss"] == 0.15
     slider = page.controls.sliders["preload_loss.loss"]
     before, at_start = page.frf.computed.data["size"], page.found.fitted
+    page.costs["all"].append(0.0)  # on a busy machine the map waits for the end of a drag
     for value in (0.2, 0.25, 0.3):
         slider.value = value
     assert page.found.fitted == at_start, "nothing is computed before the loop's next turn"
