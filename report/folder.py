@@ -22,13 +22,15 @@ COMMAND: ContextVar[str] = ContextVar("COMMAND", default="")
 
 
 @contextmanager
-def whole_folder(path: Path) -> Iterator[Path]:
+def whole_folder(path: Path, scene: bool = False) -> Iterator[Path]:
     """A temporary folder beside `path` that takes its place when the block ends well, and vanishes when it does not.
 
-    Raises `BadInput` if something stands at `path` that spindle did not write, or that was changed since.
+    Raises `BadInput` if something stands at `path` that spindle did not write, or that was changed since; or a scene, in whose place only another `scene` comes.
     """
     path = path.resolve()
     _refuse_foreign(path)
+    if not scene and (path / "spindle.toml").is_file():
+        raise BadInput(f"--out {path}: holds a scene, spindle.toml; name a new or empty folder")
     for parent in path.parents:
         if parent.is_file():
             raise BadInput(f"--out {path}: {parent} is a file, so no folder can be made in it; name a new or empty folder")

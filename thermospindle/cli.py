@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 
 from thermospindle.model.errors import BadInput, NoEquilibrium, NotConverged, OutsideRange, Unanswered, instead, visible
 from thermospindle.options import parsers
-from thermospindle.report.folder import COMMAND
+from thermospindle.report.folder import COMMAND, MARK
 
 WRITTEN = ("out", "mapping")  # options that name what is written
 
@@ -77,6 +77,7 @@ def _run(arguments: list[str]) -> int:
     token = COMMAND.set(shlex.join(["spindle", *arguments]))
     try:
         _ask_to_write(asked.get("out"))
+        _keep_what_is_asked_for(asked)
         answer = getattr(import_module(f"thermospindle.report.verbs.{module}"), function)(**asked)
     except OSError as error:
         if told := _not_writable(error, asked):
@@ -103,6 +104,17 @@ def _ask_to_write(out: Path | None) -> None:
             tempfile.TemporaryFile(dir=next(p for p in Path(out).absolute().parents if p.is_dir())).close()
         except OSError as error:
             raise OSError(error.errno, error.strerror, str(out)) from None
+
+
+def _keep_what_is_asked_for(asked: dict[str, Any]) -> None:
+    """Refuse (`BadInput`) an output folder that holds what is read for it: a folder of the program's own is replaced whole."""
+    out = asked.get("out")
+    if out is None or not (Path(out) / MARK).is_file():
+        return
+    told = [v for value in asked.values() for v in (value if isinstance(value, list) else [value]) if isinstance(v, Path) and v is not out]
+    for path in told:
+        if path.exists() and Path(out).resolve() in (path.resolve(), *path.resolve().parents):
+            raise BadInput(f"--out {out}: holds {path}, which is read; name another folder")
 
 
 def _not_writable(error: OSError, asked: dict[str, Any]) -> str:

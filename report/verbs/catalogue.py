@@ -56,7 +56,7 @@ def add(
         raise BadInput("--out: add needs the folder of the new scene")
     check_place(scene, out)
     _, known = with_effects(scene, effect_files)
-    with whole_folder(out) as folder:
+    with whole_folder(out, scene=True) as folder:
         added = new_scene(scene, effect, set, diagnosis, folder, out, known)
         values = {"scene": str(out), **asdict(added), "warnings": []}
         mark(folder, asked, values)
