@@ -69,8 +69,8 @@ class Slab:
         return self.z[1] - self.z[0]
 
 
-def slabs(section: Section, densities: dict[str, float], names: Sequence[str], carried: Sequence[str]) -> list[Slab]:
-    """The shaft that the regions `names` are, lowest slab first, with the mass of the regions `carried` on it, which do not stiffen it.
+def slabs(section: Section, densities: dict[str, float], names: Sequence[str], carried: Sequence[str], turns: bool) -> list[Slab]:
+    """The shaft that the regions `names` are, lowest slab first, with the mass of the regions `carried` on it, which do not stiffen it; all of them turn, or stand.
 
     Densities (kg/m3) are by material. In every slab the regions that bend must be one tube of one material. What is carried counts with its mass; its
     rotary inertia is taken as that of a tube of the shaft's material directly around it.
@@ -80,6 +80,8 @@ def slabs(section: Section, densities: dict[str, float], names: Sequence[str], c
         for name in told:
             if name not in known:
                 raise ValueError(f"{key}: {name!r} names no section region; {instead(name, list(known))}")
+            if known[name].part != ("rotating" if turns else "stationary"):
+                raise ValueError(f"{key}: {name!r} is of the {known[name].part} part, and the shaft {'turns' if turns else 'stands'}; allowed are regions that move with it")
             if (*names, *carried).count(name) > 1:
                 raise ValueError(f"{key}: {name!r} stands twice; its mass counts once")
     bending, heavy = ([known[n] for n in told] for told in (names, carried))

@@ -112,7 +112,7 @@ class ShaftForm(Table):
             if self.mass_regions:
                 raise ValueError("mass_regions goes with regions; beside outer_mm the diameters that carry mass are mass_outer_mm")
             return self
-        cut = slabs(section, densities, self.regions, self.mass_regions)
+        cut = slabs(section, densities, self.regions, self.mass_regions, self.turns)
         drawn = {
             "start_z_mm": cut[0].z[0],
             "outer_mm": [[s.outer, s.length] for s in cut],

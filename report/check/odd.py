@@ -91,8 +91,9 @@ def _seats(found: Looked) -> Iterator[str]:
     for b in found.spindle.bearings:
         shaft = shafts.get(found.spindle.structure.carrier(b.inner_body))
         if shaft is not None:
-            bore, seat = found.spindle.region(b.inner_ring).r[0], max(_radii(shaft, b.z)[1])
-            if abs(bore - seat) > 0.05 * seat:
+            bore, radii = found.spindle.region(b.inner_ring).r[0], _radii(shaft, b.z)[1]
+            seat = max(radii)
+            if min(abs(bore - r) for r in radii) > 0.05 * seat:  # what carries mass may be the ring itself
                 yield f"bearing {b.name}: its inner ring {b.inner_ring!r} begins at a radius of {bore / MM:g} mm, and the shaft {shaft.name!r} has {seat / MM:g} mm there"
 
 

@@ -10,6 +10,7 @@ import pytest
 from tests.conftest import ROOT
 from thermospindle.model.errors import BadInput
 from thermospindle.model.scene.reading import build
+from thermospindle.model.scene.section import Section, slabs
 
 PATH = ROOT / "scenes" / "five_bearing" / "spindle.toml"
 SHAFT = ["nose", "nose flange", "front shaft", "middle shaft", "slim shaft", "rear shaft"]
@@ -69,7 +70,9 @@ def test_a_shaft_of_two_metals_one_behind_the_other():
         ({"regions": SHAFT, "mass_regions": [*RINGS, "nose"]}, "'nose' stands twice; its mass counts once"),
         ({"regions": SHAFT, "mass_regions": [*RINGS, RINGS[0]]}, "'front1 inner ring' stands twice; its mass counts once"),
         ({"regions": SHAFT[:3], "mass_regions": ["rear1 inner ring"]}, "mass_regions: 'rear1 inner ring' reaches beyond the shaft, which spans 0 to 103 mm"),
-        ({"regions": [*SHAFT, "front1 outer ring"]}, "shafts.spindle.regions: nothing from r_mm = 37.5 to"),
+        ({"regions": [*SHAFT, "front1 outer ring"]}, "shafts.spindle.regions: 'front1 outer ring' is of the stationary part, and the shaft turns"),
+        ({"regions": SHAFT, "mass_regions": ["housing tube"]}, "shafts.spindle.mass_regions: 'housing tube' is of the stationary part, and the shaft turns"),
+        ({"regions": SHAFT, "turns": False}, "shafts.spindle.regions: 'nose' is of the rotating part, and the shaft stands"),
         ({"regions": SHAFT, "outer_mm": [[60, 440]]}, "shafts.spindle: regions and outer_mm: both told"),
         ({**NUMBERS, "mass_regions": RINGS}, "shafts.spindle.mass_regions goes with regions"),
         ({"regions": SHAFT, "moves": ["x", "tilt_y"]}, "shafts.spindle: a shaft that turns must move in x, y, z, tilt_x and tilt_y"),
@@ -79,6 +82,14 @@ def test_a_shaft_of_two_metals_one_behind_the_other():
 def test_regions_that_are_no_shaft_are_refused(keys, words):
     with pytest.raises(BadInput, match=re.escape(words)):
         five_bearing(**keys)
+
+
+def test_what_does_not_touch_is_refused():
+    raw = tomllib.loads(PATH.read_text(encoding="utf-8"))
+    [ring] = [r for r in raw["section"]["regions"] if r["name"] == "rear1 inner ring"]
+    section = Section.model_validate({"regions": [r for r in raw["section"]["regions"] if r["name"] == "rear shaft"] + [ring | {"r_mm": [31.0, 33.25]}]})
+    with pytest.raises(ValueError, match=re.escape("regions: nothing from r_mm = 30 to 31 between z_mm = 303.5 and 321.5")):
+        slabs(section, {"steel": 7850.0}, ["rear shaft", "rear1 inner ring"], [], turns=True)
 
 
 def test_one_metal_around_another_is_refused():
