@@ -80,7 +80,7 @@ def as_campaign(run: Run, title: str) -> Campaign:
             level=run.spindle.hammer.level,
             window_decay=step.test.estimate.window_decay,
             pretrigger=middle_of_hit(run.spindle.hammer),
-            frf=_as_measured(step.test.estimate.h1),
+            frf=replace(_as_measured(step.test.estimate.h1), names={p.node: p.name for p in step.point.spindle.points}),
         )
         for step in run.steps
     )

@@ -112,6 +112,14 @@ def test_frequencies_that_are_none_are_refused(wrong):
         (lambda p: ts.impact(p, element="x"), "element = 'x': allowed are linear, ball-by-ball, reduced"),
         (lambda p: ts.impact(p, element="ball"), "element = 'ball': did you mean ball-by-ball?"),
         (lambda p: ts.impact(p, seed=-1), "seed = -1: must be a whole number from 0 to 999999999999999999"),
+        (lambda p: ts.modes(p.spindle), "source: must be an operating point (ts.point), a virtual test (ts.impact) or FRFs (ts.frf), not a Spindle"),
+        (lambda p: ts.frf(p.spindle), "source: must be an operating point (ts.point) or a virtual test (ts.impact), not a Spindle"),
+        (lambda p: ts.impact(p.spindle), "point: must be an operating point (ts.point), not a Spindle"),
+        (lambda p: ts.load(None), "scene: must be a scene's folder or the name of a shipped one, not a NoneType"),
+        (lambda p: ts.compare(p.spindle, [1]), "tests: must be a campaign (ts.campaign) or its folder, not a list"),
+        (lambda p: ts.diagnose(p.spindle, DATA / "foreign_none", effects="preload_loss"), "effects = 'preload_loss': must be a list of names, as ['preload_loss']"),
+        (lambda p: p.state.bearing("uper"), "'uper' is no ball bearing here; did you mean upper?"),
+        (lambda p: ts.frf(p, [900.0])["hub_top0"], "'hub_top0': one of the FRFs is asked for by two nodes, response and reference, as frf[\"hub_top0\", \"hub_top90\"]"),
         (lambda p: ts.add("hdd_2003", "preload_loss", loss="x"), "loss = 'x': must be a finite number"),
         (lambda p: ts.deviate("hdd_2003", {"preload": float("nan")}), "preload = nan: must be a finite number"),
     ],
@@ -120,6 +128,11 @@ def test_an_argument_that_is_none_is_told_in_one_sentence(call, sentence):
     with pytest.raises(ts.BadInput) as error:
         call(ts.point("hdd_2003", 20))
     assert str(error.value) == sentence
+
+
+def test_what_no_spindle_bears_is_warned_of():
+    with pytest.warns(UserWarning, match="293.15 C lies outside -40 to 120 C"), pytest.warns(UserWarning, match="lower and upper bearing lost contact"):
+        ts.point("hdd_2003", 293.15)
 
 
 def test_a_scene_that_is_none_is_told_the_nearest(tmp_path, monkeypatch):

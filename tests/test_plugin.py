@@ -8,6 +8,7 @@ from importlib.metadata import entry_points
 
 import pytest
 
+import thermospindle.front  # noqa: F401 - before pytest's own tool runs tests in this process, and takes away what they import
 from tests.conftest import DATA, ROOT, SCENE
 from thermospindle.model.errors import BadInput
 from thermospindle.testing import (
@@ -63,6 +64,44 @@ def test_a_failure_shows_the_mode_and_its_neighbours():
     rows = [line for line in str(failed.value).splitlines() if re.match(r"  [> ] (axial|rocking|lateral) \d+ ", line)]
     assert len(rows) == 5
     assert rows[2].startswith("  > lateral 6 ")
+
+
+def test_the_parts_of_a_shift_make_it_up():
+    """Of all that moves a mode by 14 Hz next to nothing is left to other things; a first order about one end left a sixth."""
+    with pytest.raises(AssertionError) as failed:
+        assert_frequency_shift("hdd_2003", mode="axial 3", from_C=20, to_C=60, shift_Hz=0, within=1)
+    parts = [float(v) for v in re.findall(r"([+-][0-9.]+) Hz", str(failed.value).rpartition("moved by the stiffness of:")[2])]
+    assert sum(parts) == pytest.approx(-13.92, abs=0.02)
+    assert abs(parts[-1]) < 0.2
+
+
+def test_lost_contact_and_a_temperature_in_kelvin_are_told():
+    """A spindle without its bearings moves by nothing, and that passed without a word."""
+    with pytest.warns(UserWarning, match="hdd_2003: 293 C") as said:
+        assert_frequency_shift("hdd_2003", mode="axial 2", from_C=293, to_C=333, shift_Hz=0, within=1)
+    words = "; ".join(str(w.message) for w in said)
+    assert "293 C: lower and upper bearing lost contact" in words
+    assert "293 C lies outside -40 to 120 C" in words
+    with pytest.warns(UserWarning, match="150 C"), pytest.raises(AssertionError, match=r"(?s)moved too far for the elements.*150 C: lower and upper bearing lost contact"):
+        assert_frequency_shift("hdd_2003", mode="axial 2", from_C=20, to_C=150, shift_Hz=0, within=1)
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: assert_frequency(SCENE, mode="axial 2", at_C=20, frequency_Hz=1, within=-1), "within = -1: must be a finite number above 0"),
+        (lambda: assert_frequency(SCENE, mode="axial 2", at_C=20, frequency_Hz=float("nan"), within=1), "frequency_Hz = nan: must be a finite number"),
+        (lambda: assert_frequency(SCENE, mode="axial 2", at_C="20", frequency_Hz=1, within=1), "temperature_C = '20': must be a finite number"),
+        (lambda: assert_damping(SCENE, mode="axial 2", at_C=20, percent="1", within=1), "percent = '1': must be a finite number"),
+        (lambda: assert_margin(SCENE, mode="axial 2", speed_rpm=0, at_least_percent=1), "speed_rpm = 0: nothing turns"),
+        (lambda: assert_margin(SCENE, mode="axial 2", speed_rpm=7200, at_least_percent=-1), "at_least_percent = -1: must be a finite number above 0"),
+        (lambda: assert_split(SCENE, modes=("lateral 1",), at_C=20, split_Hz=1, within=1), "modes = ('lateral 1',): must be two modes"),
+        (lambda: assert_agreement(SCENE, DATA / "foreign_bond", rms=float("inf")), "rms = inf: must be a finite number above 0"),
+    ],
+)
+def test_what_an_assertion_cannot_be_asked_with(call, said):
+    with pytest.raises(BadInput, match=re.escape(said)):
+        call()
 
 
 def test_the_plugin_loads_nothing_that_computes():

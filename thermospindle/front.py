@@ -11,6 +11,7 @@ import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does, before numpy loads
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import isfinite
@@ -27,6 +28,7 @@ from thermospindle.model.machine import Addition, Condition, Spindle
 from thermospindle.model.rotor.elements import HAMMER
 from thermospindle.model.rotor.modes import Mode
 from thermospindle.model.scene.reading import load as load_scene
+from thermospindle.model.sense import of_conditions, of_states
 from thermospindle.model.units import RPM
 from thermospindle.options import FASTEST, HITS, HOTTEST, NEWTONS
 from thermospindle.sim.campaign.beside import POWER
@@ -54,16 +56,26 @@ def load(scene: str | Path, effect_files: Sequence[str | Path] = ()) -> Spindle:
 
     `effect_files` hold effects of your own that the scene has.
     """
+    _kind("scene", scene, (str, Path), "a scene's folder or the name of a shipped one")
     return equipped(load_scene(scene), [Path(f) for f in effect_files])[0]
 
 
 def point(spindle: Spindle | str | Path, temperature_C: float, *, speed_rpm: float = 0.0) -> OperatingPoint:
     """The spindle soaked at a temperature (C) and turning (rpm): bearing states in `.state`, the compiled MuJoCo model in `.model`.
 
-    Raises `NoEquilibrium` where the bearings find no balance.
+    Raises `NoEquilibrium` where the bearings find no balance; warns (`UserWarning`) of a condition that no real spindle bears and of what is odd about its bearings.
     """
-    temperature = _number("temperature_C", temperature_C, -273.15, HOTTEST)
-    return operating_point(_spindle(spindle), Condition(temperature, _number("speed_rpm", speed_rpm, -FASTEST, FASTEST) * RPM))
+    temperature = number("temperature_C", temperature_C, -273.15, HOTTEST)
+    found = operating_point(_spindle(spindle), Condition(temperature, number("speed_rpm", speed_rpm, -FASTEST, FASTEST) * RPM))
+    for doubt in doubts(found):
+        warnings.warn(doubt, stacklevel=2)
+    return found
+
+
+def doubts(point: OperatingPoint) -> list[str]:
+    """What is odd about a condition and the bearings there, a sentence each."""
+    lost = [] if point.state.status == "in contact" or not point.state.bearings else [f"{point.condition.temperature:g} C: {point.state.status}"]
+    return [*lost, *of_conditions(point.spindle, [point.condition]), *of_states(point.spindle, [point.state.bearings])]
 
 
 @overload
@@ -77,8 +89,9 @@ def modes(source: OperatingPoint | ImpactTest | Frf, *, highest_Hz: float = np.i
     strain energy by element), `.shape` (n,). Of an impact test or measured FRFs those identified by maximum likelihood: `Modes` with `.frequency` (m,)
     Hz, `.damping` (m,), `.shape` (m, responses), and `.frequency_sd` (m,) and so on, their standard errors.
     """
+    _kind("source", source, (OperatingPoint, ImpactTest, Frf), "an operating point (ts.point), a virtual test (ts.impact) or FRFs (ts.frf)")
     if highest_Hz != np.inf:
-        _number("highest_Hz", highest_Hz, 0.0, np.inf)
+        number("highest_Hz", highest_Hz, 0.0, np.inf)
     if isinstance(source, OperatingPoint):
         return source.modes_below(highest_Hz)
     if isinstance(source, Frf):
@@ -95,6 +108,7 @@ def frf(source: OperatingPoint | ImpactTest, frequency_Hz: ArrayLike | None = No
     and standard errors at its own lines. `quantity`: receptance m/N, mobility (m/s)/N, accelerance (m/s2)/N; responses are all points, references the
     hammer's.
     """
+    _kind("source", source, (OperatingPoint, ImpactTest), "an operating point (ts.point) or a virtual test (ts.impact)")
     if quantity not in POWER:
         raise BadInput(f"quantity = {quantity!r}; allowed are {', '.join(POWER)}")
     spindle = source.spindle if isinstance(source, OperatingPoint) else source.point.spindle
@@ -130,10 +144,11 @@ def impact(
     `hits` on each hammer point and their peak force `level_N` are the scene's by default; `element` "ball-by-ball" takes contact laws instead of
     linear bearings, "reduced" is computed with the modes alone. `.record` is what the analyser sampled; `ts.frf(test)` and `ts.modes(test)` follow from it.
     """
+    _kind("point", point, (OperatingPoint,), "an operating point (ts.point)")
     if hits is not None:
         _whole("hits", hits, 1, HITS)
     if level_N is not None:
-        _number("level_N", level_N, 0.0, NEWTONS)
+        number("level_N", level_N, 0.0, NEWTONS)
     if element not in HAMMER:
         raise BadInput(f"element = {element!r}: {instead(str(element), HAMMER)}")
     _whole("seed", seed, 0, 10**18 - 1)
@@ -168,6 +183,8 @@ def diagnose(
     from thermospindle.diagnosis.runout.lines import modal_tests
     from thermospindle.diagnosis.verdict import diagnose as search
 
+    if isinstance(effects, str):
+        raise BadInput(f"effects = {effects!r}: must be a list of names, as [{effects!r}]")
     catalogue = CATALOGUE if effects is None else tuple(by_name(name) for name in effects)
     return search(_spindle(spindle), modal_tests(_campaign(tests)), catalogue, progress)
 
@@ -185,7 +202,7 @@ def add(spindle: Spindle | str | Path, effect: str | Path, **values: float) -> S
     if any(a.effect == found.name for a in drawing.effects):
         raise BadInput(f"effect {found.name}: {drawing.name} has it already")
     for name, value in values.items():
-        _number(name, value)
+        number(name, value)
     own = checked(found, found.typical() | values)
     return replace(drawing, effects=(*drawing.effects, Addition(found.name, own, found)))
 
@@ -196,7 +213,7 @@ def deviate(spindle: Spindle | str | Path, deviations: Mapping[str, float]) -> S
     The names are those of `[build.deviations]` of a scene; nothing is written.
     """
     for name, value in deviations.items():
-        _number(name, value)
+        number(name, value)
     return deviated(_spindle(spindle), deviations)
 
 
@@ -207,15 +224,22 @@ def read_log(file: str | Path) -> Log:
     return read(Path(file))
 
 
+def _kind(name: str, value: object, kinds: tuple[type, ...], told: str) -> None:
+    if not isinstance(value, kinds):
+        raise BadInput(f"{name}: must be {told}, not {'an' if type(value).__name__[0] in 'AEIO' else 'a'} {type(value).__name__}")
+
+
 def _spindle(spindle: Spindle | str | Path) -> Spindle:
+    _kind("spindle", spindle, (Spindle, str, Path), "a spindle (ts.load), a scene's folder or the name of a shipped one")
     return spindle if isinstance(spindle, Spindle) else load(spindle)
 
 
 def _campaign(tests: Campaign | str | Path) -> Campaign:
+    _kind("tests", tests, (Campaign, str, Path), "a campaign (ts.campaign) or its folder")
     return tests if isinstance(tests, Campaign) else campaign(tests)
 
 
-def _number(name: str, value: float, above: float = -np.inf, most: float = np.inf) -> float:
+def number(name: str, value: float, above: float = -np.inf, most: float = np.inf) -> float:
     """The number that an argument is, above `above` and up to `most`; `BadInput` for any other."""
     if isinstance(value, bool) or not isinstance(value, Real) or not isfinite(value) or not above < value <= most:
         bounds = [f"above {above:g}"] * bool(isfinite(above)) + [f"up to {most:g}"] * bool(isfinite(most))

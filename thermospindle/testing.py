@@ -12,6 +12,7 @@ spindle (`thermospindle.load`). A scene and a condition are computed once a proc
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -37,6 +38,15 @@ __all__ = [
 MOST = 3  # elements named in a failure
 NEIGHBOURS = 2  # modes shown on each side of the one in question
 KEPT = 256  # conditions
+UNITS = {"receptance": "m/N", "mobility": "(m/s)/N", "accelerance": "(m/s2)/N"}
+
+
+def _asked(positive: Sequence[str] = (), **numbers: float) -> None:
+    """`BadInput` for a number that an assertion cannot be asked with; those named in `positive` are above nothing."""
+    from thermospindle.front import number
+
+    for name, value in numbers.items():
+        number(name, value, 0.0 if name in positive else -float("inf"))
 
 
 class Spindles:
@@ -60,33 +70,36 @@ def assert_frequency_shift(
 ) -> None:
     """The natural frequency moves by `shift_Hz` from one temperature to another, give or take `within` Hz."""
     __tracebackhide__ = True
+    _asked(["within"], shift_Hz=shift_Hz, within=within)
     cold, hot = _pair(scene, from_C, to_C, speed_rpm, speed_rpm)
     index, partners = _index(cold, mode), _partners(cold, hot)
     after = _partner(cold, hot, index, partners)
     found = after.frequency - cold.modes[index].frequency
     if not abs(found - shift_Hz) <= within:
         head = f"{_called(cold, mode)} moves by {found:+.2f} Hz from {from_C:g} to {to_C:g} C{_at(speed_rpm)}; wanted {shift_Hz:+g} +- {within:g} Hz"
-        raise AssertionError("\n".join([head, *_table(cold, hot, partners, f"{from_C:g} C", f"{to_C:g} C", index), *_behind(cold, hot, index)]))
+        raise AssertionError("\n".join([head, *_table(cold, hot, partners, f"{from_C:g} C", f"{to_C:g} C", index), *_behind(cold, hot, index, after), *_odd(cold, hot)]))
 
 
 def assert_frequency(scene: Scene, *, mode: str | int, at_C: float, frequency_Hz: float, within: float, speed_rpm: float = 0.0) -> None:
     """The natural frequency is `frequency_Hz`, give or take `within` Hz."""
     __tracebackhide__ = True
+    _asked(["within"], frequency_Hz=frequency_Hz, within=within)
     point = _of(scene, at_C, speed_rpm)
     index = _index(point, mode)
     found = point.modes[index].frequency
     if not abs(found - frequency_Hz) <= within:
-        raise AssertionError("\n".join([f"{_called(point, mode)} lies at {found:.2f} Hz, {at_C:g} C{_at(speed_rpm)}; wanted {frequency_Hz:g} +- {within:g} Hz", *_energy(point, index)]))
+        raise AssertionError("\n".join([f"{_called(point, mode)} lies at {found:.2f} Hz, {at_C:g} C{_at(speed_rpm)}; wanted {frequency_Hz:g} +- {within:g} Hz", *_energy(point, index), *_odd(point)]))
 
 
 def assert_damping(scene: Scene, *, mode: str | int, at_C: float, percent: float, within: float, speed_rpm: float = 0.0) -> None:
     """The damping ratio is `percent`, give or take `within` percent points."""
     __tracebackhide__ = True
+    _asked(["within"], percent=percent, within=within)
     point = _of(scene, at_C, speed_rpm)
     index = _index(point, mode)
     found = 100 * point.modes[index].damping_ratio
     if not abs(found - percent) <= within:
-        raise AssertionError("\n".join([f"{_called(point, mode)} has {found:.3f} % damping, {at_C:g} C{_at(speed_rpm)}; wanted {percent:g} +- {within:g} %", *_energy(point, index)]))
+        raise AssertionError("\n".join([f"{_called(point, mode)} has {found:.3f} % damping, {at_C:g} C{_at(speed_rpm)}; wanted {percent:g} +- {within:g} %", *_energy(point, index), *_odd(point)]))
 
 
 def assert_peak_level(
@@ -97,25 +110,31 @@ def assert_peak_level(
     __tracebackhide__ = True
     from thermospindle.front import frf
 
+    _asked(["level", "within"], level=level, within=within)
     point = _of(scene, at_C, speed_rpm)
     index = _index(point, mode)
     frequency = point.modes[index].damped_frequency()
     found = float(abs(frf(point, [frequency], quantity=quantity)[response, reference][0]))
     if not abs(found - level) <= within:
-        head = f"|{quantity}| of {response} to {reference} at {_called(point, mode)}, {frequency:.1f} Hz, is {found:.4g}; wanted {level:g} +- {within:g}"
-        raise AssertionError("\n".join([head, *_energy(point, index)]))
+        head = f"|{quantity}| of {response} to {reference} at {_called(point, mode)}, {frequency:.1f} Hz, is {found:.4g} {UNITS[quantity]}; wanted {level:g} +- {within:g}"
+        raise AssertionError("\n".join([head, *_energy(point, index), *_odd(point)]))
 
 
 def assert_split(scene: Scene, *, modes: tuple[str | int, str | int], at_C: float, split_Hz: float, within: float, speed_rpm: float = 0.0) -> None:
     """Two modes, as ("rocking 1", "rocking 2"), lie `split_Hz` apart, the second above the first, give or take `within` Hz."""
     __tracebackhide__ = True
+    from thermospindle.model.errors import BadInput
+
+    _asked(["within"], split_Hz=split_Hz, within=within)
+    if isinstance(modes, str) or len(modes) != 2:
+        raise BadInput(f'modes = {modes!r}: must be two modes, as ("rocking 1", "rocking 2")')
     point = _of(scene, at_C, speed_rpm)
     first, second = (_index(point, m) for m in modes)
     found = point.modes[second].frequency - point.modes[first].frequency
     if not abs(found - split_Hz) <= within:
         pair = " and ".join(f"{m} at {point.modes[i].frequency:.2f} Hz ({point.modes[i].whirl} whirl)" for m, i in zip(modes, (first, second), strict=True))
         head = f"{point.spindle.name}: {pair} lie {found:.2f} Hz apart, {at_C:g} C{_at(speed_rpm)}; wanted {split_Hz:g} +- {within:g} Hz"
-        raise AssertionError("\n".join([head, *_energy(point, first), *_energy(point, second)]))
+        raise AssertionError("\n".join([head, *_energy(point, first), *_energy(point, second), *_odd(point)]))
 
 
 def assert_margin(
@@ -128,7 +147,11 @@ def assert_margin(
     """
     __tracebackhide__ = True
     from thermospindle.model.bearing.kinematics import lines, row_kinematics
+    from thermospindle.model.errors import BadInput
 
+    _asked(["at_least_percent"], at_least_percent=at_least_percent)
+    if speed_rpm == 0:
+        raise BadInput("speed_rpm = 0: nothing turns, and no bearing has a line; must be a speed")
     spindle = _loaded(scene)
     points = [_point(spindle, t, speed_rpm) for t in (temperatures_C or spindle.temperatures)]
     index = _index(points[0], mode)
@@ -143,7 +166,7 @@ def assert_margin(
     close = sorted((row for row in near if abs(row[0]) < at_least_percent), key=lambda row: abs(row[0]))
     if close:
         head = f"{_called(points[0], mode)}{_at(speed_rpm)}: {len(close)} lines come nearer than {at_least_percent:g} %; the nearest are"
-        raise AssertionError("\n".join([head, *(f"  {text}" for _, text in close[:5]), *_energy(points[0], index)]))
+        raise AssertionError("\n".join([head, *(f"  {text}" for _, text in close[:5]), *_energy(points[0], index), *_odd(*points)]))
 
 
 def assert_agreement(scene: Scene, campaign: str | Path | Any, *, rms: float) -> None:
@@ -151,6 +174,7 @@ def assert_agreement(scene: Scene, campaign: str | Path | Any, *, rms: float) ->
     __tracebackhide__ = True
     from thermospindle.front import compare
 
+    _asked(["rms"], rms=rms)
     found = compare(_loaded(scene), campaign)
     if not found.rms_residual <= rms:
         rows = sorted(((abs(m.residual), t.test.id, m) for t in found.tests for m in t.modes), key=lambda row: -row[0])
@@ -181,14 +205,17 @@ _POINTS: dict[tuple[str, float, float], OperatingPoint] = {}
 
 
 def _point(spindle: Spindle, temperature: float, speed: float) -> OperatingPoint:
-    from thermospindle.front import point
+    from thermospindle.front import doubts, number, point
     from thermospindle.model.scene.reading import content_hash
 
-    key = content_hash(spindle), float(temperature), float(speed)
+    key = content_hash(spindle), number("temperature_C", temperature), number("speed_rpm", speed)
     if key not in _POINTS:
         if len(_POINTS) >= KEPT:
             _POINTS.pop(next(iter(_POINTS)))
-        _POINTS[key] = point(spindle, temperature, speed_rpm=speed)
+        with warnings.catch_warnings(action="ignore"):  # said at every call, also of what is kept
+            _POINTS[key] = point(spindle, temperature, speed_rpm=speed)
+    for doubt in doubts(_POINTS[key]):
+        warnings.warn(f"{spindle.name}: {doubt}", stacklevel=4)
     return _POINTS[key]
 
 
@@ -228,7 +255,8 @@ def _partners(first: OperatingPoint, then: OperatingPoint) -> list[int]:
 def _partner(first: OperatingPoint, then: OperatingPoint, index: int, partners: Sequence[int]) -> Mode:
     if partners[index] < 0:
         t = then.condition.temperature
-        raise AssertionError(f"{_called(first, index + 1)}, {first.modes[index].frequency:.1f} Hz: no mode at {t:g} C has its shape, so it cannot be followed")
+        head = f"{_called(first, index + 1)}, {first.modes[index].frequency:.1f} Hz: no mode at {t:g} C has its shape, so it cannot be followed"
+        raise AssertionError("\n".join([head, *_odd(first, then)]))
     return then.modes[partners[index]]
 
 
@@ -263,22 +291,38 @@ def _energy(point: OperatingPoint, index: int) -> list[str]:
     return [f"  strain energy of {mode.kind} at {mode.frequency:.1f} Hz: " + ", ".join(f"{name} {share:.0%}" for name, share in most)]
 
 
-def _behind(first: OperatingPoint, then: OperatingPoint, index: int) -> list[str]:
-    """Where the energy is, and what the change of each element's stiffness does to the mode, to first order: df = f/2 phi^T dK phi / phi^T K phi."""
+def _odd(*points: OperatingPoint) -> list[str]:
+    """What is odd about conditions and bearings there: what moved may be that."""
+    from thermospindle.front import doubts
+
+    return [f"  {doubt}" for doubt in dict.fromkeys(d for p in points for d in doubts(p))]
+
+
+def _behind(first: OperatingPoint, then: OperatingPoint, index: int, after: Mode) -> list[str]:
+    """Where the energy is, and what the change of each element's stiffness does to the mode: df = f/2 phi^T dK phi / phi^T K phi, the mean of what the shapes at both ends
+    say, which is right to the second order; and what is left, of masses, speed and higher orders."""
+    mode = first.modes[index]
+    ends = [_moved(first, then, first, mode), _moved(first, then, then, after)]
+    change = {name: sum(end[name] for end in ends) / 2 for name in ends[0]}
+    moved = sorted(change.items(), key=lambda row: -abs(row[1]))[:MOST]
+    told = [f"{name} {value:+.2f} Hz" for name, value in moved if abs(value) > 5e-3]
+    whole = after.frequency - mode.frequency
+    rest = whole - sum(value for _, value in moved if abs(value) > 5e-3)
+    if abs(rest) > abs(whole) / 2:
+        return [*_energy(first, index), "  moved too far for the elements' parts in it to be told to first order"]
+    told += [f"all else {rest:+.2f} Hz"] if told and abs(rest) > 5e-3 else []
+    return [*_energy(first, index), *([f"  moved by the stiffness of: {', '.join(told)}"] if told else [])]
+
+
+def _moved(first: OperatingPoint, then: OperatingPoint, at: OperatingPoint, mode: Mode) -> dict[str, float]:
+    """What the change of each element's stiffness does to a frequency (Hz), to first order about one of two conditions."""
     import numpy as np
 
     from thermospindle.model.rotor.chain import element_rows
 
-    mode = first.modes[index]
-    change: dict[str, float] = {}
-    total = 0.0
+    rows = {e.name: element_rows(at.chain, e) @ mode.shape for e in at.chain.elements}
+    before, after = ({e.name: e.stiffness for e in p.chain.elements} for p in (first, then))
     quadratic: Callable[[Any, Any], float] = lambda row, k: float(np.real(row.conj() @ k @ row))  # noqa: E731
-    after = {e.name: e for e in then.chain.elements}
-    for e in first.chain.elements:
-        row = element_rows(first.chain, e) @ mode.shape
-        total += quadratic(row, e.stiffness)
-        if e.name in after:
-            change[e.name] = quadratic(row, after[e.name].stiffness - e.stiffness)
-    moved = sorted(((name, 0.5 * mode.frequency * value / total) for name, value in change.items()), key=lambda row: -abs(row[1]))[:MOST]
-    told = ", ".join(f"{name} {value:+.2f} Hz" for name, value in moved if abs(value) > 5e-3)
-    return [*_energy(first, index), *([f"  moved by the stiffness of: {told}"] if told else [])]
+    total = sum(quadratic(rows[e.name], e.stiffness) for e in at.chain.elements)
+    both = [name for name in rows if name in before and name in after]
+    return {name: 0.5 * mode.frequency * quadratic(rows[name], after[name] - before[name]) / total for name in both}

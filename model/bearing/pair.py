@@ -19,7 +19,7 @@ from thermospindle.model.bearing.movement import Rings, Sleeve, equilibrium
 from thermospindle.model.bearing.roller import RollerState, roller_state
 from thermospindle.model.bearing.row import row_at
 from thermospindle.model.bearing.state import ByDirection, LinearState, linear_state
-from thermospindle.model.errors import BadInput, NoEquilibrium
+from thermospindle.model.errors import BadInput, NoEquilibrium, instead
 from thermospindle.model.machine import Bearing, BearingSet, Condition, RingMotion, Spindle
 from thermospindle.model.types import Array
 
@@ -97,7 +97,11 @@ class PairState:
         return {b.name: b for b in self.linear if isinstance(b, RollerState)}
 
     def bearing(self, name: str) -> BearingState:
-        return next(b for b in self.bearings if b.name == name)
+        """A ball row's state. Raises `BadInput` naming those there are."""
+        for b in self.bearings:
+            if b.name == name:
+                return b
+        raise BadInput(f"{name!r} is no ball bearing here; {instead(str(name), [b.name for b in self.bearings])}")
 
 
 def check_centred(state: PairState, what: str) -> None:

@@ -78,6 +78,7 @@ def log_frf_numbers(recording: rr.RecordingStream, id: str, order: int, temperat
     recording.send_columns(at("numbers", id), [over_frequency(frf.frequency)], columns)
     about = {"id": id, "order": order, "temperature_C": temperature, "speed_rad_per_s": speed, "quantity": frf.quantity}
     about |= {"response_nodes": frf.response_nodes, "reference_nodes": frf.reference_nodes}
+    about |= {"named_nodes": list(frf.names), "node_names": list(frf.names.values())} if frf.names else {}
     log_values(recording, at("numbers", id, "about"), about)
 
 

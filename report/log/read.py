@@ -121,8 +121,9 @@ class Log:
 
         value = np.empty((len(responses), len(references), len(frequency)), complex)
         value.real, value.imag = lines("real"), lines("imaginary")
+        names = dict(zip(about.get("named_nodes", ()), about.get("node_names", ()), strict=True))
         coherence, sd = (lines(name) if name in self.columns[entity] else None for name in ("coherence", "standard_error"))
-        return Frf(frequency[rising], value, responses, references, about["quantity"][0], coherence, sd)
+        return Frf(frequency[rising], value, responses, references, about["quantity"][0], coherence, sd, names=names)
 
     @cached_property
     def records(self) -> dict[int, HammerRecords]:

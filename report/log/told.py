@@ -48,7 +48,7 @@ def _run_words(log: Log) -> list[str]:
         groups.setdefault(entity.split("/")[1], []).append(rows)
     lines += [f"{name}: {len(rows)} entities, {sum(rows)} rows" for name, rows in groups.items() if name != "__properties"]
     for test, frf in log.frfs.items():
-        nodes = [" ".join(map(str, side)) for side in (frf.response_nodes, frf.reference_nodes)]
+        nodes = [", ".join(f"{n} {frf.names.get(n, '')}".strip() for n in side) for side in (frf.response_nodes, frf.reference_nodes)]
         first, second, last = frf.frequency[[0, 1, -1]]
         lines.append(
             f"FRFs of {test}: {frf.quantity}, responses {nodes[0]}, references {nodes[1]}, "

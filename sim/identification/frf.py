@@ -48,6 +48,8 @@ class Frf:
 
     def __getitem__(self, ends: tuple[int | str, int | str]) -> np.ndarray:
         """One FRF (n,), complex. Raises `BadInput` naming the nodes there are."""
+        if not isinstance(ends, tuple) or len(ends) != 2:
+            raise BadInput(f'{ends!r}: one of the FRFs is asked for by two nodes, response and reference, as frf["hub_top0", "hub_top90"]')
         places = [self._place(end, nodes) for end, nodes in zip(ends, (self.response_nodes, self.reference_nodes), strict=True)]
         return np.asarray(self.value[places[0], places[1]])
 
