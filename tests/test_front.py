@@ -1,5 +1,6 @@
 """`import thermospindle as ts`: the same numbers and objects as the command line, named nodes, nothing loaded before it is used."""
 
+import json
 import re
 import runpy
 import subprocess
@@ -72,6 +73,16 @@ def test_add_is_the_effect_of_the_catalogue():
 def test_compare_takes_folders_and_campaigns():
     folder = SCENE / "measured" / "jang_2003"
     assert ts.compare(SCENE, folder).rms_residual == ts.compare(ts.load("hdd_2003"), read_campaign(folder)).rms_residual
+
+
+def test_answers_in_plain_numbers():
+    """As `spindle compare --json`, with nothing in it that JSON cannot hold."""
+    found = ts.compare("hdd_2003", DATA / "foreign_bond" / "campaign.toml")
+    told = json.loads(json.dumps(ts.answer(found)))
+    assert told["rms_pull"] == found.rms_residual
+    assert told["tests"][0]["modes"][0]["measured_Hz"] == found.tests[0].modes[0].measured
+    with pytest.raises(ts.BadInput, match="found: must be a diagnosis"):
+        ts.answer(found.tests)
 
 
 def test_what_is_shown_of_an_object_is_a_line(tmp_path):

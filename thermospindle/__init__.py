@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from thermospindle.front import add as add
+    from thermospindle.front import answer as answer
     from thermospindle.front import campaign as campaign
     from thermospindle.front import compare as compare
     from thermospindle.front import deviate as deviate
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from thermospindle.front import read_log as read_log
     from thermospindle.model.errors import BadInput as BadInput
 
-__all__ = ["BadInput", "add", "campaign", "compare", "deviate", "diagnose", "frf", "impact", "load", "modes", "point", "read_log"]
+__all__ = ["BadInput", "add", "answer", "campaign", "compare", "deviate", "diagnose", "frf", "impact", "load", "modes", "point", "read_log"]
 
 
 def __getattr__(name: str) -> Any:

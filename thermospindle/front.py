@@ -17,7 +17,7 @@ from dataclasses import replace
 from math import isfinite
 from numbers import Real
 from pathlib import Path
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -187,6 +187,23 @@ def diagnose(
         raise BadInput(f"effects = {effects!r}: must be a list of names, as [{effects!r}]")
     catalogue = CATALOGUE if effects is None else tuple(by_name(name) for name in effects)
     return search(_spindle(spindle), modal_tests(_campaign(tests)), catalogue, progress)
+
+
+def answer(found: Diagnosis | Comparison) -> dict[str, Any]:
+    """All that the command line tells of a diagnosis or a comparison with `--json`, as plain dicts, lists and numbers with units in their keys: of a diagnosis `verdict`, `effects`,
+    `probability`, and `candidates` with the sizes that each effect has, in every test too, and their standard errors. docs/site/answers.toml, and the site, say what every key holds.
+    """
+    from thermospindle.diagnosis.compare.compare import Comparison as Beside
+    from thermospindle.diagnosis.verdict import Diagnosis as Found
+
+    _kind("found", found, (Found, Beside), "a diagnosis (ts.diagnose) or a comparison (ts.compare)")
+    if isinstance(found, Beside):
+        from thermospindle.report.text.compare import comparison_json
+
+        return comparison_json(found)
+    from thermospindle.report.text.diagnosis.answer import diagnosis_json
+
+    return diagnosis_json(found)
 
 
 def add(spindle: Spindle | str | Path, effect: str | Path, **values: float) -> Spindle:

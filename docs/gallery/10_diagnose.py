@@ -11,3 +11,5 @@ tests = Path(tempfile.mkdtemp()) / "tests"
 simulate(Path("hdd_2003"), temperatures=[20, 40, 60], out=tests)
 found = ts.diagnose(spindle, tests, effects=["soak_lag", "channel_delay"])
 print("missing:", found.verdict.word)
+for candidate in ts.answer(found)["candidates"]:  # sizes and standard errors in plain numbers, as `spindle diagnose --json`
+    print(candidate["effects"], f"{candidate['probability']:.3f}")

@@ -189,16 +189,22 @@ except Exception:
 
 def check_readable(path: Path) -> None:
     """Refuse (`BadInput`) a damaged log on which the library that reads it would abort the whole process, by letting it abort another."""
-    if not Path(path).is_file():
-        raise BadInput(f"{path}: no such file")
+    _check_file(Path(path))
     read_apart(Path(path), "Rerun logs", TRIAL, str(path))
+
+
+def _check_file(path: Path) -> None:
+    if path.is_dir():
+        logs = sorted(p.name for p in path.glob("*.rrd"))
+        raise BadInput(f"{path}: is a folder; a log is a file, *.rrd: {'there ' + ', '.join(logs) if logs else 'none is in it'}")
+    if not path.is_file():
+        raise BadInput(f"{path}: no such file")
 
 
 def read_log(path: Path) -> Log:
     """Everything in a log. Raises `BadInput`, one sentence that names the file, for anything but a whole log of ours."""
     path = Path(path)
-    if not path.is_file():
-        raise BadInput(f"{path}: no such file")
+    _check_file(path)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of a file cut short; the error below says so

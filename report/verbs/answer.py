@@ -60,7 +60,12 @@ def with_effects(scene: Path, effect_files: Sequence[Path]) -> tuple[Spindle, tu
 
 def temperatures_or_range(temperatures: Sequence[float] | None, spindle: Spindle, steps: int = STEPS) -> list[float]:
     """The temperatures (C) asked for; where none are, so many over the range of the scene."""
-    return np.linspace(*spindle.temperatures, steps).tolist() if temperatures is None else list(temperatures)
+    if temperatures is None:
+        return np.linspace(*spindle.temperatures, steps).tolist()
+    twice = next((t for t in temperatures if list(temperatures).count(t) > 1), None)
+    if twice is not None:
+        raise BadInput(f"--temperatures: {twice:g} stands twice; each is allowed once")
+    return list(temperatures)
 
 
 def temperature_or_reference(temperature: float | None, spindle: Spindle) -> float:

@@ -95,8 +95,9 @@ class Campaign:
 
 
 def read_campaign(folder: Path, limits: Limits = LIMITS) -> Campaign:
-    """The campaign of a folder. Raises `BadInput`, one sentence naming file, key or set, value and what is allowed."""
+    """The campaign of a folder, or of its campaign.toml. Raises `BadInput`, one sentence naming file, key or set, value and what is allowed."""
     folder = Path(folder)
+    folder = folder.parent if folder.name == "campaign.toml" else folder
     file = folder / "campaign.toml"
     if not file.is_file():
         raise BadInput(f"{folder}: no campaign there; expected a folder with campaign.toml")

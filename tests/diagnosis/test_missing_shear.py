@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import thermospindle as ts
 from tests.conftest import ROOT
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.verdict import diagnose
@@ -61,7 +62,8 @@ def test_one_condition_shows_no_drift(measured):
 
 def test_what_cannot_be_told_apart_is_said(measured):
     assert measured.may_hide == ("rotary_inertia",)
-    answer = diagnosis_json(measured)
+    answer = ts.answer(measured)
+    assert answer == diagnosis_json(measured)
     assert answer["may_hide"] == ["rotary_inertia"]
     assert answer["error"]["held_out_after"] is None
     for test in answer["next_test"]:  # no other temperature tells them apart, either; turning, hardly: of a rotary inertia 3.6 times too large the gyroscopic moment is so, too

@@ -276,7 +276,7 @@ def ours_without_content(path: Path) -> None:
     ("make", "message"),
     [
         pytest.param(lambda path: None, "no such file", id="missing"),
-        pytest.param(lambda path: path.mkdir(), "no such file", id="folder"),
+        pytest.param(lambda path: path.mkdir(), "is a folder; a log is a file, *.rrd: none is in it", id="folder"),
         pytest.param(lambda path: path.write_bytes(b""), "not a Rerun log that can be read", id="empty"),
         pytest.param(lambda path: path.write_text("frequency,level\n1,2\n"), "not a Rerun log that can be read", id="text"),
         pytest.param(foreign, "is a recording of 'another_program', not of 'thermospindle'", id="foreign"),

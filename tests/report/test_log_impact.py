@@ -60,6 +60,7 @@ def test_every_sample_of_every_hit_comes_back_bit_for_bit(two_hits: Run, file: P
 def test_frfs_and_peaks_come_back(two_hits: Run, file: Path) -> None:
     contents = ts.read_log(file)
     [frf] = contents.frfs.values()
+    assert frf["hub_top0", "hub_top0"] is not None  # nodes by name
     h1 = two_hits.steps[0].test.estimate.h1
     assert (frf.value == h1.value).all()
     assert frf.coherence is not None
