@@ -132,6 +132,7 @@ def test_frequencies_that_are_none_are_refused(wrong):
         (lambda p: p.state.bearing("uper"), "'uper' is no ball bearing here; did you mean upper?"),
         (lambda p: ts.frf(p, [900.0])["hub_top0"], "'hub_top0': one of the FRFs is asked for by two nodes, response and reference, as frf[\"hub_top0\", \"hub_top90\"]"),
         (lambda p: ts.add("hdd_2003", "preload_loss", loss="x"), "loss = 'x': must be a finite number"),
+        (lambda p: ts.deviate("hdd_2003", {"preload": -1.5}), "preload = -1.5: must be a relative deviation from -0.9 to 10"),
         (lambda p: ts.deviate("hdd_2003", {"preload": float("nan")}), "preload = nan: must be a finite number"),
     ],
 )

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from thermospindle.model.built.tolerance import deviated
+from thermospindle.model.built.tolerance import LEAST, MOST, deviated
 from thermospindle.model.errors import BadInput, instead
 from thermospindle.model.machine import Addition, Condition, Spindle
 from thermospindle.model.rotor.elements import HAMMER
@@ -230,7 +230,8 @@ def deviate(spindle: Spindle | str | Path, deviations: Mapping[str, float]) -> S
     The names are those of `[build.deviations]` of a scene; nothing is written.
     """
     for name, value in deviations.items():
-        number(name, value)
+        if not LEAST <= number(name, value) <= MOST:
+            raise BadInput(f"{name} = {value:g}: must be a relative deviation from {LEAST:g} to {MOST:g}")
     return deviated(_spindle(spindle), deviations)
 
 

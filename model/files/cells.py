@@ -13,8 +13,8 @@ FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
 def cell(name: str) -> str:
-    """A name as a cell."""
-    return f"'{name}" if name.lstrip("'").startswith(FORMULA) else name
+    """A name as a cell; a dash alone, for nothing, is none to compute."""
+    return f"'{name}" if name.lstrip("'").startswith(FORMULA) and name != "-" else name
 
 
 def cells(values: Iterable[Any]) -> list[Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from thermospindle.model.units import RPM, TO_NM
@@ -74,12 +74,18 @@ def _map_json(log: Log) -> dict[str, Any]:
     }
 
 
+def _line_of(c: Mapping[str, Any]) -> str:
+    """A line with its cause, the bearing that it is of and the way it whirls: several have one name."""
+    own = [c["cause"], f"of {c['bearing']}" if c["bearing"] else "", "" if c["line_whirl"] == "none" else c["line_whirl"]]
+    return f"{c['line']} ({' '.join(word for word in own if word)})"
+
+
 def _map_words(log: Log) -> list[str]:
     (count, modes, speeds), coincidences = log.grid[2].shape, log.rows("/numbers/coincidences")
     return [
         f"resonance map: {modes} modes at {count} temperatures x {speeds} speeds, {len(coincidences)} coincidences",
         *(
-            f"{c['line']} with mode {c['mode']} at {c['temperature_C']:.1f} C, {c['speed_rpm']:.0f} rpm, {c['frequency_Hz']:.1f} Hz"
+            f"{_line_of(c)} with {c['mode_kind']} mode {c['mode']} at {c['temperature_C']:.1f} C, {c['speed_rpm']:.0f} rpm, {c['frequency_Hz']:.1f} Hz"
             for c in coincidences[:10]
         ),
     ]

@@ -19,6 +19,10 @@ def test_no_cell_is_a_formula_and_every_name_comes_back(name):
     assert (cell(name) == name) == (name.lstrip("'")[:1] not in FORMULA or name in ("", "'"))
 
 
+def test_a_dash_for_nothing_stays():
+    assert cell("-") == name_of("-") == "-"
+
+
 def test_numbers_stay():
     assert cells(["=x", -1.0, 3]) == ["'=x", -1.0, 3]
 

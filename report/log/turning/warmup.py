@@ -70,7 +70,8 @@ def series(warmup: Warmup) -> dict[str, dict[str, tuple[Array, Any]]]:
             g: (np.array([m.temperatures[g] for m in moments]), light(PARTS[parts[g]])) for g in moments[0].temperatures
         },
         "Bearings, °C": {b: (np.array([m.bearing_temperatures[b] for m in moments]), _of_bearing(k)) for k, b in enumerate(friction)},
-        "Preload, N": {b: (np.array([m.preload[b] for m in moments]), _of_bearing(k)) for k, b in enumerate(bearings)},
+        # in nN, or rounding errors of a spring's constant force fill the panel
+        "Preload, N": {b: (np.round([m.preload[b] for m in moments], 9), _of_bearing(k)) for k, b in enumerate(bearings)},
         "Contact angle, deg": {
             b: (np.degrees([m.point.state.bearing(b).contact_angle for m in moments]), _of_bearing(k)) for k, b in enumerate(bearings)
         },
