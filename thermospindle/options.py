@@ -268,7 +268,7 @@ def parsers() -> tuple[_Parser, dict[str, argparse.ArgumentParser]]:
     one(resonances)
     speed(resonances, "the nominal speed (the scene's by default)")
     resonances.add_argument("--temperatures", type=_temperature, nargs="+", metavar="C", help="the scene's range in 21 steps by default")
-    speeds(resonances, "0 to twice the nominal speed in 41 steps by default")
+    speeds(resonances, "0 to twice the nominal speed in 41 steps by default; the nominal one is always added")
     resonances.add_argument("--multiples", type=_count(MULTIPLES), metavar="K", help="of the number of balls, and even ball orders")
     studies = verb("study", ("study", "study"), "a study from its file: a sweep, a Monte Carlo of build tolerances, a comparison of designs, or a fleet of campaigns; run again it goes on", what="file")
     studies.add_argument("--cluster", metavar="ADDRESS", help="of a Dask scheduler whose workers do the work, as in tcp://127.0.0.1:8786 (this machine's cores by default)")
