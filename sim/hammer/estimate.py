@@ -107,7 +107,7 @@ def _standard_error(v: ComplexArray, f: ComplexArray, h1: ComplexArray) -> Array
 
 def _noise_power(residual: Array, terms: Array) -> Array:
     """The sum of not negative `terms` (n, m) under which residual powers (n,) are likeliest, each exponential about it as squares of complex noise are: its coefficients rise and fall by
-    factors, each step to a likelier sum, from all terms alike (Fevotte & Idier 2011, *Neural Computation* 23, 2421, eq. 4.8; none of them is lost on the way, as one may be
+    factors, each step to a likelier sum, from all terms alike (majorisation-minimisation of Fevotte & Idier 2011, *Neural Computation* 23, 2421, for beta = 0, exponent 1 / (2 - beta); none of them is lost on the way, as one may be
     where squares are weighted with the fit itself)."""
     size = residual.mean()
     if size == 0:  # without noise
