@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 from scipy.optimize import brentq
 
+from thermospindle.model import sense
 from thermospindle.model.bearing.pair import PairState, solve
 from thermospindle.model.bearing.stiffness_table import StiffnessTable, tabulate
 from thermospindle.model.built.imperfections import Imperfections
@@ -134,6 +135,11 @@ def operating_point(
         if effect.pair:
             state = effect.pair(spindle, condition, values, state)
     return OperatingPoint(spindle, condition, state, present)
+
+
+def doubts(spindle: Spindle, points: Sequence[OperatingPoint]) -> list[str]:
+    """What is odd about conditions and about the states of the bearings there, a sentence each."""
+    return sense.of_conditions(spindle, [p.condition for p in points]) + sense.of_states(spindle, [p.state.bearings for p in points])
 
 
 def _region_temperatures(spindle: Spindle, condition: Condition, effects: Sequence[tuple[Effect, Values]]) -> float | dict[str, float]:

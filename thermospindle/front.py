@@ -28,7 +28,6 @@ from thermospindle.model.machine import Addition, Condition, Spindle
 from thermospindle.model.rotor.elements import HAMMER
 from thermospindle.model.rotor.modes import Mode
 from thermospindle.model.scene.reading import load as load_scene
-from thermospindle.model.sense import of_conditions, of_states
 from thermospindle.model.units import RPM
 from thermospindle.options import FASTEST, HITS, HOTTEST, NEWTONS
 from thermospindle.sim.campaign.beside import POWER
@@ -40,7 +39,7 @@ from thermospindle.sim.effects.own import effect_of, installed
 from thermospindle.sim.hammer.test import ImpactTest, impact_tests
 from thermospindle.sim.identification.frf import Frf
 from thermospindle.sim.identification.modal import Modes, extract
-from thermospindle.sim.operating import OperatingPoint, operating_point
+from thermospindle.sim.operating import OperatingPoint, doubts, operating_point
 from thermospindle.sim.run import identify
 
 if TYPE_CHECKING:
@@ -65,17 +64,22 @@ def point(spindle: Spindle | str | Path, temperature_C: float, *, speed_rpm: flo
 
     Raises `NoEquilibrium` where the bearings find no balance; warns (`UserWarning`) of a condition that no real spindle bears and of what is odd about its bearings.
     """
-    temperature = number("temperature_C", temperature_C, -273.15, HOTTEST)
-    found = operating_point(_spindle(spindle), Condition(temperature, number("speed_rpm", speed_rpm, -FASTEST, FASTEST) * RPM))
-    for doubt in doubts(found):
+    found = soaked(_spindle(spindle), temperature_C, speed_rpm)
+    for doubt in odd(found):
         warnings.warn(doubt, stacklevel=2)
     return found
 
 
-def doubts(point: OperatingPoint) -> list[str]:
-    """What is odd about a condition and the bearings there, a sentence each."""
+def soaked(spindle: Spindle, temperature_C: float, speed_rpm: float) -> OperatingPoint:
+    """The same without a word of what is `odd` there."""
+    temperature = number("temperature_C", temperature_C, -273.15, HOTTEST)
+    return operating_point(spindle, Condition(temperature, number("speed_rpm", speed_rpm, -FASTEST, FASTEST) * RPM))
+
+
+def odd(point: OperatingPoint) -> list[str]:
+    """Lost contact, and what else is odd about a condition and the bearings there, a sentence each."""
     lost = [] if point.state.status == "in contact" or not point.state.bearings else [f"{point.condition.temperature:g} C: {point.state.status}"]
-    return [*lost, *of_conditions(point.spindle, [point.condition]), *of_states(point.spindle, [point.state.bearings])]
+    return [*lost, *doubts(point.spindle, [point])]
 
 
 @overload

@@ -205,16 +205,15 @@ _POINTS: dict[tuple[str, float, float], OperatingPoint] = {}
 
 
 def _point(spindle: Spindle, temperature: float, speed: float) -> OperatingPoint:
-    from thermospindle.front import doubts, number, point
+    from thermospindle.front import number, odd, soaked
     from thermospindle.model.scene.reading import content_hash
 
     key = content_hash(spindle), number("temperature_C", temperature), number("speed_rpm", speed)
     if key not in _POINTS:
         if len(_POINTS) >= KEPT:
             _POINTS.pop(next(iter(_POINTS)))
-        with warnings.catch_warnings(action="ignore"):  # said at every call, also of what is kept
-            _POINTS[key] = point(spindle, temperature, speed_rpm=speed)
-    for doubt in doubts(_POINTS[key]):
+        _POINTS[key] = soaked(spindle, temperature, speed)
+    for doubt in odd(_POINTS[key]):  # at every call, also of what is kept
         warnings.warn(f"{spindle.name}: {doubt}", stacklevel=4)
     return _POINTS[key]
 
@@ -293,9 +292,9 @@ def _energy(point: OperatingPoint, index: int) -> list[str]:
 
 def _odd(*points: OperatingPoint) -> list[str]:
     """What is odd about conditions and bearings there: what moved may be that."""
-    from thermospindle.front import doubts
+    from thermospindle.front import odd
 
-    return [f"  {doubt}" for doubt in dict.fromkeys(d for p in points for d in doubts(p))]
+    return [f"  {doubt}" for doubt in dict.fromkeys(d for p in points for d in odd(p))]
 
 
 def _behind(first: OperatingPoint, then: OperatingPoint, index: int, after: Mode) -> list[str]:

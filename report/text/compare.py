@@ -112,7 +112,7 @@ def show_comparison(console: Console, c: Comparison, verbose: bool = True) -> No
         console.print(line, highlight=False)
     if any(t.correlation for t in c.tests):
         _show_frfs(console, c)
-    if c.comac:
+    if c.comac or any(t.frac for t in c.tests):
         references = sorted({reference for t in c.tests for _, reference in t.frac})
         rows = []
         for node in dict.fromkeys([*c.comac, *(response for t in c.tests for response, _ in t.frac)]):

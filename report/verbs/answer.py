@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from rich.console import Console
 
-from thermospindle.model import sense
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import FAINTEST, Spindle
 from thermospindle.report.folder import mark, whole_folder
@@ -19,7 +18,7 @@ from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.effects.known import equipped
 
 if TYPE_CHECKING:
-    from thermospindle.sim.operating import OperatingPoint
+    pass
 
 STEPS = 5  # of temperature over a scene's range, unless a verb is given others
 
@@ -62,20 +61,16 @@ def temperatures_or_range(temperatures: Sequence[float] | None, spindle: Spindle
     """The temperatures (C) asked for; where none are, so many over the range of the scene."""
     if temperatures is None:
         return np.linspace(*spindle.temperatures, steps).tolist()
-    twice = next((t for t in temperatures if list(temperatures).count(t) > 1), None)
-    if twice is not None:
-        raise BadInput(f"--temperatures: {twice:g} stands twice; each is allowed once")
-    return list(temperatures)
+    asked = list(temperatures)
+    for t in asked:
+        if asked.count(t) > 1:
+            raise BadInput(f"--temperatures: {t:g} stands twice; each is allowed once")
+    return asked
 
 
 def temperature_or_reference(temperature: float | None, spindle: Spindle) -> float:
     """The temperature (C) asked for, or the reference temperature of the scene."""
     return spindle.reference_temperature if temperature is None else temperature
-
-
-def doubts(spindle: Spindle, points: Sequence[OperatingPoint]) -> list[str]:
-    """What is odd about conditions and about the states of the bearings there."""
-    return sense.of_conditions(spindle, [p.condition for p in points]) + sense.of_states(spindle, [p.state.bearings for p in points])
 
 
 def with_hammer(spindle: Spindle, hits: int | None, level: float | None) -> Spindle:

@@ -20,7 +20,6 @@ from thermospindle.report.text import run as text
 from thermospindle.report.verbs.answer import (
     Answer,
     answered,
-    doubts,
     temperature_or_reference,
     temperatures_or_range,
     with_effects,
@@ -29,6 +28,7 @@ from thermospindle.report.verbs.answer import (
 from thermospindle.sim.campaign.campaign import write_campaign
 from thermospindle.sim.campaign.simulated import runout_campaign
 from thermospindle.sim.hammer.test import stages
+from thermospindle.sim.operating import doubts
 from thermospindle.sim.run import Run
 from thermospindle.sim.run import run as whole_chain
 

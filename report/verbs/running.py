@@ -20,12 +20,11 @@ from thermospindle.report.text.warmup import lost_contact, show_warmup, warmup_j
 from thermospindle.report.verbs.answer import (
     Answer,
     answered,
-    doubts,
     temperature_or_reference,
     temperatures_or_range,
     with_effects,
 )
-from thermospindle.sim.operating import operating_point
+from thermospindle.sim.operating import doubts, operating_point
 from thermospindle.sim.resonance.found import ResonanceMap
 from thermospindle.sim.resonance.map import resonance_map, stages
 from thermospindle.sim.running.runout import looked_at, with_imperfections

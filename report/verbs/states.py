@@ -21,13 +21,12 @@ from thermospindle.report.text import states as text
 from thermospindle.report.verbs.answer import (
     Answer,
     answered,
-    doubts,
     temperature_or_reference,
     temperatures_or_range,
     with_effects,
     write_json,
 )
-from thermospindle.sim.operating import operating_point, stiffness_table
+from thermospindle.sim.operating import doubts, operating_point, stiffness_table
 
 
 def table(

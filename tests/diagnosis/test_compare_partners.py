@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from io import StringIO
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from tests.conftest import DATA, SCENE
 from tests.diagnosis.exact_campaign import table
@@ -13,7 +15,7 @@ from thermospindle.diagnosis.compare.compare import compare
 from thermospindle.diagnosis.data.observe import DAMPING_FLOOR, observe
 from thermospindle.diagnosis.prediction.modes import Predicted, predict
 from thermospindle.diagnosis.prediction.partners import BELIEVABLE, numbered, partners
-from thermospindle.report.text.compare import comparison_json
+from thermospindle.report.text.compare import comparison_json, show_comparison
 from thermospindle.sim.campaign.campaign import Campaign, Test, read_campaign
 
 # at 60 C the third mode of the paper's own analysis is at 1771 Hz, 61 above the measured, and the scene's at 1775
@@ -204,3 +206,6 @@ def test_one_sensor_and_one_hammer_show_no_shape(spindle):
     assert found.tests[0].modes
     assert all(m.mac is None for m in found.tests[0].modes)
     assert found.comac == {}
+    console = Console(width=100, record=True, file=StringIO())
+    show_comparison(console, compare(spindle, alone))
+    assert "smallest FRAC of all tests" in console.export_text()  # lines are compared all the same
