@@ -84,18 +84,18 @@ def explanations(found: Search, inflation: float) -> tuple[tuple[Candidate, ...]
         len({s.mechanism.name for s in found.screened if s.mechanism.free == free and s.visibility > 0}) or 1 for free in (True, False)
     )
     base = found.base.evidence.ln
-    worth = inflation * coarsening(likeliest(found), inflation)
+    by = discount(likeliest(found), inflation)
     known = [h for h in found.hypotheses if _can_be(h)]
     either = frozenset(m.name for h in known for m in h.mechanisms if m.own_law)
-    twins = [h for h in known if _is_named(h, known, found.alike, LITTLE * worth)]
-    weighed = [h for h in known if h not in twins]
+    named_as = {h: own for h in known if (own := _named_as(h, known, found.alike, by))}
+    values = _with_twins([(h, _weighed(h, found.hypotheses)) for h in known], named_as)
     ways = _ways(found)
-    values = _by_change([(h, _weighed(h, found.hypotheses)) for h in weighed], found.alike, max(COARSE / worth, 1.0))
-    rows = [(h, _prior(h, named_count, free_count, either, ways) + (w - base) / worth) for h, w in values]
+    values = _by_change(values, found.alike, max(COARSE / by, 1.0))
+    rows = [(h, _prior(h, named_count, free_count, either, ways) + (w - base) / by) for h, w in values]
     top = max(w for _, w in rows)
     total = np.log(sum(np.exp(w - top) for _, w in rows)) + top
     every = [_candidate(same_names, base, float(total)) for same_names in _by_names(rows)]
-    every += [Candidate(h, h.names, True, h.evidence.ln - base, 0.0) for h in twins]
+    every += [Candidate(h, h.names, True, h.evidence.ln - base, 0.0) for h in named_as]
     none = float(np.exp(next(w for h, w in rows if not h.mechanisms) - total))
     return likelier_first(c for c in every if not c.free), likelier_first(c for c in every if c.free), none
 
@@ -108,6 +108,11 @@ def likelier_first(candidates: Iterable[Candidate]) -> tuple[Candidate, ...]:
 def likeliest(found: Search) -> Hypothesis:
     """The explanation with the most evidence, of those that can be."""
     return next(h for h in found.hypotheses if _can_be(h))
+
+
+def discount(best: Hypothesis, inflation: float) -> float:
+    """What ln evidence is divided by."""
+    return inflation * coarsening(best, inflation)
 
 
 def coarsening(best: Hypothesis, inflation: float) -> float:
@@ -156,14 +161,29 @@ def _can_be(h: Hypothesis) -> bool:
     return not ((any(m.own_law for m, *_ in rows) and beyond_limits(h)) or any(opposite(*row) for row in rows))
 
 
-def _is_named(h: Hypothesis, every: Sequence[Hypothesis], alike: Mapping[str, frozenset[str]], little: float) -> bool:
-    """Whether free forms in an explanation change the same as effects of the catalogue that do as well, to a `little` of ln evidence, beside the same others."""
+def _named_as(h: Hypothesis, every: Sequence[Hypothesis], alike: Mapping[str, frozenset[str]], by: float) -> list[Hypothesis]:
+    """The explanations of the catalogue that an explanation with free forms is: those whose effects change the same beside the same others, and do as well. They do where they are behind by
+    a `LITTLE` of ln evidence; or where they leave as little of the data, and no more than a `PLENTY` of what they are behind is the price of shapes and sizes that an effect has and a free form
+    has not: it says nothing of whether something else acts. ln evidence is divided `by` what it is worth."""
     means = [alike.get(m.name, frozenset()) if m.free else {m.name} for m in h.mechanisms]
 
     def same(names: Names) -> bool:
         return len(names) == len(means) and any(all(n in of for n, of in zip(row, means, strict=True)) for row in permutations(names))
 
-    return h.free and any(not o.free and o.evidence.ln > h.evidence.ln - little and same(o.names) for o in every)
+    def does_as_well(o: Hypothesis) -> bool:
+        behind, leaves_more = h.evidence.ln - o.evidence.ln, (o.evidence.chi2 - h.evidence.chi2) / 2
+        return behind < LITTLE * by or max(behind / PLENTY, leaves_more / LITTLE) < by
+
+    return [o for o in every if not o.free and same(o.names) and does_as_well(o)] if h.free else []
+
+
+def _with_twins(rows: Sequence[Weighed], named_as: Mapping[Hypothesis, Sequence[Hypothesis]]) -> list[Weighed]:
+    """ln evidence of explanations, without those that are others of the catalogue: the best of these has theirs, and what it gains so have all that it was among."""
+    values, raised = dict(rows), dict[Hypothesis, float]()
+    for h, own in named_as.items():
+        ahead = values[h] - max(values[o] for o in own)
+        raised |= {o: max(ahead, raised.get(o, 0.0)) for o in own}
+    return [(h, w + raised.get(h, 0.0)) for h, w in rows if h not in named_as]
 
 
 def _by_change(rows: Sequence[Weighed], alike: Mapping[str, frozenset[str]], coarse: float) -> list[Weighed]:

@@ -12,6 +12,7 @@ from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.decision.explanations import (
     Candidate,
     Names,
+    discount,
     explanations,
     likelier_first,
     likeliest,
@@ -87,7 +88,7 @@ def _unheld(
     alike = overlap(found.model, found.base.fit)
     kept = changing(found.base, alike), changing(best, same)
     gross = found.base.evidence.chi2 > GROSS * found.base.fit.count
-    if moving(found.model, found.base):
+    if moving(found.model, found.base, discount(best, same.inflation)):
         little = [c for c in candidates if c.delta_evidence < MOSTLY * (c.delta_evidence + found.by_resonances)]
         free = (*free, Candidate(found.base, (MOVING,), True, 0.0, none + sum(c.probability for c in little)))
         candidates, none = tuple(replace(c, probability=0.0) if c in little else c for c in candidates), 0.0

@@ -10,7 +10,7 @@ import numpy as np
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.fit import TEMPERS
-from thermospindle.diagnosis.inference.hypothesis import DEPARTS, LITTLE, PLENTY, Hypothesis, Task, fitted, scan
+from thermospindle.diagnosis.inference.hypothesis import DEPARTS, LITTLE, Hypothesis, Task, fitted, scan
 from thermospindle.diagnosis.inference.prior import Learned, undrifted
 from thermospindle.diagnosis.inference.screening import screen
 from thermospindle.diagnosis.inference.singles import (
@@ -33,7 +33,7 @@ LEADS = 2  # single mechanisms of the catalogue to which a second is joined, of 
 SECONDS = 2  # of each kind, joined to each of them
 PAIRS = 8  # fitted at most
 EXCHANGED = 8  # effects tried in either's place
-ENOUGH = 5.0  # ln evidence that a second mechanism must promise beside one that leaves a misfit
+ENOUGH = 5.0  # ln evidence that a second mechanism must promise beside one that leaves a misfit, and a third: what they gain by chance, or less than their odds
 
 
 def joined(
@@ -111,7 +111,7 @@ def _beside(model, leads: Sequence[Hypothesis], mechanisms: Sequence[Mechanism],
     """One mechanism more, beside each of the `leads`: of the catalogue, and free beside what is not free or free alone."""
     tasks, done = [], set()
     for lead in leads:
-        asked = ENOUGH if lead.evidence.learned.errors > 1.0 else PLENTY
+        asked = LITTLE if len(lead.mechanisms) == 1 and lead.evidence.learned.errors == 1.0 else ENOUGH
         drifts = all(m.free for m in lead.mechanisms)
         others = [m for m in mechanisms if m.name not in lead.names and not (m.free and lead.free and not drifts)]
         looked = screen(model, lead.fit, 1.0, undrifted(lead.evidence.learned), others, workers)

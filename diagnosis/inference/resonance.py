@@ -84,8 +84,8 @@ def shown(model: CampaignModel, h: Hypothesis) -> list[Resonance]:
     return [r for r, _ in _needed(model, h)]
 
 
-def moving(model: CampaignModel, h: Hypothesis) -> list[Resonance]:
-    """Those whose frequency is surely another at another temperature."""
+def moving(model: CampaignModel, h: Hypothesis, discount: float = 1.0) -> list[Resonance]:
+    """Those whose frequency is surely another at another temperature, where ln evidence counts by a `discount` less."""
     needed = _needed(model, h)
     if not needed:
         return []
@@ -96,7 +96,7 @@ def moving(model: CampaignModel, h: Hypothesis) -> list[Resonance]:
     def moves(r: Resonance, covariance: Array) -> bool:
         change = by_drift @ np.array(r.drift)
         sd = np.sqrt(np.einsum("abi,ij,abj->ab", by_drift, covariance, by_drift))
-        return bool(np.any(np.abs(change) > np.maximum(MOVES, SURELY * sd)))
+        return bool(np.any(np.abs(change) > np.maximum(MOVES, SURELY * np.sqrt(discount) * sd)))
 
     return [r for r, covariance in needed if moves(r, covariance)]
 

@@ -18,7 +18,17 @@ from thermospindle.diagnosis.inference.hypothesis import PLENTY, STRAIN, Hypothe
 from thermospindle.diagnosis.inference.pairs import exchanged, joined, joined_early, without_one
 from thermospindle.diagnosis.inference.resonance import with_resonance
 from thermospindle.diagnosis.inference.screening import Screened
-from thermospindle.diagnosis.inference.singles import FAR, OCCAM, Singles, better, by_own_laws, carried_over, fit_singles, of_each_name
+from thermospindle.diagnosis.inference.singles import (
+    BEHIND,
+    FAR,
+    OCCAM,
+    Singles,
+    better,
+    by_own_laws,
+    carried_over,
+    fit_singles,
+    of_each_name,
+)
 from thermospindle.model.parallel import in_parallel, meanwhile
 from thermospindle.model.types import Array
 
@@ -140,10 +150,12 @@ def _other_ways(model: CampaignModel, ranked: Sequence[Hypothesis], every: Seque
     if best is None or best.evidence.ln < max(h.evidence.ln for h in ranked) - NEAR:
         return []
     promised = {s.mechanism.variant: s.gain for s in sorted(tried.screened, key=lambda s: s.gain)}
+    behind = np.inf if len(best.mechanisms) > 1 else BEHIND if tried.early else FAR  # screening says what an effect does by itself
     tasks, at = [], len(model.parameters)
     for k, m in enumerate(best.mechanisms):
         sizes, after = at + len(model.tests), at + len(model.tests) + len(m.shape)
-        others = [o for o in every if (o.name, o.kind) == (m.name, m.kind) and o.choices != m.choices]
+        least = promised.get(m.variant, -np.inf) - behind
+        others = [o for o in every if (o.name, o.kind) == (m.name, m.kind) and o.choices != m.choices and promised.get(o.variant, np.inf) > least]
         for o in sorted(others, key=lambda o: -promised.get(o.variant, -np.inf))[:WAYS]:
             start = np.concatenate([best.fit.point[:sizes], np.zeros(len(o.shape)), best.fit.point[after:]])
             tasks.append(Task((*best.mechanisms[:k], o, *best.mechanisms[k + 1 :]), (start,), -np.inf))

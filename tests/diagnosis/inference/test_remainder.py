@@ -178,6 +178,7 @@ def test_one_that_moves_with_temperature_is_found(spindle):
     assert found is not None
     wider, h = found
     (moves,) = moving(wider, h)
+    assert moving(wider, h, discount=1e6) == []
     assert [moves.frequency_at((t - 20.0) / 40.0) for t in (20.0, 60.0)] == pytest.approx([1645.0, 1445.0], rel=3e-3)
     assert h.fit.chi2 / h.fit.count == pytest.approx(1.0, abs=0.15)
     assert h.evidence.ln > none.evidence.ln + 1000
