@@ -9,12 +9,12 @@ from functools import partial
 import numpy as np
 
 from thermospindle.diagnosis.data.lines import line_data
-from thermospindle.diagnosis.data.mode_table import mode_data
+from thermospindle.diagnosis.data.mode_table import TestData, mode_data
 from thermospindle.diagnosis.data.observe import condition_of
 from thermospindle.diagnosis.decision.verdict import Verdict, decide
 from thermospindle.diagnosis.forward.making import campaign_model, expected_noise
 from thermospindle.diagnosis.forward.mechanism import Mechanism, strongest, unmoved, variants
-from thermospindle.diagnosis.forward.model import FAILED, SIZE_STEP, CampaignModel, TestData
+from thermospindle.diagnosis.forward.model import FAILED, SIZE_STEP, CampaignModel
 from thermospindle.diagnosis.inference.freeform import free_forms
 from thermospindle.diagnosis.inference.hypothesis import DEPARTS, Hypothesis
 from thermospindle.diagnosis.inference.search import Search, search

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
 from thermospindle.sim.campaign.campaign import Test
@@ -26,6 +27,10 @@ class ModeData:
     @property
     def count(self) -> int:
         return len(self.frequency) + int(np.isfinite(self.damping_sd).sum())
+
+
+TestData = LineData | ModeData
+"""What one test is to the inference."""
 
 
 def mode_data(test: Test, condition: Condition) -> ModeData:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from thermospindle.diagnosis.forward.model import TestData
+from thermospindle.diagnosis.data.mode_table import TestData
 from thermospindle.model.machine import Condition, Spindle
 
 SPREAD = 3.0  # temperatures within so many tolerances of each other are one condition

@@ -2,6 +2,7 @@
 
 ===========  ========================================================================================================
 nuisance     build tolerances, measuring errors, and the model's own constant discrepancy
+numbers      which nuisance parameters are what
 mechanism    what an effect changes, and its law as a prior over conditions
 linear       one test's linear model, and how its matrices change with parameters
 response     FRFs at the lines of a test, with what their derivatives need

@@ -24,12 +24,12 @@ def nuisance_jacobian(model: CampaignModel, t: int, x: Array, effects: Applied, 
     response = model.standing(t, x, effects, linear)
     if isinstance(response, Table):
         r, found = response.residual, response.moved(together([rates.products[t], *_by_discrepancies(model, t, linear)]))
-        numbers = np.concatenate([rates.numbers[t], *[row[0] for row in model.discrepancies[t]]])
+        numbers = np.concatenate([rates.numbers[t], *[row[0] for row in model.numbers.discrepancies[t]]])
         return r, np.concatenate([found, np.zeros((more, len(r)))]), numbers
     assert isinstance(data, LineData)
-    own, channel = model.gains[t]
-    discrepancies = model.discrepancies[t]
-    record = [] if model.record is None else [model.record]
+    own, channel = model.numbers.gains[t]
+    discrepancies = model.numbers.discrepancies[t]
+    record = [] if model.numbers.record is None else [model.numbers.record]
     lights = model.lights(t, linear.matrices.dofs, x)
     numbers = np.concatenate([rates.numbers[t], *[row[0] for row in discrepancies], own, np.array(record, int), *[n for _, n in lights]])
     n_resp, n_ref, lines = response.value.shape
@@ -48,7 +48,7 @@ def nuisance_jacobian(model: CampaignModel, t: int, x: Array, effects: Applied, 
         for moved in response.moved_together(w, power, i, j, size * np.where(i == j, 0.5, 1.0)):
             at = fill(at, moved)
     for k, c in enumerate(channel):
-        for row in np.flatnonzero(model.channel_of[t][:n_resp] == c):
+        for row in np.flatnonzero(model.numbers.channel_of[t][:n_resp] == c):
             gain = response.value[row] * weight[row] * model.parameters[own[k]].sd
             jacobian[at + k, 0, row], jacobian[at + k, 1, row] = gain.real, gain.imag
     at += len(own)
@@ -62,7 +62,7 @@ def nuisance_jacobian(model: CampaignModel, t: int, x: Array, effects: Applied, 
 def _by_discrepancies(model: CampaignModel, t: int, linear: Linear) -> list[Products]:
     """What discrepancies of stiffness change in test `t`, and those of damping."""
     w = model.reference.over(linear.matrices.dofs)
-    return [pairs(w, power, i, j, size * np.where(i == j, 0.5, 1.0)) for power, (_, i, j, size) in enumerate(model.discrepancies[t])]
+    return [pairs(w, power, i, j, size * np.where(i == j, 0.5, 1.0)) for power, (_, i, j, size) in enumerate(model.numbers.discrepancies[t])]
 
 
 def column(model: CampaignModel, t: int, x: Array, first: Applied, second: Applied, apart: float) -> Array:

@@ -27,10 +27,10 @@ def hit_found(model: CampaignModel, fitted: Array, least: float) -> CampaignMode
     times gains by chance (ln of their number: chi2 of one number). Nor where it falls by far more than what is left out is in all, which then stands in for something else."""
     thin = model.thinned
     untold = [(t, d) for t, d in enumerate(thin.tests) if isinstance(d, LineData) and np.isfinite(d.duration) and not d.test.pretrigger]
-    if not untold or model.record is None:
+    if not untold or model.numbers.record is None:
         return None
-    x, own_share = fitted.copy(), float(fitted[model.record])
-    x[model.record] = 0.0
+    x, own_share = fitted.copy(), float(fitted[model.numbers.record])
+    x[model.numbers.record] = 0.0
     whole = [(t, d, thin.answer(t, x, thin.linear(t, x, []))) for t, d in untold]
     ending = [(t, d, answer) for t, d, answer in whole if isinstance(answer, Response) and answer.cut_off_after(0.0).any()]
     if not ending:

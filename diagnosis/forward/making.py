@@ -8,7 +8,8 @@ from functools import cache
 import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
-from thermospindle.diagnosis.forward.model import FAILED, Applied, CampaignModel, TestData
+from thermospindle.diagnosis.data.mode_table import TestData
+from thermospindle.diagnosis.forward.model import FAILED, Applied, CampaignModel
 from thermospindle.diagnosis.forward.nuisance import RANGE_K, Nuisance, changes_of, nuisances, reference_modes
 from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition, Spindle

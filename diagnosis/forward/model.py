@@ -12,10 +12,11 @@ from functools import cached_property
 import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
-from thermospindle.diagnosis.data.mode_table import ModeData
+from thermospindle.diagnosis.data.mode_table import ModeData, TestData
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.linear import Linear, mass_between
 from thermospindle.diagnosis.forward.nuisance import Nuisance, ReferenceModes, Resonance, Unevenness, unevennesses
+from thermospindle.diagnosis.forward.numbers import Numbers
 from thermospindle.diagnosis.forward.points import Applied, apart, otherwise, replace_measuring, stretched, uneven
 from thermospindle.diagnosis.forward.response import Light, Response
 from thermospindle.diagnosis.forward.table import Table
@@ -26,9 +27,6 @@ from thermospindle.model.rotor.chain import Matrices, matrices
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.effects.effect import HOOKS, Effect, Values
 from thermospindle.sim.operating import OperatingPoint, operating_point
-
-TestData = LineData | ModeData
-Discrepancies = tuple[Integers, Integers, Integers, Array]
 
 SIZE_STEP = 0.02  # of a size's or shape parameter's prior standard deviation, for differences
 THIN, ENOUGH_LINES = 4, 30  # lines left out of a thinned model, and how many of a test it keeps at least
@@ -90,114 +88,51 @@ class CampaignModel:
         return [keys.index(key) for key in keys]
 
     @cached_property
-    def expansion(self) -> list[int]:
-        """Numbers of the parameters of ring expansion."""
-        return [i for i, p in enumerate(self.parameters) if p.kind == kinds_of.EXPANSION]
-
-    @cached_property
-    def apart(self) -> list[int]:
-        """Numbers of the parameters by which bearings differ among themselves."""
-        return [i for i, p in enumerate(self.parameters) if p.kind in kinds_of.APART]
-
-    @cached_property
-    def balls(self) -> list[list[int]]:
-        """For every test the numbers of the parameters by which balls are stiffer: in one direction, with temperature, and in this test."""
-        kinds = (kinds_of.BALLS, kinds_of.CHANGE)
-        return [[i for i, p in enumerate(self.parameters) if p.kind in kinds and p.test in (None, t)] for t in range(len(self.tests))]
-
-    @cached_property
-    def flung(self) -> list[int]:
-        """The number of the parameter by which the balls' inertia loads are off, where the scene has these."""
-        return [i for i, p in enumerate(self.parameters) if p.kind == kinds_of.FLUNG]
-
-    @cached_property
-    def uneven(self) -> list[int]:
-        """Numbers of the parameters by which joints are uneven about the axis."""
-        return [i for i, p in enumerate(self.parameters) if p.kind == kinds_of.UNEVEN]
+    def numbers(self) -> Numbers:
+        """Which of the parameters are what."""
+        return Numbers(self.parameters, self.tests, self.reference)
 
     @cached_property
     def unevennesses(self) -> tuple[Unevenness, ...]:
         return unevennesses(self.spindle)
 
-    @cached_property
-    def temperature(self) -> list[int]:
-        """For every test the number of its thermometer's parameter."""
-        return [next(i for i, p in enumerate(self.parameters) if p.kind == kinds_of.TEMPERATURE and p.test == t) for t in range(len(self.tests))]
-
-    @cached_property
-    def discrepancies(self) -> list[tuple[Discrepancies, Discrepancies]]:
-        """For every test, of stiffness and of damping: parameter numbers, first and second mode of each, and its factor in the modal matrix."""
-        found = []
-        omega, damping = self.reference.omega, np.sqrt(2 * self.reference.damping * self.reference.omega)
-        for t in range(len(self.tests)):
-            of_test = []
-            for kinds_, scale, twice in (
-                ((kinds_of.STIFFNESS, kinds_of.STIFFNESS_DRIFT), omega, 2.0),
-                ((kinds_of.DAMPING, kinds_of.DAMPING_DRIFT), damping, 1.0),
-            ):
-                rows = [(n, *p.modes) for n, p in enumerate(self.parameters) if p.kind in kinds_ and p.test in (None, t)]
-                number, i, j = np.array(rows, int).reshape(-1, 3).T
-                sd = np.array([self.parameters[n].sd for n in number])
-                of_test.append((number, i, j, twice * sd * scale[i] * scale[j] * np.where(i == j, 1.0, np.sqrt(0.5))))
-            found.append((of_test[0], of_test[1]))
-        return found
-
-    @cached_property
-    def gains(self) -> list[tuple[Integers, Integers]]:
-        """For every test the numbers of gain parameters and the channel of each."""
-        found = []
-        for t in range(len(self.tests)):
-            rows = [
-                (i, p.index)
-                for i, p in enumerate(self.parameters)
-                if p.kind == kinds_of.GAIN or (p.kind == kinds_of.DRIFT and p.test == t)
-            ]
-            number, channel = np.array(rows, int).reshape(-1, 2).T
-            found.append((number, channel))
-        return found
-
-    @cached_property
-    def channel_of(self) -> list[Integers]:
-        """For every test the channel of each row: a sensor keeps its gain at whichever row it is."""
-        nodes = [d.sensors if isinstance(d, LineData) else () for d in self.tests]
-        number = {node: c for c, node in enumerate(dict.fromkeys(node for own in nodes for node in own))}
-        return [np.array([number[node] for node in own], int) for own in nodes]
-
     def operating(self, t: int, x: Array, effects: Applied) -> OperatingPoint:
         """The operating point of test `t`, sizes within their limits; what differs in the measuring chain alone is not worked out again."""
-        effects = within_limits(effects)
+        effects, own = within_limits(effects), self.numbers
         acting = tuple((id(e), *v.values()) for e, v in effects if any(getattr(e, hook) for hook in MEASURING))
-        little = tuple(x[own].tobytes() for own in (self.expansion, self.apart, self.balls[t], self.flung, self.uneven))
-        key = (t, x[: len(self.build)].tobytes(), float(x[self.temperature[t]]), little, acting)
+        little = tuple(x[of].tobytes() for of in (own.expansion, own.apart, own.balls[t], own.flung, own.uneven))
+        key = (t, x[: len(self.build)].tobytes(), float(x[own.temperature[t]]), little, acting)
         late = self._points.get(key)
-        if late is None:
-            if len(self._points) > 6 * len(self.tests):
-                self._points.clear()
-            test = self.tests[t]
-            warmer = float(x[self.temperature[t]]) * self.parameters[self.temperature[t]].sd
-            condition = replace(test.condition, temperature=test.condition.temperature + warmer)
-            every = [*self.present, *effects]
-            if x[self.apart].any():
-                names, own = [b.name for b in self.spindle.all_bearings], [(self.parameters[i], float(x[i])) for i in self.apart]
-                every = [apart(*({names[p.index]: v * p.sd for p, v in own if p.kind == kind} for kind in kinds_of.APART)), *every]
-            if x[self.balls[t]].any():
-                every = [self._otherwise(t, x), *every]
-            if x[self.uneven].any():
-                joints = [(self.unevennesses[p.index], float(x[i]) * p.sd) for i in self.uneven for p in [self.parameters[i]]]
-                every = [uneven(joints), *every]
-            if x[self.expansion].any():
-                every = [stretched(*(1 + float(x[i]) * self.parameters[i].sd for i in self.expansion)), *every]
-            built = self._built(t, x)
-            for i in self.flung:
-                built = replace(built, ball_inertia=max(built.ball_inertia * (1 + float(x[i]) * self.parameters[i].sd), 0.0))
-            late = self._points[key] = operating_point(built, condition, every)
-            late.chain  # noqa: B018 - worked out here, so that errors come here
-            return late
-        return replace_measuring(late, [*self.present, *effects])
+        if late is not None:
+            return replace_measuring(late, [*self.present, *effects])
+        if len(self._points) > 6 * len(self.tests):
+            self._points.clear()
+        condition, warmer = self.tests[t].condition, float(x[own.temperature[t]]) * self.parameters[own.temperature[t]].sd
+        built = self._built(t, x)
+        for i in own.flung:
+            built = replace(built, ball_inertia=max(built.ball_inertia * (1 + float(x[i]) * self.parameters[i].sd), 0.0))
+        every = [*self._otherwise_than_drawn(t, x), *self.present, *effects]
+        late = self._points[key] = operating_point(built, replace(condition, temperature=condition.temperature + warmer), every)
+        late.chain  # noqa: B018 - worked out here, so that errors come here
+        return late
+
+    def _otherwise_than_drawn(self, t: int, x: Array) -> list[tuple[Effect, Values]]:
+        """What bearings, balls, joints and rings are in test `t` that no drawing has, as effects that act before all others."""
+        own, found = self.numbers, []
+        if x[own.expansion].any():
+            found.append(stretched(*(1 + float(x[i]) * self.parameters[i].sd for i in own.expansion)))
+        if x[own.uneven].any():
+            found.append(uneven([(self.unevennesses[p.index], float(x[i]) * p.sd) for i in own.uneven for p in [self.parameters[i]]]))
+        if x[own.balls[t]].any():
+            found.append(self._otherwise(t, x))
+        if x[own.apart].any():
+            names, rows = [b.name for b in self.spindle.all_bearings], [(self.parameters[i], float(x[i])) for i in own.apart]
+            found.append(apart(*({names[p.index]: v * p.sd for p, v in rows if p.kind == kind} for kind in kinds_of.APART)))
+        return found
 
     def _otherwise(self, t: int, x: Array) -> tuple[Effect, Values]:
         """How stiff the balls are in test `t`, otherwise than drawn."""
-        rows = [(p, float(x[i]) * p.sd) for i in self.balls[t] for p in [self.parameters[i]]]
+        rows = [(p, float(x[i]) * p.sd) for i in self.numbers.balls[t] for p in [self.parameters[i]]]
         shares = {p.index: value for p, value in rows if p.kind == kinds_of.BALLS}
         warmer = sum(value for p, value in rows if p.kind == kinds_of.CHANGE and p.test is None)
         own = {p.index: value for p, value in rows if p.kind == kinds_of.CHANGE and p.test == t}
@@ -239,7 +174,7 @@ class CampaignModel:
     def _discrepancy(self, t: int, linear: Matrices, x: Array) -> tuple[Array, Array]:
         w = self.reference.over(linear.dofs)
         added = []
-        for number, i, j, size in self.discrepancies[t]:
+        for number, i, j, size in self.numbers.discrepancies[t]:
             modal = np.zeros((len(self.reference.omega),) * 2)
             np.add.at(modal, (i, j), size * x[number])
             modal = np.where(modal == 0, modal.T, modal)
@@ -272,7 +207,7 @@ class CampaignModel:
         return Table(linear, data) if isinstance(data, ModeData) else self._response(t, x, linear, data)
 
     def _response(self, t: int, x: Array, linear: Linear, data: LineData) -> Response:
-        cut = 0.0 if self.record is None else float(x[self.record])
+        cut = 0.0 if self.numbers.record is None else float(x[self.numbers.record])
         return Response(linear, data, self._gain(t, x), cut, [light for light, _ in self.lights(t, linear.matrices.dofs, x)])
 
     def lights(self, t: int, dofs: Sequence[tuple[str, str]], x: Array) -> list[tuple[Light, Integers]]:
@@ -308,20 +243,11 @@ class CampaignModel:
     def _responses(self) -> dict[int, tuple[tuple, Response | Table, Applied]]:
         return {}
 
-    @cached_property
-    def record(self) -> int | None:
-        """The number of the parameter of records that end too early."""
-        return next((i for i, p in enumerate(self.parameters) if p.kind == kinds_of.RECORD), None)
-
     def _gain(self, t: int, x: Array) -> Array:
-        number, channel = self.gains[t]
-        gain = np.zeros(self.channels)
+        number, channel = self.numbers.gains[t]
+        gain = np.zeros(self.numbers.channels)
         np.add.at(gain, channel, x[number] * np.array([self.parameters[i].sd for i in number]))
-        return np.asarray(np.exp(gain)[self.channel_of[t]])
-
-    @property
-    def channels(self) -> int:
-        return 1 + max((p.index for p in self.parameters if p.kind == kinds_of.GAIN), default=-1)
+        return np.asarray(np.exp(gain)[self.numbers.channel_of[t]])
 
     def whitened(self, t: int, value: ComplexArray, measured: ComplexArray | float) -> Array:
         data = self.tests[t]

@@ -16,11 +16,11 @@ STEP = 0.02  # of a prior standard deviation, for differences
 
 def rates_of(model: CampaignModel, x: Array, effects_of: Sequence[Applied], old: Rates | None = None) -> Rates:
     """dM, dC, dK by build tolerances, ring expansion, bearings apart, stiffness and inertia of balls, uneven joints and temperature, for every test; what structure alone moves is kept from `old`."""
-    numbers, each, dofs, uneven = [], [], [], frozenset(model.uneven)
+    numbers, each, dofs, uneven = [], [], [], frozenset(model.numbers.uneven)
     for t, effects in enumerate(effects_of):
         base = model.operating(t, x, effects)
         at = matrices(base.chain)
-        own = [*range(len(model.build)), *model.expansion, *model.apart, *model.balls[t], *model.flung, *model.uneven, model.temperature[t]]
+        own = [*range(len(model.build)), *model.numbers.expansion, *model.numbers.apart, *model.numbers.balls[t], *model.numbers.flung, *model.numbers.uneven, model.numbers.temperature[t]]
         kept = old.each[t] if old is not None and old.dofs[t] == at.dofs else ()
         found = []
         for k, i in enumerate(own):

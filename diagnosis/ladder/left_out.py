@@ -12,9 +12,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
-from thermospindle.diagnosis.data.mode_table import ModeData
+from thermospindle.diagnosis.data.mode_table import ModeData, TestData
 from thermospindle.diagnosis.decision.conditions import conditions_of
-from thermospindle.diagnosis.forward.model import CampaignModel, TestData
+from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.forward.nuisance import COINCIDE
 from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.inference.problem import Problem

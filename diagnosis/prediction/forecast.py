@@ -120,7 +120,7 @@ def by_all(model: CampaignModel, s: Standing, plan: Condition) -> Array:
     rates = np.zeros((k, len(x) + 1))
     lasting = [there.parameters[i].test is None for i in numbers]
     rates[:, numbers[lasting]] = derivatives[lasting].T
-    rates[:, -1] = derivatives[numbers == there.temperature[0]][0]
+    rates[:, -1] = derivatives[numbers == there.numbers.temperature[0]][0]
     return rates
 
 

@@ -55,7 +55,7 @@ def test_a_mean_where_no_spindle_can_be_built_predicts_nothing(spindle):
     measured = replace(spindle, materials={**spindle.materials, "steel": ending})
     model = without(campaign_data(measured, tables(measured, ())), CHANGING)
     blind = settled(unseen(model, LeftOut((1,))))
-    colder = np.where(np.arange(len(blind.fit.point)) == model.temperature[0], -1.0, blind.evidence.mean)
+    colder = np.where(np.arange(len(blind.fit.point)) == model.numbers.temperature[0], -1.0, blind.evidence.mean)
     outside = replace(blind, evidence=replace(blind.evidence, mean=colder))
     assert np.array_equal(outside.posterior[0], outside.fit.point)
     assert missed(outside, model.tests, LeftOut((1,))).count == 8

@@ -1,0 +1,105 @@
+"""Which nuisance parameters of a campaign are what."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from thermospindle.diagnosis.data.lines import LineData
+from thermospindle.diagnosis.data.mode_table import TestData
+from thermospindle.diagnosis.forward import nuisance as kinds_of
+from thermospindle.diagnosis.forward.nuisance import Nuisance, ReferenceModes
+from thermospindle.model.types import Array, Integers
+
+Discrepancies = tuple[Integers, Integers, Integers, Array]
+
+
+@dataclass(frozen=True, eq=False)
+class Numbers:
+    """The numbers of the `parameters` by what they are: of all `tests` together, or of each."""
+
+    parameters: Sequence[Nuisance]
+    tests: Sequence[TestData]
+    reference: ReferenceModes
+
+    @cached_property
+    def expansion(self) -> list[int]:
+        """Numbers of the parameters of ring expansion."""
+        return [i for i, p in enumerate(self.parameters) if p.kind == kinds_of.EXPANSION]
+
+    @cached_property
+    def apart(self) -> list[int]:
+        """Numbers of the parameters by which bearings differ among themselves."""
+        return [i for i, p in enumerate(self.parameters) if p.kind in kinds_of.APART]
+
+    @cached_property
+    def balls(self) -> list[list[int]]:
+        """For every test the numbers of the parameters by which balls are stiffer: in one direction, with temperature, and in this test."""
+        kinds = (kinds_of.BALLS, kinds_of.CHANGE)
+        return [[i for i, p in enumerate(self.parameters) if p.kind in kinds and p.test in (None, t)] for t in range(len(self.tests))]
+
+    @cached_property
+    def flung(self) -> list[int]:
+        """The number of the parameter by which the balls' inertia loads are off, where the scene has these."""
+        return [i for i, p in enumerate(self.parameters) if p.kind == kinds_of.FLUNG]
+
+    @cached_property
+    def uneven(self) -> list[int]:
+        """Numbers of the parameters by which joints are uneven about the axis."""
+        return [i for i, p in enumerate(self.parameters) if p.kind == kinds_of.UNEVEN]
+
+    @cached_property
+    def temperature(self) -> list[int]:
+        """For every test the number of its thermometer's parameter."""
+        return [next(i for i, p in enumerate(self.parameters) if p.kind == kinds_of.TEMPERATURE and p.test == t) for t in range(len(self.tests))]
+
+    @cached_property
+    def discrepancies(self) -> list[tuple[Discrepancies, Discrepancies]]:
+        """For every test, of stiffness and of damping: parameter numbers, first and second mode of each, and its factor in the modal matrix."""
+        found = []
+        omega, damping = self.reference.omega, np.sqrt(2 * self.reference.damping * self.reference.omega)
+        for t in range(len(self.tests)):
+            of_test = []
+            for kinds, scale, twice in (
+                ((kinds_of.STIFFNESS, kinds_of.STIFFNESS_DRIFT), omega, 2.0),
+                ((kinds_of.DAMPING, kinds_of.DAMPING_DRIFT), damping, 1.0),
+            ):
+                rows = [(n, *p.modes) for n, p in enumerate(self.parameters) if p.kind in kinds and p.test in (None, t)]
+                number, i, j = np.array(rows, int).reshape(-1, 3).T
+                sd = np.array([self.parameters[n].sd for n in number])
+                of_test.append((number, i, j, twice * sd * scale[i] * scale[j] * np.where(i == j, 1.0, np.sqrt(0.5))))
+            found.append((of_test[0], of_test[1]))
+        return found
+
+    @cached_property
+    def gains(self) -> list[tuple[Integers, Integers]]:
+        """For every test the numbers of gain parameters and the channel of each."""
+        found = []
+        for t in range(len(self.tests)):
+            rows = [
+                (i, p.index)
+                for i, p in enumerate(self.parameters)
+                if p.kind == kinds_of.GAIN or (p.kind == kinds_of.DRIFT and p.test == t)
+            ]
+            number, channel = np.array(rows, int).reshape(-1, 2).T
+            found.append((number, channel))
+        return found
+
+    @cached_property
+    def channel_of(self) -> list[Integers]:
+        """For every test the channel of each row: a sensor keeps its gain at whichever row it is."""
+        nodes = [d.sensors if isinstance(d, LineData) else () for d in self.tests]
+        number = {node: c for c, node in enumerate(dict.fromkeys(node for own in nodes for node in own))}
+        return [np.array([number[node] for node in own], int) for own in nodes]
+
+    @cached_property
+    def record(self) -> int | None:
+        """The number of the parameter of records that end too early."""
+        return next((i for i, p in enumerate(self.parameters) if p.kind == kinds_of.RECORD), None)
+
+    @property
+    def channels(self) -> int:
+        return 1 + max((p.index for p in self.parameters if p.kind == kinds_of.GAIN), default=-1)
