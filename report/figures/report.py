@@ -137,25 +137,28 @@ def comparison(key: str, modes: Mapping[int, str], sources: Sequence[Peaks], col
 
 @rc_context(STYLE)
 def responses(key: str, panels: Mapping[str, Sequence[Curve]], peaks: Sequence[Peaks], band: tuple[float, float]) -> str:
-    """FRFs with their coherence, one panel a driving point, below a strip of the natural frequencies of every source."""
+    """FRFs, with their coherence below where there is one, a panel a driving point, under a strip of the natural frequencies of every source."""
     every = sorted({curve.temperature for curves in panels.values() for curve in curves})
     own = ("computed", "identified")
     labels = list(dict.fromkeys(p.label for p in sorted(peaks, key=lambda p: p.source not in own)))
-    heights = [0.26 * len(labels) + 0.22, *(h for _ in panels for h in (2.35, 0.55))]
+    coherent = any(curve.coherence is not None for curves in panels.values() for curve in curves)
+    heights = [0.26 * len(labels) + 0.22, *(h for _ in panels for h in (2.35, *[0.55] * coherent))]
     figure = Figure(figsize=(10.3, sum(heights) + 1.2))
     strip, *rest = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
     _strip(strip, peaks, labels, every, band)
-    for (title, curves), axes, below in zip(panels.items(), rest[::2], rest[1::2], strict=True):
+    levels, coherences = (rest[::2], rest[1::2]) if coherent else (rest, [])
+    for (title, curves), axes in zip(panels.items(), levels, strict=True):
         for curve in curves:
             look = {"exact": (3.2, 0.3, "-"), "test": (1.0, 1.0, "-"), "measured": (0.9, 1.0, ":")}[curve.style]
             kind = dict(zip(("lw", "alpha", "ls"), look, strict=True), color=colour(curve.temperature, every))
             axes.plot(curve.frequency, 20 * np.log10(np.maximum(np.abs(curve.mobility), 1e-300)), **kind)
-            if curve.coherence is not None:
-                below.plot(curve.frequency, curve.coherence, lw=0.9, color=kind["color"], ls=look[2])
         axes.set_title(title)
         axes.set_ylabel("mobility, dB re 1 (m/s)/N")
-        below.set(ylim=(0, 1.08), yticks=(0, 0.5, 1))
-        below.set_ylabel("coherence", fontsize=7.5)
+    for curves, axes in zip(panels.values(), coherences, strict=False):
+        for curve in (c for c in curves if c.coherence is not None):
+            axes.plot(curve.frequency, curve.coherence, lw=0.9, color=colour(curve.temperature, every))
+        axes.set(ylim=(0, 1.08), yticks=(0, 0.5, 1))
+        axes.set_ylabel("coherence", fontsize=7.5)
     rest[-1].set(xlabel="frequency, Hz", xlim=band)
     handles = [Line2D([], [], color=colour(t, every), lw=2.2, label=f"{t:g} °C") for t in every]
     handles += [
@@ -166,7 +169,7 @@ def responses(key: str, panels: Mapping[str, Sequence[Curve]], peaks: Sequence[P
         handles.append(Line2D([], [], color=INK, lw=0.9, ls=":", label="measured"))
     figure.legend(handles=handles, loc="outside upper right", ncols=len(handles))
     figure.align_ylabels(rest)
-    return svg(figure, key, "frequency response functions and coherence at the driving points")
+    return svg(figure, key, "frequency response functions" + " and coherence" * coherent + " at the driving points")
 
 
 def _strip(axes: Axes, peaks: Sequence[Peaks], labels: Sequence[str], every: Sequence[float], band: tuple[float, float]) -> None:

@@ -7,7 +7,7 @@ import rerun.blueprint as rrb
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.shaft_look import extent
 from thermospindle.model.units import TO_MM
-from thermospindle.report.log.content import Pair, Shown
+from thermospindle.report.log.content import NO_COHERENCE, Pair, Shown
 from thermospindle.report.log.pictures import view
 from thermospindle.report.log.views import at, axis, scene, summary_view, window
 from thermospindle.sim.posing import CYCLE, reach, size
@@ -74,13 +74,17 @@ def framed(spindle: Spindle) -> tuple[bool, float, float]:
 
 
 def frf_views(shown: Shown, pair: Pair) -> rrb.Container:
-    """Level, phase and coherence of one FRF below each other."""
+    """Level, phase and, of several hits, coherence of one FRF below each other."""
     origin, label = at(*pair_path(pair)), f"H({pair[0]},{pair[1]})"
-    return rrb.Vertical(
+    views = [
         plot(shown, f"{origin}/level", f"{label} level, dB re 1 (m/s)/N, over frequency (#1000 is 1000 Hz)", shown.level),
-        plot(shown, f"{origin}/phase", "phase, deg", (-185.0, 185.0)),
-        plot(shown, f"{origin}/coherence", "coherence", (0.0, 1.03)),
-        row_shares=[2.6, 1, 1],
+        plot(shown, f"{origin}/phase", "phase, deg" + f" ({NO_COHERENCE})" * (not shown.coherent), (-185.0, 185.0)),
+    ]
+    if shown.coherent:
+        views.append(plot(shown, f"{origin}/coherence", "coherence", (0.0, 1.03)))
+    return rrb.Vertical(
+        *views,
+        row_shares=[2.6, 1, 1][: len(views)],
         name=label + (" driving point" if pair[0] == pair[1] else ""),
     )
 

@@ -25,6 +25,8 @@ Pair = tuple[int, int]  # response node, hammer node
 FRAMES = 900  # about, of the sweep through the band
 NOTHING = 60  # dB: an FRF so far below the largest is noise, its response vanishes by symmetry; it does not set the limits of plots
 
+NO_COHERENCE = "of one hit there is no coherence"
+
 
 @dataclass(frozen=True)
 class Peak:
@@ -163,6 +165,11 @@ class Shown:
     def temperatures(self) -> list[float]:
         """In C, of the tests."""
         return [t.temperature for t in self.tests]
+
+    @property
+    def coherent(self) -> bool:
+        """Whether the tests have a coherence: several hits do."""
+        return frf_of(self.tests[0]).coherence is not None
 
     @property
     def measured(self) -> dict[tuple[str, str], list[Peak]]:

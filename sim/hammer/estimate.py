@@ -32,7 +32,7 @@ class Windows:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """FRFs of one test. `h1` has coherence and standard errors; `h2` is the estimator biased by response noise instead."""
+    """FRFs of one test. `h1` has coherence and standard errors, of a single hit neither; `h2` is the estimator biased by response noise instead."""
 
     h1: Frf
     h2: ComplexArray
@@ -60,7 +60,7 @@ def estimate(
     sff, svv, svf = (np.mean(s, axis=1) for s in (np.abs(f) ** 2, np.abs(v) ** 2, v * f.conj()))
     with np.errstate(divide="ignore", invalid="ignore"):  # of a dead channel, which `check_frf` refuses
         h1, h2 = svf / sff, svv / svf.conj()
-        coherence = np.minimum(np.abs(svf) ** 2 / (sff * svv), 1.0)
+        coherence = np.minimum(np.abs(svf) ** 2 / (sff * svv), 1.0) if force.shape[1] > 1 else None  # of one hit 1 whatever the noise
     per_hit = v / f
     order = (1, 0, 2)  # responses first
     frf = Frf(
@@ -69,7 +69,7 @@ def estimate(
         response_nodes,
         reference_nodes,
         "mobility",
-        np.ascontiguousarray(coherence.transpose(order)),
+        None if coherence is None else np.ascontiguousarray(coherence.transpose(order)),
         np.ascontiguousarray(_standard_error(v, f, h1).transpose(order)),
     )
     return Estimate(frf, np.ascontiguousarray(h2.transpose(order)), np.moveaxis(per_hit, (1, 2), (0, 1)), windows.decay)

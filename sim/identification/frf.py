@@ -32,7 +32,7 @@ class Frf:
     response_nodes: tuple[int, ...]
     reference_nodes: tuple[int, ...]
     quantity: str  # receptance, mobility or accelerance
-    coherence: np.ndarray | None = None  # like value, real, 0 to 1
+    coherence: np.ndarray | None = None  # like value, real, 0 to 1; none of a single hit, which would agree with itself alone
     sd: np.ndarray | None = None  # like value, real, its unit: standard error sqrt(E |error|^2) of each complex value
     names: Mapping[int, str] = field(default_factory=dict, compare=False)  # of the nodes, where they are known
 

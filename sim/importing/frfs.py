@@ -27,6 +27,8 @@ ADVICE = {
     "reciprocity": "one of the two has another unit, sign or node than it says, or the spindle changed between the hits",
 }
 """What to do about what `check_frf` refuses, by a word of its sentence."""
+ONE = 1e-6
+"""Coherence within which a file's single precision writes 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +68,9 @@ def frf_of(
         frequency, np.asarray(value[index], complex), responses, references, quantity,
         _beside(placed, columns, index, "coherence", frequency, quantity), _beside(placed, columns, index, "sd", frequency, quantity),
     )  # fmt: skip
+    if frf.coherence is not None and np.all(np.abs(frf.coherence - 1) < ONE):
+        notes.append(f"test {test}: its coherence left out: 1 on every line, as that of a single hit is whatever the noise")
+        frf = replace(frf, coherence=None)
     if frf.sd is None and frf.coherence is not None and averages is not None:
         frf = replace(frf, sd=_sd(frf, averages))
     _check(frf, placed, speed)

@@ -258,7 +258,7 @@ def _first(frf: Frf, hits: int) -> int:
 
     Noise has a coherence of 1 / hits in the mean, and exceeds 1 - p^(1 / (hits - 1)) with probability p (Carter, *Proc. IEEE* 75 (1987) 236).
     """
-    if frf.coherence is None or hits < 2:
+    if frf.coherence is None:
         return 0
     least = max(HEARD, 1 - 0.1 ** (1 / (hits - 1)))
     every = frf.coherence.reshape(-1, len(frf.frequency))

@@ -19,6 +19,7 @@ from thermospindle.report.log.blueprint import framed
 from thermospindle.report.log.content import decibel, peaks, shown
 from thermospindle.report.log.told import describe
 from thermospindle.sim import posing
+from thermospindle.sim.hammer.test import estimate_of
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.run import Run
 
@@ -37,7 +38,8 @@ def two_hits(run: Run) -> Run:
     record, settings = step.test.record, replace(step.test.settings, hits=2)
     twice = replace(record, force=np.concatenate([record.force, record.force / 2], axis=1), velocity=np.concatenate([record.velocity, record.velocity / 2], axis=1))
     spindle = replace(run.spindle, hammer=replace(run.spindle.hammer, hits=2))
-    return replace(run, spindle=spindle, steps=(replace(step, test=replace(step.test, record=twice, settings=settings)),))
+    test = replace(step.test, record=twice, settings=settings, estimate=estimate_of(settings, step.point, twice))
+    return replace(run, spindle=spindle, steps=(replace(step, test=test),))
 
 
 @pytest.fixture(scope="module")
@@ -82,17 +84,29 @@ def test_a_run_has_no_records_to_give(tmp_path: Path, run: Run) -> None:
     assert ts.read_log(tmp_path / "run.rrd").records == {}
 
 
-def test_views_name_what_is_in_the_log(file: Path) -> None:
+def viewed(file: Path) -> set[str]:
+    """The entities that the views of a log show."""
     [blueprint] = RrdReader(file).blueprints()
     told: list[Any] = []
     for chunk in RrdReader(file).stream(store=blueprint):
         batch = chunk.to_record_batch()
         told += [v for name in batch.schema.names if name.endswith(("space_origin", "query")) for v in batch.column(name).to_pylist()]
-    wanted = {path for values in told for path in values or () if path.startswith("/")}
-    there = ts.read_log(file).entities
+    return {path for values in told for path in values or () if path.startswith("/")}
+
+
+def test_views_name_what_is_in_the_log(file: Path) -> None:
+    wanted, there = viewed(file), ts.read_log(file).entities
+    assert "/frf/hammer_1/response_1/coherence" in wanted
     assert {f"/records/hammer\\ {h}/hit\\ {k}/{what}" for h in (1, 2) for k in (1, 2) for what in ("force", "velocity")} <= wanted
     for path in wanted:
         assert any(entity == path or entity.startswith(f"{path}/") for entity in there), path
+
+
+def test_a_single_hit_has_no_coherence_to_show(run: Run, tmp_path: Path) -> None:
+    log.write_impact_log(run, tmp_path / "impact.rrd")
+    there = ts.read_log(tmp_path / "impact.rrd")
+    assert not [path for path in (*there.entities, *viewed(tmp_path / "impact.rrd")) if "coherence" in path]
+    assert all(frf.coherence is None and frf.sd is None for frf in there.frfs.values())  # nor scatter
 
 
 def test_the_picture_shows_the_pulse(two_hits: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

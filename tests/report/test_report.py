@@ -20,6 +20,7 @@ from thermospindle.report.page.comparison import Table, compared
 from thermospindle.report.page.headlines import headlines, misses
 from thermospindle.report.page.report import background, html, stamp, write_report
 from thermospindle.sim.campaign.campaign import ModeRow
+from thermospindle.sim.hammer.test import estimate_of
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.run import Run
 
@@ -88,6 +89,19 @@ def text(run: Run) -> str:
 @pytest.fixture(scope="module")
 def page(text: str) -> Page:
     return Page(text)
+
+
+def test_coherence_is_drawn_of_several_hits_alone(run: Run, text: str):
+    """Of one it would be 1 whatever the noise."""
+    assert "No coherence is drawn: it tells how well several hits agree, and there is one" in text
+    assert "functions and coherence at" not in text
+    step = run.steps[0]
+    record, settings = step.test.record, replace(step.test.settings, hits=2)
+    twice = replace(record, force=np.concatenate([record.force] * 2, axis=1), velocity=np.concatenate([record.velocity, 0.9 * record.velocity], axis=1))
+    test = replace(step.test, record=twice, settings=settings, estimate=estimate_of(settings, step.point, twice))
+    more = html(replace(run, steps=(replace(step, test=test),)))
+    assert "functions and coherence at" in more
+    assert "No coherence" not in more
 
 
 # ---------------------------------------------------------------- numbers

@@ -147,6 +147,7 @@ def test_h2_differs_from_h1_by_the_coherence(spindle):
 def test_one_hit_has_no_scatter(spindle, quick):
     test = impact_tests([operating_point(spindle, Condition(20.0))], replace(quick, record_length=0.05))[0]
     assert np.all(np.isinf(test.estimate.h1.sd))
+    assert test.estimate.h1.coherence is None, "1 on every line whatever the noise"
 
 
 def test_same_seed_same_test(spindle, quick):

@@ -235,6 +235,19 @@ def test_standard_errors_of_coherence_and_averages(tmp_path):
     np.testing.assert_allclose(sizes[1], sizes[0] / 10, rtol=1e-6)
 
 
+def test_a_coherence_of_one_everywhere_is_that_of_a_single_hit(tmp_path):
+    """It would make the FRFs free of noise."""
+    heads, found = columns("real", "(m/s)/N")
+    heads += [f"coherence({r},{q})" for r, q in PAIRS]
+    file = table(tmp_path / "T20.csv", ["Frequency", *heads], [FREQUENCY, *found, *[np.ones(len(FREQUENCY))] * len(PAIRS)])
+    (tmp_path / "m.toml").write_text(SPINDLE + HEAD.replace('id = "T20"', 'id = "T20"\naverages = 1'))
+    brought = bring([file], mapping=tmp_path / "m.toml", out=tmp_path / "c")
+    assert "test T20: its coherence left out: 1 on every line, as that of a single hit is whatever the noise" in brought.values["notes"]
+    frf = read_campaign(tmp_path / "c").tests[0].frf
+    assert frf.coherence is None
+    assert frf.sd is None
+
+
 UNITS_MM = """    -1
    164
          5SI - mm/milli-newton         2
