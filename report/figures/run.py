@@ -15,11 +15,12 @@ from thermospindle.report.figures.common import INK, STYLE
 
 Colour = str | tuple[float, float, float]
 Curves = Sequence[tuple[Array, Array, Colour]]
+FITS = 5  # names beside each other above the charts
 SMALL = {**STYLE, "font.size": 7.5, "axes.titlesize": 7.5, "axes.titleweight": "normal", "xtick.labelsize": 7, "ytick.labelsize": 7}
 
 
-def panels(titled: Mapping[str, Curves], columns: int, size: tuple[float, float], unit: str) -> Figure:
-    """Small charts of curves (x, y, colour) in rows of `columns`; `unit` of x below the lowest of them."""
+def panels(titled: Mapping[str, Curves], columns: int, size: tuple[float, float], unit: str, named: Mapping[str, Colour] | None = None) -> Figure:
+    """Small charts of curves (x, y, colour) in rows of `columns`; `unit` of x below the lowest of them, above them what colours are `named`."""
     with rc_context(SMALL):
         figure = Figure(figsize=size)
         rows = -(-len(titled) // columns)
@@ -35,6 +36,9 @@ def panels(titled: Mapping[str, Curves], columns: int, size: tuple[float, float]
                 axes.set_xlabel(unit)
         for axes in every.flat[len(titled) :]:
             axes.set_axis_off()
+        handles = [Line2D([], [], color=colour, lw=2, label=name) for name, colour in (named or {}).items()]
+        if handles:
+            figure.legend(handles=handles, loc="outside upper left", ncols=FITS, fontsize=7, columnspacing=1.0, handlelength=1.0, handletextpad=0.4)
     return figure
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import rerun.blueprint as rrb
 
 from thermospindle.model.machine import Spindle
@@ -28,13 +30,13 @@ def blueprint(shown: Shown, quantities: list[tuple[str, str]], factor: float) ->
     left = rrb.Vertical(rrb.Grid(*model_views(shown), grid_columns=2), _section_view(shown, "compared", section), row_shares=[2.6, 1])
     middle = frfs_below_key(shown)
     right = rrb.Vertical(
-        view("charts/bearings", f"Bearings: {_sides(shown)}", CHARTS["bearings"]),
+        view("charts/bearings", "Bearings over temperature", CHARTS["bearings"]),
         view("charts/records", "First hits of the hammers", CHARTS["records"]),
         summary_view(),
         row_shares=[3.9, 2.1, 2.9],
     )
     overview = rrb.Horizontal(left, middle, right, column_shares=[1.2, 1.5, 1.02], name="Overview")
-    return sweeping(shown, overview, _time_tab(shown), _temperature_tab(shown, quantities, factor))
+    return sweeping(shown, overview, shapes_tab(shown), _time_tab(shown), _temperature_tab(shown, quantities, factor))
 
 
 def sweeping(shown: Shown, *tabs: rrb.Container) -> rrb.Blueprint:
@@ -47,16 +49,25 @@ def frfs_below_key(shown: Shown) -> rrb.Container:
     return rrb.Vertical(view("charts/key", None, CHARTS["key"]), rrb.Tabs(*(frf_views(shown, pair) for pair in shown.pairs)), row_shares=[1, 12])
 
 
-def _sides(shown: Shown) -> str:
-    return ", ".join(f"{b.name} {colour}" for b, colour in zip(shown.run.spindle.bearings, ("blue", "orange"), strict=False))
-
-
 def model_views(shown: Shown) -> list[rrb.View]:
-    """The first mode shapes, and the answer to a swept force."""
-    views = [(f"{i} {m.kind} {m.frequency:.0f} Hz", f"mode_{i}") for i, m in enumerate(shown.modes[:5], 1)]
-    views.append((f"Sweep at {shown.pairs[0][1]}", "sweep"))
-    _, r, z = framed(shown.run.spindle)
-    return [scene(at("model", entity), name, (1.8 * r, -1.4 * r, z + 1.35 * r), (0, 0, z - 0.08 * r)) for name, entity in views]
+    """The mode shapes that the hammers excite most, and the answer to a swept force."""
+    return [*_shape_views(shown, shown.drawn), _body_view(shown, f"Sweep at {shown.pairs[0][1]}", "sweep")]
+
+
+def shapes_tab(shown: Shown) -> rrb.Container:
+    """Every mode shape in the band."""
+    return rrb.Grid(*_shape_views(shown, range(1, len(shown.modes) + 1)), name="Every mode shape")
+
+
+def _shape_views(shown: Shown, numbers: Iterable[int]) -> list[rrb.View]:
+    named = [(i, shown.modes[i - 1]) for i in numbers]
+    return [_body_view(shown, f"{i} {mode.kind} {mode.frequency:.0f} Hz", f"mode_{i}") for i, mode in named]
+
+
+def _body_view(shown: Shown, name: str, entity: str) -> rrb.View:
+    long, r, z = framed(shown.run.spindle)
+    away, middle = (0.9 * r, z + 0.1 * r) if long else (r, z - 0.08 * r)  # a slender one leaves room at its sides, and its upper end is nearer
+    return scene(at("model", entity), name, (1.8 * away, -1.4 * away, z + 1.35 * away), (0, 0, middle))
 
 
 def _section_view(shown: Shown, which: str, name: str) -> rrb.View:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
+from scipy.spatial.transform import Rotation
 
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.whole import whole
@@ -17,9 +18,13 @@ from thermospindle.model.rotor.look import RegionMesh
 from thermospindle.model.types import Array
 from thermospindle.model.units import TO_MM
 from thermospindle.report.log.content import Peak
+from thermospindle.report.log.drawing import light
 from thermospindle.report.log.read import APPLICATION
 from thermospindle.report.log.views import at
 from thermospindle.sim.identification.frf import Frf
+
+VIEWER_LIGHT, LIGHT = np.arctan2(2.0, 1.0), np.deg2rad(-60.0)
+"""Azimuths from which Rerun's light comes, along (1, 2, 3) in its shaders, and from which bodies are lit."""
 
 
 @contextmanager
@@ -107,13 +112,17 @@ def curve_look(colour: Any, name: str, width: float = 1.0) -> rr.SeriesLines:
     return rr.SeriesLines(colors=[colour], names=name, widths=width, aggregation_policy=rr.components.AggregationPolicy.Off)
 
 
-def log_mesh(recording: rr.RecordingStream, entity: str, mesh: RegionMesh) -> None:
-    """A part of a body, in mm."""
+def log_mesh(recording: rr.RecordingStream, entity: str, mesh: RegionMesh, tint: tuple[float, float, float] | None = None) -> None:
+    """A part of a body, in mm, lit from where `views.scene` looks from; half of its material's colour may be a `tint`.
+
+    The viewer has one light, fixed behind the bodies. Normals turned about z, about which bodies may spin, bring it before them.
+    """
     vertices, triangles, normals = mesh.shaded()
+    red, green, blue = mesh.rgba[:3] if tint is None else np.mean([mesh.rgba[:3], tint], axis=0)
     shape = rr.Mesh3D(
         vertex_positions=TO_MM * vertices,
         triangle_indices=triangles,
-        vertex_normals=normals,
-        albedo_factor=(255 * np.array(mesh.rgba)).astype(np.uint8),
+        vertex_normals=Rotation.from_euler("z", VIEWER_LIGHT - LIGHT).apply(normals),
+        albedo_factor=light((red, green, blue)),
     )
     recording.log(entity, shape, static=True)

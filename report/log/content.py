@@ -14,6 +14,7 @@ from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.modes import Mode
 from thermospindle.model.types import Array
 from thermospindle.sim.campaign.campaign import Test
+from thermospindle.sim.hammer.excited import most_excited
 from thermospindle.sim.identification.frf import Frf, decibel
 from thermospindle.sim.identification.numbering import identified, in_band, numbered
 from thermospindle.sim.identification.pairing import by_kind
@@ -23,6 +24,7 @@ from thermospindle.thermal.expansion import expand
 
 Pair = tuple[int, int]  # response node, hammer node
 FRAMES = 900  # about, of the sweep through the band
+DRAWN = 5  # mode shapes in the overview
 NOTHING = 60  # dB: an FRF so far below the largest is noise, its response vanishes by symmetry; it does not set the limits of plots
 
 NO_COHERENCE = "of one hit there is no coherence"
@@ -156,6 +158,7 @@ class Shown:
     tests: tuple[Test, ...]
     peaks: tuple[Peak, ...]
     modes: tuple[Mode, ...]  # in the band, at the first temperature
+    drawn: tuple[int, ...]  # numbers of those that the overview draws, from 1: the ones that the hammers excite most
     pairs: tuple[Pair, ...]  # FRFs with views of their own, driving points first
     level: tuple[float, float]  # dB, limits of their plots
     band: tuple[int, int]  # Hz
@@ -188,11 +191,15 @@ def shown(run: Run) -> Shown:
     low, high = run.spindle.hammer.band
     level = np.array([decibel(one(frf_of(t).value, frf_of(t), pair)) for t in tests for pair in pairs])
     level = level[level.max(axis=1) > level.max() - NOTHING]
+    point = run.steps[0].point
+    modes = tuple(point.modes[i] for i in in_band(run.steps[0]))
+    below = sum(m.frequency < low for m in modes)
     return Shown(
         run,
         tests,
         tuple(peaks(run)),
-        tuple(run.steps[0].point.modes[i] for i in in_band(run.steps[0])),
+        modes,
+        tuple(below + i + 1 for i in most_excited(point, modes[below:], DRAWN)),
         pairs,
         level_ends(level),
         (int(np.floor(low)), int(np.ceil(high))),

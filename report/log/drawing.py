@@ -25,7 +25,7 @@ def heat(temperature: float | Array, temperatures: Sequence[float]) -> Colours:
     return np.stack([np.interp(place, np.linspace(0, 1, len(HEAT)), channel) for channel in HEAT.T], axis=-1).astype(np.uint8)
 
 
-def light(paint: str, least: float = 0.35) -> tuple[int, int, int]:
+def light(paint: str | tuple[float, float, float], least: float = 0.35) -> tuple[int, int, int]:
     """A colour of the figures, light enough for a dark ground: no channel below `least`."""
     red, green, blue = (round(255 * (least + (1 - least) * c)) for c in to_rgb(paint))
     return red, green, blue

@@ -15,7 +15,7 @@ import rerun.blueprint as rrb
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 from thermospindle.report.figures import run as figures
-from thermospindle.report.log.blueprint import frfs_below_key, model_views, pair_path, plot, sweeping
+from thermospindle.report.log.blueprint import frfs_below_key, model_views, pair_path, plot, shapes_tab, sweeping
 from thermospindle.report.log.columns import curve_look, log_curve, log_values, whole_log
 from thermospindle.report.log.content import Shown, frf_of, shown
 from thermospindle.report.log.drawing import heat
@@ -86,7 +86,7 @@ def _blueprint(content: Shown) -> rrb.Blueprint:
     )
     left = rrb.Grid(*model_views(content), grid_columns=2)
     overview = rrb.Horizontal(left, frfs_below_key(content), right, column_shares=[1.25, 1.4, 1.05], name="Overview")
-    return sweeping(content, overview, _frf_tab(content), _record_tab(content))
+    return sweeping(content, overview, shapes_tab(content), _frf_tab(content), _record_tab(content))
 
 
 def _frf_tab(content: Shown) -> rrb.Container:

@@ -8,6 +8,7 @@ same numbers stand as series on `temperature` and `time`. `numbers/` holds the F
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -38,10 +39,11 @@ from thermospindle.sim.operating import provenance
 from thermospindle.sim.run import Run
 from thermospindle.thermal.expansion import DeformedSection, field
 
-SIDES = ((90, 200, 255), (255, 170, 80))  # lower and upper bearing
+BEARINGS = ((90, 200, 255), (255, 170, 80), (130, 225, 120), (255, 125, 185), (185, 150, 255), (235, 225, 110))  # in their order
 MEASURED = ((120, 255, 140), (30, 190, 90))
 KEYS = 5  # temperatures named in the key, at most
 LIGHT = (235, 235, 235)
+TURNING = (0.95, 0.62, 0.25)  # tint of what turns, among the mode shapes
 
 
 def write_log(run: Run, path: Path) -> None:
@@ -134,7 +136,7 @@ def log_key(recording: rr.RecordingStream, content: Shown) -> None:
 
 
 def log_motion(recording: rr.RecordingStream, content: Shown) -> None:
-    """Mode shapes, and the answer to a swept force, at the first temperature; on two timelines at once, at rest on the others."""
+    """Mode shapes, and the answer to a swept force, at the first temperature, what turns amber; on two timelines at once, at rest on the others."""
     point = content.run.steps[0].point
     frequency = np.arange(content.band[0], content.band[1] + 1, content.step)
     motions = {f"mode_{i}": posing.mode_motion(point, m, len(frequency)) for i, m in enumerate(content.modes, 1)}
@@ -147,7 +149,7 @@ def log_motion(recording: rr.RecordingStream, content: Shown) -> None:
                 moves = rr.Transform3D.columns(translation=translation, quaternion=turn)
                 recording.send_columns(at("model", name, body), [rr.TimeColumn("frequency", sequence=frequency), slow], moves)
             for mesh in meshes.get(body, []):
-                log_mesh(recording, at("model", name, body, mesh.region), mesh)
+                log_mesh(recording, at("model", name, body, mesh.region), mesh, TURNING if point.spindle.structure.body(body).turns else None)
 
 
 def log_section(recording: rr.RecordingStream, content: Shown, sections: Sequence[Mapping[str, DeformedSection]], factor: float) -> None:
@@ -179,12 +181,14 @@ def log_bearings(recording: rr.RecordingStream, content: Shown, series: Mapping[
     """The bearing states as series over temperature, and as charts; a ring gap is the outer ring's thermal motion less the
     inner ring's."""
     panels: dict[str, list[tuple[Array, Array, figures.Colour]]] = {}
-    for k, (bearing, own) in enumerate(series.items()):
+    colours = dict(zip(series, cycle(BEARINGS), strict=False))
+    for bearing, own in series.items():
         for (name, unit), values in own.items():
-            look = curve_look(SIDES[k % 2], bearing)
+            look = curve_look(colours[bearing], bearing)
             log_curve(recording, at("bearings", name, bearing), _over_temperature(content), values, look)
-            panels.setdefault(f"{name}, {unit}", []).append((np.array(content.temperatures), values, for_dark(SIDES[k % 2])))
-    log_figure(recording, "charts/bearings", figures.panels(panels, 3, CHARTS["bearings"], "°C"))
+            panels.setdefault(f"{name}, {unit}", []).append((np.array(content.temperatures), values, for_dark(colours[bearing])))
+    named = {bearing: for_dark(colour) for bearing, colour in colours.items()}
+    log_figure(recording, "charts/bearings", figures.panels(panels, 3, CHARTS["bearings"], "°C", named))
 
 
 # ---------------------------------------------------------------- records

@@ -19,6 +19,7 @@ from thermospindle.model.rotor.modes import point_rows
 from thermospindle.model.scene.reading import load
 from thermospindle.report.log import content as log_content
 from thermospindle.report.log import run as log
+from thermospindle.report.log.blueprint import model_views, shapes_tab
 from thermospindle.report.log.read import read_log
 from thermospindle.report.log.run import write_log
 from thermospindle.report.log.told import describe
@@ -198,6 +199,30 @@ def test_bodies_of_the_mujoco_model_move_as_the_mode_says(run: Run, mode: int) -
                 assert np.abs(moved[..., 2]).max() > 5 * np.abs(moved[..., :2]).max()
     wanted = 1e3 * posing.VISIBLE * posing.reach(run.spindle)
     assert largest == pytest.approx(wanted, rel=0.05)  # tilts of some 0.15 rad are finite
+
+
+def test_the_overview_draws_the_modes_that_the_hammers_excite(run: Run) -> None:
+    """Not the lowest five: of the two rocking ones, one shape in two planes, only one, and a lateral one instead."""
+    content = log_content.shown(run)
+    assert [content.modes[i - 1].kind for i in content.drawn] == ["axial", "axial", "rocking", "axial", "lateral"]
+    views = [v.name for v in model_views(content)]
+    assert views == [*(f"{i} {content.modes[i - 1].kind} {content.modes[i - 1].frequency:.0f} Hz" for i in content.drawn), "Sweep at 1"]
+    assert len(shapes_tab(content).contents) == len(content.modes)
+
+
+def test_bodies_are_lit_from_where_one_looks(run: Run, logged: dict[str, list[Any]]) -> None:
+    """By the viewer's light, fixed in its shaders, what faces the eye is bright, and no colour is near that of the ground."""
+    hub = next(m for m in posing.body_meshes(run.spindle)["hub"] if len(m.vertices) > 100)
+    entity = f"/model/mode_1/hub/{hub.region}"
+    normals = column(logged, entity, "Mesh3D:vertex_normals")[0]
+    lights = [(1.0, (1.0, 2.0, 3.0)), (0.5, (-1.0, -3.0, -5.0))]
+    shade = np.clip(0.2 + sum(strength * np.clip(normals @ d / np.linalg.norm(d), 0, 1) for strength, d in lights), 0, 1)
+    eye = np.array([1.8, -1.4, 1.35]) / np.linalg.norm([1.8, -1.4, 1.35])  # of `model_views`
+    facing = hub.shaded()[2] @ eye > 0.6
+    assert facing.sum() > 20
+    assert shade[facing].min() > 0.4
+    [albedo] = column(logged, entity, "Mesh3D:albedo_factor")[0]
+    assert min(int(albedo) >> 24, int(albedo) >> 16 & 255, int(albedo) >> 8 & 255) >= 0.35 * 255
 
 
 def test_transforms_of_one_cycle_repeat_over_the_band(run: Run, logged: dict[str, list[Any]]) -> None:

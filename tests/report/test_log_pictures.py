@@ -49,7 +49,8 @@ def test_key_and_small_charts_hold_all_there_is() -> None:
     assert box.x0 >= 0
     assert box.x1 <= made.bbox.width
     x = np.array([20.0, 60.0])
-    made = figures.panels({f"q{k}": [(x, k * x, "k"), (x, x, "r")] for k in range(4)}, 3, (4, 3), "°C")
+    made = figures.panels({f"q{k}": [(x, k * x, "k"), (x, x, "r")] for k in range(4)}, 3, (4, 3), "°C", {"front": "k", "rear": "r"})
+    assert [t.get_text() for t in made.legends[0].get_texts()] == ["front", "rear"]
     assert [len(a.lines) for a in made.axes] == [2, 2, 2, 2, 0, 0]
     assert [a.get_xlabel() for a in made.axes] == ["", "°C", "°C", "°C", "", ""]
 
