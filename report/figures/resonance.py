@@ -19,7 +19,7 @@ from thermospindle.sim.resonance.point import key
 from thermospindle.sim.running.runout import looked_at
 
 WHIRL = {"forward": "#c9371c", "backward": "#2166ac", "mixed": "#7b3f99", "none": "#1f8a70"}
-WHIRLS = {"forward": "whirls forward", "backward": "whirls backward", "mixed": "forward at one place, backward at another", "none": "axial or standing"}
+WHIRLS = {"forward": "whirls forward", "backward": "whirls backward", "mixed": "mixed whirl", "none": "axial or standing"}
 CAUSES = {
     "unbalance": INK,
     "inner waviness": "#a0741a",
@@ -44,7 +44,7 @@ def drawn_lines(found: ResonanceMap) -> list[LineTrack]:
     chosen: dict[tuple, LineTrack] = {}
     at_nominal = [c for c in found.coincidences if c.at_nominal_speed]
     for c in [*strongest(at_nominal), *strongest(found.coincidences)]:
-        chosen.setdefault((c.line.cause, c.line.order, c.line.direction, c.line.whirl), tracks[key(c.line)])
+        chosen.setdefault(_kind(c.line), tracks[key(c.line)])
     first = {(t.line.name, t.line.whirl): t for t in found.lines if t.line.cause == "unbalance"}  # static and couple unbalance are one line
     return list(first.values()) + list(chosen.values())[:LINES]
 
@@ -88,56 +88,64 @@ def campbell(found: ResonanceMap, at: int | None = None, size: tuple[float, floa
     axes.axvline(found.nominal.speed / RPM, color=PALE, lw=1.0, ls=":")
     axes.set(xlabel="speed, rpm", ylabel="frequency, Hz")
     figure.suptitle(f"Campbell diagram at {found.temperatures[t0]:.4g} °C", x=0.01, ha="left", fontweight="bold", fontsize=9.5)
-    figure.legend(handles=_key(found, drawn_lines(found), bool(marked)), loc="outside lower center", ncols=round(size[0] / 1.65), fontsize=7.5)
+    figure.legend(handles=_key(found, drawn_lines(found), bool(marked)), loc="outside lower center", ncols=int(size[0] / 1.9), fontsize=7.5)
     return figure
 
 
-def over_temperature(found: ResonanceMap, size: tuple[float, float] = SIZE, key_below: bool = True) -> Figure:
-    """Natural frequencies and the lines among them over temperature, at the nominal speed."""
+def over_temperature(found: ResonanceMap, size: tuple[float, float] = SIZE, bare: bool = False) -> Figure:
+    """Natural frequencies and the strongest lines among them over temperature, at the nominal speed; `bare` without title and key. Where there are more names than room, those of what meets
+    there come first."""
     figure = Figure(figsize=size)
     axes = figure.subplots()
     _, s0 = found.nominal_index
     values = np.array([m.frequency[:, s0] for m in found.modes])
     low, high = 0.93 * np.nanmin(values), 1.05 * np.nanmax(values)
     axes.set(xlim=(found.temperatures[0], found.temperatures[-1]), ylim=(low, high))
-    inside = [t for t in found.lines if np.nanmin(t.frequency[:, s0]) > low and np.nanmax(t.frequency[:, s0]) < high]
-    best: dict[tuple, LineTrack] = {}
-    for t in sorted(inside, key=lambda t: -t.amplitude):
-        best.setdefault((t.line.cause, t.line.order, t.line.direction, t.line.whirl), t)
-    shown = list(best.values())[:LINES]
-    crossing = [c for c in found.coincidences if c.at_nominal_speed]
-    for t in found.lines:
-        if any(key(c.line) == key(t.line) for c in crossing) and t not in shown:
-            shown.append(t)
+    crossing = strongest([c for c in found.coincidences if c.at_nominal_speed])
+    shown = _among(found, crossing, low, high)
+    crossing = [c for c in crossing if key(c.line) in {key(t.line) for t in shown}]
     for mode in found.modes:
         _draw_mode(axes, found.temperatures, mode.frequency[:, s0], mode)
     for t in shown:
         axes.plot(found.temperatures, t.frequency[:, s0], color=CAUSES[t.line.cause], lw=0.9, ls="--" if t.line.whirl < 0 else "-")
-    ends = [*(m.frequency[-1, s0] for m in found.modes), *(t.frequency[-1, s0] for t in shown)]
-    names = [*(f"mode {m.number} {m.kind}" for m in found.modes), *(f"{_named(t.line)} {t.line.bearing}" for t in shown)]
-    paints = [*(WHIRL[m.whirl] for m in found.modes), *(CAUSES[t.line.cause] for t in shown)]
+    named = [(float(m.frequency[-1, s0]), f"mode {m.number} {m.kind}", WHIRL[m.whirl], any(c.mode.number == m.number for c in crossing)) for m in found.modes]
+    named += [(float(t.frequency[-1, s0]), f"{_named(t.line)} {t.line.bearing}", CAUSES[t.line.cause], any(key(c.line) == key(t.line) for c in crossing)) for t in shown]
+    ends, names, paints, _ = zip(*sorted(named, key=lambda row: not row[-1]), strict=True)  # what meets first: the names that there is room for
     name_ends(axes, np.array(ends), names, paints)
     _mark(axes, [(c.condition.temperature, c.frequency, c.strength) for c in crossing])
     axes.set(xlabel="temperature, °C", ylabel="frequency, Hz")
-    title = f"Natural frequencies and the strongest lines among them at {found.nominal.speed / RPM:.0f} rpm"
-    figure.suptitle(title, x=0.01, ha="left", fontweight="bold", fontsize=9.5)
-    if key_below:
+    if not bare:
+        title = f"Natural frequencies and the strongest lines among them at {found.nominal.speed / RPM:.0f} rpm"
+        figure.suptitle(title, x=0.01, ha="left", fontweight="bold", fontsize=9.5)
         figure.legend(handles=_key(found, shown, bool(crossing)), loc="outside lower center", ncols=6, fontsize=7.5)
     return figure
 
 
-def both(found: ResonanceMap, size: tuple[float, float] = SIZE, key_below: bool = True) -> Figure:
-    """Where the strongest lines meet a mode, as curves over speed and temperature."""
+def _among(found: ResonanceMap, crossing: Sequence[Coincidence], low: float, high: float) -> list[LineTrack]:
+    """At most `LINES` lines to draw over temperature: those that meet a mode at the nominal speed, then the largest between `low` and `high` (Hz), one bearing for each."""
+    tracks, (_, s0) = {key(t.line): t for t in found.lines}, found.nominal_index
+    chosen = {key(c.line): tracks[key(c.line)] for c in crossing}
+    kinds = {_kind(t.line) for t in chosen.values()}
+    for t in sorted(found.lines, key=lambda t: -t.amplitude):
+        if _kind(t.line) not in kinds and np.nanmin(t.frequency[:, s0]) > low and np.nanmax(t.frequency[:, s0]) < high:
+            kinds.add(_kind(t.line))
+            chosen[key(t.line)] = t
+    return list(chosen.values())[:LINES]
+
+
+def both(found: ResonanceMap, size: tuple[float, float] = SIZE, bare: bool = False) -> Figure:
+    """Where the strongest lines meet a mode, as curves over speed and temperature, over the speeds where they do; `bare` without title and key."""
     figure = Figure(figsize=size)
     axes = figure.subplots()
-    axes.set(xlim=(0, found.speeds[-1] / RPM), ylim=(found.temperatures[0], found.temperatures[-1]))
+    axes.set_ylim(found.temperatures[0], found.temperatures[-1])
     named: list[tuple[float, str, str]] = []
     chosen = strongest([c for c in found.coincidences if c.at_nominal_speed])
     chosen += [c for c in strongest(found.coincidences) if all(_pair(c) != _pair(k) for k in chosen)]
     used = sorted({c.mode.number for c in chosen[:CURVES]})
     paints = {number: MODES[i % len(MODES)] for i, number in enumerate(used)}
-    for c in chosen[:CURVES]:
-        curve = next(k for k in found.curves if key(k.line) == key(c.line) and k.mode.number == c.mode.number)
+    curves = [next(k for k in found.curves if key(k.line) == key(c.line) and k.mode.number == c.mode.number) for c in chosen[:CURVES]]
+    axes.set_xlim(*_around([found.nominal.speed, *(s for k in curves for s in k.speed)], found.speeds))
+    for c, curve in zip(chosen, curves, strict=False):
         order = np.argsort(curve.temperature)
         paint = paints[c.mode.number]
         axes.plot(curve.speed[order] / RPM, curve.temperature[order], color=paint, lw=1.2)
@@ -153,8 +161,8 @@ def both(found: ResonanceMap, size: tuple[float, float] = SIZE, key_below: bool 
     axes.axhline(found.nominal.temperature, color=PALE, lw=1.0, ls=":")
     axes.plot(found.nominal.speed / RPM, found.nominal.temperature, "s", color=INK, ms=5, clip_on=False)
     axes.set(xlabel="speed, rpm", ylabel="temperature, °C")
-    figure.suptitle("Where the strongest lines meet a mode (line, mode number)", x=0.01, ha="left", fontweight="bold", fontsize=9.5)
-    if key_below:
+    if not bare:
+        figure.suptitle("Where the strongest lines meet a mode (line, mode number)", x=0.01, ha="left", fontweight="bold", fontsize=9.5)
         handles = [Line2D([], [], color=paints[m.number], label=f"mode {m.number} {m.kind}") for m in found.modes if m.number in paints]
         handles += [Line2D([], [], color=INK, marker="s", ls="", ms=5, label="nominal"), *[_circle()] * bool(meeting)]
         figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=7.5)
@@ -190,8 +198,20 @@ def _named(line: Line) -> str:
     return f"{line.name} ({line.order})" if line.cause in ("inner waviness", "outer waviness") else line.name
 
 
-def _pair(c: Coincidence) -> tuple[str, int, str, int, int]:
-    return c.line.cause, c.line.order, c.line.direction, c.line.whirl, c.mode.number
+def _kind(line: Line) -> tuple[str, int, str, int]:
+    """What lines of several bearings have in common."""
+    return line.cause, line.order, line.direction, line.whirl
+
+
+def _pair(c: Coincidence) -> tuple[tuple[str, int, str, int], int]:
+    return _kind(c.line), c.mode.number
+
+
+def _around(speeds: Sequence[float], every: np.ndarray) -> tuple[float, float]:
+    """Ends (rpm) of an axis that holds some `speeds` (rad/s), with a margin within `every` one of the map."""
+    low, high = min(speeds), max(speeds)
+    margin = 0.06 * (high - low)
+    return max(low - margin, every[0]) / RPM, min(high + margin, every[-1]) / RPM
 
 
 def _draw_mode(axes: Axes, x: np.ndarray, values: np.ndarray, mode: Track) -> None:

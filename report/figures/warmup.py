@@ -109,8 +109,7 @@ def _group_name(names: Sequence[str], parts: Mapping[str, str]) -> str:
 
 
 def name_ends(axes: Axes, ends: Array, names: Sequence[str], colours: Sequence[str]) -> None:
-    """Names beside the right ends of lines, moved apart where they would overlap; a thin line leads to a name that moved."""
-    used = [k for k in range(len(names)) if np.isfinite(ends[k])]
+    """Names beside the right ends of lines, moved apart where they would overlap, the first of them where there is no room for all; a thin line leads to a name that moved."""
     low, high = axes.get_ylim()
     axes.set_ylim(low, high)
     figure = axes.figure
@@ -118,7 +117,9 @@ def name_ends(axes: Axes, ends: Array, names: Sequence[str], colours: Sequence[s
     spec = axes.get_subplotspec()
     rows = spec.get_geometry()[0] if spec else 1
     height = 0.8 * figure.get_size_inches()[1] / rows * 72  # points, about
-    at = spread((np.array([ends[k] for k in used]) - low) / (high - low), 1.25 * LETTERS / height)
+    apart = 1.25 * LETTERS / height
+    used = [k for k in range(len(names)) if np.isfinite(ends[k])][: int(1 / apart) + 1]
+    at = spread((np.array([ends[k] for k in used]) - low) / (high - low), apart)
     for k, place in zip(used, at, strict=True):
         start = (ends[k] - low) / (high - low)
         axes.annotate(

@@ -17,6 +17,7 @@ from thermospindle.sim.resonance.found import Coincidence, ResonanceMap, stronge
 from thermospindle.sim.running.runout import looked_at
 
 SAID = 4  # crossings at the nominal speed told in words, of more than one more
+FEW = 4  # temperatures or speeds that are told one by one
 SHOWN = 18  # coincidences in the terminal and the report
 
 
@@ -24,6 +25,7 @@ def map_json(found: ResonanceMap) -> dict[str, Any]:
     """Coincidences; modes over the grid [temperature][speed]; lines at the nominal condition; runout along both axes."""
     return {
         "nominal": {"temperature_C": found.nominal.temperature, "speed_rpm": found.nominal.speed / RPM},
+        "mapped": mapped(found),
         "sentences": sentences(found),
         "coincidences": [_coincidence_json(c) for c in found.coincidences],
         "modes": [{"mode": m.number, "kind": m.kind, "whirl": m.whirl, "frequency_Hz": known(m.frequency)} for m in found.modes],
@@ -96,6 +98,19 @@ def _runout_json(along: Array, name: str, unit: float) -> dict[str, list[float]]
     return {name: (unit * place).tolist(), "radial": (1e6 * radial).tolist(), "axial": (1e6 * axial).tolist()}
 
 
+def mapped(found: ResonanceMap) -> str:
+    """Which temperatures and speeds the map has, in a sentence."""
+    temperatures, speeds = _spoken(found.temperatures, "temperature", "C"), _spoken(found.speeds / RPM, "speed", "rpm")
+    return f"Mapped at {temperatures}, and at {speeds}; the nominal {found.nominal.temperature:g} C and {found.nominal.speed / RPM:g} rpm are always among them."
+
+
+def _spoken(values: Array, name: str, unit: str) -> str:
+    """All of a few values, of many their number and ends."""
+    if len(values) > FEW:
+        return f"{len(values)} {name}s from {values[0]:g} to {values[-1]:g} {unit}"
+    return f"{len(values)} {name}s, {', '.join(f'{v:g}' for v in values[:-1])} and {values[-1]:g} {unit}"
+
+
 def sentences(found: ResonanceMap) -> list[str]:
     """One sentence for every line that crosses a mode at the nominal speed, strongest first; else that none does, and the nearest."""
     rpm = f"{found.nominal.speed / RPM:g} rpm"
@@ -137,12 +152,12 @@ def _mode(c: Coincidence) -> str:
 
 
 def show_map(console: Console, found: ResonanceMap) -> None:
-    for said in told(found):
+    for said in [*told(found), mapped(found)]:
         console.print(said, highlight=False)
     if not found.coincidences:
         return
     console.print()
-    title = f"Coincidences from {found.temperatures[0]:g} to {found.temperatures[-1]:g} C, up to {found.speeds[-1] / RPM:g} rpm, strongest first"
+    title = f"Coincidences from {found.temperatures[0]:g} to {found.temperatures[-1]:g} C, {found.speeds[0] / RPM:g} to {found.speeds[-1] / RPM:g} rpm, strongest first"
     columns = ("line", "wave", "bearing", "mode", "T\nC", "speed\nrpm", "f\nHz", "strong\nnm", "NRRO\nnm rms", "margin\n%")
     show_grid(console, title, columns, [_cells(c) for c in strongest(found.coincidences)[:SHOWN]], columns[:4], keys=4)
     whose = (
@@ -198,7 +213,7 @@ def write_map(found: ResonanceMap, folder: Path) -> None:
 
 def map_section(found: ResonanceMap) -> tuple[str, str]:
     """Title and HTML of a report section."""
-    said = "".join(f"<p>{prose(s)}</p>" for s in told(found))
+    said = "".join(f"<p>{prose(s)}</p>" for s in [*told(found), mapped(found)])
     head = ("line", "wave and order", "bearing", "mode", "°C", "rpm", "Hz", "strength, nm", "NRRO (nonrepeatable runout), nm rms", "margin, %")
     grid = table(head, [[prose(cell) for cell in _cells(c)] for c in strongest(found.coincidences)[:SHOWN]], range(4))
     from thermospindle.report.figures.common import svg

@@ -22,8 +22,8 @@ from thermospindle.report.log.columns import curve_look, log_curve, log_values, 
 from thermospindle.report.log.content import made_from
 from thermospindle.report.log.drawing import light
 from thermospindle.report.log.pictures import log_figure, log_figures, place, view
-from thermospindle.report.log.views import at, summary_view, window
-from thermospindle.report.text.resonance import map_json, sentences
+from thermospindle.report.log.views import at, axis, summary_view, window
+from thermospindle.report.text.resonance import map_json, mapped, told
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.resonance.found import ResonanceMap, strongest
 
@@ -69,7 +69,7 @@ def log_pictures(recording: rr.RecordingStream, found: ResonanceMap) -> None:
     times = _over_temperature(found)
     with rc_context(STYLE):
         log_figures(recording, "campbell", times, [campbell(found, k, CAMPBELL) for k in range(len(found.temperatures))])
-        charts = {"coincidences": both(found, SMALL, key_below=False), "temperature": over_temperature(found, SMALL, key_below=False)}
+        charts = {"coincidences": both(found, SMALL, bare=True), "temperature": over_temperature(found, SMALL, bare=True)}
     for name, figure in charts.items():
         log_figure(recording, f"{name}/picture", figure)
         axes = figure.axes[0]
@@ -109,7 +109,8 @@ def log_series(recording: rr.RecordingStream, found: ResonanceMap) -> None:
 def summary(found: ResonanceMap) -> str:
     """Markdown: what is crossed at the nominal speed, and the strongest coincidences."""
     lines = [
-        *(f"{s}\n" for s in sentences(found)),
+        *(f"{s}\n" for s in told(found)),
+        f"{mapped(found)}\n",
         "| line | cause | mode | °C | rpm | Hz | nm | margin % |",
         "|---|---|---|---|---|---|---|---|",
     ]
@@ -133,12 +134,14 @@ def blueprint(found: ResonanceMap) -> rrb.Blueprint:
         column_shares=[1.3, 1],
         name="Overview",
     )
+    whole = {"temperature": TICK * found.temperatures[[0, -1]], "speed": found.speeds[[0, -1]] / RPM}
+    read = {"temperature": f"#{20 * TICK} is 20 °C", "speed": "in rpm"}
     tabs = [
         rrb.Vertical(
-            rrb.TimeSeriesView(origin=at("series", f"over {over}"), name=f"Hz over {over}"),
-            rrb.TimeSeriesView(origin=at("nrro", f"over {over}"), name=f"NRRO (nonrepeatable runout) over {over}"),
+            rrb.TimeSeriesView(origin=at("series", f"over {over}"), name=f"Hz over {over}, {read[over]}", axis_x=axis("seq", *ends.round().astype(int))),
+            rrb.TimeSeriesView(origin=at("nrro", f"over {over}"), name=f"NRRO (nonrepeatable runout) over {over}", axis_x=axis("seq", *ends.round().astype(int))),
             name=f"Over {over} (choose the timeline {over})",
         )
-        for over in ("temperature", "speed")
+        for over, ends in whole.items()
     ]
     return window(rrb.Tabs(overview, *tabs), TEMPERATURE, fps=4.0 * TICK)

@@ -1,5 +1,6 @@
 """The resonance map: crossings against a closed form, exactness, direction and sense of whirl, strength, and what it tells."""
 
+import io
 import json
 from dataclasses import replace
 from itertools import pairwise
@@ -7,6 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib import rc_context
+from matplotlib.text import Text
+from rich.console import Console
 
 from tests.mounting import told_preload
 from thermospindle.cli import main
@@ -15,12 +19,13 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.modes import modes
 from thermospindle.model.units import RPM
+from thermospindle.report.figures.common import STYLE
 from thermospindle.report.figures.resonance import CAUSES, both, campbell, over_temperature
 from thermospindle.report.figures.warmup import MODES
 from thermospindle.report.log.read import read_log
 from thermospindle.report.log.told import describe, log_json
 from thermospindle.report.log.turning.map import write_map_log
-from thermospindle.report.text.resonance import SAID, map_json, map_section, sentences, told
+from thermospindle.report.text.resonance import SAID, map_json, map_section, mapped, sentences, show_map, told
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.resonance.found import strongest
 from thermospindle.sim.resonance.map import resonance_map
@@ -154,6 +159,29 @@ def test_modes_of_the_coincidences_differ_in_colour(found):
     assert len(set(paints)) == len(paints)
 
 
+@pytest.mark.parametrize("size", [(9.6, 6.2), (6.5, 3.1), (6.5, 1.5)])
+def test_names_of_lines_do_not_lie_over_each_other(found, met, size):
+    """Those of what meets come first where there is no room for all; a figure for a view that has a title has none of its own."""
+    for of in (found, met):
+        figure = over_temperature(of, size, bare=True)
+        with rc_context(STYLE):
+            figure.draw_without_rendering()
+        boxes = sorted((Text.get_window_extent(t) for t in figure.axes[0].texts), key=lambda b: b.y0)  # without the arrow
+        assert len(boxes) > 5
+        assert all(b.y0 >= a.y1 for a, b in pairwise(boxes))
+        assert figure.get_suptitle() == ""
+        assert not figure.legends
+    assert any("30 (fo-fc) + fo (31) upper" in t.get_text() for t in figure.axes[0].texts), "it meets a mode at the nominal speed"
+
+
+def test_the_axis_of_coincidences_holds_them_and_little_else(found):
+    [axes] = both(found).axes
+    low, high = axes.get_xlim()
+    speeds = np.concatenate([line.get_xdata() for line in axes.lines if line.get_linestyle() == "-" and len(line.get_xdata()) > 2])
+    assert low <= speeds.min() < low + 0.1 * (high - low)
+    assert high - 0.1 * (high - low) < speeds.max() <= high
+
+
 def test_axial_lines_leave_rocking_modes_alone(found):
     for c in found.coincidences:
         assert (c.line.direction == "axial") == (c.mode.kind == "axial")
@@ -202,6 +230,24 @@ def test_answer_as_json(met):
     title, html = map_section(met)
     assert title == "Resonance map"
     assert html.count("<svg") == 4
+
+
+def test_a_sentence_tells_what_was_mapped(spindle, found):
+    """One number for --speeds is one speed, beside the nominal one, and no end of a range."""
+    assert mapped(found) == "Mapped at 9 temperatures from 20 to 60 C, and at 17 speeds from 0 to 14400 rpm; the nominal 20 C and 7200 rpm are always among them."
+    one = resonance_map(spindle, [22.0], [3000 * RPM], NOMINAL)
+    assert mapped(one) == "Mapped at 2 temperatures, 20 and 22 C, and at 2 speeds, 3000 and 7200 rpm; the nominal 20 C and 7200 rpm are always among them."
+    assert map_json(one)["mapped"] == mapped(one)
+    console = Console(record=True, width=300, file=io.StringIO())
+    show_map(console, one)
+    assert mapped(one) in console.export_text()
+    assert "at 2 speeds, 3000 and 7200" in map_section(one)[1]
+
+
+def test_help_says_which_speeds_are_mapped(capsys):
+    with pytest.raises(SystemExit, match="0"):
+        main(["map", "--help"])
+    assert "every speed to map, the nominal one added: one number is one speed and no end of a range" in " ".join(capsys.readouterr().out.split())
 
 
 def test_sentence_without_a_crossing(spindle):
