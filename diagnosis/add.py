@@ -11,8 +11,8 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from thermospindle.diagnosis.answer import Answer, called_in, fitted_values, offered_for, read_answer
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Spindle
 from thermospindle.model.scene.reading import content_hash, load, scene_path
@@ -20,6 +20,9 @@ from thermospindle.sim.campaign.form import toml
 from thermospindle.sim.effects import CATALOGUE, by_name, checked, resolved
 from thermospindle.sim.effects.effect import Effect, called, fitted_to, refusal
 from thermospindle.sim.effects.own import OwnEffect
+
+if TYPE_CHECKING:
+    from thermospindle.diagnosis.answer import Answer
 
 
 @dataclass(frozen=True)
@@ -82,8 +85,11 @@ def new_scene(
     fitted: dict[str, dict[str, float]] = {}
     build: dict[str, float] = {}
     note = ""
-    answer = read_answer(diagnosis) if diagnosis else None
-    if answer and diagnosis:
+    answer = None
+    if diagnosis:
+        from thermospindle.diagnosis.answer import fitted_values, offered_for, read_answer  # what diagnoses takes its time to load
+
+        answer = read_answer(diagnosis)
         offered = offered_for(effects, answer, diagnosis)
         fitted = fitted_values(effects, offered, diagnosis)
         build, note = _build_of(effects, answer, diagnosis, old, file)
@@ -202,6 +208,8 @@ def _build_of(effects: Sequence[Effect], answer: Answer, diagnosis: Path, old: S
     A diagnosis of a scene that has deviations already found more of them, relative to those; one of the scene before (the second
     effect of a pair, added after the first) found the same.
     """
+    from thermospindle.diagnosis.answer import called_in
+
     names = {called_in(answer, e) for e in effects}
     if not answer.build:
         return {}, f"{diagnosis} holds no tolerances: the build is the drawing's"

@@ -17,8 +17,7 @@ from scipy.optimize import least_squares
 from thermospindle.model.built.tolerance import Toleranced
 from thermospindle.model.machine import Condition, HammerTest, Spindle
 from thermospindle.model.types import Array, ComplexArray
-from thermospindle.sim.campaign.beside import POWER
-from thermospindle.sim.identification.frf import Frf
+from thermospindle.sim.identification.frf import POWER, Frf
 from thermospindle.sim.operating import operating_point
 
 STEP = 1e-5  # relative, for differences: far above what the bearing equilibrium is solved to

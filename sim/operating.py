@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import mujoco
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from thermospindle.model import sense
 from thermospindle.model.bearing.pair import PairState, solve
@@ -178,7 +178,7 @@ def unloads(spindle: Spindle, states: Sequence[PairState], bearing: str) -> floa
 
     for cold, hot in pairwise(states):
         if cold.bearing(bearing).in_contact != hot.bearing(bearing).in_contact:
-            return float(brentq(deformation, cold.condition.temperature, hot.condition.temperature, xtol=1e-3))
+            return float(scipy.optimize.brentq(deformation, cold.condition.temperature, hot.condition.temperature, xtol=1e-3))
     return None if states[0].bearing(bearing).in_contact else states[0].condition.temperature
 
 

@@ -89,3 +89,29 @@ def test_the_catalogue_is_told_without_the_libraries_that_compute():
     loaded = set(done.stderr.split())
     assert "thermospindle.sim.effects" in loaded
     assert not loaded & {"scipy.optimize", "scipy.sparse", "scipy.interpolate", "skfem", "mujoco", "matplotlib", "rerun", "pydantic"}
+
+
+SIMULATES = {"scipy.optimize", "scipy.interpolate", "scipy.ndimage", "scipy.signal", "scipy.stats", "skfem", "mujoco", "matplotlib"}
+
+
+def loaded_by(*arguments: str) -> set[str]:
+    """The modules that a verb has loaded when it is done, in a process of its own."""
+    program = "import sys; from thermospindle.cli import main; print(main(sys.argv[1:]), *sys.modules, file=sys.stderr)"
+    done = subprocess.run([sys.executable, "-c", program, *arguments], capture_output=True, text=True, cwd=ROOT, check=True)
+    code, *loaded = done.stderr.splitlines()[-1].split()
+    assert code == "0"
+    return set(loaded)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["effects", "--scene", "hdd_2003"],
+        ["add", "hdd_2003", "bond_softening", "--out", "NEW"],
+        ["import", "tests/data/amh_isma/at_rest.csv", "--mapping", "NEW"],
+    ],
+    ids=["effects", "add", "import"],
+)
+def test_a_verb_that_computes_no_model_loads_nothing_that_does(arguments, tmp_path):
+    loaded = loaded_by(*(str(tmp_path / "new") if a == "NEW" else a for a in arguments))
+    assert not loaded & (SIMULATES | {"rerun", "thermospindle.sim.operating"})

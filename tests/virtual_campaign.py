@@ -16,11 +16,10 @@ from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array, ComplexArray
-from thermospindle.sim.campaign.beside import POWER
 from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Noise, Test
 from thermospindle.sim.effects import CATALOGUE, of_scene
 from thermospindle.sim.effects.effect import Effect, Values
-from thermospindle.sim.identification.frf import Frf
+from thermospindle.sim.identification.frf import POWER, Frf
 from thermospindle.sim.identification.modal import noise_model
 from thermospindle.sim.operating import operating_point
 

@@ -13,8 +13,10 @@ from math import exp, expm1, isfinite, log
 import numpy as np
 import scipy
 
+from thermospindle.model.types import Array
+
 NEARLY_ROUND = 1e-3  # of ln k, below which the quotient cancels, and ln k is proportional to the difference
-FLATTEST, KNOTS = 17.0, 60  # of ln k, which it is at most; and how many of it a first guess is made from
+FLATTEST, KNOTS = 17.0, 400  # of ln k, which it is at most; and how many of it a first guess is made from
 MOST_STEPS, ENOUGH = 6, 1e-8  # of Newton's method, whose next step is the square of the last
 
 
@@ -46,7 +48,7 @@ def ellipticity(curvature_difference: float) -> float:
     nearly_round = _of_nearly_round()
     if curvature_difference <= nearly_round:
         return exp(NEARLY_ROUND * curvature_difference / nearly_round)
-    log_k = exp(float(_guess()(log(1 - curvature_difference))))
+    log_k = exp(float(np.interp(log(1 - curvature_difference), *_guess(), left=np.nan)))
     if not isfinite(log_k):
         raise ValueError(f"curvature difference {curvature_difference!r} is of a contact flatter than exp({FLATTEST:g})")
     for _ in range(MOST_STEPS):
@@ -75,10 +77,10 @@ def _of_nearly_round() -> float:
 
 
 @cache
-def _guess() -> scipy.interpolate.CubicSpline:
-    """ln ln k over ln(1 - F), right to 2e-4, from where Newton's method takes two steps."""
-    log_k = np.geomspace(NEARLY_ROUND, FLATTEST, KNOTS)
-    return scipy.interpolate.CubicSpline([log(1 - _difference(float(v))[0]) for v in log_k[::-1]], np.log(log_k[::-1]), extrapolate=False)
+def _guess() -> tuple[Array, Array]:
+    """ln(1 - F), rising, and ln ln k; straight lines between them are right to 1e-4, from where Newton's method takes two steps."""
+    log_k = np.geomspace(FLATTEST, NEARLY_ROUND, KNOTS)
+    return np.array([log(1 - _difference(float(v))[0]) for v in log_k]), np.log(log_k)
 
 
 @lru_cache(maxsize=4096)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import minimize
+import scipy
 
 from thermospindle.model.bearing import ball_row, roller
 from thermospindle.model.bearing.pair import BearingState, PairState, damping_time
@@ -120,7 +120,7 @@ def _motion(stiffness: Array, mass: Array, rows: Sequence[_Row], load: Array, si
         held = sum((row.b.T @ row.light(row.b @ u)[1] @ row.b for row in rows), start=np.zeros_like(stiffness))
         return (stiffness + held) * np.outer(unit, unit) / work + 1e-12 * np.eye(len(u))
 
-    found = minimize(potential, np.zeros(len(load)), jac=gradient, hess=hessian, method="trust-exact", options={"gtol": 1e-7, "maxiter": 400})
+    found = scipy.optimize.minimize(potential, np.zeros(len(load)), jac=gradient, hess=hessian, method="trust-exact", options={"gtol": 1e-7, "maxiter": 400})
     u = found.x * unit
     before = [row.force(none) for row in rows]
     for _ in range(MOST_STEPS):

@@ -17,7 +17,7 @@ pictures          figures of matplotlib as pictures in a log, turned dark like t
 read              reads any of our logs back: numbers bit for bit as computed
 run               the Rerun log of a run: one `.rrd` with what was computed, and a blueprint that shows it at a glance
 study/            the Rerun log of a study
-told              what a log holds, as JSON and in words
+told              what a log holds, as JSON and in words, and its FRFs as tables
 views             what all blueprints are made of: paths of entities, views and their axes, and the window that holds
                   them
 turning/          the Rerun logs of a spindle that turns, and of how it warms up

@@ -17,11 +17,11 @@ from thermospindle.model.files.whole import whole
 from thermospindle.model.rotor.look import RegionMesh
 from thermospindle.model.types import Array
 from thermospindle.model.units import TO_MM
-from thermospindle.report.log.content import Peak
 from thermospindle.report.log.drawing import light
 from thermospindle.report.log.read import APPLICATION
 from thermospindle.report.log.views import at
 from thermospindle.sim.identification.frf import Frf
+from thermospindle.sim.identification.peak import Peak
 
 VIEWER_LIGHT, LIGHT = np.arctan2(2.0, 1.0), np.deg2rad(-60.0)
 """Azimuths from which Rerun's light comes, along (1, 2, 3) in its shaders, and from which bodies are lit."""

@@ -19,12 +19,13 @@ from thermospindle.model.machine import Spindle
 from thermospindle.model.types import ComplexArray
 from thermospindle.model.units import RPM
 from thermospindle.report.log.columns import curve_look, log_curve, log_frf_numbers, log_peak_numbers, over_frequency, whole_log
-from thermospindle.report.log.content import Pair, Peak, level_ends, one
+from thermospindle.report.log.content import Pair, level_ends, one
 from thermospindle.report.log.drawing import heat
 from thermospindle.report.log.views import at, axis, window
 from thermospindle.report.typeset import UNITS
 from thermospindle.sim.campaign.campaign import Test
 from thermospindle.sim.identification.frf import Frf, decibel
+from thermospindle.sim.identification.peak import Peak
 from thermospindle.sim.operating import provenance
 
 COMPUTED = (170, 172, 178)

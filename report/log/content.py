@@ -18,6 +18,7 @@ from thermospindle.sim.hammer.excited import most_excited
 from thermospindle.sim.identification.frf import Frf, decibel
 from thermospindle.sim.identification.numbering import identified, in_band, numbered
 from thermospindle.sim.identification.pairing import by_kind
+from thermospindle.sim.identification.peak import Peak
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.run import Run, as_campaign
 from thermospindle.thermal.expansion import expand
@@ -28,20 +29,6 @@ DRAWN = 5  # mode shapes in the overview
 NOTHING = 60  # dB: an FRF so far below the largest is noise, its response vanishes by symmetry; it does not set the limits of plots
 
 NO_COHERENCE = "of one hit there is no coherence"
-
-
-@dataclass(frozen=True)
-class Peak:
-    """A modal peak; `mode` counts the model's modes at the first temperature, 0 if none of them is the same."""
-
-    source: str  # computed, identified, or the folder of a measured campaign
-    test: str
-    temperature: float  # C
-    mode: int
-    kind: str
-    frequency: float  # Hz
-    frequency_sd: float = np.nan  # Hz
-    damping_ratio: float = np.nan
 
 
 def tests_of(run: Run) -> tuple[Test, ...]:

@@ -19,10 +19,10 @@ from matplotlib.figure import Figure
 from thermospindle.model.types import Array
 from thermospindle.report.figures.common import PALE, STYLE, broken, cells, logarithmic, residual_norm
 from thermospindle.report.log.columns import curve_look, log_curve, log_peak_numbers, log_values, log_words, over_frequency, whole_log
-from thermospindle.report.log.content import Peak
 from thermospindle.report.log.pictures import for_dark, log_figure, view
 from thermospindle.report.log.views import at, window
 from thermospindle.report.typeset import signed_short
+from thermospindle.sim.identification.peak import Peak
 
 MEASURED, COMPUTED, HELD_OUT = np.array([(120, 255, 140), (255, 170, 80), (90, 200, 255)], np.uint8)
 SIZES = {"error": (6.1, 2.6), "residuals": (6.1, 3.5), "responses": (9.0, 8.7)}  # inches

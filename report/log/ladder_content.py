@@ -9,12 +9,13 @@ import numpy as np
 from thermospindle.diagnosis.ladder.ladder import Ladder
 from thermospindle.diagnosis.ladder.step import Step
 from thermospindle.model.types import ComplexArray
-from thermospindle.report.log.content import Peak, one
+from thermospindle.report.log.content import one
 from thermospindle.report.log.ladder import Level, ShownLadder, ShownStep, Track
 from thermospindle.report.text.ladder import sentences
 from thermospindle.report.text.ladder_table import cells, residual_map
 from thermospindle.report.typeset import UNITS
 from thermospindle.sim.identification.frf import decibel
+from thermospindle.sim.identification.peak import Peak
 from thermospindle.sim.operating import provenance
 
 TINY = 1e-3  # Hz, instead of zero, where a receptance has no level

@@ -20,8 +20,8 @@ from rerun.chunk import RrdReader
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.apart import read_apart
 from thermospindle.model.types import Array
-from thermospindle.report.log.content import Peak
 from thermospindle.sim.identification.frf import Frf
+from thermospindle.sim.identification.peak import Peak
 
 APPLICATION = "thermospindle"
 KINDS = ("run", "map", "runout", "warmup", "study")

@@ -29,12 +29,13 @@ from thermospindle.report.log.columns import (
     over_frequency,
     whole_log,
 )
-from thermospindle.report.log.content import Pair, Peak, Shown, bearing_series, frf_of, one, shown, summary
+from thermospindle.report.log.content import Pair, Shown, bearing_series, frf_of, one, shown, summary
 from thermospindle.report.log.drawing import heat
 from thermospindle.report.log.pictures import for_dark, log_figure
 from thermospindle.report.log.views import at
 from thermospindle.sim import posing
 from thermospindle.sim.identification.frf import decibel
+from thermospindle.sim.identification.peak import Peak
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.run import Run
 from thermospindle.thermal.expansion import DeformedSection, field

@@ -1,13 +1,17 @@
-"""What a log holds, as JSON and in words: a row a kind in `SHOW`."""
+"""What a log holds, as JSON and in words, a row a kind in `SHOW`; and the FRFs of a run as tables."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from thermospindle.model.units import RPM, TO_NM
 from thermospindle.report.log.read import Log
-from thermospindle.report.typeset import known
+from thermospindle.report.typeset import known, write_csv
 
 
 def log_json(log: Log) -> dict[str, Any]:
@@ -163,6 +167,16 @@ def _study_words(log: Log) -> list[str]:
         given = [v for v in values if v == v]
         lines.append(f"{name}: {len(given)} of {len(values)} known" + (f", {min(given):.6g} to {max(given):.6g}" if given else ""))
     return lines
+
+
+def write_frf_tables(log: Log, folder: Path) -> None:
+    """One CSV a test: frequency and the real and imaginary part of every FRF."""
+    for test, frf in log.frfs.items():
+        names = [f"H({i},{j})" for i in frf.response_nodes for j in frf.reference_nodes]
+        head = ["frequency_Hz", *(f"{part} {name} ({frf.quantity})" for name in names for part in ("re", "im"))]
+        lines = np.ascontiguousarray(frf.value.reshape(len(names), -1).T).view(float)
+        write_csv(folder / f"{test}.csv", head, np.column_stack([frf.frequency, lines]).tolist())
+    (folder / "contents.json").write_text(json.dumps({"scene": log.scene, "entities": list(log.entities)}, indent=1))
 
 
 SHOW: dict[str, tuple[Callable[[Log], dict[str, Any]], Callable[[Log], list[str]]]] = {

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import numpy as np
 from rich.console import Console
 
 from thermospindle.model.bearing.stiffness_table import write_table
@@ -17,14 +15,10 @@ from thermospindle.model.rotor.modes import Mode, group_energy
 from thermospindle.model.units import RPM
 from thermospindle.report.text.grid import show_grid
 from thermospindle.report.text.states import modes_json, show_table, write_modes_csv
-from thermospindle.report.typeset import write_csv
 from thermospindle.sim.campaign.campaign import Campaign, write_campaign
 from thermospindle.sim.identification.numbering import identified, measured_rows, numbered
 from thermospindle.sim.operating import provenance, stiffness_table
 from thermospindle.sim.run import Run, Step, as_campaign
-
-if TYPE_CHECKING:
-    from thermospindle.report.log.read import Log
 
 # ---------------------------------------------------------------- JSON
 
@@ -78,16 +72,6 @@ def write_run(run: Run, folder: Path, progress: Callable[[str], None]) -> None:
     progress("report written")
     write_log(run, folder / "run.rrd")
     progress("Rerun log written")
-
-
-def write_frf_tables(log: Log, folder: Path) -> None:
-    """One CSV a test: frequency and the real and imaginary part of every FRF."""
-    for test, frf in log.frfs.items():
-        names = [f"H({i},{j})" for i in frf.response_nodes for j in frf.reference_nodes]
-        head = ["frequency_Hz", *(f"{part} {name} ({frf.quantity})" for name in names for part in ("re", "im"))]
-        lines = np.ascontiguousarray(frf.value.reshape(len(names), -1).T).view(float)
-        write_csv(folder / f"{test}.csv", head, np.column_stack([frf.frequency, lines]).tolist())
-    (folder / "contents.json").write_text(json.dumps({"scene": log.scene, "entities": list(log.entities)}, indent=1))
 
 
 # ---------------------------------------------------------------- terminal

@@ -15,7 +15,6 @@ from thermospindle.model.machine import Spindle
 from thermospindle.model.units import RPM
 from thermospindle.report.progress import progress_bar
 from thermospindle.report.verbs.answer import Answer, with_effects
-from thermospindle.sim.campaign.beside import left_out
 from thermospindle.sim.campaign.campaign import Campaign, write_campaign
 from thermospindle.sim.importing.assemble import campaign_of, check_tests, read, spoken
 from thermospindle.sim.importing.mapping import MappingForm, read_mapping
@@ -125,6 +124,8 @@ def _doubts(campaign: Campaign, spindle: Spindle) -> list[str]:
 
 
 def _written(campaign: Campaign, out: Path, notes: list[str], scene: Path | None, doubts: list[str]) -> Answer:
+    from thermospindle.sim.campaign.beside import left_out  # what computes a model takes its time to load, and a form needs none
+
     values: dict[str, Any] = {
         "campaign": str(out),
         "spindle": campaign.spindle,

@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from thermospindle.report.log.read import check_readable, read_log
-from thermospindle.report.log.told import describe, log_json
-from thermospindle.report.text.run import write_frf_tables
+from thermospindle.report.log.told import describe, log_json, write_frf_tables
 from thermospindle.report.verbs.answer import Answer, answered, write_json
 
 

@@ -13,11 +13,8 @@ from thermospindle.model.shaft import SAME_HEIGHT, Shaft
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.model.units import MM
 from thermospindle.sim.campaign.campaign import Campaign, Test
-from thermospindle.sim.identification.frf import Frf, out_of, without
+from thermospindle.sim.identification.frf import POWER, Frf, out_of, without
 from thermospindle.sim.operating import OperatingPoint, operating_point
-
-POWER = {"receptance": -1, "mobility": 0, "accelerance": 1}
-"""Power of i omega that turns a mobility into each quantity."""
 
 
 @dataclass(frozen=True, eq=False)

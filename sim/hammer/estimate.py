@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+import scipy
 
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.hammer.pulse import PRE_TRIGGER
@@ -81,7 +81,7 @@ def _force_window(time: Array, force: Array, open_for: float) -> Array:
     touching = np.abs(force) > 0.05 * peak
     touching[..., time < PRE_TRIGGER / 2] = False
     width = max(round(2 * open_for / float(time[1] - time[0])), 3)
-    return (uniform_filter1d(touching.astype(float), width, axis=-1, mode="nearest") > 1e-9).astype(float)
+    return (scipy.ndimage.uniform_filter1d(touching.astype(float), width, axis=-1, mode="nearest") > 1e-9).astype(float)
 
 
 def _standard_error(v: ComplexArray, f: ComplexArray, h1: ComplexArray) -> Array:

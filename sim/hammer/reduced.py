@@ -15,7 +15,7 @@ from itertools import pairwise
 from math import ceil
 
 import numpy as np
-from scipy.linalg import expm
+import scipy
 
 from thermospindle.model.machine import HammerTest
 from thermospindle.model.rotor.modes import point_rows
@@ -69,5 +69,5 @@ def stepped(small: Reduced, forces: Array, step: float) -> tuple[Array, Array]:
     whole[r : 2 * r, :r] = -inverse @ small.stiffness
     whole[r : 2 * r, r : 2 * r] = -inverse @ small.damping
     whole[r : 2 * r, 2 * r :] = inverse @ forces
-    carried = expm(whole * step)
+    carried = scipy.linalg.expm(whole * step)
     return np.asarray(carried[: 2 * r, : 2 * r], float), np.asarray(carried[: 2 * r, 2 * r :], float)

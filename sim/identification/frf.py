@@ -18,6 +18,8 @@ from thermospindle.sim.identification.running_lines import RunningLines, running
 
 TO_POWER = {"receptance": 1j, "mobility": 1.0, "accelerance": -1j}
 """What an FRF may be, with the phase that turns it to mobility."""
+POWER = {"receptance": -1, "mobility": 0, "accelerance": 1}
+"""Power of i omega that turns a mobility into each quantity."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import median_filter
 
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.identification.pairing import mac as mac
@@ -92,7 +92,7 @@ def scatter(frf: ArrayLike, window: int = 41) -> Array:
     frf = np.asarray(frf)
     step = np.abs(frf[..., 1:-1] - (frf[..., :-2] + frf[..., 2:]) / 2) / np.sqrt(1.5 * np.log(2))
     size = np.abs(frf[..., 1:-1])
-    absolute, relative = (median_filter(x, (1, 1, window), mode="nearest") for x in (step, np.divide(step, size, out=np.zeros_like(step), where=size > 0)))
+    absolute, relative = (scipy.ndimage.median_filter(x, (1, 1, window), mode="nearest") for x in (step, np.divide(step, size, out=np.zeros_like(step), where=size > 0)))
     larger = relative * np.sqrt(np.maximum(size**2 - 4 * absolute**2, 0))
     return np.pad(np.maximum(absolute, larger), ((0, 0), (0, 0), (1, 1)), mode="edge")
 

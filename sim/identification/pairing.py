@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import linear_sum_assignment
 
 from thermospindle.model.rotor.modes import Mode
 from thermospindle.model.types import Array, ComplexArray
@@ -137,7 +137,7 @@ def pairs(a: ModeSet, b: ModeSet, policy: Policy) -> NDArray[np.intp]:
         return np.zeros((0, 2), np.intp)
     padded = np.full((na + nb, na + nb), policy.alone / 2)
     padded[:na, :nb], padded[na:, nb:] = cost(a, b, policy), 0.0
-    rows, columns = linear_sum_assignment(padded)
+    rows, columns = scipy.optimize.linear_sum_assignment(padded)
     chosen = np.stack([rows, columns], 1)[(rows < na) & (columns < nb)]
     if policy.alike >= 0:
         chosen = by_common(chosen, a, b, policy)

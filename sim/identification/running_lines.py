@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import fdtrc
 
 from thermospindle.model.types import Array, ComplexArray
 
@@ -124,4 +124,4 @@ def _tail(here: ComplexArray, at: ComplexArray, x: Array, poles: int) -> Array:
     moved = np.array([(here * x ** (p + 1)) @ from_lines[0] for p in range(poles)]).reshape(poles, len(here))  # the value at 0, by d
     by_d = np.einsum("pr,pq,qr->r", moved.conj(), of_d, moved).real * variance.mean()
     expected = variance * (1 + float((from_lines[0] ** 2).sum())) + by_d
-    return np.asarray(fdtrc(2, 2 * freedom, np.abs(at - numerator[0]) ** 2 / expected))
+    return np.asarray(scipy.special.fdtrc(2, 2 * freedom, np.abs(at - numerator[0]) ** 2 / expected))

@@ -10,8 +10,7 @@ import numpy as np
 
 from thermospindle.model.errors import BadInput
 from thermospindle.model.types import Array, ComplexArray
-from thermospindle.sim.campaign.beside import POWER
-from thermospindle.sim.identification.frf import Frf, check_frf, even, gap
+from thermospindle.sim.identification.frf import POWER, Frf, check_frf, even, gap
 from thermospindle.sim.importing.measured import Curve, listed
 
 FEWEST = 16  # lines of an FRF that is of use

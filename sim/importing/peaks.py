@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import least_squares
-from scipy.signal import find_peaks
+import scipy
 
 from thermospindle.model.types import Array
 from thermospindle.sim.identification.modal import scatter
@@ -35,7 +34,7 @@ def from_peaks(curves: Sequence[Curve], speed: float) -> tuple[list[ModeLine], l
     step = float(np.median(np.diff(curves[0].frequency)))
     for curve in curves:
         size = np.asarray(curve.value, float)
-        tops, of = find_peaks(np.log(np.maximum(size, 1e-9 * size.max())), prominence=np.log(PROMINENCE))
+        tops, of = scipy.signal.find_peaks(np.log(np.maximum(size, 1e-9 * size.max())), prominence=np.log(PROMINENCE))
         noise = scatter(size[None, None])[0, 0]
         for top, drop in zip(tops.tolist(), of["prominences"], strict=True):
             if size[top] * -np.expm1(-drop) > ABOVE_NOISE * noise[top] and (mode := _peak(curve.frequency, size, top, drop, step)) is not None:
@@ -115,7 +114,7 @@ def _fitted(frequency: Array, size: Array, top: int, reach: int, step: float) ->
         return np.abs(p[2] / (1 - r**2 + 2j * np.exp(p[1]) * r) + p[3] + 1j * p[4]) - y
 
     limits = np.array([[0.5, -20.0, -np.inf, -np.inf, -np.inf], [2.0, 3.0, np.inf, np.inf, np.inf]])  # ln damping of 1e-9 to 20
-    fit = least_squares(left, [1.0, np.log(0.01), 0.02, 0.0, 0.0], x_scale=[1e-3, 1.0, 0.1, 0.1, 0.1], bounds=limits, max_nfev=200)
+    fit = scipy.optimize.least_squares(left, [1.0, np.log(0.01), 0.02, 0.0, 0.0], x_scale=[1e-3, 1.0, 0.1, 0.1, 0.1], bounds=limits, max_nfev=200)
     damping, found = float(np.exp(fit.x[1])), float(fit.x[0] * frequency[top])
     if abs(found - frequency[top]) > max(2 * step, damping * found) or not 1e-6 < damping < HEAVY or len(lines) < 7:
         return None

@@ -13,6 +13,7 @@ import pytest
 import rerun as rr
 from rerun.chunk import RrdReader
 
+from tests.test_imports import SIMULATES, loaded_by
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.modes import point_rows
@@ -247,6 +248,12 @@ def test_section_grows_with_the_free_expansion_of_the_base(run: Run, logged: dic
     assert grown == pytest.approx(30.0 * 23e-6 * 40.0, rel=0.1)  # mm; the steel shaft holds it back a little
     left = column(logged, "/section/compared/left/stationary", "Mesh3D:vertex_positions")[0]
     assert left[:, 0].min() == pytest.approx(-30.0)  # 20 C is the reference
+
+
+def test_a_log_is_inspected_without_what_computes_and_draws(file: Path) -> None:
+    loaded = loaded_by("inspect", str(file))
+    assert "rerun" in loaded
+    assert not loaded & (SIMULATES | {"thermospindle.sim.operating"})
 
 
 # ---------------------------------------------------------------- files
