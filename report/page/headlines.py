@@ -15,6 +15,7 @@ from thermospindle.sim.identification.numbering import temperature_of
 from thermospindle.sim.run import Run
 
 CERTAIN = 2.0  # standard errors beyond which a difference is called one
+SAME = 0.05  # N, in which preloads differ that are told as one
 CLOSE = 0.05  # relative distance of neighbours whose splitting is compared
 
 
@@ -23,18 +24,16 @@ def headlines(run: Run, table: Table) -> list[tuple[str, str, str]]:
     cold, hot = table.temperatures
     first, last = (next(s.point.state for s in run.steps if temperature_of(s) == t) for t in (cold, hot))
     pairs = list(zip(first.bearings, last.bearings, strict=True))[::-1]
+    names = " / ".join(b.name for _, b in pairs) + " bearing"
     if cold == hot:
-        return [("Preload", f"{pairs[-1][0].preload:.1f} N", f"at {cold:g} °C")] if pairs else []
+        return [_preload([a.preload for a, _ in pairs], f"at {cold:g} °C", names)] if pairs else []
     cards = []
     if pairs:
-        before, after = (b.preload for b in pairs[-1])
         angle = " / ".join(f"{np.degrees(b.contact_angle - a.contact_angle):+.2f}" for a, b in pairs)
         radial = " / ".join(_change(a.radial_stiffness, b.radial_stiffness) for a, b in pairs)
         axial = " / ".join(_change(a.axial_stiffness, b.axial_stiffness) for a, b in pairs)
-        names = " / ".join(b.name for _, b in pairs) + " bearing"
-        left = f"{100 * after / before:.0f} % of it is left at {hot:g} °C" if before else f"none at {cold:g} °C"
         cards = [
-            ("Preload", f"{before:.1f} → {after:.1f} N", left),
+            _preload_change([(a.preload, b.preload) for a, b in pairs], cold, hot, names),
             ("Contact angle", f"{angle} degrees", f"{names}, from {cold:g} to {hot:g} °C"),
             ("Radial bearing stiffness", radial, f"{names}; axial {axial}"),
         ]
@@ -49,8 +48,24 @@ def headlines(run: Run, table: Table) -> list[tuple[str, str, str]]:
     return cards
 
 
+def _preload(of: Sequence[float], at: str, names: str) -> tuple[str, str, str]:
+    """A card of the preload of every bearing, once where all have the same."""
+    if max(of) - min(of) < SAME:
+        return "Preload", f"{of[0]:.1f} N", at
+    return "Preload", " / ".join(f"{n:.0f}" for n in of) + " N", f"{names}, {at}"
+
+
+def _preload_change(of: Sequence[tuple[float, float]], cold: float, hot: float, names: str) -> tuple[str, str, str]:
+    """A card of what becomes of it (before, after), once where all have the same."""
+    if np.ptp(of, axis=0).max() >= SAME:
+        return "Preload", " / ".join(f"{a:.0f}\u00a0→\u00a0{b:.0f}" for a, b in of) + " N", f"{names}, from {cold:g} to {hot:g} °C"
+    before, after = of[0]
+    told = f"none at {cold:g} °C" if not before else f"{100 * after / before:.0f} % of it is left at {hot:g} °C" if after < before else f"{_change(before, after)} at {hot:g} °C"
+    return "Preload", f"{before:.1f} → {after:.1f} N", told
+
+
 def _change(before: float, after: float) -> str:
-    return f"{100 * (after / before - 1):+.0f} %" if before else "from nothing"
+    return f"{round(100 * (after / before - 1)):+d} %" if before else "from nothing"
 
 
 def misses(table: Table) -> list[str]:

@@ -132,7 +132,7 @@ def driving_points(run: Run, steps: Sequence[Step]) -> dict[str, list[Curve]]:
             coherence = None if estimate.coherence is None else estimate.coherence[i, j]
             curves.append(Curve("test", temperature_of(step), estimate.frequency, estimate.value[i, j], coherence))
             curves += _measured_curves(run, step, node)
-        panels[f"{letter}) struck and measured on the {point.body}: point {node} ({point.name}), along {point.axis[1].lower()}"] = curves
+        panels[f"{letter}) struck and measured on the {run.spindle.structure.carrier(point.body)}: point {node} ({point.name}), along {point.axis[1].lower()}"] = curves
     return panels
 
 

@@ -278,6 +278,17 @@ def test_changed_spindle_is_told(run: Run):
     assert "differs from its file" in said["Where the numbers come from"]
 
 
+@pytest.mark.parametrize(("scene", "told"), [("hdd_2003", "16.0 → "), ("five_bearing", "211 → 236 / 211 → 640 / 382 → 940 / 191 → 299 / 191 → 238 N")])
+def test_the_preload_of_every_bearing_that_has_its_own(scene: str, told: str) -> None:
+    """That of one stood for all five; preload that rises is not what is left of it, and no change is -0."""
+    spindle = load(ROOT / "scenes" / scene)
+    steps = [SimpleNamespace(point=operating_point(spindle, Condition(t))) for t in (20.0, 60.0)]
+    cards = {what: (number, why) for what, number, why in headlines(SimpleNamespace(steps=steps), Table((), (), (20.0, 60.0), {}, ()))}  # type: ignore[arg-type]
+    assert cards["Preload"][0].replace("\u00a0", " ").startswith(told)
+    assert not re.search(r"[-−]0 %", " ".join(cards["Radial bearing stiffness"]))
+    assert ("of it is left" in cards["Preload"][1]) == (scene == "hdd_2003")
+
+
 @pytest.mark.parametrize(("scene", "cards"), [("mk7702", 0), ("hdd_2003", 3)])
 def test_headlines_of_scenes_with_and_without_ball_rows(scene: str, cards: int) -> None:
     """A division by a preload that nothing has was a traceback of every `run` of a scene on rated bearings."""
