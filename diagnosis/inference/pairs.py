@@ -10,7 +10,7 @@ import numpy as np
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.fit import TEMPERS
-from thermospindle.diagnosis.inference.hypothesis import DEPARTS, LITTLE, Hypothesis, Task, fitted, scan
+from thermospindle.diagnosis.inference.hypothesis import DEPARTS, LITTLE, PLENTY, Hypothesis, Task, fitted, scan
 from thermospindle.diagnosis.inference.prior import Learned, undrifted
 from thermospindle.diagnosis.inference.screening import screen
 from thermospindle.diagnosis.inference.singles import (
@@ -33,7 +33,9 @@ LEADS = 2  # single mechanisms of the catalogue to which a second is joined, of 
 SECONDS = 2  # of each kind, joined to each of them
 PAIRS = 8  # fitted at most
 EXCHANGED = 8  # effects tried in either's place
-ENOUGH = 5.0  # ln evidence that a second mechanism must promise beside one that leaves a misfit, and a third: what they gain by chance, or less than their odds
+ENOUGH = 5.0  # ln evidence that a second mechanism must promise beside one that leaves a misfit, and a third at least
+ASKED = {"law": LITTLE, "own law": ENOUGH, "free": PLENTY}
+"""ln evidence that a second mechanism must promise beside one that leaves none: less than its odds is by chance, and what is wrong in a law looks like a little of what may be anything."""
 
 
 def joined(
@@ -107,16 +109,22 @@ def exchanged(
     return fitted(model, tasks, TEMPERS[1:], best.fit, tried.most, tried.expected, workers, beaten=best.fit.cost + 2 * FAR)
 
 
+def _asked(lead: Hypothesis, kind: str) -> float:
+    """ln evidence that one mechanism more must promise."""
+    if lead.evidence.learned.errors > 1.0:
+        return ENOUGH
+    return max(ASKED[kind], ENOUGH) if len(lead.mechanisms) > 1 else ASKED[kind]
+
+
 def _beside(model, leads: Sequence[Hypothesis], mechanisms: Sequence[Mechanism], most: float, expected: Learned, workers) -> list[Hypothesis]:
     """One mechanism more, beside each of the `leads`: of the catalogue, and free beside what is not free or free alone."""
     tasks, done = [], set()
     for lead in leads:
-        asked = LITTLE if len(lead.mechanisms) == 1 and lead.evidence.learned.errors == 1.0 else ENOUGH
         drifts = all(m.free for m in lead.mechanisms)
         others = [m for m in mechanisms if m.name not in lead.names and not (m.free and lead.free and not drifts)]
         looked = screen(model, lead.fit, 1.0, undrifted(lead.evidence.learned), others, workers)
         for kind in MOST:
-            for s in [s for s in promising(looked, kind) if s.gain > asked][:SECONDS]:
+            for s in [s for s in promising(looked, kind) if s.gain > _asked(lead, kind)][:SECONDS]:
                 whole = with_laws((s.mechanism, *lead.mechanisms))
                 if whole not in done:
                     done.add(whole)

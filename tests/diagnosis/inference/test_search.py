@@ -149,11 +149,13 @@ def test_a_way_that_promised_next_to_nothing_is_not_followed(spindle):
         assert asked == ways
 
 
-@pytest.mark.parametrize(("promise", "weighed"), [(4.0, True), (1.0, False)])
-def test_a_second_cause_that_hardly_shows_is_weighed(spindle, monkeypatch, promise, weighed):
-    """Beside one that leaves no misfit: blind campaigns 902 and 921 were answered the first of two for sure, for what promised less than 12 in ln evidence was not even asked."""
+@pytest.mark.parametrize(("promise", "kind", "weighed"), [(4.0, {}, True), (1.0, {}, False), (4.0, {"own_law": True}, False), (11.0, {"free": True}, False), (13.0, {"free": True}, True)])
+def test_a_second_cause_that_hardly_shows_is_weighed(spindle, monkeypatch, promise, kind, weighed):
+    """Beside one that leaves no misfit: blind campaigns 902 and 921 were answered the first of two for sure, for what promised less than 12 in ln evidence was not even asked. The more
+    there is to choose, the more is asked."""
     model = model_of(spindle, mode_campaign(spindle, TESTS[:2], 3, []))
     bond, preload = (variants(effect(name))[0] for name in ("bond_softening", "preload_loss"))
+    preload = replace(preload, **kind)
     none, own = fit(model), fit(model, [bond])
     base, lead = (Hypothesis(f, evidence(model, f)) for f in (none, own))
     lead = replace(lead, evidence=replace(lead.evidence, ln=base.evidence.ln + 50))
