@@ -28,6 +28,7 @@ SHOWS = np.sqrt(10.0)
 VISIBLE = 2 * SHOWS
 LEAST = 1e-3
 MUCH = 0.3  # of the largest amount of what is hidden
+SURE = 0.99
 BINS = (0.0, 0.2, 0.5, 0.8, 0.95, 0.99, 1.0)
 DOCS = ROOT / "docs" / "blind.txt"
 
@@ -122,6 +123,20 @@ def _answers(row: Row) -> list[tuple[float, bool]]:
 def most_probable(row: Row) -> tuple[float, bool]:
     """The most probable answer's stated probability, and whether it is true."""
     return max(_answers(row), key=lambda a: a[0])
+
+
+def sure(row: Row) -> bool:
+    """Whether one answer that names effects was stated to be all but certain, where something is hidden."""
+    return bool(row["hidden"] and row["effects"] and row["candidates"]) and _likeliest(row)["probability"] > SURE
+
+
+def _likeliest(row: Row) -> Row:
+    return max(row["candidates"], key=lambda c: c["probability"])
+
+
+def no_wrong_name(row: Row) -> bool:
+    """Whether every name of the most probable candidate is one of a hidden piece's, whatever else is hidden."""
+    return set(_likeliest(row)["effects"]) <= {name for names in truths(row) for name in names}
 
 
 def interval(k: int, n: int) -> tuple[float, float]:
@@ -230,6 +245,9 @@ def show(console: Console, rows: Sequence[Row]) -> None:
             a, b = interval(k, len(own_bin))
             table.add_row(f"{low:g} to {high:g}", str(len(own_bin)), f"{np.mean([p for p, _ in own_bin]):.3f}", f"{k} ({a:.0%} to {b:.0%})")
     console.print(table)
+    certain = [r for r in told if sure(r)]
+    console.print(f"names stated above {SURE:g}, every one right: {share(certain, no_wrong_name)}")
+    console.print(f"  and nothing that shows left out: {share(certain, lambda r: true_names(r, _likeliest(r)['effects']))}")
     if seconds := [r["seconds"] for r in rows]:
         console.print(f"seconds a diagnosis: median {np.median(seconds):.0f}, largest {max(seconds):.0f}")
     if sets:

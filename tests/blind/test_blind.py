@@ -1,5 +1,6 @@
 """The blind study's own world: nothing of its own switched on it is the product's model, every hidden mechanism is seen, seeds repeat."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,19 @@ from tests.blind.alike import left, right, right_names
 from tests.blind.campaigns import campaign, in_contact
 from tests.blind.laws import law
 from tests.blind.mechanisms import mechanisms
-from tests.blind.score import above_noise, element_found, halved, interval, most_probable, outcome, show, told_elsewhere, truth_probability
+from tests.blind.score import (
+    above_noise,
+    element_found,
+    halved,
+    interval,
+    most_probable,
+    no_wrong_name,
+    outcome,
+    show,
+    sure,
+    told_elsewhere,
+    truth_probability,
+)
 from tests.blind.study import FURTHER, FURTHER_FROM, FURTHER_SHARE, SCENES, draw
 from tests.blind.visible import change, seen, visibility
 from tests.blind.world import Record, World, answer
@@ -258,6 +271,20 @@ SCORED = [
 def test_the_score_of_a_verdict(told, expected, probability):
     assert outcome(told) == expected
     assert truth_probability(told) == pytest.approx(probability)
+
+
+def test_what_was_stated_for_sure_is_judged_by_name_and_as_a_whole():
+    """One of two named for sure: no name is wrong, and one that shows is missing; nothing of what is not sure, or of none hidden."""
+    half, whole, wrong = (
+        row("two", "identified", names, [["a"], ["c"]], candidates=[(names, 0.999), (["b"], 0.001)]) for names in (["a"], ["a", "c"], ["b"])
+    )
+    assert [(sure(r), no_wrong_name(r)) for r in (half, whole, wrong)] == [(True, True), (True, True), (True, False)]
+    assert not sure(row("one", "identified", ["a"], [["a"]], candidates=[(["a"], 0.98)]))
+    assert not sure(row("nothing", "none", none=1.0))
+    console = Console(record=True, width=160)
+    with console.capture() as captured:
+        show(console, [r | {"seed": i} for i, r in enumerate((half, whole, wrong))])
+    assert re.search(r"names stated above 0.99, every one right: 2 of 3 .*\n  and nothing that shows left out: 1 of 3 ", captured.get())
 
 
 def test_the_table_of_scores():
