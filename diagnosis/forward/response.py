@@ -16,7 +16,7 @@ from thermospindle.model.rotor.chain import Matrices
 from thermospindle.model.rotor.modes import LARGE, Poles, poles
 from thermospindle.model.rotor.reduced import reduced
 from thermospindle.model.types import Array, ComplexArray, Integers
-from thermospindle.sim.campaign.beside import POWER
+from thermospindle.sim.identification.frf import POWER
 
 SILENT = 1e-6  # of a mode's answer, left at the end of a record
 TOGETHER = 8  # derivatives at a time
