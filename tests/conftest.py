@@ -97,6 +97,13 @@ def coarse_warmups() -> Iterator[None]:
         yield
 
 
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Studies without their figures, for tests of their numbers; others have them drawn."""
+    for kind in ("monte_carlo", "sweep"):
+        monkeypatch.setattr(f"thermospindle.report.figures.study.{kind}", lambda *_: {})
+
+
 def made_once(folders: pytest.TempPathFactory, name: str, make: Callable[[], Made]) -> Made:
     """What one of pytest's workers has made already, or what `make` makes, left on disk for the others."""
     import cloudpickle

@@ -17,7 +17,7 @@ import pytest
 
 from tests.blind import study as blind
 from tests.conftest import ROOT
-from tests.test_study import DRAWN, files, study
+from tests.studies import DRAWN, files, study
 from thermospindle.cli import main
 from thermospindle.sim.study import parts
 
