@@ -74,6 +74,11 @@ class LineData:
         return () if self.test.frf is None else self.test.frf.response_nodes
 
     @property
+    def hammers(self) -> tuple[int, ...]:
+        """Nodes of the columns."""
+        return () if self.test.frf is None else self.test.frf.reference_nodes
+
+    @property
     def count(self) -> int:
         """Real numbers in the likelihood."""
         return 2 * self.value.size

@@ -27,11 +27,11 @@ def nuisance_jacobian(model: CampaignModel, t: int, x: Array, effects: Applied, 
         numbers = np.concatenate([rates.numbers[t], *[row[0] for row in model.numbers.discrepancies[t]]])
         return r, np.concatenate([found, np.zeros((more, len(r)))]), numbers
     assert isinstance(data, LineData)
-    own, channel = model.numbers.gains[t]
+    (own, channel), (struck, hammer) = model.numbers.gains[t], model.numbers.hammers[t]
     discrepancies = model.numbers.discrepancies[t]
     record = [] if model.numbers.record is None else [model.numbers.record]
     lights = model.lights(t, linear.matrices.dofs, x)
-    numbers = np.concatenate([rates.numbers[t], *[row[0] for row in discrepancies], own, np.array(record, int), *[n for _, n in lights]])
+    numbers = np.concatenate([rates.numbers[t], *[row[0] for row in discrepancies], own, struck, np.array(record, int), *[n for _, n in lights]])
     n_resp, n_ref, lines = response.value.shape
     weight = np.sqrt(2) / data.sd
     jacobian = np.zeros((len(numbers) + more, 2, n_resp, n_ref, lines))
@@ -52,6 +52,11 @@ def nuisance_jacobian(model: CampaignModel, t: int, x: Array, effects: Applied, 
             gain = response.value[row] * weight[row] * model.parameters[own[k]].sd
             jacobian[at + k, 0, row], jacobian[at + k, 1, row] = gain.real, gain.imag
     at += len(own)
+    for k, h in enumerate(hammer):
+        for of in np.flatnonzero(model.numbers.hammer_of[t] == h):
+            gain = response.value[:, of] * weight[:, of] * model.parameters[struck[k]].sd
+            jacobian[at + k, 0, :, of], jacobian[at + k, 1, :, of] = gain.real, gain.imag
+    at += len(struck)
     if record:
         at = fill(at, response.cut_off[None])
     for light, of_light in lights:

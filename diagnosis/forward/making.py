@@ -33,8 +33,9 @@ def campaign_model(spindle: Spindle, campaign: Campaign, tests: Sequence[TestDat
     build = tuple(toleranced(spindle))
     lines = [d for d in tests if isinstance(d, LineData)]
     channels = len({node for d in lines for node in d.sensors})
+    hammers = len({node for d in lines for node in d.hammers})
     names = [d.test.id for d in tests]
-    parameters = nuisances(spindle, build, names, bool(lines), channels, modes, changes(spindle, present, names, [d.condition for d in tests]))
+    parameters = nuisances(spindle, build, names, bool(lines), channels, hammers, modes, changes(spindle, present, names, [d.condition for d in tests]))
     return CampaignModel(spindle, tuple(tests), scenes, build, parameters, modes, present, lumped=campaign.lumped_shafts)
 
 

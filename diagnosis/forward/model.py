@@ -25,7 +25,7 @@ from thermospindle.model.errors import NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import Matrices, matrices
 from thermospindle.model.types import Array, ComplexArray, Integers
-from thermospindle.sim.effects.effect import HOOKS, Effect, Values
+from thermospindle.sim.effects.effect import HOOKS, Effect, Measurement, Values
 from thermospindle.sim.operating import OperatingPoint, operating_point
 
 SIZE_STEP = 0.02  # of a size's or shape parameter's prior standard deviation, for differences
@@ -169,7 +169,17 @@ class CampaignModel:
         bare, between = worked_out
         stiffness, damping = self._discrepancy(t, bare, x)
         whole = Matrices(bare.mass, bare.damping + damping, bare.stiffness + stiffness, bare.dofs)
-        return Linear(whole, point.measurement, point.chain.layout, between)
+        return Linear(whole, self._struck(t, point.measurement, x), point.chain.layout, between)
+
+    def _struck(self, t: int, chain: Measurement, x: Array) -> Measurement:
+        """A measuring chain whose hammers have gains of their own."""
+        number, hammer = self.numbers.hammers[t]
+        if not x[number].any():
+            return chain
+        gain = np.zeros(len(chain.reference_rows))
+        for n, h in zip(number, hammer, strict=True):
+            gain[self.numbers.hammer_of[t] == h] += x[n] * self.parameters[n].sd
+        return replace(chain, reference_rows=np.exp(gain)[:, None] * chain.reference_rows)
 
     def _discrepancy(self, t: int, linear: Matrices, x: Array) -> tuple[Array, Array]:
         w = self.reference.over(linear.dofs)

@@ -33,6 +33,8 @@ from thermospindle.model.types import Array
 
 BUILD, TEMPERATURE, GAIN, DRIFT, EXPANSION = "build", "temperature", "gain", "gain drift", "thermal expansion"
 APART = "stiffness apart", "damping apart"  # of bearings
+HAMMER, HAMMER_DRIFT = "gain of a hammer", "drift of a hammer's gain"
+"""Of the force at each hammer's point, in all tests and from test to test: its calibration, and the cosine of how askew it hits (5 degrees are 0.4 %)."""
 BALLS = "stiffness of the balls"
 FLUNG, FLUNG_SD = "inertia loads of the balls", 0.1
 """Relative, of centrifugal force and gyroscopic moment together: cage speeds by different assumptions (one race's control, both contact angles, the half sum) differ by some
@@ -186,7 +188,7 @@ def changes_of(tests: Sequence[str], far: Sequence[float], faster: Sequence[floa
 
 
 def nuisances(
-    spindle: Spindle, build: Sequence[Toleranced], tests: Sequence[str], with_lines: bool, channels: int, modes: ReferenceModes, changes: Sequence[Nuisance] = ()
+    spindle: Spindle, build: Sequence[Toleranced], tests: Sequence[str], with_lines: bool, channels: int, hammers: int, modes: ReferenceModes, changes: Sequence[Nuisance] = ()
 ) -> tuple[Nuisance, ...]:
     """All nuisance parameters of a campaign with `tests` (ids): those of FRF lines only where a test has any, `changes` of the balls' stiffness among them (`changes_of`)."""
     t = spindle.tolerances
@@ -216,5 +218,7 @@ def nuisances(
     if with_lines:
         found += [Nuisance(GAIN, f"gain of channel {c + 1}", t.gain, index=c) for c in range(channels)]
         found += [Nuisance(DRIFT, f"gain of channel {c + 1} in {name}", DRIFT_SD, test=k, index=c) for k, name in drifting for c in range(channels)]
+        found += [Nuisance(HAMMER, f"gain of hammer {h + 1}", t.gain, index=h) for h in range(hammers) if hammers > 1]  # of one alone that of all channels
+        found += [Nuisance(HAMMER_DRIFT, f"gain of hammer {h + 1} in {name}", DRIFT_SD, test=k, index=h) for k, name in drifting for h in range(hammers)]
         found.append(Nuisance(RECORD, "end of the records, before answers have died away", 1.0))
     return tuple(found)

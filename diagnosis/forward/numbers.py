@@ -77,23 +77,27 @@ class Numbers:
     @cached_property
     def gains(self) -> list[tuple[Integers, Integers]]:
         """For every test the numbers of gain parameters and the channel of each."""
-        found = []
-        for t in range(len(self.tests)):
-            rows = [
-                (i, p.index)
-                for i, p in enumerate(self.parameters)
-                if p.kind == kinds_of.GAIN or (p.kind == kinds_of.DRIFT and p.test == t)
-            ]
-            number, channel = np.array(rows, int).reshape(-1, 2).T
-            found.append((number, channel))
-        return found
+        return [self._of_one_and_all(t, kinds_of.GAIN, kinds_of.DRIFT) for t in range(len(self.tests))]
+
+    @cached_property
+    def hammers(self) -> list[tuple[Integers, Integers]]:
+        """For every test the numbers of the parameters of hammers' gains and the hammer of each."""
+        return [self._of_one_and_all(t, kinds_of.HAMMER, kinds_of.HAMMER_DRIFT) for t in range(len(self.tests))]
+
+    def _of_one_and_all(self, t: int, in_all: str, in_one: str) -> tuple[Integers, Integers]:
+        rows = [(i, p.index) for i, p in enumerate(self.parameters) if p.kind == in_all or (p.kind == in_one and p.test == t)]
+        number, index = np.array(rows, int).reshape(-1, 2).T
+        return number, index
 
     @cached_property
     def channel_of(self) -> list[Integers]:
         """For every test the channel of each row: a sensor keeps its gain at whichever row it is."""
-        nodes = [d.sensors if isinstance(d, LineData) else () for d in self.tests]
-        number = {node: c for c, node in enumerate(dict.fromkeys(node for own in nodes for node in own))}
-        return [np.array([number[node] for node in own], int) for own in nodes]
+        return _counted([d.sensors if isinstance(d, LineData) else () for d in self.tests])
+
+    @cached_property
+    def hammer_of(self) -> list[Integers]:
+        """For every test the hammer of each column."""
+        return _counted([d.hammers if isinstance(d, LineData) else () for d in self.tests])
 
     @cached_property
     def record(self) -> int | None:
@@ -103,3 +107,9 @@ class Numbers:
     @property
     def channels(self) -> int:
         return 1 + max((p.index for p in self.parameters if p.kind == kinds_of.GAIN), default=-1)
+
+
+def _counted(nodes: Sequence[Sequence[int]]) -> list[Integers]:
+    """Nodes of every test by the order in which tests first have them."""
+    number = {node: c for c, node in enumerate(dict.fromkeys(node for own in nodes for node in own))}
+    return [np.array([number[node] for node in own], int) for own in nodes]

@@ -22,6 +22,7 @@ REFERENCE = {
     kinds_of.STIFFNESS_DRIFT: kinds_of.STIFFNESS_DRIFT_SD,
     kinds_of.DAMPING_DRIFT: kinds_of.DAMPING_DRIFT_SD,
     kinds_of.DRIFT: kinds_of.DRIFT_SD,
+    kinds_of.HAMMER_DRIFT: kinds_of.DRIFT_SD,
     kinds_of.CHANGE: kinds_of.CHANGE_SD,
 }
 """Widths in which nuisances of unknown size are counted; build tolerances in those that the scene states."""

@@ -250,6 +250,7 @@ LEARNED = {
     kinds_of.STIFFNESS_DRIFT: "frequency_discrepancy_drift",
     kinds_of.DAMPING_DRIFT: "damping_discrepancy_drift",
     kinds_of.DRIFT: "gain_drift",
+    kinds_of.HAMMER_DRIFT: "hammer_gain_drift",
     kinds_of.CHANGE: "bearing_change_discrepancy",
     kinds_of.ACTION: "action_of_effects",
 }
