@@ -145,6 +145,16 @@ def of_tolerances(model: CampaignModel, best: Hypothesis, explained: bool = True
     return f" The drawing is off by more than its tolerances, which are taken {times:g} times as wide as stated{which}."
 
 
+def of_motions(model: CampaignModel, best: Hypothesis) -> str:
+    """How far thermal motions of the rings are off, where that is more than what two programs differ by."""
+    if best.evidence.learned.sizes.get(kinds_of.EXPANSION, 1.0) == 1.0:
+        return ""
+    errors = np.sqrt(np.diag(best.evidence.covariance))
+    rows = [(i, q) for i, q in enumerate(model.parameters) if q.kind == kinds_of.EXPANSION]
+    off = [f"{q.name} {100 * q.at(best.evidence.mean[i]):+.2g} +- {100 * q.sd * errors[i]:.1g} %" for i, q in rows if abs(best.evidence.mean[i]) > max(OFF, errors[i])]
+    return f" Thermal motions differ from what temperature and the scene's coefficients of expansion give: {', '.join(off)}." if off else ""
+
+
 def of_what_is_left(best: Hypothesis, same: Overlap) -> str:
     """What is left where the best explanation still misses the data and misses them alike in all tests."""
     if best.evidence.learned.errors <= STRAIN or same.tests < ALIKE:

@@ -174,12 +174,10 @@ class CampaignModel:
     def _struck(self, t: int, chain: Measurement, x: Array) -> Measurement:
         """A measuring chain whose hammers have gains of their own."""
         number, hammer = self.numbers.hammers[t]
-        if not x[number].any():
+        if not (x[number].any() and len(self.numbers.hammer_of[t])):
             return chain
-        gain = np.zeros(len(chain.reference_rows))
-        for n, h in zip(number, hammer, strict=True):
-            gain[self.numbers.hammer_of[t] == h] += x[n] * self.parameters[n].sd
-        return replace(chain, reference_rows=np.exp(gain)[:, None] * chain.reference_rows)
+        gain = self._gain(x, number, hammer, self.numbers.hammer_of[t])
+        return replace(chain, reference_rows=gain[:, None] * chain.reference_rows)
 
     def _discrepancy(self, t: int, linear: Matrices, x: Array) -> tuple[Array, Array]:
         w = self.reference.over(linear.dofs)
@@ -218,7 +216,7 @@ class CampaignModel:
 
     def _response(self, t: int, x: Array, linear: Linear, data: LineData) -> Response:
         cut = 0.0 if self.numbers.record is None else float(x[self.numbers.record])
-        return Response(linear, data, self._gain(t, x), cut, [light for light, _ in self.lights(t, linear.matrices.dofs, x)])
+        return Response(linear, data, self._gain(x, *self.numbers.gains[t], self.numbers.channel_of[t]), cut, [light for light, _ in self.lights(t, linear.matrices.dofs, x)])
 
     def lights(self, t: int, dofs: Sequence[tuple[str, str]], x: Array) -> list[tuple[Light, Integers]]:
         """The light resonances of test `t` at nuisance values, over `dofs`, and the numbers of the parameters of each."""
@@ -253,11 +251,10 @@ class CampaignModel:
     def _responses(self) -> dict[int, tuple[tuple, Response | Table, Applied]]:
         return {}
 
-    def _gain(self, t: int, x: Array) -> Array:
-        number, channel = self.numbers.gains[t]
-        gain = np.zeros(self.numbers.channels)
-        np.add.at(gain, channel, x[number] * np.array([self.parameters[i].sd for i in number]))
-        return np.asarray(np.exp(gain)[self.numbers.channel_of[t]])
+    def _gain(self, x: Array, number: Integers, index: Integers, of: Integers) -> Array:
+        """Gains of rows (or columns) that are `of` these channels (or hammers), which the parameters by `number` are the ln of, one or more for each `index`."""
+        ln = x[number] * np.array([self.parameters[i].sd for i in number])
+        return np.asarray(np.exp((of[:, None] == index) @ ln))
 
     def whitened(self, t: int, value: ComplexArray, measured: ComplexArray | float) -> Array:
         data = self.tests[t]

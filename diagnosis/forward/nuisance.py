@@ -64,9 +64,9 @@ RANGE_K = 40.0  # over which that is told
 COINCIDE = 0.01  # of a frequency, within which modes are a pair or a cluster
 RIGID = 1e-6  # of the highest frequency, below which a mode is a rigid body's: rounding leaves some 1e-8 of it, and a beam's highest is in MHz
 EXPANSION_SD = {"radial motion of the rings": 3e-3, "axial motion of the rings": 3e-3, "growth of the grooves": 0.03}
-"""Relative errors of thermal motions, the same at all temperatures: two honest finite-element programs differ by a thousandth in the motions, and
-in whether a groove grows with its ring's free strain or follows its face."""
-
+"""Relative errors of thermal motions, the same at all temperatures, at the reference width: two honest finite-element programs differ by a thousandth in the motions, and
+in whether a groove grows with its ring's free strain or follows its face. Coefficients of expansion out of tables, and what a ball gives for a movement, are off by a per cent or
+two, so that how wide they are is learned (`ODDS`)."""
 
 
 @dataclass(frozen=True)

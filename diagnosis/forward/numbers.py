@@ -104,10 +104,6 @@ class Numbers:
         """The number of the parameter of records that end too early."""
         return next((i for i, p in enumerate(self.parameters) if p.kind == kinds_of.RECORD), None)
 
-    @property
-    def channels(self) -> int:
-        return 1 + max((p.index for p in self.parameters if p.kind == kinds_of.GAIN), default=-1)
-
 
 def _counted(nodes: Sequence[Sequence[int]]) -> list[Integers]:
     """Nodes of every test by the order in which tests first have them."""

@@ -48,11 +48,17 @@ GRIDS = {
     kinds_of.DRIFT: (0.0, 3e-4, 1e-3, 3e-3, 1e-2),
     kinds_of.HAMMER_DRIFT: (0.0, 1e-3, 3e-3, 1e-2),
     kinds_of.CHANGE: (0.0, 0.01, 0.03),
+    kinds_of.EXPANSION: (1.0, 3.0, 6.0),
     kinds_of.ACTION: (0.0, 0.01, 0.03, 0.1),
 }
 WIDER = {1.0: 0.0, 2.0: -12.0, 4.0: -13.0, 8.0: -14.0}
 """Prior odds (ln) that a drawing is off by so many times the build tolerances that the scene states, assumed, and less than those of any two effects: one
 tolerance that is strained tells of an effect, several of a drawing that is off."""
+FARTHER = {1.0: 0.0, 3.0: -2.0, 6.0: -4.0}
+"""Prior odds (ln) that thermal motions are off by so many times what two finite-element programs differ by, assumed: one spindle in eight by a per cent, one in sixty by two, where any
+one effect is in one of a hundred."""
+ODDS = {kinds_of.BUILD: WIDER, kinds_of.EXPANSION: FARTHER}
+"""By kind of nuisance, of sizes of which one is that of the scene or of the model itself."""
 WIDTHS = (0.5, 1.0, 2.0, 4.0)  # of a size, in its own prior standard deviations
 DEPARTURES = (0.0, 0.1, 0.3, 1.0)  # from a law, of the size
 FREE_WIDTHS = (0.1, 0.3, 1.0, 3.0, 10.0)  # of what has no law: its width is to be learned
@@ -110,7 +116,7 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
     def each(s: float, sizes: Mapping[str, float], nuisances: Nuisances | None = None) -> Array:
         """ln evidence of every combination of widths, departures and offsets of the mechanisms, by its prior odds."""
         scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
-        wider = WIDER[sizes.get(kinds_of.BUILD, 1.0)]
+        wider = sum(of[sizes.get(kind, 1.0)] for kind, of in ODDS.items())
         return marginal(scaled, nuisances or integrated(model, fit, s, sizes)).integrated(roots) + odds - fit.count * np.log(s) + wider
 
     nuisances = None

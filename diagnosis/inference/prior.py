@@ -24,8 +24,9 @@ REFERENCE = {
     kinds_of.DRIFT: kinds_of.DRIFT_SD,
     kinds_of.HAMMER_DRIFT: kinds_of.DRIFT_SD,
     kinds_of.CHANGE: kinds_of.CHANGE_SD,
+    kinds_of.EXPANSION: 1.0,
 }
-"""Widths in which nuisances of unknown size are counted; build tolerances in those that the scene states."""
+"""Widths in which nuisances of unknown size are counted; build tolerances in those that the scene states, thermal motions in `EXPANSION_SD`."""
 ACTION = 3.0  # times the relative error of frequencies, which what the model says of an effect may be wrong by
 Own = tuple[float, float, float]
 """Width in a size's own prior standard deviations, departure and offset of one mechanism."""
@@ -57,9 +58,9 @@ CHANGING = (*DRIFTING, kinds_of.CHANGE)
 
 
 def steady(learned: Learned, mechanisms: Sequence[Mechanism] = ()) -> Learned:
-    """What was learned of constant discrepancies and of gains, for a fit of `mechanisms`: how much modes drift, bearings change otherwise, and a drawing is off, is left as it is on
+    """What was learned of constant discrepancies and of gains, for a fit of `mechanisms`: how much modes drift, bearings change otherwise, thermal motions and a drawing are off, is left as it is on
     paper, so that none takes what the mechanisms should explain."""
-    on_paper = (*CHANGING, kinds_of.BUILD)
+    on_paper = (*CHANGING, kinds_of.EXPANSION, kinds_of.BUILD)
     sizes = {kind: REFERENCE[kind] if kind in on_paper else max(REFERENCE[kind], size) for kind, size in learned.sizes.items() if kind in REFERENCE}
     return as_stated(sizes, mechanisms)
 

@@ -16,7 +16,7 @@ import numpy as np
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import Mechanism, variants
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
-from thermospindle.diagnosis.inference.evidence import GRIDS, Evidence, evidence
+from thermospindle.diagnosis.inference.evidence import GRIDS, ODDS, Evidence, evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit
 from thermospindle.diagnosis.inference.prior import Learned, as_stated, precision_and_variances
 from thermospindle.diagnosis.inference.problem import Problem
@@ -151,7 +151,7 @@ def _at_learned(model: CampaignModel, first: Fit) -> Settled:
     Far from the reference the quadratic about the fit is not to be trusted: a model that misses frequencies by a hundredth shifts peaks
     by more than their width.
     """
-    kinds = [kind for kind in GRIDS if any(p.kind == kind for p in model.parameters)]
+    kinds = [kind for kind in GRIDS if kind not in ODDS and any(p.kind == kind for p in model.parameters)]
     tried = [as_stated(dict(zip(kinds, row, strict=True)), first.mechanisms) for row in product(*(GRIDS[kind] for kind in kinds))]
     learned = as_stated(evidence(model, first, tried).learned.sizes, first.mechanisms)
     found = fit(model, first.mechanisms, first.point, tempers=TEMPERS[-2:], learned=learned, moved=first.moved)

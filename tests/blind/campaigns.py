@@ -18,6 +18,9 @@ from thermospindle.model.types import Array
 from thermospindle.sim.campaign.campaign import Campaign, Noise, Test
 from thermospindle.sim.identification.frf import Frf
 
+HAMMERS_FROM = 2000
+"""The first seed whose world has thermal motions that are off and hammers with gains of their own: seeds before it were judged without."""
+
 
 @dataclass(frozen=True, eq=False)
 class Made:
@@ -67,6 +70,13 @@ def drawn_world(random: np.random.Generator, spindle: Spindle) -> World:
     )
 
 
+def further(world: World, seed: int) -> World:
+    """With what worlds have from seed `HAMMERS_FROM` on: thermal motions that are off by a per cent, hammers whose force is off and drifts."""
+    random = np.random.default_rng([seed, 73])
+    radial, axial = (float(f) for f in 1 + random.choice([3e-3, 0.01, 0.02]) * random.standard_normal(2))
+    return replace(world, motions=(radial, axial), hammer_gain=float(random.choice([1e-3, 5e-3, 0.02])), hammer_drift=float(random.choice([0.0, 1e-3, 4e-3])))
+
+
 def drawn_record(random: np.random.Generator) -> Record:
     told, times = str(random.choice(["nothing", "sd", "noise"])), float(random.choice([0.5, 1.0, 2.0]))
     if random.random() < 0.5:
@@ -84,18 +94,22 @@ def campaign(
     """One campaign; the seed draws the world and the record (unless given), tolerances, errors and noise."""
     random = np.random.default_rng([seed, 61])
     own, rec = drawn_world(random, spindle), drawn_record(random)
+    own = further(own, seed) if seed >= HAMMERS_FROM else own
     world, record = world or own, record or rec
     built = spindle
     for parameter in toleranced(spindle):
         built = parameter.apply(built, parameter.sd * float(np.clip(random.standard_normal(), -3, 3)))
     gain = 1 + spindle.tolerances.gain * random.standard_normal(len(spindle.points))
+    hits = np.random.default_rng([seed, 79])
+    force = 1 + world.hammer_gain * hits.standard_normal(len(spindle.hammer.hammer_nodes))
     hidden = in_contact(built, tests, world, hidden)
     made = []
     for k, plan in enumerate(tests):
         true = plan.temperature + spindle.tolerances.temperature * random.standard_normal()
         at = answer(built, Condition(true, plan.speed), world, hidden, plan.place(spindle))
         drift = 1 + world.gain_drift * random.standard_normal(len(gain))
-        frf = measured(replace(at, gain=at.gain * gain * drift), spindle, record, random)
+        hit = force * (1 + world.hammer_drift * hits.standard_normal(len(force)))
+        frf = measured(replace(at, gain=at.gain * gain * drift, references=hit[:, None] * at.references), spindle, record, random)
         name = f"T{plan.temperature:g}_n{plan.speed * 30 / np.pi:.0f}_{k}"
         made.append(Test(name, plan.temperature, plan.speed, frf=frf, window_decay=record.decay))
     stated = Noise(spindle.hammer.noise_of_value, spindle.hammer.noise_of_largest) if record.told == "noise" else None

@@ -43,6 +43,9 @@ class World:
     damping_error: float = 0.0  # of the modal damping matrix, alike: not proportional
     seed: int = 0  # of the modal matrices
     gain_drift: float = 0.0  # from test to test, each channel
+    motions: tuple[float, float] = (1.0, 1.0)  # thermal motions of the rings in radius and along the axis, over the model's: other coefficients of expansion
+    hammer_gain: float = 0.0  # of each hammer's force, in all tests
+    hammer_drift: float = 0.0  # of it from test to test
 
 
 @dataclass(frozen=True)
@@ -139,6 +142,7 @@ def answer(spindle: Spindle, condition: Condition, world: World, hidden: Sequenc
     regions = {g.name: condition.temperature for g in spindle.regions}
     uniform = not any("temperatures" in h.acts for h in hidden)
     motions = expand(spindle, condition.temperature if uniform else changed("temperatures", regions), world.mesh)
+    motions = {b: _otherwise(m, *world.motions) for b, m in motions.items()}
     motions = changed("motions", dict(motions))
     state = balanced(
         spindle, condition, {b: _grooves(spindle, b, m, world.grooves_follow_faces) for b, m in motions.items()}, world.constant_kept
@@ -214,6 +218,17 @@ def moved(rows: Sequence[BallRow], external: float) -> float:
         if reach > 5e-4:
             raise ValueError("the bearings find no axial equilibrium within 0.5 mm")
     return float(brentq(left, start - reach, start + reach, xtol=1e-17, rtol=1e-14))
+
+
+def _otherwise(motion: RingMotion, radial: float, axial: float) -> RingMotion:
+    """A motion whose material expands otherwise: grooves stay, which grow with their ring's steel."""
+    return replace(
+        motion,
+        inner_r=radial * motion.inner_r,
+        outer_r=radial * motion.outer_r,
+        inner_z=axial * motion.inner_z,
+        outer_z=axial * motion.outer_z,
+    )
 
 
 def _grooves(spindle: Spindle, name: str, motion: RingMotion, share: float) -> RingMotion:

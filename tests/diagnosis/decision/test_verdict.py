@@ -13,7 +13,7 @@ from thermospindle.diagnosis.decision import reason
 from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.decision.loss import FALSE_ALARM, MISSED, WRONG
 from thermospindle.diagnosis.decision.verdict import decide
-from thermospindle.diagnosis.forward.nuisance import BUILD, DAMPING_DRIFT, STIFFNESS_DRIFT, Nuisance
+from thermospindle.diagnosis.forward.nuisance import BUILD, DAMPING_DRIFT, EXPANSION, EXPANSION_SD, STIFFNESS_DRIFT, Nuisance
 from thermospindle.model.machine import Condition
 
 CASES = {
@@ -202,6 +202,20 @@ def test_a_drawing_that_is_off_is_said():
 
     assert told(1.0) == ""
     assert told(4.0) == " The drawing is off by more than its tolerances, which are taken 4 times as wide as stated: hub by -90%, preload by -12%, mount by +5%."
+
+
+def test_thermal_motions_that_are_off_are_said():
+    """Of those that are known less well than two programs differ by, what is off by more than these and more than its error."""
+    lead, parameters = made({"a": 60.0}).hypotheses[0], tuple(Nuisance(EXPANSION, name, sd) for name, sd in EXPANSION_SD.items())
+
+    def told(times: float, mean: tuple[float, ...]) -> str:
+        evidence = replace(lead.evidence, learned=replace(lead.evidence.learned, sizes={EXPANSION: times}), mean=np.array(mean), covariance=np.diag([0.01, 9.0, 0.01]))
+        return reason.of_motions(SimpleNamespace(parameters=parameters), replace(lead, evidence=evidence))
+
+    assert told(1.0, (6.0, 0.0, 0.0)) == told(3.0, (1.0, 2.9, 0.0)) == ""
+    assert told(3.0, (6.0, -4.0, 1.0)) == (
+        " Thermal motions differ from what temperature and the scene's coefficients of expansion give: radial motion of the rings +1.8 +- 0.03 %, axial motion of the rings -1.2 +- 0.9 %."
+    )
 
 
 @pytest.mark.parametrize(("misses", "confirmed"), [(30.0, True), (80.0, False)])

@@ -18,12 +18,13 @@ from thermospindle.diagnosis.forward.nuisance import (
     DAMPING_DRIFT,
     DAMPING_DRIFT_SD,
     DRIFT,
+    EXPANSION,
     STIFFNESS,
     STIFFNESS_DRIFT,
     STIFFNESS_DRIFT_SD,
     Nuisance,
 )
-from thermospindle.diagnosis.inference.evidence import OFFSET, WIDER, WIDTHS, Learned, evidence, left_out, own_grid
+from thermospindle.diagnosis.inference.evidence import FARTHER, OFFSET, WIDER, WIDTHS, Learned, evidence, left_out, own_grid
 from thermospindle.diagnosis.inference.gaussian import Quadratic, ln_integral, marginal, posterior, under
 from thermospindle.diagnosis.inference.prior import (
     ACTION,
@@ -212,6 +213,20 @@ def test_tolerances_wider_than_stated_are_learned(build, times):
         own = [q.kind == BUILD for q in made.model.parameters]
         prior[own, own] *= found.learned.sizes[BUILD] ** 2
         assert found.ln == pytest.approx(made.ln(prior, found.learned.errors) + WIDER[found.learned.sizes[BUILD]], abs=1e-6)
+
+
+@pytest.mark.parametrize(("off", "times"), [(1.0, {1.0}), (12.0, {3.0, 6.0})])
+def test_how_far_thermal_motions_are_off_is_learned(off, times):
+    """Whatever is asked, and at their prior odds beside the integral with as wide a prior."""
+    for seed in range(5):
+        made = toy(seed, 0.0, rows=200, build=off, drawing=EXPANSION)
+        found = evidence(made.model, made.fit)
+        wider = found.learned.sizes[EXPANSION]
+        assert wider in times
+        prior = made.prior(*(found.learned.sizes[k] for k in (STIFFNESS, DAMPING, DRIFT)))
+        own = [q.kind == EXPANSION for q in made.model.parameters]
+        prior[own, own] *= wider**2
+        assert found.ln == pytest.approx(made.ln(prior, found.learned.errors) + FARTHER[wider], abs=1e-6)
 
 
 @pytest.mark.parametrize(("hidden", "much"), [(2.0, False), ((1.2, 4.0, 1.1), True)])
