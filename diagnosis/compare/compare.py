@@ -177,13 +177,14 @@ def _repeat_variance(observed: Sequence[Observation], chosen: Sequence[Integers]
     holds for all tests of the campaign, also those made once.
     """
     extra = [np.zeros(2 * len(o.frequency)) for o in observed]
-    seen: dict[tuple[int, int], dict[Condition, list[tuple[int, int]]]] = {}
+    seen: dict[tuple[int, int], dict[int, list[tuple[int, int]]]] = {}
+    made = _first_alike([o.condition for o in observed], [o.test for o in observed])
     for t, (o, partner, number) in enumerate(zip(observed, chosen, numbers, strict=True)):
         m = len(o.frequency)
         for i in range(2 * m):
             if partner[i % m] >= 0 and np.isfinite(o.covariance[i, i]):
                 which = (number[int(partner[i % m])], i // m)
-                seen.setdefault(which, {}).setdefault(o.condition, []).append((t, i))
+                seen.setdefault(which, {}).setdefault(made[t], []).append((t, i))
     for by_condition in seen.values():
         repeated = [places for places in by_condition.values() if len(places) > 1]
         free = sum(len(places) - 1 for places in repeated)
@@ -192,6 +193,18 @@ def _repeat_variance(observed: Sequence[Observation], chosen: Sequence[Integers]
             for t, i in (place for places in by_condition.values() for place in places):
                 extra[t][i] = max(0.0, beyond)
     return extra
+
+
+def _first_alike(conditions: Sequence[Condition], tests: Sequence[Test]) -> list[int]:
+    """For every test the first that it is a repeat of, or itself: at one condition one of which the same else was noted; or one of which `repeat` tells another count,
+    for notes may say who measured, and when."""
+    found: list[int] = []
+    for t, (at, test) in enumerate(zip(conditions, tests, strict=True)):
+        alike = [k for k in range(t) if conditions[k] == at]
+        noted = [k for k in alike if tests[k].conditions == test.conditions]
+        counted = [k for k in alike if tests[k].repeat != test.repeat]
+        found.append(next((found[k] for k in (*noted, *counted)), t))
+    return found
 
 
 def _excess(observed: Sequence[Observation], places: Sequence[tuple[int, int]]) -> float:

@@ -30,7 +30,7 @@ from tests.blind.alike import right
 from tests.blind.campaigns import Made, campaign, described, plans
 from tests.blind.hidden import Hidden, Mechanism
 from tests.blind.mechanisms import mechanisms
-from tests.blind.visible import seen, visibility
+from tests.blind.visible import seen, visibility, visibility_beside
 from tests.blind.world import Plan, World
 from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.decision.explanations import coarsening, likeliest
@@ -122,6 +122,7 @@ def judge(seed: int, without: Sequence[str] = ()) -> dict[str, Any]:
     }
     of = seen(made, drawn.spindle) if made.hidden else None
     row |= described(made, drawn.spindle) | {"visibility": visibility(made, drawn.spindle, of) if of else []}
+    row |= {"visibility_beside": visibility_beside(made, drawn.spindle, of) if of and len(made.hidden) > 1 else []}
     row |= {"right": right(made, drawn.spindle, of) if of else []}
     start = time.perf_counter()
     try:

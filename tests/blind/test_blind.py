@@ -25,7 +25,7 @@ from tests.blind.score import (
     truth_probability,
 )
 from tests.blind.study import FURTHER, FURTHER_FROM, FURTHER_SHARE, SCENES, draw
-from tests.blind.visible import change, seen, visibility
+from tests.blind.visible import change, seen, visibility, visibility_beside
 from tests.blind.world import Record, World, answer
 from tests.conftest import ROOT
 from thermospindle.diagnosis.verdict import diagnose
@@ -103,6 +103,19 @@ def test_hammers_of_later_worlds_have_gains_of_their_own():
     assert further(World(), HAMMERS_FROM).hammer_gain > 0
     assert drawn.made().world.motions == World().motions
     assert drawn.made().world.hammer_gain == 0.0
+
+
+def test_of_two_that_do_the_same_neither_shows_beside_the_other():
+    """And one that does something else shows nearly as well as alone. What hammers are off by is among what may stand in, where a world has it."""
+    drawn = draw(995)
+    made = drawn.made()
+    of = seen(made, drawn.spindle)
+    alone, beside = (f(made, drawn.spindle, of) for f in (visibility, visibility_beside))
+    assert all(0.5 * a < b <= a for a, b in zip(alone, beside, strict=True))
+    twice = replace(made, hidden=(made.hidden[1], made.hidden[1]))
+    assert max(visibility_beside(twice, drawn.spindle, of)) < np.sqrt(len(drawn.tests)) < visibility(twice, drawn.spindle, of)[0]
+    gains = seen(replace(made, world=replace(made.world, hammer_gain=0.01)), drawn.spindle)
+    assert gains.columns.shape[1] == of.columns.shape[1] + len(drawn.spindle.hammer.hammer_nodes) * (1 + len(drawn.tests))
 
 
 def test_what_is_hidden_leaves_every_bearing_in_contact():

@@ -16,12 +16,14 @@ from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array, ComplexArray
 
 SMALL = 1e-4  # share of a size, of a tolerance and of a prior width, at which its change is taken for linear
+MOTIONS_SD = 0.01  # relative, of thermal motions, of the three widths that worlds are drawn with
 
 
 @dataclass(frozen=True, eq=False)
 class Seen:
     """What a campaign can tell apart: lines (Hz), standard errors of every test's FRFs there, and the columns (N, k) of all that may stand in for a
-    change, each at one standard deviation: build tolerances, temperatures, gains and each mode's constant error, with what couples any two."""
+    change, each at one standard deviation: build tolerances, temperatures, gains and each mode's constant error, with what couples any two; in worlds that
+    have them thermal motions and hammers' gains."""
 
     frequency: Array
     sd: tuple[Array, ...]
@@ -48,8 +50,8 @@ def seen(made: Made, spindle: Spindle, lines: int = 160) -> Seen:
     frequency = np.linspace(*hammer.band, lines)
     plain = replace(made.world, stiffness_error=0.0, damping_error=0.0)
 
-    def all_tests(s: Spindle, warmer: float = 0.0) -> list[ComplexArray]:
-        return [answer(s, Condition(p.temperature + warmer, p.speed), plain, (), p.place(spindle)).frf(frequency) for p in made.plans]
+    def all_tests(s: Spindle, warmer: float = 0.0, world: World = plain) -> list[ComplexArray]:
+        return [answer(s, Condition(p.temperature + warmer, p.speed), world, (), p.place(spindle)).frf(frequency) for p in made.plans]
 
     base = all_tests(made.built)
     dense = made.campaign.tests[0].frf.frequency.size / lines  # type: ignore[union-attr]
@@ -78,6 +80,15 @@ def seen(made: Made, spindle: Spindle, lines: int = 160) -> Seen:
         columns.append(column([b * (1 + spindle.tolerances.gain * pick) for b in base]))
         for k in range(len(base)):
             columns.append(column([b * (1 + made.world.gain_drift * pick * (j == k)) for j, b in enumerate(base)]))
+    for i in range(len(hammer.hammer_nodes) if made.world.hammer_gain else 0):
+        pick = (np.arange(len(hammer.hammer_nodes)) == i)[None, :, None]
+        columns.append(column([b * (1 + made.world.hammer_gain * pick) for b in base]))
+        for k in range(len(base)):
+            columns.append(column([b * (1 + made.world.hammer_drift * pick * (j == k)) for j, b in enumerate(base)]))
+    for i in range(2 if plain.motions != World().motions else 0):
+        further = [tuple(np.array(plain.motions) + by * MOTIONS_SD * SMALL * (np.arange(2) == i)) for by in (1, -1)]
+        more, less = (all_tests(made.built, world=replace(plain, motions=motions)) for motions in further)
+        columns.append(column(more, less) / (2 * SMALL))
     columns += _modal_columns(made, column, frequency, plain, spindle)
     return replace(found, columns=np.array(columns).T)
 
@@ -99,11 +110,28 @@ def visibility(made: Made, spindle: Spindle, of: Seen) -> list[float]:
     Of the piece itself and of a little of it over its share the smaller: what moves peaks by many widths is no longer what small
     tolerances do, but a larger tolerance may do the same."""
     plain = replace(made.world, stiffness_error=0.0, damping_error=0.0)
+    return [_shows(of, [change(made, spindle, of, h, share, plain) for share in (1.0, SMALL)]) for h in made.hidden]
+
+
+def visibility_beside(made: Made, spindle: Spindle, of: Seen) -> list[float]:
+    """The same of every piece where two are hidden, after what the other, as much of it as there is in every test by itself, could take: the law of what is named is the data's."""
+    plain = replace(made.world, stiffness_error=0.0, damping_error=0.0)
+    changes = [[change(made, spindle, of, h, share, plain) for share in (1.0, SMALL)] for h in made.hidden]
     found = []
-    for h in made.hidden:
-        squares = [of.inner(d[:, None], d[:, None])[0, 0] for d in (change(made, spindle, of, h, share, plain) for share in (1.0, SMALL))]
-        found.append(float(np.sqrt(max(min(squares), 0.0))))
+    for k, own in enumerate(changes):
+        others = [_of_each_test(d, len(made.plans)) for j, both in enumerate(changes) if j != k for d in both]
+        found.append(_shows(replace(of, columns=np.hstack([of.columns, *others])), own))
     return found
+
+
+def _of_each_test(moved: Array, tests: int) -> Array:
+    """A change (N,) in one test after the other (N, tests)."""
+    parts = moved.reshape(2, tests, -1)
+    return np.stack([(parts * (np.arange(tests) == k)[None, :, None]).ravel() for k in range(tests)], axis=1)
+
+
+def _shows(of: Seen, changes: Sequence[Array]) -> float:
+    return float(np.sqrt(max(min(of.inner(d[:, None], d[:, None])[0, 0] for d in changes), 0.0)))
 
 
 def _modal_columns(made: Made, column, frequency: Array, plain: World, spindle: Spindle) -> list[Array]:

@@ -142,6 +142,25 @@ def test_repeat_scatter_is_pooled_and_holds_for_tests_made_once(certain):
     assert found == pytest.approx([np.sqrt(5.0)] * 5, rel=5e-3)
 
 
+@pytest.mark.parametrize(
+    ("made", "sd"),
+    [
+        ([(1, {}), (1, {})], np.sqrt(2.0)),
+        ([(1, {"grease": "old"}), (1, {"grease": "new"})], 0.1),
+        ([(1, {"run": 1}), (2, {"run": 2})], np.sqrt(2.0)),
+        ([(1, {"grease": "old"}), (1, {"grease": "new"}), (2, {"grease": "new"})], 2.0),
+    ],
+)
+def test_tests_noted_to_differ_are_no_repeats(certain, made, sd):
+    """1001, 1003 and 1005.83 Hz: of what was noted as another condition nothing is scatter, unless `repeat` counts it as one."""
+    rows = zip(made, (1001.0, 1003.0, 1003.0 + 2 * np.sqrt(2.0)), strict=False)
+    tests = tuple(
+        Test(f"t{i}", 20.0, 0.0, repeat=repeat, conditions=noted, modes=(ModeRow(f"t{i}", 1, "axial", f, 0.1),)) for i, ((repeat, noted), f) in enumerate(rows)
+    )
+    found = [t.modes[0].sd for t in compare(certain, Campaign("noted", certain.name, "mobility", certain.points, tests)).tests]
+    assert found == pytest.approx([np.hypot(sd, FREQUENCY_FLOOR * 1001.0)] * len(tests), rel=5e-3)
+
+
 def test_the_error_of_the_temperature_is_in_the_standard_errors(spindle, certain):
     """At 60 C a bearing mode falls by some 0.3 % a kelvin: 0.2 K is more than its standard error; the base hardly moves."""
     campaign = table(spindle, 60.0, ("axial", 1000.3), ("rocking", 1775.1), ("rocking", 1800.2), ("lateral", 4120.0), sd=0.1)
