@@ -11,7 +11,7 @@ import numpy as np
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.forward.linear import Linear, Products, Rates, pairs, products, same_chain, together
 from thermospindle.diagnosis.forward.model import CampaignModel
-from thermospindle.diagnosis.forward.points import Applied
+from thermospindle.diagnosis.forward.points import Applied, aside
 from thermospindle.diagnosis.forward.response import Response
 from thermospindle.diagnosis.forward.table import Table
 from thermospindle.model.types import Array, ComplexArray, Integers
@@ -28,10 +28,11 @@ def nuisance_jacobian(model: CampaignModel, t: int, x: Array, effects: Applied, 
         return r, np.concatenate([found, np.zeros((more, len(r)))]), numbers
     assert isinstance(data, LineData)
     (own, channel), (struck, hammer) = model.numbers.gains[t], model.numbers.hammers[t]
+    missed, way = model.numbers.misses[t]
     discrepancies = model.numbers.discrepancies[t]
     record = [] if model.numbers.record is None else [model.numbers.record]
     lights = model.lights(t, linear.matrices.dofs, x)
-    numbers = np.concatenate([rates.numbers[t], *[row[0] for row in discrepancies], own, struck, np.array(record, int), *[n for _, n in lights]])
+    numbers = np.concatenate([rates.numbers[t], *[row[0] for row in discrepancies], own, struck, missed, np.array(record, int), *[n for _, n in lights]])
     n_resp, n_ref, lines = response.value.shape
     weight = np.sqrt(2) / data.sd
     jacobian = np.zeros((len(numbers) + more, 2, n_resp, n_ref, lines))
@@ -57,6 +58,13 @@ def nuisance_jacobian(model: CampaignModel, t: int, x: Array, effects: Applied, 
             gain = response.value[:, of] * weight[:, of] * model.parameters[struck[k]].sd
             jacobian[at + k, 0, :, of], jacobian[at + k, 1, :, of] = gain.real, gain.imag
     at += len(struck)
+    missing, struck_by = aside(model.operating(t, x, effects)), model.numbers.hammer_of[t]
+    for ref, gain in enumerate(model.hammer_gain(t, x)):
+        moved = gain * response.struck(missing[:, ref]) * weight[:, ref][:, None]
+        for n in np.flatnonzero(way // 2 == struck_by[ref]):
+            miss = moved[:, way[n] % 2] * model.parameters[missed[n]].sd
+            jacobian[at + n, 0, :, ref], jacobian[at + n, 1, :, ref] = miss.real, miss.imag
+    at += len(missed)
     if record:
         at = fill(at, response.cut_off[None])
     for light, of_light in lights:

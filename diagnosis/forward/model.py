@@ -17,7 +17,7 @@ from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.linear import Linear, mass_between
 from thermospindle.diagnosis.forward.nuisance import Nuisance, ReferenceModes, Resonance, Unevenness, unevennesses
 from thermospindle.diagnosis.forward.numbers import Numbers
-from thermospindle.diagnosis.forward.points import Applied, apart, otherwise, replace_measuring, stretched, uneven
+from thermospindle.diagnosis.forward.points import Applied, apart, aside, otherwise, replace_measuring, stretched, uneven
 from thermospindle.diagnosis.forward.response import Light, Response
 from thermospindle.diagnosis.forward.table import Table
 from thermospindle.model.built.tolerance import Toleranced
@@ -169,15 +169,23 @@ class CampaignModel:
         bare, between = worked_out
         stiffness, damping = self._discrepancy(t, bare, x)
         whole = Matrices(bare.mass, bare.damping + damping, bare.stiffness + stiffness, bare.dofs)
-        return Linear(whole, self._struck(t, point.measurement, x), point.chain.layout, between)
+        return Linear(whole, self._struck(t, point, x), point.chain.layout, between)
 
-    def _struck(self, t: int, chain: Measurement, x: Array) -> Measurement:
-        """A measuring chain whose hammers have gains of their own."""
-        number, hammer = self.numbers.hammers[t]
-        if not (x[number].any() and len(self.numbers.hammer_of[t])):
+    def _struck(self, t: int, point: OperatingPoint, x: Array) -> Measurement:
+        """The measuring chain of a point, whose hammers miss theirs and have gains of their own."""
+        number, which = self.numbers.misses[t]
+        chain, gain = point.measurement, self.hammer_gain(t, x)
+        if not (len(gain) and (x[number].any() or (gain != 1.0).any())):
             return chain
-        gain = self._gain(x, number, hammer, self.numbers.hammer_of[t])
-        return replace(chain, reference_rows=gain[:, None] * chain.reference_rows)
+        rows = chain.reference_rows.copy()
+        for n, (hammer, way) in zip(number, zip(*divmod(which, 2), strict=True), strict=True):
+            own = self.numbers.hammer_of[t] == hammer
+            rows[own] += x[n] * self.parameters[n].sd * aside(point)[way][own]
+        return replace(chain, reference_rows=gain[:, None] * rows)
+
+    def hammer_gain(self, t: int, x: Array) -> Array:
+        """Gain (n_ref,) of the hammer of each column of test `t`."""
+        return self._gain(x, *self.numbers.hammers[t], self.numbers.hammer_of[t])
 
     def _discrepancy(self, t: int, linear: Matrices, x: Array) -> tuple[Array, Array]:
         w = self.reference.over(linear.dofs)

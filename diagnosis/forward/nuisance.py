@@ -35,6 +35,10 @@ BUILD, TEMPERATURE, GAIN, DRIFT, EXPANSION = "build", "temperature", "gain", "ga
 APART = "stiffness apart", "damping apart"  # of bearings
 HAMMER, HAMMER_DRIFT = "gain of a hammer", "drift of a hammer's gain"
 """Of the force at each hammer's point, in all tests and from test to test: its calibration, and the cosine of how askew it hits (5 degrees are 0.4 %)."""
+MISS, MISS_DRIFT, MISS_SD, MISS_DRIFT_SD = "miss of a hammer", "drift of a hammer's miss", 2e-4, 1e-4
+"""How far (m) from its point a hammer hits on the mean: in all tests, and from test to test at the reference width. By hand a tip meets its mark to some tenths of a millimetre, which
+at a radius of 12 mm is a per cent of the moment."""
+WAYS = ("outwards, or upwards on a side", "around the axis")
 BALLS = "stiffness of the balls"
 FLUNG, FLUNG_SD = "inertia loads of the balls", 0.1
 """Relative, of centrifugal force and gyroscopic moment together: cage speeds by different assumptions (one race's control, both contact angles, the half sum) differ by some
@@ -52,6 +56,7 @@ RECORD = "end of records"
 RESONANCE = "light resonance"
 STIFFNESS, DAMPING = "stiffness discrepancy", "damping discrepancy"
 STIFFNESS_DRIFT, DAMPING_DRIFT = "drifting stiffness discrepancy", "drifting damping discrepancy"
+DISCREPANCIES = (STIFFNESS, DAMPING, STIFFNESS_DRIFT, DAMPING_DRIFT)
 STIFFNESS_SD = 1e-3  # relative error of a frequency at the reference width
 DAMPING_SD = 0.03  # relative error of a damping ratio at the reference width
 STIFFNESS_DRIFT_SD, DAMPING_DRIFT_SD = 1e-4, 0.01  # of one mode in one test, at the reference width
@@ -73,7 +78,8 @@ two, so that how wide they are is learned (`ODDS`)."""
 class Nuisance:
     """One nuisance parameter; `sd` is one prior standard deviation in its own unit (relative or K).
 
-    `index` is the number of the toleranced parameter (build), of the bearing (apart), the unevenness, the channel (gain: sensors in the order in which tests first have them), or unused; `modes` the pair of a discrepancy.
+    `index` is the number of the toleranced parameter (build), of the bearing (apart), the unevenness, the channel (gain: sensors in the order in which tests first have them), the hammer, of a
+    miss twice that and its way, or unused; `modes` the pair of a discrepancy.
     """
 
     kind: str
@@ -220,5 +226,8 @@ def nuisances(
         found += [Nuisance(DRIFT, f"gain of channel {c + 1} in {name}", DRIFT_SD, test=k, index=c) for k, name in drifting for c in range(channels)]
         found += [Nuisance(HAMMER, f"gain of hammer {h + 1}", t.gain, index=h) for h in range(hammers) if hammers > 1]  # of one alone that of all channels
         found += [Nuisance(HAMMER_DRIFT, f"gain of hammer {h + 1} in {name}", DRIFT_SD, test=k, index=h) for k, name in drifting for h in range(hammers)]
+        ways = [(2 * h + i, f"miss of hammer {h + 1} {way}") for h in range(hammers) for i, way in enumerate(WAYS)]
+        found += [Nuisance(MISS, of, MISS_SD, index=i) for i, of in ways]
+        found += [Nuisance(MISS_DRIFT, f"{of} in {name}", MISS_DRIFT_SD, test=k, index=i) for k, name in drifting for i, of in ways]
         found.append(Nuisance(RECORD, "end of the records, before answers have died away", 1.0))
     return tuple(found)

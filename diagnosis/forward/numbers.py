@@ -84,6 +84,11 @@ class Numbers:
         """For every test the numbers of the parameters of hammers' gains and the hammer of each."""
         return [self._of_one_and_all(t, kinds_of.HAMMER, kinds_of.HAMMER_DRIFT) for t in range(len(self.tests))]
 
+    @cached_property
+    def misses(self) -> list[tuple[Integers, Integers]]:
+        """For every test the numbers of the parameters by which hammers miss, and twice the hammer with the way of each."""
+        return [self._of_one_and_all(t, kinds_of.MISS, kinds_of.MISS_DRIFT) for t in range(len(self.tests))]
+
     def _of_one_and_all(self, t: int, in_all: str, in_one: str) -> tuple[Integers, Integers]:
         rows = [(i, p.index) for i, p in enumerate(self.parameters) if p.kind == in_all or (p.kind == in_one and p.test == t)]
         number, index = np.array(rows, int).reshape(-1, 2).T

@@ -10,12 +10,14 @@ import numpy as np
 from thermospindle.diagnosis.forward.nuisance import DIRECTIONS, RANGE_K, Unevenness
 from thermospindle.model.bearing.pair import PairState
 from thermospindle.model.machine import Condition, RingMotion, Spindle
-from thermospindle.model.rotor.chain import RotorBase
+from thermospindle.model.rotor.chain import RotorBase, point_row
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import Effect, Values
+from thermospindle.sim.effects.measuring.hammer_position import off
 from thermospindle.sim.operating import OperatingPoint
 
 Applied = Sequence[tuple[Effect, Values]]
+STEP = 1e-4  # m
 
 
 def replace_measuring(point: OperatingPoint, effects: Applied) -> OperatingPoint:
@@ -27,6 +29,16 @@ def replace_measuring(point: OperatingPoint, effects: Applied) -> OperatingPoint
     if "_bare" in point.__dict__:
         other.__dict__["_bare"] = point.__dict__["_bare"]
     return other
+
+
+def aside(point: OperatingPoint) -> Array:
+    """How the rows of its hammers change a metre beside their points, the two ways on the face that is struck (2, n_ref, n); kept with the point."""
+    kept = point.__dict__.get("_aside")
+    if kept is None:
+        aimed = [point.spindle.point(node) for node in point.spindle.hammer.hammer_nodes]
+        ways = [[point_row(point.chain, off(p, STEP, way)) - point_row(point.chain, p) for p in aimed] for way in (0.0, np.pi / 2)]
+        kept = point.__dict__["_aside"] = np.array(ways) / STEP
+    return np.asarray(kept)
 
 
 def stretched(radial: float, axial: float, grooves: float) -> tuple[Effect, Values]:

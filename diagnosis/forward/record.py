@@ -36,7 +36,11 @@ class RecordEnd:
     @property
     def value(self) -> ComplexArray:
         """(n_resp, n_ref, L)."""
-        return -self.moved((self.at_end[:, None] * self.force)[None, self.seen])[0]
+        return self.of(self.force)
+
+    def of(self, force: ComplexArray) -> ComplexArray:
+        """(n_resp, k, L) of other forces (n, k) on the poles."""
+        return -self.moved((self.at_end[:, None] * force)[None, self.seen])[0]
 
     def moved(self, amplitude: ComplexArray) -> ComplexArray:
         """Sums (m, n_resp, n_ref, L) of the seen poles with `amplitude` (m, k, n_ref) each."""

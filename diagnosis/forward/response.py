@@ -216,6 +216,12 @@ class Response:
         """What responses read of a force on `columns` (r, m), in the measured quantity: (m, n_resp, L)."""
         return _over(columns, self._read)
 
+    def struck(self, rows: Array) -> ComplexArray:
+        """The answer to a hammer whose force acts on `rows` (k, n), (n_resp, k, L), less what of it comes after the records' end."""
+        columns = self.over(rows.T)
+        found = self.read(columns).transpose(1, 0, 2)
+        return found if (end := self._late) is None else found + self._cut * end.of(end.poles.left @ columns)
+
     def driven(self, columns: Array, power: Integers) -> ComplexArray:
         """The force (m, n_ref, L) that appears on one vector where s^`power` times it and `columns` (r, m) is added to the dynamic stiffness, less what
         of it comes after the records' end."""

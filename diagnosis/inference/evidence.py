@@ -47,6 +47,7 @@ GRIDS = {
     kinds_of.DAMPING_DRIFT: (0.0, 0.01, 0.03),
     kinds_of.DRIFT: (0.0, 3e-4, 1e-3, 3e-3, 1e-2),
     kinds_of.HAMMER_DRIFT: (0.0, 1e-3, 3e-3, 1e-2),
+    kinds_of.MISS_DRIFT: (0.0, 3e-5, 1e-4, 3e-4),  # m
     kinds_of.CHANGE: (0.0, 0.01, 0.03),
     kinds_of.EXPANSION: (1.0, 3.0, 6.0),
     kinds_of.ACTION: (0.0, 0.01, 0.03, 0.1),

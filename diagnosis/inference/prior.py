@@ -23,6 +23,7 @@ REFERENCE = {
     kinds_of.DAMPING_DRIFT: kinds_of.DAMPING_DRIFT_SD,
     kinds_of.DRIFT: kinds_of.DRIFT_SD,
     kinds_of.HAMMER_DRIFT: kinds_of.DRIFT_SD,
+    kinds_of.MISS_DRIFT: kinds_of.MISS_DRIFT_SD,
     kinds_of.CHANGE: kinds_of.CHANGE_SD,
     kinds_of.EXPANSION: 1.0,
 }

@@ -57,7 +57,7 @@ class Problem:
             for q in m.shape:
                 self.low[at], self.high[at] = ((limit - q.neutral) / q.prior_sd for limit in q.limits)
                 at += 1
-        small = (kinds_of.STIFFNESS, kinds_of.DAMPING, kinds_of.STIFFNESS_DRIFT, kinds_of.DAMPING_DRIFT, kinds_of.DRIFT, kinds_of.HAMMER_DRIFT)
+        small = (*kinds_of.DISCREPANCIES, kinds_of.DRIFT, kinds_of.HAMMER_DRIFT, kinds_of.MISS_DRIFT)
         self.reach = np.ones(self.length)  # what of a parameter's move counts towards the longest step
         self.reach[: self.nuisances] = [0.05 if q.kind in small else 1.0 for q in model.parameters]
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from tests.blind.hidden import Hidden
 from tests.blind.laws import REFERENCE
-from tests.blind.world import Answer, Plan, Record, World, answer, lowest
+from tests.blind.world import Answer, Plan, Record, World, answer, lowest, points_struck
 from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array
@@ -71,10 +71,12 @@ def drawn_world(random: np.random.Generator, spindle: Spindle) -> World:
 
 
 def further(world: World, seed: int) -> World:
-    """With what worlds have from seed `HAMMERS_FROM` on: thermal motions that are off by a per cent, hammers whose force is off and drifts."""
+    """With what worlds have from seed `HAMMERS_FROM` on: thermal motions that are off by a per cent, hammers whose force is off and drifts and that hit beside their points, another way in each
+    test."""
     random = np.random.default_rng([seed, 73])
     radial, axial = (float(f) for f in 1 + random.choice([3e-3, 0.01, 0.02]) * random.standard_normal(2))
-    return replace(world, motions=(radial, axial), hammer_gain=float(random.choice([1e-3, 5e-3, 0.02])), hammer_drift=float(random.choice([0.0, 1e-3, 4e-3])))
+    misses = {"miss": float(random.choice([5e-5, 2e-4])), "miss_drift": float(random.choice([0.0, 3e-5, 1e-4]))}
+    return replace(world, motions=(radial, axial), hammer_gain=float(random.choice([1e-3, 5e-3, 0.02])), hammer_drift=float(random.choice([0.0, 1e-3, 4e-3])), **misses)
 
 
 def drawn_record(random: np.random.Generator) -> Record:
@@ -101,12 +103,15 @@ def campaign(
         built = parameter.apply(built, parameter.sd * float(np.clip(random.standard_normal(), -3, 3)))
     gain = 1 + spindle.tolerances.gain * random.standard_normal(len(spindle.points))
     hits = np.random.default_rng([seed, 79])
-    force = 1 + world.hammer_gain * hits.standard_normal(len(spindle.hammer.hammer_nodes))
+    aimed, faces = points_struck(spindle), faces_struck(spindle)
+    force = 1 + world.hammer_gain * hits.standard_normal(len(aimed))
+    aimed = aimed + beside(faces, world.miss * hits.standard_normal((len(aimed), 2)))
     hidden = in_contact(built, tests, world, hidden)
     made = []
     for k, plan in enumerate(tests):
         true = plan.temperature + spindle.tolerances.temperature * random.standard_normal()
-        at = answer(built, Condition(true, plan.speed), world, hidden, plan.place(spindle))
+        struck = aimed + beside(faces, world.miss_drift * hits.standard_normal((len(aimed), 2)))
+        at = answer(built, Condition(true, plan.speed), world, hidden, plan.place(spindle), struck)
         drift = 1 + world.gain_drift * random.standard_normal(len(gain))
         hit = force * (1 + world.hammer_drift * hits.standard_normal(len(force)))
         frf = measured(replace(at, gain=at.gain * gain * drift, references=hit[:, None] * at.references), spindle, record, random)
@@ -115,6 +120,18 @@ def campaign(
     stated = Noise(spindle.hammer.noise_of_value, spindle.hammer.noise_of_largest) if record.told == "noise" else None
     found = Campaign(f"blind {seed}", spindle.name, "mobility", spindle.points, tuple(made), stated, lumped_shafts=bool(spindle.structure.shafts))
     return Made(found, built, world, record, tuple(tests), tuple(hidden))
+
+
+def faces_struck(spindle: Spindle) -> Array:
+    """Two directions (hammers, 2, 3) on the face that each hammer strikes, across each other."""
+    hit = [np.array(spindle.point(node).direction, float) for node in spindle.hammer.hammer_nodes]
+    first = [np.eye(3)[int(np.argmin(np.abs(h)))] for h in hit]
+    return np.array([[a, np.cross(h, a)] for h, a in zip(hit, first, strict=True)])
+
+
+def beside(faces: Array, by: Array) -> Array:
+    """Offsets (hammers, 3) on faces (hammers, 2, 3) `by` (hammers, 2) along their directions."""
+    return np.einsum("hw,hwx->hx", by, faces)
 
 
 def in_contact(spindle: Spindle, tests: Sequence[Plan], world: World, hidden: Sequence[Hidden]) -> Sequence[Hidden]:

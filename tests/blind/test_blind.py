@@ -97,7 +97,8 @@ def test_hammers_of_later_worlds_have_gains_of_their_own():
         plain, other = (campaign(drawn.spindle, drawn.tests, (), seed, w, record).campaign for w in (World(), world))
         return np.array([np.median(np.abs(b.frf.value / a.frf.value), axis=(0, 2)) for a, b in zip(plain.tests, other.tests, strict=True)])
 
-    steady, drifting = gains(948, World(hammer_gain=0.01)), gains(948, World(hammer_drift=0.01))
+    steady, drifting, missing = (gains(948, World(**{which: by})) for which, by in (("hammer_gain", 0.01), ("hammer_drift", 0.01), ("miss_drift", 1e-3)))
+    assert np.ptp(missing, axis=0).min() > 1e-3
     assert np.ptp(steady, axis=0).max() < 1e-6 < np.ptp(steady, axis=1).min()
     assert np.ptp(drifting, axis=0).min() > 1e-3
     assert further(World(), HAMMERS_FROM).hammer_gain > 0
@@ -115,7 +116,7 @@ def test_of_two_that_do_the_same_neither_shows_beside_the_other():
     twice = replace(made, hidden=(made.hidden[1], made.hidden[1]))
     assert max(visibility_beside(twice, drawn.spindle, of)) < np.sqrt(len(drawn.tests)) < visibility(twice, drawn.spindle, of)[0]
     gains = seen(replace(made, world=replace(made.world, hammer_gain=0.01)), drawn.spindle)
-    assert gains.columns.shape[1] == of.columns.shape[1] + len(drawn.spindle.hammer.hammer_nodes) * (1 + len(drawn.tests))
+    assert gains.columns.shape[1] == of.columns.shape[1] + len(drawn.spindle.hammer.hammer_nodes) * (1 + len(drawn.tests)) * 3  # of force, and of either way
 
 
 def test_what_is_hidden_leaves_every_bearing_in_contact():

@@ -8,9 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
-from tests.blind.campaigns import Made
+from tests.blind.campaigns import Made, beside, faces_struck
 from tests.blind.hidden import Hidden
-from tests.blind.world import World, answer, modal_errors
+from tests.blind.world import World, answer, modal_errors, points_struck
 from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array, ComplexArray
@@ -85,6 +85,16 @@ def seen(made: Made, spindle: Spindle, lines: int = 160) -> Seen:
         columns.append(column([b * (1 + made.world.hammer_gain * pick) for b in base]))
         for k in range(len(base)):
             columns.append(column([b * (1 + made.world.hammer_drift * pick * (j == k)) for j, b in enumerate(base)]))
+        for way in range(2):
+            by = np.zeros((len(hammer.hammer_nodes), 2))
+            by[i, way] = 1e-4
+            hits = points_struck(spindle) + beside(faces_struck(spindle), by)
+            aside = [
+                (answer(made.built, Condition(p.temperature, p.speed), plain, (), p.place(spindle), hits).frf(frequency) - b) / 1e-4
+                for p, b in zip(made.plans, base, strict=True)
+            ]
+            columns.append(column([b + made.world.miss * d for b, d in zip(base, aside, strict=True)]))
+            columns += [column([b + made.world.miss_drift * d * (j == k) for j, (b, d) in enumerate(zip(base, aside, strict=True))]) for k in range(len(base))]
     for i in range(2 if plain.motions != World().motions else 0):
         further = [tuple(np.array(plain.motions) + by * MOTIONS_SD * SMALL * (np.arange(2) == i)) for by in (1, -1)]
         more, less = (all_tests(made.built, world=replace(plain, motions=motions)) for motions in further)

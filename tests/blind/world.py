@@ -46,6 +46,8 @@ class World:
     motions: tuple[float, float] = (1.0, 1.0)  # thermal motions of the rings in radius and along the axis, over the model's: other coefficients of expansion
     hammer_gain: float = 0.0  # of each hammer's force, in all tests
     hammer_drift: float = 0.0  # of it from test to test
+    miss: float = 0.0  # m, of each hammer beside its point, on either way, in all tests
+    miss_drift: float = 0.0  # m, of it from test to test
 
 
 @dataclass(frozen=True)
@@ -127,8 +129,11 @@ class Answer:
 # ---------------------------------------------------------------- one condition
 
 
-def answer(spindle: Spindle, condition: Condition, world: World, hidden: Sequence[Hidden] = (), place: Place | None = None) -> Answer:
-    """A spindle at a condition, in a world, with hidden physics; `place` is where their laws are asked, by default the condition."""
+def answer(
+    spindle: Spindle, condition: Condition, world: World, hidden: Sequence[Hidden] = (), place: Place | None = None, hits: Array | None = None
+) -> Answer:
+    """A spindle at a condition, in a world, with hidden physics; `place` is where their laws are asked, by default the condition, and `hits` (hammers, 3) where hammers are aimed at, by
+    default their points."""
     if place is None:
         place = condition.temperature, abs(condition.speed) / spindle.nominal_speed
 
@@ -155,7 +160,7 @@ def answer(spindle: Spindle, condition: Condition, world: World, hidden: Sequenc
     if world.stiffness_error or world.damping_error:
         linear = perturbed(linear, drawing, world)
     n = len(spindle.points)
-    hammers = np.array([spindle.point(node).position for node in spindle.hammer.hammer_nodes])
+    hammers = points_struck(spindle) if hits is None else hits
     gain, delay = changed("gain", np.ones(n)), changed("delay", np.zeros(n))
     references = [
         row_of(chain, spindle.point(node).body, at, spindle.point(node).direction)
@@ -163,6 +168,11 @@ def answer(spindle: Spindle, condition: Condition, world: World, hidden: Sequenc
     ]
     responses = [row_of(chain, p.body, p.position, p.direction) for p in spindle.points]
     return Answer(linear, np.array(responses), np.array(references), gain, delay, changed("decay", 0.0), state.status)
+
+
+def points_struck(spindle: Spindle) -> Array:
+    """Positions (hammers, 3) of the points that hammers strike."""
+    return np.array([spindle.point(node).position for node in spindle.hammer.hammer_nodes], float)
 
 
 def lowest(spindle: Spindle) -> str:

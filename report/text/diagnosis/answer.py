@@ -252,6 +252,7 @@ LEARNED = {
     kinds_of.DAMPING_DRIFT: "damping_discrepancy_drift",
     kinds_of.DRIFT: "gain_drift",
     kinds_of.HAMMER_DRIFT: "hammer_gain_drift",
+    kinds_of.MISS_DRIFT: "hammer_miss_m",
     kinds_of.CHANGE: "bearing_change_discrepancy",
     kinds_of.ACTION: "action_of_effects",
 }

@@ -13,7 +13,7 @@ from thermospindle.report.typeset import plain
 
 MOVED, NAMED = 0.5, 3  # standard deviations from which something is said to have moved, and how many of these are named
 PERCENT = (kinds_of.BUILD, kinds_of.EXPANSION, kinds_of.GAIN, kinds_of.HAMMER, *kinds_of.APART, kinds_of.BALLS, kinds_of.CHANGE, kinds_of.UNEVEN, kinds_of.FLUNG)
-TOLD = (*PERCENT, kinds_of.TEMPERATURE)
+UNITS = {kinds_of.TEMPERATURE: (1.0, "K"), kinds_of.MISS: (1e3, "mm")} | dict.fromkeys(PERCENT, (100.0, "%"))
 
 
 def granted_words(d: Diagnosis, drawn: float) -> str:
@@ -24,15 +24,15 @@ def granted_words(d: Diagnosis, drawn: float) -> str:
     left = float(np.sqrt(base.evidence.chi2 / base.fit.count))
     mean, parameters = base.evidence.mean, d.search.model.parameters
     rows = sorted(((float(x), p) for x, p in zip(mean, parameters, strict=False)), key=lambda row: -abs(row[0]))
-    moved = [_moved(x, p) for x, p in rows if p.kind in TOLD and abs(x) >= MOVED][:NAMED]
+    moved = [_moved(x, p) for x, p in rows if p.kind in UNITS and abs(x) >= MOVED][:NAMED]
     constant = _constant(d.search.model, rows) if base.evidence.learned.sizes.get(kinds_of.STIFFNESS, 0.0) > 0 else ""
     by = "; ".join(filter(None, [constant, f"{', '.join(moved)}" if moved else f"no tolerance moved by more than {MOVED:g} of its standard deviations"]))
     return f"As drawn the scene misses these data by {drawn:.1f} of their own standard errors (`compare`, which counts the thermometer's too, shows it mode by mode); what takes that to {left:.2f} is {by}."
 
 
 def _moved(x: float, p: Nuisance) -> str:
-    value = f"{p.at(x):+.2g} K" if p.kind == kinds_of.TEMPERATURE else f"{100 * p.at(x):+.2g} %"
-    return f"{p.name} {value} ({x:+.1f} s.d.)"
+    times, unit = UNITS[p.kind]
+    return f"{p.name} {times * p.at(x):+.2g} {unit} ({x:+.1f} s.d.)"
 
 
 def _constant(model: CampaignModel, rows: list[tuple[float, Nuisance]]) -> str:

@@ -23,6 +23,8 @@ from thermospindle.diagnosis.forward.nuisance import (
     GAIN,
     HAMMER,
     HAMMER_DRIFT,
+    MISS,
+    MISS_DRIFT,
     RECORD,
     STIFFNESS,
     TEMPERATURE,
@@ -40,7 +42,7 @@ from thermospindle.sim.campaign.campaign import Noise
 NOISELESS = Noise(0.0, 0.0)
 CONDITIONS = (Condition(20.0), Condition(45.0, 7200 * RPM))
 FREQUENCY = np.arange(400.0, 6000.1, 40.0)
-KINDS = (BUILD, EXPANSION, *APART, BALLS, CHANGE, FLUNG, TEMPERATURE, GAIN, DRIFT, HAMMER, HAMMER_DRIFT, STIFFNESS, DAMPING, RECORD)
+KINDS = (BUILD, EXPANSION, *APART, BALLS, CHANGE, FLUNG, TEMPERATURE, GAIN, DRIFT, HAMMER, HAMMER_DRIFT, MISS, MISS_DRIFT, STIFFNESS, DAMPING, RECORD)
 SCENES = {"reference": ROOT / "scenes" / "hdd_2003", "symmetric": ROOT / "tests" / "scenes" / "symmetric"}
 
 
@@ -88,7 +90,7 @@ def test_derivatives_of_lines(scene, quantity, decay):
     model, x = made(scene, quantity=quantity, window_decay=decay)
     worst = worst_by_kind(model, 1, x)
     assert set(worst) == set(KINDS) - {FLUNG}  # these scenes' balls have none
-    for kind in (GAIN, DRIFT, HAMMER, HAMMER_DRIFT, STIFFNESS, DAMPING, RECORD):
+    for kind in (GAIN, DRIFT, HAMMER, HAMMER_DRIFT, MISS, MISS_DRIFT, STIFFNESS, DAMPING, RECORD):
         assert worst[kind] < 1e-4, kind
     for kind in (BUILD, EXPANSION, *APART, BALLS, CHANGE, TEMPERATURE):
         assert worst[kind] < 5e-3, kind
@@ -129,7 +131,7 @@ def test_derivatives_of_a_flexible_shaft():
     """Of its reduced model, at speed and warm, against differences of residuals that have a basis of their own on either side: what moves the basis is off by half a per cent."""
     model, x = made(load(ROOT / "scenes" / "five_bearing"), frequency=np.arange(300.0, 4000.1, 50.0))
     worst = worst_by_kind(model, 1, x)
-    for kind in (GAIN, DRIFT, HAMMER, HAMMER_DRIFT, RECORD):
+    for kind in (GAIN, DRIFT, HAMMER, HAMMER_DRIFT, MISS, MISS_DRIFT, RECORD):
         assert worst[kind] < 1e-8, kind
     for kind in (BUILD, EXPANSION, *APART, BALLS, CHANGE, FLUNG, TEMPERATURE, STIFFNESS, DAMPING):
         assert worst[kind] < 1e-2, kind
