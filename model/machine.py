@@ -213,6 +213,12 @@ class Spindle:
         """The bearings with rolling elements: ball rows, then roller bearings."""
         return (*self.bearings, *self.roller_bearings)
 
+    @property
+    def used_materials(self) -> tuple[str, ...]:
+        """Names of the materials that regions, balls, rollers and rings are made of, in order."""
+        used = {g.material for g in self.regions} | {name for b in self.bearings for name in (b.ball_material, b.ring_material)}
+        return tuple(sorted(used | {name for r in self.roller_bearings for name in (r.roller_material, r.ring_material)}))
+
     def bearing(self, name: str) -> Bearing:
         """The ball row of that name."""
         return next(b for b in self.bearings if b.name == name)

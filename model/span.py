@@ -14,9 +14,7 @@ def temperature_range(spindle: Spindle, lubricant: bool = True) -> tuple[float, 
     viscosity, which friction and films ask for; `lubricant` False leaves that out. A finite difference must stay inside: one-sided at
     either end. Empty (low > high) where two laws have no temperature in common.
     """
-    used = {g.material for g in spindle.regions} | {name for b in spindle.bearings for name in (b.ball_material, b.ring_material)}
-    used |= {name for r in spindle.roller_bearings for name in (r.roller_material, r.ring_material)}
-    laws = [law for name in used for law in (spindle.materials[name].youngs_modulus, spindle.materials[name].thermal_expansion)]
+    laws = [law for name in spindle.used_materials for law in (spindle.materials[name].youngs_modulus, spindle.materials[name].thermal_expansion)]
     laws += [spindle.thermal.friction.viscosity] if lubricant else []
     spans = [_span(law) for law in laws]
     return max(low for low, _ in spans), min(high for _, high in spans)

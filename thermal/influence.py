@@ -14,7 +14,7 @@ from functools import lru_cache, partial
 
 import numpy as np
 
-from thermospindle.model.machine import Bearing, Material, Region, RollerBearing, Spindle
+from thermospindle.model.machine import Bearing, Law, Region, RollerBearing, Spindle
 from thermospindle.thermal import store
 from thermospindle.thermal.elastic import Elasticity, Race, Response, Solid
 from thermospindle.thermal.mesh import PartMesh, tiled
@@ -91,7 +91,8 @@ class Gain:
 
 def gains(spindle: Spindle, tolerance: float, temperatures: Mapping[str, float]) -> tuple[Gain, ...]:
     """The gains of `influence` at temperatures (C, by region), part by part, without what only fields of temperature need."""
-    of = _Of(spindle.regions, tuple(spindle.materials.items()), spindle.ringed, spindle.reference_temperature, spindle)
+    made_of = tuple((name, m.youngs_modulus, m.poisson_ratio) for name, m in spindle.materials.items())
+    of = _Of(spindle.regions, made_of, spindle.ringed, spindle.reference_temperature, spindle)
     return tuple(gain_at(temperatures) for gain_at in _gains(of, tolerance))
 
 
@@ -100,7 +101,7 @@ class _Of:
     """What of a spindle its influence depends on."""
 
     regions: tuple[Region, ...]
-    materials: tuple[tuple[str, Material], ...]
+    materials: tuple[tuple[str, Law, float], ...]
     ringed: tuple[Bearing | RollerBearing, ...]
     reference_temperature: float
     spindle: Spindle = field(compare=False)

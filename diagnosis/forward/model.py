@@ -26,6 +26,7 @@ from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import Matrices, matrices
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.effects.effect import HOOKS, Effect, Measurement, Values
+from thermospindle.sim.effects.temperature.expansion_mismatch import expanding, with_material
 from thermospindle.sim.operating import OperatingPoint, operating_point
 
 SIZE_STEP = 0.02  # of a size's or shape parameter's prior standard deviation, for differences
@@ -100,7 +101,7 @@ class CampaignModel:
         """The operating point of test `t`, sizes within their limits; what differs in the measuring chain alone is not worked out again."""
         effects, own = within_limits(effects), self.numbers
         acting = tuple((id(e), *v.values()) for e, v in effects if any(getattr(e, hook) for hook in MEASURING))
-        little = tuple(x[of].tobytes() for of in (own.expansion, own.apart, own.balls[t], own.flung, own.uneven))
+        little = tuple(x[of].tobytes() for of in (own.expansion, own.coefficients, own.apart, own.balls[t], own.flung, own.uneven))
         key = (t, x[: len(self.build)].tobytes(), float(x[own.temperature[t]]), little, acting)
         late = self._points.get(key)
         if late is not None:
@@ -111,6 +112,10 @@ class CampaignModel:
         built = self._built(t, x)
         for i in own.flung:
             built = replace(built, ball_inertia=max(built.ball_inertia * (1 + float(x[i]) * self.parameters[i].sd), 0.0))
+        for i in own.coefficients:
+            if x[i]:
+                material = built.materials[built.used_materials[self.parameters[i].index]]
+                built = with_material(built, expanding(material, float(x[i]) * self.parameters[i].sd))
         every = [*self._otherwise_than_drawn(t, x), *self.present, *effects]
         late = self._points[key] = operating_point(built, replace(condition, temperature=condition.temperature + warmer), every)
         late.chain  # noqa: B018 - worked out here, so that errors come here

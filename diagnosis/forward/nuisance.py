@@ -32,6 +32,8 @@ from thermospindle.model.structure import MOVES
 from thermospindle.model.types import Array
 
 BUILD, TEMPERATURE, GAIN, DRIFT, EXPANSION = "build", "temperature", "gain", "gain drift", "thermal expansion"
+COEFFICIENT, COEFFICIENT_SD = "coefficient of expansion", 0.01
+"""Relative, of each material, the same at all temperatures: what tables give of one alloy differs by a per cent or two."""
 APART = "stiffness apart", "damping apart"  # of bearings
 HAMMER, HAMMER_DRIFT = "gain of a hammer", "drift of a hammer's gain"
 """Of the force at each hammer's point, in all tests and from test to test: its calibration, and the cosine of how askew it hits (5 degrees are 0.4 %)."""
@@ -70,8 +72,8 @@ COINCIDE = 0.01  # of a frequency, within which modes are a pair or a cluster
 RIGID = 1e-6  # of the highest frequency, below which a mode is a rigid body's: rounding leaves some 1e-8 of it, and a beam's highest is in MHz
 EXPANSION_SD = {"radial motion of the rings": 3e-3, "axial motion of the rings": 3e-3, "growth of the grooves": 0.03}
 """Relative errors of thermal motions, the same at all temperatures, at the reference width: two honest finite-element programs differ by a thousandth in the motions, and
-in whether a groove grows with its ring's free strain or follows its face. Coefficients of expansion out of tables, and what a ball gives for a movement, are off by a per cent or
-two, so that how wide they are is learned (`ODDS`)."""
+in whether a groove grows with its ring's free strain or follows its face. What a ball gives for a movement is off by a per cent or two, so that how wide they are is
+learned (`ODDS`)."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,7 @@ class Nuisance:
     """One nuisance parameter; `sd` is one prior standard deviation in its own unit (relative or K).
 
     `index` is the number of the toleranced parameter (build), of the bearing (apart), the unevenness, the channel (gain: sensors in the order in which tests first have them), the hammer, of a
-    miss twice that and its way, or unused; `modes` the pair of a discrepancy.
+    miss twice that and its way, the material (`Spindle.used_materials`), or unused; `modes` the pair of a discrepancy.
     """
 
     kind: str
@@ -200,6 +202,8 @@ def nuisances(
     t = spindle.tolerances
     found = [Nuisance(BUILD, p.name, p.sd, index=i) for i, p in enumerate(build)]
     found += [Nuisance(EXPANSION, name, sd, index=i) for i, (name, sd) in enumerate(EXPANSION_SD.items())]
+    if spindle.ringed:
+        found += [Nuisance(COEFFICIENT, f"expansion of {name}", COEFFICIENT_SD, index=i) for i, name in enumerate(spindle.used_materials)]
     every = [b.name for b in spindle.all_bearings]
     for kind, own, sd in zip(APART, ([b.name for b in spindle.rolling], every), (t.structure, t.damping), strict=True):  # given ones have stiffnesses of their own
         if len(own) > 1:

@@ -31,6 +31,11 @@ class Numbers:
         return [i for i, p in enumerate(self.parameters) if p.kind == kinds_of.EXPANSION]
 
     @cached_property
+    def coefficients(self) -> list[int]:
+        """Numbers of the parameters of coefficients of expansion."""
+        return [i for i, p in enumerate(self.parameters) if p.kind == kinds_of.COEFFICIENT]
+
+    @cached_property
     def apart(self) -> list[int]:
         """Numbers of the parameters by which bearings differ among themselves."""
         return [i for i, p in enumerate(self.parameters) if p.kind in kinds_of.APART]

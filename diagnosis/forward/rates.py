@@ -1,4 +1,4 @@
-"""How the matrices of every test change with what tolerances, thermometers, ring expansion and bearings among themselves may be off by."""
+"""How the matrices of every test change with what tolerances, thermometers, the expansion of materials and of rings, and bearings among themselves may be off by."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ STEP = 0.02  # of a prior standard deviation, for differences
 
 
 def rates_of(model: CampaignModel, x: Array, effects_of: Sequence[Applied], old: Rates | None = None) -> Rates:
-    """dM, dC, dK by build tolerances, ring expansion, bearings apart, stiffness and inertia of balls, uneven joints and temperature, for every test; what structure alone moves is kept from `old`."""
+    """dM, dC, dK by build tolerances, expansion of materials and rings, bearings apart, stiffness and inertia of balls, uneven joints and temperature, for every test; what structure alone moves is kept from `old`."""
     numbers, each, dofs, uneven = [], [], [], frozenset(model.numbers.uneven)
     for t, effects in enumerate(effects_of):
         base = model.operating(t, x, effects)
         at = matrices(base.chain)
-        own = [*range(len(model.build)), *model.numbers.expansion, *model.numbers.apart, *model.numbers.balls[t], *model.numbers.flung, *model.numbers.uneven, model.numbers.temperature[t]]
+        own = [*range(len(model.build)), *model.numbers.expansion, *model.numbers.coefficients, *model.numbers.apart, *model.numbers.balls[t], *model.numbers.flung, *model.numbers.uneven, model.numbers.temperature[t]]
         kept = old.each[t] if old is not None and old.dofs[t] == at.dofs else ()
         found = []
         for k, i in enumerate(own):

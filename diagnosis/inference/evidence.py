@@ -130,10 +130,9 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
         values = each(s, sizes)
         for _ in range(SWEEPS):
             before = logsumexp(values)
-            for kind, grid in grids.items():
-                for size in grid:
-                    if size != sizes[kind] and logsumexp(there := each(s, {**sizes, kind: size})) > logsumexp(values):
-                        values, sizes = there, {**sizes, kind: size}
+            for move in _moves(grids):
+                if (to := {**sizes, **move}) != sizes and logsumexp(there := each(s, to)) > logsumexp(values):
+                    values, sizes = there, to
             for scale in scales:
                 if scale != s and logsumexp(there := each(scale, sizes)) > logsumexp(values):
                     values, s = there, scale
@@ -162,6 +161,16 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
     ln = logsumexp(values) + truncation - (fit.owed / 2 if fit.temper == 1.0 else 0.0)
     by_departing = logsumexp(values) - logsumexp(values[held]) + logsumexp(odds[held])
     return Evidence(ln, learned, mean, spread, np.array(means).reshape(shape), np.array(covariances).reshape(*shape, tests), chi2, by_departing)
+
+
+def _moves(grids: Mapping[str, Sequence[float]]) -> list[dict[str, float]]:
+    """Steps of a sweep: one size after the other; and what drifts from test to test to nothing where a constant error is of some size, for what is off by the same in all tests
+    could be taken for drift, beside which a constant costs more than it gains."""
+    found = [{kind: size} for kind, grid in grids.items() for size in grid]
+    for constant, drift in ((kinds_of.STIFFNESS, kinds_of.STIFFNESS_DRIFT), (kinds_of.DAMPING, kinds_of.DAMPING_DRIFT)):
+        if constant in grids and drift in grids:
+            found += [{constant: size, drift: grids[drift][0]} for size in grids[constant]]
+    return found
 
 
 def integrated(model: CampaignModel, fit: Fit, errors: float, sizes: Mapping[str, float]) -> Nuisances:

@@ -223,7 +223,7 @@ class Effect:
     sized: Sizes | None = None
     drifts: str = ""  # of one drafted from a diagnosis: the element, or effect, whose change it is
     lasting: bool = False  # its size is the same in every test, as a mass is: no law that data may depart from
-    exact: bool = False  # mechanics alone gives its law over speed and temperature: data may hardly depart from it, and have none of their own
+    exact: bool = False  # mechanics or the material alone gives its law over speed and temperature: data may hardly depart from it, and have none of their own
 
     def neutral(self) -> dict[str, float]:
         return {p.name: p.neutral for p in self.parameters}

@@ -113,7 +113,7 @@ def _by_size(
         except (ValueError, RuntimeError, ArithmeticError):
             after = before
         moved.append(of.whitened([(after - before) / step if k == t else np.zeros_like(b) for k, b in enumerate(base)]))
-    columns = np.array([np.sum(moved, axis=0)] if m.effect.lasting else moved).T
+    columns = np.array([np.sum(moved, axis=0)] if m.effect.lasting or m.effect.exact else moved).T
     low, high = ((limit - m.size.neutral) / m.size.prior_sd for limit in m.size.limits)
     return columns, np.full(columns.shape[1], low), np.full(columns.shape[1], high)
 

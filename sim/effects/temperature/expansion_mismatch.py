@@ -93,4 +93,5 @@ EFFECT = Effect(
     spindle=spindle,
     idle=idle,
     acts_on=(SECTION,),
+    exact=True,
 )

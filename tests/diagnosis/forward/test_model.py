@@ -16,6 +16,7 @@ from thermospindle.diagnosis.forward.nuisance import (
     BALLS,
     BUILD,
     CHANGE,
+    COEFFICIENT,
     DAMPING,
     DRIFT,
     EXPANSION,
@@ -42,7 +43,7 @@ from thermospindle.sim.campaign.campaign import Noise
 NOISELESS = Noise(0.0, 0.0)
 CONDITIONS = (Condition(20.0), Condition(45.0, 7200 * RPM))
 FREQUENCY = np.arange(400.0, 6000.1, 40.0)
-KINDS = (BUILD, EXPANSION, *APART, BALLS, CHANGE, FLUNG, TEMPERATURE, GAIN, DRIFT, HAMMER, HAMMER_DRIFT, MISS, MISS_DRIFT, STIFFNESS, DAMPING, RECORD)
+KINDS = (BUILD, EXPANSION, COEFFICIENT, *APART, BALLS, CHANGE, FLUNG, TEMPERATURE, GAIN, DRIFT, HAMMER, HAMMER_DRIFT, MISS, MISS_DRIFT, STIFFNESS, DAMPING, RECORD)
 SCENES = {"reference": ROOT / "scenes" / "hdd_2003", "symmetric": ROOT / "tests" / "scenes" / "symmetric"}
 
 
@@ -92,7 +93,7 @@ def test_derivatives_of_lines(scene, quantity, decay):
     assert set(worst) == set(KINDS) - {FLUNG}  # these scenes' balls have none
     for kind in (GAIN, DRIFT, HAMMER, HAMMER_DRIFT, MISS, MISS_DRIFT, STIFFNESS, DAMPING, RECORD):
         assert worst[kind] < 1e-4, kind
-    for kind in (BUILD, EXPANSION, *APART, BALLS, CHANGE, TEMPERATURE):
+    for kind in (BUILD, EXPANSION, COEFFICIENT, *APART, BALLS, CHANGE, TEMPERATURE):
         assert worst[kind] < 5e-3, kind
 
 
@@ -133,7 +134,7 @@ def test_derivatives_of_a_flexible_shaft():
     worst = worst_by_kind(model, 1, x)
     for kind in (GAIN, DRIFT, HAMMER, HAMMER_DRIFT, MISS, MISS_DRIFT, RECORD):
         assert worst[kind] < 1e-8, kind
-    for kind in (BUILD, EXPANSION, *APART, BALLS, CHANGE, FLUNG, TEMPERATURE, STIFFNESS, DAMPING):
+    for kind in (BUILD, EXPANSION, COEFFICIENT, *APART, BALLS, CHANGE, FLUNG, TEMPERATURE, STIFFNESS, DAMPING):
         assert worst[kind] < 1e-2, kind
 
 

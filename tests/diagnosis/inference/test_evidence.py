@@ -17,6 +17,7 @@ from thermospindle.diagnosis.forward.nuisance import (
     DAMPING,
     DAMPING_DRIFT,
     DAMPING_DRIFT_SD,
+    DAMPING_SD,
     DRIFT,
     EXPANSION,
     STIFFNESS,
@@ -25,9 +26,11 @@ from thermospindle.diagnosis.forward.nuisance import (
     Nuisance,
 )
 from thermospindle.diagnosis.inference.evidence import FARTHER, OFFSET, WIDER, WIDTHS, Learned, evidence, left_out, own_grid
+from thermospindle.diagnosis.inference.fit import Fit
 from thermospindle.diagnosis.inference.gaussian import Quadratic, ln_integral, marginal, posterior, under
 from thermospindle.diagnosis.inference.prior import (
     ACTION,
+    AGEING,
     Root,
     mechanism_root,
     misjudged,
@@ -114,6 +117,16 @@ def test_a_model_that_is_wrong_may_be_wrong_in_what_an_effect_does():
     assert learned[[2, 4], 0] == pytest.approx(0.1 / STIFFNESS_DRIFT_SD * np.array([0.01, 0.02]))
     opposed = misjudged(model, right | {STIFFNESS: 0.01}, np.concatenate([moved, -moved]))
     assert opposed @ opposed.T == pytest.approx(2 * found @ found.T)  # two mechanisms may be misjudged though together they move nothing
+
+
+def test_gains_age_with_the_order_of_the_tests():
+    """Beside what they scatter by, each sensor's and each hammer's by itself."""
+    parameters = [Nuisance(kind, "gain", 1e-3, test=t, index=i) for kind in (DRIFT, kinds_of.HAMMER_DRIFT) for i in range(2) for t in range(3)]
+    model = SimpleNamespace(parameters=parameters, tests=[None] * 3)
+    own = nuisance_root(model, {DRIFT: 2 * kinds_of.DRIFT_SD, kinds_of.HAMMER_DRIFT: 0.0}, np.zeros((0, 3, 2, 0)))
+    covariance = np.diag(own.scale**2) + own.beside @ own.beside.T
+    one = 4 * (np.eye(3) + AGEING**2 * np.outer([-1, 0, 1], [-1, 0, 1]))
+    assert covariance == pytest.approx(block_diag(one, one, np.zeros((6, 6))))
 
 
 def test_what_is_wrong_in_an_effect_is_alike_in_all_tests():
@@ -268,3 +281,31 @@ def test_what_is_left_out_is_predicted_from_the_rest(hidden):
         density += made.ln(prior, learned.errors) - without.ln(prior, learned.errors)
     assert left_out(made.model, made.fit, found, groups) == pytest.approx((np.sqrt(total / made.fit.count), density), rel=1e-4)
     assert np.isnan(left_out(made.model, made.fit, found, [[0, 1, 2]])).all()
+
+
+def test_what_is_off_by_the_same_in_all_tests_is_no_drift():
+    """A constant error of two modes among many that have none, each of them free to drift as well, and gains that drift by much: as long as these make errors look large, drift costs less than a
+    constant of all modes, which beside it then costs more than it gains. Another's campaign with nothing hidden was *unexplained* for that: the damping of one mode off by 7 % in all nine tests."""
+    random = np.random.default_rng(2)
+    modes, tests, rows = 12, 6, 60
+    parameters = [Nuisance(DAMPING, "c", DAMPING_SD, modes=(i, j)) for i in range(modes) for j in range(i, modes)]
+    parameters += [Nuisance(DAMPING_DRIFT, "d", DAMPING_DRIFT_SD, test=t, modes=(i, i)) for t in range(tests) for i in range(modes)]
+    parameters += [Nuisance(DRIFT, "g", kinds_of.DRIFT_SD, test=t, index=i) for t in range(tests) for i in range(4)]
+    true = {DAMPING: 1.0, DRIFT: 6.0}
+    n, by_test = len(parameters), []
+    for t in range(tests):
+        columns = 3 * random.standard_normal((rows, n))
+        for k, p in enumerate(parameters):
+            if p.kind == DRIFT:
+                columns[:, k] *= float(p.test == t)
+            elif p.kind == DAMPING_DRIFT:  # does what the constant error of the same mode does
+                constant = next(c for c, q in enumerate(parameters) if q.kind == DAMPING and q.modes == p.modes)
+                columns[:, k] = (DAMPING_DRIFT_SD / DAMPING_SD) * columns[:, constant] if p.test == t else 0.0
+        y = columns @ np.array([true.get(p.kind, 0.0) if p.kind == DRIFT or p.modes in ((0, 0), (5, 5)) else 0.0 for p in parameters]) + random.standard_normal(rows)
+        by_test.append((float(y @ y), -columns.T @ y, columns.T @ columns))
+    chi2, gradient, information = (np.sum([b[k] for b in by_test], axis=0) for k in range(3))
+    fit = Fit((), np.zeros(n), np.zeros((0, tests)), (), (), float(chi2), gradient, information, tuple(by_test), tests * rows, None, 1.0)
+    model = SimpleNamespace(parameters=tuple(parameters), tests=tuple(SimpleNamespace(condition=c, count=rows) for c in [Condition(20.0)] * tests))
+    learned = evidence(model, fit).learned.sizes
+    assert learned[DAMPING] > 0.0
+    assert learned[DAMPING_DRIFT] == 0.0

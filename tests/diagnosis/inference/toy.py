@@ -21,6 +21,7 @@ from thermospindle.diagnosis.forward.nuisance import (
     Nuisance,
 )
 from thermospindle.diagnosis.inference.fit import Fit
+from thermospindle.diagnosis.inference.prior import AGEING
 from thermospindle.model.machine import Condition
 from thermospindle.sim.effects.effect import Effect, Parameter
 
@@ -42,6 +43,8 @@ class Toy:
         n = len(self.model.parameters)
         whole = np.zeros((len(self.fit.point), len(self.fit.point)))
         whole[:n, :n] = np.diag([size.get(p.kind, 1.0) ** 2 for p in self.model.parameters])
+        ages = np.array([size[DRIFT] * AGEING * (p.test - 1) if p.kind == DRIFT else 0.0 for p in self.model.parameters])  # -1, 0, 1 in three tests
+        whole[:n, :n] += np.outer(ages, ages)
         for m, root, (width, departure, _) in zip(self.mechanisms, self.fit.roots, own, strict=True):
             inverse = np.linalg.inv(root)
             whole[n:, n:] = inverse @ size_covariance(CONDITIONS, width * m.size.prior_sd, departure) @ inverse.T

@@ -56,7 +56,7 @@ def test_beside_a_model_that_is_worse_less_shows(plain, worse, least, most):
     known, now = (visibility(model.thinned, done, of, m, m.size.neutral + size) for of in (learned, worse(learned)))
     assert least < now / known < most
     known, now = (screen(model, done, 1.0, of, [m], 1, turned=False)[0].visibility for of in (learned, worse(learned)))
-    assert least < now / known < 0.96  # what drifts is beside what tolerances take already
+    assert least < now / known < 0.97  # what drifts is beside what tolerances take already
 
 
 @pytest.mark.parametrize(("built", "found"), [(0.3, True), (0.0, False)])
