@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import partial
 
+import cloudpickle
 import numpy as np
 
 from thermospindle.diagnosis.data.lines import line_data
@@ -94,6 +95,14 @@ class Diagnosis:
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self.campaign.title!r} beside {self.spindle.name}: {self.verdict.reason}>"
+
+    def __reduce__(self) -> tuple[Callable, tuple[bytes]]:
+        """For `pickle`, which refuses what free forms and tolerances do, functions made where they are asked."""
+        return _unpacked, (cloudpickle.dumps({f.name: getattr(self, f.name) for f in fields(self)}),)
+
+
+def _unpacked(packed: bytes) -> Diagnosis:
+    return Diagnosis(**cloudpickle.loads(packed))
 
 
 def diagnose(

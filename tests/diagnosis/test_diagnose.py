@@ -1,6 +1,7 @@
 """The whole diagnosis on campaigns with a known answer: another program's, and mode tables drawn from the model with a hidden effect."""
 
 import json
+import pickle
 import re
 from dataclasses import replace
 
@@ -69,6 +70,13 @@ def test_probabilities_add_up_to_one(nothing_missing):
     verdict = nothing_missing.verdict
     total = verdict.probability_none + verdict.probability_unknown + sum(c.probability for c in verdict.candidates)
     assert total == pytest.approx(1.0, abs=1e-9)
+
+
+def test_a_diagnosis_is_kept_by_pickle(nothing_missing):
+    """Free forms and tolerances are functions made where they are asked, which `pickle` refuses."""
+    again = pickle.loads(pickle.dumps(nothing_missing))
+    assert diagnosis_json(again) == diagnosis_json(nothing_missing)
+    assert again.search.model.residual(0, again.verdict.accepted.fit.nuisance, ()) == pytest.approx(nothing_missing.search.model.residual(0, nothing_missing.verdict.accepted.fit.nuisance, ()))
 
 
 def test_every_test_is_left_out_once(nothing_missing):
