@@ -94,6 +94,11 @@ class CampaignModel:
         return Numbers(self.parameters, self.tests, self.reference)
 
     @cached_property
+    def sd(self) -> Array:
+        """Prior standard deviations (P,) of the parameters in their own units."""
+        return np.array([p.sd for p in self.parameters])
+
+    @cached_property
     def unevennesses(self) -> tuple[Unevenness, ...]:
         return unevennesses(self.spindle)
 
@@ -178,14 +183,12 @@ class CampaignModel:
 
     def _struck(self, t: int, point: OperatingPoint, x: Array) -> Measurement:
         """The measuring chain of a point, whose hammers miss theirs and have gains of their own."""
-        number, which = self.numbers.misses[t]
+        (number, which), of = self.numbers.misses[t], self.numbers.hammer_of[t]
         chain, gain = point.measurement, self.hammer_gain(t, x)
         if not (len(gain) and (x[number].any() or (gain != 1.0).any())):
             return chain
-        rows = chain.reference_rows.copy()
-        for n, (hammer, way) in zip(number, zip(*divmod(which, 2), strict=True), strict=True):
-            own = self.numbers.hammer_of[t] == hammer
-            rows[own] += x[n] * self.parameters[n].sd * aside(point)[way][own]
+        missed = np.bincount(which, x[number] * self.sd[number], 2 * (of.max() + 1)).reshape(-1, 2)  # of every hammer, either way
+        rows = chain.reference_rows + np.einsum("rw,wrn->rn", missed[of], aside(point))
         return replace(chain, reference_rows=gain[:, None] * rows)
 
     def hammer_gain(self, t: int, x: Array) -> Array:
@@ -266,7 +269,7 @@ class CampaignModel:
 
     def _gain(self, x: Array, number: Integers, index: Integers, of: Integers) -> Array:
         """Gains of rows (or columns) that are `of` these channels (or hammers), which the parameters by `number` are the ln of, one or more for each `index`."""
-        ln = x[number] * np.array([self.parameters[i].sd for i in number])
+        ln = x[number] * self.sd[number]
         return np.asarray(np.exp((of[:, None] == index) @ ln))
 
     def whitened(self, t: int, value: ComplexArray, measured: ComplexArray | float) -> Array:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
 from thermospindle.diagnosis.forward.nuisance import DIRECTIONS, RANGE_K, Unevenness
 from thermospindle.model.bearing.pair import PairState
-from thermospindle.model.machine import Condition, RingMotion, Spindle
-from thermospindle.model.rotor.chain import RotorBase, point_row
+from thermospindle.model.machine import Condition, Point, RingMotion, Spindle
+from thermospindle.model.rotor.chain import Layout, RotorBase, row_of
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import Effect, Values
 from thermospindle.sim.effects.measuring.hammer_position import off
@@ -32,13 +33,15 @@ def replace_measuring(point: OperatingPoint, effects: Applied) -> OperatingPoint
 
 
 def aside(point: OperatingPoint) -> Array:
-    """How the rows of its hammers change a metre beside their points, the two ways on the face that is struck (2, n_ref, n); kept with the point."""
-    kept = point.__dict__.get("_aside")
-    if kept is None:
-        aimed = [point.spindle.point(node) for node in point.spindle.hammer.hammer_nodes]
-        ways = [[point_row(point.chain, off(p, STEP, way)) - point_row(point.chain, p) for p in aimed] for way in (0.0, np.pi / 2)]
-        kept = point.__dict__["_aside"] = np.array(ways) / STEP
-    return np.asarray(kept)
+    """How the rows of its hammers change a metre beside their points, the two ways on the face that is struck (2, n_ref, n)."""
+    return _aside(point.chain.layout, tuple(point.spindle.point(node) for node in point.spindle.hammer.hammer_nodes))
+
+
+@lru_cache(maxsize=256)
+def _aside(layout: Layout, aimed: tuple[Point, ...]) -> Array:
+    found = np.array([[row_of(layout, off(p, STEP, way)) - row_of(layout, p) for p in aimed] for way in (0.0, np.pi / 2)]) / STEP
+    found.flags.writeable = False
+    return found
 
 
 def stretched(radial: float, axial: float, grooves: float) -> tuple[Effect, Values]:

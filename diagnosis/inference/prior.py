@@ -117,7 +117,7 @@ def misjudged(model: CampaignModel, sizes: Mapping[str, float], moved: Array) ->
 
 def ageing(model: CampaignModel, sizes: Mapping[str, float]) -> Array:
     """Root (P, k) of the prior covariance of gains that go straight with the order in which the campaign lists its tests, in proportion to their drift from test to test."""
-    order = np.linspace(-1.0, 1.0, len(model.tests)) if len(model.tests) > 1 else np.zeros(len(model.tests))
+    order = np.linspace(-1.0, 1.0, len(model.tests))
     found: dict[tuple[str, int], Array] = {}
     for i, q in enumerate(model.parameters):
         if q.kind in AGES and sizes.get(q.kind, REFERENCE[q.kind]):

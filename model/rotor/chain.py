@@ -166,7 +166,12 @@ def _element_rows(layout: Layout, a: str, b: str, z: float, slides: str) -> Arra
 
 def point_row(chain: RotorBase, point: Point) -> Array:
     """Row (n,) of the displacement of a measuring point along its direction."""
-    return np.array(point.direction) @ motion_rows(chain, point.body, point.position)[:3]
+    return row_of(chain.layout, point)
+
+
+def row_of(layout: Layout, point: Point) -> Array:
+    """The same from what it depends on alone."""
+    return np.array(point.direction) @ _motion_rows(layout, point.body, point.position)[:3]
 
 
 def matrices(chain: RotorBase) -> Matrices:
