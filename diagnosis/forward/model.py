@@ -65,9 +65,9 @@ class CampaignModel:
     # ------------------------------------------------------------ the spindle at nuisance values
 
     def _built(self, t: int, x: Array) -> Spindle:
-        values = x[: len(self.build)]
+        values, coefficients = x[: len(self.build)], self.numbers.coefficients
         t = self._like[t]
-        key = (t, values.tobytes())
+        key = (t, values.tobytes(), x[coefficients].tobytes())
         if key not in self._spindles:
             if len(self._spindles) > 4 * len(self.tests):
                 self._spindles.clear()
@@ -75,6 +75,10 @@ class CampaignModel:
             for parameter, nuisance, value in zip(self.build, self.parameters[: len(values)], values, strict=True):
                 if value:
                     spindle = parameter.apply(spindle, nuisance.at(value))
+            for i in coefficients:
+                if x[i]:
+                    material = spindle.materials[spindle.used_materials[self.parameters[i].index]]
+                    spindle = with_material(spindle, expanding(material, float(x[i]) * self.sd[i]))
             self._spindles[key] = spindle
         return self._spindles[key]
 
@@ -117,10 +121,6 @@ class CampaignModel:
         built = self._built(t, x)
         for i in own.flung:
             built = replace(built, ball_inertia=max(built.ball_inertia * (1 + float(x[i]) * self.parameters[i].sd), 0.0))
-        for i in own.coefficients:
-            if x[i]:
-                material = built.materials[built.used_materials[self.parameters[i].index]]
-                built = with_material(built, expanding(material, float(x[i]) * self.parameters[i].sd))
         every = [*self._otherwise_than_drawn(t, x), *self.present, *effects]
         late = self._points[key] = operating_point(built, replace(condition, temperature=condition.temperature + warmer), every)
         late.chain  # noqa: B018 - worked out here, so that errors come here
