@@ -132,9 +132,9 @@ def test_derivatives_of_a_flexible_shaft():
     """Of its reduced model, at speed and warm, against differences of residuals that have a basis of their own on either side: what moves the basis is off by half a per cent."""
     model, x = made(load(ROOT / "scenes" / "five_bearing"), frequency=np.arange(300.0, 4000.1, 50.0))
     worst = worst_by_kind(model, 1, x)
-    for kind in (GAIN, DRIFT, HAMMER, HAMMER_DRIFT, MISS, MISS_DRIFT, RECORD):
+    for kind in (GAIN, DRIFT, HAMMER, HAMMER_DRIFT, RECORD):
         assert worst[kind] < 1e-8, kind
-    for kind in (BUILD, EXPANSION, COEFFICIENT, *APART, BALLS, CHANGE, FLUNG, TEMPERATURE, STIFFNESS, DAMPING):
+    for kind in (MISS, MISS_DRIFT, BUILD, EXPANSION, COEFFICIENT, *APART, BALLS, CHANGE, FLUNG, TEMPERATURE, STIFFNESS, DAMPING):
         assert worst[kind] < 1e-2, kind
 
 
