@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import partial
 
-import cloudpickle
 import numpy as np
 
 from thermospindle.diagnosis.data.lines import line_data
@@ -23,7 +22,7 @@ from thermospindle.diagnosis.misfit.patterns import Chosen, choose_for
 from thermospindle.diagnosis.prediction.detectable import smallest, unseen_beside
 from thermospindle.diagnosis.prediction.next_test import NextTest, next_tests
 from thermospindle.model.machine import Condition, Spindle
-from thermospindle.model.parallel import in_parallel
+from thermospindle.model.parallel import in_parallel, packed, unpacked
 from thermospindle.model.types import Array
 from thermospindle.sim.campaign.beside import check_points
 from thermospindle.sim.campaign.campaign import Campaign, Noise, Test
@@ -98,11 +97,11 @@ class Diagnosis:
 
     def __reduce__(self) -> tuple[Callable, tuple[bytes]]:
         """For `pickle`, which refuses what free forms and tolerances do, functions made where they are asked."""
-        return _unpacked, (cloudpickle.dumps({f.name: getattr(self, f.name) for f in fields(self)}),)
+        return _again, (packed({f.name: getattr(self, f.name) for f in fields(self)}),)
 
 
-def _unpacked(packed: bytes) -> Diagnosis:
-    return Diagnosis(**cloudpickle.loads(packed))
+def _again(kept: bytes) -> Diagnosis:
+    return Diagnosis(**unpacked(kept))
 
 
 def diagnose(

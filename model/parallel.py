@@ -110,7 +110,7 @@ def _pool(workers: int) -> Iterator[Any]:
 def _sent(function: Callable[[Item], Result], items: list[Item], workers: int) -> Iterator[Result]:
     with _pool(workers) as pool, TemporaryDirectory(prefix="thermospindle-") as folder:  # a pool sends with every item what it is to call
         sent = Path(folder) / uuid4().hex
-        sent.write_bytes(cloudpickle.dumps(function))
+        sent.write_bytes(packed(function))
         yield from pool.map(partial(_call, sent), items)
 
 
@@ -118,6 +118,16 @@ def _running(workers: int) -> bool:
     """Whether that many workers are at hand; half the idle time is left to them, lest they go while they are counted on."""
     there, until = _last
     return workers <= there and time.monotonic() - until < IDLE / 2
+
+
+def packed(what: Any) -> bytes:
+    """An object for another process or another day of the same user, closures and all."""
+    return bytes(cloudpickle.dumps(what))
+
+
+def unpacked(kept: bytes) -> Any:
+    """What was packed. It runs what is in it: nothing that a file of data holds comes here."""
+    return cloudpickle.loads(kept)
 
 
 # ---------------------------------------------------------------- in a worker
@@ -145,7 +155,7 @@ def _leave_with(parent: int) -> None:
 
 @lru_cache(maxsize=2)
 def _function(sent: Path) -> Callable[[Any], Any]:
-    return cloudpickle.loads(sent.read_bytes())
+    return unpacked(sent.read_bytes())
 
 
 def _call(sent: Path, item: Any) -> Any:
