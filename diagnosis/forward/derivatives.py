@@ -62,7 +62,7 @@ def nuisance_jacobian(model: CampaignModel, t: int, x: Array, effects: Applied, 
     for ref, gain in enumerate(model.hammer_gain(t, x)):
         moved = gain * response.struck(missing[:, ref]) * weight[:, ref][:, None]
         for n in np.flatnonzero(way // 2 == struck_by[ref]):
-            miss = moved[:, way[n] % 2] * model.parameters[missed[n]].sd
+            miss = moved[:, way[n] % 2] * model.sd[missed[n]]
             jacobian[at + n, 0, :, ref], jacobian[at + n, 1, :, ref] = miss.real, miss.imag
     at += len(missed)
     if record:

@@ -117,12 +117,11 @@ def misjudged(model: CampaignModel, sizes: Mapping[str, float], moved: Array) ->
 
 def ageing(model: CampaignModel, sizes: Mapping[str, float]) -> Array:
     """Root (P, k) of the prior covariance of gains that go straight with the order in which the campaign lists its tests, in proportion to their drift from test to test."""
-    order = np.linspace(-1.0, 1.0, len(model.tests))
+    order, scatter = np.linspace(-1.0, 1.0, len(model.tests)), np.sqrt(nuisance_variances(model, sizes))
     found: dict[tuple[str, int], Array] = {}
     for i, q in enumerate(model.parameters):
-        if q.kind in AGES and sizes.get(q.kind, REFERENCE[q.kind]):
-            column = found.setdefault((q.kind, q.index), np.zeros(len(model.parameters)))
-            column[i] = AGEING * sizes.get(q.kind, REFERENCE[q.kind]) / REFERENCE[q.kind] * order[q.test]
+        if q.kind in AGES and scatter[i]:
+            found.setdefault((q.kind, q.index), np.zeros(len(model.parameters)))[i] = AGEING * scatter[i] * order[q.test]
     return np.array(list(found.values())).reshape(len(found), len(model.parameters)).T
 
 
