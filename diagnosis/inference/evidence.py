@@ -170,6 +170,9 @@ def _moves(grids: Mapping[str, Sequence[float]]) -> list[dict[str, float]]:
     for constant, drift in ((kinds_of.STIFFNESS, kinds_of.STIFFNESS_DRIFT), (kinds_of.DAMPING, kinds_of.DAMPING_DRIFT)):
         if constant in grids and drift in grids:
             found += [{constant: size, drift: grids[drift][0]} for size in grids[constant]]
+    if kinds_of.BUILD in grids:
+        as_drawn = {kind: grids[kind][0] for kind in kinds_of.DISCREPANCIES if kind in grids}
+        found += [{**as_drawn, kinds_of.BUILD: times} for times in grids[kinds_of.BUILD]]
     return found
 
 

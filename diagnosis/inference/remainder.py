@@ -23,7 +23,8 @@ from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.inference.screening import linearised
 from thermospindle.model.types import Array, ComplexArray
 
-LAGS, SMALL = 12, 0.05  # lines over which residuals are compared, and the correlation that chance makes
+LAGS = 12  # lines over which residuals are compared
+SMALL, BY_CHANCE = 0.05, 3.0  # a correlation that says nothing, and its standard deviations by chance (of n numbers 1 / sqrt(n) each) up to which it says nothing either
 LOOKED = 0.2  # correlation from which a light resonance is looked for
 ALIKE = 0.5  # correlation of what is left in one test with what is left in another, from which it is called constant
 DRIFTS = tuple(0.02 * k for k in range(-12, 13))  # of ln frequency over `RANGE_K`, of a resonance that moves with temperature
@@ -52,15 +53,20 @@ def overlap(model: CampaignModel, fit: Fit) -> Overlap:
         for t, d in enumerate(model.tests)
         if isinstance(d, LineData) and d.count
     ]
-    total, square = np.zeros(LAGS), sum(float(np.mean(r * r)) for _, r in left)
+    total, square, count = np.zeros(LAGS), sum(float(np.mean(r * r)) for _, r in left), sum(r.size for _, r in left)
     if square <= 0.0:
         return Overlap(1.0, 0.0, 1.0)
     for _, r in left:
         total += [float(np.mean(r[:, k:] * r[:, :-k])) if r.shape[1] > k else 0.0 for k in range(1, LAGS + 1)]
     correlation = total / square
-    seen = np.cumprod(correlation > SMALL).astype(bool)  # up to where it is lost in chance
+    seen = np.cumprod(correlation > says_nothing(count)).astype(bool)  # up to where it is lost in chance
     lines, tests = float(1 + 2 * correlation[seen].sum()), between_tests(left)
     return Overlap(lines, tests, lines * (1 + (len(left) - 1) * tests))
+
+
+def says_nothing(count: int) -> float:
+    """Up to where a correlation of so many numbers with as many others is chance, or too little to matter."""
+    return max(SMALL, BY_CHANCE / float(np.sqrt(count)))
 
 
 def between_tests(left: Sequence[tuple[Array, Array]]) -> float:
@@ -73,7 +79,7 @@ def between_tests(left: Sequence[tuple[Array, Array]]) -> float:
                 there = other[:, np.abs(other_lines[None, :] - lines[:, None]).argmin(axis=1)].ravel()
                 size = float(np.linalg.norm(r) * np.linalg.norm(there))
                 correlation = float(r.ravel() @ there) / size if size else 0.0
-                found.append(correlation if correlation > SMALL else 0.0)
+                found.append(correlation if correlation > says_nothing(r.size) else 0.0)
     return float(np.mean(found)) if found else 0.0
 
 

@@ -84,6 +84,14 @@ def test_what_is_missed_in_every_test_is_one_finding(share):
     assert between_tests(left) == pytest.approx(share, abs=0.02)
 
 
+def test_noise_of_few_numbers_says_nothing_twice():
+    """One FRF of 140 lines in four tests: correlations of a twentieth are chance there, and evidence is worth what it says. A spindle's weaker preload, seen from its nose alone, was no
+    effect for that: its 8.0 in ln evidence counted 2."""
+    random = np.random.default_rng(11)
+    found = [between_tests([(np.arange(140.0), random.standard_normal((2, 140))) for _ in range(4)]) for _ in range(100)]
+    assert np.mean(np.array(found) > 0) < 0.05  # six pairs, of which each is beyond three standard deviations once in 700
+
+
 @pytest.mark.parametrize(("gained", "word"), [(0.5, "two effects"), (100.0, "ambiguous")])
 def test_a_little_more_beside_a_law_that_does_not_hold_is_no_second_effect(gained, word):
     found = made({("first", "more"): 617.0, "first": 600.0, "more": 20.0})

@@ -47,7 +47,7 @@ def test_a_fit_that_stalls_from_where_screening_points_starts_again():
     screened = screen(model, base, 1.0, none.learned, [m], 1)[0]
     expected = steady(none.learned)
     most = fit(model, (), none.mean, learned=expected).cost
-    found = _fit_one(model, base.rates, (1.0,), most, expected, False, Task((m,), (screened.start,), -np.inf))
+    found = _fit_one(model, base.rates, (1.0,), most, expected, False, np.inf, Task((m,), (screened.start,), -np.inf))
     assert found is not None
     assert found.fit.chi2 / found.fit.count == pytest.approx(1.0, abs=0.1)
     assert found.evidence.ln - none.ln > 8
