@@ -50,6 +50,13 @@ class Hypothesis:
         return any(m.free for m in self.mechanisms)
 
     @property
+    def idle(self) -> tuple[bool, ...]:
+        """Of every mechanism whether its sizes, in all tests, are its neutral value within three of their errors."""
+        errors = np.sqrt(np.einsum("mtt->mt", self.evidence.size_covariance))
+        neutral = np.array([[m.size.neutral] for m in self.mechanisms])
+        return tuple((np.abs(self.evidence.sizes - neutral) <= 3 * errors).all(axis=1).tolist())
+
+    @property
     def excess(self) -> float:
         """What is left beyond noise, in squares of the errors a number."""
         return max(self.fit.chi2 / self.fit.count - 1.0, 0.0)

@@ -77,18 +77,22 @@ def joined_early(
 
 
 def without_one(model: CampaignModel, found: Sequence[Hypothesis], most: float, expected: Learned, workers) -> list[Hypothesis]:
-    """The best explanation of several mechanisms without each of them, as far as the rest was not fitted together: it came to be one by one, and what came first
-    may be what the others do without (backward elimination: Draper & Smith, *Applied Regression Analysis*, 3rd ed. 1998, 15.3)."""
-    best = max(found, key=lambda h: h.evidence.ln, default=None)
-    if best is None:
-        return []
-    known, tasks, at = {with_laws(h.mechanisms) for h in found}, [], len(model.parameters)
-    for k, m in enumerate(best.mechanisms):
-        rest, own = (*best.mechanisms[:k], *best.mechanisms[k + 1 :]), len(model.tests) + len(m.shape)
-        if rest and with_laws(rest) not in known:
-            tasks.append(Task(rest, (np.delete(best.fit.point, slice(at, at + own)),), -np.inf))
-        at += own
-    return fitted(model, tasks, TEMPERS[-2:], best.fit, most, expected, workers, beaten=best.fit.cost + 2 * FAR) if tasks else []
+    """The best explanations of several mechanisms, of all and of the catalogue, without each of them, as far as the rest was not fitted together, or fell behind without one that does
+    nothing, so that it had stalled: they came to be one by one, and what came first may be what the others do without (backward elimination: Draper & Smith, *Applied Regression Analysis*,
+    3rd ed. 1998, 15.3)."""
+    ranked = sorted(found, key=lambda h: h.evidence.ln)
+    known = {with_laws(h.mechanisms): h.evidence.ln for h in ranked}
+    leads = {id(best): best for best in (next((h for h in reversed(ranked) if not h.free or free), None) for free in (True, False)) if best is not None}
+    tasks: dict[frozenset, Task] = {}
+    for lead in leads.values():
+        at = len(model.parameters)
+        for k, (m, idle) in enumerate(zip(lead.mechanisms, lead.idle, strict=True)):
+            rest, own = (*lead.mechanisms[:k], *lead.mechanisms[k + 1 :]), len(model.tests) + len(m.shape)
+            if rest and (with_laws(rest) not in known or (idle and known[with_laws(rest)] < lead.evidence.ln - LITTLE)):
+                tasks.setdefault(with_laws(rest), Task(rest, (np.delete(lead.fit.point, slice(at, at + own)),), -np.inf))
+            at += own
+    cost = min((h.fit.cost for h in leads.values()), default=np.inf)
+    return fitted(model, list(tasks.values()), TEMPERS[-2:], ranked[-1].fit, most, expected, workers, beaten=cost + 2 * FAR) if tasks else []
 
 
 def exchanged(

@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.forward.nuisance import Resonance
@@ -24,6 +25,7 @@ RESONANCES, CLEARED = 2, 0.1  # light resonances at most, and the share of what 
 CHANCE = 3.0  # standard deviations of chi2 by chance, of which nothing is said to be left
 SLIGHT = 0.5  # squares of the errors, of which it cannot be told whether they are alike in all tests
 RESONANT = 0.2  # damping ratio up to which it is a resonance
+BEYOND = 1.15  # times the highest line, up to which it is one: far above them a resonance is a mass that moves along, and far below the lowest a spring to the ground
 FAR = 3.0  # times what a resonance may leave, from which counting its parameters anew will not help
 MOVES, SURELY = 0.01, 5.0  # relative change of its frequency over the tests, and standard errors of it, from which it moves
 CENTRED = 2  # times that a light resonance's parameters are counted anew from where they were fitted
@@ -57,7 +59,7 @@ def with_resonance(model: CampaignModel, h: Hypothesis, workers: int | None = No
         tried = in_parallel(partial(_from, wider, h.mechanisms), ((fitted, TEMPERS[EARLY:]), (afresh, TEMPERS)), workers)
         best = replace(min(tried, key=lambda f: f.cost), mechanisms=h.mechanisms)
         sd, learned = np.array([q.sd for q in resonance.nuisances]), None
-        if not asked(Hypothesis(best, evidence(wider, best)), 0.0, FAR * clear) or resonance.at(sd * best.point[n : n + more]).damping > RESONANT:
+        if not asked(Hypothesis(best, evidence(wider, best)), 0.0, FAR * clear) or not _resonates(model, resonance.at(sd * best.point[n : n + more])):
             return None  # smooth over the band, it would stand in for something else
         for _ in range(CENTRED):  # so that all explanations start about it as it is
             resonance = resonance.at(sd * best.point[n : n + more])
@@ -68,6 +70,13 @@ def with_resonance(model: CampaignModel, h: Hypothesis, workers: int | None = No
     except FAILED:
         return None
     return (wider, found) if asked(found, PLENTY, clear) else None
+
+
+def _resonates(model: CampaignModel, resonance: Resonance) -> bool:
+    """Whether it shows as one in the lines that were measured."""
+    lines = [d.frequency for d in model.tests if isinstance(d, LineData)]
+    low, high = min(float(f.min()) for f in lines), max(float(f.max()) for f in lines)
+    return resonance.damping <= RESONANT and low / BEYOND <= resonance.frequency <= BEYOND * high
 
 
 def _left_by(model: CampaignModel, h: Hypothesis, moves: bool = False) -> Resonance | None:

@@ -113,7 +113,7 @@ def _without_effects(model: CampaignModel) -> Hypothesis:
 
 def _without_what_does_nothing(model: CampaignModel, none: Hypothesis, ended: Sequence[Hypothesis]) -> Hypothesis:
     """The model without effects, fitted on from the best explanation that explains more with effects of no size in any test: then it had stalled."""
-    idle = [h for h in ended if none.evidence.learned.errors > STRAIN and h.evidence.ln > none.evidence.ln + OCCAM and _does_nothing(h)]
+    idle = [h for h in ended if none.evidence.learned.errors > STRAIN and h.evidence.ln > none.evidence.ln + OCCAM and all(h.idle)]
     if not idle:
         return none
     best = max(idle, key=lambda h: h.evidence.ln)
@@ -124,13 +124,6 @@ def _without_what_does_nothing(model: CampaignModel, none: Hypothesis, ended: Se
     except FAILED:
         return none
     return max(none, found, key=lambda h: h.evidence.ln)
-
-
-def _does_nothing(h: Hypothesis) -> bool:
-    """Whether the sizes of all its mechanisms, in all tests, are their neutral values within three of their errors."""
-    errors = np.sqrt(np.einsum("mtt->mt", h.evidence.size_covariance))
-    neutral = np.array([[m.size.neutral] for m in h.mechanisms])
-    return bool((np.abs(h.evidence.sizes - neutral) <= 3 * errors).all())
 
 
 def _ended(model: CampaignModel, least: float, found: Sequence[Hypothesis], workers: int | None) -> list[Hypothesis]:

@@ -17,6 +17,7 @@ from thermospindle.diagnosis.inference.pairs import exchanged, joined, joined_ea
 from thermospindle.diagnosis.inference.prior import steady
 from thermospindle.diagnosis.inference.screening import Screened
 from thermospindle.diagnosis.inference.singles import Singles, fit_singles
+from thermospindle.diagnosis.verdict import diagnose
 from thermospindle.model.machine import Condition
 
 TESTS = (Condition(20.0), Condition(40.0), Condition(60.0))
@@ -38,29 +39,38 @@ def test_a_second_cause_that_hardly_shows_is_weighed(spindle, monkeypatch, promi
     assert [h.names for h in found] == ([("bond_softening", "preload_loss")] if weighed else [])
 
 
+def of_a_disk_and_a_mount(spindle, tests):
+    """A disk of 3 g on the hub and a mount 30 % softer, in every test: no single mechanism moves all peaks to where they are."""
+    hidden = [("added_disk", {"mass": 3.0}), ("mount_compliance", {"compliance": 0.3, "thermal_share": 0.0})]
+    both = [(effect(name), {q.name: q.neutral for q in effect(name).parameters} | own) for name, own in hidden]
+    return virtual_campaign(spindle, tests, 5, both, drawn(spindle, len(tests), 5), responses=(1, 3, 6), frequency=np.arange(400.0, 6000.1, 24.0))
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("tests", [TESTS, TESTS[::2]])
-def test_two_constant_causes_of_which_neither_is_found_alone(spindle, tests):
-    """A disk of 3 g on the hub and a mount 30 % softer, in every test: no single mechanism moves all peaks to where they are, and no fit arrives. Joined while
-    errors are enlarged they do. Campaign 640 of the blind study was unexplained for that. Of two tests discrepancies may be all of it: asked as if they were not."""
-    disk, mount = effect("added_disk"), effect("mount_compliance")
-    hidden = [(e, {q.name: q.neutral for q in e.parameters} | own) for e, own in ((disk, {"mass": 3.0}), (mount, {"compliance": 0.3, "thermal_share": 0.0}))]
-    few = len(tests) == 2
-    campaign = virtual_campaign(spindle, tests, 5, hidden, drawn(spindle, len(tests), 5), responses=(1, 3, 6), frequency=np.arange(400.0, 6000.1, 24.0))
-    model = model_of(spindle, campaign)
+def test_two_constant_causes_are_joined_while_errors_are_enlarged(spindle):
+    """Where nothing that was tried explains the data. Campaign 640 of the blind study was unexplained for that."""
+    model = model_of(spindle, of_a_disk_and_a_mount(spindle, TESTS[::2]))
     first = fit(model)
     none = settled(model, Hypothesis(first, evidence(model, first)))
-    mechanisms = [m for name in ("added_disk", "mount_compliance", *([] if few else ["window_damping"])) for m in variants(effect(name))]
+    mechanisms = [m for name in ("added_disk", "mount_compliance") for m in variants(effect(name))]
     tried = fit_singles(model, none, mechanisms, lambda done: None, 1)
     before = max(h.evidence.ln for h in (none, *tried.singles))
-    if few:
-        learned = replace(none.evidence.learned, errors=1.5)
-        none, tried = replace(none, evidence=replace(none.evidence, learned=learned)), replace(tried, singles=[])
-    found = max(joined_early(model, none, tried, [], mechanisms, 1), key=lambda h: h.evidence.ln)
+    strained = replace(none, evidence=replace(none.evidence, learned=replace(none.evidence.learned, errors=1.5)))
+    found = max(joined_early(model, strained, replace(tried, singles=[]), [], mechanisms, 1), key=lambda h: h.evidence.ln)
     assert set(found.names) == {"added_disk", "mount_compliance"}
     assert found.evidence.ln > before + 10
-    sizes = dict(zip(found.names, found.evidence.sizes, strict=True))
-    assert sizes["added_disk"] == pytest.approx(3.0, abs=0.3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tests", [TESTS, TESTS[::2]])
+def test_two_constant_causes_are_both_named(spindle, tests):
+    """By the whole diagnosis. Of three tests a light resonance at 15 kHz, far beyond the band, stood in for the disk's mass, and a mass at the sensor was named; of two the true pair was
+    never fitted, and a mass at the sensor, of no size, named beside it."""
+    found = diagnose(spindle, of_a_disk_and_a_mount(spindle, tests))
+    assert (found.verdict.word, set(found.verdict.effects)) == ("two effects", {"added_disk", "mount_compliance"})
+    told = found.verdict.candidates[0].told
+    sizes = dict(zip(told.names, told.evidence.sizes, strict=True))
+    assert sizes["added_disk"] == pytest.approx(3.0, abs=0.5)
     assert sizes["mount_compliance"] == pytest.approx(0.3, abs=0.03)
 
 
@@ -84,6 +94,22 @@ def test_what_came_first_is_tried_without(spindle):
     assert set(more) == {("bond_softening", "preload_loss"), ("preload_loss", "modulus_softening")}
     assert more["bond_softening", "preload_loss"] > max(h.evidence.ln for h in found) - 1
     assert more["bond_softening", "preload_loss"] > more["preload_loss", "modulus_softening"] + 10
+
+
+@pytest.mark.parametrize(("size", "known", "again"), [(0.0, -100.0, True), (0.0, 0.0, False), (0.1, -100.0, False)])
+def test_what_fell_behind_without_one_that_does_nothing_is_fitted_again(spindle, size, known, again):
+    """A bond that softens, and a modulus that does nothing beside it; with the bond alone 100 behind in ln evidence that fit had stalled, not so where the modulus does something."""
+    bond, modulus = (variants(effect(name))[0] for name in ("bond_softening", "modulus_softening"))
+    model = model_of(spindle, mode_campaign(spindle, TESTS[:2], 3, [(bond.effect, bond.values(bond.size.typical, [q.neutral for q in bond.shape]))]))
+    alone, both = (Hypothesis(f, evidence(model, f)) for f in (fit(model, of, tempers=TEMPERS[-2:]) for of in ([bond], [bond, modulus])))
+    sizes = np.array([both.evidence.sizes[0], np.full(2, modulus.size.neutral + size)])
+    covariance = np.array([1e-6 * np.eye(2)] * 2)
+    both = replace(both, evidence=replace(both.evidence, ln=0.0, sizes=sizes, size_covariance=covariance))
+    assert both.idle == (False, size == 0.0)
+    alone = replace(alone, evidence=replace(alone.evidence, ln=known))
+    other = replace(alone, fit=replace(alone.fit, mechanisms=(modulus,)))
+    found = without_one(model, [alone, other, both], np.inf, steady(both.evidence.learned), 1)
+    assert [h.names for h in found] == ([("bond_softening",)] if again else [])
 
 
 def test_two_effects_without_laws_are_exchanged_for_others(spindle):

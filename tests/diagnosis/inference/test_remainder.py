@@ -18,7 +18,7 @@ from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
 from thermospindle.diagnosis.inference.remainder import by_frequency
-from thermospindle.diagnosis.inference.resonance import moving, shown, with_resonance
+from thermospindle.diagnosis.inference.resonance import _resonates, moving, shown, with_resonance
 from thermospindle.diagnosis.verdict import diagnose
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.machine import Condition
@@ -93,6 +93,12 @@ def test_where_nothing_is_left_none_is_found(spindle):
     plain = model_of(spindle, virtual_campaign(spindle, TESTS, 5, (), drawn(spindle, 3, 5), responses=(1, 3, 6), frequency=FREQUENCY))
     first = fit(plain)
     assert with_resonance(plain, Hypothesis(first, evidence(plain, first))) is None
+
+
+@pytest.mark.parametrize(("frequency", "damping", "resonates"), [(1700.0, 0.02, True), (6500.0, 0.02, True), (15199.0, 0.02, False), (300.0, 0.02, False), (1700.0, 0.3, False)])
+def test_far_beyond_the_band_it_is_a_mass_that_moves_along(model, frequency, damping, resonates):
+    """Two constant causes were told as a mass at the sensor and a softer mount, for an oscillator at 15 kHz had a disk's mass on the hub; below the band it is a spring to the ground."""
+    assert _resonates(model, Resonance(frequency, damping, ())) == resonates
 
 
 def test_sums_over_channels_are_those_of_whole_columns():
