@@ -89,9 +89,10 @@ def _unheld(
     kept = changing(found.base, alike), changing(best, same)
     gross = found.base.evidence.chi2 > GROSS * found.base.fit.count
     if moving(found.model, found.base, discount(best, same.inflation)):
-        little = [c for c in candidates if c.delta_evidence < MOSTLY * (c.delta_evidence + found.by_resonances)]
-        free = (*free, Candidate(found.base, (MOVING,), True, 0.0, none + sum(c.probability for c in little)))
-        candidates, none = tuple(replace(c, probability=0.0) if c in little else c for c in candidates), 0.0
+        little = [c for c in (*candidates, *free) if c.delta_evidence < MOSTLY * (c.delta_evidence + found.by_resonances)]
+        moves = Candidate(found.base, (MOVING,), True, 0.0, none + sum(c.probability for c in little))
+        candidates, free = (tuple(replace(c, probability=0.0) if c in little else c for c in every) for every in (candidates, free))
+        free, none = (*free, moves), 0.0
     by_chance = SURE * np.sqrt(2 / found.base.fit.count)  # standard deviations of chi2 a number
     changes = len(found.model.tests) > 1 and alike.tests < ALIKE and kept[0] > max(MUCH, by_chance)
     if _adrift(found.base) or gross or changes:
