@@ -46,6 +46,7 @@ GRIDS = {
     kinds_of.STIFFNESS_DRIFT: (0.0, 3e-5, 1e-4, 3e-4, 1e-3),
     kinds_of.DAMPING_DRIFT: (0.0, 0.01, 0.03),
     kinds_of.DRIFT: (0.0, 3e-4, 1e-3, 3e-3, 1e-2),
+    kinds_of.HAMMER: (1.0, 3.0),
     kinds_of.HAMMER_DRIFT: (0.0, 1e-3, 3e-3, 1e-2),
     kinds_of.MISS_DRIFT: (0.0, 3e-5, 1e-4, 3e-4),  # m
     kinds_of.CHANGE: (0.0, 0.01, 0.03),
@@ -58,7 +59,10 @@ tolerance that is strained tells of an effect, several of a drawing that is off.
 FARTHER = {1.0: 0.0, 3.0: -2.0, 6.0: -4.0}
 """Prior odds (ln) that thermal motions are off by so many times what two finite-element programs differ by, assumed: one spindle in eight by a per cent, one in sixty by two, where any
 one effect is in one of a hundred."""
-ODDS = {kinds_of.BUILD: WIDER, kinds_of.EXPANSION: FARTHER}
+UNCALIBRATED = {1.0: 0.0, 3.0: -2.0}
+"""Prior odds (ln) that hammers' gains are off by three times what the scene's channels are, assumed: a hammer whose calibration is old, or that always hits askew by 10 to 15 degrees,
+is off by some per cent, which a sensor's gain would have to explain in part."""
+ODDS = {kinds_of.BUILD: WIDER, kinds_of.EXPANSION: FARTHER, kinds_of.HAMMER: UNCALIBRATED}
 """By kind of nuisance, of sizes of which one is that of the scene or of the model itself."""
 WIDTHS = (0.5, 1.0, 2.0, 4.0)  # of a size, in its own prior standard deviations
 DEPARTURES = (0.0, 0.1, 0.3, 1.0)  # from a law, of the size

@@ -22,12 +22,13 @@ REFERENCE = {
     kinds_of.STIFFNESS_DRIFT: kinds_of.STIFFNESS_DRIFT_SD,
     kinds_of.DAMPING_DRIFT: kinds_of.DAMPING_DRIFT_SD,
     kinds_of.DRIFT: kinds_of.DRIFT_SD,
+    kinds_of.HAMMER: 1.0,
     kinds_of.HAMMER_DRIFT: kinds_of.DRIFT_SD,
     kinds_of.MISS_DRIFT: kinds_of.MISS_DRIFT_SD,
     kinds_of.CHANGE: kinds_of.CHANGE_SD,
     kinds_of.EXPANSION: 1.0,
 }
-"""Widths in which nuisances of unknown size are counted; build tolerances in those that the scene states, thermal motions in `EXPANSION_SD`."""
+"""Widths in which nuisances of unknown size are counted; build tolerances and hammers' gains in those that the scene states, thermal motions in `EXPANSION_SD`."""
 ACTION = 3.0  # times the relative error of frequencies, which what the model says of an effect may be wrong by
 AGEING = 2.0
 """What a gain that drifts is off by at the first and the last test, going straight with their order, times what it scatters by: amplifiers warm up, calibrations age. Chosen on one

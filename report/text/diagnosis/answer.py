@@ -89,6 +89,7 @@ def _learned(evidence: Evidence) -> dict[str, float]:
     return {
         **{LEARNED[kind]: size for kind, size in s.sizes.items() if kind in LEARNED},
         "build_tolerances_times": s.sizes.get(kinds_of.BUILD, 1.0),
+        "hammer_gains_times": s.sizes.get(kinds_of.HAMMER, 1.0),
         "thermal_motions_times": s.sizes.get(kinds_of.EXPANSION, 1.0),
         "errors_times": s.errors,
     }

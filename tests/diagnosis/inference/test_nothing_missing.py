@@ -10,7 +10,7 @@ import pytest
 from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, virtual_campaign
 from thermospindle.diagnosis.decision.verdict import decide
 from thermospindle.diagnosis.forward.mechanism import variants
-from thermospindle.diagnosis.forward.nuisance import BUILD, HAMMER_DRIFT, MISS_DRIFT
+from thermospindle.diagnosis.forward.nuisance import BUILD, HAMMER, HAMMER_DRIFT, MISS_DRIFT
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.freeform import free_forms
@@ -53,6 +53,15 @@ def test_hammers_that_tell_the_force_otherwise_in_each_test_are_no_missing_effec
     assert decide(found).word == "none"
     assert found.base.evidence.learned.sizes[HAMMER_DRIFT] > 0
     assert found.base.fit.chi2 / found.base.fit.count == pytest.approx(1.0, abs=0.1)
+
+
+def test_hammers_whose_calibration_is_off_are_no_missing_effect(spindle):
+    """Two hammers that read 6 and 5 % too little force in every test, and nothing hidden: blind campaign 2037 was `sensor_gain` for that."""
+    campaign = virtual_campaign(spindle, TESTS, 5, [], drawn(spindle, 3, 5), responses=(1, 3, 6), frequency=np.arange(400.0, 6000.1, 16.0))
+    tests = [replace(t, frf=replace(t.frf, value=t.frf.value * np.array([1.06, 1.05])[:, None])) for t in campaign.tests]
+    found = search(model_of(spindle, replace(campaign, tests=tuple(tests))), variants(effect("sensor_gain")), [], workers=1)
+    assert decide(found).word == "none"
+    assert found.base.evidence.learned.sizes[HAMMER] > 1.0
 
 
 def test_hammers_that_hit_beside_their_points_are_no_missing_effect(spindle):
