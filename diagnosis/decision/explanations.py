@@ -20,6 +20,7 @@ from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.inference.gaussian import impossible, opposite
 from thermospindle.diagnosis.inference.hypothesis import DEPARTS, LITTLE, PLENTY, STRAIN, Hypothesis
+from thermospindle.diagnosis.inference.remainder import Overlap
 from thermospindle.diagnosis.inference.search import Search
 from thermospindle.model.types import Array
 
@@ -77,14 +78,14 @@ def _as_unknown(h: Hypothesis) -> Hypothesis:
     return replace(h, fit=replace(h.fit, mechanisms=mechanisms))
 
 
-def explanations(found: Search, inflation: float) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...], float]:
-    """Explanations of the catalogue and free ones, with the most probable first, and the probability of nothing missing. `inflation` is by how much the evidence
-    is too large, for residuals that say the same."""
+def explanations(found: Search, same: Overlap) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...], float]:
+    """Explanations of the catalogue and free ones, with the most probable first, and the probability of nothing missing, where the best leaves residuals
+    that say the `same`."""
     free_count, named_count = (
         len({s.mechanism.name for s in found.screened if s.mechanism.free == free and s.visibility > 0}) or 1 for free in (True, False)
     )
     base = found.base.evidence.ln
-    by = discount(likeliest(found), inflation)
+    by = discount(likeliest(found), same)
     known = [h for h in found.hypotheses if _can_be(h)]
     either = frozenset(m.name for h in known for m in h.mechanisms if m.own_law)
     named_as = {h: own for h in known if (own := _named_as(h, known, found.alike, by))}
@@ -110,21 +111,22 @@ def likeliest(found: Search) -> Hypothesis:
     return next(h for h in found.hypotheses if _can_be(h))
 
 
-def discount(best: Hypothesis, inflation: float) -> float:
+def discount(best: Hypothesis, same: Overlap) -> float:
     """What ln evidence is divided by."""
-    return inflation * coarsening(best, inflation)
+    return same.inflation * coarsening(best, same)
 
 
-def coarsening(best: Hypothesis, inflation: float) -> float:
+def coarsening(best: Hypothesis, same: Overlap) -> float:
     """What ln evidence is divided by where what the best explanation leaves shows the model to be wrong: `COARSE`, or one.
 
-    Residuals that are too large, or say the same over lines or tests (an `inflation` beyond one), a drawing beyond its tolerances, and several effects of which none
+    Residuals that are too large, or say the same in one test as in another, a drawing beyond its tolerances, and several effects of which none
     has its law tell of something that is not in the model, and evidence that counts lines as if nothing were missing is too sure (Miller & Dunson, *J. Am. Statist. Assoc.* 114 (2019) 1113: the coarsened
-    posterior is a power of the likelihood). Constant errors of modes that are learned are in the model, with what they make wrong in an effect (`ACTION`).
+    posterior is a power of the likelihood). Residuals no larger than stated that say the same over lines of one test are noise that a window or a leak has spread over them, of which there is less: `Overlap.inflation`
+    counts that. Constant errors of modes that are learned are in the model, with what they make wrong in an effect (`ACTION`).
     """
     learned = best.evidence.learned
     lawless = len(best.mechanisms) > 1 and not best.free and min(learned.departures) >= DEPARTS
-    wrong = learned.errors > STRAIN or inflation > 1.0 or learned.sizes.get(kinds_of.BUILD, 1.0) > 1.0 or lawless
+    wrong = learned.errors > STRAIN or same.tests > 0.0 or learned.sizes.get(kinds_of.BUILD, 1.0) > 1.0 or lawless
     return COARSE if wrong else 1.0
 
 

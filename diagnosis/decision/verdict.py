@@ -63,7 +63,7 @@ def decide(found: Search) -> Verdict:
     found = with_unknown(found)
     best = likeliest(found)
     same = overlap(found.model, best.fit)
-    candidates, free, none = explanations(found, same.inflation)
+    candidates, free, none = explanations(found, same)
     candidates, free, none = _unheld(found, best, same, candidates, free, none)
     word, effects, losses = least_loss(candidates, none, free, found.alike)
     accepted = _accepted(found, word, effects, candidates, free)
@@ -88,7 +88,7 @@ def _unheld(
     alike = overlap(found.model, found.base.fit)
     kept = changing(found.base, alike), changing(best, same)
     gross = found.base.evidence.chi2 > GROSS * found.base.fit.count
-    if moving(found.model, found.base, discount(best, same.inflation)):
+    if moving(found.model, found.base, discount(best, same)):
         little = [c for c in (*candidates, *free) if c.delta_evidence < MOSTLY * (c.delta_evidence + found.by_resonances)]
         moves = Candidate(found.base, (MOVING,), True, 0.0, none + sum(c.probability for c in little))
         candidates, free = (tuple(replace(c, probability=0.0) if c in little else c for c in every) for every in (candidates, free))

@@ -155,7 +155,7 @@ def weighed(found: Diagnosis) -> dict[str, Any]:
     whether it is coarsened."""
     search, base = found.search, found.search.base.evidence.ln
     best = likeliest(search)
-    inflation = overlap(search.model, best.fit).inflation
+    same = overlap(search.model, best.fit)
     return {
         "explanations": [
             [
@@ -167,8 +167,8 @@ def weighed(found: Diagnosis) -> dict[str, Any]:
             ]
             for h in search.hypotheses
         ],
-        "inflation": inflation,
-        "coarse": coarsening(best, inflation),
+        "inflation": same.inflation,
+        "coarse": coarsening(best, same),
         "screened": [
             len({s.mechanism.name for s in search.screened if s.mechanism.free == free and s.visibility > 0}) for free in (False, True)
         ],

@@ -20,6 +20,7 @@ from thermospindle.diagnosis.inference.freeform import free_forms, runs_against
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
 from thermospindle.diagnosis.inference.prior import CHANGING, steady, undrifted
 from thermospindle.diagnosis.inference.problem import Problem
+from thermospindle.diagnosis.inference.remainder import Overlap
 from thermospindle.diagnosis.inference.screening import Screened, linearised, screen
 from thermospindle.diagnosis.inference.search import Search, _other_ways, _without_what_does_nothing, search
 from thermospindle.diagnosis.inference.singles import HIDING, Singles, cost_of, lasting
@@ -116,7 +117,7 @@ def test_ways_that_the_data_do_not_tell_apart_are_told_as_such(spindle):
     base = Hypothesis(none, evidence(model, none))
     hypotheses = tuple(sorted([base, best, *found], key=lambda h: -h.evidence.ln))
     looked = tuple(Screened(m, 0.0, first.point, 1.0) for m in every)
-    (told,), _, _ = explanations(Search(model, base, hypotheses, looked), 1.0)
+    (told,), _, _ = explanations(Search(model, base, hypotheses, looked), Overlap(1.0, 0.0, 1.0))
     assert len(told.ways) == 3
     assert all(share > 0.2 for _, share in told.ways)
     values = told_values(told, 0, spindle)
