@@ -155,6 +155,8 @@ def both(found: ResonanceMap, size: tuple[float, float] = SIZE, bare: bool = Fal
             end = (curve.speed[order][-1] / RPM, curve.temperature[order][-1])
             axes.annotate(f"{c.line.name}, {c.mode.number}", end, (4, 2), textcoords="offset points", fontsize=7.5, color=paint)
     _name_tops(axes, named)
+    if not curves:
+        axes.text(0.5, 0.5, "no line meets a mode here", transform=axes.transAxes, ha="center", va="center", color=PALE)
     meeting = [(c.condition.speed / RPM, c.condition.temperature, c.strength) for c in chosen[:CURVES] if c.at_nominal_speed]
     _mark(axes, meeting)
     axes.axvline(found.nominal.speed / RPM, color=PALE, lw=1.0, ls=":")
@@ -208,8 +210,8 @@ def _pair(c: Coincidence) -> tuple[tuple[str, int, str, int], int]:
 
 
 def _around(speeds: Sequence[float], every: np.ndarray) -> tuple[float, float]:
-    """Ends (rpm) of an axis that holds some `speeds` (rad/s), with a margin within `every` one of the map."""
-    low, high = min(speeds), max(speeds)
+    """Ends (rpm) of an axis that holds some `speeds` (rad/s), with a margin within `every` one of the map; of the whole map where these are one."""
+    low, high = (min(speeds), max(speeds)) if min(speeds) < max(speeds) else (every[0], every[-1])
     margin = 0.06 * (high - low)
     return max(low - margin, every[0]) / RPM, min(high + margin, every[-1]) / RPM
 

@@ -1,0 +1,87 @@
+"""Pictures of resonance maps."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from matplotlib import rc_context
+from matplotlib.text import Text
+
+from tests.sim.resonance.conftest import NOMINAL
+from thermospindle.model.units import RPM
+from thermospindle.report.figures.common import STYLE
+from thermospindle.report.figures.resonance import CAUSES, both, campbell, over_temperature
+from thermospindle.report.figures.warmup import MODES
+from thermospindle.sim.resonance.map import resonance_map
+
+
+def test_the_key_of_a_figure_names_the_causes_of_its_lines(found):
+    """And of no others: its colours are those that are drawn."""
+    for figure in (campbell(found), over_temperature(found)):
+        [axes], [key_below] = figure.axes, figure.legends
+        entries = zip(key_below.get_lines(), (t.get_text() for t in key_below.get_texts()), strict=True)
+        told = {name: line.get_color() for line, name in entries if name in CAUSES}
+        drawn = {line.get_color() for line in axes.lines if line.get_linewidth() == 0.9}
+        assert told == {cause: paint for cause, paint in CAUSES.items() if paint in drawn}
+        assert len(told) > 1
+
+
+def test_static_and_couple_unbalance_are_one_line_of_a_figure(found):
+    unbalance = [t for t in found.lines if t.line.cause == "unbalance"]
+    [axes] = campbell(replace(found, lines=(*found.lines, *unbalance))).axes
+    assert [t.get_text() for t in axes.texts].count("1x") == 1
+
+
+def test_modes_of_the_coincidences_differ_in_colour(found):
+    """However many modes lie below those that lines meet."""
+
+    def far(mode):
+        return replace(mode, number=len(MODES) * mode.number)
+
+    moved = replace(
+        found,
+        modes=tuple(far(m) for m in found.modes),
+        curves=tuple(replace(c, mode=far(c.mode)) for c in found.curves),
+        coincidences=tuple(replace(c, mode=far(c.mode)) for c in found.coincidences),
+    )
+    [key_below] = both(moved).legends
+    paints = [line.get_color() for line in key_below.get_lines() if line.get_linestyle() == "-"]
+    assert len(paints) > 1
+    assert len(set(paints)) == len(paints)
+
+
+@pytest.mark.parametrize("size", [(9.6, 6.2), (6.5, 3.1), (6.5, 1.5)])
+def test_names_of_lines_do_not_lie_over_each_other(found, met, size):
+    """Those of what meets come first where there is no room for all; a figure for a view that has a title has none of its own."""
+    for of in (found, met):
+        figure = over_temperature(of, size, bare=True)
+        with rc_context(STYLE):
+            figure.draw_without_rendering()
+        boxes = sorted((Text.get_window_extent(t) for t in figure.axes[0].texts), key=lambda b: b.y0)  # without the arrow
+        assert len(boxes) > 5
+        assert all(b.y0 >= a.y1 for a, b in pairwise(boxes))
+        assert figure.get_suptitle() == ""
+        assert not figure.legends
+    assert any("30 (fo-fc) + fo (31) upper" in t.get_text() for t in figure.axes[0].texts), "it meets a mode at the nominal speed"
+
+
+def test_the_axis_of_coincidences_holds_them_and_little_else(found):
+    [axes] = both(found).axes
+    low, high = axes.get_xlim()
+    speeds = np.concatenate([line.get_xdata() for line in axes.lines if line.get_linestyle() == "-" and len(line.get_xdata()) > 2])
+    assert low <= speeds.min() < low + 0.1 * (high - low)
+    assert high - 0.1 * (high - low) < speeds.max() <= high
+
+
+def test_where_no_line_meets_a_mode_the_picture_says_so(spindle):
+    """Of a map as wide as the axis, which one speed alone does not give."""
+    near = replace(resonance_map(spindle, [20.0, 22.0], [7000 * RPM, 7300 * RPM], NOMINAL), coincidences=(), curves=())
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        [axes] = both(near).axes
+    assert axes.get_xlim() == pytest.approx((7000.0, 7300.0))
+    assert [t.get_text() for t in axes.texts] == ["no line meets a mode here"]
