@@ -82,7 +82,7 @@ def decide(found: Search) -> Verdict:
 def _unheld(
     found: Search, best: Hypothesis, same: Overlap, candidates: tuple[Candidate, ...], free: tuple[Candidate, ...], none: float
 ) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...], float]:
-    """What is only the best of what was tried, with its probability moved to the unknown: nothing missing, where a light resonance moves with temperature, modes drift by more than two honest
+    """What is only the best of what was tried, with its probability moved to the unknown: nothing missing, where a light resonance moves with temperature (and what gains little beside it), modes drift by more than two honest
     programs differ by, the data are missed grossly, or much is left that is not alike in all tests; effects, where they leave much of what changes, or miss it grossly; and drifts that
     miss the data grossly."""
     alike = overlap(found.model, found.base.fit)
