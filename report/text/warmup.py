@@ -139,15 +139,47 @@ def show_warmup(console: Console, warmup: Warmup) -> None:
 
 
 def told(warmup: Warmup) -> str:
-    """In one sentence where a warm-up ends: temperatures, preload, frequencies, and how near to running away."""
+    """Where a warm-up ends, what it passes through on the way, and how near to running away it is."""
     end, first = warmup.steady, first_row(warmup)
     warm = ", ".join(f"{name} {t:.1f} C" for name, t in end.bearing_temperatures.items()) or f"the hottest region {max(end.temperatures.values()):.1f} C"
     pressed = "" if first is None else f", the preload of {first} goes from {warmup.moments[0].preload[first]:.2f} to {end.preload[first]:.2f} N"
-    shifts = warmup.steady_frequencies - warmup.frequencies[0]
-    known_shifts = np.flatnonzero(np.isfinite(shifts))
-    most = f", no natural frequency moves by more than {np.abs(shifts[known_shifts]).max():.1f} Hz" if len(known_shifts) else ""
-    near = f"; it is near runaway, {warmup.feedback:.0%} of a load that is added come back as heat" if warmup.feedback > NEAR else "; it does not run away"
-    return f"In the steady state the bearings are at {warm}{pressed}{most}{near}."
+    near = f"it is near runaway, {warmup.feedback:.0%} of a load that is added come back as heat" if warmup.feedback > NEAR else "it does not run away"
+    return " ".join([f"In the steady state the bearings are at {warm}{pressed}; {near}.", *_on_the_way(warmup)])
+
+
+def _on_the_way(warmup: Warmup) -> list[str]:
+    """Sentences on the least and the largest preload of any bearing, and on the mode that is ever furthest from its frequency at the start."""
+    said = []
+    loads = [(load, name, _when(warmup, k)) for k, m in enumerate((*warmup.moments, warmup.steady)) for name, load in m.preload.items()]
+    if loads:
+        (least, low, early), (most, high, late) = min(loads, key=lambda row: row[0]), max(loads, key=lambda row: row[0])
+        ends = f"the smallest preload of any bearing is {least:.2f} N ({low}, {early}), the largest {most:.2f} N ({high}, {late})"
+        said.append(f"Over the whole warm-up {ends}." if f"{least:.2f}" != f"{most:.2f}" else "The preload of no bearing changes on the way.")
+    if (furthest := furthest_mode(warmup)) is not None:
+        moment, k = furthest
+        start, there = warmup.frequencies[0, k], _frequencies(warmup)[moment, k]
+        said.append(f"Of the natural frequencies f{k + 1} ({warmup.modes[k].kind}) moves most: it is {there:.1f} Hz {_when(warmup, moment)}, {there - start:+z.1f} Hz from {start:.1f} Hz at the start.")
+    return said
+
+
+def furthest_mode(warmup: Warmup) -> tuple[int, int] | None:
+    """Moment and mode, from 0, of the largest change of a natural frequency since the start; the steady state counts as the last moment. None without modes."""
+    every = _frequencies(warmup)
+    shift = np.nan_to_num(np.abs(every - every[0]))
+    if not shift.size:
+        return None
+    moment, mode = np.unravel_index(int(np.argmax(shift)), shift.shape)
+    return int(moment), int(mode)
+
+
+def _frequencies(warmup: Warmup) -> Array:
+    """Frequencies (moments and the steady state, modes)."""
+    return np.vstack([warmup.frequencies, warmup.steady_frequencies])
+
+
+def _when(warmup: Warmup, moment: int) -> str:
+    """The time of a moment in words; the one after the last is the steady state."""
+    return "in the steady state" if moment == len(warmup.times) else "at the start" if moment == 0 else f"at {warmup.times[moment] / MINUTE:.2f} min"
 
 
 def lost_contact(warmup: Warmup) -> str:
@@ -222,6 +254,7 @@ def warmup_section(warmup: Warmup) -> tuple[str, str]:
         f"<p>From {warmup.start:g} °C in air of {warmup.air:g} °C at {warmup.speed / RPM:.0f} rpm. The slowest time constant is "
         f"{warmup.time_constant:.0f} s. In the steady state the bearings are at {escape(bearings)} °C{pressed}{fits} and bearing friction is "
         f"{scale * sum(last.friction.values()):.0f} {unit}; natural frequencies move by {shifts} Hz.</p>"
+        f"{''.join(f'<p>{escape(said)}</p>' for said in _on_the_way(warmup))}"
         f"<p>Heat: motor {total['motor']}, bearings {total['friction']} in; convection {total['convection']} out; "
         f"stored {total['stored']}.</p>"
     )

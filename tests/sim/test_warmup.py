@@ -252,6 +252,19 @@ def test_answer_as_json_and_rows(warm):
     assert "161 s" in html
 
 
+def test_what_moves_most_is_told_of_any_time(warm):
+    """A frequency that comes back and a preload that falls on the way are told with their time, not only where they end."""
+    frequencies = warm.frequencies.copy()
+    frequencies[3, 4] += 700.0
+    told = text.told(replace(warm, frequencies=frequencies))
+    shift = frequencies[3, 4] - frequencies[0, 4]
+    assert f"f5 ({warm.modes[4].kind}) moves most: it is {frequencies[3, 4]:.1f} Hz at {warm.times[3] / 60:.2f} min, {shift:+.1f} Hz from" in told
+    every = [load for m in (*warm.moments, warm.steady) for load in m.preload.values()]
+    assert f"smallest preload of any bearing is {min(every):.2f} N (" in told
+    assert f"largest {max(every):.2f} N (" in told
+    assert "moves most" in warmup_section(warm)[1]
+
+
 def test_units_go_with_the_size_of_the_machine(warm, monkeypatch):
     """A disk drive is told in milliwatts and joules, a machine tool in watts and kilojoules, in words and figure alike."""
     assert [axes.get_ylabel() for axes in figure(warm).axes][2] == "friction heat, mW"
