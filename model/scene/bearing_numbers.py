@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field, Strict, model_validator
 
+from thermospindle.model.bearing import stiffness_table
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.cells import plain_number
 from thermospindle.model.scene.fields import Finite, NotNegative, Positive, Share, Table
@@ -17,6 +20,9 @@ from thermospindle.model.units import RPM
 Row = Annotated[tuple[Finite, Finite, Finite, Finite, Finite], Strict(False)]
 COLUMNS = ("radial_stiffness_N_per_m", "axial_stiffness_N_per_m", "tilt_stiffness_N_m_per_rad", "coupling_stiffness_N_per_rad")
 """Of a table; those that are missing are zero, but one of the first two must be there."""
+WHERE = ("temperature_C", "speed_rpm")
+BESIDE = ("bearing", *(c for c in (*stiffness_table.COLUMNS, *stiffness_table.OF_ROLLERS) if c not in COLUMNS))
+"""Columns of the verb `table` that are no stiffness."""
 
 
 class Numbers(Table):
@@ -59,20 +65,22 @@ class Numbers(Table):
 
 
 def _read(file: Path, bearing: str | None) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
-    """The grid of a table; `BadInput` where it is none, or has gaps."""
+    """The grid of a table; `BadInput` where it is none, has gaps, or a column that is not known."""
     if not file.is_file():  # a pipe would be waited for, a device has no end
         raise BadInput(f"{file}: no such file")
     try:
-        lines = [line for line in file.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+        lines = [line for line in file.read_text(encoding="utf-8-sig").splitlines() if not line.startswith("#")]
         rows = list(csv.DictReader(lines))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise BadInput(f"{file}: cannot be read as a table of bearing stiffness: {error}") from None
+    if rows:
+        _check_columns(file, rows)
     if rows and bearing is not None:
         rows = [row for row in rows if row.get("bearing") == bearing]
     if not rows:
         raise BadInput(f"{file}: has no rows{f' of bearing {bearing!r}' if bearing else ''}")
     known = [c for c in COLUMNS if c in rows[0]]
-    if not set(known) & set(COLUMNS[:2]) or "temperature_C" not in rows[0] or "speed_rpm" not in rows[0]:
+    if not set(known) & set(COLUMNS[:2]) or not set(WHERE) <= set(rows[0]):
         raise BadInput(f"{file}: its columns must be temperature_C, speed_rpm and {', '.join(COLUMNS)}, the last two where there are any")
     values: dict[tuple[float, float], np.ndarray] = {}
     for number, row in enumerate(rows, 2):
@@ -81,6 +89,8 @@ def _read(file: Path, bearing: str | None) -> tuple[tuple[float, ...], tuple[flo
             radial, axial, tilt, coupling = (float(plain_number(row[c])) if c in known else 0.0 for c in COLUMNS)
         except (TypeError, AttributeError, ValueError):  # a row that ends before its time has None
             raise BadInput(f"{file}: row {number}: every column must hold a number in digits 0 to 9") from None
+        if None in row:  # what is left of a row that has more cells than the header
+            raise BadInput(f"{file}: row {number}: has more cells than the header has columns; numbers have a point, not a comma")
         k = np.diag([radial, radial, axial, tilt, tilt])
         k[0, 4] = k[4, 0] = coupling
         k[1, 3] = k[3, 1] = -coupling
@@ -91,7 +101,19 @@ def _read(file: Path, bearing: str | None) -> tuple[tuple[float, ...], tuple[flo
         if not np.isfinite(k).all() or np.linalg.eigvalsh(k).min() < -1e-9 * np.abs(k).max():
             raise BadInput(f"{file}: row {number}: is no stiffness of a bearing; it must be finite and push nothing away")
         values[at] = k
+    if not any(k.any() for k in values.values()):
+        raise BadInput(f"{file}: {', '.join(known)}: all are zero{f' of bearing {bearing!r}' if bearing else ''}; a table holds some stiffness, in the units of its header")
     temperatures, speeds = (tuple(sorted({at[i] for at in values})) for i in (0, 1))
     if len(values) != len(temperatures) * len(speeds):
         raise BadInput(f"{file}: the table has gaps; it needs a row for each of {len(temperatures)} temperatures and {len(speeds)} speeds")
     return temperatures, speeds, tuple(float(v) for t in temperatures for s in speeds for v in values[t, s].ravel())
+
+
+def _check_columns(file: Path, rows: Sequence[Mapping[str, str | None]]) -> None:
+    """`BadInput` for a column that is neither stiffness nor what the verb `table` writes: a misspelt one would be a stiffness of zero."""
+    allowed = (*WHERE, *COLUMNS, *BESIDE)
+    for column in rows[0]:
+        if column is None or column in allowed or (not column and not any(row[column] for row in rows)):
+            continue
+        near = get_close_matches(column, allowed, n=1)
+        raise BadInput(f"{file}: column {column!r}: unknown; allowed are {', '.join(allowed)}{f'; did you mean {near[0]}?' if near else ''}")

@@ -1,0 +1,37 @@
+"""Bearings given by numbers: what a table over temperature and speed may hold."""
+
+import pytest
+
+from thermospindle.model.errors import BadInput
+from thermospindle.model.scene.bearing_numbers import Numbers
+
+HEADER = "temperature_C,speed_rpm,radial_stiffness_N_per_m,axial_stiffness_N_per_m"
+
+
+def grid(folder, header=HEADER, row="20,0,2e7,0"):
+    (folder / "bearing.csv").write_text(f"{header}\n{row}\n", encoding="utf-8")
+    return Numbers(table="bearing.csv", damping_ratio=0.05).grid(folder)
+
+
+def test_a_table(tmp_path):
+    """Also as spreadsheets write it: with a byte-order mark, and columns without anything."""
+    *_, stiffness = grid(tmp_path, "\ufeff" + HEADER + ",", "20,0,2e7,0,")
+    assert stiffness[0] == 2e7
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "told"),
+    [
+        (HEADER.replace("stiffness", "stifness", 1), "20,0,2e7,0", ["column 'radial_stifness_N_per_m'", "temperature_C, speed_rpm", "did you mean radial_stiffness_N_per_m?"]),
+        (HEADER.replace("N_per_m", "N_per_um", 1), "20,0,20,0", ["column 'radial_stiffness_N_per_um'", "did you mean radial_stiffness_N_per_m?"]),
+        (HEADER + ",tilt_stifness_Nm_per_rad", "20,0,2e7,0,1e4", ["did you mean tilt_stiffness_N_m_per_rad?"]),
+        (HEADER + ",", "20,0,2e7,0,1e4", ["column ''"]),
+        (HEADER, "20,0,2e7,0,5", ["row 2: has more cells than the header"]),
+        (HEADER, "20,0,0,0", ["radial_stiffness_N_per_m, axial_stiffness_N_per_m: all are zero"]),
+    ],
+)
+def test_refused_tables(tmp_path, header, row, told):
+    with pytest.raises(BadInput) as error:
+        grid(tmp_path, header, row)
+    for words in (f"{tmp_path / 'bearing.csv'}: ", *told):
+        assert words in str(error.value)
