@@ -20,7 +20,7 @@ from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.inference.gaussian import impossible, opposite
 from thermospindle.diagnosis.inference.hypothesis import DEPARTS, LITTLE, PLENTY, STRAIN, Hypothesis
-from thermospindle.diagnosis.inference.remainder import Overlap
+from thermospindle.diagnosis.inference.remainder import SMALL, Overlap
 from thermospindle.diagnosis.inference.search import Search
 from thermospindle.model.types import Array
 
@@ -89,9 +89,9 @@ def explanations(found: Search, same: Overlap) -> tuple[tuple[Candidate, ...], t
     known = [h for h in found.hypotheses if _can_be(h)]
     either = frozenset(m.name for h in known for m in h.mechanisms if m.own_law)
     named_as = {h: own for h in known if (own := _named_as(h, known, found.alike, by))}
-    values = _with_twins([(h, _weighed(h, found.hypotheses)) for h in known], named_as)
-    ways = _ways(found)
-    values = _by_change(values, found.alike, max(COARSE / by, 1.0))
+    coarse, ways = max(COARSE / by, 1.0), _ways(found)  # what ln evidence is divided by anyway counts for both
+    values = _with_twins([(h, _weighed(h, found.hypotheses, coarse)) for h in known], named_as)
+    values = _by_change(values, found.alike, coarse)
     rows = [(h, _prior(h, named_count, free_count, either, ways) + (w - base) / by) for h, w in values]
     top = max(w for _, w in rows)
     total = np.log(sum(np.exp(w - top) for _, w in rows)) + top
@@ -126,12 +126,12 @@ def coarsening(best: Hypothesis, same: Overlap) -> float:
     """
     learned = best.evidence.learned
     lawless = len(best.mechanisms) > 1 and not best.free and min(learned.departures) >= DEPARTS
-    wrong = learned.errors > STRAIN or same.tests > 0.0 or learned.sizes.get(kinds_of.BUILD, 1.0) > 1.0 or lawless
+    wrong = learned.errors > STRAIN or same.tests > SMALL or learned.sizes.get(kinds_of.BUILD, 1.0) > 1.0 or lawless
     return COARSE if wrong else 1.0
 
 
-def _weighed(h: Hypothesis, every: Sequence[Hypothesis]) -> float:
-    """ln evidence, of which what one mechanism more gains counts a `COARSE`-th as far as the best explanation without it, and every other that does as well, gains as
+def _weighed(h: Hypothesis, every: Sequence[Hypothesis], coarse: float) -> float:
+    """ln evidence, of which what one mechanism more gains counts a `coarse`-th as far as the best explanation without it, and every other that does as well, gains as
     much by laws that are not its effects' own: what is wrong in a law looks like a little of something else."""
     parts = [o for o in every if o.mechanisms and set(o.names) < set(h.names)]
     if not parts:
@@ -139,7 +139,7 @@ def _weighed(h: Hypothesis, every: Sequence[Hypothesis]) -> float:
     lead = max(parts, key=lambda o: o.evidence.ln)
     gain = h.evidence.ln - lead.evidence.ln
     in_doubt = min(gain, *(_by_other_laws(o, every) for o in [lead, *_doing_as_well(lead, set(h.names) - set(lead.names), every)]))
-    return _weighed(lead, every) + gain - (1 - 1 / COARSE) * max(in_doubt, 0.0)
+    return _weighed(lead, every, coarse) + gain - (1 - 1 / coarse) * max(in_doubt, 0.0)
 
 
 def _doing_as_well(lead: Hypothesis, more: Collection[str], every: Sequence[Hypothesis]) -> list[Hypothesis]:

@@ -68,6 +68,11 @@ class Mechanism:
         return self.name, self.kind, *sorted(self.choices.items())
 
     @property
+    def lasting(self) -> bool:
+        """Whether it does the same in every test: for what its effect is, or of the share chosen that temperature has in it."""
+        return self.effect.lasting or self.choices.get("thermal_share") == 0.0
+
+    @property
     def size(self) -> Parameter:
         return self.effect.parameters[0]
 

@@ -149,7 +149,7 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
     mean, spread = posterior(scaled, nuisances or integrated(model, fit, s, sizes), mechanism_root(model, fit.mechanisms, learned))
     chi2 = whole.at(mean)
     mean, spread = fit.point + turn @ (mean - fit.point), turn @ spread @ turn.T
-    truncation = ln_within_limits(fit, mean, spread)
+    truncation = ln_within_limits(fit, mean, spread, s)
     mean[[h.number for h in fit.held]] = fit.point[[h.number for h in fit.held]]
     at, means, covariances = p, [], []
     tests = len(model.tests)
@@ -162,7 +162,7 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
     shape = (len(fit.mechanisms), tests)
     by_law = [np.array([d == 0.0 or m.kind != "law" for _, d, _ in grid]) for m, grid in zip(fit.mechanisms, own_grids, strict=True)]
     held = reduce(np.multiply.outer, by_law, np.array(True)).ravel()
-    ln = logsumexp(values) + truncation - (fit.owed / 2 if fit.temper == 1.0 else 0.0)
+    ln = logsumexp(values) + truncation - (fit.owed / (2 * s**2) if fit.temper == 1.0 else 0.0)
     by_departing = logsumexp(values) - logsumexp(values[held]) + logsumexp(odds[held])
     return Evidence(ln, learned, mean, spread, np.array(means).reshape(shape), np.array(covariances).reshape(*shape, tests), chi2, by_departing)
 

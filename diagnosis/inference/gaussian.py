@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import lsq_linear
-from scipy.special import log_ndtr, ndtr
+from scipy.special import binom, chdtrc, log_ndtr, ndtr
 
 from thermospindle.diagnosis.forward.mechanism import Mechanism, grown, size_covariance
 from thermospindle.diagnosis.forward.model import CampaignModel
@@ -141,17 +141,18 @@ def ln_integral(q: Quadratic, nuisances: Nuisances, own: Array) -> float:
     return float(marginal(q, nuisances).integrated([own[None]])[0])
 
 
-def ln_within_limits(fit: Fit, mean: Array, spread: Array) -> float:
+def ln_within_limits(fit: Fit, mean: Array, spread: Array, errors: float) -> float:
     """ln of the posterior probability, to a quadratic, that shape parameters are within their limits, over the prior's; of one that is held at a limit, of the
-    integral of what falls off from there."""
+    integral of what falls off from there, `errors` being so many times those stated."""
     found, at, held = 0.0, len(fit.nuisance), {h.number: h for h in fit.held}
     for m, root in zip(fit.mechanisms, fit.roots, strict=True):
         for number, q in enumerate(m.shape, at + len(root)):
             low, high = ((limit - q.neutral) / q.prior_sd for limit in q.limits)
             if number in held:
-                h = held[number]
-                scaled = h.slope / np.sqrt(h.curvature)
-                inside = scaled**2 / 2 + log_ndtr(-scaled) - np.log(h.curvature) / 2 - fit.point[number] ** 2 / 2
+                h, far = held[number], abs(float(fit.point[number]))  # the prior, whose slope is that and whose curvature is one, knows of no errors
+                slope, curvature = (h.slope + far) / errors**2 - far, max((h.curvature - 1.0) / errors**2, 0.0) + 1.0
+                scaled = slope / np.sqrt(curvature)
+                inside = scaled**2 / 2 + log_ndtr(-scaled) - np.log(curvature) / 2 - far**2 / 2
             else:
                 sd = max(float(np.sqrt(max(spread[number, number], 0.0))), 1e-12)
                 inside = np.log(max(ndtr((high - mean[number]) / sd) - ndtr((low - mean[number]) / sd), 1e-300))
@@ -181,13 +182,28 @@ def one_sided(model: CampaignModel, mechanism: Mechanism, own: tuple[float, floa
 
 
 def impossible(m: Mechanism, sizes: Array, covariance: Array) -> bool:
-    """Whether a mechanism would need sizes (tests,) that it cannot have: whether those that it can lie more than `CANNOT` standard errors from them, all tests taken
-    together. What is alike in all tests may be a build tolerance's as well, and a size that is off by that is not told by one test's standard error."""
+    """Whether a mechanism would need sizes (tests,) that it cannot have: whether those that it can lie farther from them, all tests taken together, than `CANNOT` standard errors of one are by
+    chance, were the truth at the limit: chi-bar-squared, of as many independent tests as there are (Silvapulle & Sen, *Constrained Statistical Inference*, 2005, Eq. 3.5). What is alike in all tests may be a build tolerance's as well, and a size that is off by that is not told by one test's standard error."""
     variance, along = np.linalg.eigh(covariance)
     known = (TINY * m.size.prior_sd) ** 2  # rounding may leave a variance below nothing
     whitened = along.T / np.sqrt(np.maximum(variance, max(TINY * float(variance.sum()), known)))[:, None]
     nearest = lsq_linear(whitened, whitened @ sizes, m.size.limits)
-    return bool(2 * nearest.cost > CANNOT**2)
+    return bool(2 * nearest.cost > CANNOT**2 and _by_chance(2 * nearest.cost, _independent(m, sizes, covariance)) < ndtr(-CANNOT))
+
+
+def _independent(m: Mechanism, sizes: Array, covariance: Array) -> int:
+    """How many independent sizes those are worth that are not well within their limits: (sum of the eigenvalues)^2 over the sum of their squares, of their correlations."""
+    sd = np.sqrt(np.maximum(np.diag(covariance), (TINY * m.size.prior_sd) ** 2))
+    low, high = m.size.limits
+    near = np.minimum(sizes - low, high - sizes) < CANNOT * sd
+    values = np.linalg.eigvalsh((covariance / sd / sd[:, None])[np.ix_(near, near)])
+    return max(round(float(values.sum() ** 2 / max(values @ values, 1e-300))), 1)
+
+
+def _by_chance(square: float, count: int) -> float:
+    """Probability that so many independent errors beyond their limits, each as often as not, have squares of a larger sum."""
+    beyond = np.arange(1, count + 1)
+    return float(binom(count, beyond) @ chdtrc(beyond, square)) / 2.0**count
 
 
 def apart_by(sizes: Array, covariance: Array) -> Array:

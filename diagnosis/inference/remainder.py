@@ -60,17 +60,18 @@ def overlap(model: CampaignModel, fit: Fit) -> Overlap:
         total += [float(np.mean(r[:, k:] * r[:, :-k])) if r.shape[1] > k else 0.0 for k in range(1, LAGS + 1)]
     correlation = total / square
     seen = np.cumprod(correlation > says_nothing(count)).astype(bool)  # up to where it is lost in chance
-    lines, tests = float(1 + 2 * correlation[seen].sum()), between_tests(left)
+    lines = float(1 + 2 * correlation[seen].sum())
+    tests = between_tests(left, lines)
     return Overlap(lines, tests, lines * (1 + (len(left) - 1) * tests))
 
 
-def says_nothing(count: int) -> float:
+def says_nothing(count: float) -> float:
     """Up to where a correlation of so many numbers with as many others is chance, or too little to matter."""
     return max(SMALL, BY_CHANCE / float(np.sqrt(count)))
 
 
-def between_tests(left: Sequence[tuple[Array, Array]]) -> float:
-    """Mean correlation of residuals (channels, lines) at frequencies (lines,) of one test with those of another at its nearest lines; what chance
+def between_tests(left: Sequence[tuple[Array, Array]], alike: float = 1.0) -> float:
+    """Mean correlation of residuals (channels, lines) at frequencies (lines,) of one test with those of another at its nearest lines, `alike` of which say the same; what chance
     makes counts as none."""
     found = []
     for a, (lines, r) in enumerate(left):
@@ -79,7 +80,7 @@ def between_tests(left: Sequence[tuple[Array, Array]]) -> float:
                 there = other[:, np.abs(other_lines[None, :] - lines[:, None]).argmin(axis=1)].ravel()
                 size = float(np.linalg.norm(r) * np.linalg.norm(there))
                 correlation = float(r.ravel() @ there) / size if size else 0.0
-                found.append(correlation if correlation > says_nothing(r.size) else 0.0)
+                found.append(correlation if correlation > says_nothing(r.size / alike) else 0.0)
     return float(np.mean(found)) if found else 0.0
 
 

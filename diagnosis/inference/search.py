@@ -35,7 +35,8 @@ from thermospindle.model.types import Array
 FINALISTS = {1: 3, 2: 2, 3: 1}  # explanations of one, two and three mechanisms that are fitted anew at the end, of the catalogue and free
 NEAR = 100.0  # ln evidence behind the best, so far
 UNLIKELY = 5.0  # ln evidence behind the best, of a way to act that need not be told
-WAYS = 8  # in which an effect of the best explanation may act too, at most, those that screening promises most of
+RIVALS = 3  # explanations of which other ways are asked, at most: each shares its prior among all that its effects have
+WAYS = 8  # in which an effect of these may act too, at most, those that screening promises most of
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,11 +138,15 @@ def _at_the_end(model: CampaignModel, least: float, h: Hypothesis) -> Hypothesis
 
 
 def _other_ways(model: CampaignModel, ranked: Sequence[Hypothesis], every: Sequence[Mechanism], tried: Singles, workers: int | None) -> list[Hypothesis]:
-    """The best explanation of the catalogue with each of its effects acting in every other way that it has (the other bearing, the other ideal case of its law): screening
-    chose one, and what the data do not tell of that is not to be told as if they did."""
-    best = max((h for h in ranked if h.mechanisms and not h.free), key=lambda h: h.evidence.ln, default=None)
-    if best is None or best.evidence.ln < max(h.evidence.ln for h in ranked) - NEAR:
-        return []
+    """The best explanation of the catalogue, and those that do nearly as well, with each of their effects acting in every other way that it has (the other bearing, the other ideal case of its
+    law): screening chose one, and what the data do not tell of that is not to be told as if they did."""
+    named = of_each_name([h for h in ranked if h.mechanisms and not h.free])
+    best = max((h.evidence.ln for h in ranked), default=-np.inf)
+    rivals = [h for h in named[:RIVALS] if h.evidence.ln > max(named[0].evidence.ln - UNLIKELY, best - NEAR)]
+    return [way for h in rivals for way in _ways_of(model, h, every, tried, workers)]
+
+
+def _ways_of(model: CampaignModel, best: Hypothesis, every: Sequence[Mechanism], tried: Singles, workers: int | None) -> list[Hypothesis]:
     promised = {s.mechanism.variant: s.gain for s in sorted(tried.screened, key=lambda s: s.gain)}
     behind = np.inf if len(best.mechanisms) > 1 else BEHIND if tried.early else FAR  # screening says what an effect does by itself
     tasks, at = [], len(model.parameters)

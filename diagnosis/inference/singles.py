@@ -98,7 +98,8 @@ def _owed(
     nothing = evidence(model, none.fit, [undrifted(none.evidence.learned)]).ln
     delivered: dict[str, float] = {}
     for h in singles:
-        delivered[h.names[0]] = max(h.evidence.ln - nothing, delivered.get(h.names[0], -np.inf))
+        own = evidence(model, h.fit, [undrifted(h.evidence.learned)]).ln - nothing  # with nothing that drifts, as promised
+        delivered[h.names[0]] = max(own, delivered.get(h.names[0], -np.inf))
     tasks = []
     for kind, count in OWED.items():
         promised = promising(looked, kind)
@@ -152,7 +153,7 @@ def lasting(
     if lead.evidence.learned.sizes.get(kinds_of.STIFFNESS, 0.0) < HIDING and off < STRAINED:
         return []
     own = np.concatenate([np.zeros(n), lead.fit.point[n:]])
-    drawn = {m.name: m for m in reversed(mechanisms) if m.effect.lasting and m.name not in lead.names}
+    drawn = {m.name: m for m in reversed(mechanisms) if m.lasting and m.kind == "law" and m.name not in lead.names}
     tasks = [
         Task((*lead.mechanisms, m), tuple(np.concatenate([own, at[n:]]) for at in scan(model, (m,))[1:]), -np.inf) for m in drawn.values()
     ]

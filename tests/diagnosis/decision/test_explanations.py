@@ -6,13 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from tests.hand_made_search import SIZE, by_departing, made, mechanism, total
 from thermospindle.diagnosis.decision.explanations import COARSE, OWN_LAW, PRIOR, coarsening, discount
 from thermospindle.diagnosis.decision.verdict import Verdict, decide
 from thermospindle.diagnosis.forward.nuisance import BUILD, DAMPING, STIFFNESS
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
-from thermospindle.diagnosis.inference.remainder import Overlap, between_tests
+from thermospindle.diagnosis.inference.remainder import SMALL, Overlap, between_tests
 from thermospindle.diagnosis.inference.screening import Screened
 
 
@@ -70,6 +71,7 @@ def test_evidence_is_worth_less_where_the_model_is_seen_to_be_wrong(sizes, error
     assert np.log(first / second) == pytest.approx(6.0 / worth)
     assert coarsening(wrong[0], Overlap(1.0, 0.0, 1.0)) == worth
     assert coarsening(wrong[0], Overlap(1.0, 0.1, 1.3)) == COARSE
+    assert coarsening(wrong[0], Overlap(1.0, 0.01, 1.03)) == worth  # what one of many pairs of tests has by chance
 
 
 def test_noise_that_a_window_spreads_over_lines_counts_as_often_as_it_says_something():
@@ -97,6 +99,18 @@ def test_noise_of_few_numbers_says_nothing_twice():
     random = np.random.default_rng(11)
     found = [between_tests([(np.arange(140.0), random.standard_normal((2, 140))) for _ in range(4)]) for _ in range(100)]
     assert np.mean(np.array(found) > 0) < 0.05  # six pairs, of which each is beyond three standard deviations once in 700
+
+
+def test_noise_that_a_window_spreads_says_nothing_twice_between_tests():
+    """Autoregressive over lines, 0.7 from one to the next: of 800 numbers a sixth are of their own, and of 36 pairs of tests some correlate by chance."""
+    random = np.random.default_rng(3)
+
+    def noise() -> tuple[np.ndarray, np.ndarray]:
+        return np.arange(400.0), lfilter([np.sqrt(1 - 0.49)], [1.0, -0.7], random.standard_normal((2, 500)))[:, 100:]
+
+    found = np.array([between_tests([noise() for _ in range(9)], 1.7 / 0.3) for _ in range(40)])
+    assert found.max() < SMALL
+    assert np.mean(found > 0) < 0.15
 
 
 @pytest.mark.parametrize(("gained", "word"), [(0.5, "two effects"), (100.0, "ambiguous")])

@@ -100,7 +100,7 @@ def test_a_shape_with_a_law_of_the_datas_own_says_nothing_of_amounts():
 
 @pytest.mark.parametrize(
     ("count", "off", "alike", "cannot"),
-    [(4, 1.2, 0.0, False), (8, 1.2, 0.0, True), (4, 2.4, 0.99, False), (4, 2.4, 0.0, True), (1, 2.9, 0.0, False), (1, 3.1, 0.0, True)],
+    [(4, 1.2, 0.0, False), (8, 1.2, 0.0, False), (8, 1.7, 0.0, True), (4, 2.4, 0.99, False), (4, 2.4, 0.0, True), (1, 2.9, 0.0, False), (1, 3.1, 0.0, True)],
 )
 def test_what_a_size_cannot_be_is_asked_of_all_tests_together(count, off, alike, cannot):
     """Sizes `off` standard errors below what they can be, in each of so many tests: independent errors make root-n as much of it, what is alike in all tests
@@ -114,6 +114,16 @@ def test_what_a_size_cannot_be_is_asked_of_all_tests_together(count, off, alike,
     assert not impossible(m, np.full(count, 0.1), covariance)
     assert not impossible(m, np.full(count, 0.1), np.zeros((count, count)))
     assert impossible(m, np.full(count, low - 0.01), -1e-18 * np.eye(count))  # rounding of what is known
+
+
+@pytest.mark.parametrize("count", [1, 5, 12, 20])
+def test_a_size_at_its_limit_is_said_to_be_beyond_it_as_seldom_with_many_tests_as_with_one(count):
+    """Sums of squares beyond a limit grow with the number of tests: against those of one a truth at the limit was impossible in half of all campaigns of twenty."""
+    m = variants(effect("preload_loss"))[0]
+    sd, low, random = 0.02, m.size.limits[0], np.random.default_rng(count)
+    drawn = low + sd * random.standard_normal((1000, count))
+    rate = np.mean([impossible(m, sizes, sd**2 * np.eye(count)) for sizes in drawn])
+    assert rate <= 0.006  # 0.00135 of one
 
 
 @pytest.mark.parametrize(("sizes", "sd", "wrong"), [
