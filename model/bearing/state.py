@@ -54,7 +54,8 @@ def linear_state(spindle: Spindle, b: LinearBearing, condition: Condition) -> Li
         ("speed", "rpm", [v / RPM for v in b.speed], abs(condition.speed) / RPM),
     ):
         if len(values) > 1 and not values[0] - 1e-9 <= where <= values[-1] + 1e-9:
-            raise OutsideRange(f"the table of bearing {b.name!r} spans {name} {values[0]:g} to {values[-1]:g} {unit} and was asked at {where:g} {unit}")
+            of = f"{spindle.file or spindle.name}: bearings.{b.name}.numbers.table"
+            raise OutsideRange(f"{of}: spans {name} {values[0]:g} to {values[-1]:g} {unit} and was asked at {where:g} {unit}")
         at.append(float(np.interp(where, values, np.arange(len(values)))))
     i, j = (min(int(x), n - 1) for x, n in zip(at, grid.shape[:2], strict=True))
     p, q = at[0] - i, at[1] - j

@@ -13,6 +13,7 @@ import numpy as np
 
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array
+from thermospindle.model.units import RPM
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.running.excitation import harmonics, response
 from thermospindle.sim.running.lines import amplitude_of
@@ -35,8 +36,14 @@ class LineSpectrum:
 
 
 def waterfall(spindle: Spindle, temperature: float, speeds: Sequence[float]) -> list[LineSpectrum]:
-    """Line spectra at one temperature (C) and several speeds (rad/s), none of them zero."""
-    return [_spectrum(spindle, Condition(temperature, speed)) for speed in speeds]
+    """Line spectra at one temperature (C) and several speeds (rad/s), none of them zero; those beyond the tables of bearings are left out."""
+    return [_spectrum(spindle, Condition(temperature, speed)) for speed in speeds if _known(spindle, speed)]
+
+
+def _known(spindle: Spindle, speed: float) -> bool:
+    """Whether every bearing given by a table over speed is known at a speed (rad/s)."""
+    tables = (b.speed for b in spindle.linear_bearings if len(b.speed) > 1)
+    return all(t[0] - 1e-9 * RPM <= abs(speed) <= t[-1] + 1e-9 * RPM for t in tables)
 
 
 def run_up(speed: float) -> list[float]:

@@ -17,6 +17,7 @@ from thermospindle.sim.operating import operating_point
 from thermospindle.sim.running.excitation import harmonics
 from thermospindle.sim.running.run import run_spindle
 from thermospindle.sim.running.runout import runout
+from thermospindle.sim.running.waterfall import STEPS, run_up, waterfall
 
 TEXT = """
 format = 2
@@ -149,5 +150,12 @@ def test_a_map_goes_as_far_as_tables_do_and_has_the_drums_unbalance(two, capsys)
 
 
 def test_beyond_a_table_the_speed_is_told_in_rpm(two):
-    with pytest.raises(OutsideRange, match="spans speed 0 to 7000 rpm and was asked at 8000 rpm"):
+    with pytest.raises(OutsideRange, match=r"spindle.toml: bearings.rear.numbers.table: spans speed 0 to 7000 rpm and was asked at 8000 rpm"):
         operating_point(two, Condition(20.0, 8000 * RPM))
+
+
+def test_a_waterfall_goes_as_far_as_tables_do(two):
+    """A record at the last speed of a table has its run-up drawn up to there."""
+    found = waterfall(two, 20.0, run_up(7000 * RPM))
+    assert len(found) == STEPS / 1.25
+    assert found[-1].speed == pytest.approx(7000 * RPM)
