@@ -12,8 +12,11 @@ from thermospindle.model import sense
 from thermospindle.model.bearing.pair import joined
 from thermospindle.model.bearing.roller import RollerState
 from thermospindle.model.errors import NoEquilibrium, OutsideRange
+from thermospindle.model.files.formats import SCENE
 from thermospindle.model.machine import Condition, LinearBearing, Point, Spindle
 from thermospindle.model.rotor.static import FREE
+from thermospindle.model.scene.fields import read_file
+from thermospindle.model.scene.reading import with_shipped_rows
 from thermospindle.model.shaft import SAME_HEIGHT, Shaft
 from thermospindle.model.units import MM, RPM
 from thermospindle.report.check.understood import free_angle
@@ -30,6 +33,11 @@ NEAR = 0.05
 """Of the speed, within which a natural frequency is called critical."""
 CONFORMITY = (0.505, 0.58)
 """Groove radius over ball diameter of bearings that are made: 0.515 to 0.53 mostly (Harris, Rolling Bearing Analysis, ch. 2)."""
+CONTACT_ANGLE = (5.0, 60.0)
+"""Degrees: deep-groove bearings have 8 to 15 of their clearance, angular contact ones 12 to 40, thrust ones 60."""
+SAG = 1.0 * MM
+"""By which the weight of what turns would sink on one bearing alone: more than any gap between what turns and what stands, and seals and motors would rub."""
+GRAVITY = 9.81
 LEAST_EXPANSION = 0.01
 """um/m K: glass ceramics such as Zerodur have 0.02, and whoever writes 1/K has 1e-5."""
 LEAST_DENSITY = 100.0
@@ -104,6 +112,33 @@ def _contacts(found: Looked) -> Iterator[str]:
                 yield f"bearing {b.name}: the {ring} groove's radius is {value:g} ball diameters; bearings have {CONFORMITY[0]:g} to {CONFORMITY[1]:g}"
         if free_angle(b, found.reference.state.bearing(b.name)) is None:
             yield f"bearing {b.name}: its contact angle under the preload means that the rings would press the balls without any; a larger angle, or more preload, is meant"
+
+
+def _angles(found: Looked) -> Iterator[str]:
+    if found.spindle.file is None:
+        return
+    raw = with_shipped_rows(read_file(SCENE, found.spindle.file))
+    for name, row in raw.get("ball_rows", {}).items():
+        key = "free_contact_angle_deg" if "free_contact_angle_deg" in row else "contact_angle_deg"
+        of = [bearing for bearing, told in raw["bearings"].items() if told.get("row") == name]
+        if of and not CONTACT_ANGLE[0] <= row[key] <= CONTACT_ANGLE[1]:
+            yield (
+                f"ball_rows.{name}.{key} = {row[key]:g}, of {', '.join(of)}: angular contact bearings have 12 to 40 degrees, thrust bearings 60, "
+                "and deep-groove ones 8 to 15; the key takes degrees"
+            )
+
+
+def _soft(found: Looked) -> Iterator[str]:
+    """Of a bearing given by numbers its stiffness across the axis where it has any, else along it."""
+    weight = found.spindle.turning_mass * GRAVITY
+    for b in found.spindle.linear_bearings:
+        x, y, axial = np.reshape(b.stiffness, (-1, 5, 5))[:, range(3), range(3)].max(axis=0)
+        stiffness, way = (max(x, y), "radial") if max(x, y) > 0 else (axial, "axial")
+        if 0 < stiffness * SAG < weight:
+            yield (
+                f"bearing {b.name}: its {way} stiffness is {stiffness:g} N/m at most, on which the {found.spindle.turning_mass:.3g} kg that turn would sink by "
+                f"{weight / stiffness / MM:.3g} mm; bearings give way by less than {SAG / MM:g} mm, so that another unit may be meant (2e7 N/m are 20 N/um)"
+            )
 
 
 def _preload(found: Looked) -> Iterator[str]:
@@ -305,5 +340,5 @@ def _count(n: int, one: str, many: str = "") -> str:
 
 
 QUESTIONS: tuple[Callable[[Looked], Iterator[str]], ...] = (
-    _loose, _same_place, _seats, _contacts, _materials, _preload, _pushed, _sense, _tables, _free, _undamped, _damping, _critical, _sections, _points, _hammer, _running, _effects,
+    _loose, _same_place, _seats, _contacts, _angles, _soft, _materials, _preload, _pushed, _sense, _tables, _free, _undamped, _damping, _critical, _sections, _points, _hammer, _running, _effects,
 )  # fmt: skip
