@@ -7,6 +7,7 @@ from itertools import zip_longest
 
 import numpy as np
 from matplotlib import rc_context
+from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
@@ -20,6 +21,7 @@ from thermospindle.report.typeset import UNITS, signed_short
 from thermospindle.sim.identification.frf import decibel
 
 MOST, MOST_ALONE = 3, 6  # FRFs over each other, of every test and of one alone
+NUMBER = 0.04  # of the width of an FRF that the number of a mode takes
 FDAC_LINES = 260  # about, of an FDAC map
 
 
@@ -96,18 +98,19 @@ def overlay(c: Comparison) -> Figure:
     figure = _figure(10.3, 0.9 + (2.1 if alone else 1.35) * rows)
     panels = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=False if alone else "col")
     every_row = [(*tests[0], pairs[k : k + columns]) for k in range(0, len(pairs), columns)] if alone else [(*row, pairs) for row in tests]
-    for (t, found, own), row in zip(every_row, panels, strict=True):
+    for k, ((t, found, own), row) in enumerate(zip(every_row, panels, strict=True), 1):
         for axes, pair in zip_longest(row, own):
-            axes.tick_params(labelbottom=alone or row is panels[-1])
+            axes.tick_params(labelbottom=alone or k == rows)
             ij = found.pairs.get(pair)
             if ij is None:
                 axes.set_axis_off()
                 continue
             axes.plot(found.frequency, decibel(found.measured[ij]), color=colour(t.test.temperature, every), lw=2.4, alpha=0.55)
             axes.plot(found.frequency, decibel(found.computed[ij]), color=INK, lw=0.8, ls=(0, (4, 2)))
+            _number_modes(axes, t.modes, (found.frequency[0], found.frequency[-1]))
         row[0].set_ylabel(label(t.test))
     for k, pair in enumerate(pairs):
-        panels.flat[k].set_title(f"H({pair[0]},{pair[1]})" + (" driving point" if pair[0] == pair[1] else ""))
+        panels.flat[k].set_title(f"H({pair[0]},{pair[1]})" + (" driving point" if pair[0] == pair[1] else ""), pad=14)
     for axes in panels[-1]:
         axes.set_xlabel("frequency, Hz")
         axes.set_xlim(tests[0][1].frequency[0], tests[0][1].frequency[-1])
@@ -115,8 +118,26 @@ def overlay(c: Comparison) -> Figure:
     figure.supylabel(f"{quantity}, dB re 1 {UNITS[quantity]}", fontsize=8.5)
     handles = [Line2D([], [], color=colour(t, every), lw=2.4, alpha=0.55, label=f"measured, {t:g} °C") for t in sorted(set(every))]
     handles.append(Line2D([], [], color=INK, lw=0.8, ls=(0, (4, 2)), label="computed"))
+    if any(t.modes for t, _ in tests):
+        handles.append(Line2D([], [], color=PALE, marker="|", ls="none", ms=6, label="paired mode and its number, where measured"))
     figure.legend(handles=handles, loc="outside upper right", ncols=min(len(handles), 6))
     return figure
+
+
+def _number_modes(axes: Axes, modes: Sequence[PairedMode], band: tuple[float, float]) -> None:
+    """A tick at the top of an FRF at every paired mode's measured frequency, with its number; neighbours without room for two numbers share a place."""
+    groups: list[list[PairedMode]] = []
+    for m in sorted((m for m in modes if band[0] <= m.measured <= band[1]), key=lambda m: m.measured):
+        axes.plot(m.measured, 0.985, marker="|", ms=6, color=PALE, transform=axes.get_xaxis_transform(), clip_on=False)
+        groups.append([m])
+        while len(groups) > 1 and _middle(groups[-1]) - _middle(groups[-2]) < NUMBER * (len(groups[-2]) + len(groups[-1])) / 2 * (band[1] - band[0]):
+            groups[-2:] = [groups[-2] + groups[-1]]
+    for group in groups:
+        axes.text(_middle(group), 1.01, ",".join(str(m.number) for m in group), transform=axes.get_xaxis_transform(), ha="center", va="bottom", fontsize=7, color=PALE)
+
+
+def _middle(group: Sequence[PairedMode]) -> float:
+    return float(np.mean([m.measured for m in group]))
 
 
 def shown_pairs(found: Correlation, most: int) -> list[Pair]:

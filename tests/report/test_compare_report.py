@@ -250,4 +250,8 @@ def test_numbers_can_be_read_and_one_test_shows_more_of_its_frfs(found):
 
 
 def test_labels_of_an_open_place_are_shown(found):
+    below = figures(found)["frfs"].axes[-3:]  # of two tests the row of the last
+    assert all(axes.xaxis.get_tick_params()["labelbottom"] for axes in below)
+    numbers = {n for text in below[0].texts for n in text.get_text().split(",")}
+    assert numbers == {str(m.number) for m in found.tests[-1].modes}
     assert all(axes.xaxis.get_tick_params()["labelbottom"] for axes in figures(replace(found, tests=found.tests[:1]))["frfs"].axes if axes.lines)
