@@ -40,6 +40,8 @@ def bring(
         raise BadInput(f"--out {out}: is not empty; a campaign is written to a new or empty folder")
     spindle = with_effects(scene, effect_files)[0] if scene is not None else None
     form = read_mapping(None if fresh else mapping)
+    if spindle is not None and form.spindle not in (None, spindle.name):
+        raise BadInput(f"{mapping}: spindle = {form.spindle!r}: --scene {scene} is {spindle.name!r}; a campaign is of one scene, so change one of the two or leave it out")
     steps = len(files) * (2 if fresh and out is None else 1)
     with progress_bar(steps) as done:
         found = read(files, form, spindle, mapping, done)

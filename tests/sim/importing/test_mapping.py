@@ -280,6 +280,18 @@ def test_points_on_a_flexible_shaft_are_told_by_its_name(tmp_path):
         bring([file], mapping=tmp_path / "m.toml", scene="mk7702", out=tmp_path / "d")
 
 
+def test_a_mapping_for_another_scene_is_refused(tmp_path):
+    """It made a campaign for one scene, to be compared with another."""
+    heads, found = columns("real", "(m/s)/N")
+    file = table(tmp_path / "T20.csv", ["Frequency", *heads], [FREQUENCY, *found])
+    (tmp_path / "m.toml").write_text('spindle = "free_shaft"\n' + HEAD)
+    with pytest.raises(BadInput, match=r"m.toml: spindle = 'free_shaft': --scene hdd_2003 is 'hdd_2003'"):
+        bring([file], mapping=tmp_path / "m.toml", scene="hdd_2003", out=tmp_path / "c")
+    (tmp_path / "m.toml").write_text(SPINDLE + HEAD)
+    bring([file], mapping=tmp_path / "m.toml", scene="hdd_2003", out=tmp_path / "c")
+    assert read_campaign(tmp_path / "c").spindle == "hdd_2003"
+
+
 def test_patterns_and_folders(tmp_path):
     """A pattern that no shell expanded is expanded; a folder is told from a file."""
     (tmp_path / "a.csv").write_text("frequency,mode\n1000,1\n")
