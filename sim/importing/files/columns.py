@@ -218,6 +218,8 @@ def _value(file: Path, parts: Mapping[str, Column], settings: FileForm) -> tuple
         return None, [Question(file.name, "phase_unit", f"whether the phase in {name} is in deg or rad")]
     if unit == "deg" and settings.phase_unit is None and 0.9 * np.pi < np.abs(phase).max() <= np.pi * (1 + 1e-6):
         return None, [Question(file.name, "phase_unit", "whether its phases are in deg, as their headings say, or in rad: they stay within +-3.14")]
+    if unit == "rad" and settings.phase_unit is None and np.abs(phase).max() > FULL_TURN:
+        return None, [Question(file.name, "phase_unit", "whether its phases are in rad, as their headings say, or in deg: they go beyond a turn, 6.28")]
     return size * np.exp(1j * phase * (np.pi / 180 if unit == "deg" else 1.0)), []
 
 

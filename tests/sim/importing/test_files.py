@@ -181,6 +181,17 @@ def test_radians_under_a_heading_of_degrees_are_asked(tmp_path):
     assert frf.value.shape == FRF.value.shape
 
 
+def test_degrees_under_a_heading_of_radians_are_asked(tmp_path):
+    """Also phases in radians that were unwrapped go beyond a turn; one key says which they are."""
+    heads, found = columns("phase", "(m/s)/N")
+    file = table(tmp_path / "T20.csv", ["Frequency [Hz]", *(h.replace("phase [deg]", "phase [rad]") for h in heads)], [FREQUENCY, *found])
+    with pytest.raises(BadInput, match="1 thing is not told") as said:
+        imported(tmp_path, "", file)
+    assert "phase_unit: whether its phases are in rad, as their headings say, or in deg: they go beyond a turn, 6.28" in str(said.value)
+    frf = imported(tmp_path, '[[files]]\nfile = "T20.csv"\nphase_unit = "deg"\n', file)
+    np.testing.assert_allclose(frf.value, FRF.value, rtol=1e-8)
+
+
 def test_a_sweep_in_uneven_steps(tmp_path):
     """Lines of a logarithmic sweep are kept as they are, through the campaign's file too; a conjugated one is refused as any other."""
     lines = np.geomspace(400.0, 700.0, 400)
