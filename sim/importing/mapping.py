@@ -9,7 +9,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError
+from pydantic import AfterValidator, Field, ValidationError
 
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.formats import CURRENT, MAPPING, migrated
@@ -23,7 +23,16 @@ REST = "*"
 """In `columns`: all columns that nothing else tells; they can only be ignored."""
 Quantity = Literal["receptance", "mobility", "accelerance"]
 Temperature = Annotated[float, Field(gt=-273.15, le=5000, allow_inf_nan=False)]
-Band = Annotated[list[NotNegative], Field(min_length=2, max_length=2)]
+
+
+def _low_first(ends: list[float]) -> list[float]:
+    if not ends[0] < ends[1]:
+        raise ValueError("its ends are the wrong way round; the lower one comes first, as in [50.0, 3000.0]")
+    return ends
+
+
+Band = Annotated[list[NotNegative], Field(min_length=2, max_length=2), AfterValidator(_low_first)]
+"""Hz."""
 
 
 class FileForm(Table):

@@ -312,6 +312,8 @@ def test_patterns_and_folders(tmp_path):
         ("[[points]]\nnode = 1\n[[points]]\nnode = 1\n", "points: node = 1 stands 2 times"),
         ('[[points]]\nnode = 1\nname = "much too long a name"\n', "points.1: name = 'much too long a name'"),
         ("[records]\nband_Hz = [1.0]\n", "records.band_Hz"),
+        ("[records]\nband_Hz = [3e3, 50]\n", r"m.toml: records.band_Hz = \[3000.0, 50\]: its ends are the wrong way round"),
+        ("band_Hz = [3e3, 50]\n", r"m.toml: band_Hz = \[3000.0, 50\]: its ends are the wrong way round; the lower one comes first"),
     ],
 )
 def test_a_wrong_mapping_is_one_sentence(tmp_path, wrong, said):
