@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from thermospindle.diagnosis.compare.correlation import Correlation, assurance, comac, correlate, frac
+from thermospindle.diagnosis.compare.correlation import Correlation, assurance, comac, correlate, frac, has_frfs
 from thermospindle.diagnosis.data.observe import Observation, observe
 from thermospindle.diagnosis.prediction.modes import Predicted, predict
 from thermospindle.diagnosis.prediction.partners import BELIEVABLE, by_hammer, crossings, group, numbered, partners, shapes
@@ -75,6 +75,7 @@ class TestComparison:
     correlation: Correlation | None
     residuals: Array  # (2m,) of measured [frequency, damping], whitened; a missing mode's in place of its frequency, 0 where there is none
     count: int  # of those there are
+    beyond: str = ""  # the state of the bearings, where the model gives no FRFs of it
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.test.id}: {len(self.modes)} modes paired, {len(self.missing)} missing, {len(self.extra)} more computed>"
@@ -249,13 +250,15 @@ def _test(
     frf = o.test.frf
     low, high = spindle.hammer.band if frf is None else (frf.frequency[0], frf.frequency[-1])
     found = set(partner.tolist())
-    correlated = beside(spindle, campaign.points, o.test, o.condition) if frfs else None
+    own = beside(spindle, campaign.points, o.test, o.condition) if frfs else None
+    known_frfs = own is not None and has_frfs(own)
     return TestComparison(
         o.test,
         tuple(modes),
         tuple(o.frequency[lost].tolist()),
         tuple(float(f) for j, f in enumerate(p.frequency) if low <= f <= high and j not in found),
-        None if correlated is None else correlate(correlated),
+        correlate(own) if own is not None and known_frfs else None,
         residuals,
         len(rows) + len(lost),
+        own.point.state.status if own is not None and not known_frfs else "",
     )

@@ -30,6 +30,7 @@ from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.campaign.beside import Beside
 
 SILENT = 1e-6  # of the largest FRF of the test; smaller computed ones are forbidden by symmetry and have no shape to compare
+LARGEST = 1e30  # of any unit: a computed FRF as large as that is none
 FEWEST = 8  # lines of a band that is worth a number
 LOUDER, NEARLY = 3.0, 0.25  # dB, from which a factor that all FRFs share is told; within which, or within this part of it, they share it
 SHIFT_STEP = 5e-4  # relative, between the shifts tried
@@ -122,6 +123,12 @@ class Correlation:
         """FDAC (computed lines, measured lines)."""
         x, a = (_unit(_stacked(v)[:, list(k)]) for v, k in ((self.measured, measured_lines), (self.computed, computed_lines)))
         return np.abs(a.conj().T @ x) ** 2
+
+
+def has_frfs(beside: Beside) -> bool:
+    """Whether the model has FRFs at the condition of a test: with no bearing in contact the free shaft's matrices are singular, and rounding alone is left."""
+    largest = np.abs(beside.computed(beside.measured.frequency)).max(initial=0.0)
+    return bool(largest < LARGEST)
 
 
 def correlate(beside: Beside) -> Correlation:

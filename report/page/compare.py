@@ -16,7 +16,7 @@ from thermospindle.report.figures.runout_campaign import comparison_figures
 from thermospindle.report.log.compare import FrfsBeside, write_comparison_log
 from thermospindle.report.page import runout_compare as runout
 from thermospindle.report.page.report import Section, write_page
-from thermospindle.report.text.compare import AGREES, TOGETHER
+from thermospindle.report.text.compare import AGREES, TOGETHER, unlike
 from thermospindle.report.typeset import figure, minus, signed, table, with_error
 
 WORDS = {
@@ -86,16 +86,17 @@ def _summary(c: Comparison) -> str:
         f"<p>{Markup.escape(c.campaign)} beside the scene {Markup.escape(c.spindle)}: rms residual <b>{c.rms_residual:.3g} standard errors</b>"
     ]
     if modes:
-        residuals = [(m.residual, f"{signed(m.error, 2)} Hz", m) for m in modes]
+        alike = [m for m in modes if not unlike(m)] or modes
+        residuals = [(m.residual, f"{signed(m.error, 2)} Hz", m) for m in alike]
         residuals += [
             (m.damping_residual, f"{signed(100 * (m.damping_computed - m.damping_measured), 3)} % of damping", m)
-            for m in modes
+            for m in alike
             if m.damping_residual is not None and m.damping_measured is not None
         ]
         residual, error, worst = max(residuals, key=lambda row: abs(row[0]))
         if abs(residual) < c.rms_residual >= AGREES and not any(t.missing for t in c.tests):
             words.append(f"; {TOGETHER.format(abs(residual))}")
-        words.append(f", the largest that of mode {worst.number} ({worst.kind}), {signed(residual, 1)} standard errors or {error}")
+        words.append(f", the largest in standard errors that of mode {worst.number} ({worst.kind}), {signed(residual, 1)} standard errors or {error}")
     words.append(".</p>")
     remarks = [f"{label(t.test, ', ')}: {what} {', '.join(f'{f:.1f}' for f in values)} Hz" for t in c.tests
             for what, values in (("measured, not computed (a mode the model lacks, or a false pole):", t.missing), ("computed, not measured:", t.extra))

@@ -80,17 +80,40 @@ TOGETHER = "no mode alone is off by more than {:.1f}, but their errors hang toge
 """Where the modes' own errors are smaller than their rms residual, which knows what their errors have in common."""
 
 
+UNLIKE = 0.1
+"""MAC below which a measured mode has nothing of the computed one that stands near its frequency: its error says nothing."""
+
+
 def verdict(c: Comparison) -> str:
-    """One sentence: whether they agree, by how much they do not, and the mode that is furthest off."""
+    """One sentence: whether they agree, by how much they do not, and the modes that are furthest off, in standard errors and in Hz."""
     words = "agrees with the tests within their errors" if c.rms_residual < AGREES else "nearly agrees with the tests" if c.rms_residual < ALMOST else "does not agree with the tests"
     sentence = f"{c.spindle} {words}: rms residual {c.rms_residual:.3g} standard errors"
-    every = [(abs(m.residual), t, m) for t in c.tests for m in t.modes]
+    every = [(t, m) for t in c.tests for m in t.modes]
     if not every or c.rms_residual < AGREES:
         return f"{sentence}."
-    alone, t, m = max(every, key=lambda row: row[0])
+    alone = max(abs(m.residual) for _, m in every)
     if alone < c.rms_residual and not any(t.missing for t in c.tests):
         return f"{sentence}; {TOGETHER.format(alone)}."
-    return f"{sentence}; furthest off is the {m.kind} mode at {m.measured:.0f} Hz of {t.test.id}, computed {abs(m.error):.3g} Hz too {'high' if m.error > 0 else 'low'}."
+    alike = [(t, m) for t, m in every if not unlike(m)]
+    if not alike:
+        return f"{sentence}; no computed mode near a measured one has its shape."
+    t, m = max(alike, key=lambda row: abs(row[1].residual))
+    _, largest = far = max(alike, key=lambda row: abs(row[1].error))
+    in_hertz = "" if largest is m else f"; in Hz it is {_mode(*far)} {_off(largest)}"
+    return f"{sentence}; furthest off in standard errors is {_mode(t, m)} {_off(m)} ({abs(m.residual):.3g} standard errors){in_hertz}."
+
+
+def unlike(m: PairedMode) -> bool:
+    """Whether the measured shape of a paired mode has nothing of the computed one."""
+    return m.mac is not None and m.mac < UNLIKE
+
+
+def _mode(t: TestComparison, m: PairedMode) -> str:
+    return f"the {m.kind} mode at {m.measured:.0f} Hz of {t.test.id},"
+
+
+def _off(m: PairedMode) -> str:
+    return f"computed {abs(m.error):.3g} Hz too {'high' if m.error > 0 else 'low'}"
 
 
 def show_comparison(console: Console, c: Comparison, verbose: bool = True) -> None:

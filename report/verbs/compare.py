@@ -16,6 +16,7 @@ from thermospindle.diagnosis.data.observe import observe
 from thermospindle.diagnosis.runout.compare import RunoutBeside, compare_runout, rms_residual
 from thermospindle.diagnosis.runout.lines import modal_tests
 from thermospindle.model.machine import Spindle
+from thermospindle.model.units import RPM
 from thermospindle.report.progress import progress_bar
 from thermospindle.report.text.compare import comparison_json, show_before_after, show_comparison
 from thermospindle.report.text.runout_compare import runout_comparison_json, show_errors, show_runout_comparison
@@ -62,7 +63,17 @@ def compare(
             turning[1](console)
 
     write = write_json("comparison.json", lambda folder: _write(comparison, spindle, folder, *(turning[2:] if turning else ())))
-    return answered(values, show, out, asked, write, [*left_out(tests), *_louder(comparison)])
+    return answered(values, show, out, asked, write, [*left_out(tests), *_beyond(comparison), *_louder(comparison)])
+
+
+def _beyond(c: Comparison) -> list[str]:
+    """Tests at conditions that the model does not bear."""
+    return [
+        f"tests.{t.test.id}: at {t.test.temperature:g} C and {t.test.speed / RPM:g} rpm the {t.beyond}: this is beyond what the model bears, and its FRFs are not compared; "
+        "is the temperature right, and in C?"
+        for t in c.tests
+        if t.beyond
+    ]
 
 
 def _louder(c: Comparison) -> list[str]:

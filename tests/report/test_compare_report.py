@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from dataclasses import replace
 from html.parser import HTMLParser
 
@@ -21,6 +22,7 @@ from thermospindle.report.log.read import read_log
 from thermospindle.report.page.compare import sections, write_comparison
 from thermospindle.report.text.compare import show_comparison, verdict
 from thermospindle.report.typeset import with_error
+from thermospindle.report.verbs.compare import _beyond
 from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Noise, Test
 from thermospindle.sim.identification.frf import Frf
 from thermospindle.sim.operating import operating_point
@@ -95,6 +97,28 @@ def test_errors_that_hang_together_are_told(found):
     assert "furthest off" not in verdict(together)
     assert words not in verdict(found)
     assert any("but their errors hang together" in str(section) for section in sections(together))
+
+
+def test_furthest_off_says_in_what(found):
+    """The largest error in standard errors need not be that in Hz, and a mode of another shape is neither."""
+    modes = list(found.tests[0].modes)
+    modes[0], modes[1], modes[2] = replace(modes[0], sd=1e-4), replace(modes[1], computed=1.05 * modes[1].measured), replace(modes[2], sd=1e-5, mac=0.0)
+    told = verdict(replace(found, tests=(replace(found.tests[0], modes=tuple(modes)),)))
+    assert f"furthest off in standard errors is the {modes[0].kind} mode at {modes[0].measured:.0f} Hz of T20" in told
+    assert f"({abs(modes[0].residual):.3g} standard errors); in Hz it is the {modes[1].kind} mode at {modes[1].measured:.0f} Hz of T20" in told
+    strange = tuple(replace(m, mac=0.0) for m in modes)
+    assert "no computed mode near a measured one has its shape" in verdict(replace(found, tests=(replace(found.tests[0], modes=strange),)))
+
+
+def test_kelvin_for_celsius_is_told_and_warns_of_no_overflow(spindle, campaign):
+    """At 293 C both bearings lose contact: their matrices are singular, and FRFs of 1e276 are rounding."""
+    kelvin = replace(campaign, tests=(replace(campaign.tests[0], temperature=293.0),))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        other = compare(spindle, kelvin)
+    assert other.tests[0].correlation is None
+    (told,) = _beyond(other)
+    assert "at 293 C and 0 rpm the lower and upper bearing lost contact" in told
 
 
 def test_the_folder(folder):
