@@ -20,6 +20,12 @@ from thermospindle.model.units import DEGREE, MM
 Three = Annotated[tuple[Positive, Positive, Positive], Strict(False)]
 
 
+def _too_many(what: str, count: int, diameter: float, pitch: float) -> str:
+    """What is said of more `balls` or `rollers` than there is room for on a pitch circle (mm)."""
+    most = int(np.pi * pitch / diameter)
+    return f"{what} = {count}: so many of {diameter:g} mm do not fit on the pitch circle of {pitch:g} mm; at most {most} do, side by side"
+
+
 class Catalogue(Table):
     """What a catalogue prints of a universal pair of spindle bearings at its light, medium and heavy preload."""
 
@@ -45,9 +51,7 @@ class BallRow(Table):
     @model_validator(mode="after")
     def _balls_fit(self) -> BallRow:
         if self.balls * self.ball_diameter_mm > np.pi * self.pitch_diameter_mm:
-            raise ValueError(
-                "that many balls do not fit on the pitch circle; balls * ball_diameter_mm must be below pi * pitch_diameter_mm"
-            )
+            raise ValueError(_too_many("balls", self.balls, self.ball_diameter_mm, self.pitch_diameter_mm))
         if (self.contact_angle_deg is None) == (self.free_contact_angle_deg is None):
             raise ValueError("a ball row has either contact_angle_deg, under the preload, or free_contact_angle_deg, without load")
         told = [key for key in ("inner_conformity", "outer_conformity") if getattr(self, key) is not None]
@@ -90,7 +94,7 @@ class RollerRow(Table):
     @model_validator(mode="after")
     def _rollers_fit(self) -> RollerRow:
         if self.rollers * self.roller_diameter_mm > np.pi * self.pitch_diameter_mm:
-            raise ValueError("that many rollers do not fit on the pitch circle; rollers * roller_diameter_mm must be below pi * pitch_diameter_mm")
+            raise ValueError(_too_many("rollers", self.rollers, self.roller_diameter_mm, self.pitch_diameter_mm))
         if self.rows > 1 and self.row_spacing_mm is None:
             raise ValueError("row_spacing_mm is missing: the distance between the middles of rows side by side")
         if self.rows == 1 and self.row_spacing_mm is not None:

@@ -187,7 +187,9 @@ def first_error(where: str | Path, raw: Any, form: type[BaseModel], error: Valid
 
 
 def _told(kind: str, message: str, value: Any) -> str:
-    """pydantic's words in those of a file: what it calls a tuple is a list in brackets, and a number in quotes is none."""
+    """pydantic's words in those of a file: what it calls a tuple is a list in brackets, and neither a number in quotes nor nan is one."""
+    if isinstance(value, float) and not np.isfinite(value):
+        return "input should be a finite number"
     if kind in ("tuple_type", "list_type"):
         return "input should be a list in brackets, as [1.0, 2.0]"
     if kind in ("float_type", "int_type") and isinstance(value, str) and value.replace(".", "", 1).strip().isdigit():
