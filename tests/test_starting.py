@@ -41,6 +41,14 @@ def test_a_new_scene_has_its_name(scenes: Path, kind: str) -> None:
     assert f'title = "my {kind}"' in (scenes / kind / "spindle.toml").read_text(encoding="utf-8")
 
 
+def test_a_name_with_a_blank_is_quoted_where_it_is_to_be_typed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "a b", "--like", "rotor"]) == 0
+    said = capsys.readouterr().out
+    assert "spindle check 'a b' " in said
+    assert "spindle modes 'a b'\n" in said
+
+
 def _runs(kind: str, verb: str) -> Any:
     return pytest.param(kind, verb, marks=[pytest.mark.slow] if verb in ("map", "runout") else [])
 

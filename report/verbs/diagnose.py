@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -114,7 +115,7 @@ def draft(diagnosis: Path, name: str | None = None, element: str | None = None, 
 
     def show(console: Console) -> None:
         console.print(f"{out}: {effect.title}; {effect.equation}" + ("" if written.doubt else f"; {written.fits}"))
-        console.print(f"Read it, edit it, then: spindle add SCENE {called} --effect {out} --from {diagnosis} --out NEW_SCENE")
+        console.print(f"Read it, edit it, then: spindle add SCENE {called} --effect {shlex.quote(str(out))} --from {shlex.quote(str(diagnosis))} --out NEW_SCENE")
 
     return Answer(values, show)
 

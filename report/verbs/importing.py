@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -159,6 +160,6 @@ def _written(campaign: Campaign, out: Path, notes: list[str], scene: Path | None
             console.print(f"  {t['id']}: {t['temperature_C']:g} C, {t['speed_rpm']:g} rpm: {', '.join(x for x in (frfs, modes) if x)}", highlight=False)
         for note in notes:
             console.print(f"  {note}", highlight=False)
-        console.print(f"Next: spindle compare {scene or 'SCENE'} {out}", highlight=False)
+        console.print(f"Next: {shlex.join(['spindle', 'compare', str(scene or 'SCENE'), str(out)])}", highlight=False)
 
     return Answer(values, show)

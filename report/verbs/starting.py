@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -33,10 +34,11 @@ def new(name: str, like: str, out: Path | None = None) -> Answer:
         (written / "spindle.toml").write_text(text.replace('"TITLE"', json.dumps(name, ensure_ascii=False), 1), encoding="utf-8")
         read_toml(written / "spindle.toml")  # whatever characters its name has
     file = folder / "spindle.toml"
+    typed = shlex.quote(str(folder))
 
     def show(console: Console) -> None:
         console.print(f"{file}: a spindle like {like}, every key explained. Then:", highlight=False)
-        console.print(f"  spindle check {folder}     what the program understands of it\n  spindle modes {folder}", highlight=False)
+        console.print(f"  spindle check {typed}     what the program understands of it\n  spindle modes {typed}", highlight=False)
 
     return Answer({"scene": str(folder), "file": str(file), "like": like, "warnings": []}, show)
 
