@@ -20,6 +20,7 @@ from thermospindle.model.units import RPM
 Row = Annotated[tuple[Finite, Finite, Finite, Finite, Finite], Strict(False)]
 COLUMNS = ("radial_stiffness_N_per_m", "axial_stiffness_N_per_m", "tilt_stiffness_N_m_per_rad", "coupling_stiffness_N_per_rad")
 """Of a table; those that are missing are zero, but one of the first two must be there."""
+DIRECTIONS = ("x", "y", "z", "tilt_x", "tilt_y")
 WHERE = ("temperature_C", "speed_rpm")
 BESIDE = ("bearing", *(c for c in (*stiffness_table.COLUMNS, *stiffness_table.OF_ROLLERS) if c not in COLUMNS))
 """Columns of the verb `table` that are no stiffness."""
@@ -45,7 +46,11 @@ class Numbers(Table):
         if self.matrix_SI is not None:
             k = np.array(self.matrix_SI)
             if np.abs(k - k.T).max() > 1e-9 * np.abs(k).max():
-                raise ValueError("matrix_SI must be symmetric")
+                i, j = np.unravel_index(int(np.abs(k - k.T).argmax()), k.shape)
+                raise ValueError(
+                    f"matrix_SI must be symmetric, and row {DIRECTIONS[i]}, column {DIRECTIONS[j]} is {k[i, j]:g}, row {DIRECTIONS[j]}, column {DIRECTIONS[i]} "
+                    f"{k[j, i]:g}; springs here, MuJoCo's too, derive from an energy, so that cross-coupled bearings (journals, seals) are out of scope"
+                )
             if np.linalg.eigvalsh(k).min() < -1e-9 * np.abs(k).max():
                 raise ValueError("matrix_SI has a negative eigenvalue: a bearing that pushes the shaft away")
         if self.bearing is not None and self.table is None:

@@ -1,6 +1,8 @@
 """Bearings given by numbers: what a table over temperature and speed may hold."""
 
+import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from thermospindle.model.errors import BadInput
 from thermospindle.model.scene.bearing_numbers import Numbers
@@ -35,3 +37,10 @@ def test_refused_tables(tmp_path, header, row, told):
         grid(tmp_path, header, row)
     for words in (f"{tmp_path / 'bearing.csv'}: ", *told):
         assert words in str(error.value)
+
+
+def test_a_cross_coupled_bearing_is_refused_with_its_entries():
+    matrix = np.diag([2e7, 2e7, 0.0, 0.0, 0.0])
+    matrix[0, 1], matrix[1, 0] = 3e6, -3e6
+    with pytest.raises(ValidationError, match=r"row x, column y is 3e\+06, row y, column x -3e\+06; .* cross-coupled bearings \(journals, seals\) are out of scope"):
+        Numbers(matrix_SI=matrix.tolist(), damping_ratio=0.05)
