@@ -127,8 +127,13 @@ def _range_of(values: Mapping[str, Array]) -> str:
     return ", ".join(told)
 
 
-def show_modes(console: Console, answer: dict[str, Any], point: OperatingPoint) -> None:
-    groups = list(answer["modes"][0]["energy"]) if answer["modes"] else []
+def show_modes(console: Console, answer: dict[str, Any], point: OperatingPoint, highest: float) -> None:
+    """A table of the modes below `highest` (Hz), or in a sentence that there are none, and where the lowest is."""
+    if not answer["modes"]:
+        lowest = f"the lowest is at {point.modes[0].frequency:.2f} Hz" if point.modes else "nothing here oscillates"
+        console.print(f"No mode lies below {highest:g} Hz at {answer['temperature_C']:g} C, {answer['speed_rpm']:g} rpm; {lowest}.", highlight=False)
+        return
+    groups = list(answer["modes"][0]["energy"])
     title = f"Modes at {answer['temperature_C']:g} C, {answer['speed_rpm']:g} rpm (bearings {answer['status']})"
     columns = ("mode", "f\nHz", "damping\n%", "kind", "whirl", *(f"{g}\n%" for g in groups))
     rows = []

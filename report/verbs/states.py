@@ -89,10 +89,11 @@ def modes(
         raise BadInput(f"--highest {highest:g}: must be positive")
     spindle = _with_beam(with_effects(scene, effect_files)[0], beam)
     point = operating_point(spindle, Condition(temperature_or_reference(temperature, spindle), speed_rpm * RPM))
-    values = text.modes_json(point, spindle.hammer.band[1] if highest is None else highest)
+    end = spindle.hammer.band[1] if highest is None else highest
+    values = text.modes_json(point, end)
     return answered(
         values,
-        lambda console: text.show_modes(console, values, point),
+        lambda console: text.show_modes(console, values, point, end),
         out,
         {"verb": "modes"} | asked,
         lambda folder, _: text.write_modes(point, folder),

@@ -96,3 +96,8 @@ def test_static_says_nothing_of_beams_where_there_are_none(capsys: pytest.Captur
     said = capsys.readouterr().out
     assert "beam" not in said
     assert not re.search(r"-0\.0+\b", said)
+
+
+def test_where_no_mode_lies_the_lowest_is_told_instead_of_an_empty_table(capsys: pytest.CaptureFixture[str]):
+    assert main(["modes", "hdd_2003", "--highest", "100"]) == 0
+    assert capsys.readouterr().out.strip() == "No mode lies below 100 Hz at 20 C, 0 rpm; the lowest is at 1002.00 Hz."
