@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from thermospindle.report.text.grid import show_grid
 from thermospindle.report.typeset import figure, known, prose, table, write_csv
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.resonance.found import Coincidence, ResonanceMap, strongest
+from thermospindle.sim.resonance.point import key
 from thermospindle.sim.running.runout import looked_at
 
 SAID = 4  # crossings at the nominal speed told in words, of more than one more
@@ -122,14 +124,38 @@ def sentences(found: ResonanceMap) -> list[str]:
         near = f"; nearest is {_line(apart)}, {100 * apart.margin:+.1f} % from {_mode(apart)}" if apart else ""
         return [f"This spindle at {rpm} crosses no line between {low:g} and {high:g} C{near}."]
     said = []
-    for c in crossed:
-        start = int(np.argmin(np.abs(found.nrro_temperature[:, 0] - found.nominal.temperature)))
-        before = found.nrro_temperature[start, 2 if c.line.direction == "axial" else 1]
-        said.append(
-            f"This spindle at {rpm} crosses {_line(c)} at {c.condition.temperature:.1f} C with {_mode(c)} at {c.frequency:.1f} Hz; "
-            f"{c.line.direction} NRRO (nonrepeatable runout) is {1e9 * c.nrro:.1f} nm rms there and {1e9 * before:.1f} nm at {found.nominal.temperature:g} C."
-        )
+    for alike in _same_line(crossed):
+        c = alike[0]
+        meets = f"This spindle at {rpm} crosses {_line(c, [a.line.bearing for a in alike])} at {c.condition.temperature:.1f} C with {_mode(c)} at {c.frequency:.1f} Hz"
+        said.append(f"{meets}; {_repeatable(found, alike) if c.repeats else _nonrepeatable(found, c)}.")
     return said
+
+
+def _same_line(crossed: Sequence[Coincidence]) -> list[list[Coincidence]]:
+    """Crossings, those of one wave in several bearings that repeats every revolution together: at one frequency they are one line of the spectrum."""
+    groups: dict[tuple[Any, ...], list[Coincidence]] = {}
+    for c in crossed:
+        line = c.line
+        alike = (line.cause, line.order, line.direction, line.whirl, c.mode.number, round(c.condition.temperature, 1)) if line.bearing and c.repeats else (id(c), len(groups))
+        groups.setdefault(alike, []).append(c)
+    return list(groups.values())
+
+
+def _repeatable(found: ResonanceMap, alike: Sequence[Coincidence]) -> str:
+    """Runout of a line at a whole multiple of the speed, of several bearings their sum, which no phases make larger."""
+    if not any(c.strength for c in alike):
+        return "it repeats every revolution (RRO), and no imperfection here makes it: runout stays as it is"
+    which = {key(c.line) for c in alike}
+    before = sum(t.amplitude for t in found.lines if key(t.line) in which)
+    most = "at most " if len(alike) > 1 else ""
+    there = f"{most}{1e9 * sum(c.strength for c in alike):.1f} nm zero to peak there, of that mode alone"
+    return f"it repeats every revolution (RRO), and the runout in it is {there}, and {most}{1e9 * before:.1f} nm at {found.nominal.temperature:g} C"
+
+
+def _nonrepeatable(found: ResonanceMap, c: Coincidence) -> str:
+    start = int(np.argmin(np.abs(found.nrro_temperature[:, 0] - found.nominal.temperature)))
+    before = found.nrro_temperature[start, 2 if c.line.direction == "axial" else 1]
+    return f"{c.line.direction} NRRO (nonrepeatable runout) is {1e9 * c.nrro:.1f} nm rms there and {1e9 * before:.1f} nm at {found.nominal.temperature:g} C"
 
 
 def told(found: ResonanceMap) -> list[str]:
@@ -140,9 +166,11 @@ def told(found: ResonanceMap) -> list[str]:
     return every if left <= 1 else [*every[:SAID], many]
 
 
-def _line(c: Coincidence) -> str:
+def _line(c: Coincidence, bearings: Sequence[str] = ()) -> str:
     order = f" of order {c.line.order}" if c.line.order else ""
-    where = f" of the {c.line.bearing} bearing" if c.line.bearing else ""
+    names = [*dict.fromkeys(bearings)] or [c.line.bearing]
+    every = f"{', '.join(names[:-1])} and {names[-1]} bearings" if len(names) > 1 else f"{names[0]} bearing"
+    where = f" of the {every}" if names[0] else ""
     return f"{c.line.name} ({c.line.cause}{order}{where})"
 
 
@@ -167,14 +195,15 @@ def show_map(console: Console, found: ResonanceMap) -> None:
     )
     console.print(
         f"{len(found.coincidences)} in all. Strength: amplitude of the mode at the {looked_at(found.spindle)} under {whose}. "
+        f"NRRO: of all lines there, - where the line repeats every revolution and NRRO leaves it out. "
         f"Margin: of the line from the mode at {found.nominal.temperature:g} C, {found.nominal.speed / RPM:g} rpm.",
         highlight=False,
     )
     if found.interpolated:
         i = found.interpolated
         console.print(
-            f"{i.crossings} of them, the weaker ones, are interpolated between grid points; of the {i.checked} strongest, found both ways, frequencies "
-            f"differ by {100 * i.frequency_error:.2g} % at most and strengths by {100 * i.largest_strength_error:.2g} %.",
+            f"{i.crossings} of them, the weaker ones, are interpolated between grid points. How good that is, the {i.checked} strongest tell, which are exact and were "
+            f"interpolated too: frequencies are off by {100 * i.frequency_error:.2g} % at most, strengths by {100 * i.largest_strength_error:.2g} %.",
             highlight=False,
         )
 
@@ -187,7 +216,7 @@ def _cells(c: Coincidence) -> list[str]:
         f"{c.condition.speed / RPM:.0f}",
         f"{c.frequency:.1f}",
         f"{1e9 * c.strength:.1f}",
-        f"{1e9 * c.nrro:.1f}",
+        "-" if c.repeats else f"{1e9 * c.nrro:.1f}",
         f"{100 * c.margin:+.1f}",
     )
     return [c.line.name, cause, c.line.bearing, mode, *numbers]

@@ -54,6 +54,12 @@ class Coincidence:
     at_nominal_speed: bool
     interpolated: bool = False
 
+    @property
+    def repeats(self) -> bool:
+        """Whether the line is a whole multiple of the speed, which NRRO leaves out."""
+        order = 2 * np.pi * self.line.frequency / self.condition.speed if self.condition.speed else 0.0
+        return abs(order - round(order)) < 1e-6
+
 
 @dataclass(frozen=True, eq=False)
 class Interpolated:

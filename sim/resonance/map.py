@@ -76,8 +76,7 @@ def resonance_map(
     Modes up to `highest` (Hz, the scene's band by default) at the nominal condition are followed. `imperfections` default to the
     scene's (with those of its effects), or to a plausible set where it names none. BadInput for a grid without extent.
     """
-    over_t = np.unique(np.array([*temperatures, nominal.temperature], float))
-    over_s = np.unique(np.array([*speeds, nominal.speed], float))
+    over_t, over_s = _with(nominal.temperature, temperatures), _with(nominal.speed, speeds)
     if len(over_t) < 2 or len(over_s) < 2:
         raise BadInput("temperatures and speeds: a map needs at least two different ones of each, the nominal condition included")
     if over_s[0] < 0:
@@ -106,6 +105,12 @@ def resonance_map(
     return ResonanceMap(
         spindle, nominal, over_t, over_s, tracks, of_lines, tuple(curves), tuple(found), along_s, along_t, grid.drawn_from, interpolated
     )
+
+
+def _with(nominal: float, values: Sequence[float]) -> Array:
+    """Places of the grid in rising order with the nominal one, once: one that differs from it by rounding alone would be a neighbour that nothing can be interpolated to."""
+    every = np.array(values, float)
+    return np.unique([nominal, *every[~np.isclose(every, nominal, rtol=1e-9, atol=1e-9)]])
 
 
 def stages(spindle: Spindle, temperatures: int) -> int:

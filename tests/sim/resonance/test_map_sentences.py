@@ -1,0 +1,69 @@
+"""What a map says of lines that repeat every revolution, of one line in several bearings, and of places of its grid that are one."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from thermospindle.model.units import RPM
+from thermospindle.report.text.resonance import sentences, show_map
+from thermospindle.report.verbs.answer import answered
+from thermospindle.sim.resonance.found import Coincidence, Interpolated, ResonanceMap
+from thermospindle.sim.resonance.map import _with
+
+
+@pytest.fixture
+def crossed(met: ResonanceMap) -> Coincidence:
+    return next(c for c in met.coincidences if c.at_nominal_speed)
+
+
+def of_order_one(c: Coincidence, cause: str, bearing: str, strength: float) -> Coincidence:
+    line = replace(c.line, cause=cause, bearing=bearing, order=1, frequency=c.condition.speed / (2 * np.pi), direction="radial")
+    return replace(c, line=line, strength=strength)
+
+
+def test_unbalance_is_told_by_its_own_amplitude(met, crossed):
+    """NRRO leaves out whole multiples of the speed, so it says nothing of them."""
+    (said,) = sentences(replace(met, coincidences=(of_order_one(crossed, "unbalance", "", 1.2241e-6),)))
+    assert "it repeats every revolution (RRO), and the runout in it is 1224.1 nm zero to peak there" in said
+    assert "NRRO" not in said
+    (said,) = sentences(replace(met, coincidences=(crossed,)))
+    assert not crossed.repeats
+    assert "NRRO (nonrepeatable runout) is" in said
+
+
+def test_one_wave_of_all_bearings_that_repeats_is_one_line(met, crossed):
+    both = tuple(of_order_one(crossed, "inner waviness", name, 1e-9) for name in ("lower", "upper"))
+    (said,) = sentences(replace(met, coincidences=both))
+    assert "(inner waviness of order 1 of the lower and upper bearings)" in said
+    assert "at most 2.0 nm zero to peak there" in said
+    (said,) = sentences(replace(met, coincidences=tuple(replace(c, strength=0.0) for c in both)))
+    assert "no imperfection here makes it" in said
+
+
+def test_the_nominal_speed_is_one_place_of_the_grid():
+    """120000 rpm in 40 steps meets 60000 rpm but for rounding; between two such places interpolated frequencies were off by 69 %."""
+    speeds = np.linspace(0, 2 * 60000 * RPM, 41)
+    nominal = np.nextafter(speeds[20], np.inf)
+    assert len(_with(nominal, speeds)) == 41
+    assert nominal in _with(nominal, speeds)
+    assert len(_with(nominal, [0.0, 10.0])) == 3
+
+
+def test_what_interpolation_is_worth_is_told_of_those_that_are_exact(met):
+    console = Console(record=True, width=400, file=io.StringIO())
+    show_map(console, replace(met, interpolated=Interpolated(634, 60, 3.5e-4, 0.01, 0.033)))
+    text = console.export_text()
+    assert "the 60 strongest tell, which are exact and were interpolated too: frequencies are off by 0.035 % at most, strengths by 3.3 %" in text
+
+
+def test_a_warning_of_every_bearing_is_one():
+    said = [f"120000 rpm means a speed factor n dm of 4.32e+06 mm rev/min in the {name} bearing; ball bearings end at about 2.5e+06" for name in ("front", "rear", "third")]
+    answer = answered({}, lambda console: None, None, {}, warnings=[*said, "another", said[0]])
+    merged, other = answer.values["warnings"]
+    assert "in the front, rear and third bearings; ball" in merged
+    assert other == "another"
