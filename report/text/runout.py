@@ -21,7 +21,7 @@ from thermospindle.report.typeset import table, write_csv
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.running.lines import FoundLine
 from thermospindle.sim.running.revolutions import ErrorMotion
-from thermospindle.sim.running.runout import AXIAL, Runout, X, looked_at
+from thermospindle.sim.running.runout import AXIAL, Runout, X, Y, looked_at
 from thermospindle.sim.running.waterfall import run_up, waterfall
 
 STATISTICS = {
@@ -36,8 +36,8 @@ STATISTICS = {
     "asynchronous_error_um": "asynchronous error motion: widest band of all revolutions at one angle",
     "once_per_revolution_um": "part once per revolution, zero to peak",
 }
-MAIN = {"radial": X, "axial": AXIAL}
-"""The probe each direction is quoted from; the others are under `probes`."""
+MAIN = {"radial": X, "radial_y": Y, "axial": AXIAL}
+"""The probe each direction is quoted from, across the axis along x and along y; the others are under `probes`."""
 SHOWN = 14  # lines in the terminal
 
 
@@ -115,7 +115,7 @@ def show_runout(console: Console, answer: dict[str, Any], where: str) -> None:
     nominal = f" ({answer['speed_from']})" if answer["speed_from"] != "--speed" else ""
     title = f"Runout at {answer['temperature_C']:g} C, {answer['speed_rpm']:g} rpm{nominal}, {answer['revolutions']} revolutions, um"
     title += f" (bearings {answer['status']})"
-    quoted = grid(title, ("", f"radial\n({where} x)", "axial"), words=("",))
+    quoted = grid(title, ("", f"radial\n({where} x)", f"radial\n({where} y)", "axial"), words=("",))
     for key, meaning in STATISTICS.items():
         quoted.add_row(meaning, *(f"{answer[key][d]:.4f}" for d in MAIN))
     console.print(quoted)
@@ -201,7 +201,7 @@ def runout_section(runout: Runout, answer: dict[str, Any]) -> tuple[str, str]:
     text = (
         f"<p>{answer['revolutions']} revolutions at {answer['temperature_C']:g} °C and {answer['speed_rpm']:.6g} rpm, bearings {answer['status']}, "
         f"imperfections {answer['imperfections']}. The repeatable part is made of the lines at whole multiples of the turning frequency.</p>"
-        f"{table(('nm', f'radial ({escape(where)} x)', 'axial'), quoted)}"
+        f"{table(('nm', f'radial ({escape(where)} x)', f'radial ({escape(where)} y)', 'axial'), quoted)}"
         f"{''.join(drawn.values())}"
         f"{table(('Hz', 'orders', 'direction', 'nm', 'line', 'cause'), lines, (2, 4, 5))}"
     )

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from tests.mounting import turning_inside
 from thermospindle.cli import main
@@ -22,7 +24,7 @@ from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
 from thermospindle.report.figures.common import spread
 from thermospindle.report.figures.runout import motion_figure, spectrum_figure
-from thermospindle.report.text.runout import runout_json, runout_section, write_runout
+from thermospindle.report.text.runout import runout_json, runout_section, show_runout, write_runout
 from thermospindle.report.verbs.starting import new
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.running import runout as running
@@ -252,7 +254,7 @@ def test_command_line_answers_and_writes(tmp_path, capsys):
     assert main([*call, "--out", str(out)]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["revolutions"] == 30
-    assert set(answer["rro_um"]) == set(answer["nrro_um"]) == {"radial", "axial"}
+    assert set(answer["rro_um"]) == set(answer["nrro_um"]) == {"radial", "radial_y", "axial"}
     assert answer["nrro_um"]["radial"] > answer["nrro_rms_um"]["radial"] > 0
     amplitudes = [g["amplitude_um"] for g in answer["lines"]]
     assert amplitudes == sorted(amplitudes, reverse=True)
@@ -309,6 +311,19 @@ def test_the_inner_ring_may_turn_instead(spindle):
     assert only.causes[0].name == "fc"
     assert only.frequency == pytest.approx(120.0 - 69.527, rel=1e-4)  # the cage seen from the other ring
     assert hub_probes(turned)[0].body == "shaft"
+
+
+def test_both_radial_probes_are_quoted(found):
+    """An orbit may be longer along y than along x: what is called radial is that of x, and y stands beside it."""
+    answer = runout_json(found, "linear", "linear", None) | {"speed_from": "--speed"}
+    for direction, probe in (("radial", X), ("radial_y", Y), ("axial", AXIAL)):
+        assert answer["rro_um"][direction] == answer["probes"][probe]["rro_um"]
+    console = Console(record=True, width=120, file=io.StringIO())
+    show_runout(console, answer, "hub")
+    text = console.export_text()
+    assert "(hub x)  (hub y)" in text
+    assert f"{answer['rro_um']['radial_y']:.4f}" in text
+    assert "radial (hub y)" in runout_section(found, answer)[1]
 
 
 def test_the_report_section_holds_figures_and_lines(found):
