@@ -30,6 +30,7 @@ CAUSES = {
 }
 SIZE = (9.6, 6.2)  # inches
 LINES = 9  # drawn in a diagram
+MARKED = 6  # coincidences along an axis of the runout
 CURVES = 14  # drawn in the map
 
 
@@ -44,7 +45,8 @@ def drawn_lines(found: ResonanceMap) -> list[LineTrack]:
     chosen: dict[tuple, LineTrack] = {}
     at_nominal = [c for c in found.coincidences if c.at_nominal_speed]
     for c in [*strongest(at_nominal), *strongest(found.coincidences)]:
-        chosen.setdefault(_kind(c.line), tracks[key(c.line)])
+        if c.line.cause != "unbalance":
+            chosen.setdefault(_kind(c.line), tracks[key(c.line)])
     first = {(t.line.name, t.line.whirl): t for t in found.lines if t.line.cause == "unbalance"}  # static and couple unbalance are one line
     return list(first.values()) + list(chosen.values())[:LINES]
 
@@ -182,16 +184,20 @@ def runout(found: ResonanceMap) -> Figure:
         (left, found.nrro_temperature, 1.0, at_speed, lambda c: c.condition.temperature, f"temperature at {n_nominal:.0f} rpm, °C"),
         (right, found.nrro_speed, 1 / RPM, at_temperature, lambda c: c.condition.speed / RPM, f"speed at {t_nominal:g} °C, rpm"),
     )
+    names, paints = ("radial", "axial"), ("#7a3d8f", "#a0741a")
     for axes, along, unit, crossed, place, label in panels:
         x, values = unit * along[:, 0], along[:, 1:]
-        for column, name, paint in ((0, "radial", "#7a3d8f"), (1, "axial", "#a0741a")):
-            axes.plot(x, 1e9 * values[:, column], color=paint, label=name)
-        for c in strongest(crossed)[:6]:
+        for series, name, paint in zip(values.T, names, paints, strict=True):
+            axes.plot(x, 1e9 * series, color=paint, marker=".", ms=4, lw=1.0, label=f"{name}, dots: computed")
+        marked = [c for c in strongest(crossed) if not c.repeats][:MARKED]
+        for c in marked:
             axes.axvline(place(c), color=PALE, lw=0.8, ls=":")
+            axes.plot(place(c), 1e9 * c.nrro, "o", mfc="none", mec=paints[names.index(c.line.direction)], ms=8, mew=1.2, clip_on=False)
         axes.set(xlabel=label, ylabel=f"nonrepeatable runout (NRRO) of the {looked_at(found.spindle)}, nm rms", xlim=(x[0], x[-1]))
-        axes.set_ylim(0, 1.25e9 * values.max() or 1.0)
-        _name_tops(axes, [(place(c), f"{c.line.name}, {c.mode.number}", PALE) for c in strongest(crossed)[:6]])
-        axes.legend(loc="best")
+        axes.set_ylim(0, 1.25e9 * max(values.max(), *(c.nrro for c in marked), 0.0) or 1.0)
+        _name_tops(axes, [(place(c), f"{c.line.name}, {c.mode.number}", PALE) for c in marked])
+        handles = axes.get_legend_handles_labels()[0]
+        axes.legend(handles=[*handles, *[_circle()] * bool(marked)], loc="best")
     return figure
 
 

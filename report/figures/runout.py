@@ -22,6 +22,7 @@ from thermospindle.sim.running.waterfall import LineSpectrum, on_grid
 
 REPEATS, BAND = "#c9371c", "#2166ac"
 NAMED = {"radial": 9, "axial": 7}  # lines with labels, at most
+NOTHING = 1e-6  # of the strongest line: a direction with no stronger one does not move
 DECADES = 3.0  # of the spectrum below its strongest line
 ROOM = 250.0  # for labels, times the strongest line
 RANGE = 50.0  # dB below the strongest line that the waterfall shows
@@ -74,8 +75,8 @@ def _polar(axes: PolarAxes, cut: Revolutions, probe: int, quoted: ErrorMotion, t
     axes.fill_between(angle, low, high, color=BAND, alpha=0.2, lw=0, label="band of all revolutions (NRRO)")
     for turn in value[:: max(1, len(value) // 12)]:
         axes.plot(angle, _closed(turn), color=BAND, lw=0.3, alpha=0.5)
-    axes.plot(np.linspace(0, 2 * np.pi, 181), np.zeros(181), color=INK, lw=0.8, ls="--", label="least-squares circle")
     axes.plot(angle, _closed(mean), color=REPEATS, lw=2.0, label="repeatable part (RRO)")
+    axes.plot(np.linspace(0, 2 * np.pi, 181), np.zeros(181), color=INK, lw=0.9, ls="--", zorder=5, label="least-squares circle (axial: mean)")
     axes.set_rlim(-2.6 * reach, 1.15 * reach)
     step = round_down(reach / 1.5)
     axes.set_yticks([-step, 0.0, step], [f"−{step:g}", "0", f"{step:g} nm"])
@@ -121,9 +122,8 @@ def spectrum_figure(runout: Runout) -> Figure:
     """Amplitude over frequency and orders, across and along the axis, with the strongest lines named."""
     rate = abs(runout.turning)
     frequency, *amplitudes = spectra(runout)
-    strongest = max((g.amplitude for g in runout.lines), default=0.0)
-    highest = 1.06 * max((g.frequency for g in runout.lines if g.amplitude > 1e-2 * strongest), default=10 * rate)
-    with rc_context(STYLE):
+    highest = 1.06 * max((g.frequency for g in _large(runout.lines)), default=10 * rate)
+    with rc_context(STYLE | {"figure.constrained_layout.w_pad": 0.15}):  # the last number of an axis is wider than its end
         figure = Figure(figsize=(11.0, 7.6))
         panels = figure.subplots(2, 1, sharex=True)
         for axes, direction, amplitude in zip(panels, ("radial", "axial"), amplitudes, strict=True):
@@ -146,6 +146,13 @@ def spectrum_figure(runout: Runout) -> Figure:
         shown = dict(zip(labels, handles, strict=True)) | more
         figure.legend(shown.values(), shown.keys(), loc="outside lower center", ncols=len(shown))
     return figure
+
+
+def _large(every: Sequence[FoundLine]) -> list[FoundLine]:
+    """Lines that a spectrum must hold: of each direction those above a hundredth of its strongest, unless that is nothing beside the strongest of all."""
+    most = max((g.amplitude for g in every), default=0.0)
+    own = {d: max((g.amplitude for g in every if g.direction == d), default=0.0) for d in NAMED}
+    return [g for g in every if g.amplitude > 1e-2 * own[g.direction] and own[g.direction] > NOTHING * most]
 
 
 def waterfall_figure(spectra: Sequence[LineSpectrum], direction: str, size: tuple[float, float]) -> Figure:

@@ -96,8 +96,9 @@ def resonance_map(
     curves = [curve for curve, own in candidates if any(id(c) in met_by for c in own)]
     found = [met_by[id(c)] for _, own in candidates for c in own if id(c) in met_by]
     found.sort(key=lambda c: (not c.at_nominal_speed, -c.strength, c.frequency))
-    crossed = [c.condition.speed for c in strongest([c for c in found if c.condition.temperature == nominal.temperature])]
-    met = [c.condition.temperature for c in strongest([c for c in found if c.at_nominal_speed])]
+    of_runout = [c for c in found if not c.repeats]  # which NRRO is made of
+    crossed = [c.condition.speed for c in strongest([c for c in of_runout if c.condition.temperature == nominal.temperature])]
+    met = [c.condition.temperature for c in strongest([c for c in of_runout if c.at_nominal_speed])]
     progress(f"{len(found)} coincidences")
     along_s = np.array([(s, *grid.nrro(Condition(nominal.temperature, s), (t0, _nearest(over_s, s)))) for s in _dense(over_s, crossed)])
     along_t = np.array([(t, *grid.nrro(Condition(t, nominal.speed), (_nearest(over_t, t), s0))) for t in _dense(over_t, met)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import TO_MM
-from thermospindle.report.figures.runout import RANGE, polar_figure, waterfall_figure
+from thermospindle.report.figures.runout import RANGE, motion_figure, polar_figure, spectrum_figure, waterfall_figure
 from thermospindle.report.log.read import read_log
 from thermospindle.report.log.told import describe
 from thermospindle.report.log.turning.runout import log_signals, orbit_pieces, write_runout_log
@@ -170,6 +171,24 @@ def test_the_polar_plot_holds_the_band(record):
 
 
 # ---------------------------------------------------------------- reading, refusing
+
+
+def test_the_spectrum_holds_the_strongest_lines_of_both_directions(record):
+    """Axial lines far above a strong 1x, and small beside it: the axial panel was empty."""
+    far = [replace(g, frequency=40 * record.turning, amplitude=1e-4 * record.lines[0].amplitude, direction="axial") for g in record.lines[:1]]
+    few = replace(record, lines=(*(g for g in record.lines if g.direction == "radial"), *far))
+    axial = spectrum_figure(few).axes[1]
+    assert axial.get_xlim()[1] > 40 * record.turning
+    assert len(axial.texts) == 1
+    nothing = replace(few, lines=(*few.lines[:-1], replace(far[0], amplitude=1e-12 * record.lines[0].amplitude)))
+    assert spectrum_figure(nothing).axes[1].get_xlim()[1] < 40 * record.turning
+
+
+def test_the_least_squares_circle_lies_above_the_repeatable_part(record):
+    """Where both are one circle the dashes are seen on it."""
+    polar = motion_figure(record).axes[1]
+    named = {line.get_label(): line.get_zorder() for line in polar.lines}
+    assert named["least-squares circle (axial: mean)"] > named["repeatable part (RRO)"]
 
 
 def test_inspect_tells_what_is_in_it(file, capsys):

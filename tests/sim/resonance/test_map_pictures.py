@@ -14,7 +14,7 @@ from matplotlib.text import Text
 from tests.sim.resonance.conftest import NOMINAL
 from thermospindle.model.units import RPM
 from thermospindle.report.figures.common import STYLE
-from thermospindle.report.figures.resonance import CAUSES, both, campbell, over_temperature
+from thermospindle.report.figures.resonance import CAUSES, both, campbell, over_temperature, runout
 from thermospindle.report.figures.warmup import MODES
 from thermospindle.sim.resonance.map import resonance_map
 
@@ -34,6 +34,27 @@ def test_static_and_couple_unbalance_are_one_line_of_a_figure(found):
     unbalance = [t for t in found.lines if t.line.cause == "unbalance"]
     [axes] = campbell(replace(found, lines=(*found.lines, *unbalance))).axes
     assert [t.get_text() for t in axes.texts].count("1x") == 1
+
+
+def test_unbalance_is_named_once_where_it_meets_modes(found):
+    """Among the lines of the strongest coincidences it stood a second time."""
+    c = found.coincidences[0]
+    line = next(t.line for t in found.lines if t.line.cause == "unbalance")
+    [axes] = campbell(replace(found, coincidences=(replace(c, line=line, strength=1.0), *found.coincidences))).axes
+    assert [t.get_text() for t in axes.texts].count("1x") == 1
+
+
+def test_runout_shows_where_it_was_computed_and_the_peaks_of_the_table(met):
+    """A dot for each value, a ring for each coincidence at its NRRO, none for a line that NRRO leaves out."""
+    left, _ = runout(met).axes
+    curves = [line for line in left.lines if line.get_marker() == "."]
+    assert [len(line.get_xdata()) for line in curves] == [len(met.nrro_temperature)] * 2
+    rings = {(float(line.get_xdata()[0]), float(line.get_ydata()[0])) for line in left.lines if line.get_marker() == "o"}
+    c = next(c for c in met.coincidences if c.at_nominal_speed)
+    assert (c.condition.temperature, pytest.approx(1e9 * c.nrro)) in [*rings]
+    repeating = replace(c, line=replace(c.line, frequency=c.condition.speed / (2 * np.pi)))
+    left, _ = runout(replace(met, coincidences=(repeating,))).axes
+    assert not [line for line in left.lines if line.get_marker() == "o"]
 
 
 def test_modes_of_the_coincidences_differ_in_colour(found):
