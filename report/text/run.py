@@ -114,7 +114,7 @@ def _error(value: float, digits: int) -> str:
 
 def show_run(console: Console, run: Run, out: Path) -> None:
     temperatures = [s.point.condition.temperature for s in run.steps]
-    show_table(console, stiffness_table(run.spindle, temperatures, [run.steps[0].point.condition.speed]))
+    show_table(console, stiffness_table(run.spindle, temperatures, [run.steps[0].point.condition.speed]), any(run.spindle.radial_load))
     console.print()
     highest = run.spindle.hammer.band[1]
     numbers, beside = numbered(run), measured_rows(run)

@@ -85,13 +85,18 @@ def write_modes_csv(points: list[OperatingPoint], path: Path) -> None:
     write_csv(path, head, rows)
 
 
-def show_table(console: Console, table: StiffnessTable) -> None:
+def show_table(console: Console, table: StiffnessTable, radial_load: bool = False) -> None:
+    """Bearings by condition. At speed, where heavy balls have two angles and forces, angle and force are called those of the inner contact; under a `radial_load` the
+    force is called the largest of the balls."""
     if not table.values:
         console.print("The scene has no bearings.")
         return
+    contact = "inner" if table.speed.any() else "contact"
+    angle = "inner\nangle\ndeg" if table.speed.any() else "angle\ndeg"
+    force = f"{'largest' + chr(10) if radial_load else ''}{contact}\nforce\nN"
     shown = [
-        ("contact_angle_deg", "angle\ndeg", 1, 2), ("deformation_um", "deform.\num", 1, 3), ("clearance_um", "clear-\nance\num", 1, 2),
-        ("contact_force_N", "contact\nforce\nN", 1, 3), ("ball_stiffness_N_per_m", "ball k\nN/um", 1e-6, 3), ("preload_N", "preload\nN", 1, 2),
+        ("contact_angle_deg", angle, 1, 2), ("deformation_um", "deform.\num", 1, 3), ("clearance_um", "clear-\nance\num", 1, 2),
+        ("contact_force_N", force, 1, 3), ("ball_stiffness_N_per_m", "ball k\nN/um", 1e-6, 3), ("preload_N", "preload\nN", 1, 2),
         ("radial_stiffness_N_per_m", "k_RR\nN/um", 1e-6, 2), ("axial_stiffness_N_per_m", "k_AA\nN/um", 1e-6, 3),
     ]  # fmt: skip
     shown = [row for row in shown if all(row[0] in values for values in table.values.values())]
@@ -102,19 +107,24 @@ def show_table(console: Console, table: StiffnessTable) -> None:
                 row = ["" if np.isnan(values[c][i, j]) else f"{values[c][i, j] * scale:.{digits}f}" for c, _, scale, digits in shown]
                 rows.append([f"{temperature:g}", f"{speed / RPM:g}", name, *row])
     show_grid(console, "Bearing state", columns, rows, ("bearing",), keys=3)
+    rows_of_balls = any("contact_angle_deg" in values and np.isfinite(values["contact_angle_deg"]).any() for values in table.values.values())
+    if table.speed.any() and rows_of_balls:
+        console.print("Inner angle and force: of the contact with the inner ring; the outer angle is in table.csv of --out.")
+    if radial_load and rows_of_balls:
+        console.print("Under the radial load deformation, force and ball k are those of the most loaded ball; the angle is the mean of all, weighted with their force.")
     for name, where in table.unloads.items():
         if where is not None:
             console.print(f"{name} bearing loses contact at {where:.2f} C")
 
 
-def show_told_table(console: Console, table: StiffnessTable) -> None:
+def show_told_table(console: Console, table: StiffnessTable, radial_load: bool = False) -> None:
     """In one sentence how far each bearing's preload and radial stiffness go, then the table."""
     ends = [f"{name} {said}" for name, values in table.values.items() if (said := _range_of(values))]
     if ends:
         span = f"From {table.temperature[0]:g} to {table.temperature[-1]:g} C" if len(table.temperature) > 1 else f"At {table.temperature[0]:g} C"
         rpm = f" at {table.speed[0] / RPM:g} rpm" if len(table.speed) == 1 else f" and {table.speed[0] / RPM:g} to {table.speed[-1] / RPM:g} rpm"
         console.print(f"{span}{rpm}: {'; '.join(ends)}.\n", highlight=False, markup=False)
-    show_table(console, table)
+    show_table(console, table, radial_load)
 
 
 def _range_of(values: Mapping[str, Array]) -> str:

@@ -15,8 +15,10 @@ from thermospindle.cli import main
 from thermospindle.report.text.effects import show_effects
 from thermospindle.report.text.grid import show_grid
 from thermospindle.report.text.run import show_impact, show_run
+from thermospindle.report.text.states import show_table
 from thermospindle.sim.effects import CATALOGUE
 from thermospindle.sim.identification.numbering import identified
+from thermospindle.sim.operating import stiffness_table
 from thermospindle.sim.run import Run
 
 
@@ -46,6 +48,22 @@ def test_a_sentence_comes_before_the_table(verb, sentence, capsys):
     """What came out, in one sentence, and then the numbers."""
     assert main(list(verb)) == 0
     assert " ".join(capsys.readouterr().out.split()).startswith(sentence)
+
+
+def test_a_table_says_which_contact_and_which_ball(spindle):
+    """At speed balls have two angles and forces; under a radial load each ball has its own."""
+    said = []
+    for speed, load in ((0.0, False), (754.0, False), (754.0, True)):
+        out = StringIO()
+        show_table(Console(file=out, width=120), stiffness_table(spindle, [20.0], [speed]), load)
+        said.append(" ".join(out.getvalue().split()))
+    assert "inner" not in said[0]
+    assert "largest" not in said[0]
+    assert said[1].count("inner") >= 2
+    assert "Inner angle and force: of the contact with the inner ring" in said[1]
+    assert "largest" not in said[1]
+    assert "largest" in said[2]
+    assert "those of the most loaded ball" in said[2]
 
 
 # ---------------------------------------------------------------- pictures
