@@ -5,11 +5,13 @@ K deformation**1.5 beyond the unloaded distance and none below (Jones 1960; Harr
 psi_j in its own r-z plane; the outer ring's displacement relative to the inner, (x, y, z, tilt_x, tilt_y), moves the outer
 centre there by u_r = x cos + y sin and u_z = z + arm (tilt_x sin - tilt_y cos). Forces are those needed on the outer ring.
 
-With ball inertia the ball centre is an unknown of its own (`model.bearing.heavy_ball`).
+With ball inertia the ball centre is an unknown of its own (`model.bearing.heavy_ball`), and so is the speed of the cage, with which all balls orbit: the mean of what rolling at the angles of
+each would make it. What one ring is pushed aside with the other is then, too.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -19,13 +21,14 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from thermospindle.model.bearing.heavy_ball import LEAST_STRETCH, Balance, BallInertia, HeavyBall, Vector, settled
+from thermospindle.model.bearing.heavy_ball import LEAST_STRETCH, Balance, BallInertia, HeavyBall, Vector, balance, driven, settled
 from thermospindle.model.bearing.hertz import in_series
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.types import Array
 
 Centres = dict["BallRow", Vector]
 """Where the balls of rows with centred rings settled last."""
+ROUNDS, STANDING = 20, 1e-12  # of the cage's speed, and what of it is no change
 ROUNDED = 4 * 2.0**-52
 """Of a distance of groove centres, what rounding may change of the two that a ball's centre divides it into."""
 
@@ -118,13 +121,16 @@ def respond(row: BallRow, displacement: Array | None = None, centre: Vector | No
     """
     u = np.zeros(5) if displacement is None else np.asarray(displacement, float)
     line = centre_line(row, u)
-    local = _with_inertia(row, line, centre) if _heavy(row) else _massless(row, line)
+    local, cage = _with_inertia(row, line, centre) if _heavy(row) else (_massless(row, line), None)
     force, stiffness, inner, outer, inner_angle, outer_angle, deformation = local
     b = kinematics(row)
     flat = b.reshape(-1, 5)
+    tangent = flat.T @ (stiffness @ b).reshape(-1, 5)
+    if cage is not None:
+        tangent += np.outer(cage.force_by_speed.ravel() @ flat, cage.speed_by_line.ravel() @ flat)
     return RowForce(
         force.ravel() @ flat,
-        flat.T @ (stiffness @ b).reshape(-1, 5),
+        tangent,
         inner,
         outer,
         inner_angle,
@@ -146,7 +152,8 @@ def centred_axial(row: BallRow, movement: float, centres: Centres | None = None)
     axial = row.axial + movement
     if _heavy(row):
         centres = {} if centres is None else centres
-        found = _settled(row, [(-row.radial, axial)], centres.get(row))[0]
+        line = -row.radial, axial
+        found = settled(_ball(row), line, *_tolerances(row, [line]), centres.get(row))  # all balls roll alike, and the cage with them
         centres[row] = found.centre
         return row.balls * found.on_outer[1], row.balls * found.stiffness()[3]
     length = hypot(row.radial, axial)
@@ -174,28 +181,82 @@ def _massless(row: BallRow, line: Array) -> tuple[Array, ...]:
     return force[:, None] * e, stiffness, force, force, angle, angle, deformation
 
 
-def _with_inertia(row: BallRow, line: Array, centre: Vector | None) -> tuple[Array, ...]:
-    """As `_massless`, with the centre of every ball an unknown of its own; balls on the same line, as of centred rings, are one."""
-    balances = _settled(row, [(r, z) for r, z in line.tolist()], centre)
-    different = {id(b): b for b in balances}
-    stiffness = {key: np.reshape(b.stiffness(), (2, 2)) for key, b in different.items()}
+@dataclass(frozen=True)
+class Cage:
+    """What the balls' forces on the outer ring (balls, 2) change by with the cage's speed, and that with every ball's line (balls, 2)."""
+
+    force_by_speed: Array
+    speed_by_line: Array
+
+
+def _with_inertia(row: BallRow, line: Array, centre: Vector | None) -> tuple[tuple[Array, ...], Cage | None]:
+    """As `_massless` at the speed of the cage, with the centre of every ball an unknown of its own; and what the cage does as rings move."""
+    lines = [(r, z) for r, z in line.tolist()]
+    speed, found = _at_one_speed(row, lines, centre)
+    moved = {at: driven(_ball(_held(row, speed)), here, at) for at, here in found.items()}
+    balances, each = [found[at] for at in lines], [moved[at] for at in lines]
+    stiffness = {at: np.reshape(b.stiffness(), (2, 2)) for at, b in found.items()}
     told = np.array([(*b.on_outer, b.inner, b.outer, b.inner_angle, b.outer_angle, b.deformation) for b in balances]).T
-    return told[:2].T, np.array([stiffness[id(b)] for b in balances]), *told[2:]
+    values = told[:2].T, np.array([stiffness[at] for at in lines]), *told[2:]
+    if row.inertia is not None and row.inertia.cage is not None:
+        return values, None
+    by_itself = 1.0 - float(np.mean([d.by_cage for d in each]))
+    cage = Cage(np.array([d.force_by_cage for d in each]), np.array([d.by_line for d in each]) / len(each) / by_itself)
+    return values, cage
 
 
-def _settled(row: BallRow, lines: Sequence[Vector], centre: Vector | None = None) -> list[Balance]:
-    """The balance of every ball, (balls,), at `lines` (balls, 2) between the groove centres."""
+def with_cage_held(row: BallRow) -> BallRow:
+    """The row whose cage keeps the speed that it has with centred rings, whatever balls and rings do."""
+    line = -row.radial, row.axial
+    return _held(row, _at_one_speed(row, [line], None)[0]) if _heavy(row) else row
+
+
+def _held(row: BallRow, cage: float) -> BallRow:
     assert row.inertia is not None
-    ball = HeavyBall(row.inner_length, row.outer_length, row.inner_constant, row.outer_constant, row.inertia)
-    different = dict.fromkeys(lines)
-    stretch = max(LEAST_STRETCH, max(hypot(r, z) for r, z in different) - row.unloaded_distance)
+    return replace(row, inertia=replace(row.inertia, cage=cage))
+
+
+def _at_one_speed(row: BallRow, lines: Sequence[Vector], centre: Vector | None) -> tuple[float, dict[Vector, Balance]]:
+    """Speed of the cage, and the balance of a ball at every different one of `lines` (balls, 2) between the groove centres; balls on the same line, as of centred rings, are one."""
+    assert row.inertia is not None
+    weights, tolerances = Counter(lines), _tolerances(row, lines)
+    found = {at: settled(_ball(row), at, *tolerances, centre) for at in weights}
+    if row.inertia.cage is not None:
+        return row.inertia.cage, found
+
+    def rolling(row: BallRow) -> tuple[float, float]:
+        """Mean over the balls of the speed by rolling, and its derivative by the cage's."""
+        each = [(weights[at], driven(_ball(row), here, at)) for at, here in found.items()]
+        return sum(n * d.speed for n, d in each) / len(lines), sum(n * d.by_cage for n, d in each) / len(lines)
+
+    cage = rolling(row)[0]
+    if len(found) == 1:  # it rolls with them
+        return cage, {at: balance(_ball(_held(row, cage)), here.centre, at) for at, here in found.items()}
+    for _ in range(ROUNDS):
+        at_speed = _held(row, cage)
+        found = {at: settled(_ball(at_speed), at, *tolerances, here.centre) for at, here in found.items()}
+        speed, by_cage = rolling(at_speed)
+        step = (speed - cage) / (1.0 - by_cage)
+        if abs(step) <= STANDING * abs(speed):
+            return cage, found
+        cage += step
+    raise NoEquilibrium("the speed of a cage did not settle")
+
+
+def _ball(row: BallRow) -> HeavyBall:
+    assert row.inertia is not None
+    return HeavyBall(row.inner_length, row.outer_length, row.inner_constant, row.outer_constant, row.inertia)
+
+
+def _tolerances(row: BallRow, lines: Sequence[Vector]) -> tuple[float, float]:
+    """Of the resultant on a settled ball (N), and of the stiffness added to the step of one that touches nothing (N/m)."""
+    assert row.inertia is not None
+    stretch = max(LEAST_STRETCH, max(hypot(r, z) for r, z in lines) - row.unloaded_distance)
     contact, flung = row.constant * stretch**1.5, row.inertia.loads((1.0, 0.0), (1.0, 0.0)).centrifugal
     tolerance, least = 1e-12 * contact + 1e-13 * flung, 1e-9 * row.constant * sqrt(stretch)
     # a groove distance is rounded to some of its last bits, which the stiffer race turns into force: 1.5 K^(2/3) F^(1/3) of it
     stiffest = 1.5 * max(row.inner_constant, row.outer_constant) ** (2 / 3) * max(contact, flung) ** (1 / 3)
-    tolerance += ROUNDED * row.unloaded_distance * stiffest
-    found = {at: settled(ball, at, tolerance, least, centre) for at in different}
-    return [found[at] for at in lines]
+    return tolerance + ROUNDED * row.unloaded_distance * stiffest, least
 
 
 # ---------------------------------------------------------------- loads

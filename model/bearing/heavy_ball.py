@@ -10,6 +10,9 @@ a positive M pushes the ball towards a larger outer angle. C and M depend on bot
 between ball and outer groove and the inner one by c. With G = dR/dl, J = dP/dl, and S = -dR/dc, H = dP/dc where the gap is held,
 dR/dc = -(S + G), and the ring sees k = J (S + G)^-1 S + H (S + G)^-1 G.
 
+A ball by itself orbits as fast as rolling at its own two angles makes it. The balls of a row share a cage, and orbit with its speed, the mean of those (`ball_row`): were
+each as fast as it would roll, the centrifugal forces of a row whose rings are moved aside would add up to a force that only one of its rings feels.
+
 With M the friction is no derivative of an energy, so k, the exact derivative of P, is not symmetric: for a row of the reference spindle the
 radial-tilt entries differ by 7e-9 of their size at 7200 rpm, 7e-5 at 30,000, as the fourth power of the speed.
 
@@ -37,7 +40,7 @@ LEAST_ROLLING = 1e-9  # of 1 + cos(a_i - a_o), which is 2 where both contacts li
 
 @dataclass(frozen=True)
 class BallInertia:
-    """What makes a ball heavy at speed; `share` scales centrifugal force and gyroscopic moment (0 none, 1 full)."""
+    """What makes a ball heavy at speed; `share` scales centrifugal force and gyroscopic moment (0 none, 1 full). It orbits with a `cage` of that speed (rad/s), or as it rolls."""
 
     diameter: float
     pitch_diameter: float
@@ -45,13 +48,14 @@ class BallInertia:
     inner_speed: float  # rad/s
     outer_speed: float
     share: float = 1.0
+    cage: float | None = None
 
     @property
     def mass(self) -> float:
         return pi / 6 * self.density * self.diameter**3
 
-    def loads(self, outer: Vector, inner: Vector) -> Loads:
-        """What the ball's inertia asks of its contacts, for the cosine and sine of its `outer` and `inner` contact angles a_o, a_i.
+    def orbit(self, outer: Vector, inner: Vector) -> Orbit:
+        """Speed of the cage about the axis by rolling, for the cosine and sine of the ball's `outer` and `inner` contact angles a_o, a_i.
 
         Kinematics of Harris 1991, ch. 8: rolling at both races and no spin at the outer, tan beta = sin a_o / (cos a_o + gamma). A ball that
         spins with w about an axis at beta to z while it orbits with the cage's speed has dH/dt = cage z x H = J w cage sin(beta) about the
@@ -65,22 +69,47 @@ class BallInertia:
         lag, both, across = 1 - gamma * ci, max(1 + co * ci + so * si, LEAST_ROLLING), si * co - ci * so
         relative = self.outer_speed - self.inner_speed
         behind, by_outer, by_inner = (relative / both * x for x in (lag, -lag * across / both, gamma * si + lag * across / both))
-        cage = self.outer_speed - behind
-        orbit = self.share * self.mass * self.pitch_diameter / 2
-        polar = self.share * self.mass * self.diameter**2 / 10 / gamma
-        turned = cage - behind  # of cage times behind, by behind
+        return Orbit(self.outer_speed - behind, -by_outer, -by_inner)
+
+    def loads(self, outer: Vector, inner: Vector) -> Loads:
+        """What the ball's inertia asks of its contacts."""
+        co, so = outer
+        speed, by_outer, by_inner = self.orbit(outer, inner) if self.cage is None else Orbit(self.cage, 0.0, 0.0)
+        orbit, polar = self._orbiting, self._turning
+        behind = self.outer_speed - speed
+        centrifugal_by_speed, moment_by_speed = 2 * orbit * speed, polar * (behind - speed) * so
         return Loads(
-            orbit * cage**2,
-            -2 * orbit * cage * by_outer,
-            -2 * orbit * cage * by_inner,
-            polar * cage * behind * so,
-            polar * (turned * by_outer * so + cage * behind * co),
-            polar * turned * by_inner * so,
+            orbit * speed**2,
+            centrifugal_by_speed * by_outer,
+            centrifugal_by_speed * by_inner,
+            polar * speed * behind * so,
+            moment_by_speed * by_outer + polar * speed * behind * co,
+            moment_by_speed * by_inner,
+            centrifugal_by_speed,
+            moment_by_speed,
         )
+
+    @property
+    def _orbiting(self) -> float:
+        """C over the square of the cage's speed."""
+        return self.share * self.mass * self.pitch_diameter / 2
+
+    @property
+    def _turning(self) -> float:
+        """M over the cage's speed, what it is behind the outer ring, and sin a_o."""
+        return self.share * self.mass * self.diameter * self.pitch_diameter / 10
+
+
+class Orbit(NamedTuple):
+    """Speed of the cage (rad/s), and its derivatives by the outer and the inner contact angle."""
+
+    speed: float
+    by_outer: float
+    by_inner: float
 
 
 class Loads(NamedTuple):
-    """Centrifugal force C (N) and gyroscopic moment M (N m) of a ball, and their derivatives by the outer and the inner contact angle."""
+    """Centrifugal force C (N) and gyroscopic moment M (N m) of a ball, their derivatives by the outer and the inner contact angle, and those by the cage's speed with both held."""
 
     centrifugal: float
     centrifugal_by_outer: float
@@ -88,6 +117,8 @@ class Loads(NamedTuple):
     moment: float
     moment_by_outer: float
     moment_by_inner: float
+    centrifugal_by_speed: float
+    moment_by_speed: float
 
 
 @dataclass(frozen=True)
@@ -231,6 +262,39 @@ def balance(ball: HeavyBall, centre: Vector, line: Vector) -> Balance:
     )
 
 
+class Driven(NamedTuple):
+    """What a ball that orbits with the cage has to do with its speed: its own by rolling (rad/s), the derivatives of that by the outer groove's centre (2,) and by the cage's speed, and
+    of the force on the outer ring (2,) by the cage's speed."""
+
+    speed: float
+    by_line: Vector
+    by_cage: float
+    force_by_cage: Vector
+
+
+def driven(ball: HeavyBall, here: Balance, line: Vector) -> Driven:
+    """Of a ball settled at `here` with its cage's speed, for the outer groove's centre at `line`; its centre follows both."""
+    (cr, cz), gap = here.centre, (line[0] - here.centre[0], line[1] - here.centre[1])
+    inner_length, outer_length = hypot(cr, cz), hypot(*gap)
+    (ir, iz), cosine, sine = (cr / inner_length, cz / inner_length), -gap[0] / outer_length, gap[1] / outer_length
+    own, loads = ball.inertia.orbit((cosine, sine), (-ir, iz)), ball.inertia.loads((cosine, sine), (-ir, iz))
+    friction = (2 / ball.inertia.diameter if here.outer > 0 else 0.0) * loads.moment_by_speed
+    on_outer = -friction * sine, -friction * cosine
+    s, g, j = here.by_inner, here.by_line, here.by_outer
+    inverse = _inverse((s[0] + g[0], s[1] + g[1], s[2] + g[2], s[3] + g[3]))
+    moved_r, moved_z = _times(inverse, (on_outer[0] + loads.centrifugal_by_speed, on_outer[1]))  # of the centre, by the cage's speed
+    follows = _product(inverse, g)  # and by the line
+    pushed_r, pushed_z = _times(j, (moved_r, moved_z))
+    by_gap = own.by_outer * sine / outer_length, own.by_outer * cosine / outer_length
+    by_centre = own.by_inner * iz / inner_length - by_gap[0], -own.by_inner * ir / inner_length - by_gap[1]
+    return Driven(
+        own.speed,
+        (by_gap[0] + by_centre[0] * follows[0] + by_centre[1] * follows[2], by_gap[1] + by_centre[0] * follows[1] + by_centre[1] * follows[3]),
+        by_centre[0] * moved_r + by_centre[1] * moved_z,
+        (on_outer[0] - pushed_r, on_outer[1] - pushed_z),
+    )
+
+
 def _contact(vector: Vector, unloaded: float, constant: float) -> tuple[float, Vector, float, float]:
     """Length (m) and direction of a line between centres, contact force K d^1.5 (N) and its slope (N/m)."""
     length = hypot(*vector)
@@ -251,6 +315,10 @@ def _inverse(m: Matrix) -> Matrix:
     if determinant == 0.0:
         raise NoEquilibrium("a ball touches neither race and nothing holds it")
     return m[3] / determinant, -m[1] / determinant, -m[2] / determinant, m[0] / determinant
+
+
+def _times(m: Matrix, v: Vector) -> Vector:
+    return m[0] * v[0] + m[1] * v[1], m[2] * v[0] + m[3] * v[1]
 
 
 def _product(a: Matrix, b: Matrix) -> Matrix:

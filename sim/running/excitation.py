@@ -28,7 +28,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from thermospindle.model.bearing.ball_row import BallRow, respond
+from thermospindle.model.bearing.ball_row import BallRow, respond, with_cage_held
 from thermospindle.model.bearing.kinematics import (
     SMALLEST,
     Kinematics,
@@ -170,12 +170,13 @@ class Felt:
     """What the balls of a row feel of one wave: each pulls the rings by `pull` (2,) N/m (r, z) times Re(amplitude exp(i rate t)).
 
     `amplitude` (balls,) m; `rate` (rad/s) in the frame of the cage; `line` names what comes of it (direction, and +1 or -1 for the sense of
-    the rate in which it adds to the cage's).
+    the rate in which it adds to the cage's). Where it does the same to all balls at once the cage's speed changes with them, and each pulls by `all_pull` along the axis.
     """
 
     amplitude: ComplexArray
     rate: float
     pull: Array
+    all_pull: float
     line: Callable[[str, int], Line]
 
 
@@ -197,7 +198,7 @@ def _free_displacements(name: str, row: BallRow, kin: Kinematics, own: RowImperf
     for n, f in enumerate(felt):
         if abs(along[n]) > limit[n] and f.rate != 0.0:
             size = along[n] if f.rate > 0 else along[n].conjugate()
-            found.append((f.line("axial", 0), f.pull[1] * size * np.array([0, 0, 1, 0, 0], complex)))
+            found.append((f.line("axial", 0), f.all_pull * size * np.array([0, 0, 1, 0, 0], complex)))
         for side, across in ((1, plus[n]), (-1, minus[n])):
             if abs(across) > limit[n]:
                 speed = kin.cage + side * f.rate
@@ -211,26 +212,27 @@ def _free_displacements(name: str, row: BallRow, kin: Kinematics, own: RowImperf
 def _felt(name: str, row: BallRow, kin: Kinematics, own: RowImperfections) -> Iterator[Felt]:
     ball = np.arange(kin.balls)
     place = np.exp(2j * np.pi * ball / kin.balls)
-    local = respond(replace(row, balls=1)).tangent[np.ix_([0, 2], [0, 2])]
+    one = replace(row, balls=1)
+    local, of_all = (respond(r).tangent[np.ix_([0, 2], [0, 2])] for r in (with_cage_held(one), one))
     for ring, sign, radial, axial in (("inner", -1, own.inner_radial, own.inner_axial), ("outer", 1, own.outer_radial, own.outer_axial)):
-        for pull, waves in zip(sign * local.T, (radial, axial), strict=True):
+        for pull, all_pull, waves in zip(sign * local.T, sign * of_all[1], (radial, axial), strict=True):
             for wave in waves:
                 amplitude = cmath.rect(wave.amplitude, wave.phase) * place[wave.order * ball % kin.balls]
                 rate = wave.order * (kin.cage - kin.ring(ring))
-                yield Felt(amplitude, rate, pull, _race_namer(name, kin, ring, wave.order))
+                yield Felt(amplitude, rate, pull, float(all_pull), _race_namer(name, kin, ring, wave.order))
     if not own.ball_diameter and not own.ball_waves:
         return
-    inner_push, outer_push = contact_pushes(row)
+    (inner_push, outer_push), (inner_all, outer_all) = contact_pushes(with_cage_held(row)), contact_pushes(row)
     if own.ball_diameter:  # half of it at either contact; a common deviation is a preload
         size = np.array(own.ball_diameter, complex)
         line = cage_line(name, kin, "ball size")
-        yield Felt(size - size.mean(), 0.0, (inner_push + outer_push) / 2, lambda direction, side: line)
+        yield Felt(size - size.mean(), 0.0, (inner_push + outer_push) / 2, 0.0, lambda direction, side: line)
     for order in sorted({wave.order for waves in own.ball_waves for wave in waves}):
-        pull = inner_push + (-1) ** order * outer_push  # the outer contact lies opposite the inner one
+        pull, all_pull = inner_push + (-1) ** order * outer_push, float(inner_all[1] + (-1) ** order * outer_all[1])  # the outer contact lies opposite the inner one
         if np.abs(pull).max() > CANCELLED * np.abs(inner_push).max():
             amplitude = np.array([_amplitude(waves, order) for waves in own.ball_waves])
             rate = order * kin.spin * np.sign(kin.turning)
-            yield Felt(amplitude, float(rate), pull, _ball_namer(name, kin, order))
+            yield Felt(amplitude, float(rate), pull, all_pull, _ball_namer(name, kin, order))
 
 
 @lru_cache(maxsize=256)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import root
 
 from thermospindle.model.bearing.ball_row import BallInertia, BallRow, displacement_under, energy, respond
 from thermospindle.model.bearing.hertz import race_contact
@@ -137,6 +138,62 @@ def test_forces_on_a_heavy_ball_balance():
     assert ao < np.radians(41.5) < ai
     assert outer > inner
     assert bearing.balls * inner * np.sin(ai) == pytest.approx(17800, rel=1e-9)
+
+
+def on_inner(bearing: BallRow, moved: np.ndarray, cage: float | None = None) -> tuple[np.ndarray, float]:
+    """Force (2,) across the axis on the inner ring, from Harris's equations ball by ball (1991, ch. 8 and 9, outer-race control, the outer ring still), with angles and a root finder, and the mean
+    speed of the balls; each at its own speed or at that of a `cage`."""
+    inertia = bearing.inertia
+    diameter, gamma = inertia.diameter, inertia.diameter / inertia.pitch_diameter
+    force, speeds = np.zeros(2), []
+    for psi in bearing.azimuths:
+        r = -bearing.radial + moved[0] * np.cos(psi) + moved[1] * np.sin(psi)
+        z = bearing.axial + moved[2] + bearing.arm * (moved[3] * np.sin(psi) - moved[4] * np.cos(psi))
+
+        def state(c, r=r, z=z):
+            inner, outer = np.arctan2(c[1], -c[0]), np.arctan2(z - c[1], c[0] - r)
+            pressed = np.hypot(*c) - bearing.inner_length, np.hypot(r - c[0], z - c[1]) - bearing.outer_length
+            loads = [k * max(d, 0.0) ** 1.5 for k, d in zip((bearing.inner_constant, bearing.outer_constant), pressed, strict=True)]
+            beta = np.arctan2(np.sin(outer), np.cos(outer) + gamma)
+            lead, lag = (1 + gamma * np.cos(outer)) / np.cos(outer - beta), (1 - gamma * np.cos(inner)) / np.cos(inner - beta)
+            own = inertia.inner_speed * lag / (lag + lead)
+            speed = own if cage is None else cage
+            friction = 2 / diameter * inertia.mass * diameter**2 / 10 * (speed * lead / gamma) * speed * np.sin(beta)
+            return *loads, inner, outer, inertia.mass * inertia.pitch_diameter / 2 * speed**2, friction, own
+
+        def left(c, state=state):
+            qi, qo, ai, ao, centrifugal, friction, _ = state(1e-3 * c)
+            return [
+                qi * np.cos(ai) - qo * np.cos(ao) + centrifugal + friction * np.sin(ao),
+                qi * np.sin(ai) - qo * np.sin(ao) - friction * np.cos(ao),
+            ]
+
+        qi, _, ai, _, _, _, own = state(1e-3 * root(left, 500.0 * np.array([r, z]), tol=1e-14).x)
+        force += qi * np.cos(ai) * np.array([np.cos(psi), np.sin(psi)])
+        speeds.append(own)
+    return force, float(np.mean(speeds))
+
+
+def test_radial_stiffness_at_speed_is_that_of_harris_equations_with_one_cage():
+    """218 bearing at speed, 17.8 kN: of the inner ring 184 N/um with the cage's speed, 172 with each ball at its own, for which what the outer ring feels is 156: one ring cannot be pushed
+    by less than the other."""
+    bearing = fast_218()
+    centred = displacement_under(bearing, np.array([0, 0, 17800.0, 0, 0]))
+    cage, aside = on_inner(bearing, centred)[1], 1e-7 * np.eye(5)[0]
+    slope = -(on_inner(bearing, centred + aside, cage)[0] - on_inner(bearing, centred - aside, cage)[0]) / 2e-7
+    assert respond(bearing, centred).tangent[0, 0] == pytest.approx(slope[0], rel=1e-5)
+    own = -(on_inner(bearing, centred + aside)[0] - on_inner(bearing, centred - aside)[0]) / 2e-7
+    assert own[0] == pytest.approx(172.1e6, rel=1e-3)
+
+
+def test_both_rings_feel_the_same_across_the_axis():
+    """Of balls with one cage, which stand evenly, centrifugal forces add up to nothing."""
+    bearing = fast_218()
+    moved = displacement_under(bearing, np.array([3000.0, -1000.0, 17800.0, 0, 0]))
+    answer = respond(bearing, moved)
+    along = np.stack([np.cos(bearing.azimuths), np.sin(bearing.azimuths)])
+    assert np.ptp(answer.ball_force) > 0.5 * answer.ball_force.mean()
+    assert -along @ (answer.ball_force * np.cos(answer.inner_angle)) == pytest.approx(answer.force[:2], rel=1e-6)
 
 
 def test_heavy_balls_tangent_is_exact():
