@@ -42,13 +42,14 @@ class BearingState(ByDirection):
     contact_angle: float
     outer_contact_angle: float
     deformation: float
-    contact_force: float
+    contact_force: float  # at the inner contact
     ball_stiffness: float
     preload: float
     stiffness: Array
     damping: Array
     row: BallRow
     in_contact: bool
+    outer_contact_force: float  # larger at speed, by what centrifugal force adds
     movement: float = 0.0
     displacement: tuple[float, ...] = ()  # (5,), of its outer ring under a radial load; empty for centred rings
     radial_force: tuple[float, float] = (0.0, 0.0)  # on its outer ring under that load, to hold it there
@@ -227,7 +228,7 @@ def bearing_state(spindle: Spindle, b: Bearing, row: BallRow, centre: Vector | N
     felt = TOUCHING * b.preload / (b.balls * np.sin(b.contact_angle))
     stiffness = answer.tangent
     if row.inertia is not None:
-        # outer-race control makes the tangent of heavy balls unsymmetric, by 1e-4 of it; springs, in MuJoCo too, carry the symmetric part
+        # outer-race control makes the tangent of heavy balls unsymmetric, by 1e-4 of it, under radial loads with the cage's speed by up to a hundredth; springs, in MuJoCo too, carry the symmetric part
         stiffness = (stiffness + stiffness.T) / 2
     return BearingState(
         name=b.name,
@@ -242,5 +243,6 @@ def bearing_state(spindle: Spindle, b: Bearing, row: BallRow, centre: Vector | N
         damping=damping_time(spindle, b) * stiffness,
         row=row,
         in_contact=bool(answer.in_contact.all() and answer.ball_force.min() > felt),
+        outer_contact_force=float(answer.outer_ball_force[0]),
         movement=movement,
     )

@@ -32,8 +32,11 @@ COLUMNS = {
     "coupling_stiffness_N_per_rad": lambda b: b.coupling_stiffness,
 }
 """Property of a bearing state behind every column."""
+AT_SPEED = {"outer_contact_force_N": lambda b: b.outer_contact_force}
+"""Columns of a table that has ball bearings; those that were written earlier have none."""
 OF_ROLLERS = {"clearance_um": lambda b: b.clearance * 1e6}
 """Columns of a table that has roller bearings."""
+FURTHER = (*AT_SPEED, *OF_ROLLERS)
 GAPS = "{}: the table has gaps; every bearing needs a row for each temperature and speed, and one only"
 MISSING = -1e308  # in a grid that is being read; NaN is what a bearing given by numbers does not have
 
@@ -72,7 +75,7 @@ def _between(grid: Array, values: Array, where: float, name: str, unit: str) -> 
 def tabulate(states: Sequence[Sequence[PairState]], unloads: Mapping[str, float | None], provenance: Mapping[str, str]) -> StiffnessTable:
     """Table of pair states on a grid: `states[i][j]` at temperature i and speed j."""
     bearings = states[0][0].all_bearings
-    columns = COLUMNS | (OF_ROLLERS if any(isinstance(b, RollerState) for b in bearings) else {})
+    columns = COLUMNS | (AT_SPEED if any(isinstance(b, BearingState) for b in bearings) else {}) | (OF_ROLLERS if any(isinstance(b, RollerState) for b in bearings) else {})
 
     def column(name: str, read) -> Array:
         return np.array([[_property(state.any_bearing(name), read) for state in row] for row in states])
@@ -100,7 +103,7 @@ def write_table(table: StiffnessTable, path: Path) -> None:
         file.write(f"# provenance: {json.dumps(dict(table.provenance))}\n")
         file.write(f"# unloads_C: {json.dumps(dict(table.unloads))}\n")
         writer = csv.writer(file, lineterminator="\n")
-        told = [*COLUMNS, *(c for c in OF_ROLLERS if any(c in columns for columns in table.values.values()))]
+        told = [*COLUMNS, *(c for c in FURTHER if any(c in columns for columns in table.values.values()))]
         writer.writerow(["bearing", "temperature_C", "speed_rpm", *told])
         for name, columns in table.values.items():
             for i, t in enumerate(table.temperature):
@@ -122,7 +125,7 @@ def read_table(path: Path) -> StiffnessTable:
             raise BadInput(GAPS.format(path))  # before grids are made of it: of a damaged file they could be of any size
         for row in rows:
             where = np.searchsorted(temperature, float(row["temperature_C"])), np.searchsorted(rpm, float(row["speed_rpm"]))
-            for column in (*COLUMNS, *(c for c in OF_ROLLERS if c in row)):
+            for column in (*COLUMNS, *(c for c in FURTHER if c in row)):
                 grid = values.setdefault(name_of(row["bearing"]), {}).setdefault(column, np.full((len(temperature), len(rpm)), MISSING))
                 grid[where] = float(row[column])
     except BadInput:

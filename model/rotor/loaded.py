@@ -150,6 +150,7 @@ def _displaced(spindle: Spindle, b: BearingState, q: Array) -> BearingState:
         outer_contact_angle=float(share @ answer.outer_angle),
         deformation=float(answer.deformation[most]),
         contact_force=float(answer.ball_force[most]),
+        outer_contact_force=float(answer.outer_ball_force[most]),
         ball_stiffness=1.5 * b.row.constant * max(float(answer.deformation[most]), 0.0) ** 0.5,
         preload=spindle.bearing(b.name).sense * float(answer.force[2]),
         stiffness=stiffness,

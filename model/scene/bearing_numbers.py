@@ -22,7 +22,7 @@ COLUMNS = ("radial_stiffness_N_per_m", "axial_stiffness_N_per_m", "tilt_stiffnes
 """Of a table; those that are missing are zero, but one of the first two must be there."""
 DIRECTIONS = ("x", "y", "z", "tilt_x", "tilt_y")
 WHERE = ("temperature_C", "speed_rpm")
-BESIDE = ("bearing", *(c for c in (*stiffness_table.COLUMNS, *stiffness_table.OF_ROLLERS) if c not in COLUMNS))
+BESIDE = ("bearing", *(c for c in (*stiffness_table.COLUMNS, *stiffness_table.FURTHER) if c not in COLUMNS))
 """Columns of the verb `table` that are no stiffness."""
 
 

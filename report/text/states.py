@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from thermospindle.model.bearing.stiffness_table import OF_ROLLERS, StiffnessTable
+from thermospindle.model.bearing.stiffness_table import FURTHER, StiffnessTable
 from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.modes import Mode, group_energy
 from thermospindle.model.rotor.static import Static
@@ -21,6 +21,7 @@ from thermospindle.sim.operating import OperatingPoint
 
 JSON_COLUMNS = (
     "contact_angle_deg",
+    "outer_contact_angle_deg",
     "deformation_um",
     "contact_force_N",
     "ball_stiffness_N_per_m",
@@ -39,7 +40,7 @@ def table_json(table: StiffnessTable) -> dict[str, Any]:
     """Lists over temperature at the first speed; with several speeds each entry of `speeds` holds its own."""
 
     def at(speed: int) -> dict[str, Any]:
-        columns = [*JSON_COLUMNS, *OF_ROLLERS]
+        columns = [*JSON_COLUMNS, *FURTHER]
         return {name: {c: [None if np.isnan(x) else x for x in v[c][:, speed].tolist()] for c in columns if c in v} for name, v in table.values.items()}
 
     answer = {"temperature_C": table.temperature.tolist(), "bearings": at(0), "unloads_C": dict(table.unloads)}
