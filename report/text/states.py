@@ -94,7 +94,7 @@ def show_table(console: Console, table: StiffnessTable, radial_load: bool = Fals
         return
     contact = "inner" if table.speed.any() else "contact"
     angle = "inner\nangle\ndeg" if table.speed.any() else "angle\ndeg"
-    force = f"{'largest' + chr(10) if radial_load else ''}{contact}\nforce\nN"
+    force = "\n".join([*(["largest"] if radial_load else []), contact, "force", "N"])
     shown = [
         ("contact_angle_deg", angle, 1, 2), ("deformation_um", "deform.\num", 1, 3), ("clearance_um", "clear-\nance\num", 1, 2),
         ("contact_force_N", force, 1, 3), ("ball_stiffness_N_per_m", "ball k\nN/um", 1e-6, 3), ("preload_N", "preload\nN", 1, 2),
