@@ -83,8 +83,11 @@ class Place(BaseModel):
         return self
 
 
-def place_of(diagnosis: Path, element: str | None) -> tuple[Place, float]:
-    """The first that would have to drift, or `element`, and the reference temperature (C) of the scene. Raises `BadInput` where the file holds none, one that
+NAMING = ("identified", "two effects")
+
+
+def place_of(diagnosis: Path, element: str | None) -> tuple[Place, float, tuple[str, ...]]:
+    """The first that would have to drift, or `element`, the reference temperature (C) of the scene, and the effects that the verdict names, without which that would drift. Raises `BadInput` where the file holds none, one that
     changes by nothing, or a name that cannot stand in a Python file."""
     if not diagnosis.is_file():
         raise BadInput(f"{diagnosis}: cannot be read: no such file")
@@ -93,7 +96,8 @@ def place_of(diagnosis: Path, element: str | None) -> tuple[Place, float]:
         reference = float(told.get("reference_temperature_C", REFERENCE))
         if not -273.15 < reference < LARGEST:
             raise ValueError
-        named = [str(p["element"]) for p in told["where"]]
+        elements = [str(p["element"]) for p in told["where"]]
+        named = tuple(str(e) for e in told.get("effects", ())) if told.get("verdict") in NAMING else ()
         found = [Place.model_validate(p) for p in told["where"] if element in (None, p["element"])][:1]
     except OSError as error:
         raise BadInput(f"{diagnosis}: cannot be read: {error.strerror}") from None
@@ -104,12 +108,12 @@ def place_of(diagnosis: Path, element: str | None) -> tuple[Place, float]:
     if not found and element is None:
         raise BadInput(f"{diagnosis}: where: is empty; the diagnosis found nothing that drifts, and there is nothing to draft")
     if not found:
-        raise BadInput(f"--element {element}: does not drift in {diagnosis}; allowed are {', '.join(named) or 'none'}")
+        raise BadInput(f"--element {element}: does not drift in {diagnosis}; allowed are {', '.join(elements) or 'none'}")
     place = found[0]
     _check_plain(place.element, place.unit, diagnosis.name, *((*(place.effect.at or ()), *place.effect.values) if place.effect else ()))
     if not place.of_tests(place.key).any():
         raise BadInput(f"{diagnosis}: where: {place.element} changes by 0 in every test; there is nothing to draft")
-    return place, reference
+    return place, reference, named
 
 
 def correlated(covariance: Array) -> tuple[Array, Array]:

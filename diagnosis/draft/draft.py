@@ -17,11 +17,13 @@ NEAR = 10.0  # criterion within which rivals are named in the file
 
 @dataclass(frozen=True)
 class Draft:
-    """The text of an effect file, how well its law fits in a sentence, and whether that leaves it in `doubt`."""
+    """The text of an effect file, of which element it is, how well its law fits in a sentence, and whether that leaves it in `doubt`; and the effects that the diagnosis named instead."""
 
     text: str
+    element: str
     fits: str
     doubt: bool
+    named: tuple[str, ...] = ()
 
 
 def draft(diagnosis: Path, name: str, element: str | None = None) -> Draft:
@@ -29,7 +31,7 @@ def draft(diagnosis: Path, name: str, element: str | None = None) -> Draft:
 
     The first element that would have to drift is taken, or `element`. Raises `BadInput` where the file holds none, or one that changes by nothing.
     """
-    place, reference = place_of(diagnosis, element)
+    place, reference, named = place_of(diagnosis, element)
     temperature, speed = place.of_tests("temperature_C"), np.abs(place.of_tests("speed_rpm"))
     change, covariance = place.logarithmic
     top = float(speed.max()) or 1.0
@@ -48,7 +50,7 @@ def draft(diagnosis: Path, name: str, element: str | None = None) -> Draft:
         limits=[_about(v) for v in best.values[:2]],
         fits=fits,
     )
-    return Draft(text, fits, doubt)
+    return Draft(text, place.element, fits, doubt, named)
 
 
 def _fits(best: Fitted) -> tuple[str, bool]:

@@ -111,7 +111,12 @@ def draft(diagnosis: Path, name: str | None = None, element: str | None = None, 
     with whole(out) as file:
         file.write_text(written.text, encoding="utf-8")
     effect = effect_of(out)
-    values = {"effect": called, "file": str(out), "equation": effect.equation, "parameters": effect.typical(), "warnings": [written.fits] if written.doubt else []}
+    warnings = [written.fits] if written.doubt else []
+    if written.named and element is None:
+        names = " and ".join(written.named)
+        adding = f"spindle add SCENE {' '.join(written.named)} --from {shlex.quote(str(diagnosis))} --out NEW_SCENE"
+        warnings.append(f"{diagnosis} names {names}, and nothing has to be drafted: {adding}; this draft is of {written.element}, which would have to drift instead")
+    values = {"effect": called, "file": str(out), "equation": effect.equation, "parameters": effect.typical(), "warnings": warnings}
 
     def show(console: Console) -> None:
         console.print(f"{out}: {effect.title}; {effect.equation}" + ("" if written.doubt else f"; {written.fits}"))

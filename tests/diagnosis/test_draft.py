@@ -96,6 +96,18 @@ def drafted(answer, folder):
     return text, own, runpy.run_path(str(file))["law"]
 
 
+def test_what_is_named_needs_no_draft(tmp_path, capsys):
+    """A bond that was identified: a newcomer's plain `draft` wrote a step of the rings, which no law fitted, without a word."""
+    answer = of_rings(tmp_path, [0.1 * t for t in AT], 0.01)
+    told = json.loads(answer.read_text(encoding="utf-8"))
+    answer.write_text(json.dumps(told | {"verdict": "identified", "effects": ["bond_softening"]}), encoding="utf-8")
+    for element, warned in ((None, True), ("bearings rings apart radially", False)):
+        asked = ["--element", element] if element else []
+        assert main(["draft", str(answer), "--out", str(tmp_path / f"own_{warned}.py"), "--json", *asked]) == 0
+        said = json.loads(capsys.readouterr().out)["warnings"]
+        assert any("names bond_softening, and nothing has to be drafted: spindle add SCENE bond_softening --from" in w for w in said) == warned
+
+
 STEEP, SLIGHT = [0.5 + np.exp((t - 70) / 4) for t in AT], [3 + 0.02 * (t - 20) / 50 for t in AT]
 
 
