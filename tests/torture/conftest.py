@@ -88,6 +88,9 @@ def pytest_terminal_summary(terminalreporter):
     if not EXAMPLES:
         return
     terminalreporter.section("torture")
+    if terminalreporter.config.getoption("numprocesses", None):
+        terminalreporter.write_line("examples are counted without -n alone: each process has counts of its own")
+        return
     for what, count in sorted(COUNTS.items()):
         told = ", ".join(f"{number} {name}" for name, number in count.most_common())
         terminalreporter.write_line(f"{what:26} {sum(count.values()):7} examples: {told}")
