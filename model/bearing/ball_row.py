@@ -12,7 +12,7 @@ each would make it. What one ring is pushed aside with the other is then, too.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from math import hypot, sqrt
@@ -21,7 +21,18 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from thermospindle.model.bearing.heavy_ball import LEAST_STRETCH, Balance, BallInertia, HeavyBall, Vector, balance, driven, settled
+from thermospindle.model.bearing.heavy_ball import (
+    LEAST_STRETCH,
+    Balance,
+    BallInertia,
+    Driven,
+    HeavyBall,
+    Vector,
+    balance,
+    driven,
+    rolling,
+    settled,
+)
 from thermospindle.model.bearing.hertz import in_series
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.types import Array
@@ -192,10 +203,9 @@ class Cage:
 def _with_inertia(row: BallRow, line: Array, centre: Vector | None) -> tuple[tuple[Array, ...], Cage | None]:
     """As `_massless` at the speed of the cage, with the centre of every ball an unknown of its own; and what the cage does as rings move."""
     lines = [(r, z) for r, z in line.tolist()]
-    speed, found = _at_one_speed(row, lines, centre)
-    moved = {at: driven(_ball(_held(row, speed)), here, at) for at, here in found.items()}
-    balances, each = [found[at] for at in lines], [moved[at] for at in lines]
-    stiffness = {at: np.reshape(b.stiffness(), (2, 2)) for at, b in found.items()}
+    _, found = _at_one_speed(row, lines, centre)
+    balances, each = zip(*(found[at] for at in lines), strict=True)
+    stiffness = {at: np.reshape(b.stiffness(), (2, 2)) for at, (b, _) in found.items()}
     told = np.array([(*b.on_outer, b.inner, b.outer, b.inner_angle, b.outer_angle, b.deformation) for b in balances]).T
     values = told[:2].T, np.array([stiffness[at] for at in lines]), *told[2:]
     if row.inertia is not None and row.inertia.cage is not None:
@@ -216,26 +226,28 @@ def _held(row: BallRow, cage: float) -> BallRow:
     return replace(row, inertia=replace(row.inertia, cage=cage))
 
 
-def _at_one_speed(row: BallRow, lines: Sequence[Vector], centre: Vector | None) -> tuple[float, dict[Vector, Balance]]:
-    """Speed of the cage, and the balance of a ball at every different one of `lines` (balls, 2) between the groove centres; balls on the same line, as of centred rings, are one."""
+def _at_one_speed(row: BallRow, lines: Sequence[Vector], centre: Vector | None) -> tuple[float, dict[Vector, tuple[Balance, Driven]]]:
+    """Speed of the cage, and what a ball is at every different one of `lines` (balls, 2) between the groove centres; balls on the same line, as of centred rings, are one."""
     assert row.inertia is not None
     weights, tolerances = Counter(lines), _tolerances(row, lines)
-    found = {at: settled(_ball(row), at, *tolerances, centre) for at in weights}
-    if row.inertia.cage is not None:
-        return row.inertia.cage, found
 
-    def rolling(row: BallRow) -> tuple[float, float]:
-        """Mean over the balls of the speed by rolling, and its derivative by the cage's."""
-        each = [(weights[at], driven(_ball(row), here, at)) for at, here in found.items()]
-        return sum(n * d.speed for n, d in each) / len(lines), sum(n * d.by_cage for n, d in each) / len(lines)
+    def mean(values: Mapping[Vector, float]) -> float:
+        return sum(n * values[at] for at, n in weights.items()) / len(lines)
 
-    cage = rolling(row)[0]
-    if len(found) == 1:  # it rolls with them
-        return cage, {at: balance(_ball(_held(row, cage)), here.centre, at) for at, here in found.items()}
+    def at_speed(cage: float, balances: Mapping[Vector, Balance]) -> dict[Vector, tuple[Balance, Driven]]:
+        ball = _ball(_held(row, cage))
+        return {at: (here, driven(ball, here, at)) for at, here in balances.items()}
+
+    here = {at: settled(_ball(row), at, *tolerances, centre) for at in weights}
+    if (cage := row.inertia.cage) is not None:
+        return cage, at_speed(cage, here)
+    cage = mean({at: rolling(row.inertia, b.centre, at).speed for at, b in here.items()})
+    if len(here) == 1:  # it rolls with them
+        return cage, at_speed(cage, {at: balance(_ball(_held(row, cage)), b.centre, at) for at, b in here.items()})
     for _ in range(ROUNDS):
-        at_speed = _held(row, cage)
-        found = {at: settled(_ball(at_speed), at, *tolerances, here.centre) for at, here in found.items()}
-        speed, by_cage = rolling(at_speed)
+        here = {at: settled(_ball(_held(row, cage)), at, *tolerances, b.centre) for at, b in here.items()}
+        found = at_speed(cage, here)
+        speed, by_cage = (mean({at: getattr(d, of) for at, (_, d) in found.items()}) for of in ("speed", "by_cage"))
         step = (speed - cage) / (1.0 - by_cage)
         if abs(step) <= STANDING * abs(speed):
             return cage, found

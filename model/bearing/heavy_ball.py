@@ -75,7 +75,8 @@ class BallInertia:
         """What the ball's inertia asks of its contacts."""
         co, so = outer
         speed, by_outer, by_inner = self.orbit(outer, inner) if self.cage is None else Orbit(self.cage, 0.0, 0.0)
-        orbit, polar = self._orbiting, self._turning
+        orbit = self.share * self.mass * self.pitch_diameter / 2
+        polar = self.share * self.mass * self.diameter * self.pitch_diameter / 10
         behind = self.outer_speed - speed
         centrifugal_by_speed, moment_by_speed = 2 * orbit * speed, polar * (behind - speed) * so
         return Loads(
@@ -88,16 +89,6 @@ class BallInertia:
             centrifugal_by_speed,
             moment_by_speed,
         )
-
-    @property
-    def _orbiting(self) -> float:
-        """C over the square of the cage's speed."""
-        return self.share * self.mass * self.pitch_diameter / 2
-
-    @property
-    def _turning(self) -> float:
-        """M over the cage's speed, what it is behind the outer ring, and sin a_o."""
-        return self.share * self.mass * self.diameter * self.pitch_diameter / 10
 
 
 class Orbit(NamedTuple):
@@ -272,12 +263,19 @@ class Driven(NamedTuple):
     force_by_cage: Vector
 
 
+def rolling(inertia: BallInertia, centre: Vector, line: Vector) -> Orbit:
+    """How fast a ball with its centre at `centre` would roll, for the outer groove's centre at `line`."""
+    inner, gap = hypot(*centre), (line[0] - centre[0], line[1] - centre[1])
+    outer = hypot(*gap)
+    return inertia.orbit((-gap[0] / outer, gap[1] / outer), (-centre[0] / inner, centre[1] / inner))
+
+
 def driven(ball: HeavyBall, here: Balance, line: Vector) -> Driven:
     """Of a ball settled at `here` with its cage's speed, for the outer groove's centre at `line`; its centre follows both."""
     (cr, cz), gap = here.centre, (line[0] - here.centre[0], line[1] - here.centre[1])
     inner_length, outer_length = hypot(cr, cz), hypot(*gap)
     (ir, iz), cosine, sine = (cr / inner_length, cz / inner_length), -gap[0] / outer_length, gap[1] / outer_length
-    own, loads = ball.inertia.orbit((cosine, sine), (-ir, iz)), ball.inertia.loads((cosine, sine), (-ir, iz))
+    own, loads = rolling(ball.inertia, here.centre, line), ball.inertia.loads((cosine, sine), (-ir, iz))
     friction = (2 / ball.inertia.diameter if here.outer > 0 else 0.0) * loads.moment_by_speed
     on_outer = -friction * sine, -friction * cosine
     s, g, j = here.by_inner, here.by_line, here.by_outer
