@@ -13,6 +13,7 @@ from thermospindle.diagnosis.data.observe import condition_of
 from thermospindle.diagnosis.forward import nuisance
 from thermospindle.diagnosis.forward.making import campaign_model, expected_noise
 from thermospindle.diagnosis.forward.model import CampaignModel
+from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array, ComplexArray
@@ -128,3 +129,10 @@ def truth(model: CampaignModel, errors: Drawn) -> Array:
         elif p.kind == nuisance.GAIN:
             x[i] = errors.gain[p.index] / p.sd
     return x
+
+
+def fitted(scene: Spindle, conditions, seed: int, responses=(1, 3, 6), **changes):
+    """Model, its fit, and what it was made with, for a campaign of three channels."""
+    errors = drawn(scene, len(conditions), seed)
+    model = model_of(scene, virtual_campaign(scene, conditions, seed, errors=errors, responses=responses, **changes))
+    return model, fit(model), errors

@@ -5,6 +5,8 @@ from collections import Counter
 
 import pytest
 
+from tests.counted import in_other_processes
+
 if os.name == "nt":  # SIGKILL, mounts and limits of file size are not there
     collect_ignore_glob = ["test_*.py"]
 KILLS = int(os.environ.get("FAULTS_KILLS", "0"))
@@ -22,6 +24,8 @@ def pytest_terminal_summary(terminalreporter):
     if not KILLS:
         return
     terminalreporter.section("faults")
+    if in_other_processes(terminalreporter):
+        return
     for what, count in COUNTS.items():
         terminalreporter.write_line(f"{what:14} {', '.join(f'{number} {name}' for name, number in count.most_common())}")
     landed = sum(n for count in COUNTS.values() for name, n in count.items() if name.startswith("killed"))

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 import pytest
 from hypothesis import HealthCheck, Phase, settings
 
+from tests.counted import in_other_processes
 from tests.torture.apart import SECONDS, Hangs
 from thermospindle.model.errors import BadInput, NoEquilibrium, NotConverged, OutsideRange
 
@@ -88,8 +89,7 @@ def pytest_terminal_summary(terminalreporter):
     if not EXAMPLES:
         return
     terminalreporter.section("torture")
-    if terminalreporter.config.getoption("numprocesses", None):
-        terminalreporter.write_line("examples are counted without -n alone: each process has counts of its own")
+    if in_other_processes(terminalreporter):
         return
     for what, count in sorted(COUNTS.items()):
         told = ", ".join(f"{number} {name}" for name, number in count.most_common())

@@ -170,25 +170,15 @@ def test_damaged_text_is_one_sentence(tmp_path, text, said):
     assert not (tmp_path / "c").exists()
 
 
-def test_radians_under_a_heading_of_degrees_are_asked(tmp_path):
-    """Once for all FRFs of a file, and settled by one key either way."""
-    heads, found = columns("decibel", "(m/s)/N")
-    file = table(tmp_path / "T20.csv", ["Frequency [Hz]", *(h.replace("phase [rad]", "phase [deg]") for h in heads)], [FREQUENCY, *found])
+@pytest.mark.parametrize(("kind", "true", "told", "why"), [("decibel", "rad", "deg", "they stay within +-3.14"), ("phase", "deg", "rad", "they go beyond a turn, 6.28")])
+def test_phases_that_look_like_another_unit_than_their_heading_are_asked(tmp_path, kind, true, told, why):
+    """Once for all FRFs of a file, and settled by one key either way; also phases in radians that were unwrapped go beyond a turn."""
+    heads, found = columns(kind, "(m/s)/N")
+    file = table(tmp_path / "T20.csv", ["Frequency [Hz]", *(h.replace(f"phase [{true}]", f"phase [{told}]") for h in heads)], [FREQUENCY, *found])
     with pytest.raises(BadInput, match="1 thing is not told") as said:
         imported(tmp_path, "", file)
-    assert "phase_unit: whether its phases are in deg, as their headings say, or in rad: they stay within +-3.14" in str(said.value)
-    frf = imported(tmp_path, '[[files]]\nfile = "T20.csv"\nphase_unit = "rad"\n', file)
-    assert frf.value.shape == FRF.value.shape
-
-
-def test_degrees_under_a_heading_of_radians_are_asked(tmp_path):
-    """Also phases in radians that were unwrapped go beyond a turn; one key says which they are."""
-    heads, found = columns("phase", "(m/s)/N")
-    file = table(tmp_path / "T20.csv", ["Frequency [Hz]", *(h.replace("phase [deg]", "phase [rad]") for h in heads)], [FREQUENCY, *found])
-    with pytest.raises(BadInput, match="1 thing is not told") as said:
-        imported(tmp_path, "", file)
-    assert "phase_unit: whether its phases are in rad, as their headings say, or in deg: they go beyond a turn, 6.28" in str(said.value)
-    frf = imported(tmp_path, '[[files]]\nfile = "T20.csv"\nphase_unit = "deg"\n', file)
+    assert f"phase_unit: whether its phases are in {told}, as their headings say, or in {true}: {why}" in str(said.value)
+    frf = imported(tmp_path, f'[[files]]\nfile = "T20.csv"\nphase_unit = "{true}"\n', file)
     np.testing.assert_allclose(frf.value, FRF.value, rtol=1e-8)
 
 
