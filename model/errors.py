@@ -1,6 +1,6 @@
 """What goes wrong in one sentence: the command line prints it and ends with exit code 2."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from unicodedata import category
 
@@ -43,6 +43,11 @@ def instead(word: str, known: Iterable[str]) -> str:
     part = [name for name in names if word and (name.startswith(word) or word.startswith(name))]
     near = [*part, *get_close_matches(word, names, n=1)]
     return f"did you mean {near[0]}?" if near else f"allowed are {', '.join(names) or 'none'}"
+
+
+def listed(names: Sequence[str]) -> str:
+    """a; a and b; a, b and c."""
+    return ", ".join(names[:-1]) + (" and " if len(names) > 1 else "") + names[-1] if names else ""
 
 
 def visible(text: str) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from thermospindle.model.bearing.pair import BearingState
+from thermospindle.model.errors import listed
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.units import MM, RPM
 
@@ -28,13 +29,16 @@ def of_conditions(spindle: Spindle, conditions: Sequence[Condition]) -> list[str
                 "its function; the materials are taken as the scene has them"
             )
     fastest = max(abs(c.speed) for c in conditions)
+    alike: dict[str, list[str]] = {}  # bearings by their speed factor, as it is told
     for b in spindle.bearings:
         reached = fastest / RPM * b.pitch_diameter / MM
         if reached > FASTEST:
-            said.append(
-                f"{fastest / RPM:g} rpm means a speed factor n dm of {reached:.3g} mm rev/min in the {b.name} bearing; ball bearings "
-                f"end at about {FASTEST:.2g}"
-            )
+            alike.setdefault(f"{reached:.3g}", []).append(b.name)
+    said += [
+        f"{fastest / RPM:g} rpm means a speed factor n dm of {reached} mm rev/min in the {listed(names)} bearing{'s' * (len(names) > 1)}; ball bearings "
+        f"end at about {FASTEST:.2g}"
+        for reached, names in alike.items()
+    ]
     return said
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from thermospindle.diagnosis.compare.correlation import Correlation, assurance, comac, correlate, frac, has_frfs
+from thermospindle.diagnosis.compare.correlation import Correlation, assurance, comac, correlate, frac
 from thermospindle.diagnosis.data.observe import Observation, observe
 from thermospindle.diagnosis.prediction.modes import Predicted, predict
 from thermospindle.diagnosis.prediction.partners import BELIEVABLE, by_hammer, crossings, group, numbered, partners, shapes
@@ -251,14 +251,14 @@ def _test(
     low, high = spindle.hammer.band if frf is None else (frf.frequency[0], frf.frequency[-1])
     found = set(partner.tolist())
     own = beside(spindle, campaign.points, o.test, o.condition) if frfs else None
-    known_frfs = own is not None and has_frfs(own)
+    correlation = None if own is None else correlate(own)
     return TestComparison(
         o.test,
         tuple(modes),
         tuple(o.frequency[lost].tolist()),
         tuple(float(f) for j, f in enumerate(p.frequency) if low <= f <= high and j not in found),
-        correlate(own) if own is not None and known_frfs else None,
+        correlation,
         residuals,
         len(rows) + len(lost),
-        own.point.state.status if own is not None and not known_frfs else "",
+        own.point.state.status if own is not None and correlation is None else "",
     )

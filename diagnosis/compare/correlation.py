@@ -125,16 +125,12 @@ class Correlation:
         return np.abs(a.conj().T @ x) ** 2
 
 
-def has_frfs(beside: Beside) -> bool:
-    """Whether the model has FRFs at the condition of a test: with no bearing in contact the free shaft's matrices are singular, and rounding alone is left."""
-    largest = np.abs(beside.computed(beside.measured.frequency)).max(initial=0.0)
-    return bool(largest < LARGEST)
-
-
-def correlate(beside: Beside) -> Correlation:
-    """All correlations of one test."""
+def correlate(beside: Beside) -> Correlation | None:
+    """All correlations of one test; None where the model has no FRFs at its condition: with no bearing in contact the free shaft's matrices are singular, and rounding alone is left."""
     frequency, measured = beside.measured.frequency, beside.measured.value
     computed = beside.computed(frequency)
+    if not np.abs(computed).max(initial=0.0) < LARGEST:
+        return None
     x, a = _stacked(measured), _stacked(computed)
     inner = np.abs(np.sum(x.conj() * a, axis=0))
     sizes = np.array([np.sum(np.abs(v) ** 2, axis=0) for v in (x, a)])

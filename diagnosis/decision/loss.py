@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from thermospindle.diagnosis.decision.explanations import Candidate, Names, named_part
 
 WRONG, FALSE_ALARM, MISSED, SET, HALF = 10.0, 20.0, 5.0, 1.0, 3.0
+NAMING = ("identified", "two effects")  # answers that stand by their effects
 ENOUGH = 0.95  # posterior probability that a set holds the truth, where that is in the catalogue
 NEGLIGIBLE = 1e-3  # probability that adds nothing to a set
 MOSTLY = 0.6  # of the ln evidence of an explanation with free drift in it, or of the misfit that changes, that what is named must reach to be the answer

@@ -9,6 +9,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, Field, model_validator
 
+from thermospindle.diagnosis.decision.loss import NAMING
 from thermospindle.diagnosis.draft.laws import REFERENCE
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.formats import DIAGNOSIS, migrated
@@ -81,9 +82,6 @@ class Place(BaseModel):
         if not np.allclose(correlation, correlation.T, atol=1e-6) or np.linalg.eigvalsh(correlation).min() < -SURE:
             raise ValueError
         return self
-
-
-NAMING = ("identified", "two effects")
 
 
 def place_of(diagnosis: Path, element: str | None) -> tuple[Place, float, tuple[str, ...]]:

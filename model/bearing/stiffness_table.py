@@ -6,6 +6,8 @@ import csv
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
+from operator import or_
 from pathlib import Path
 from typing import Any
 
@@ -32,11 +34,11 @@ COLUMNS = {
     "coupling_stiffness_N_per_rad": lambda b: b.coupling_stiffness,
 }
 """Property of a bearing state behind every column."""
-AT_SPEED = {"outer_contact_force_N": lambda b: b.outer_contact_force}
+OF_BALLS = {"outer_contact_force_N": lambda b: b.outer_contact_force}
 """Columns of a table that has ball bearings; those that were written earlier have none."""
 OF_ROLLERS = {"clearance_um": lambda b: b.clearance * 1e6}
 """Columns of a table that has roller bearings."""
-FURTHER = (*AT_SPEED, *OF_ROLLERS)
+FURTHER = (*OF_BALLS, *OF_ROLLERS)
 GAPS = "{}: the table has gaps; every bearing needs a row for each temperature and speed, and one only"
 MISSING = -1e308  # in a grid that is being read; NaN is what a bearing given by numbers does not have
 
@@ -75,7 +77,8 @@ def _between(grid: Array, values: Array, where: float, name: str, unit: str) -> 
 def tabulate(states: Sequence[Sequence[PairState]], unloads: Mapping[str, float | None], provenance: Mapping[str, str]) -> StiffnessTable:
     """Table of pair states on a grid: `states[i][j]` at temperature i and speed j."""
     bearings = states[0][0].all_bearings
-    columns = COLUMNS | (AT_SPEED if any(isinstance(b, BearingState) for b in bearings) else {}) | (OF_ROLLERS if any(isinstance(b, RollerState) for b in bearings) else {})
+    further = [of for kind, of in ((BearingState, OF_BALLS), (RollerState, OF_ROLLERS)) if any(isinstance(b, kind) for b in bearings)]
+    columns = reduce(or_, further, COLUMNS)
 
     def column(name: str, read) -> Array:
         return np.array([[_property(state.any_bearing(name), read) for state in row] for row in states])

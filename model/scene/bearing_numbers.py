@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Mapping, Sequence
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated
 
@@ -14,7 +13,7 @@ from pydantic import Field, Strict, model_validator
 from thermospindle.model.bearing import stiffness_table
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.cells import plain_number
-from thermospindle.model.scene.fields import Finite, NotNegative, Positive, Share, Table
+from thermospindle.model.scene.fields import Finite, NotNegative, Positive, Share, Table, meant
 from thermospindle.model.units import RPM
 
 Row = Annotated[tuple[Finite, Finite, Finite, Finite, Finite], Strict(False)]
@@ -120,5 +119,4 @@ def _check_columns(file: Path, rows: Sequence[Mapping[str, str | None]]) -> None
     for column in rows[0]:
         if column is None or column in allowed or (not column and not any(row[column] for row in rows)):
             continue
-        near = get_close_matches(column, allowed, n=1)
-        raise BadInput(f"{file}: column {column!r}: unknown; allowed are {', '.join(allowed)}{f'; did you mean {near[0]}?' if near else ''}")
+        raise BadInput(f"{file}: column {column!r}: unknown; allowed are {', '.join(allowed)}{meant(column, allowed)}")

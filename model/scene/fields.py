@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from types import UnionType
@@ -174,9 +174,7 @@ def first_error(where: str | Path, raw: Any, form: type[BaseModel], error: Valid
     match problem["type"]:
         case "extra_forbidden":
             allowed = _allowed_keys(form, location[:-1])
-            near = get_close_matches(str(location[-1]), allowed, n=1)
-            meant = f"; did you mean {near[0]}?" if near else ""
-            return f"{where}: {key}: unknown key; allowed here: {', '.join(allowed)}{meant}"
+            return f"{where}: {key}: unknown key; allowed here: {', '.join(allowed)}{meant(str(location[-1]), allowed)}"
         case "missing":
             return f"{where}: {key}: missing, and has no default"
         case _:
@@ -184,6 +182,12 @@ def first_error(where: str | Path, raw: Any, form: type[BaseModel], error: Valid
             given = "" if isinstance(problem["input"], Mapping | LawTable) else f" = {_shown(problem['input'])}"
             told = f"{key}{given}: {message[0].lower()}{message[1:]}".removeprefix(": ")
             return f"{where}: {told}"
+
+
+def meant(word: str, allowed: Sequence[str]) -> str:
+    """What to say after all that is allowed: the one that an unknown `word` is most like."""
+    near = get_close_matches(word, allowed, n=1)
+    return f"; did you mean {near[0]}?" if near else ""
 
 
 def _told(kind: str, message: str, value: Any) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 
 from rich.console import Console
 
+from thermospindle.model.errors import listed
 from thermospindle.report.text.grid import show_grid
 
 
@@ -26,10 +27,10 @@ def sentences(values: Mapping[str, Any]) -> list[str]:
     """What the whole is, in a few sentences."""
     turning, standing = values["parts"]["turning"], values["parts"]["standing"]
     low, high = values["temperature_range_C"]
-    found = [f"Turning: {_and(turning) or 'nothing'}" + (f" ({values['turning_mass_kg']:.4g} kg)" if turning else "") + f". Standing: {_and(standing) or 'the ground alone'}."]
+    found = [f"Turning: {listed(turning) or 'nothing'}" + (f" ({values['turning_mass_kg']:.4g} kg)" if turning else "") + f". Standing: {listed(standing) or 'the ground alone'}."]
     for name, s in values["sets"].items():
-        slides = f"; the rings of {_and(s['sprung'])} slide on {_spring(s)}" if s["sprung"] else ""
-        found.append(f"Set {name}: {_and(s['bearings'])}, {s['arrangement']}, preload {s['preload_N']:g} N, {s['kind']}{slides}.")
+        slides = f"; the rings of {listed(s['sprung'])} slide on {_spring(s)}" if s["sprung"] else ""
+        found.append(f"Set {name}: {listed(s['bearings'])}, {s['arrangement']}, preload {s['preload_N']:g} N, {s['kind']}{slides}.")
     if values["sets"]:
         found.append(f"Balls with {values['ball_inertia']:.0%} of their inertia." if values["ball_inertia"] else "Balls without inertia: speed changes no bearing.")
     found += [_rollers(name, b) for name, b in values["bearings"].items() if b["kind"] == "roller row"]
@@ -42,7 +43,7 @@ def sentences(values: Mapping[str, Any]) -> list[str]:
     h, modes = values["hammer"], values["modes_Hz"]
     points = [name for name, p in values["points"].items() if p["hammer"]]
     found.append(
-        f"Hammer on {_and(points)}: {h['band_Hz'][0]:g} to {h['band_Hz'][1]:g} Hz, a pulse of {h['pulse_us']:.3g} us that first vanishes at {h['vanishes_at_Hz']:.0f} Hz; "
+        f"Hammer on {listed(points)}: {h['band_Hz'][0]:g} to {h['band_Hz'][1]:g} Hz, a pulse of {h['pulse_us']:.3g} us that first vanishes at {h['vanishes_at_Hz']:.0f} Hz; "
         f"steps of {h['step_us']:.3g} us."
     )
     shown = ", ".join(f"{f:.0f}" for f in modes[:8]) + (" ..." if len(modes) > 8 else "")
@@ -50,7 +51,7 @@ def sentences(values: Mapping[str, Any]) -> list[str]:
     found.append(f"Meant for {low:g} to {high:g} C" + (f" and {values['nominal_speed_rpm']:g} rpm." if turning else "."))
     effects = values["effects"]
     count = len(effects["can_act"]) + len(effects["nothing_to_act_on"])
-    own = f"Effects in it: {_and(effects['of_the_scene'])}. " if effects["of_the_scene"] else ""
+    own = f"Effects in it: {listed(effects['of_the_scene'])}. " if effects["of_the_scene"] else ""
     found.append(f"{own}Of {count} effects {len(effects['can_act'])} can act here (spindle effects --scene tells why the others cannot).")
     return found
 
@@ -117,10 +118,6 @@ def _across_axis(s: Mapping[str, Any]) -> str:
 
 def _spring(s: Mapping[str, Any]) -> str:
     return "a constant force" if s["rate_N_per_m"] is None else f"a spring of {s['rate_N_per_m']:g} N/m"
-
-
-def _and(names: list[str]) -> str:
-    return ", ".join(names[:-1]) + (" and " if len(names) > 1 else "") + names[-1] if names else ""
 
 
 def of_words(rows: list[list[str]], k: int) -> bool:

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from thermospindle.diagnosis.decision.loss import NAMING
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.ladder.forms import AS_DRAWN
 from thermospindle.diagnosis.ladder.ladder import CLEAR, DISCREPANCY, MODES, TOLERANCES, Ladder
@@ -20,7 +21,6 @@ STRETCHED = 2.0  # standard deviations from which a tolerance is named
 MOST = 5  # things named in one sentence
 CLOSE = 0.05  # relative distance of two modes that are called a pair
 FURTHER = 1.5  # times the error of natural frequencies, from which it is said to rise
-NAMING = ("identified", "two effects")  # verdicts that stand by their effects
 WRONG = 3.0  # standard errors from which a shift or a split is called wrong
 MISSED = {kinds_of.STIFFNESS: "natural frequencies", kinds_of.DAMPING: "damping ratios"}
 

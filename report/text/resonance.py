@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
+from thermospindle.model.errors import listed
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 from thermospindle.report.text.grid import show_grid
@@ -169,8 +170,7 @@ def told(found: ResonanceMap) -> list[str]:
 def _line(c: Coincidence, bearings: Sequence[str] = ()) -> str:
     order = f" of order {c.line.order}" if c.line.order else ""
     names = [*dict.fromkeys(bearings)] or [c.line.bearing]
-    every = f"{', '.join(names[:-1])} and {names[-1]} bearings" if len(names) > 1 else f"{names[0]} bearing"
-    where = f" of the {every}" if names[0] else ""
+    where = f" of the {listed(names)} bearing{'s' * (len(names) > 1)}" if names[0] else ""
     return f"{c.line.name} ({c.line.cause}{order}{where})"
 
 

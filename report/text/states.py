@@ -110,7 +110,7 @@ def show_table(console: Console, table: StiffnessTable, radial_load: bool = Fals
     show_grid(console, "Bearing state", columns, rows, ("bearing",), keys=3)
     rows_of_balls = any("contact_angle_deg" in values and np.isfinite(values["contact_angle_deg"]).any() for values in table.values.values())
     if table.speed.any() and rows_of_balls:
-        console.print("Inner angle and force: of the contact with the inner ring; the outer angle is in table.csv of --out.")
+        console.print("Inner angle and force: of the contact with the inner ring; those of the outer one are in table.csv of --out.")
     if radial_load and rows_of_balls:
         console.print("Under the radial load deformation, force and ball k are those of the most loaded ball; the angle is the mean of all, weighted with their force.")
     for name, where in table.unloads.items():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -43,25 +42,12 @@ def answered(
     warnings: Sequence[str] = (),
 ) -> Answer:
     """The answer with its warnings; where `out` is given, the folder that `write` fills, marked with what was `asked`."""
-    answer = {**values, "warnings": _bearings_together(warnings)}
+    answer = {**values, "warnings": list(dict.fromkeys(warnings))}
     if out is not None:
         with whole_folder(Path(out)) as folder:
             write(folder, answer)
             mark(folder, asked, answer)
     return Answer(answer, show)
-
-
-def _bearings_together(warnings: Sequence[str]) -> list[str]:
-    """Warnings, once each; those that differ in the name of a bearing alone are one of all these bearings."""
-    groups: dict[tuple[str, str], list[str]] = {}
-    for said in dict.fromkeys(warnings):
-        of_one = re.fullmatch(r"(.* in the )([^;,]+)( bearing; .*)", said)
-        before, name, after = of_one.groups() if of_one else (said, "", "")
-        groups.setdefault((before, after), []).append(name)
-    return [
-        f"{before}{', '.join(names[:-1])} and {names[-1]}{after.replace(' bearing;', ' bearings;', 1)}" if len(names) > 1 else f"{before}{names[0]}{after}"
-        for (before, after), names in groups.items()
-    ]
 
 
 def with_effects(scene: Path, effect_files: Sequence[Path]) -> tuple[Spindle, tuple[Effect, ...]]:

@@ -9,6 +9,7 @@ import numpy as np
 from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.decision.errors import arrived, as_drawn, whole
 from thermospindle.diagnosis.decision.explanations import Candidate
+from thermospindle.diagnosis.decision.loss import NAMING
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.inference.evidence import Evidence, left_out
@@ -204,7 +205,7 @@ def _invisible(d: Diagnosis) -> list[str]:
 
 def _places(d: Diagnosis) -> list[Drift]:
     """What changes, with what the verdict goes by first: effects that it names without their laws, or what drifts without any catalogue."""
-    return [*d.own_laws, *d.drifts] if d.verdict.word in ("identified", "two effects") else [*d.drifts, *d.own_laws]
+    return [*d.own_laws, *d.drifts] if d.verdict.word in NAMING else [*d.drifts, *d.own_laws]
 
 
 def _place(p: Drift, d: Diagnosis) -> dict[str, Any]:

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from thermospindle.model.machine import Condition
+from thermospindle.model.sense import of_conditions
 from thermospindle.model.units import RPM
 from thermospindle.report.text.resonance import sentences, show_map
-from thermospindle.report.verbs.answer import answered
 from thermospindle.sim.resonance.found import Coincidence, Interpolated, ResonanceMap
 from thermospindle.sim.resonance.map import _with
 
@@ -61,9 +62,12 @@ def test_what_interpolation_is_worth_is_told_of_those_that_are_exact(met):
     assert "the 60 strongest tell, which are exact and were interpolated too: frequencies are off by 0.035 % at most, strengths by 3.3 %" in text
 
 
-def test_a_warning_of_every_bearing_is_one():
-    said = [f"120000 rpm means a speed factor n dm of 4.32e+06 mm rev/min in the {name} bearing; ball bearings end at about 2.5e+06" for name in ("front", "rear", "third")]
-    answer = answered({}, lambda console: None, None, {}, warnings=[*said, "another", said[0]])
-    merged, other = answer.values["warnings"]
+def test_a_warning_of_every_bearing_is_one(spindle):
+    """Of bearings of one pitch diameter; one of another has a sentence of its own."""
+    named = replace(spindle, bearings=tuple(replace(spindle.bearings[0], name=name) for name in ("front", "rear", "third")))
+    other = replace(spindle.bearings[0], name="large", pitch_diameter=0.036)
+    [merged] = of_conditions(named, [Condition(20.0, 400_000 * RPM)])
     assert "in the front, rear and third bearings; ball" in merged
-    assert other == "another"
+    merged, alone = of_conditions(replace(named, bearings=(*named.bearings, other)), [Condition(20.0, 400_000 * RPM)])
+    assert "in the front, rear and third bearings; ball" in merged
+    assert "n dm of 1.44e+07 mm rev/min in the large bearing; ball bearings end at about 2.5e+06" in alone
