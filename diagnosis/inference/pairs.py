@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import chain
 
 import numpy as np
 
@@ -69,7 +68,7 @@ def joined_early(
     for lead in of_each_name([h for h in tried.early if not h.free])[:LEADS]:
         others = [m for m in mechanisms if m.name not in lead.names]
         looked = screen(model.thinned, lead.fit, lead.fit.temper, none.evidence.learned, others, workers)
-        for s in chain.from_iterable(promising(looked, kind)[:SECONDS] for kind in MOST):
+        for s in (s for kind in MOST for s in promising(looked, kind)[:SECONDS] if s.gain > LITTLE):
             task = task_of(lead.mechanisms, lead.fit, s, -np.inf, far=True)
             found.setdefault(with_laws(task.mechanisms), (lead.evidence.ln + s.gain, task))
     chosen = [task for _, task in sorted(found.values(), key=lambda t: -t[0])[:PAIRS]]
