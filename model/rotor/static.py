@@ -18,6 +18,8 @@ from thermospindle.model.types import Array
 
 FREE = 1e-12
 """Of the largest eigenvalue of M^-1/2 K M^-1/2: what is below is a motion that nothing resists."""
+ALIKE = 1e-6
+"""Of a stiffness, within which two directions are one."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,29 @@ def static(spindle: Spindle, chain: RotorBase, point: Point) -> Static:
     total = sum(energy.values())
     shares = {key: value / total for key, value in energy.items()} if total > 0 else {}
     return Static(point, 1 / compliance if compliance > 0 else np.inf, reactions, shares)
+
+
+@dataclass(frozen=True)
+class Around:
+    """Answers at one point: its `own`, of a force on the axis along it at the point's height, and `across`, the other way across the axis, None of a
+    point that measures along it."""
+
+    own: Static
+    axial: Static
+    across: Static | None
+
+    @property
+    def alike(self) -> bool:
+        """Whether the point is as stiff the other way across the axis as along its direction."""
+        return self.across is None or bool(np.isclose(self.across.stiffness, self.own.stiffness, rtol=ALIKE))
+
+
+def around(spindle: Spindle, chain: RotorBase, point: Point) -> Around:
+    """The answers at a point of a chain at its operating state."""
+    x, y, _ = point.direction
+    axial = replace(point, position=(0.0, 0.0, point.position[2]), direction=(0.0, 0.0, 1.0))  # off the axis it would tilt what it acts on
+    across = static(spindle, chain, replace(point, direction=(abs(y), abs(x), 0.0))) if x or y else None
+    return Around(static(spindle, chain, point), static(spindle, chain, axial), across)
 
 
 def displacement(stiffness: Array, mass: Array, force: Array) -> Array | None:

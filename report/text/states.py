@@ -12,7 +12,7 @@ from rich.console import Console
 from thermospindle.model.bearing.stiffness_table import FURTHER, StiffnessTable
 from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.modes import Mode, group_energy
-from thermospindle.model.rotor.static import Static
+from thermospindle.model.rotor.static import Around, Static
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 from thermospindle.report.text.grid import show_grid
@@ -158,33 +158,37 @@ def show_modes(console: Console, answer: dict[str, Any], point: OperatingPoint, 
 # ---------------------------------------------------------------- a unit force
 
 
-def static_json(answers: Sequence[Static], bearings: str, beam: str) -> dict[str, Any]:
-    """By point: stiffness (None where nothing holds it), reactions and shares of the compliance."""
-    points = {
-        a.point.name: {
-            "direction": a.point.axis,
-            "stiffness_N_per_m": a.stiffness if 0 < a.stiffness < float("inf") else None,
-            "free": a.stiffness == 0.0,
-            "reactions_N": dict(a.reactions),
-            "compliance_shares": dict(a.shares),
-        }
-        for a in answers
-    }
+def static_json(answers: Sequence[Around], bearings: str, beam: str) -> dict[str, Any]:
+    """By point: stiffness (None where nothing holds it), reactions and shares of the compliance; the same `axial`, and `across` where the point measures across the axis."""
+    points = {a.own.point.name: _static_json(a.own) | {"axial": _static_json(a.axial), "across": a.across and _static_json(a.across)} for a in answers}
     return {"bearings": bearings, "beam": beam, "points": points}
 
 
-def show_static(console: Console, values: dict[str, Any]) -> None:
+def _static_json(answer: Static) -> dict[str, Any]:
+    return {
+        "direction": answer.point.axis,
+        "stiffness_N_per_m": answer.stiffness if 0 < answer.stiffness < float("inf") else None,
+        "free": answer.stiffness == 0.0,
+        "reactions_N": dict(answer.reactions),
+        "compliance_shares": dict(answer.shares),
+    }
+
+
+def show_static(console: Console, values: dict[str, Any], answers: Sequence[Around]) -> None:
     """A table of stiffness and bearing reactions, and one of where the compliance of each point sits."""
     points = values["points"]
+    rows = _told(values, answers)
     reactions, parts = (list(dict.fromkeys(name for row in points.values() for name in row[key])) for key in ("reactions_N", "compliance_shares"))
     told = f"bearings {values['bearings']}" + (f", beam {values['beam']}" if values["beam"] != "none" else "")
     show_grid(
         console,
         f"Stiffness at each point, and what every bearing bears of 1 N there ({told})",
         ["point", "along", "stiffness\nN/um", *(f"{name}\nN" for name in reactions)],
-        [[name, row["direction"], _stiffness(row), *("-" if row["free"] else f"{row['reactions_N'].get(b, 0.0):+z.4f}" for b in reactions)] for name, row in points.items()],
+        [[name, along, _stiffness(row), *("-" if row["free"] else f"{row['reactions_N'].get(b, 0.0):+z.4f}" for b in reactions)] for name, along, row in rows],
         words=("point", "along"),
     )
+    if any(along == "axis" for _, along, _ in rows):
+        console.print("axis: a force along it, on the axis at the point's height.")
     if not parts:
         return  # every point is free to move
     console.print()
@@ -195,6 +199,26 @@ def show_static(console: Console, values: dict[str, Any]) -> None:
         [[name, *("-" if row["free"] else f"{100 * row['compliance_shares'].get(part, 0.0):.1f}" for part in parts)] for name, row in points.items()],
         words=("point",),
     )
+
+
+def _told(values: dict[str, Any], answers: Sequence[Around]) -> list[tuple[str, str, dict[str, Any]]]:
+    """Name, direction and answer of the rows shown: every point's own, then, each place once, the axis and what differs the other way across it, where it can move so."""
+
+    def place(of: Static) -> tuple[object, ...]:
+        x, y, z = of.point.position
+        return (of.point.body, z, *((x, y) if of.point.axis[1] == "Z" else of.point.axis[1]))
+
+    known, rows = {place(a.own) for a in answers}, []
+    for a in answers:
+        name = a.own.point.name
+        row = values["points"][name]
+        rows.append((name, row["direction"], row))
+        if a.across and not a.alike and np.isfinite(a.across.stiffness) and place(a.across) not in known:
+            rows.append((name, row["across"]["direction"], row["across"]))
+        if np.isfinite(a.axial.stiffness) and place(a.axial) not in known:
+            rows.append((name, "axis", row["axial"]))
+        known |= {place(found) for found in (a.across, a.axial) if found}
+    return rows
 
 
 def _stiffness(row: dict[str, Any]) -> str:

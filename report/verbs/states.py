@@ -114,7 +114,7 @@ def static(
     effect_files: Sequence[Path] = (),
     out: Path | None = None,
 ) -> Answer:
-    """Stiffness, bearing reactions and shares of the compliance for a unit force at every measuring point.
+    """Stiffness, bearing reactions and shares of the compliance for a unit force at every measuring point, along its direction, along the axis and the other way across it.
 
     `bearings` rated: springs of the stiffness that the scene's bearings are rated at, to rigid ground, the default where all have one;
     computed: what the program computes, in the spindle's own housing.
@@ -127,9 +127,9 @@ def static(
     chosen = bearings or (RATED if statics.rated(spindle) else COMPUTED)
     point = operating_point(spindle, Condition(temperature_or_reference(temperature, spindle), speed_rpm * RPM))
     chain = statics.rated_chain(spindle, point.chain) if chosen == RATED else point.chain
-    answers = [statics.static(spindle, chain, p) for p in spindle.points]
+    answers = [statics.around(spindle, chain, p) for p in spindle.points]
     values = text.static_json(answers, chosen, _beam_of(spindle))
-    return answered(values, lambda console: text.show_static(console, values), out, {"verb": "static"} | asked, write_json("static.json"), doubts(spindle, [point]))
+    return answered(values, lambda console: text.show_static(console, values, answers), out, {"verb": "static"} | asked, write_json("static.json"), doubts(spindle, [point]))
 
 
 def _with_beam(spindle: Spindle, beam: str | None) -> Spindle:
