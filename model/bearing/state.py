@@ -11,15 +11,34 @@ from thermospindle.model.machine import Condition, LinearBearing, Spindle
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 
+ALIKE = 1e-6
+"""Of the radial stiffness, by which directions across the axis differ where they differ."""
+
 
 class ByDirection:
-    """The entries of a bearing's stiffness (5, 5) that have names."""
+    """The entries of a bearing's stiffness (5, 5) that have names. Those along x and about x hold along y and about y too, unless a radial load
+    or given numbers tell directions apart."""
 
     stiffness: Array
 
     @property
+    def alike(self) -> bool:
+        """Whether the bearing is as stiff in every direction across the axis."""
+        k = self.stiffness
+        return bool(max(abs(k[0, 0] - k[1, 1]), abs(k[0, 1])) <= ALIKE * max(k[0, 0], k[1, 1]))
+
+    @property
     def radial_stiffness(self) -> float:
         return float(self.stiffness[0, 0])
+
+    @property
+    def radial_stiffness_y(self) -> float:
+        return float(self.stiffness[1, 1])
+
+    @property
+    def radial_stiffness_xy(self) -> float:
+        """Force along x for a motion along y (N/m)."""
+        return float(self.stiffness[0, 1])
 
     @property
     def axial_stiffness(self) -> float:
@@ -30,9 +49,18 @@ class ByDirection:
         return float(self.stiffness[3, 3])
 
     @property
+    def tilt_stiffness_y(self) -> float:
+        return float(self.stiffness[4, 4])
+
+    @property
     def coupling_stiffness(self) -> float:
         """Radial force per tilt, k_x,tilt_y (N/rad)."""
         return float(self.stiffness[0, 4])
+
+    @property
+    def coupling_stiffness_y(self) -> float:
+        """The same along y, -k_y,tilt_x (N/rad)."""
+        return -float(self.stiffness[1, 3])
 
 
 @dataclass(frozen=True)

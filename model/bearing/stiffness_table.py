@@ -38,7 +38,14 @@ OF_BALLS = {"outer_contact_force_N": lambda b: b.outer_contact_force}
 """Columns of a table that has ball bearings; those that were written earlier have none."""
 OF_ROLLERS = {"clearance_um": lambda b: b.clearance * 1e6}
 """Columns of a table that has roller bearings."""
-FURTHER = (*OF_BALLS, *OF_ROLLERS)
+BY_DIRECTION = {
+    "radial_stiffness_y_N_per_m": lambda b: b.radial_stiffness_y,
+    "radial_stiffness_xy_N_per_m": lambda b: b.radial_stiffness_xy,
+    "tilt_stiffness_y_N_m_per_rad": lambda b: b.tilt_stiffness_y,
+    "coupling_stiffness_y_N_per_rad": lambda b: b.coupling_stiffness_y,
+}
+"""Columns of a table with a bearing that is not as stiff in every direction across the axis; those above are along x and about x then."""
+FURTHER = (*OF_BALLS, *OF_ROLLERS, *BY_DIRECTION)
 GAPS = "{}: the table has gaps; every bearing needs a row for each temperature and speed, and one only"
 MISSING = -1e308  # in a grid that is being read; NaN is what a bearing given by numbers does not have
 
@@ -78,6 +85,8 @@ def tabulate(states: Sequence[Sequence[PairState]], unloads: Mapping[str, float 
     """Table of pair states on a grid: `states[i][j]` at temperature i and speed j."""
     bearings = states[0][0].all_bearings
     further = [of for kind, of in ((BearingState, OF_BALLS), (RollerState, OF_ROLLERS)) if any(isinstance(b, kind) for b in bearings)]
+    if not all(b.alike for row in states for state in row for b in state.all_bearings):
+        further.append(BY_DIRECTION)
     columns = reduce(or_, further, COLUMNS)
 
     def column(name: str, read) -> Array:

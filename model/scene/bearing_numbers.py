@@ -19,15 +19,17 @@ from thermospindle.model.units import RPM
 Row = Annotated[tuple[Finite, Finite, Finite, Finite, Finite], Strict(False)]
 COLUMNS = ("radial_stiffness_N_per_m", "axial_stiffness_N_per_m", "tilt_stiffness_N_m_per_rad", "coupling_stiffness_N_per_rad")
 """Of a table; those that are missing are zero, but one of the first two must be there."""
+BY_DIRECTION = tuple(stiffness_table.BY_DIRECTION)
+"""Of a table whose bearing is not as stiff along y as along x; those that are missing are as along x, the second zero."""
 DIRECTIONS = ("x", "y", "z", "tilt_x", "tilt_y")
 WHERE = ("temperature_C", "speed_rpm")
-BESIDE = ("bearing", *(c for c in (*stiffness_table.COLUMNS, *stiffness_table.FURTHER) if c not in COLUMNS))
+BESIDE = ("bearing", *(c for c in (*stiffness_table.COLUMNS, *stiffness_table.FURTHER) if c not in (*COLUMNS, *BY_DIRECTION)))
 """Columns of the verb `table` that are no stiffness."""
 
 
 class Numbers(Table):
     """`radial`, `axial` and `tilt` stiffness alike in both planes; or `matrix_SI`, order x, y, z, tilt_x, tilt_y in N, m and rad; or the CSV
-    file `table` with columns temperature_C, speed_rpm and those of `COLUMNS`, which is also what the verb `table` writes."""
+    file `table` with columns temperature_C, speed_rpm and those of `COLUMNS` and `BY_DIRECTION`, which is also what the verb `table` writes."""
 
     radial_stiffness_N_per_um: Positive | None = None
     axial_stiffness_N_per_um: NotNegative = 0.0
@@ -91,13 +93,15 @@ def _read(file: Path, bearing: str | None) -> tuple[tuple[float, ...], tuple[flo
         try:
             at = float(plain_number(row["temperature_C"])), float(plain_number(row["speed_rpm"])) * RPM
             radial, axial, tilt, coupling = (float(plain_number(row[c])) if c in known else 0.0 for c in COLUMNS)
+            along_y, mixed, tilt_y, coupling_y = (float(plain_number(row[c])) if c in row else same for c, same in zip(BY_DIRECTION, (radial, 0.0, tilt, coupling), strict=True))
         except (TypeError, AttributeError, ValueError):  # a row that ends before its time has None
             raise BadInput(f"{file}: row {number}: every column must hold a number in digits 0 to 9") from None
         if None in row:  # what is left of a row that has more cells than the header
             raise BadInput(f"{file}: row {number}: has more cells than the header has columns; numbers have a point, not a comma")
-        k = np.diag([radial, radial, axial, tilt, tilt])
+        k = np.diag([radial, along_y, axial, tilt, tilt_y])
+        k[0, 1] = k[1, 0] = mixed
         k[0, 4] = k[4, 0] = coupling
-        k[1, 3] = k[3, 1] = -coupling
+        k[1, 3] = k[3, 1] = -coupling_y
         if at in values:
             raise BadInput(f"{file}: row {number}: {at[0]:g} C and {at[1] / RPM:g} rpm stand twice{'' if bearing else '; which bearing? say bearing = ...'}")
         if not np.isfinite(at).all():
@@ -115,7 +119,7 @@ def _read(file: Path, bearing: str | None) -> tuple[tuple[float, ...], tuple[flo
 
 def _check_columns(file: Path, rows: Sequence[Mapping[str, str | None]]) -> None:
     """`BadInput` for a column that is neither stiffness nor what the verb `table` writes: a misspelt one would be a stiffness of zero."""
-    allowed = (*WHERE, *COLUMNS, *BESIDE)
+    allowed = (*WHERE, *COLUMNS, *BY_DIRECTION, *BESIDE)
     for column in rows[0]:
         if column is None or column in allowed or (not column and not any(row[column] for row in rows)):
             continue

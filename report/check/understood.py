@@ -128,6 +128,7 @@ def _bearing(point: OperatingPoint, b: Bearing | LinearBearing | RollerBearing) 
         "inner_on": spindle.structure.carrier(b.inner_body),
         "outer_on": spindle.structure.carrier(b.outer_body),
         "radial_stiffness_N_per_um": 1e-6 * state.radial_stiffness,
+        "radial_stiffness_y_N_per_um": 1e-6 * state.radial_stiffness_y,
         "axial_stiffness_N_per_um": 1e-6 * state.axial_stiffness,
         "tilt_stiffness_N_m_per_rad": state.tilt_stiffness,
     }

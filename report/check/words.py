@@ -63,7 +63,7 @@ def grids(values: Mapping[str, Any]) -> list[tuple[str, list[str], list[list[str
             name, f"{b['z_mm']:g}", f"{b['inner_on']} - {b['outer_on']}", b.get("sense", "-"),
             f"{b['preload_N']:.4g}" if "preload_N" in b else "-", f"{b['contact_angle_deg']:.2f}" if "contact_angle_deg" in b else "-",
             f"{b['load_lines_meet_axis_at_mm']:.1f}" if "contact_angle_deg" in b else "-",
-            f"{b['radial_stiffness_N_per_um']:.4g}", f"{b['axial_stiffness_N_per_um']:.4g}",
+            ", ".join(dict.fromkeys(f"{b[f'radial_stiffness{y}_N_per_um']:.4g}" for y in ("", "_y"))), f"{b['axial_stiffness_N_per_um']:.4g}",
         ]
         for name, b in values["bearings"].items()
     ]  # fmt: skip

@@ -95,10 +95,11 @@ def show_table(console: Console, table: StiffnessTable, radial_load: bool = Fals
     contact = "inner" if table.speed.any() else "contact"
     angle = "inner\nangle\ndeg" if table.speed.any() else "angle\ndeg"
     force = "\n".join([*(["largest"] if radial_load else []), contact, "force", "N"])
+    told_apart = any("radial_stiffness_y_N_per_m" in values for values in table.values.values())
     shown = [
         ("contact_angle_deg", angle, 1, 2), ("deformation_um", "deform.\num", 1, 3), ("clearance_um", "clear-\nance\num", 1, 2),
         ("contact_force_N", force, 1, 3), ("ball_stiffness_N_per_m", "ball k\nN/um", 1e-6, 3), ("preload_N", "preload\nN", 1, 2),
-        ("radial_stiffness_N_per_m", "k_RR\nN/um", 1e-6, 2), ("axial_stiffness_N_per_m", "k_AA\nN/um", 1e-6, 3),
+        ("radial_stiffness_N_per_m", "k_xx\nN/um" if told_apart else "k_RR\nN/um", 1e-6, 2), ("radial_stiffness_y_N_per_m", "k_yy\nN/um", 1e-6, 2), ("axial_stiffness_N_per_m", "k_AA\nN/um", 1e-6, 3),
     ]  # fmt: skip
     shown = [row for row in shown if all(row[0] in values for values in table.values.values())]
     columns, rows = ["T\nC", "speed\nrpm", "bearing", *(head for _, head, _, _ in shown)], []
@@ -131,7 +132,12 @@ def show_told_table(console: Console, table: StiffnessTable, radial_load: bool =
 def _range_of(values: Mapping[str, Array]) -> str:
     """From the first condition to the last, of what the bearing has; empty where its table tells neither."""
     told = []
-    for column, words, unit, scale in (("preload_N", "preload", "N", 1.0), ("radial_stiffness_N_per_m", "radial stiffness", "N/um", 1e-6)):
+    along = " along x" if "radial_stiffness_y_N_per_m" in values else ""
+    for column, words, unit, scale in (
+        ("preload_N", "preload", "N", 1.0),
+        ("radial_stiffness_N_per_m", f"radial stiffness{along}", "N/um", 1e-6),
+        ("radial_stiffness_y_N_per_m", "along y", "N/um", 1e-6),
+    ):
         if column in values and np.all(np.isfinite(ends := values[column][[0, -1], [0, -1]] * scale)):
             first, last = (f"{x:.2f}" for x in ends)
             told.append(f"{words} {first} {unit}" if first == last else f"{words} {first} to {last} {unit}")

@@ -1,14 +1,20 @@
 """The stiffness table: its CSV reads back, and it answers inside its grid only."""
 
+import json
+
 import numpy as np
 import pytest
 
 from tests.conftest import ROOT
-from thermospindle.model.bearing.stiffness_table import COLUMNS, read_table, write_table
+from thermospindle.cli import main
+from thermospindle.model.bearing.ball_row import respond
+from thermospindle.model.bearing.stiffness_table import BY_DIRECTION, COLUMNS, read_table, write_table
 from thermospindle.model.errors import BadInput, OutsideRange
+from thermospindle.model.machine import Condition
+from thermospindle.model.scene.bearing_numbers import Numbers
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
-from thermospindle.sim.operating import stiffness_table
+from thermospindle.sim.operating import operating_point, stiffness_table
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +53,33 @@ def test_outer_contacts_carry_the_centrifugal_force_too(table, tmp_path):
     old = read_table(tmp_path / "old.csv").values["upper"]
     assert "outer_contact_force_N" not in old
     assert old["contact_force_N"] == pytest.approx(at_rest["contact_force_N"], rel=1e-12)
+
+
+def test_a_bearing_under_a_radial_load_is_told_along_x_and_along_y(table, tmp_path, capsys):
+    """Derivatives of the forces of its balls; a table of it as a bearing of numbers has them too. Without the load no column tells directions apart."""
+    assert not any(set(BY_DIRECTION) & set(columns) for columns in table.values.values())
+    folder = tmp_path / "pushed"
+    folder.mkdir()
+    text = (ROOT / "scenes" / "five_bearing" / "spindle.toml").read_text(encoding="utf-8")
+    pushed = text.replace("ball_inertia = 1.0", "ball_inertia = 1.0\nradial_load_N = [1200.0, 900.0]\nradial_load_z_mm = 0.0")
+    (folder / "spindle.toml").write_text(pushed, encoding="utf-8")
+    assert main(["table", str(folder), "--temperatures", "20", "--json", "--out", str(tmp_path / "out")]) == 0
+    told = {key: values[0] for key, values in json.loads(capsys.readouterr().out)["bearings"]["front1"].items()}
+    state = operating_point(load(folder), Condition(20.0)).state.bearing("front1")
+    at, step = np.array(state.displacement), 1e-9
+    slopes = [(respond(state.row, at + d).force - respond(state.row, at - d).force) / (2 * step) for d in step * np.eye(5)]
+    assert told["radial_stiffness_N_per_m"] == pytest.approx(slopes[0][0], rel=1e-5)
+    assert told["radial_stiffness_y_N_per_m"] == pytest.approx(slopes[1][1], rel=1e-5)
+    assert told["radial_stiffness_xy_N_per_m"] == pytest.approx(slopes[1][0], rel=1e-4)
+    assert abs(slopes[0][0] / slopes[1][1] - 1) > 0.01
+    assert main(["table", str(folder), "--temperatures", "20"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert f"radial stiffness along x {slopes[0][0] / 1e6:.2f} N/um, along y {slopes[1][1] / 1e6:.2f} N/um" in said
+    assert "k_yy" in said
+    assert read_table(tmp_path / "out" / "table.csv").values["front1"]["radial_stiffness_y_N_per_m"][0, 0] == told["radial_stiffness_y_N_per_m"]
+    stiffness = np.reshape(Numbers(table="table.csv", bearing="front1", damping_ratio=0.0).grid(tmp_path / "out")[2], (5, 5))
+    assert stiffness[:2, :2] == pytest.approx(state.stiffness[:2, :2], rel=1e-12)
+    assert np.diag(stiffness) == pytest.approx(np.diag(state.stiffness), rel=1e-12)
 
 
 def test_answers_between_grid_points(table, spindle):
