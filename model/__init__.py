@@ -13,6 +13,7 @@ scene/         `spindle.toml`: its form, reading and checking
 files/         what all files share: written whole, formats and their migrations, cells of CSV files
 bearing/       contact, ball, row, sets; stiffness over temperature and speed; bearing frequencies
 rotor/         the section's masses, the rotor-base chain, modes and FRFs, and the same as a MuJoCo model
+pressure       Hertz pressure of a bearing's most loaded contact, and what ISO 76 allows at rest
 sense          limits of sense of conditions and states: they warn
 units          the units people write and read
 errors         what goes wrong in one sentence

@@ -17,6 +17,7 @@ from thermospindle.model.bearing.pair import PairState, solve
 from thermospindle.model.bearing.stiffness_table import StiffnessTable, tabulate
 from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.machine import Condition, RingMotion, Spindle
+from thermospindle.model.pressure import pressures
 from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.chain import Matrices, RotorBase, matrices, rotor_base
 from thermospindle.model.rotor.loaded import loaded
@@ -163,9 +164,10 @@ def drawing(spindle: Spindle, condition: Condition, effects: Sequence[tuple[Effe
 
 def stiffness_table(spindle: Spindle, temperatures: Sequence[float], speeds: Sequence[float] = (0.0,)) -> StiffnessTable:
     """Bearing properties over temperature (C) and speed (rad/s), and the temperature at which a bearing unloads."""
-    states = [[operating_point(spindle, Condition(t, speed)).state for speed in sorted(set(speeds))] for t in sorted(set(temperatures))]
+    points = [[operating_point(spindle, Condition(t, speed)) for speed in sorted(set(speeds))] for t in sorted(set(temperatures))]
+    states = [[point.state for point in row] for row in points]
     lost = {b.name: unloads(spindle, [row[0] for row in states], b.name) for b in spindle.bearings}
-    return tabulate(states, lost, provenance(spindle))
+    return tabulate(states, lost, provenance(spindle), [[pressures(point.spindle, point.state) for point in row] for row in points])
 
 
 def unloads(spindle: Spindle, states: Sequence[PairState], bearing: str) -> float | None:

@@ -36,6 +36,13 @@ class Contact:
         cube = 6 * e * load / (np.pi * self.curvature_sum * self.effective_modulus)
         return float((k**2 * cube) ** (1 / 3)), float((cube / k) ** (1 / 3))
 
+    def pressure(self, load: float) -> float:
+        """Largest pressure (Pa) at `load` (N), in the middle of the ellipse; 0 where nothing presses."""
+        if load <= 0:
+            return 0.0
+        a, b = self.half_axes(load)
+        return 1.5 * load / (np.pi * a * b)
+
 
 def ellipticity(curvature_difference: float) -> float:
     """Ellipticity k = a/b >= 1 for the curvature difference F(rho), 0 <= F < 1 (Hamrock & Dowson 1981, Eq. 3.27).

@@ -55,7 +55,7 @@ def row_at(spindle: Spindle, b: Bearing, sense: int, motion: RingMotion, speed: 
 def reference_deformation(spindle: Spindle, b: Bearing) -> float:
     """Deformation (m) of each ball under the preload at the reference temperature, both contacts: Eq. (6) inverted."""
     motion = reference_motion(spindle.reference_temperature)
-    return _reference_deformation(b, *_elastic(spindle, b, motion.temperature), motion)
+    return _reference_deformation(b, *elastic(spindle, b, motion.temperature), motion)
 
 
 @lru_cache(maxsize=4096)
@@ -66,10 +66,10 @@ def _reference_deformation(b: Bearing, ball: Elastic, ring: Elastic, motion: Rin
 
 def contact_constants(spindle: Spindle, b: Bearing, motion: RingMotion, angle: float) -> tuple[float, float]:
     """Hertz constants (inner, outer) at the temperature of `motion`, with its grown ball and its elastic moduli."""
-    return _contact_constants(b, *_elastic(spindle, b, motion.temperature), motion, angle)
+    return _contact_constants(b, *elastic(spindle, b, motion.temperature), motion, angle)
 
 
-def _elastic(spindle: Spindle, b: Bearing, temperature: float) -> tuple[Elastic, Elastic]:
+def elastic(spindle: Spindle, b: Bearing, temperature: float) -> tuple[Elastic, Elastic]:
     """Of balls and rings at a temperature."""
     ball, ring = spindle.materials[b.ball_material], spindle.materials[b.ring_material]
     return (ball.youngs_modulus(temperature), ball.poisson_ratio), (ring.youngs_modulus(temperature), ring.poisson_ratio)

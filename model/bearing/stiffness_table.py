@@ -45,7 +45,9 @@ BY_DIRECTION = {
     "coupling_stiffness_y_N_per_rad": lambda b: b.coupling_stiffness_y,
 }
 """Columns of a table with a bearing that is not as stiff in every direction across the axis; those above are along x and about x then."""
-FURTHER = (*OF_BALLS, *OF_ROLLERS, *BY_DIRECTION)
+PRESSURE = "contact_pressure_MPa"
+"""Column of a table that has ball or roller bearings."""
+FURTHER = (*OF_BALLS, *OF_ROLLERS, *BY_DIRECTION, PRESSURE)
 GAPS = "{}: the table has gaps; every bearing needs a row for each temperature and speed, and one only"
 MISSING = -1e308  # in a grid that is being read; NaN is what a bearing given by numbers does not have
 
@@ -81,8 +83,10 @@ def _between(grid: Array, values: Array, where: float, name: str, unit: str) -> 
     return float(scipy.interpolate.PchipInterpolator(grid, values)(np.clip(where, grid[0], grid[-1])))
 
 
-def tabulate(states: Sequence[Sequence[PairState]], unloads: Mapping[str, float | None], provenance: Mapping[str, str]) -> StiffnessTable:
-    """Table of pair states on a grid: `states[i][j]` at temperature i and speed j."""
+def tabulate(
+    states: Sequence[Sequence[PairState]], unloads: Mapping[str, float | None], provenance: Mapping[str, str], pressures: Sequence[Sequence[Mapping[str, float]]] = ()
+) -> StiffnessTable:
+    """Table of pair states on a grid: `states[i][j]` at temperature i and speed j, and as many `pressures` (Pa, by bearing), or none."""
     bearings = states[0][0].all_bearings
     further = [of for kind, of in ((BearingState, OF_BALLS), (RollerState, OF_ROLLERS)) if any(isinstance(b, kind) for b in bearings)]
     if not all(b.alike for row in states for state in row for b in state.all_bearings):
@@ -92,10 +96,14 @@ def tabulate(states: Sequence[Sequence[PairState]], unloads: Mapping[str, float 
     def column(name: str, read) -> Array:
         return np.array([[_property(state.any_bearing(name), read) for state in row] for row in states])
 
+    values = {b.name: {key: column(b.name, read) for key, read in columns.items()} for b in bearings}
+    if any(own for row in pressures for own in row):
+        for b in bearings:
+            values[b.name][PRESSURE] = np.array([[1e-6 * own.get(b.name, np.nan) for own in row] for row in pressures])
     return StiffnessTable(
         np.array([row[0].condition.temperature for row in states]),
         np.array([state.condition.speed for state in states[0]]),
-        {b.name: {key: column(b.name, read) for key, read in columns.items()} for b in bearings},
+        values,
         dict(unloads),
         dict(provenance),
     )

@@ -14,6 +14,7 @@ from thermospindle.model.bearing.roller import RollerState
 from thermospindle.model.errors import NoEquilibrium, OutsideRange
 from thermospindle.model.files.formats import SCENE
 from thermospindle.model.machine import Condition, LinearBearing, Point, Spindle
+from thermospindle.model.pressure import OF_BALLS, OF_ROLLERS, pressures
 from thermospindle.model.rotor.static import FREE
 from thermospindle.model.scene.fields import read_file
 from thermospindle.model.scene.reading import with_shipped_rows
@@ -154,6 +155,22 @@ def _preload(found: Looked) -> Iterator[str]:
             moved = [f"{b.name} {now.preload:.3g} of {b.preload:.3g} N" for b, now in pairs if now.in_contact and far(now.preload / b.preload)]
             if moved:
                 yield f"{where} the preload is {what} that of the reference: {', '.join(moved)}"
+
+
+def _pressed(found: Looked) -> Iterator[str]:
+    """Of every bearing the state that presses it most."""
+    states = [found.reference, *(p for p in (found.hot, found.turning) if not isinstance(p, str))]
+    of = [pressures(p.spindle, p.state) for p in states]
+    balls = {b.name for b in found.spindle.bearings}
+    for name in of[0]:
+        k = max(range(len(of)), key=lambda i: of[i][name])
+        limit, what = (OF_BALLS, "balls") if name in balls else (OF_ROLLERS, "rollers")
+        if of[k][name] > limit:
+            at = states[k].condition
+            yield (
+                f"bearing {name}: its {what} press the races with {of[k][name] / 1e6:.0f} MPa at {at.temperature:g} C and {at.speed / RPM:.0f} rpm, under preload and the loads told; "
+                f"{what} leave dents from {limit / 1e6:.0f} MPa, the static limit of ISO 76"
+            )
 
 
 def _pushed(found: Looked) -> Iterator[str]:
@@ -340,5 +357,5 @@ def _count(n: int, one: str, many: str = "") -> str:
 
 
 QUESTIONS: tuple[Callable[[Looked], Iterator[str]], ...] = (
-    _loose, _same_place, _seats, _contacts, _angles, _soft, _materials, _preload, _pushed, _sense, _tables, _free, _undamped, _damping, _critical, _sections, _points, _hammer, _running, _effects,
+    _loose, _same_place, _seats, _contacts, _angles, _soft, _materials, _preload, _pressed, _pushed, _sense, _tables, _free, _undamped, _damping, _critical, _sections, _points, _hammer, _running, _effects,
 )  # fmt: skip

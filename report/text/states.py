@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from thermospindle.model.bearing.stiffness_table import FURTHER, StiffnessTable
+from thermospindle.model.bearing.stiffness_table import FURTHER, PRESSURE, StiffnessTable
+from thermospindle.model.pressure import OF_BALLS, OF_ROLLERS
 from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.modes import Mode, group_energy
 from thermospindle.model.rotor.static import Around, Static
@@ -114,9 +115,24 @@ def show_table(console: Console, table: StiffnessTable, radial_load: bool = Fals
         console.print("Inner angle and force: of the contact with the inner ring; those of the outer one are in table.csv of --out.")
     if radial_load and rows_of_balls:
         console.print("Under the radial load deformation, force and ball k are those of the most loaded ball; the angle is the mean of all, weighted with their force.")
+    if pressed := _pressed(table):
+        console.print(pressed, highlight=False)
     for name, where in table.unloads.items():
         if where is not None:
             console.print(f"{name} bearing loses contact at {where:.2f} C")
+
+
+def _pressed(table: StiffnessTable) -> str:
+    """In one sentence the largest contact pressure of every bearing, and what bearings are rated by; empty where none has rolling elements."""
+    most = {name: float(np.nanmax(values[PRESSURE])) for name, values in table.values.items() if PRESSURE in values and np.isfinite(values[PRESSURE]).any()}
+    if not most:
+        return ""
+    limits = [
+        f"{limit / 1e6:.0f} of {kind}"
+        for kind, limit, own in (("ball bearings", OF_BALLS, "contact_angle_deg"), ("roller bearings", OF_ROLLERS, "clearance_um"))
+        if any(own in values and np.isfinite(values[own]).any() for values in table.values.values())
+    ]
+    return f"Largest contact pressure (Hertz): {', '.join(f'{name} {p:.0f}' for name, p in most.items())} MPa; the static limit of ISO 76 is {', '.join(limits)}."
 
 
 def show_told_table(console: Console, table: StiffnessTable, radial_load: bool = False) -> None:

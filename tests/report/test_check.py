@@ -161,6 +161,7 @@ ODD = [
     ("grinding", "outer_conformity = 0.53", "outer_conformity = 0.60", "the outer groove's radius is 0.6 ball diameters"),
     ("free_shaft", "[tolerances]", "[[effects]]\nname = \"preload_loss\"\n[tolerances]", "effect preload_loss: nothing to act on here"),
     ("hdd_2003", 'between = ["seat", "shaft"]', 'between = ["hub", "shaft"]', "joint flange: 'hub' turns and 'shaft' does not"),
+    ("hdd", "preload_N = 16.0", "preload_N = 900.0", "under preload and the loads told; balls leave dents from 4200 MPa, the static limit of ISO 76"),
     ("rotor", "nominal_speed_rpm = 4000.0", "nominal_speed_rpm = 7200.0", "lies at the nominal speed"),
     ("rotor", "outer_mm = [[30, 600]]", "outer_mm = [[30, 300], [150, 300]]", "its diameter jumps from 30 to 150 mm at z_mm = 300"),
 ]  # fmt: skip
