@@ -19,6 +19,8 @@ from thermospindle.report.verbs.answer import Answer, with_effects
 from thermospindle.sim.campaign.campaign import Campaign, write_campaign
 from thermospindle.sim.importing.assemble import campaign_of, check_tests, read, spoken
 from thermospindle.sim.importing.mapping import MappingForm, read_mapping
+from thermospindle.sim.importing.measured import listed
+from thermospindle.sim.importing.places import misfits
 from thermospindle.sim.importing.template import template
 
 
@@ -41,8 +43,7 @@ def bring(
         raise BadInput(f"--out {out}: is not empty; a campaign is written to a new or empty folder")
     spindle = with_effects(scene, effect_files)[0] if scene is not None else None
     form = read_mapping(None if fresh else mapping)
-    if spindle is not None and form.spindle not in (None, spindle.name):
-        raise BadInput(f"{mapping}: spindle = {form.spindle!r}: --scene {scene} is {spindle.name!r}; a campaign is of one scene, so change one of the two or leave it out")
+    form, renamed = _for_scene(form, mapping, spindle, scene)
     steps = len(files) * (2 if fresh and out is None else 1)
     with progress_bar(steps) as done:
         found = read(files, form, spindle, mapping, done)
@@ -58,7 +59,18 @@ def bring(
     except Unanswered as error:
         raise Unanswered(error.head, error.items, f"{mapping} is written: {error.tail}" if fresh else error.tail) from None
     write_campaign(campaign, Path(out))
-    return _written(campaign, Path(out), notes, None if scene is None else Path(scene), [] if spindle is None else _doubts(campaign, spindle))
+    return _written(campaign, Path(out), notes, None if scene is None else Path(scene), [*renamed, *([] if spindle is None else _doubts(campaign, spindle))])
+
+
+def _for_scene(form: MappingForm, mapping: Path | None, spindle: Spindle | None, scene: Path | None) -> tuple[MappingForm, list[str]]:
+    """The mapping for the scene given; where it names another one that all it names fits as well, as a copy with another name, with a sentence that says so. Else `BadInput`."""
+    if spindle is None or form.spindle in (None, spindle.name):
+        return form, []
+    if wrong := misfits(form, spindle):
+        has = f"and of what the mapping names {spindle.name} has {listed(wrong, 3)}"
+        raise BadInput(f"{mapping}: spindle = {form.spindle!r}: --scene {scene} is {spindle.name!r}, {has}; a campaign is of one scene, so change one of the two or leave it out")
+    said = f"{mapping}: spindle = {form.spindle!r}, and --scene {scene} is {spindle.name!r}, which has all that the mapping names: it is taken for that"
+    return form.model_copy(update={"spindle": spindle.name}), [said]
 
 
 def _named(path: Path) -> list[Path]:

@@ -10,6 +10,7 @@ from thermospindle.model.machine import Point, Spindle
 from thermospindle.model.scene.measuring import axis_vector
 from thermospindle.model.scene.shafts import resolved_body
 from thermospindle.model.units import MM
+from thermospindle.sim.importing.files.labels import end, role_of
 from thermospindle.sim.importing.mapping import MadePoint, MappingForm
 from thermospindle.sim.importing.measured import End, Question, listed
 
@@ -36,6 +37,36 @@ def points_of(form: MappingForm, scene: Spindle | None) -> tuple[dict[int, Point
         point = _point(made, base)
         found[made.node] = replace(point, body=resolved_body(shafts, point.body, point.position[2]))
     return found, questions
+
+
+APART = 1.0 * MM
+"""Further off, a point of the mapping is another than the scene's of the same node."""
+
+
+def misfits(form: MappingForm, scene: Spindle) -> list[str]:
+    """What a mapping that was written for another scene names and this one has not, or has elsewhere, a clause each."""
+    own = {p.node: p for p in scene.points}
+    made = {p.node for p in form.points}
+    names = {p.name for p in scene.points} | {p.name for p in form.points} | {str(c) for p in form.points for c in p.called}
+    found = []
+    for point in form.points:
+        base = own.get(point.node)
+        if base is None and point.body is None:
+            found.append(f"no point of node {point.node}")
+        if point.body is not None and point.body not in scene.structure.parts:
+            found.append(f"no body {point.body!r}")
+        if base is not None and point.direction is not None and point.direction[1] != base.axis[1]:
+            found.append(f"node {point.node} along {base.axis}, not {point.direction}")
+        if base is not None and point.position_mm is not None and max(abs(a * MM - b) for a, b in zip(point.position_mm, base.position, strict=True)) > APART:
+            found.append(f"node {point.node} at {', '.join(f'{v / MM:g}' for v in base.position)} mm, not {', '.join(f'{v:g}' for v in point.position_mm)}")
+    told = [end(str(e)) for f in form.files for e in (f.response, f.reference) if e is not None]
+    told += [e for f in form.files for column in f.columns.values() if (role := role_of(column)) for e in (role.response, role.reference)]
+    for e in told:
+        if e.label and not ({e.label, e.name} & names) and str(e.node) not in names and e.node not in made and e.node not in own:
+            found.append(f"no point {e.label}")
+        elif e.node in own and e.node not in made and e.direction and e.direction[1] != own[e.node].axis[1]:
+            found.append(f"node {e.node} along {own[e.node].axis}, not {e.direction}")
+    return list(dict.fromkeys(found))
 
 
 def _point(made: MadePoint, base: Point | None) -> Point:
@@ -72,9 +103,9 @@ def _sign(end: End, point: Point) -> int:
 def unplaced(ends: Sequence[tuple[str, End]], points: dict[int, Point], scene: Spindle | None) -> list[Question]:
     """One question for all ends that no point is called by: `ends` are (file name, end)."""
     labels: dict[str, list[str]] = {}
-    for file, end in ends:
-        if end.label:
-            labels.setdefault(end.label, []).append(file)
+    for file, of in ends:
+        if of.label:
+            labels.setdefault(of.label, []).append(file)
     if not labels:
         return []
     there = f"; points there are {listed(f'{p.node} {p.name} {p.axis}' for p in points.values())}" if points else ""

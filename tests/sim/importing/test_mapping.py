@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
+
 import numpy as np
 import pytest
 
-from tests.conftest import ROOT
+from tests.conftest import ROOT, SCENE
 from tests.made_campaign import FREQUENCY
 from tests.sim.importing.exported import FRF, HEAD, SPINDLE, columns, imported, table
 from thermospindle.model.errors import BadInput, Unanswered
@@ -156,7 +158,6 @@ def test_a_title_above_numbers_is_no_row_of_headings(tmp_path):
 
 
 def test_points_of_a_scene(tmp_path):
-    from tests.conftest import SCENE
 
     heads, found = columns("real", "(m/s)/N", FRF.value)
     file = table(tmp_path / "T20.csv", ["Frequency", *heads], [FREQUENCY, *found])
@@ -173,7 +174,6 @@ def test_points_of_a_scene(tmp_path):
      ("Hz", 20.0, -1e9, ["test T20: speed_rpm = -1e+09, and hdd_2003 is meant for 7200 rpm: is it in another unit?"]), ("kHz", 20.0, 0.0, ["test T20: lines from 400000 to"])],
 )  # fmt: skip
 def test_other_units_than_the_scenes_are_doubted(tmp_path, unit, temperature, speed, doubts):
-    from tests.conftest import SCENE
 
     heads, found = columns("real", "(m/s)/N", FRF.value)
     file = table(tmp_path / "T20.csv", [f"Frequency [{unit}]", *heads], [FREQUENCY, *found])
@@ -280,16 +280,38 @@ def test_points_on_a_flexible_shaft_are_told_by_its_name(tmp_path):
         bring([file], mapping=tmp_path / "m.toml", scene="mk7702", out=tmp_path / "d")
 
 
-def test_a_mapping_for_another_scene_is_refused(tmp_path):
+@pytest.mark.parametrize(
+    ("right", "wrong", "told"),
+    [
+        ('body = "seat"', 'body = "table"', "has no body 'table';"),
+        ('direction = "-X"', 'direction = "-Y"', r"has node 3 along \+X, not -Y;"),
+        ("[12.0, 0.0, 20.0]", "[12.0, 0.0, 35.0]", "has node 1 at 12, 0, 20 mm, not 12, 0, 35;"),
+        ("[[tests]]", '[[files]]\nfile = "T20.csv"\nreference = 9\n[[tests]]', "has no point 9;"),
+        ("[[tests]]", '[[files]]\nfile = "T20.csv"\nresponse = "5:+Y"\n[[tests]]', r"has node 5 along \+Z, not \+Y;"),
+        ("[[points]]", "[[points]]\nnode = 40\n[[points]]", "has no point of node 40;"),
+    ],
+)
+def test_a_mapping_for_another_scene_is_refused(right, wrong, told, tmp_path):
     """It made a campaign for one scene, to be compared with another."""
     heads, found = columns("real", "(m/s)/N")
     file = table(tmp_path / "T20.csv", ["Frequency", *heads], [FREQUENCY, *found])
-    (tmp_path / "m.toml").write_text('spindle = "free_shaft"\n' + HEAD)
-    with pytest.raises(BadInput, match=r"m.toml: spindle = 'free_shaft': --scene hdd_2003 is 'hdd_2003'"):
+    (tmp_path / "m.toml").write_text('spindle = "free_shaft"\n' + HEAD.replace(right, wrong, 1))
+    with pytest.raises(BadInput, match=rf"m.toml: spindle = 'free_shaft': --scene hdd_2003 is 'hdd_2003', and of what the mapping names hdd_2003 {told}"):
         bring([file], mapping=tmp_path / "m.toml", scene="hdd_2003", out=tmp_path / "c")
+    assert not (tmp_path / "c").exists()
+
+
+def test_a_mapping_serves_a_scene_that_was_renamed(tmp_path):
+    """The same machine under another name: all that the mapping names is there. The campaign is the new scene's, and both names are said."""
+    heads, found = columns("real", "(m/s)/N")
+    file = table(tmp_path / "T20.csv", ["Frequency", *heads], [FREQUENCY, *found])
     (tmp_path / "m.toml").write_text(SPINDLE + HEAD)
-    bring([file], mapping=tmp_path / "m.toml", scene="hdd_2003", out=tmp_path / "c")
-    assert read_campaign(tmp_path / "c").spindle == "hdd_2003"
+    shutil.copytree(SCENE, tmp_path / "mine")
+    said = bring([file], mapping=tmp_path / "m.toml", scene=tmp_path / "mine", out=tmp_path / "c").values["warnings"]
+    assert [w for w in said if "spindle = 'hdd_2003'" in w and "is 'mine', which has all that the mapping names" in w] == said
+    assert read_campaign(tmp_path / "c").spindle == "mine"
+    assert bring([file], mapping=tmp_path / "m.toml", scene="hdd_2003", out=tmp_path / "d").values["warnings"] == []
+    assert read_campaign(tmp_path / "d").spindle == "hdd_2003"
 
 
 def test_patterns_and_folders(tmp_path):
