@@ -121,7 +121,9 @@ FAR, FASTER = 100.0, 5.0
 
 
 def _doubts(campaign: Campaign, spindle: Spindle) -> list[str]:
-    """What fits the scene so badly that it may be in another unit: kelvin for C, kHz for Hz, Hz for rpm."""
+    """What fits the scene so badly that it may be in another unit: kelvin for C, kHz for Hz, Hz for rpm; and where nothing does, what the FRFs tell beside the scene's own."""
+    from thermospindle.sim.importing.likeness import likenesses  # as below
+
     low, high = spindle.temperatures[0], spindle.temperatures[-1]
     first, last = spindle.hammer.band
     found = []
@@ -135,7 +137,7 @@ def _doubts(campaign: Campaign, spindle: Spindle) -> list[str]:
                 f"test {t.id}: lines from {t.frf.frequency[0]:g} to {t.frf.frequency[-1]:g} Hz, and the hammer test of {spindle.name} is from {first:g} to {last:g} Hz: "
                 "are they in another unit?"
             )
-    return found
+    return found or likenesses(spindle, campaign)
 
 
 def _written(campaign: Campaign, out: Path, notes: list[str], scene: Path | None, doubts: list[str]) -> Answer:

@@ -1,0 +1,161 @@
+"""Imported FRFs beside those of the scene: a channel that is larger by the ratio of two units, and two channels that are each other's.
+
+A model is never right, and none of this is refused. A factor is told where every FRF of a channel has it in the median over the louder half of its lines; two channels where
+each fits the other's computed FRFs at least `BETTER` times as well as its own, in rms of ln magnitude about the median, which no factor changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from thermospindle.model.errors import BadInput, NoEquilibrium, OutsideRange
+from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.types import Array
+from thermospindle.sim.campaign.beside import beside, check_points
+from thermospindle.sim.campaign.campaign import Campaign, Test
+
+FACTORS = {
+    1e3: "millimetres told as metres, or kilonewtons as newtons",
+    1e-3: "metres told as millimetres, or newtons as kilonewtons",
+    9.80665: "m/s2 told as g",
+    1 / 9.80665: "g told as m/s2",
+}
+"""Measured over computed, and the mistake in a unit that makes it."""
+WITHIN, SCATTER = 0.15, 1.0
+"""Relative, of a factor; and of ln ratio over the lines of an FRF, its median deviation up to which it is one."""
+SILENT = 1e-2
+"""Of the largest FRF of a test, in rms: smaller ones are forbidden by symmetry, and their size is noise; so are lines below as much of its median."""
+LARGEST = 1e30
+"""Of any unit: a computed FRF as large as that is of a spindle that no bearing holds."""
+BETTER = 2.0
+MOST_LINES = 1000
+"""Of an FRF that are looked at."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """One FRF: ln of its measured and computed magnitude (n,), below what each is silence, and whether the model answers there at all."""
+
+    response: int
+    reference: int
+    measured: Array
+    computed: Array
+    silence: tuple[float, float]
+    loud: bool
+
+    @property
+    def heard(self) -> tuple[Array, Array]:
+        """Measured and computed, silence as loud as it may be."""
+        return np.maximum(self.measured, self.silence[0]), np.maximum(self.computed, self.silence[1])
+
+
+def likenesses(spindle: Spindle, campaign: Campaign) -> list[str]:
+    """What tells of units or channels mistaken, a sentence each."""
+    if not any(t.frf is not None for t in campaign.tests):
+        return []
+    try:
+        check_points(spindle, campaign)
+        tests = [pairs for t in campaign.tests if (pairs := _pairs(spindle, campaign, t))]
+    except (BadInput, NoEquilibrium, OutsideRange) as error:
+        return [f"the FRFs are not set beside those of {spindle.name}: {error}"]
+    names = {p.node: f"{p.node} ({p.name})" for p in campaign.points}
+    return [*_factors(tests, names, spindle.name), *_swapped(tests, names, spindle.name)]
+
+
+def _pairs(spindle: Spindle, campaign: Campaign, test: Test) -> list[Pair]:
+    """The FRFs of a test at some of its lines; none of a table of modes, or where the model has no answer."""
+    own = beside(spindle, campaign.points, test, Condition(test.temperature, test.speed, test.level or 0.0, np.inf if test.soak_time is None else test.soak_time))
+    if own is None or not len(own.measured.frequency):
+        return []
+    step = -(-len(own.measured.frequency) // MOST_LINES)
+    measured = own.measured.value[..., ::step]
+    computed = own.computed(own.measured.frequency[::step])
+    if not np.abs(computed).max() < LARGEST:
+        return []
+    size = np.sqrt(np.mean(np.abs(computed) ** 2, axis=-1))
+    x, a = (np.log(np.maximum(np.abs(value), 1e-300)) for value in (measured, computed))
+    silence = tuple(float(np.log(SILENT) + np.median(value, axis=-1).max()) for value in (x, a))
+    ends = [(i, j, r, h) for i, r in enumerate(own.measured.response_nodes) for j, h in enumerate(own.measured.reference_nodes)]
+    return [Pair(r, h, x[i, j], a[i, j], (silence[0], silence[1]), bool(size[i, j] > SILENT * size.max())) for i, j, r, h in ends]
+
+
+# ---------------------------------------------------------------- factors of units
+
+
+def _factors(tests: Sequence[Sequence[Pair]], names: Mapping[int, str], scene: str) -> Iterator[str]:
+    """A factor that all FRFs share, or all of a response, or of a hammer's point."""
+    told = [(p, _factor(p)) for pairs in tests for p in pairs if p.loud]
+
+    def shared(own: Sequence[tuple[Pair, float | None]]) -> float | None:
+        found = {factor for _, factor in own}
+        return found.pop() if len(found) == 1 else None
+
+    if (factor := shared(told)) is not None:
+        yield _said("all FRFs", factor, scene)
+        return
+    for what, key in (("the FRFs of response", "response"), ("the FRFs of the hammer at", "reference")):
+        by_node: dict[int, list[tuple[Pair, float | None]]] = {}
+        for p, factor in told:
+            by_node.setdefault(getattr(p, key), []).append((p, factor))
+        for node, own in by_node.items():
+            if (factor := shared(own)) is not None:
+                yield _said(f"{what} {names[node]}", factor, scene)
+
+
+def _factor(pair: Pair) -> float | None:
+    """The factor of `FACTORS` by which an FRF is larger than computed; None where it is none of them."""
+    ratio = (pair.measured - pair.computed)[pair.computed >= np.median(pair.computed)]
+    middle = float(np.median(ratio))
+    if float(np.median(np.abs(ratio - middle))) > SCATTER:
+        return None
+    return next((f for f in FACTORS if abs(np.exp(middle) / f - 1) <= WITHIN), None)
+
+
+def _said(who: str, factor: float, scene: str) -> str:
+    times = f"{factor:.4g} times" if factor > 1 else f"1/{1 / factor:.4g} of"
+    return f"{who} are about {times} those that {scene} has: is a unit another than is told, as {FACTORS[factor]}?"
+
+
+# ---------------------------------------------------------------- channels of each other
+
+
+def _swapped(tests: Sequence[Sequence[Pair]], names: Mapping[int, str], scene: str) -> list[str]:
+    """Two responses, or two hammer points, that are each other's in every test that has both; of the two kinds the one that is fewer, for one exchange looks like others."""
+    found: list[list[str]] = []
+    for what, key, other in (("responses", "response", "reference"), ("hammer points", "reference", "response")):
+        nodes = sorted({getattr(p, key) for pairs in tests for p in pairs})
+        said = []
+        for a, b in combinations(nodes, 2):
+            rows = [(row[a], row[b]) for pairs in tests if a in (row := _rows(pairs, key, other)) and b in row]
+            if _each_others(rows):
+                said.append(f"{what} {names[a]} and {names[b]}: each fits what {scene} has of the other far better than its own: are the two exchanged?")
+        found += [said] if said else []
+    return min(found, key=len, default=[])
+
+
+Row = dict[int, Pair]
+"""The FRFs of one channel by the node at their other end."""
+
+
+def _rows(pairs: Sequence[Pair], key: str, other: str) -> dict[int, Row]:
+    rows: dict[int, Row] = {}
+    for p in pairs:
+        rows.setdefault(getattr(p, key), {})[getattr(p, other)] = p
+    return rows
+
+
+def _each_others(rows: Sequence[tuple[Row, Row]]) -> bool:
+    """Of two channels in some tests, whether the other's model fits both at least `BETTER` times as well as their own; by what the model moves at one of the two."""
+    told = [(pair, n) for pair in rows for n in pair[0] if pair[0][n].loud or pair[1][n].loud]
+    if not told:
+        return False
+
+    def misfit(measured: int, computed: int) -> float:
+        off = np.concatenate([pair[measured][n].heard[0] - pair[computed][n].heard[1] for pair, n in told])
+        return float(np.sqrt(np.mean((off - np.median(off)) ** 2)))
+
+    return BETTER * max(misfit(0, 1), misfit(1, 0)) < min(misfit(0, 0), misfit(1, 1))
