@@ -1,7 +1,7 @@
 """The picture of a scene: the half section with bearings and their load lines above the axis, what moves as a chain below it.
 
-The axis lies across the picture, z to the right. Above: regions of the section (or the shafts' outlines where there is none), balls and
-load lines, springs of bearings given by numbers, measuring points. Below: beams with their nodes, centres of mass of rigid bodies, joints.
+The axis lies across the picture, z to the right. Above: regions of the section (or the shafts' outlines where there is none), turning
+bodies that are in neither as cylinders of their mass and inertia, balls and load lines, springs of bearings given by numbers, measuring points. Below: beams with their nodes, centres of mass of rigid bodies, joints.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from matplotlib.patches import Circle, Patch, Polygon, Rectangle
 
 from thermospindle.model.machine import Bearing, LinearBearing, RollerBearing, Spindle
 from thermospindle.model.shaft import Shaft
+from thermospindle.model.structure import Body
 from thermospindle.model.units import MM
 from thermospindle.report.check.understood import apex
 from thermospindle.report.figures.common import INK, PALE, STYLE
@@ -25,6 +26,8 @@ from thermospindle.sim.operating import OperatingPoint
 
 TURNING, STANDING, LOAD, HIT, JOINT = "#cfdcea", "#dcdad5", "#a0741a", "#c9371c", "#2e7d6b"
 WIDTH, TALLEST = 10.3, 5.2  # inches, of the picture and of the machine in it
+TURNED = "#4f77a8"
+LEAST = 0.12  # inches, of the box of a body without inertia
 LETTER = 0.062  # inches, of a small letter's width
 
 
@@ -92,6 +95,10 @@ def _frame(spindle: Spindle) -> Frame:
     ends += [b.z for b in spindle.structure.bodies] + [p.position[2] for p in spindle.points] + [b.z for b in spindle.all_bearings]
     radii = [r for s in spindle.structure.shafts for g in s.segments for r in (*g.outer, *g.mass_outer)] + [g.r[1] for g in spindle.regions]
     radii += [float(np.hypot(*p.position[:2])) for p in spindle.points]
+    for b in _undrawn(spindle):
+        radius, length = cylinder(b)
+        ends += [b.z - length / 2, b.z + length / 2]
+        radii.append(radius)
     shafts = [r for s in spindle.structure.shafts for g in s.segments for r in g.outer]
     low, high, top = min(ends) / MM, max(ends) / MM, max([*radii, 0.02 * (max(ends) - min(ends))]) / MM
     room = 0.03 * (high - low)
@@ -105,7 +112,11 @@ def _frame(spindle: Spindle) -> Frame:
 
 
 def _bodies(axes: Axes, spindle: Spindle, frame: Frame) -> None:
-    """The regions of the section, and the outlines of shafts that are not in it."""
+    """The regions of the section, the outlines of shafts that are not in it, and turning bodies that are in neither as the solid cylinders of their mass and inertia."""
+    for b in _undrawn(spindle):
+        (radius, length), least = cylinder(b), LEAST * frame.per_inch
+        wide, high = max(length / MM, least), max(radius / MM, least)
+        axes.add_patch(Rectangle((b.z / MM - wide / 2, 0), wide, high, fc="none", ec=TURNED, lw=1.1, ls=(0, (4, 2)), zorder=2))
     for g in spindle.regions:
         (r0, r1), (z0, z1) = (np.array(side) / MM for side in (g.r, g.z))
         axes.add_patch(Rectangle((z0, r0), z1 - z0, r1 - r0, fc=TURNING if g.part == "rotating" else STANDING, ec=INK, lw=0.5))
@@ -113,6 +124,17 @@ def _bodies(axes: Axes, spindle: Spindle, frame: Frame) -> None:
         middle = (s.nodes[0] + s.nodes[-1]) / 2
         if not any(g.z[0] <= middle <= g.z[1] and (g.part == "rotating") == s.turns for g in spindle.regions):
             _outline(axes, s, 1)
+
+
+def _undrawn(spindle: Spindle) -> list[Body]:
+    """Turning rigid bodies, as a chuck or a motor's rotor, that neither section nor shafts show. What stands has its housing there, and seldom a polar inertia that is its own."""
+    return [b for b in spindle.structure.rigid_bodies if b.turns and b.mass > 0 and not b.regions]
+
+
+def cylinder(b: Body) -> tuple[float, float]:
+    """Radius and length (m) of the solid cylinder of a body's mass and inertia: I_z = m r^2 / 2, I_x = m (3 r^2 + l^2) / 12; 0 for what it has no inertia for."""
+    radius = np.sqrt(2 * b.inertia[2] / b.mass)
+    return float(radius), float(np.sqrt(max(12 * min(b.inertia[:2]) / b.mass - 3 * radius**2, 0.0)))
 
 
 def _outline(axes: Axes, s: Shaft, sign: int) -> None:
@@ -208,6 +230,7 @@ def _labels(spindle: Spindle, frame: Frame) -> tuple[list[Label], list[Label]]:
     """Names above (bearings, points) and below (shafts, bodies, joints), staggered so that none covers another."""
     structure = spindle.structure
     top = [(b.name, b.z / MM, frame.top if isinstance(b, LinearBearing) else b.pitch_diameter / MM / 2, LOAD) for b in spindle.all_bearings]
+    top += [(f"{b.name}, {b.mass:.3g} kg", b.z / MM, max(cylinder(b)[0] / MM, LEAST * frame.per_inch), TURNED) for b in _undrawn(spindle)]
     at: dict[tuple[float, float], list[str]] = {}
     hit: dict[tuple[float, float], bool] = {}
     for p in spindle.points:
@@ -271,6 +294,8 @@ def _legend(spindle: Spindle) -> list[Line2D | Patch]:
     handles: list[Line2D | Patch] = [Patch(fc=TURNING, ec=INK, lw=0.5, label="turns")]
     if any(g.part != "rotating" for g in spindle.regions) or any(not s.turns for s in structure.shafts):
         handles.append(Patch(fc=STANDING, ec=INK, lw=0.5, label="stands"))
+    if _undrawn(spindle):
+        handles.append(Patch(fc="none", ec=TURNED, lw=1.1, ls=(0, (4, 2)), label="cylinder of a body's mass and inertia"))
     if spindle.bearings or spindle.roller_bearings:
         handles.append(Line2D([], [], color=LOAD, lw=0.9, ls=(0, (5, 2)), label="load line"))
     if spindle.linear_bearings:

@@ -15,7 +15,7 @@ from thermospindle.report.typeset import figure, micro, minus, prose, table
 from thermospindle.sim.operating import OperatingPoint
 
 CAPTION = (
-    "Above the axis the section, bearings with the load lines of their contact angle at the reference, and measuring points; below it what the "
+    "Above the axis the section, dashed the solid cylinder of the mass and inertia of each turning body that is not in it, bearings with the load lines of their contact angle at the reference, and measuring points; below it what the "
     "model moves: beams with their nodes, rigid bodies by their centres of mass, joints. Hatched: mass without stiffness."
 )
 

@@ -29,14 +29,14 @@ RANGE = 50.0  # dB below the strongest line that the waterfall shows
 
 
 def motion_figure(runout: Runout) -> Figure:
-    """Orbit, and polar plots of the radial and the axial probe."""
+    """Orbit, and polar plots of the radial probes along x and y and of the axial one."""
     with rc_context(STYLE):
-        figure = Figure(figsize=(11.0, 4.3))
-        whole = figure.add_gridspec(1, 3, width_ratios=(1.0, 1.05, 1.05))
+        figure = Figure(figsize=(8.8, 8.4))
+        whole = figure.add_gridspec(2, 2, width_ratios=(1.0, 1.05))
         where = looked_at(runout.point.spindle)
         cut, values, names = runout.by_lines, runout.values(), [p.name for p in runout.signals.probes]
         _orbit(figure.add_subplot(whole[0]), cut, names.index(X), names.index(Y), where)
-        for place, name, title in ((1, X, f"Radial error motion ({where} x)"), (2, AXIAL, "Axial error motion")):
+        for place, name, title in ((1, X, f"Radial error motion ({where} x)"), (2, Y, f"Radial error motion ({where} y)"), (3, AXIAL, "Axial error motion")):
             axes = figure.add_subplot(whole[place], projection="polar")
             assert isinstance(axes, PolarAxes)
             _polar(axes, cut, names.index(name), values[name], title, name != AXIAL)

@@ -186,7 +186,7 @@ def runout_section(runout: Runout, answer: dict[str, Any]) -> tuple[str, str]:
 
     where = looked_at(runout.point.spindle)
     captions = {
-        "motion": f"Orbit of the {where}, and its error motion over the angle of the turning part.",
+        "motion": f"Orbit of the {where}, and its error motion along x, y and the axis over the angle of the turning part.",
         "spectrum": "Amplitude over frequency; a mark is a line fitted at its known frequency.",
     }
     drawn = pictures(figures(runout), captions, "runout-")

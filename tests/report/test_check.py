@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.patches import Rectangle
 
 from tests.conftest import ROOT
 from thermospindle.cli import main
@@ -67,6 +68,25 @@ def test_the_key_names_what_is_in_the_picture() -> None:
         words[name] = {t.get_text() for t in key.get_texts()}
     assert words["five_bearing"] - words["mk7702"] == {"stands", "load line", "centre of mass", "joint"}
     assert words["mk7702"] - words["five_bearing"] == {"bearing by numbers"}
+
+
+def test_a_body_that_turns_and_is_in_no_section_is_drawn_as_a_cylinder(tmp_path: Path) -> None:
+    """A steel disc of 171 mm and 17 mm width: m = rho pi r^2 l, I_z = m r^2 / 2, I_x = m (3 r^2 + l^2) / 12."""
+    r, length = 0.0855, 0.017
+    m = 7850 * np.pi * r**2 * length
+    across = m * (3 * r**2 + length**2) / 12
+    text = SCENES["rotor"].read_text(encoding="utf-8")
+    for key, value in (("mass_kg = 3.0 ", f"mass_kg = {m} "), ("[6.0e-3, 6.0e-3]", f"[{across}, {across}]"), ("polar_inertia_kg_m2 = 1.1e-2", f"polar_inertia_kg_m2 = {m * r**2 / 2}")):
+        text = text.replace(key.rstrip(), value.rstrip(), 1)
+    (tmp_path / "spindle.toml").write_text(text, encoding="utf-8")
+    [axes] = drawing(operating_point(load(tmp_path), Condition(20.0))).axes
+    [box] = [p for p in axes.patches if isinstance(p, Rectangle) and p.get_linestyle() != "-" and p.get_linestyle() != "solid"]
+    assert (box.get_x() + box.get_width() / 2, box.get_y(), box.get_width(), box.get_height()) == pytest.approx((225.0, 0.0, 17.0, 85.5), abs=1e-6)
+    assert f"disc, {m:.3g} kg" in {t.get_text() for t in axes.texts}
+    assert axes.get_ylim()[1] > 85.5
+    for name in ("five_bearing", "hdd_2003"):  # what turns is drawn there already, and the section shows what stands
+        [axes] = drawing(operating_point(load(SCENES[name]), Condition(20.0))).axes
+        assert not any(" kg" in t.get_text() for t in axes.texts)
 
 
 def test_no_leader_runs_through_a_name() -> None:

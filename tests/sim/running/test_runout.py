@@ -232,6 +232,9 @@ def test_figures_name_the_lines(found):
     assert any("1x" in t or "unbalance" in t for t in texts)  # the repeatable line is always named
     motion = motion_figure(found)
     assert motion.axes[0].get_title(loc="left") == f"Orbit, {found.averaged.count} revolutions"
+    for axes, name, title in zip(motion.axes[1:], ("hub x", "hub y", "hub axial"), ("(hub x)", "(hub y)", "Axial"), strict=True):
+        assert title in axes.get_title(loc="left")
+        assert f"total {1e9 * found.values()[name].total_error:.3g} nm" in axes.texts[-1].get_text()
 
 
 def test_command_line_answers_and_writes(tmp_path, capsys):
