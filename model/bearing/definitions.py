@@ -5,10 +5,19 @@ A ball row, a bearing given by numbers, cylindrical roller rows; sets of ball ro
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 SENSE = {"back-to-back": (-1, 1), "face-to-face": (1, -1), "tandem": (1, 1)}
 """`Bearing.sense` of the (lower, upper) bearing of a pair: back-to-back outer rings load as they move apart."""
+
+
+@dataclass(frozen=True)
+class ToldAngle:
+    """The contact angle as a scene file tells it: `key` of its `row`, contact_angle_deg or free_contact_angle_deg, and the `value` (degrees) there."""
+
+    row: str
+    key: str
+    value: float
 
 
 @dataclass(frozen=True)
@@ -37,6 +46,7 @@ class Bearing:
     raceway_width: float | None = None  # m, along z; None for the whole height of a ring that is this bearing's alone
     constant_factor: float = 1.0  # load-deflection constant over that of Hertz, where a catalogue tells it
     rated_stiffness: float | None = None  # N/m, radial, as a catalogue or designer states it
+    told: ToldAngle | None = field(default=None, compare=False, repr=False)  # what its contact angle was made of
 
     @property
     def elements(self) -> int:

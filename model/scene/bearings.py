@@ -12,7 +12,7 @@ from pydantic import Field, Strict, model_validator
 
 from thermospindle.model import machine as m
 from thermospindle.model.bearing.catalogue import CatalogueRow, derived
-from thermospindle.model.bearing.definitions import PreloadSpring
+from thermospindle.model.bearing.definitions import PreloadSpring, ToldAngle
 from thermospindle.model.scene.bearing_numbers import Numbers
 from thermospindle.model.scene.fields import Place, Positive, Share, Span, Table
 from thermospindle.model.units import DEGREE, MM
@@ -171,9 +171,9 @@ class Bearing(Table):
         assert self.inner_ring is not None
         assert self.outer_ring is not None
         row = rows[self.row]
-        angle = row.contact_angle_deg if row.contact_angle_deg is not None else row.free_contact_angle_deg
+        key = "free_contact_angle_deg" if row.contact_angle_deg is None else "contact_angle_deg"
+        angle = getattr(row, key)
         clearance = row.diametral_clearance_mm
-        assert angle is not None
         inner, outer = row.inner_conformity, row.outer_conformity
         if inner is None or outer is None:  # from the catalogue: both alike, so that f_i + f_o - 1 gives the unloaded distance
             told = row.catalogue_row()
@@ -201,6 +201,7 @@ class Bearing(Table):
             preload=mounted.preload,
             raceway_width=None if self.raceway_width_mm is None else self.raceway_width_mm * MM,
             rated_stiffness=None if self.rated_radial_stiffness_N_per_um is None else self.rated_radial_stiffness_N_per_um * 1e6,
+            told=ToldAngle(self.row, key, angle),
         )
 
     def linear(self, name: str, inner_body: str, outer_body: str, folder: Path) -> m.LinearBearing:

@@ -140,6 +140,8 @@ def content_hash(spindle: Spindle) -> str:
     if not any(content["radial_load"]):  # what came later counts where there is any
         content.pop("radial_load")
         content.pop("radial_load_z")
+    for row in content["bearings"]:
+        row.pop("told")
     if not content["roller_bearings"]:
         content.pop("roller_bearings")
     for film in content["thermal"]["convections"]:

@@ -9,15 +9,13 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from thermospindle.model import sense
+from thermospindle.model.bearing.definitions import ToldAngle
 from thermospindle.model.bearing.pair import joined
 from thermospindle.model.bearing.roller import RollerState
 from thermospindle.model.errors import NoEquilibrium, OutsideRange
-from thermospindle.model.files.formats import SCENE
 from thermospindle.model.machine import Condition, LinearBearing, Point, Spindle
 from thermospindle.model.pressure import OF_BALLS, OF_ROLLERS, pressures
 from thermospindle.model.rotor.static import FREE
-from thermospindle.model.scene.fields import read_file
-from thermospindle.model.scene.reading import with_shipped_rows
 from thermospindle.model.shaft import SAME_HEIGHT, Shaft
 from thermospindle.model.units import MM, RPM
 from thermospindle.report.check.understood import free_angle
@@ -116,17 +114,16 @@ def _contacts(found: Looked) -> Iterator[str]:
 
 
 def _angles(found: Looked) -> Iterator[str]:
-    if found.spindle.file is None:
-        return
-    raw = with_shipped_rows(read_file(SCENE, found.spindle.file))
-    for name, row in raw.get("ball_rows", {}).items():
-        key = "free_contact_angle_deg" if "free_contact_angle_deg" in row else "contact_angle_deg"
-        of = [bearing for bearing, told in raw["bearings"].items() if told.get("row") == name]
-        if of and not CONTACT_ANGLE[0] <= row[key] <= CONTACT_ANGLE[1]:
-            yield (
-                f"ball_rows.{name}.{key} = {row[key]:g}, of {', '.join(of)}: angular contact bearings have 12 to 40 degrees, thrust bearings 60, "
-                "and deep-groove ones 8 to 15; the key takes degrees"
-            )
+    """Once a row of the scene's, whatever bearings have it."""
+    of: dict[ToldAngle, list[str]] = {}
+    for b in found.spindle.bearings:
+        if b.told is not None and not CONTACT_ANGLE[0] <= b.told.value <= CONTACT_ANGLE[1]:
+            of.setdefault(b.told, []).append(b.name)
+    for told, names in of.items():
+        yield (
+            f"ball_rows.{told.row}.{told.key} = {told.value:g}, of {', '.join(names)}: angular contact bearings have 12 to 40 degrees, thrust bearings 60, "
+            "and deep-groove ones 8 to 15; the key takes degrees"
+        )
 
 
 def _soft(found: Looked) -> Iterator[str]:

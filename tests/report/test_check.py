@@ -16,6 +16,7 @@ from thermospindle.cli import main
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
 from thermospindle.report.check.drawing import drawing
+from thermospindle.report.check.odd import looked, odd
 from thermospindle.report.check.understood import arrangement
 from thermospindle.report.check.words import of_words
 from thermospindle.sim.operating import operating_point
@@ -195,6 +196,18 @@ def test_what_is_odd_is_said(name: str, right: str, wrong: str, sentence: str, t
     (tmp_path / "spindle.toml").write_text(text.replace(right, wrong), encoding="utf-8")
     assert any(sentence in words for words in checked(tmp_path, capsys)["odd"])
     assert not any(sentence in words for words in checked(SCENES[name], capsys)["odd"])
+
+
+def test_an_angle_that_is_none_is_told_as_the_file_has_it(tmp_path: Path) -> None:
+    """The free angle that was typed, not the loaded one that follows; and of a spindle whose file is gone."""
+    text = SCENES["hdd"].read_text(encoding="utf-8")
+    told = text.replace("contact_angle_deg = 24.5 ", "free_contact_angle_deg = 2.5 ")
+    (tmp_path / "spindle.toml").write_text(told, encoding="utf-8")
+    spindle = load(tmp_path)
+    (tmp_path / "spindle.toml").unlink()
+    point = operating_point(spindle, Condition(20.0))
+    assert np.degrees(spindle.bearings[0].contact_angle) > 6.0
+    assert any("free_contact_angle_deg = 2.5, of lower, upper: angular contact" in words for words in odd(looked(spindle, point)))
 
 
 def test_a_spring_that_nothing_holds_is_odd(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
