@@ -3,26 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from itertools import combinations, pairwise
+from itertools import pairwise
 
 import numpy as np
 
-from thermospindle.model import sense
-from thermospindle.model.bearing.definitions import ToldAngle
-from thermospindle.model.bearing.pair import joined
-from thermospindle.model.bearing.roller import RollerState
-from thermospindle.model.errors import NoEquilibrium, OutsideRange
-from thermospindle.model.machine import Condition, LinearBearing, Point, Spindle
-from thermospindle.model.pressure import OF_BALLS, OF_ROLLERS, pressures
+from thermospindle.model.machine import Point, Spindle
 from thermospindle.model.rotor.static import FREE
 from thermospindle.model.shaft import SAME_HEIGHT, Shaft
 from thermospindle.model.units import MM, RPM
-from thermospindle.report.check.understood import free_angle
+from thermospindle.report.check.looked import Looked
+from thermospindle.report.check.odd_bearings import OF_BEARINGS
 from thermospindle.sim.effects import of_scene
 from thermospindle.sim.effects.effect import refusal
 from thermospindle.sim.hammer.pulse import pulse_duration
-from thermospindle.sim.operating import OperatingPoint, operating_point
 
 WEAK = 0.1
 """Share of its force at low frequency below which a hammer hardly excites: 20 dB."""
@@ -30,13 +23,6 @@ UNDAMPED = 1e-5
 """Damping ratio below which a record cannot show how a mode dies out: of metals, 1e-4 and more."""
 NEAR = 0.05
 """Of the speed, within which a natural frequency is called critical."""
-CONFORMITY = (0.505, 0.58)
-"""Groove radius over ball diameter of bearings that are made: 0.515 to 0.53 mostly (Harris, Rolling Bearing Analysis, ch. 2)."""
-CONTACT_ANGLE = (5.0, 60.0)
-"""Degrees: deep-groove bearings have 8 to 15 of their clearance, angular contact ones 12 to 40, thrust ones 60."""
-SAG = 1.0 * MM
-"""By which the weight of what turns would sink on one bearing alone: more than any gap between what turns and what stands, and seals and motors would rub."""
-GRAVITY = 9.81
 LEAST_EXPANSION = 0.01
 """um/m K: glass ceramics such as Zerodur have 0.02, and whoever writes 1/K has 1e-5."""
 LEAST_DENSITY = 100.0
@@ -47,50 +33,9 @@ MANY_STEPS = 1e6
 """Of integration in a virtual hammer test, some minutes of computing for a flexible shaft."""
 
 
-@dataclass(frozen=True)
-class Looked:
-    """A spindle at its reference temperature at rest, and in its hottest state at rest and turning; in words where there is none."""
-
-    spindle: Spindle
-    reference: OperatingPoint
-    hot: OperatingPoint | str
-    turning: OperatingPoint | str
-
-
-def looked(spindle: Spindle, reference: OperatingPoint) -> Looked:
-    """The states that the questions below are asked of."""
-    hottest = max(spindle.temperatures, key=lambda t: abs(t - spindle.reference_temperature))
-
-    def at(temperature: float, speed: float) -> OperatingPoint | str:
-        try:
-            return operating_point(spindle, Condition(temperature, speed))
-        except (NoEquilibrium, OutsideRange) as error:
-            return f"at {temperature:g} C and {speed / RPM:.0f} rpm: {error}"
-
-    turns = any(b.turns for b in spindle.structure.bodies)
-    return Looked(spindle, reference, at(hottest, 0.0), at(spindle.reference_temperature, spindle.nominal_speed) if turns else "")
-
-
 def odd(found: Looked) -> list[str]:
     """All that is odd, each once."""
     return list(dict.fromkeys(words for question in QUESTIONS for words in question(found)))
-
-
-# ---------------------------------------------------------------- bearings
-
-
-def _loose(found: Looked) -> Iterator[str]:
-    for state in found.reference.state.linear:
-        if isinstance(state, RollerState) and state.load == 0.0:
-            yield f"bearing {state.name}: its rollers are loose by {1e6 * state.clearance:.3g} um, and no load presses them: it carries nothing"
-
-
-def _same_place(found: Looked) -> Iterator[str]:
-    carrier = found.spindle.structure.carrier
-    for a, b in combinations(found.spindle.all_bearings, 2):
-        same = {carrier(a.inner_body), carrier(a.outer_body)} == {carrier(b.inner_body), carrier(b.outer_body)}
-        if same and abs(a.z - b.z) < 0.1 * MM:
-            yield f"bearings {a.name} and {b.name} sit at the same place, z_mm = {a.z / MM:g}, between the same parts: one of them may be meant elsewhere"
 
 
 def _seats(found: Looked) -> Iterator[str]:
@@ -104,115 +49,6 @@ def _seats(found: Looked) -> Iterator[str]:
                 yield f"bearing {b.name}: its inner ring {b.inner_ring!r} begins at a radius of {bore / MM:g} mm, and the shaft {shaft.name!r} has {seat / MM:g} mm there"
 
 
-def _contacts(found: Looked) -> Iterator[str]:
-    for b in found.spindle.bearings:
-        for ring, value in (("inner", b.inner_conformity), ("outer", b.outer_conformity)):
-            if not CONFORMITY[0] <= value <= CONFORMITY[1]:
-                yield f"bearing {b.name}: the {ring} groove's radius is {value:g} ball diameters; bearings have {CONFORMITY[0]:g} to {CONFORMITY[1]:g}"
-        if free_angle(b, found.reference.state.bearing(b.name)) is None:
-            yield f"bearing {b.name}: its contact angle under the preload means that the rings would press the balls without any; a larger angle, or more preload, is meant"
-
-
-def _angles(found: Looked) -> Iterator[str]:
-    """Once a row of the scene's, whatever bearings have it."""
-    of: dict[ToldAngle, list[str]] = {}
-    for b in found.spindle.bearings:
-        if b.told is not None and not CONTACT_ANGLE[0] <= b.told.value <= CONTACT_ANGLE[1]:
-            of.setdefault(b.told, []).append(b.name)
-    for told, names in of.items():
-        yield (
-            f"ball_rows.{told.row}.{told.key} = {told.value:g}, of {', '.join(names)}: angular contact bearings have 12 to 40 degrees, thrust bearings 60, "
-            "and deep-groove ones 8 to 15; the key takes degrees"
-        )
-
-
-def _soft(found: Looked) -> Iterator[str]:
-    """Of a bearing given by numbers its stiffness across the axis where it has any, else along it."""
-    weight = found.spindle.turning_mass * GRAVITY
-    for b in found.spindle.linear_bearings:
-        x, y, axial = np.reshape(b.stiffness, (-1, 5, 5))[:, range(3), range(3)].max(axis=0)
-        stiffness, way = (max(x, y), "radial") if max(x, y) > 0 else (axial, "axial")
-        if 0 < stiffness * SAG < weight:
-            yield (
-                f"bearing {b.name}: its {way} stiffness is {stiffness:g} N/m at most, on which the {found.spindle.turning_mass:.3g} kg that turn would sink by "
-                f"{weight / stiffness / MM:.3g} mm; bearings give way by less than {SAG / MM:g} mm, so that another unit may be meant (2e7 N/m are 20 N/um)"
-            )
-
-
-def _preload(found: Looked) -> Iterator[str]:
-    for state in (found.hot, found.turning):
-        if isinstance(state, str):
-            if state:
-                yield f"no state {state}"
-            continue
-        where = f"at {state.condition.temperature:g} C" + (f" and {state.condition.speed / RPM:.0f} rpm" if state.condition.speed else "")
-        pairs = [(b, state.state.bearing(b.name)) for b in found.reference.state.bearings]
-        yield from (f"bearing {b.name} loses contact {where}" for b, now in pairs if not now.in_contact)
-        for what, far in (("less than half", lambda ratio: ratio < 0.5), ("more than twice", lambda ratio: ratio > 2.0)):
-            moved = [f"{b.name} {now.preload:.3g} of {b.preload:.3g} N" for b, now in pairs if now.in_contact and far(now.preload / b.preload)]
-            if moved:
-                yield f"{where} the preload is {what} that of the reference: {', '.join(moved)}"
-
-
-def _pressed(found: Looked) -> Iterator[str]:
-    """Of every bearing the state that presses it most."""
-    states = [found.reference, *(p for p in (found.hot, found.turning) if not isinstance(p, str))]
-    of = [pressures(p.spindle, p.state) for p in states]
-    balls = {b.name for b in found.spindle.bearings}
-    for name in of[0]:
-        k = max(range(len(of)), key=lambda i: of[i][name])
-        limit, what = (OF_BALLS, "balls") if name in balls else (OF_ROLLERS, "rollers")
-        if of[k][name] > limit:
-            at = states[k].condition
-            yield (
-                f"bearing {name}: its {what} press the races with {of[k][name] / 1e6:.0f} MPa at {at.temperature:g} C and {at.speed / RPM:.0f} rpm, under preload and the loads told; "
-                f"{what} leave dents from {limit / 1e6:.0f} MPa, the static limit of ISO 76"
-            )
-
-
-def _pushed(found: Looked) -> Iterator[str]:
-    """A spring behind rows that are all loaded one way pushes on what the other rows hold."""
-    spindle = found.spindle
-    if spindle.axial_load:
-        return
-    for group in joined(spindle):
-        own = {b.name for b in group}
-        one_way = [s for s in spindle.sets if s.bearings[0] in own and spindle.one_way(s)]
-        if not sum(spindle.bearing(s.bearings[0]).sense * s.preload for s in one_way):
-            continue
-        for s in (s for s in one_way if s.spring is not None):
-            others = [b.name for b in group if b.name not in s.bearings]
-            if others:
-                push = spindle.bearing(s.bearings[0]).sense * s.preload
-                yield (
-                    f"set {s.name}: the {s.preload:g} N of its spring are held from outside, and nothing of them reaches {', '.join(others)}; "
-                    f"axial_load_N = {-push:g} takes that outer force away, so that they hold the spring"
-                )
-
-
-def _sense(found: Looked) -> Iterator[str]:
-    spindle = found.spindle
-    yield from sense.of_conditions(spindle, [*(Condition(t) for t in spindle.temperatures), Condition(spindle.temperatures[0], spindle.nominal_speed)])
-    yield from sense.of_states(spindle, [p.state.bearings for p in (found.reference, found.hot, found.turning) if not isinstance(p, str)])
-
-
-def _tables(found: Looked) -> Iterator[str]:
-    spindle = found.spindle
-    for b in spindle.linear_bearings:
-        for what, unit, values, wanted in (
-            ("temperatures", "C", b.temperature, spindle.temperatures),
-            ("speeds", "rpm", tuple(s / RPM for s in b.speed), (0.0, spindle.nominal_speed / RPM)),
-        ):
-            if len(values) > 1 and (wanted[0] < values[0] - 1e-9 or wanted[1] > values[-1] + 1e-9):
-                yield f"bearing {b.name}: its table holds {what} from {values[0]:g} to {values[-1]:g} {unit}, and the spindle runs from {wanted[0]:g} to {wanted[1]:g} {unit}"
-    if spindle.linear_bearings and not spindle.bearings and not spindle.roller_bearings and all(_constant(b) for b in spindle.linear_bearings):
-        yield "every bearing is given by constant numbers: temperature changes nothing here, and speed only what is gyroscopic"
-
-
-def _constant(b: LinearBearing) -> bool:
-    return len(b.temperature) * len(b.speed) == 1
-
-
 def _materials(found: Looked) -> Iterator[str]:
     """Numbers that are of a material in other units than their keys'."""
     for m in found.spindle.materials.values():
@@ -221,9 +57,6 @@ def _materials(found: Looked) -> Iterator[str]:
             yield f"material {m.name}: expands by {expansion:.2g} um/m in a kelvin, and even glass ceramics by 0.02; the key takes micrometres per metre and kelvin, of steel 11.5"
         if m.density < LEAST_DENSITY:
             yield f"material {m.name}: has {m.density:g} kg/m3, less than any solid part; of steel it is 7800"
-
-
-# ---------------------------------------------------------------- structure
 
 
 def _free(found: Looked) -> Iterator[str]:
@@ -354,5 +187,5 @@ def _count(n: int, one: str, many: str = "") -> str:
 
 
 QUESTIONS: tuple[Callable[[Looked], Iterator[str]], ...] = (
-    _loose, _same_place, _seats, _contacts, _angles, _soft, _materials, _preload, _pressed, _pushed, _sense, _tables, _free, _undamped, _damping, _critical, _sections, _points, _hammer, _running, _effects,
+    *OF_BEARINGS, _seats, _materials, _free, _undamped, _damping, _critical, _sections, _points, _hammer, _running, _effects,
 )  # fmt: skip

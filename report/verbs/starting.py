@@ -47,7 +47,8 @@ def check(scene: Path, effect_files: Sequence[Path] = (), out: Path | None = Non
     """What the program understands of a scene, assumes and finds odd; a folder holds `check.json`, `check.html` and the picture."""
     asked = dict(locals())
     from thermospindle.model.machine import Condition  # `new` computes nothing, and waits for nothing that does
-    from thermospindle.report.check.odd import looked, odd
+    from thermospindle.report.check.looked import looked
+    from thermospindle.report.check.odd import odd
     from thermospindle.report.check.understood import understood
     from thermospindle.report.check.words import show_check
     from thermospindle.sim.operating import operating_point

@@ -16,7 +16,8 @@ from thermospindle.cli import main
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
 from thermospindle.report.check.drawing import drawing
-from thermospindle.report.check.odd import looked, odd
+from thermospindle.report.check.looked import looked
+from thermospindle.report.check.odd import odd
 from thermospindle.report.check.understood import arrangement
 from thermospindle.report.check.words import of_words
 from thermospindle.sim.operating import operating_point

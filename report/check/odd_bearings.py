@@ -1,0 +1,152 @@
+"""What is odd about the bearings of a scene, and what holds or presses them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from itertools import combinations
+
+import numpy as np
+
+from thermospindle.model import sense
+from thermospindle.model.bearing.definitions import ToldAngle
+from thermospindle.model.bearing.pair import joined
+from thermospindle.model.bearing.roller import RollerState
+from thermospindle.model.machine import Condition, LinearBearing
+from thermospindle.model.pressure import OF_BALLS, OF_ROLLERS, pressures
+from thermospindle.model.units import MM, RPM
+from thermospindle.report.check.looked import Looked
+from thermospindle.report.check.understood import free_angle
+
+CONFORMITY = (0.505, 0.58)
+"""Groove radius over ball diameter of bearings that are made: 0.515 to 0.53 mostly (Harris, Rolling Bearing Analysis, ch. 2)."""
+CONTACT_ANGLE = (5.0, 60.0)
+"""Degrees: deep-groove bearings have 8 to 15 of their clearance, angular contact ones 12 to 40, thrust ones 60."""
+SAG = 1.0 * MM
+"""By which the weight of what turns would sink on one bearing alone: more than any gap between what turns and what stands, and seals and motors would rub."""
+GRAVITY = 9.81
+
+
+def _loose(found: Looked) -> Iterator[str]:
+    for state in found.reference.state.linear:
+        if isinstance(state, RollerState) and state.load == 0.0:
+            yield f"bearing {state.name}: its rollers are loose by {1e6 * state.clearance:.3g} um, and no load presses them: it carries nothing"
+
+
+def _same_place(found: Looked) -> Iterator[str]:
+    carrier = found.spindle.structure.carrier
+    for a, b in combinations(found.spindle.all_bearings, 2):
+        same = {carrier(a.inner_body), carrier(a.outer_body)} == {carrier(b.inner_body), carrier(b.outer_body)}
+        if same and abs(a.z - b.z) < 0.1 * MM:
+            yield f"bearings {a.name} and {b.name} sit at the same place, z_mm = {a.z / MM:g}, between the same parts: one of them may be meant elsewhere"
+
+
+def _contacts(found: Looked) -> Iterator[str]:
+    for b in found.spindle.bearings:
+        for ring, value in (("inner", b.inner_conformity), ("outer", b.outer_conformity)):
+            if not CONFORMITY[0] <= value <= CONFORMITY[1]:
+                yield f"bearing {b.name}: the {ring} groove's radius is {value:g} ball diameters; bearings have {CONFORMITY[0]:g} to {CONFORMITY[1]:g}"
+        if free_angle(b, found.reference.state.bearing(b.name)) is None:
+            yield f"bearing {b.name}: its contact angle under the preload means that the rings would press the balls without any; a larger angle, or more preload, is meant"
+
+
+def _angles(found: Looked) -> Iterator[str]:
+    """Once a row of the scene's, whatever bearings have it."""
+    of: dict[ToldAngle, list[str]] = {}
+    for b in found.spindle.bearings:
+        if b.told is not None and not CONTACT_ANGLE[0] <= b.told.value <= CONTACT_ANGLE[1]:
+            of.setdefault(b.told, []).append(b.name)
+    for told, names in of.items():
+        yield (
+            f"ball_rows.{told.row}.{told.key} = {told.value:g}, of {', '.join(names)}: angular contact bearings have 12 to 40 degrees, thrust bearings 60, "
+            "and deep-groove ones 8 to 15; the key takes degrees"
+        )
+
+
+def _soft(found: Looked) -> Iterator[str]:
+    """Of a bearing given by numbers its stiffness across the axis where it has any, else along it."""
+    weight = found.spindle.turning_mass * GRAVITY
+    for b in found.spindle.linear_bearings:
+        x, y, axial = np.reshape(b.stiffness, (-1, 5, 5))[:, range(3), range(3)].max(axis=0)
+        stiffness, way = (max(x, y), "radial") if max(x, y) > 0 else (axial, "axial")
+        if 0 < stiffness * SAG < weight:
+            yield (
+                f"bearing {b.name}: its {way} stiffness is {stiffness:g} N/m at most, on which the {found.spindle.turning_mass:.3g} kg that turn would sink by "
+                f"{weight / stiffness / MM:.3g} mm; bearings give way by less than {SAG / MM:g} mm, so that another unit may be meant (2e7 N/m are 20 N/um)"
+            )
+
+
+def _preload(found: Looked) -> Iterator[str]:
+    for state in (found.hot, found.turning):
+        if isinstance(state, str):
+            if state:
+                yield f"no state {state}"
+            continue
+        where = f"at {state.condition.temperature:g} C" + (f" and {state.condition.speed / RPM:.0f} rpm" if state.condition.speed else "")
+        pairs = [(b, state.state.bearing(b.name)) for b in found.reference.state.bearings]
+        yield from (f"bearing {b.name} loses contact {where}" for b, now in pairs if not now.in_contact)
+        for what, far in (("less than half", lambda ratio: ratio < 0.5), ("more than twice", lambda ratio: ratio > 2.0)):
+            moved = [f"{b.name} {now.preload:.3g} of {b.preload:.3g} N" for b, now in pairs if now.in_contact and far(now.preload / b.preload)]
+            if moved:
+                yield f"{where} the preload is {what} that of the reference: {', '.join(moved)}"
+
+
+def _pressed(found: Looked) -> Iterator[str]:
+    """Of every bearing the state that presses it most."""
+    states = [found.reference, *(p for p in (found.hot, found.turning) if not isinstance(p, str))]
+    of = [pressures(p.spindle, p.state) for p in states]
+    balls = {b.name for b in found.spindle.bearings}
+    for name in of[0]:
+        k = max(range(len(of)), key=lambda i: of[i][name])
+        limit, what = (OF_BALLS, "balls") if name in balls else (OF_ROLLERS, "rollers")
+        if of[k][name] > limit:
+            at = states[k].condition
+            yield (
+                f"bearing {name}: its {what} press the races with {of[k][name] / 1e6:.0f} MPa at {at.temperature:g} C and {at.speed / RPM:.0f} rpm, under preload and the loads told; "
+                f"{what} leave dents from {limit / 1e6:.0f} MPa, the static limit of ISO 76"
+            )
+
+
+def _pushed(found: Looked) -> Iterator[str]:
+    """A spring behind rows that are all loaded one way pushes on what the other rows hold."""
+    spindle = found.spindle
+    if spindle.axial_load:
+        return
+    for group in joined(spindle):
+        own = {b.name for b in group}
+        one_way = [s for s in spindle.sets if s.bearings[0] in own and spindle.one_way(s)]
+        if not sum(spindle.bearing(s.bearings[0]).sense * s.preload for s in one_way):
+            continue
+        for s in (s for s in one_way if s.spring is not None):
+            others = [b.name for b in group if b.name not in s.bearings]
+            if others:
+                push = spindle.bearing(s.bearings[0]).sense * s.preload
+                yield (
+                    f"set {s.name}: the {s.preload:g} N of its spring are held from outside, and nothing of them reaches {', '.join(others)}; "
+                    f"axial_load_N = {-push:g} takes that outer force away, so that they hold the spring"
+                )
+
+
+def _sense(found: Looked) -> Iterator[str]:
+    spindle = found.spindle
+    yield from sense.of_conditions(spindle, [*(Condition(t) for t in spindle.temperatures), Condition(spindle.temperatures[0], spindle.nominal_speed)])
+    yield from sense.of_states(spindle, [p.state.bearings for p in (found.reference, found.hot, found.turning) if not isinstance(p, str)])
+
+
+def _tables(found: Looked) -> Iterator[str]:
+    spindle = found.spindle
+    for b in spindle.linear_bearings:
+        for what, unit, values, wanted in (
+            ("temperatures", "C", b.temperature, spindle.temperatures),
+            ("speeds", "rpm", tuple(s / RPM for s in b.speed), (0.0, spindle.nominal_speed / RPM)),
+        ):
+            if len(values) > 1 and (wanted[0] < values[0] - 1e-9 or wanted[1] > values[-1] + 1e-9):
+                yield f"bearing {b.name}: its table holds {what} from {values[0]:g} to {values[-1]:g} {unit}, and the spindle runs from {wanted[0]:g} to {wanted[1]:g} {unit}"
+    if spindle.linear_bearings and not spindle.bearings and not spindle.roller_bearings and all(_constant(b) for b in spindle.linear_bearings):
+        yield "every bearing is given by constant numbers: temperature changes nothing here, and speed only what is gyroscopic"
+
+
+def _constant(b: LinearBearing) -> bool:
+    return len(b.temperature) * len(b.speed) == 1
+
+
+OF_BEARINGS: tuple[Callable[[Looked], Iterator[str]], ...] = (_loose, _same_place, _contacts, _angles, _soft, _preload, _pressed, _pushed, _sense, _tables)
