@@ -22,7 +22,7 @@ from thermospindle.diagnosis.inference.prior import CHANGING, steady, undrifted
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.inference.remainder import Overlap
 from thermospindle.diagnosis.inference.screening import Screened, linearised, screen
-from thermospindle.diagnosis.inference.search import Search, _other_ways, _without_what_does_nothing, search
+from thermospindle.diagnosis.inference.search import Search, _from_the_drawing, _other_ways, _without_what_does_nothing, search
 from thermospindle.diagnosis.inference.singles import HIDING, Singles, cost_of, lasting
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
@@ -146,6 +146,44 @@ def test_a_way_that_promised_next_to_nothing_is_not_followed(spindle):
             patch.setattr("thermospindle.diagnosis.inference.search.fitted", followed)
             _other_ways(model, [best], [first, second, third], replace(tried, early=early), 1)
         assert asked == ways
+
+
+def test_ways_are_asked_of_what_is_needed(spindle, monkeypatch):
+    """Of a preload that was lost, with or without a gain beside it that does nothing: not those of an explanation that an effect less does as well as, nor, where it is needed, of an effect of no size.
+    A third of a diagnosis went into these."""
+    preload, gain = (variants(effect(name)) for name in ("preload_loss", "sensor_gain"))
+    model = model_of(spindle, mode_campaign(spindle, TESTS[:2], 3, [(preload[0].effect, preload[0].effect.typical())]))
+    hypotheses = []
+    for mechanisms in ([preload[0]], [preload[0], gain[0]]):
+        own = fit(model, mechanisms)
+        hypotheses.append(Hypothesis(own, evidence(model, own)))
+    alone, both = hypotheses
+    assert both.idle == (False, True)
+    asked: list[tuple[str, ...]] = []
+
+    def followed(model, tasks, *rest, **kind):
+        asked.extend(tuple(m.name for m, o in zip(task.mechanisms, both.mechanisms, strict=False) if m.choices != o.choices) for task in tasks)
+        return []
+
+    monkeypatch.setattr("thermospindle.diagnosis.inference.search.fitted", followed)
+    tried = Singles([alone], (), np.inf, steady(alone.evidence.learned))
+    for gained in (1.0, 20.0):
+        asked.clear()
+        late = replace(both, evidence=replace(both.evidence, ln=alone.evidence.ln + gained))
+        _other_ways(model, [alone, late], [*preload, *gain], tried, 1)
+        assert asked == [("preload_loss",)] * (len(preload) - 1)
+
+
+def test_a_shape_in_a_valley_of_its_own_is_fitted_from_the_drawing(spindle):
+    """A disk whose radius was fitted beside tolerances that were dragged away with it."""
+    disk = variants(effect("added_disk"))[0]
+    model = model_of(spindle, mode_campaign(spindle, TESTS[:2], 3, [(disk.effect, disk.values(3.0, [q.neutral for q in disk.shape]))]))
+    found = fit(model, [disk])
+    h = Hypothesis(found, evidence(model, found))
+    assert _from_the_drawing(model, h) is h
+    away = np.concatenate([found.nuisance + 3.0, found.point[len(found.nuisance) :]])
+    stalled = Hypothesis(replace(found, point=away, cost=found.cost + 80.0), replace(h.evidence, ln=h.evidence.ln - 40.0))
+    assert _from_the_drawing(model, stalled).evidence.ln == pytest.approx(h.evidence.ln, abs=1.0)
 
 
 def test_a_model_without_effects_that_stalled_is_fitted_from_one_whose_effect_does_nothing(spindle):
