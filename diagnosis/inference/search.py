@@ -137,8 +137,7 @@ def _ended(model: CampaignModel, least: float, found: Sequence[Hypothesis], work
 def _at_the_end(model: CampaignModel, least: float, h: Hypothesis) -> Hypothesis:
     if h.mechanisms:  # without any it is settled
         h = settled(model, h)
-        if not h.free and any(m.shape for m in h.mechanisms):
-            h = max(h, _from_the_drawing(model, h), key=lambda h: h.evidence.ln)
+        h = _from_the_drawing(model, h) if not h.free and any(m.shape for m in h.mechanisms) else h
     return widened(model, h, least)
 
 
@@ -148,9 +147,10 @@ def _from_the_drawing(model: CampaignModel, h: Hypothesis) -> Hypothesis:
     own = h.fit.point[len(model.parameters) :]
     try:
         again = fit(model, h.mechanisms, np.concatenate([np.zeros(len(model.parameters)), own]), h.fit.rates, TEMPERS[-1:], h.evidence.learned, h.fit.moved)
+        found = Hypothesis(again, evidence(model, again))
     except FAILED:
         return h
-    return settled(model, Hypothesis(again, evidence(model, again))) if again.cost < h.fit.cost - LITTLE else h
+    return settled(model, found) if found.evidence.ln > h.evidence.ln + LITTLE and not found.evidence.rounded else h
 
 
 def _other_ways(model: CampaignModel, ranked: Sequence[Hypothesis], every: Sequence[Mechanism], tried: Singles, workers: int | None) -> list[Hypothesis]:
