@@ -34,7 +34,7 @@ BEYOND = 4  # polynomials of the next degrees, where what a block lacks shows fi
 LEFT_OUT, SCATTERING = 2, 3  # polynomials of the next degrees left out where a block tells the noise, and lines at least beyond them
 LACK_OF_FIT = 4.0  # standard deviations of a block's chi2, and of that of the next degrees alone, from which it is divided
 LINES_THAT_SCATTER = 50  # of an FRF at least, from whose neighbours its noise can be told
-RISES = (0, 2, 4)  # powers of frequency in which noise of largest is told: a hammer's force falls, and noise over it rises
+RISES = (0, 2, 4)  # powers of frequency in which the variance of noise of largest is told: a hammer's force falls, and noise over it rises; a displacement's differentiated twice is the last, from the first line on
 CHANGED = 1.5  # times the step before, from which lines are another piece
 FALLS = (2, 4)  # powers of 1/frequency in which the variance of an accelerometer's noise falls, as a velocity's and a displacement's
 USUAL, WIDE = (1e-3, 1e-6), (1e-12, 1e-14)  # of the mean square, that count as such: of noise that is much the same over the band, and of one that falls
@@ -101,12 +101,12 @@ def line_data(test: Test, condition: Condition, stated: Noise | None, expected: 
     sd = np.maximum(sd, least)
     falling = _falls(value, sd, damped, frequency)
     if falling is not None:
-        sd = np.maximum(sd, _smooth_sd(value, scatter(value) / np.sqrt(neighbours(damped)), falling))
+        sd = np.maximum(sd, _smooth_sd(value, scatter(value) / np.sqrt(neighbours(damped)), frequency, falling))
     known, blocks = sd if noise_from in KNOWN else None, _blocks(value, sd, damped, gaps)
-    seen = _within_blocks(value, blocks, damped, falling)
+    seen = _within_blocks(value, blocks, damped, frequency, falling)
     if seen is None and len(frequency) > LINES_THAT_SCATTER:  # noise stated too small divides every block to single lines
-        blocks = _blocks(value, np.maximum(sd, _smooth_sd(value, scatter(value) / np.sqrt(neighbours(damped)), falling)), damped, gaps)
-        seen = _within_blocks(value, blocks, damped, falling)
+        blocks = _blocks(value, np.maximum(sd, _smooth_sd(value, scatter(value) / np.sqrt(neighbours(damped)), frequency, falling)), damped, gaps)
+        seen = _within_blocks(value, blocks, damped, frequency, falling)
     for _ in range(2):
         if seen is None:
             break
@@ -117,20 +117,20 @@ def line_data(test: Test, condition: Condition, stated: Noise | None, expected: 
         sd = sd_seen if known is None else np.maximum(known, sd_seen)
         noise_from = SCATTER if known is None else noise_from
         blocks = _blocks(value, sd, damped, gaps)
-        seen = _within_blocks(value, blocks, damped, falling)
+        seen = _within_blocks(value, blocks, damped, frequency, falling)
     at, kept, error = _compressed(frequency, value, sd, blocks, damped)
     return LineData(test, condition, at, kept, error, frf.quantity, noise_from, len(frequency))
 
 
 def _noise(frf: Frf, value: ComplexArray, use, stated: Noise | None, expected: Noise, damped: float) -> tuple[Array, str]:
     if frf.sd is not None and np.all(np.isfinite(frf.sd)):
-        return _smooth_sd(value, frf.sd[:, :, use]), REPEATS
+        return _smooth_sd(value, frf.sd[:, :, use], frf.frequency[use]), REPEATS
     if stated is not None:
         return noise_model(value, stated.of_value, stated.of_largest), CAMPAIGN
     seen = scatter(value) if value.shape[-1] > LINES_THAT_SCATTER else None
     if seen is None:
         return noise_model(value, expected.of_value, expected.of_largest), "the scene's measuring accuracy"
-    return _smooth_sd(value, seen / np.sqrt(neighbours(damped))), SCATTER
+    return _smooth_sd(value, seen / np.sqrt(neighbours(damped)), frf.frequency[use]), SCATTER
 
 
 def _falls(value: ComplexArray, sd: Array, damped: float, frequency: Array) -> Array | None:
@@ -144,10 +144,10 @@ def _falls(value: ComplexArray, sd: Array, damped: float, frequency: Array) -> A
     return np.array([(frequency[0] / frequency) ** power for power in FALLS]) if steep else None
 
 
-def _smooth_sd(value: ComplexArray, sd: Array, falling: Array | None = None) -> Array:
+def _smooth_sd(value: ComplexArray, sd: Array, frequency: Array, falling: Array | None = None) -> Array:
     """The noise of value and of largest, rising with frequency and, where given, of the shapes `falling`, that the standard errors `sd` of single lines
     follow, FRF by FRF; few hits scatter them."""
-    size, shapes = np.abs(value), _shapes(sd.shape[2], falling)
+    size, shapes = np.abs(value), _shapes(frequency, falling)
     largest = size.max(axis=(0, 2))
     smooth = np.empty_like(sd)
     for i, j in np.ndindex(*sd.shape[:2]):
@@ -163,9 +163,9 @@ def _confirmed(known: Array, seen: Array) -> bool:
     return bool(max(np.sqrt(np.mean(part)) for part in parts) < CONFIRMED)
 
 
-def _shapes(n: int, falling: Array | None) -> Array:
+def _shapes(frequency: Array, falling: Array | None) -> Array:
     """Shapes (shapes, n) over the lines of a noise of largest: level, rising, and `falling` where given."""
-    rising = np.linspace(0, 1, n) ** np.array(RISES)[:, None]
+    rising = (frequency / frequency[-1]) ** np.array(RISES)[:, None]
     return rising if falling is None else np.concatenate([rising, falling])
 
 
@@ -211,11 +211,11 @@ def _lacking(squares: Array, mean: float, variance: float) -> bool:
     return float(squares.sum()) > mean + LACK_OF_FIT * np.sqrt(variance)
 
 
-def _within_blocks(value: ComplexArray, blocks: list[tuple[int, int]], damped: float, falling: Array | None = None) -> Array | None:
+def _within_blocks(value: ComplexArray, blocks: list[tuple[int, int]], damped: float, frequency: Array, falling: Array | None = None) -> Array | None:
     """Noise variances (n_resp, n_ref, n) from what the polynomials of all blocks leave, as shares of |H|^2 and of the largest |H|^2 to that
     hammer, reference by reference; none of an FRF that is silent. None where too few degrees of freedom are left."""
     size = np.abs(value) ** 2
-    shapes = _shapes(size.shape[-1], falling)
+    shapes = _shapes(frequency, falling)
     variance = np.zeros(size.shape)
     heard = size.max(axis=-1) > SILENT**2 * size.max()
     for j in np.flatnonzero(heard.any(axis=0)):
