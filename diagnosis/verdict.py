@@ -10,7 +10,6 @@ import numpy as np
 
 from thermospindle.diagnosis.data.lines import line_data
 from thermospindle.diagnosis.data.mode_table import TestData, mode_data
-from thermospindle.diagnosis.data.observe import condition_of
 from thermospindle.diagnosis.decision.verdict import Verdict, decide
 from thermospindle.diagnosis.forward.making import campaign_model, expected_noise
 from thermospindle.diagnosis.forward.mechanism import Mechanism, strongest, unmoved, variants
@@ -25,7 +24,7 @@ from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.parallel import in_parallel, packed, unpacked
 from thermospindle.model.types import Array
 from thermospindle.sim.campaign.beside import check_points
-from thermospindle.sim.campaign.campaign import Campaign, Noise, Test
+from thermospindle.sim.campaign.campaign import Campaign, Noise, Test, condition_of
 from thermospindle.sim.effects import CATALOGUE, of_scene, usable
 from thermospindle.sim.effects.effect import Effect
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from thermospindle.diagnosis.data.lines import line_data
 from thermospindle.diagnosis.data.mode_table import mode_data
-from thermospindle.diagnosis.data.observe import condition_of
 from thermospindle.diagnosis.forward import nuisance
 from thermospindle.diagnosis.forward.making import campaign_model, expected_noise
 from thermospindle.diagnosis.forward.model import CampaignModel
@@ -17,7 +16,7 @@ from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array, ComplexArray
-from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Noise, Test
+from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Noise, Test, condition_of
 from thermospindle.sim.effects import CATALOGUE, of_scene
 from thermospindle.sim.effects.effect import Effect, Values
 from thermospindle.sim.identification.frf import POWER, Frf

@@ -101,11 +101,11 @@ def line_data(test: Test, condition: Condition, stated: Noise | None, expected: 
     sd = np.maximum(sd, least)
     falling = _falls(value, sd, damped, frequency)
     if falling is not None:
-        sd = np.maximum(sd, _smooth_sd(value, scatter(value) / np.sqrt(neighbours(damped)), frequency, falling))
+        sd = np.maximum(sd, _smooth_sd(value, _scatter(value, damped), frequency, falling))
     known, blocks = sd if noise_from in KNOWN else None, _blocks(value, sd, damped, gaps)
     seen = _within_blocks(value, blocks, damped, frequency, falling)
     if seen is None and len(frequency) > LINES_THAT_SCATTER:  # noise stated too small divides every block to single lines
-        blocks = _blocks(value, np.maximum(sd, _smooth_sd(value, scatter(value) / np.sqrt(neighbours(damped)), frequency, falling)), damped, gaps)
+        blocks = _blocks(value, np.maximum(sd, _smooth_sd(value, _scatter(value, damped), frequency, falling)), damped, gaps)
         seen = _within_blocks(value, blocks, damped, frequency, falling)
     for _ in range(2):
         if seen is None:
@@ -127,10 +127,14 @@ def _noise(frf: Frf, value: ComplexArray, use, stated: Noise | None, expected: N
         return _smooth_sd(value, frf.sd[:, :, use], frf.frequency[use]), REPEATS
     if stated is not None:
         return noise_model(value, stated.of_value, stated.of_largest), CAMPAIGN
-    seen = scatter(value) if value.shape[-1] > LINES_THAT_SCATTER else None
-    if seen is None:
+    if value.shape[-1] <= LINES_THAT_SCATTER:
         return noise_model(value, expected.of_value, expected.of_largest), "the scene's measuring accuracy"
-    return _smooth_sd(value, seen / np.sqrt(neighbours(damped)), frf.frequency[use]), SCATTER
+    return _smooth_sd(value, _scatter(value, damped), frf.frequency[use]), SCATTER
+
+
+def _scatter(value: ComplexArray, damped: float) -> Array:
+    """Standard errors (n_resp, n_ref, n) of single lines by their neighbours', whose noise a window makes alike."""
+    return np.asarray(scatter(value) / np.sqrt(neighbours(damped)))
 
 
 def _falls(value: ComplexArray, sd: Array, damped: float, frequency: Array) -> Array | None:
@@ -139,7 +143,7 @@ def _falls(value: ComplexArray, sd: Array, damped: float, frequency: Array) -> A
     low = frequency <= (1 - LOW[0]) * frequency[0] + LOW[0] * frequency[-1]
     if low.sum() < LOW[1]:
         return None
-    seen = scatter(value) / np.sqrt(neighbours(damped)) / sd
+    seen = _scatter(value, damped) / sd
     steep = np.median(seen[..., low]) > 2 * np.median(seen[..., ~low])
     return np.array([(frequency[0] / frequency) ** power for power in FALLS]) if steep else None
 

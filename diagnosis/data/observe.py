@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.parallel import in_parallel
 from thermospindle.model.types import Array, ComplexArray
-from thermospindle.sim.campaign.campaign import Campaign, Noise, Test
+from thermospindle.sim.campaign.campaign import Campaign, Noise, Test, condition_of
 from thermospindle.sim.identification.frf import out_of, without
 from thermospindle.sim.identification.modal import noise_model
 from thermospindle.sim.identification.pairing import REPEATED, ModeSet, pairs
@@ -106,11 +106,6 @@ def _only(o: Observation, kept: NDArray[np.bool_]) -> Observation:
         residue=o.residue[kept],
         residue_sd=o.residue_sd[kept],
     )
-
-
-def condition_of(test: Test) -> Condition:
-    soak = np.inf if test.soak_time is None else test.soak_time
-    return Condition(test.temperature, test.speed, test.level or 0.0, soak)
 
 
 def _from_frf(test: Test, noise: Noise) -> Observation:

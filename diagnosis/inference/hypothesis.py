@@ -93,13 +93,17 @@ def _fit_one(model: CampaignModel, rates, tempers, most: float, expected: Learne
         found = fit(model, mechanisms, starts, rates, tempers, learned=prior, beaten=beaten)
         reached = Hypothesis(found, evidence(model, found))
         if found.temper == 1.0 and (found.cost > most + LITTLE or reached.evidence.ln < task.hoped - LITTLE):
-            loose = np.concatenate([np.zeros(len(model.parameters)), task.starts[0][len(model.parameters) :]])
-            again = fit(model, mechanisms, loose, rates, TEMPERS[1:], learned=prior, beaten=beaten)
+            again = fit(model, mechanisms, as_drawn(model, task.starts[0]), rates, TEMPERS[1:], learned=prior, beaten=beaten)
             if again.cost < found.cost:
                 reached = Hypothesis(again, evidence(model, again))
         return None if reached.evidence.rounded else reached
     except FAILED:
         return None
+
+
+def as_drawn(model: CampaignModel, point: Array) -> Array:
+    """A parameter vector (n,) with nothing off its drawing, and its mechanisms as they are."""
+    return np.concatenate([np.zeros(len(model.parameters)), point[len(model.parameters) :]])
 
 
 def scan(model: CampaignModel, mechanisms: Sequence[Mechanism]) -> tuple[Array, ...]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.fit import TEMPERS
 from thermospindle.diagnosis.inference.hypothesis import DEPARTS, LITTLE, PLENTY, Hypothesis, Task, fitted, scan
 from thermospindle.diagnosis.inference.prior import Learned, undrifted
-from thermospindle.diagnosis.inference.screening import screen
+from thermospindle.diagnosis.inference.screening import Screened, screen
 from thermospindle.diagnosis.inference.singles import (
     CLOSE,
     FAR,
@@ -68,7 +69,7 @@ def joined_early(
     for lead in of_each_name([h for h in tried.early if not h.free])[:LEADS]:
         others = [m for m in mechanisms if m.name not in lead.names]
         looked = screen(model.thinned, lead.fit, lead.fit.temper, none.evidence.learned, others, workers)
-        for s in (s for kind in MOST for s in promising(looked, kind)[:SECONDS] if s.gain > LITTLE):
+        for s in _seconds(looked, lambda kind: LITTLE):
             task = task_of(lead.mechanisms, lead.fit, s, -np.inf, far=True)
             found.setdefault(with_laws(task.mechanisms), (lead.evidence.ln + s.gain, task))
     chosen = [task for _, task in sorted(found.values(), key=lambda t: -t[0])[:PAIRS]]
@@ -119,6 +120,11 @@ def _asked(lead: Hypothesis, kind: str) -> float:
     return max(ASKED[kind], ENOUGH) if len(lead.mechanisms) > 1 else ASKED[kind]
 
 
+def _seconds(looked: Sequence[Screened], asked: Callable[[str], float]) -> list[Screened]:
+    """Of each kind the most promising, as far as they promise more than is `asked` of the kind."""
+    return [s for kind in MOST for s in promising(looked, kind)[:SECONDS] if s.gain > asked(kind)]
+
+
 def _beside(model, leads: Sequence[Hypothesis], mechanisms: Sequence[Mechanism], most: float, expected: Learned, workers) -> list[Hypothesis]:
     """One mechanism more, beside each of the `leads`: of the catalogue, and free beside what is not free or free alone."""
     tasks, done = [], set()
@@ -126,12 +132,11 @@ def _beside(model, leads: Sequence[Hypothesis], mechanisms: Sequence[Mechanism],
         drifts = all(m.free for m in lead.mechanisms)
         others = [m for m in mechanisms if m.name not in lead.names and not (m.free and lead.free and not drifts)]
         looked = screen(model, lead.fit, 1.0, undrifted(lead.evidence.learned), others, workers)
-        for kind in MOST:
-            for s in [s for s in promising(looked, kind) if s.gain > _asked(lead, kind)][:SECONDS]:
-                whole = with_laws((s.mechanism, *lead.mechanisms))
-                if whole not in done:
-                    done.add(whole)
-                    tasks.append((lead.evidence.ln + s.gain, task_of(lead.mechanisms, lead.fit, s, lead.evidence.ln - OCCAM, far=True)))
+        for s in _seconds(looked, partial(_asked, lead)):
+            whole = with_laws((s.mechanism, *lead.mechanisms))
+            if whole not in done:
+                done.add(whole)
+                tasks.append((lead.evidence.ln + s.gain, task_of(lead.mechanisms, lead.fit, s, lead.evidence.ln - OCCAM, far=True)))
     chosen = [task for _, task in sorted(tasks, key=lambda t: -t[0])[:PAIRS]]
     if not chosen:
         return []

@@ -14,8 +14,8 @@ from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, fit
 from thermospindle.diagnosis.inference.freeform import alike, runs_against
-from thermospindle.diagnosis.inference.hypothesis import LITTLE, PLENTY, STRAIN, Hypothesis, Task, fitted, settled, widened
-from thermospindle.diagnosis.inference.pairs import exchanged, joined, joined_early, without_one
+from thermospindle.diagnosis.inference.hypothesis import LITTLE, PLENTY, STRAIN, Hypothesis, Task, as_drawn, fitted, settled, widened
+from thermospindle.diagnosis.inference.pairs import ENOUGH, exchanged, joined, joined_early, without_one
 from thermospindle.diagnosis.inference.resonance import with_resonance
 from thermospindle.diagnosis.inference.screening import Screened
 from thermospindle.diagnosis.inference.singles import (
@@ -35,7 +35,7 @@ from thermospindle.model.types import Array
 FINALISTS = {1: 3, 2: 2, 3: 1}  # explanations of one, two and three mechanisms that are fitted anew at the end, of the catalogue and free
 NEAR = 100.0  # ln evidence behind the best, so far
 UNLIKELY = 5.0  # ln evidence behind the best, of a way to act that need not be told
-GAINED = {2: 5.0, 3: PLENTY}  # ln evidence of a second, and of a third, of which other ways are asked: an effect that is not needed has no way
+GAINED = {2: ENOUGH, 3: PLENTY}  # ln evidence of a second, and of a third, of which other ways are asked: an effect that is not needed has no way
 RIVALS = 3  # explanations of which other ways are asked, at most: each shares its prior among all that its effects have
 WAYS = 8  # in which an effect of these may act too, at most, those that screening promises most of
 
@@ -144,9 +144,8 @@ def _at_the_end(model: CampaignModel, least: float, h: Hypothesis) -> Hypothesis
 def _from_the_drawing(model: CampaignModel, h: Hypothesis) -> Hypothesis:
     """Once more with no tolerance off its drawing: a shape that went where tolerances were strained may lie in a valley of its own, where these hold it. A disk of 3 g and 12.5 mm was found as one
     of 3.9 +- 0.02 g and 15 mm, 80 in chi2 behind."""
-    own = h.fit.point[len(model.parameters) :]
     try:
-        again = fit(model, h.mechanisms, np.concatenate([np.zeros(len(model.parameters)), own]), h.fit.rates, TEMPERS[-1:], h.evidence.learned, h.fit.moved)
+        again = fit(model, h.mechanisms, as_drawn(model, h.fit.point), h.fit.rates, TEMPERS[-1:], h.evidence.learned, h.fit.moved)
         found = Hypothesis(again, evidence(model, again))
     except FAILED:
         return h

@@ -22,7 +22,7 @@ from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit
 from thermospindle.diagnosis.inference.freeform import as_told_by
-from thermospindle.diagnosis.inference.hypothesis import EARLY, LITTLE, PLENTY, STRAIN, Hypothesis, Task, fitted, scan
+from thermospindle.diagnosis.inference.hypothesis import EARLY, LITTLE, PLENTY, STRAIN, Hypothesis, Task, as_drawn, fitted, scan
 from thermospindle.diagnosis.inference.prior import CHANGING, Learned, steady, undrifted
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.inference.resonance import with_more
@@ -152,7 +152,7 @@ def lasting(
     off = max((abs(float(v)) for q, v in zip(model.parameters, lead.evidence.mean, strict=False) if q.kind == kinds_of.BUILD), default=0.0)
     if lead.evidence.learned.sizes.get(kinds_of.STIFFNESS, 0.0) < HIDING and off < STRAINED:
         return []
-    own = np.concatenate([np.zeros(n), lead.fit.point[n:]])
+    own = as_drawn(model, lead.fit.point)
     drawn = {m.name: m for m in reversed(mechanisms) if m.lasting and m.kind == "law" and m.name not in lead.names}
     tasks = [
         Task((*lead.mechanisms, m), tuple(np.concatenate([own, at[n:]]) for at in scan(model, (m,))[1:]), -np.inf) for m in drawn.values()

@@ -13,12 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from thermospindle.diagnosis.data.observe import condition_of
 from thermospindle.model.bearing.kinematics import Kinematics, Line, lines, row_kinematics
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array, ComplexArray
-from thermospindle.sim.campaign.campaign import Campaign, Test
+from thermospindle.sim.campaign.campaign import Campaign, Test, condition_of
 from thermospindle.sim.campaign.runout_record import WINDOWS, RunoutRecord
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.running.lines import fit

@@ -12,7 +12,7 @@ from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
 
 ALIKE = 1e-6
-"""Of the radial stiffness, by which directions across the axis differ where they differ."""
+"""Of a stiffness across the axis, within which two directions are one."""
 
 
 class ByDirection:

@@ -12,14 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from thermospindle.model.bearing.state import ALIKE
 from thermospindle.model.machine import Point, Spindle
 from thermospindle.model.rotor.chain import Element, RotorBase, element_rows, matrices, point_row
 from thermospindle.model.types import Array
 
 FREE = 1e-12
 """Of the largest eigenvalue of M^-1/2 K M^-1/2: what is below is a motion that nothing resists."""
-ALIKE = 1e-6
-"""Of a stiffness, within which two directions are one."""
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import numpy as np
 from thermospindle.diagnosis.compare.before_after import held_out
 from thermospindle.diagnosis.compare.compare import TestComparison, compare, rms_residual
 from thermospindle.diagnosis.compare.fit import Fitted, Free, fit
-from thermospindle.diagnosis.data.observe import Observation, condition_of, observe
+from thermospindle.diagnosis.data.observe import Observation, observe
 from thermospindle.diagnosis.forward.mechanism import REFERENCE_WIDTH
 from thermospindle.diagnosis.runout.lines import modal_tests
 from thermospindle.model.built.tolerance import Toleranced, deviated, toleranced
@@ -27,7 +27,7 @@ from thermospindle.model.types import Array, ComplexArray
 from thermospindle.model.units import RPM
 from thermospindle.report.workbench.state import FURTHEST, Setting, key_of, set_named
 from thermospindle.sim.campaign.beside import beside
-from thermospindle.sim.campaign.campaign import Campaign, Test, read_campaign
+from thermospindle.sim.campaign.campaign import Campaign, Test, condition_of, read_campaign
 from thermospindle.sim.effects import usable
 from thermospindle.sim.effects.effect import HOOKS, Effect
 from thermospindle.sim.effects.known import equipped

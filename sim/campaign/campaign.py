@@ -20,7 +20,7 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.files.cells import cells, name_of
 from thermospindle.model.files.formats import CAMPAIGN, CURRENT, KEY
 from thermospindle.model.files.whole import whole
-from thermospindle.model.machine import Point
+from thermospindle.model.machine import Condition, Point
 from thermospindle.model.scene.fields import first_error, read_file
 from thermospindle.model.units import MINUTE, MM, RPM
 from thermospindle.sim.campaign.form import MODE_COLUMNS, ModeTable, checked, in_unit, toml
@@ -92,6 +92,11 @@ class Campaign:
 
 
 # ---------------------------------------------------------------- reading
+
+
+def condition_of(test: Test) -> Condition:
+    """A test's condition: of no stated level the light tap, of no stated time in the chamber long enough."""
+    return Condition(test.temperature, test.speed, test.level or 0.0, np.inf if test.soak_time is None else test.soak_time)
 
 
 def read_campaign(folder: Path, limits: Limits = LIMITS) -> Campaign:

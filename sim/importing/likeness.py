@@ -13,10 +13,10 @@ from itertools import combinations
 import numpy as np
 
 from thermospindle.model.errors import BadInput, NoEquilibrium, OutsideRange
-from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.machine import Spindle
 from thermospindle.model.types import Array
 from thermospindle.sim.campaign.beside import beside, check_points
-from thermospindle.sim.campaign.campaign import Campaign, Test
+from thermospindle.sim.campaign.campaign import Campaign, Test, condition_of
 
 FACTORS = {
     1e3: "millimetres told as metres, or kilonewtons as newtons",
@@ -68,7 +68,7 @@ def likenesses(spindle: Spindle, campaign: Campaign) -> list[str]:
 
 def _pairs(spindle: Spindle, campaign: Campaign, test: Test) -> list[Pair]:
     """The FRFs of a test at some of its lines; none of a table of modes, or where the model has no answer."""
-    own = beside(spindle, campaign.points, test, Condition(test.temperature, test.speed, test.level or 0.0, np.inf if test.soak_time is None else test.soak_time))
+    own = beside(spindle, campaign.points, test, condition_of(test))
     if own is None or not len(own.measured.frequency):
         return []
     step = -(-len(own.measured.frequency) // MOST_LINES)

@@ -11,9 +11,9 @@ import pytest
 from tests.conftest import SCENE
 from thermospindle.cli import main
 from thermospindle.diagnosis.data.lines import line_data
-from thermospindle.diagnosis.data.observe import condition_of, observe
+from thermospindle.diagnosis.data.observe import observe
 from thermospindle.model.machine import Condition
-from thermospindle.sim.campaign.campaign import Campaign, Noise, Test, write_campaign
+from thermospindle.sim.campaign.campaign import Campaign, Noise, Test, condition_of, write_campaign
 from thermospindle.sim.identification.frf import Frf, out_of, without
 from thermospindle.sim.identification.modal import noise_model
 from thermospindle.sim.identification.running_lines import RunningLines
