@@ -36,17 +36,18 @@ def progress_bar(steps: int) -> Iterator[Callable[[str], None]]:
 def plain_lines(steps: int | None = None) -> Iterator[Callable[[str], None]]:
     """The same in lines, told at their times however long a step takes; without `steps` where nobody knows how many there will be."""
     began, done, last = time.monotonic(), 0, "starting"
+    needed = 0.0  # for what has been done
     ended = threading.Event()
 
     def told(what: str) -> None:
-        nonlocal done, last
-        done, last = done + 1, what
+        nonlocal done, last, needed
+        done, last, needed = done + 1, what, time.monotonic() - began
 
     def tell() -> None:
         wait = FIRST
         while not ended.wait(wait) and sys.stderr is not None:  # closed by the caller: `print` would take standard output
             with suppress(OSError, ValueError):  # whoever read it has gone
-                print(_line(time.monotonic() - began, done, steps, last), file=sys.stderr, flush=True)
+                print(_line(time.monotonic() - began, needed, done, steps, last), file=sys.stderr, flush=True)
             wait = EVERY
 
     teller = threading.Thread(target=tell, daemon=True)
@@ -58,10 +59,15 @@ def plain_lines(steps: int | None = None) -> Iterator[Callable[[str], None]]:
         teller.join()
 
 
-def _line(seconds: float, done: int, steps: int | None, last: str) -> str:
+def _line(seconds: float, needed: float, done: int, steps: int | None, last: str) -> str:
+    """What has been done after `seconds`, of which the steps that have ended `needed` so many; a step that takes longer than those leaves at least what they foretell of the others."""
     if steps is None:
         return f"{_duration(seconds)}: {visible(last)}"
-    left = f", about {_duration(seconds / done * (steps - done))} left" if 0 < done < steps else ""
+    left = ""
+    if 0 < done < steps:
+        each, late = needed / done, seconds - needed
+        others = each * (steps - done - 1)
+        left = f", about {_duration(others + each - late)} left" if late < each else f", more than {_duration(others)} left" if others else ", the last one takes longer"
     return f"{_duration(seconds)}: {min(done, steps)} of {steps} steps done{left}; last: {visible(last)}"
 
 
