@@ -85,8 +85,11 @@ def read(
     curves = {test: [_with(x, coherence.get(test, {})) for x in every] for test, every in curves.items()}
     groups, open_records = _records(contents, settings)
     questions += open_records
+    measured = scene.hammer.band if scene is not None and form.band_Hz is None and form.records.band_Hz is None else None
+    if groups and scene is not None and measured:
+        notes.append(f"time records: kept from {measured[0]:g} to {measured[1]:g} Hz, where the hammer test of {scene.name} is; band_Hz under [records] keeps another band")
     for (test, label), group in groups.items():
-        made = frfs_of(group, label, form.records)
+        made = frfs_of(group, label, form.records, measured)
         notes += made.notes
         questions += made.questions
         curves.setdefault(test, []).extend(made.curves)

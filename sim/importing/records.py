@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from thermospindle.model.errors import BadInput
 from thermospindle.model.types import Array
 from thermospindle.sim.hammer.estimate import Windows, estimate
 from thermospindle.sim.hammer.pulse import PRE_TRIGGER
@@ -57,8 +58,13 @@ class FromRecords:
     pretrigger: float = 0.0
 
 
-def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form: RecordForm) -> FromRecords:
-    """The FRFs of all records that one hammer point made, each file with its force and responses."""
+def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form: RecordForm, measured: tuple[float, float] | None = None) -> FromRecords:
+    """The FRFs of all records that one hammer point made, each file with its force and responses; where `form` has no band, within the one that the scene is `measured` in (Hz).
+
+    Raises `BadInput` for a sample that is no number.
+    """
+    for path, motions in files:
+        _check_numbers(path, motions)
     notes: list[str] = []
     every = ", ".join(dict.fromkeys(path.name for path, _ in files))
     name = listed(every.split(", "))
@@ -92,7 +98,7 @@ def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form
     response: Array = np.array([[h.response[:, :n] for h in good]]) * np.array(scales[1:])[:, None]
     end = form.exponential_end or _needed(response)
     decay = -np.log(end) / (n * step)
-    band = (form.band_Hz[0], form.band_Hz[1]) if form.band_Hz else _band(force, step)
+    band = (form.band_Hz[0], form.band_Hz[1]) if form.band_Hz else _within(_band(force, step), measured)
     contact = max(_contact(f, step) for f in force[0])
     windows = Windows(contact + 1e-3, float(decay))
     found = estimate(step * np.arange(float(n)), force, response, windows, band, tuple(range(len(ends))), (0,))
@@ -139,6 +145,17 @@ def _scales(motions: Sequence[Motion]) -> list[float] | None:
     force = units.of_force(next(m for m in motions if m.force).unit)
     told = [units.of_response(m.unit) for m in motions if not m.force]
     return None if force is None or None in told else [force, *(t[1] for t in told if t is not None)]
+
+
+def _check_numbers(path: Path, motions: Sequence[Motion]) -> None:
+    """`BadInput` for the first sample that is no number, of which one makes a whole spectrum none."""
+    for m in motions:
+        wrong = np.argwhere(~np.isfinite(m.value))
+        if len(wrong):
+            row, sample = wrong[0]
+            hit = f" of row {row + 1}" if len(m.value) > 1 else ""
+            more = f", and {len(wrong) - 1} more of it are none either" if len(wrong) > 1 else ""
+            raise BadInput(f"{path}: {m.where}: sample {sample + 1}{hit} is {m.value[row, sample]:g}, which is no number{more}; take the hit out of the file, or export it again")
 
 
 def _hits(path: Path, motions: Sequence[Motion], step: float, form: RecordForm) -> tuple[list[Hit], list[str]]:
@@ -251,6 +268,12 @@ def _band(force: Array, step: float) -> tuple[float, float]:
     fallen = np.flatnonzero((spectrum < REACH * spectrum.max()) & (np.arange(len(spectrum)) > np.argmax(spectrum)))
     high = frequency[fallen[0]] if len(fallen) else frequency[-1]
     return float(frequency[2]), float(min(high, 0.4 / step))
+
+
+def _within(excited: tuple[float, float], measured: tuple[float, float] | None) -> tuple[float, float]:
+    """What the hammer excites of the band that the scene is measured in: what lies beyond has modes of its own, which the scene does not speak of; all of it where they share none."""
+    low, high = max(excited[0], measured[0]) if measured else excited[0], min(excited[1], measured[1]) if measured else excited[1]
+    return (low, high) if low < high else excited
 
 
 def _first(frf: Frf, hits: int) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.conftest import SCENE
 from thermospindle.model.errors import BadInput, Unanswered
 from thermospindle.report.verbs.importing import bring
 from thermospindle.sim.campaign.campaign import read_campaign
@@ -156,6 +157,37 @@ def test_a_hit_a_row_and_no_hit(tmp_path):
     test = read_campaign(tmp_path / "c").tests[0]
     model = exact(test.frf.frequency, test.window_decay)[:, :1]
     assert np.abs(test.frf.value - model).max() < 1e-3 * np.abs(model).max()
+
+
+@pytest.mark.parametrize(("told", "kept"), [("", (400.0, 6000.0)), ("[records]\nband_Hz = [100.0, 1000.0]\n", (100.0, 1000.0))], ids=["the scene's", "told"])
+def test_records_are_kept_in_the_band_that_the_scene_is_measured_in(tmp_path, told, kept):
+    """Where the mapping tells none, and said in one sentence; what lies beyond is poles that cost time and tell nothing of the scene."""
+    random = np.random.default_rng(5)
+    force, answer = zip(*(hit(random) for _ in range(4)), strict=True)
+    np.savez(tmp_path / "hammer1.npz", fs=RATE, force=np.array(force), velocity1=np.array(answer)[:, 0, 0], velocity2=np.array(answer)[:, 1, 0])
+    form = MAPPING.split("[[points]]", maxsplit=1)[0].replace('"rig"', '"hdd_2003"').replace(
+        'test = "T20"', 'test = "T20"\nreference = 1\ncolumns = { force = "force [N]", velocity1 = "velocity 1 [m/s]", velocity2 = "velocity 2 [m/s]" }', 1
+    )
+    (tmp_path / "m.toml").write_text(form + told)
+    answer = bring([tmp_path / "hammer1.npz"], mapping=tmp_path / "m.toml", scene=SCENE, out=tmp_path / "c")
+    frequency = read_campaign(tmp_path / "c").tests[0].frf.frequency
+    assert kept[0] <= frequency[0] < kept[0] + 2.0
+    assert frequency[-1] <= kept[1]
+    said = [n for n in answer.values["notes"] if "band_Hz under [records]" in n]
+    assert said == ([] if told else ["time records: kept from 400 to 6000 Hz, where the hammer test of hdd_2003 is; band_Hz under [records] keeps another band"])
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+def test_a_sample_that_is_no_number_is_named(tmp_path, wrong):
+    """By file, channel, hit and sample; it was told as a fault of the coherence of FRFs."""
+    force, answer = hit(np.random.default_rng(5))
+    forces, answers = np.array([force] * 3), np.array([answer[:, 0]] * 3)
+    answers[1, 1, 99:101] = wrong
+    np.savez(tmp_path / "hammer1.npz", fs=RATE, force=forces, velocity1=answers[:, 0], velocity2=answers[:, 1])
+    told = MAPPING.replace('test = "T20"', 'test = "T20"\nreference = 1\ncolumns = { force = "force [N]", velocity1 = "velocity 1 [m/s]", velocity2 = "velocity 2 [m/s]" }', 1)
+    (tmp_path / "m.toml").write_text(told)
+    with pytest.raises(BadInput, match=rf"hammer1\.npz: velocity2: sample 100 of row 2 is {wrong:g}, which is no number, and 1 more of it are none either"):
+        bring([tmp_path / "hammer1.npz"], mapping=tmp_path / "m.toml", out=tmp_path / "c")
 
 
 def test_what_records_leave_open_is_asked_at_once(tmp_path):
