@@ -31,6 +31,7 @@ from thermospindle.model.units import RPM
 from thermospindle.report.figures.diagnosis import errors, evidence_bars, explanations, law
 from thermospindle.report.page.diagnosis import sections, write_diagnosis
 from thermospindle.report.text.diagnosis.answer import diagnosis_json
+from thermospindle.report.text.diagnosis.doubts import doubt_words
 from thermospindle.report.text.diagnosis.granted import granted_words
 from thermospindle.report.text.diagnosis.words import _drift_words, law_words, show_diagnosis, value_words, would_change
 from thermospindle.report.text.runout_diagnosis import runout_diagnosis_json
@@ -111,6 +112,35 @@ def test_the_law_that_departs_is_told_where_something_drifts_beside_it(told):
     assert all(c.hypothesis is not accepted for c in v.candidates)
     [sentence] = law_words(replace(found, verdict=replace(v, accepted=accepted)))
     assert "The data do not have the law that soak_lag assumes" in sentence
+
+
+def test_what_speaks_against_a_name_is_said_beside_it(told, capsys):
+    """A bond was identified of which left-out tests were missed by 50.6 standard errors instead of 39.4, at -32 nm/N in one test, and no word told the reader to doubt."""
+    found, answer = told
+    v = found.verdict
+    [best] = v.candidates
+    limits = best.hypothesis.mechanisms[0].size.limits
+    own = best.hypothesis.evidence
+    tests = [t.test.id for t in found.search.model.tests]
+
+    def seen(after, sizes):
+        evidence = replace(own, sizes=(np.array(sizes),), size_covariance=(0.01 * np.eye(len(sizes)),))
+        verdict = replace(v, candidates=(replace(best, hypothesis=replace(best.hypothesis, evidence=evidence)),), held_out_before=39.4, held_out_after=after)
+        return doubt_words(replace(found, verdict=verdict))
+
+    inside = [0.0, 0.1, limits[0] - 0.15]
+    assert seen(38.0, inside) == seen(39.5, inside) == seen(np.nan, inside) == []
+    [against] = seen(50.6, inside)
+    assert against == "Tests that are left out speak against soak_lag: predicted from all others they are missed by 50.6 standard errors with it, by 39.4 without."
+    [beyond] = seen(38.0, [0.0, limits[0] - 0.5, 0.1])
+    assert beyond == f"Of soak_lag the data ask for a hub_share that is not physical: {limits[0] - 0.5:.2f} +- 0.10 in {tests[1]}; possible is {limits[0]:g} to {limits[1]:g}."
+    assert doubt_words(replace(found, verdict=replace(v, word="none", effects=(), held_out_before=1.0, held_out_after=2.0))) == []
+    doubted = answer | {"doubts": [against, beyond]}
+    show_diagnosis(Console(width=2000), doubted)
+    printed = capsys.readouterr().out
+    assert against in printed
+    assert beyond in printed
+    assert "speak against soak_lag" in dict(sections(found, doubted))["Verdict"]
 
 
 def test_what_a_test_would_show(told):

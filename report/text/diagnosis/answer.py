@@ -18,6 +18,7 @@ from thermospindle.diagnosis.inference.resonance import shown
 from thermospindle.diagnosis.verdict import Diagnosis, Drift
 from thermospindle.model.machine import Spindle
 from thermospindle.model.types import Array
+from thermospindle.report.text.diagnosis.doubts import doubt_words
 from thermospindle.report.text.diagnosis.granted import granted_words
 from thermospindle.report.text.diagnosis.words import condition, drift_words, law_words, would_change
 from thermospindle.report.typeset import known
@@ -40,6 +41,7 @@ def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
         "granted": granted_words(d, drawn),
         "would_change": would_change(d),
         "law_departs": law_words(d),
+        "doubts": doubt_words(d),
         "probability": {"none": v.probability_none, "unknown": v.probability_unknown},
         "expected_loss": dict(v.losses),
         "candidates": [_candidate(c, d) for c in v.candidates[:SHOWN]],

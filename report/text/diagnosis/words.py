@@ -151,7 +151,7 @@ def show_diagnosis(console: Console, answer: dict[str, Any], verbose: bool = Tru
     console.print(answer["reason"])
     if answer["granted"]:
         console.print(answer["granted"])
-    for sentence in answer["law_departs"]:
+    for sentence in (*answer["law_departs"], *answer["doubts"]):
         console.print(sentence)
     console.print(answer["would_change"])
     if answer["may_hide"]:
