@@ -22,7 +22,7 @@ from thermospindle.sim.effects.effect import Effect, called, fitted_to, refusal
 from thermospindle.sim.effects.own import OwnEffect
 
 if TYPE_CHECKING:
-    from thermospindle.diagnosis.answer import Answer
+    from thermospindle.diagnosis.answer import Answer, Offered
 
 
 @dataclass(frozen=True)
@@ -92,8 +92,8 @@ def new_scene(
         answer = read_answer(diagnosis)
         offered = offered_for(effects, answer, diagnosis)
         fitted = fitted_values(effects, offered, diagnosis)
-        build, note = _build_of(effects, answer, diagnosis, old, file)
-        note = "\n".join([*([note] if note else []), *(_lawless(e, answer, diagnosis) for e in effects if e.name in offered.lawless)])
+        build, note = _build_of(effects, answer, offered, diagnosis, old, file)
+        note = "\n".join([*_with_others(effects, answer, offered, diagnosis), *([note] if note else []), *(_lawless(e, answer, diagnosis) for e in effects if e.name in offered.lawless)])
     hand = _by_effect(effects, by_hand)
     added = tuple(_added(e, old, fitted.get(e.name, {}), hand[e.name], diagnosis) for e in effects)
     _write(file, effects, added, build, answer.tests if answer else (), f"fitted, from {diagnosis}", folder, out, catalogue)
@@ -202,7 +202,19 @@ def _lawless(effect: Effect, answer: Answer, diagnosis: Path) -> str:
     return f"the data have another law than {name} assumes, and {size} is its mean over the tests{drafts}"
 
 
-def _build_of(effects: Sequence[Effect], answer: Answer, diagnosis: Path, old: Spindle, file: Path) -> tuple[dict[str, float], str]:
+def _with_others(effects: Sequence[Effect], answer: Answer, offered: Offered, diagnosis: Path) -> list[str]:
+    """A sentence where values are those of effects together with others, or where others together with them are more probable."""
+    from thermospindle.diagnosis.answer import called_in
+
+    names = {called_in(answer, e) for e in effects}
+    what = " + ".join(n for n in offered.effects if n in names)
+    if names < set(offered.effects):
+        return [f"no explanation of {diagnosis} is {what} alone: values are those of {' + '.join(offered.effects)}, the most probable that has {'it' if len(names) == 1 else 'them'}"]
+    first = next((c for c in answer.candidates if names <= set(c.effects)), offered)
+    return [f"values are those of {what} alone; {' + '.join(first.effects)}, more probable in {diagnosis}, has others, for which add all of them at once"] if first is not offered else []
+
+
+def _build_of(effects: Sequence[Effect], answer: Answer, offered: Offered, diagnosis: Path, old: Spindle, file: Path) -> tuple[dict[str, float], str]:
     """Deviations of the new scene, none where it keeps those it has, and a word on them.
 
     A diagnosis of a scene that has deviations already found more of them, relative to those; one of the scene before (the second
@@ -213,9 +225,9 @@ def _build_of(effects: Sequence[Effect], answer: Answer, diagnosis: Path, old: S
     names = {called_in(answer, e) for e in effects}
     if not answer.build:
         return {}, f"{diagnosis} holds no tolerances: the build is the drawing's"
-    if not names <= set(answer.best):
+    if not names <= set(answer.best) or (offered.parameters and set(offered.effects) != set(answer.best)):
         beside = " + ".join(answer.best) or "no effect"
-        return {}, f"the tolerances of {diagnosis} were fitted beside {beside} and do not go with {' + '.join(sorted(names))}: left out"
+        return {}, f"the tolerances of {diagnosis} were fitted beside {beside} and do not go with {' + '.join(sorted(names))}{' alone' * (names < set(answer.best))}: left out"
     missing = set(answer.best) - names - {a.effect for a in old.effects}
     note = f"{len(answer.build)} build tolerances as fitted beside {' + '.join(answer.best)}"
     if missing:

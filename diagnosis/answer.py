@@ -98,9 +98,10 @@ def _finite(value: Any) -> float:
 
 
 def offered_for(effects: Sequence[Effect], answer: Answer, file: Path) -> Offered:
-    """The first candidate that has all these effects, or what drafted ones are of; of elements that drift the answer has no other values than a draft."""
+    """The candidate of these effects, or what drafted ones are of, and no others, else the first that has them all: beside another effect one has another size; of elements that drift the answer has no other values than a draft."""
     names = [called_in(answer, e) for e in effects]
-    found = next((c for c in answer.candidates if set(names) <= set(c.effects)), None)
+    having = [c for c in answer.candidates if set(names) <= set(c.effects)]
+    found = next((c for c in having if set(names) == set(c.effects)), having[0] if having else None)
     if found is None and all(e.drifts for e in effects) and set(names) <= set(answer.best):
         return Offered(tuple(names), {})
     if found is None:

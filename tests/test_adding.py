@@ -93,14 +93,14 @@ def diagnosis(tmp_path):
     return file
 
 
-def test_add_takes_fitted_values_from_the_first_candidate_with_the_effect(capsys, tmp_path, diagnosis):
+def test_add_takes_fitted_values_from_the_candidate_that_is_the_effect(capsys, tmp_path, diagnosis):
     arguments = ("add", SCENE, "bond_softening", "--from", diagnosis, "--set", "width=3", "--out", tmp_path / "b", "--json")
     found = answer(capsys, *arguments)
-    chosen = {"hot_compliance": 11.0, "transition": 47.0, "width": 3.0}  # the rest is typical
-    assert found["added"][0]["values"] == {"hot_compliance": 11.0, "cold_ratio": 4.75, "loss_factor": 0.04, "bearing": -1.0} | chosen
+    chosen = {"hot_compliance": 99.0, "width": 3.0}  # the rest is typical
+    assert found["added"][0]["values"] == {"transition": 50.0, "cold_ratio": 4.75, "loss_factor": 0.04, "bearing": -1.0} | chosen
     said = load(tmp_path / "b").provenance["effects.bond_softening.values.transition"]
     assert said.origin == "calibrated"
-    assert "diagnosis.json: hot_compliance, transition; set by hand: width" in said.source
+    assert "diagnosis.json: hot_compliance; set by hand: width" in said.source
     assert (
         answer(capsys, "add", SCENE, "soak_lag", "--from", diagnosis, "--out", tmp_path / "s", "--json")["added"][0]["values"]["hub_share"]
         == 0.1

@@ -72,6 +72,26 @@ def test_a_pair_comes_with_both_its_values(add, tmp_path):
     assert values[1] == {"mass": 1.5, "outer_radius": 12.5, "height": 2.0}
 
 
+def test_one_effect_has_the_values_that_it_has_alone(add, tmp_path):
+    """Where an explanation is that effect alone, however probable; else those of the likeliest that has it. Both is said; a pair's values were taken for its own."""
+    [pair, other] = answer()["candidates"]
+    alone = {"effects": ["preload_loss"], "parameters": {"preload_loss.loss": row(0.35)}}
+    found = add("alone", "preload_loss", found=answer() | {"candidates": [pair, other, alone]})
+    assert found["added"][0]["values"]["loss"] == 0.35
+    assert "values are those of preload_loss alone; preload_loss + added_disk, more probable in" in found["note"]
+    assert "were fitted beside preload_loss + added_disk and do not go with preload_loss alone: left out" in found["note"]
+    assert load(tmp_path / "alone").build is None
+    found = add("of the pair", "preload_loss")
+    assert found["added"][0]["values"]["loss"] == 0.2
+    assert "is preload_loss alone: values are those of preload_loss + added_disk, the most probable that has it" in found["note"]
+    both = add("both", "preload_loss", "added_disk", found=answer() | {"candidates": [alone, pair, other]})
+    assert both["added"][0]["values"]["loss"] == 0.2
+    assert "alone" not in both["note"].replace(str(tmp_path), "")
+    first = add("first", "preload_loss", found=answer(["preload_loss"]) | {"candidates": [alone, pair]})
+    assert (first["added"][0]["values"]["loss"], first["build"]) == (0.35, TOLERANCES)
+    assert "values are those" not in first["note"]
+
+
 def test_one_after_the_other_is_the_pair(add, tmp_path):
     one = add("one", "preload_loss")
     assert "of which added_disk is not in the scene yet" in one["note"]
