@@ -67,7 +67,7 @@ def _line(seconds: float, needed: float, done: int, steps: int | None, last: str
     if 0 < done < steps:
         each, late = needed / done, seconds - needed
         others = each * (steps - done - 1)
-        left = f", about {_duration(others + each - late)} left" if late < each else f", more than {_duration(others)} left" if others else ", the last one takes longer"
+        left = f", about {_duration(others + each - late)} left" if late < each else f", more than {_duration(others)} left" if others >= 1 else ""
     return f"{_duration(seconds)}: {min(done, steps)} of {steps} steps done{left}; last: {visible(last)}"
 
 
