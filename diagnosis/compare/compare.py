@@ -75,6 +75,7 @@ class TestComparison:
     correlation: Correlation | None
     residuals: Array  # (2m,) of measured [frequency, damping], whitened; a missing mode's in place of its frequency, 0 where there is none
     count: int  # of those there are
+    offsets: Mapping[tuple[int, int], Array]  # by mode number and 0 for its frequency, 1 for its damping: what a relative error of one does to the residuals (2m,)
     beyond: str = ""  # the state of the bearings, where the model gives no FRFs of it
 
     def __repr__(self) -> str:
@@ -104,6 +105,7 @@ class Comparison:
     tests: tuple[TestComparison, ...]
     comac: Mapping[int, float | None]
     crossings: tuple[str, ...]
+    built: bool = False  # whether the scene has build tolerances that were fitted
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.campaign!r} beside {self.spindle}: {len(self.tests)} tests, rms error {self.rms_residual:.3g} standard errors>"
@@ -150,7 +152,7 @@ def compare(
             pairs += shapes(o, p, partner).values()
         progress(f"{o.test.id}: compared")
     by_node = comac(nodes, pairs)
-    return Comparison(spindle.name, campaign.title, tuple(tests), by_node, crossings(observed, predicted, numbers))
+    return Comparison(spindle.name, campaign.title, tuple(tests), by_node, crossings(observed, predicted, numbers), spindle.build is not None)
 
 
 def _shape_nodes(o: Observation) -> tuple[int, ...]:
@@ -247,6 +249,10 @@ def _test(
     covariance = (o.covariance + np.diag(np.where(np.isfinite(relative), extra, 0.0)))[np.ix_(rows, rows)]
     residuals = np.zeros(2 * m)
     residuals[rows], residuals[lost] = whitened(error, covariance), BELIEVABLE / relative[lost]
+    offsets: dict[tuple[int, int], Array] = {}
+    for i, column in zip(rows.tolist(), whitened(np.eye(len(rows)), covariance).reshape(len(rows), len(rows)).T, strict=True):
+        offset = offsets.setdefault((number[int(partner[i % m])], i // m), np.zeros(2 * m))
+        offset[rows] = column
     frf = o.test.frf
     low, high = spindle.hammer.band if frf is None else (frf.frequency[0], frf.frequency[-1])
     found = set(partner.tolist())
@@ -260,5 +266,6 @@ def _test(
         correlation,
         residuals,
         len(rows) + len(lost),
+        offsets,
         own.point.state.status if own is not None and correlation is None else "",
     )

@@ -16,8 +16,8 @@ from thermospindle.report.figures.runout_campaign import comparison_figures
 from thermospindle.report.log.compare import FrfsBeside, write_comparison_log
 from thermospindle.report.page import runout_compare as runout
 from thermospindle.report.page.report import Section, write_page
-from thermospindle.report.text.compare import AGREES, TOGETHER, unlike
-from thermospindle.report.typeset import figure, minus, signed, table, with_error
+from thermospindle.report.text.compare import AGREES, TOGETHER, constant_words, unlike
+from thermospindle.report.typeset import figure, minus, prose, signed, table, with_error
 
 WORDS = {
     "pulls": (
@@ -98,6 +98,7 @@ def _summary(c: Comparison) -> str:
             words.append(f"; {TOGETHER.format(abs(residual))}")
         words.append(f", the largest in standard errors that of mode {worst.number} ({worst.kind}), {signed(residual, 1)} standard errors or {error}")
     words.append(".</p>")
+    words.append(f"<p>{prose(constant)}</p>" if (constant := constant_words(c)) else "")
     remarks = [f"{label(t.test, ', ')}: {what} {', '.join(f'{f:.1f}' for f in values)} Hz" for t in c.tests
             for what, values in (("measured, not computed (a mode the model lacks, or a false pole):", t.missing), ("computed, not measured:", t.extra))
             if values]  # fmt: skip

@@ -10,6 +10,7 @@ from rich.console import Console
 
 from thermospindle.diagnosis.compare.before_after import BeforeAfter
 from thermospindle.diagnosis.compare.compare import Comparison, PairedMode, TestComparison
+from thermospindle.diagnosis.compare.constant import constant_errors
 from thermospindle.diagnosis.compare.correlation import Band
 from thermospindle.model.units import RPM
 from thermospindle.report.text.grid import grid, show_grid
@@ -26,7 +27,13 @@ def comparison_json(c: Comparison) -> dict[str, Any]:
         "comac": {str(node): value for node, value in c.comac.items()},
         "crossings": list(c.crossings),
         "rms_pull": known(c.rms_residual),
+        "constant_errors": _constant_json(c),
     }
+
+
+def _constant_json(c: Comparison) -> dict[str, Any] | None:
+    found = constant_errors(c.tests)
+    return found and {"share": found.share, "rms_pull": found.without, "frequency_percent": {str(number): 100 * error for number, error in found.frequency.items()}}
 
 
 def _test_json(t: TestComparison) -> dict[str, Any]:
@@ -103,6 +110,26 @@ def verdict(c: Comparison) -> str:
     return f"{sentence}; furthest off in standard errors is {_mode(t, m)} {_off(m)} ({abs(m.residual):.3g} standard errors){in_hertz}."
 
 
+MOST = 0.5  # of the squares of all errors, from which what is the same at all conditions is most of them
+
+
+def constant_words(c: Comparison) -> str:
+    """Where a scene and a campaign disagree mostly by what is the same at all conditions: a sentence with the figures, and what that may be; else empty."""
+    found = constant_errors(c.tests)
+    if found is None or c.rms_residual < AGREES or found.share < MOST or not found.frequency:
+        return ""
+    number = max(found.frequency, key=lambda n: abs(found.frequency[n]))
+    what = (
+        "build tolerances are fitted in this scene, so what is still missing are constant errors of modes, which diagnose leaves free and compare does not"
+        if c.built
+        else "build tolerances and constant errors of modes do that, which diagnose leaves free and compare does not"
+    )
+    return (
+        f"{100 * found.share:.3g} % of the squared errors are the same at all conditions, a constant error of every mode (most {100 * found.frequency[number]:+.2g} % of the frequency of mode {number}), "
+        f"without which {found.without:.3g} standard errors would be left: {what}."
+    )
+
+
 def unlike(m: PairedMode) -> bool:
     """Whether the measured shape of a paired mode has nothing of the computed one."""
     return m.mac is not None and m.mac < UNLIKE
@@ -119,6 +146,8 @@ def _off(m: PairedMode) -> str:
 def show_comparison(console: Console, c: Comparison, verbose: bool = True) -> None:
     """The verdict, the table of modes, what has no partner; with `verbose` also the correlation of FRFs, crossings, FRAC and COMAC by point."""
     console.print(verdict(c), style="bold", highlight=False, markup=False)
+    if constant := constant_words(c):
+        console.print(constant, highlight=False, markup=False)
     console.print(f"Tests: {c.campaign}", highlight=False, markup=False)
     if verbose or sum(len(t.modes) for t in c.tests) <= FEW:
         _show_modes(console, c)

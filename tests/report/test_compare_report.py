@@ -13,6 +13,7 @@ from matplotlib import rc_context
 from rich.console import Console
 
 from thermospindle.diagnosis.compare.compare import compare
+from thermospindle.diagnosis.compare.constant import constant_errors
 from thermospindle.diagnosis.data.observe import observe
 from thermospindle.model.machine import Condition
 from thermospindle.report.figures.common import STYLE, label, svg
@@ -20,7 +21,7 @@ from thermospindle.report.figures.compare import figures, shown_pairs
 from thermospindle.report.log.compare import FrfsBeside, write_comparison_log
 from thermospindle.report.log.read import read_log
 from thermospindle.report.page.compare import sections, write_comparison
-from thermospindle.report.text.compare import show_comparison, verdict
+from thermospindle.report.text.compare import comparison_json, constant_words, show_comparison, verdict
 from thermospindle.report.typeset import with_error
 from thermospindle.report.verbs.compare import _beyond
 from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Noise, Test
@@ -86,6 +87,26 @@ def test_the_whole_is_one_percent_low(found):
         assert len(test.modes) >= 7
         assert test.correlation.whole.shift == pytest.approx(0.01, abs=5e-4)
         assert test.missing == test.extra == ()
+
+
+def test_what_is_the_same_at_all_conditions_is_said_with_its_figures(found, folder, capsys):
+    """A scene that add had made of a diagnosis was 25 standard errors off where diagnose had told 1.9: constant errors of modes are free there, and nothing said so."""
+    constant = constant_errors(found.tests)
+    assert list(constant.frequency.values()) == pytest.approx([0.01] * len(constant.frequency), abs=1e-3)
+    assert constant.share > 0.99
+    assert constant.without < 0.1 * found.rms_residual
+    said = constant_words(found)
+    assert f"{constant.without:.3g} standard errors would be left: build tolerances and constant errors of modes do that" in said
+    assert "build tolerances are fitted in this scene, so what is still missing are constant errors of modes" in constant_words(replace(found, built=True))
+    show_comparison(Console(width=2000), found)
+    assert said in capsys.readouterr().out
+    assert "of the squared errors are the same at all conditions" in (folder / "report.html").read_text()
+    assert comparison_json(found)["constant_errors"]["rms_pull"] == constant.without
+    cold, hot = found.tests
+    moving = replace(found, tests=(cold, replace(hot, residuals=-hot.residuals)))
+    assert constant_errors(moving.tests).share < 0.5
+    assert constant_words(moving) == ""
+    assert constant_errors([cold]) is None
 
 
 def test_errors_that_hang_together_are_told(found):
