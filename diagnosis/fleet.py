@@ -79,9 +79,7 @@ def _compared(c: Comparison) -> Row:
 
     def mean_error(number: int, damping: bool) -> float | None:
         if damping:
-            values = [
-                m.damping_computed / m.damping_measured - 1 for m in paired if m.number == number and m.damping_measured is not None
-            ]
+            values = [e for m in paired if m.number == number and (e := m.damping_error) is not None]
         else:
             values = [m.error / m.measured for m in paired if m.number == number]
         return 100 * float(np.mean(values)) if values else None

@@ -28,7 +28,7 @@ from thermospindle.sim.effects import of_scene
 
 @dataclass(frozen=True)
 class PairedMode:
-    """A measured mode and the computed one behind it; damping ratios are None where not measured, `mac` where no shape
+    """A measured mode and the computed one behind it; damping ratios are None where not measured, `damping_sd` also where no error of one is told, `mac` where no shape
     can be compared (`partners.shapes`).
 
     `number` counts the computed modes at the coldest test at rest and follows them from there by shape. Modes closer than
@@ -54,6 +54,11 @@ class PairedMode:
     @property
     def residual(self) -> float:
         return self.error / self.sd
+
+    @property
+    def damping_error(self) -> float | None:
+        """Relative to the measured one."""
+        return None if self.damping_measured is None else self.damping_computed / self.damping_measured - 1
 
     @property
     def damping_residual(self) -> float | None:
@@ -235,7 +240,7 @@ def _test(
                 float(o.frequency[i]),
                 float(p.frequency[j]),
                 float(o.frequency[i] * relative[i]),
-                float(o.damping[i]) if known else None,
+                float(o.damping[i]) if np.isfinite(o.damping[i]) else None,
                 float(p.damping[j]),
                 float(o.damping[i] * relative[m + i]) if known else None,
                 assurance(*shown[i]) if i in shown else None,

@@ -68,8 +68,9 @@ class Step:
     above: str  # the step it stands on, empty for the first
 
     def residual(self, measured: MeasuredModes) -> tuple[Array, Array]:
-        """(computed - measured) / standard error (n,) of frequencies and of damping ratios, NaN where there is none."""
-        return (self.frequency - measured.frequency) / measured.sd, (self.damping - measured.damping) / measured.damping_sd
+        """(computed - measured) / standard error (n,) of frequencies and of damping ratios, NaN where there is none, of either."""
+        of_damping = np.where(np.isfinite(measured.damping_sd), (self.damping - measured.damping) / measured.damping_sd, np.nan)
+        return (self.frequency - measured.frequency) / measured.sd, of_damping
 
 
 def as_drawn(model: CampaignModel, measured: MeasuredModes, name: str, applied: Applied, above: str = "") -> Step:

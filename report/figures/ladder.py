@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from thermospindle.diagnosis.ladder.ladder import Ladder
+from thermospindle.model.types import Array
 from thermospindle.report.figures.common import PALE, STYLE, broken, cells, logarithmic, residual_bar, residual_norm
 from thermospindle.report.text.ladder_table import ResidualMap, residual_map
 from thermospindle.report.typeset import signed_short
@@ -22,7 +24,7 @@ BESIDE = 12  # names of steps that fit beside each other
 @rc_context(STYLE)
 def figure(found: Ladder) -> Figure:
     first, last = (residual_map(found, r) for r in (found.steps[0], found.top))
-    rows = 1 if first.damping is None else 2
+    rows = len(_shown(first))
     tall = 0.32 * len(first.modes) + 0.75
     drawn = Figure(figsize=(10.0, 3.1 + rows * tall))
     parts: Any = drawn.subfigures(2, 1, height_ratios=[3.1, rows * tall])
@@ -67,14 +69,13 @@ def _errors(axes: Axes, found: Ladder) -> None:
 
 def draw_maps(part: Any, steps: Sequence[tuple[str, ResidualMap]]) -> None:
     """Maps of residuals beside each other in a figure or a part of one, each below its name; dampings below frequencies."""
-    rows = 1 if steps[0][1].damping is None else 2
+    rows = len(_shown(steps[0][1]))
     norm = residual_norm(max(float(np.nanmax(np.abs(m.frequency))) for _, m in steps))
     grid = part.subplots(rows, len(steps), squeeze=False)
     for k, (name, residuals) in enumerate(steps):
-        for i, (what, values) in enumerate((("frequencies", residuals.frequency), ("damping ratios", residuals.damping))[:rows]):
-            assert values is not None
+        for i, (what, values, own) in enumerate(_shown(residuals)):
             axes = grid[i][k]
-            cells(axes, values, norm, "RdBu_r", signed_short)
+            cells(axes, values, norm if own is None else own, "RdBu_r", signed_short)
             axes.set_xticks(range(len(residuals.tests)), [t.replace(", ", "\n").removesuffix(" rpm") for t in residuals.tests], fontsize=7.5)
             axes.set_yticks(range(len(residuals.modes)), residuals.modes if k == 0 else [])
             axes.set_title(f"{name}: {what}")
@@ -82,6 +83,16 @@ def draw_maps(part: Any, steps: Sequence[tuple[str, ResidualMap]]) -> None:
                 axes.set_xlabel("temperature, and below it speed in rpm")
         grid[0][0].set_ylabel("mode")
     residual_bar(part, norm, grid, shrink=0.9, pad=0.01)
+
+
+def _shown(residuals: ResidualMap) -> list[tuple[str, Array, Normalize | None]]:
+    """What each map is of, and its values; with colours of its own where they are no standard errors, and small."""
+    found: list[tuple[str, Array, Normalize | None]] = [("frequencies", residuals.frequency, None)]
+    if residuals.damping is not None:
+        found.append(("damping ratios", residuals.damping, None))
+    elif residuals.damping_percent is not None:
+        found.append(("damping ratios, % (no errors told)", residuals.damping_percent, Normalize(-100.0, 100.0)))
+    return found
 
 
 def _short(value: float) -> str:

@@ -109,7 +109,7 @@ def _summary(c: Comparison) -> str:
 def _table(c: Comparison) -> str:
     head = (
         "test", "mode", "kind", "measured, Hz", "computed, Hz", "error, Hz", "error, %", "error, s.e.",
-        "damping, %", "computed, %", "MAC",
+        "damping, %", "computed, %", "error, %", "MAC",
     )  # fmt: skip
     rows = []
     for t in c.tests:
@@ -118,7 +118,7 @@ def _table(c: Comparison) -> str:
             cells = [
                 label(t.test, ", ") if k == 0 else "", str(m.number), m.kind, with_error((m.measured, m.sd), digits=2), f"{m.computed:.2f}",
                 signed(m.error, 2), signed(100 * m.error / m.measured, 2), signed(m.residual, 1), damping, f"{100 * m.damping_computed:.3f}",
-                "–" if m.mac is None else f"{m.mac:.3f}" + ("*" if m.close else ""),
+                "–" if m.damping_error is None else signed(100 * m.damping_error, 1), "–" if m.mac is None else f"{m.mac:.3f}" + ("*" if m.close else ""),
             ]  # fmt: skip
             rows.append(cells)
     starred = any(m.close and m.mac is not None for t in c.tests for m in t.modes)

@@ -75,6 +75,7 @@ def _mode_json(m: PairedMode) -> dict[str, Any]:
         "damping_measured": m.damping_measured,
         "damping_sd": m.damping_sd,
         "damping_computed": m.damping_computed,
+        "damping_error_percent": None if m.damping_error is None else 100 * m.damping_error,
         "damping_pull": m.damping_residual,
         "mac": m.mac,
         "close": m.close,
@@ -187,7 +188,7 @@ def _show_modes(console: Console, c: Comparison) -> None:
     for t in c.tests:
         for m in t.modes:
             damping = "" if m.damping_measured is None else f"{100 * m.damping_measured:.3f}"
-            damping_error = "" if m.damping_residual is None else f"{m.damping_residual:+z.1f}"
+            damping_error = f"{m.damping_residual:+z.1f}" if m.damping_residual is not None else _in_percent([m])
             mac = "" if m.mac is None else f"{m.mac:.3f}" + ("*" if m.close else "")
             error = (f"{m.error:+z.2f}", f"{100 * m.error / m.measured:+z.2f}", f"{m.residual:+z.1f}")
             name = t.test.id if m is t.modes[0] else ""
@@ -196,6 +197,7 @@ def _show_modes(console: Console, c: Comparison) -> None:
             rows.append([name, str(m.number), m.kind, *frequencies, *error, *beside])
     show_grid(console, "Modes, computed - measured", columns, rows, ("test", "kind"), keys=3)
     console.print("+-: standard error of the measured frequency, with what the test's temperature is uncertain by")
+    _show_unsure(console, c)
     if any(m.close and m.mac is not None for t in c.tests for m in t.modes):
         console.print("* close modes: share of the measured shape in the plane of the computed ones")
 
@@ -215,10 +217,22 @@ def _show_by_mode(console: Console, c: Comparison) -> None:
         low, high = min(o.measured for o in modes), max(o.measured for o in modes)
         rows.append([
             str(number), kind, str(len(modes)), f"{low:.1f}-{high:.1f}", f"{np.mean([o.error for o in modes]):+z.2f}", f"{_rms([o.residual for o in modes]):.1f}",
-            f"{m.error:+z.2f}", worst, f"{_rms(damping):.1f}" if damping else "", f"{min(macs):.3f}" if macs else "",
+            f"{m.error:+z.2f}", worst, f"{_rms(damping):.1f}" if damping else _in_percent(modes), f"{min(macs):.3f}" if macs else "",
         ])  # fmt: skip
     columns = ("mode", "kind", "tests", "measured\nHz", "error, Hz\nmean", "s.e.\nrms", "error, Hz\nworst", "in test", "damping\ns.e. rms", "MAC\nleast")
     show_grid(console, f"Modes of {len(c.tests)} tests, computed - measured", columns, rows, ("kind", "in test"), keys=2)
+    _show_unsure(console, c)
+
+
+def _show_unsure(console: Console, c: Comparison) -> None:
+    if any(m.damping_measured is not None and m.damping_sd is None for t in c.tests for m in t.modes):
+        console.print("dampings without a standard error are compared in per cent and count in no other number; damping_sd_percent in the mapping of import tells one", highlight=False)
+
+
+def _in_percent(modes: Sequence[PairedMode]) -> str:
+    """The mean error of dampings whose standard errors nobody told; empty where none were measured."""
+    errors = [e for m in modes if (e := m.damping_error) is not None]
+    return f"{100 * float(np.mean(errors)):+z.0f} %" if errors else ""
 
 
 def _rms(values: Sequence[float]) -> float:

@@ -62,7 +62,7 @@ def _discrepancy(found: Ladder) -> str:
     """How wrong the model is at all conditions alike, and what granting that does."""
     below, r = found.step(TOLERANCES), found.step(DISCREPANCY)
     assert r.fitted is not None
-    known = MISSED if np.isfinite(found.measured.damping).any() else {kinds_of.STIFFNESS: MISSED[kinds_of.STIFFNESS]}
+    known = MISSED if np.isfinite(found.measured.damping_sd).any() else {kinds_of.STIFFNESS: MISSED[kinds_of.STIFFNESS]}
     missed = [f"{what} by {100 * r.fitted.learned.sizes[kind]:g} %" for kind, what in known.items() if r.fitted.learned.sizes.get(kind)]
     if not missed:
         return "A constant discrepancy of the model is not asked for: what is missing changes with the conditions, or nothing is."

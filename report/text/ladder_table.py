@@ -33,12 +33,14 @@ LEGEND = (
 
 @dataclass(frozen=True, eq=False)
 class ResidualMap:
-    """(computed - measured) / standard error by mode (row) and test (column), NaN where not measured; `damping` None without any."""
+    """(computed - measured) / standard error by mode (row) and test (column), NaN where not measured; `damping` None without any standard error, then `damping_percent` of the measured ones
+    where there are."""
 
     modes: list[str]
     tests: list[str]
     frequency: Array
     damping: Array | None
+    damping_percent: Array | None
 
 
 def residual_map(found: Ladder, step: Step) -> ResidualMap:
@@ -47,13 +49,15 @@ def residual_map(found: Ladder, step: Step) -> ResidualMap:
     order = sorted(range(len(tests)), key=lambda t: _place(tests[t]))
     column = {t: k for k, t in enumerate(order)}
     row = {number: k for k, number in enumerate(measured.kinds)}
-    frequency, damping = np.full((2, len(row), len(order)), np.nan)
-    rows = zip(measured.number, measured.test, *step.residual(measured), strict=True)
-    for number, t, of_frequency, of_damping in rows:
+    maps = np.full((3, len(row), len(order)), np.nan)
+    rows = zip(measured.number, measured.test, *step.residual(measured), 100 * (step.damping / measured.damping - 1), strict=True)
+    for number, t, *values in rows:
         if number:
-            frequency[row[int(number)], column[int(t)]], damping[row[int(number)], column[int(t)]] = of_frequency, of_damping
+            maps[:, row[int(number)], column[int(t)]] = values
+    frequency, damping, percent = maps
+    sure, told = np.isfinite(damping).any(), np.isfinite(percent).any()
     modes = [f"{n} {kind}" for n, kind in measured.kinds.items()]
-    return ResidualMap(modes, _tests([tests[t] for t in order]), frequency, damping if np.isfinite(damping).any() else None)
+    return ResidualMap(modes, _tests([tests[t] for t in order]), frequency, damping if sure else None, percent if told and not sure else None)
 
 
 def _place(o: Observation) -> tuple[float, float, str]:
@@ -106,7 +110,8 @@ def _step_json(r: Step) -> dict[str, Any]:
 
 
 def _lists(residuals: ResidualMap) -> dict[str, Any]:
-    return {"frequency": known(residuals.frequency), "damping": None if residuals.damping is None else known(residuals.damping)}
+    dampings = {"damping": residuals.damping, "damping_percent": residuals.damping_percent}
+    return {"frequency": known(residuals.frequency)} | {key: None if values is None else known(values) for key, values in dampings.items()}
 
 
 # ---------------------------------------------------------------- terminal

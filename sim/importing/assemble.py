@@ -299,6 +299,10 @@ def _placed(curve: Curve, form: MappingForm, points: dict[int, Point], settings:
     return Placed(curve, response, reference, told[0], told[1] * a * b)
 
 
+def _damping_sd(mode: ModeLine, form: MappingForm) -> float | None:
+    return None if mode.damping_ratio is None or form.damping_sd_percent is None else mode.damping_ratio * form.damping_sd_percent / 100
+
+
 def _test(id_: str, told: TestForm, found: Read, placed: list[Placed], quantity: str, form: MappingForm, notes: list[str]) -> Test:
     assert told.temperature_C is not None
     assert told.speed_rpm is not None
@@ -323,7 +327,7 @@ def _test(id_: str, told: TestForm, found: Read, placed: list[Placed], quantity:
         if not peaks and frf is None:
             raise BadInput(f"{files}: magnitudes without phase, and no peak in them that a mode explains; a table of modes by hand can be imported")
     rows = tuple(
-        ModeRow(id_, k, m.kind, m.frequency, m.frequency_sd or form.frequency_sd_Hz or 0.0, m.damping_ratio, m.damping_ratio_sd)
+        ModeRow(id_, k, m.kind, m.frequency, m.frequency_sd or form.frequency_sd_Hz or 0.0, m.damping_ratio, m.damping_ratio_sd or _damping_sd(m, form))
         for k, m in enumerate(sorted(lines, key=lambda m: m.frequency), 1)
     )
     soak = None if told.soak_time_min is None else told.soak_time_min * MINUTE

@@ -57,6 +57,24 @@ def test_damping_error_in_standard_errors(spindle):
     assert mode.damping_computed == pytest.approx(0.00539, abs=1e-5)
 
 
+@pytest.mark.parametrize("verbose", [True, False])
+def test_damping_whose_error_nobody_told_is_compared_in_per_cent(spindle, verbose):
+    """It was blank, as if nothing had been measured; in no other number does it count."""
+    told, bare = table(spindle, 20.0, ("axial", 1002.07)), table(spindle, 20.0, ("axial", 1002.07))
+    [test] = bare.tests
+    bare = replace(bare, tests=tuple(replace(test, id=f"T{k}", modes=tuple(replace(r, test=f"T{k}", damping_ratio_sd=None) for r in test.modes)) for k in range(1 if verbose else 22)))
+    found = compare(spindle, bare)
+    mode, sure = found.tests[0].modes[0], compare(spindle, told).tests[0].modes[0]
+    assert (mode.damping_residual, mode.damping_measured) == (None, 0.01)
+    assert mode.damping_error == sure.damping_error == pytest.approx(mode.damping_computed / 0.01 - 1)
+    assert found.tests[0].count == 1
+    own = comparison_json(found)["tests"][0]["modes"][0]
+    assert (own["damping_error_percent"], own["damping_pull"], own["damping_sd"]) == (pytest.approx(100 * mode.damping_error), None, None)
+    show_comparison(Console(file=(text := StringIO()), width=200), found, verbose)
+    assert f" {100 * mode.damping_error:+.0f} %" in text.getvalue()
+    assert "compared in per cent" in text.getvalue()
+
+
 def at(*frequency):
     """Poles of one percent damping at frequencies (Hz)."""
     return 2 * np.pi * np.array(frequency) * (-0.01 + 1j * np.sqrt(1 - 0.01**2))

@@ -21,7 +21,7 @@ from thermospindle.diagnosis.ladder.ladder import CLEAR, DISCREPANCY, TOLERANCES
 from thermospindle.diagnosis.prediction.next_test import ModePrediction, NextTest
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
-from thermospindle.report.figures.ladder import residual_map
+from thermospindle.report.figures.ladder import figure, residual_map
 from thermospindle.report.log.ladder_content import response, shown
 from thermospindle.report.log.read import read_log
 from thermospindle.report.page.ladder import section, write_ladder
@@ -96,6 +96,23 @@ def test_residuals_are_errors_over_standard_errors(lagging):
     own = lagging.measured.test == 0
     assert shown.frequency[:, 0] == pytest.approx(((step.frequency - lagging.measured.frequency) / SD)[own], rel=1e-9)
     assert np.sqrt(np.mean(shown.frequency**2)) == pytest.approx(step.error, rel=0.02)  # of logarithms there
+
+
+def test_dampings_whose_errors_nobody_told_are_shown_in_per_cent(lagging):
+    """They stood in the picture as errors of 0.0, as if the model had met every one of them."""
+    step, m = lagging.top, lagging.measured
+    told = replace(m, damping=step.damping / 1.1, damping_sd=np.full(len(m.test), np.inf))
+    shown = residual_map(replace(lagging, measured=told), step)
+    assert shown.damping is None
+    assert shown.damping_percent == pytest.approx(np.full((8, 2), 10.0))
+    with_errors = replace(told, damping_sd=np.where(m.test == 0, 0.05 * told.damping, np.inf))
+    shown = residual_map(replace(lagging, measured=with_errors), step)
+    assert shown.damping_percent is None
+    assert shown.damping[:, 0] == pytest.approx(2.0)
+    assert np.isnan(shown.damping[:, 1]).all()
+    drawn = figure(replace(lagging, measured=told))
+    [axes] = [a for a in drawn.get_axes() if a.get_title(loc="left") == f"{lagging.top.name}: damping ratios, % (no errors told)"]
+    assert {text.get_text() for text in axes.texts} == {"+10"}
 
 
 def test_data_decide_no_more_than_there_are_of_them(lagging):

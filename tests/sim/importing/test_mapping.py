@@ -141,6 +141,23 @@ def test_frequencies_alone_are_modes(tmp_path):
     assert [m.frequency for m in read_campaign(tmp_path / "c").tests[0].modes] == [1002.5, 1545.0]
 
 
+def test_how_sure_dampings_are_may_be_told_for_all_of_them(tmp_path):
+    """The form offers it where a table tells none; it is no question, for without it dampings are compared in per cent."""
+    file, form = tmp_path / "picked.csv", tmp_path / "form.toml"
+    file.write_text("frequency,damping_%\n1002.5,0.5\n1545.0,\n")
+    bring([file], mapping=form)
+    assert "# damping_sd_percent = 10.0" in form.read_text()
+    answers = 'frequency_sd_Hz = 0.5\nspindle = "hdd_2003"\n[[tests]]\nid = "picked"\ntemperature_C = 20\nspeed_rpm = 0\n'
+    for name, told, expected in (("without", "", [None, None]), ("with", "damping_sd_percent = 10.0\n", [pytest.approx(0.0005), None])):
+        mapping = tmp_path / f"{name}.toml"
+        mapping.write_text(told + answers)
+        bring([file], mapping=mapping, out=tmp_path / name)
+        assert [m.damping_ratio_sd for m in read_campaign(tmp_path / name).tests[0].modes] == expected
+    file.write_text("frequency,damping_%,damping_ratio_sd\n1002.5,0.5,0.001\n")
+    bring([file], mapping=tmp_path / "sure.toml")
+    assert "damping_sd_percent" not in (tmp_path / "sure.toml").read_text()
+
+
 @pytest.mark.parametrize(("rows", "count"), [(("1,5,2,25,3,5", "2,5,2,35,3,6"), 6), (("1,2,25,3,5", "2,2,35,3,6"), 5)])
 def test_commas_for_columns_and_decimals_are_named(tmp_path, rows, count):
     """It was asked what column 1 to column 6 are, under three headings."""
