@@ -60,16 +60,17 @@ def write_comparison(
     turning: Sequence[RunoutBeside] = (),
     errors: Mapping[str, float | None] | None = None,
     campaign: str = "",
+    name: str = "",
     progress: Callable[[str], None] = lambda done: None,
 ) -> None:
     """`report.html`, a PNG and an SVG of every picture, and, where there are FRFs, `compare.rrd`, in a folder that exists.
 
-    `c` are tests of modes, `turning` tests of runout with the `errors` of two scenes; either may be missing. `campaign` is its title, where there is no `c`.
+    `c` are tests of modes, `turning` tests of runout with the `errors` of two scenes; either may be missing. `campaign` is its title, where there is no `c`, and `name` what its folder is called.
     """
     drawn = comparison_figures(turning)
     every = [*(sections(c) if c else []), *(runout.sections(turning, drawn, errors) if turning else [])]
     ids = {t.test.id for t in (c.tests if c else ())} | {t.test.id for t in turning}
-    write_page(folder, spindle, len(ids), c.campaign if c else campaign, every, "Comparison")
+    write_page(folder, spindle, len(ids), c.campaign if c else campaign, every, "Comparison", name)
     progress("page written")
     for name, one in ((figures(c) if c else {}) | drawn).items():
         save(one, folder, name)

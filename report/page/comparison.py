@@ -122,7 +122,7 @@ def _measured_peaks(run: Run, numbers: Sequence[Mapping[int, int]]) -> list[Peak
 
 def _label(run: Run, campaign: Campaign) -> str:
     several = sum(any(t.modes for t in c.tests) for c in run.measured) > 1
-    return f"measured, {campaign.folder.name if campaign.folder else campaign.title}" if several else "measured"
+    return f"measured, {campaign.name}" if several else "measured"
 
 
 def _row(step: Step, index: int, number: int, flexibility: str) -> Row:

@@ -50,16 +50,16 @@ def sections(d: Diagnosis, answer: dict[str, Any], drawn: dict[str, Figure] | No
 
 
 def write_diagnosis(
-    d: Diagnosis | None, answer: dict[str, Any], spindle: Spindle, folder: Path, turning: RunoutDiagnosis | None = None, told: dict[str, Any] | None = None
+    d: Diagnosis | None, answer: dict[str, Any], spindle: Spindle, folder: Path, turning: RunoutDiagnosis | None = None, told: dict[str, Any] | None = None, name: str = ""
 ) -> None:
-    """`report.html`, and every picture as SVG and PNG, into a folder that exists; `turning` is the diagnosis of runout, `told` its answer."""
+    """`report.html`, and every picture as SVG and PNG, into a folder that exists; `turning` is the diagnosis of runout, `told` its answer; `name` is that of the campaign's folder."""
     modal = figures(d) if d else {}
     runout = diagnosis_figures(turning) if turning else {}
     every = sections(d, answer, modal) if d else []
     if told:
         every += runout_diagnosis.sections(told, runout)
     count = (len(d.search.model.tests) if d else 0) + (len(turning.seen) if turning else 0)
-    write_page(folder, spindle, count, answer["campaign"], every, "Diagnosis")
+    write_page(folder, spindle, count, answer["campaign"], every, "Diagnosis", name)
     for name, one in (modal | runout).items():
         save(one, folder, name, 130)
 
@@ -82,33 +82,37 @@ def _verdict(answer: dict[str, Any]) -> str:
 
 CANDIDATES = (
     "ln evidence is against the model without effects, and so is the error on conditions left out; probability among everything tried: no effect, one, "
-    "two, and free drift. "
+    "two, and free drift, which is something unknown. "
     "Two effects at once are believed less beforehand."
 )
 
 
 def _candidates(answer: dict[str, Any]) -> str:
-    head = ["effects", "ln evidence", "probability", "left-out error, %", "value", "", "unit", "believable"]
+    head = ["effects", "ln\nevidence", "probability", "left-out\nerror, %", "value", "", "unit", "believable"]
+    rest = [("no effect", "0", answer["probability"]["none"]), ("something unknown", "", answer["probability"]["unknown"])]
+    blocks = [(c["probability"], _candidate(c)) for c in answer["candidates"]] + [(p, [[name, gain, f"{p:.3f}", *[""] * 5]]) for name, gain, p in rest]
+    return table(head, [row for _, rows in sorted(blocks, key=lambda block: -block[0]) for row in rows], (0, 4, 6, 7), CANDIDATES, ruled=True)
+
+
+def _candidate(c: dict[str, Any]) -> list[list[str]]:
+    """Rows of an explanation, one a parameter."""
+    arrived = "no,<br>not arrived" if not c["arrived"] else "yes" if c["believable"] else "no,<br>at a limit"
+    left_out = "–" if c["held_out_error_ratio"] is None else f"{100 * c['held_out_error_ratio']:.0f}"
     rows = []
-    for c in answer["candidates"]:
-        for k, (name, v) in enumerate(c["parameters"].items()):
-            first = k == 0
-            spread = spread_words(c | {"parameters": c["parameters"] | {name: v | {"unit": "1"}}}, name)  # units have a column of their own
-            words = re.sub(r" (to [^ ]+ ±|\(mean )", r" <br>\1", prose(spread)) if spread else escape(value_words(v)) if "called" in v or v.get("others") else ""
-            value, _, sd = (words, "", "") if words else _with_error(v["value"], v["sd"]).partition(" <small>")
-            rows.append(
-                [
-                    escape(" + ".join(c["effects"])).replace(" + ", " +<br>") if first else "",
-                    minus(_evidence(c["delta_evidence"])) if first else "",
-                    f"{c['probability']:.3f}" if first else "",
-                    "" if not first else "–" if c["held_out_error_ratio"] is None else f"{100 * c['held_out_error_ratio']:.0f}",
-                    escape((name.split(".", 1)[1] if len(c["effects"]) == 1 else name) + (" (test by test)" if "<br>" in words else "")),
-                    value + (f" <small>{sd}" if sd else ""),
-                    unit_cell(v["unit"]),
-                    ("no,<br>not arrived" if not c["arrived"] else "yes" if c["believable"] else "no,<br>at a limit") if first else "",
-                ]
-            )
-    return table(head, rows, (0, 4, 6, 7), CANDIDATES)
+    for k, (name, v) in enumerate(c["parameters"].items()):
+        spread = spread_words(c | {"parameters": c["parameters"] | {name: v | {"unit": "1"}}}, name)  # units have a column of their own
+        words = _spread(spread) if spread else escape(value_words(v)) if "called" in v or v.get("others") else ""
+        value, _, sd = (words, "", "") if words else _with_error(v["value"], v["sd"]).partition(" <small>")
+        parameter = escape(name.split(".", 1)[1] if len(c["effects"]) == 1 else name) + (" <br>(test by test)" if spread else "")
+        head = ["", "", "", ""] if k else [escape(" + ".join(c["effects"])).replace(" + ", " +<br>"), minus(_evidence(c["delta_evidence"])), f"{c['probability']:.3f}", left_out]
+        rows.append([*head, parameter, value + (f" <small>{sd}" if sd else ""), unit_cell(v["unit"]), "" if k else arrived])
+    return rows
+
+
+def _spread(words: str) -> str:
+    """A range in a cell that may be narrower than its words are long: names of tests are as long as their files'."""
+    lines = re.sub(r" (to [^ ]+ ±|\(mean )", r" <br>\1", prose(words))
+    return f'<span class="spread">{lines}</span>'
 
 
 def _tests(answer: dict[str, Any]) -> str:

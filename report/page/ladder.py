@@ -30,5 +30,5 @@ def write_ladder(found: Ladder, folder: Path) -> None:
     from thermospindle.report.page.report import write_page
 
     save(ladder_plots.figure(found), folder, "ladder", 130)
-    write_page(folder, found.spindle, len(found.model.tests), found.campaign.title, [section(found)], "Ladder")
+    write_page(folder, found.spindle, len(found.model.tests), found.campaign.title, [section(found)], "Ladder", found.campaign.name)
     write_ladder_log(shown(found), folder / "ladder.rrd")

@@ -56,15 +56,15 @@ def html(run: Run, extra_sections: Sequence[Section] = ()) -> str:
     return page(run.spindle, _conditions(run), every, "Report" if extra_sections else "Run")
 
 
-def page(spindle: Spindle, conditions: str, sections: Sequence[Section], kind: str = "") -> str:
-    """A page of the report's look with any sections, at `conditions` in words; `kind` (Run, Comparison, ...) begins its title."""
-    return str(_page().page(spindle, conditions, [(title, Markup(body)) for title, body in sections], kind, Markup(MADE)))
+def page(spindle: Spindle, conditions: str, sections: Sequence[Section], kind: str = "", of: str = "") -> str:
+    """A page of the report's look with any sections, at `conditions` in words; `kind` (Run, Comparison, ...) begins its title, and what it is `of` follows."""
+    return str(_page().page(spindle, conditions, [(title, Markup(body)) for title, body in sections], kind, of, Markup(MADE)))
 
 
-def write_page(folder: Path, spindle: Spindle, tests: int, campaign: str, sections: Sequence[Section], kind: str) -> None:
-    """`report.html` on so many tests of a campaign."""
+def write_page(folder: Path, spindle: Spindle, tests: int, campaign: str, sections: Sequence[Section], kind: str, name: str = "") -> None:
+    """`report.html` on so many tests of a `campaign`, by its title; its `name` and the scene's are in the page's own title, for pages of one spindle side by side."""
     conditions = f"the conditions of {tests} test{'s' if tests > 1 else ''}: {campaign}"
-    (folder / "report.html").write_text(page(spindle, conditions, sections, kind), encoding="utf-8")
+    (folder / "report.html").write_text(page(spindle, conditions, sections, kind, f"{name or campaign} beside {spindle.name}"), encoding="utf-8")
 
 
 def stamp(folder: Path, command: str, date: str) -> None:

@@ -43,7 +43,7 @@ def compare(
     tests = modal_tests(whole)
     if turning and not tests.tests:
         values = {"spindle": spindle.name, "campaign": whole.title, **turning[0]}
-        alone = write_json("comparison.json", lambda folder: _write(None, spindle, folder, *turning[2:], whole.title))
+        alone = write_json("comparison.json", lambda folder: _write(None, spindle, folder, *turning[2:], whole.title, name=whole.name))
         return answered(values, turning[1], out, asked, alone)
     with progress_bar((3 if earlier else 2) * len(tests.tests)) as progress:
         observed = observe(tests, spindle, progress)
@@ -62,7 +62,7 @@ def compare(
         if turning:
             turning[1](console)
 
-    write = write_json("comparison.json", lambda folder: _write(comparison, spindle, folder, *(turning[2:] if turning else ())))
+    write = write_json("comparison.json", lambda folder: _write(comparison, spindle, folder, *(turning[2:] if turning else ()), name=whole.name))
     return answered(values, show, out, asked, write, [*left_out(tests), *_beyond(comparison), *_louder(comparison)])
 
 
@@ -85,10 +85,10 @@ def _louder(c: Comparison) -> list[str]:
     return [f"measured FRFs are {size}, all alike: a unit, a sensor's or the hammer's sensitivity, or the mass of the drawing is off by a factor of about {10 ** (abs(by) / 20):.2g}"]
 
 
-def _write(*what: Any) -> None:
+def _write(*what: Any, name: str) -> None:
     from thermospindle.report.page.compare import write_comparison  # matplotlib and rerun take their time to load
 
-    write_comparison(*what)
+    write_comparison(*what, name=name)
 
 
 def _of_runout(

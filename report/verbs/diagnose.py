@@ -53,7 +53,7 @@ def diagnose(
 
         def alone(folder: Path, answer: dict[str, Any]) -> None:
             write_json("diagnosis.json")(folder, answer)
-            _write(None, answer, spindle, folder, of_runout, answer)
+            _write(None, answer, spindle, folder, of_runout, answer, name=whole.name)
 
         return answered(told | where, show_runout, out, asked, alone)
     with progress_bar(len(tests.tests) + verdict.STEPS) as progress:
@@ -71,7 +71,7 @@ def diagnose(
 
     def write(folder: Path, answer: dict[str, Any]) -> None:
         write_json("diagnosis.json")(folder, answer)
-        _write(found, answer, spindle, folder, *((turning[2], turning[0]) if turning else ()))
+        _write(found, answer, spindle, folder, *((turning[2], turning[0]) if turning else ()), name=whole.name)
 
     return answered(values, show, out, asked, write, [*left_out(tests), *_found(found)])
 
@@ -89,10 +89,10 @@ def _found(found: verdict.Diagnosis) -> list[str]:
     return unable
 
 
-def _write(*what: Any) -> None:
+def _write(*what: Any, name: str) -> None:
     from thermospindle.report.page.diagnosis import write_diagnosis  # matplotlib takes its time to load
 
-    write_diagnosis(*what)
+    write_diagnosis(*what, name=name)
 
 
 def draft(diagnosis: Path, name: str | None = None, element: str | None = None, out: Path | None = None) -> Answer:

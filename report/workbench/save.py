@@ -43,7 +43,7 @@ def save(bench: Bench, s: Setting, errors: Errors, ladder: tuple[Step, ...], out
             spindle = built(bench, s)
             found = compare(spindle, bench.campaign, bench.observations)
             progress("FRFs computed, now drawing")
-            write_comparison(found, spindle, folder / "report", progress=progress)
+            write_comparison(found, spindle, folder / "report", name=bench.campaign.name, progress=progress)
             written.append("report")
         asked = {"verb": "workbench", "scene": bench.scene, "campaign": bench.campaign.folder if bench.campaign else None}
         steps = [{"step": r.name, "fitted": r.fitted, "left_out": r.left_out} for r in ladder]

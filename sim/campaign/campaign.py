@@ -87,6 +87,11 @@ class Campaign:
     lumped_shafts: bool = False  # of this program's virtual tests, whose flexible shafts have their masses at nodes
     folder: Path | None = field(default=None, compare=False)
 
+    @property
+    def name(self) -> str:
+        """What its folder is called, or its title without one."""
+        return self.folder.resolve().name if self.folder else self.title
+
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.title!r} of {self.spindle}: {len(self.tests)} tests, {len(self.points)} points, {self.quantity}>"
 

@@ -52,7 +52,7 @@ def found(spindle, campaign):
 @pytest.fixture(scope="module")
 def folder(spindle, found, tmp_path_factory):
     path = tmp_path_factory.mktemp("comparison")
-    write_comparison(found, spindle, path)
+    write_comparison(found, spindle, path, name="campA")
     return path
 
 
@@ -171,7 +171,7 @@ def test_close_modes_are_starred(found, folder):
     assert close
     assert [cell for cell in Cells(text).cells if cell.endswith("*")] == close
     assert "* Close modes: share of the measured shape" in text
-    assert "<title>Comparison: " in text
+    assert f"<title>Comparison: campA beside {found.spindle}: " in text  # two of one spindle are told apart in their tabs
 
 
 def test_sections_have_the_form_of_the_report(found):

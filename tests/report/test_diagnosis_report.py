@@ -13,6 +13,7 @@ import pytest
 from rich.console import Console
 
 from tests.conftest import SCENE
+from tests.report.browser import Browser, installed
 from thermospindle.cli import main
 from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.decision.errors import arrived, whole
@@ -30,6 +31,7 @@ from thermospindle.model.scene.reading import content_hash, load
 from thermospindle.model.units import RPM
 from thermospindle.report.figures.diagnosis import errors, evidence_bars, explanations, law
 from thermospindle.report.page.diagnosis import sections, write_diagnosis
+from thermospindle.report.page.report import write_page
 from thermospindle.report.text.diagnosis.answer import diagnosis_json
 from thermospindle.report.text.diagnosis.doubts import doubt_words
 from thermospindle.report.text.diagnosis.granted import granted_words
@@ -57,7 +59,7 @@ def told(nothing_missing):
 
 def cells(section):
     """Rows of text of all tables of a section."""
-    rows = re.findall(r"<tr>(.*?)</tr>", section)
+    rows = re.findall(r"<tr[^>]*>(.*?)</tr>", section)
     return [[unescape(re.sub(r"<[^>]+>", "", c)) for c in re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row)] for row in rows]
 
 
@@ -68,8 +70,7 @@ def test_the_page_says_what_the_json_says(told):
     assert f"{answer['verdict']}: {answer['effects'][0]}" in verdict
     assert f"{answer['error']['before']:.2f}" in verdict
     assert f"{answer['error']['held_out_after']:.2f}" in verdict
-    rows = cells(by_title["Explanations"])
-    assert rows[1][0] == "soak_lag"
+    assert "soak_lag" in {row[0] for row in cells(by_title["Explanations"])}
     tolerances = {row[0]: row for row in cells(by_title["What these data pin down"])}
     for name, t in answer["tolerances"].items():
         unit = 1 if name.startswith("temperature of") else 100
@@ -87,7 +88,7 @@ def test_a_size_that_differs_from_test_to_test_is_told_as_a_range(told, capsys):
     tests = [row["test"] for row in law]
     for departure, spread in ((0.1, False), (0.3, True)):
         other = answer | {"candidates": [first | {"departure_from_law": {name: departure}, "law": {name: law}}, *rest]}
-        row = cells(dict(sections(found, other))["Explanations"])[1]
+        row = next(row for row in cells(dict(sections(found, other))["Explanations"]) if row[0] == name)
         assert ("(test by test)" in row[4]) == spread
         assert row[5].startswith(f"from −0.1130 ± 0.0080 in {tests[2]} to 0.0330 ± 0.0080 in {tests[1]} (mean ") == spread
         show_diagnosis(Console(width=2000), other)
@@ -235,13 +236,46 @@ def test_the_law_is_that_of_the_data(told):
         assert np.min(np.abs(drawn - row["size"])) < 1e-12
 
 
+def test_what_is_unknown_has_a_row_beside_the_explanations_and_no_effect_too(told):
+    """By probability: something unknown with all of it stood nowhere in a table whose rows were all 0.000."""
+    found, answer = told
+    for none, unknown, order in ((0.0, 1.0, ["something unknown", "soak_lag", "no effect"]), (0.07, 0.03, ["soak_lag", "no effect", "something unknown"])):
+        [first, *_] = answer["candidates"]
+        told = answer | {"probability": {"none": none, "unknown": unknown}, "candidates": [first | {"probability": 1 - none - unknown}]}
+        rows = [row for row in cells(dict(sections(found, told))["Explanations"])[1:] if row[0]]
+        assert [row[0] for row in rows] == order
+        assert {row[0]: row[2] for row in rows} == {"no effect": f"{none:.3f}", "something unknown": f"{unknown:.3f}", "soak_lag": f"{1 - none - unknown:.3f}"}
+
+
+@pytest.mark.skipif(installed() is None, reason="no Chromium or Chrome is installed on this machine")
+def test_the_table_of_explanations_is_seen_whole_on_a_wide_screen(told, tmp_path):
+    """Of a pair whose sizes differ from test to test, in tests with long names, units were beyond the edge."""
+    found, answer = told
+    [first, *_] = answer["candidates"]
+    effects = ["bond_softening", "constant_force_preload"]
+    size = {"value": 26.2, "sd": 1.3, "unit": "nm/N"}
+    law = [{"test": f"spindle_20C_{speed}rpm", "temperature_C": 20.0, "speed_rpm": speed, "size": speed / 250, "sd": 9.8} for speed in (0.0, 7200.0)]
+    pair = first | {"effects": effects, "parameters": {f"{name}.hot_compliance": size for name in effects}, "law": dict.fromkeys(effects, law)}
+    told = answer | {"candidates": [pair | {"departure_from_law": dict.fromkeys(effects, 1.0), "probability": 0.5}]}
+    write_page(tmp_path, found.spindle, 2, "long", [("Explanations", dict(sections(found, told))["Explanations"])], "Diagnosis")
+    browser = Browser(tmp_path / "profile")
+    try:
+        browser.open((tmp_path / "report.html").as_uri())
+        browser.wait("document.querySelector('.scroll .spread') !== null")
+        width, seen = browser.run("(e => [e.scrollWidth, e.clientWidth])(document.querySelector('.scroll'))")
+    finally:
+        browser.close()
+    assert width <= seen
+
+
 def test_files(told, tmp_path):
-    write_diagnosis(*told, told[0].spindle, tmp_path)
+    write_diagnosis(*told, told[0].spindle, tmp_path, name="campA")
     pictures = {f.stem for f in tmp_path.iterdir()} - {"report"}
     assert {"errors", "explanations", "law"} <= pictures
     assert {p.name for p in tmp_path.iterdir()} == {"report.html"} | {f"{n}.{kind}" for n in pictures for kind in ("svg", "png")}
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "lag &amp; &lt;haste&gt;" in page
+    assert f"<title>Diagnosis: campA beside {told[0].spindle.name}: " in page
     assert "<haste>" not in page
     assert "<free>" not in page
     assert page.count("<svg") == len(pictures)
