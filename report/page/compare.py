@@ -60,6 +60,7 @@ def write_comparison(
     turning: Sequence[RunoutBeside] = (),
     errors: Mapping[str, float | None] | None = None,
     campaign: str = "",
+    *,
     name: str = "",
     progress: Callable[[str], None] = lambda done: None,
 ) -> None:

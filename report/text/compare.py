@@ -33,7 +33,9 @@ def comparison_json(c: Comparison) -> dict[str, Any]:
 
 def _constant_json(c: Comparison) -> dict[str, Any] | None:
     found = constant_errors(c.tests)
-    return found and {"share": found.share, "rms_pull": found.without, "frequency_percent": {str(number): 100 * error for number, error in found.frequency.items()}}
+    if found is None:
+        return None
+    return {"share": found.share, "rms_pull": found.without, "frequency_percent": {str(number): 100 * error for number, error in found.frequency.items()}}
 
 
 def _test_json(t: TestComparison) -> dict[str, Any]:
