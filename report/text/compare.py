@@ -117,9 +117,10 @@ MOST = 0.5  # of the squares of all errors, from which what is the same at all c
 
 
 def constant_words(c: Comparison) -> str:
-    """Where a scene and a campaign disagree mostly by what is the same at all conditions: a sentence with the figures, and what that may be; else empty."""
+    """Where a scene and a campaign disagree mostly by what is the same at all conditions, and nearly agree without it: a sentence with the figures, and what that may be; else empty, for
+    what is left then may be an effect."""
     found = constant_errors(c.tests)
-    if found is None or c.rms_residual < AGREES or found.share < MOST or not found.frequency:
+    if found is None or c.rms_residual < AGREES or found.share < MOST or found.without >= ALMOST or not found.frequency:
         return ""
     number = max(found.frequency, key=lambda n: abs(found.frequency[n]))
     what = (
