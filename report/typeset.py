@@ -30,8 +30,10 @@ def micro(text: str) -> str:
 
 
 def prose(text: str) -> str:
-    """Plain words of the terminal as HTML: escaped, with true minus, plus-minus, arrow, degrees and micro."""
-    return minus(micro(re.sub(r"(?<=\d) C\b", " °C", str(escape(text))))).replace("+-", "±").replace("-&gt;", "→")
+    """Plain words of the terminal as HTML: escaped, with true minus, plus-minus, arrow, degrees and micro; what stands in backticks is code, and stays as it is typed."""
+    typed = [str(escape(part)) for part in re.split(r"`([^`]+)`", text)]  # words, code, words, ...
+    words = [minus(micro(re.sub(r"(?<=\d) C\b", " °C", part))).replace("+-", "±").replace("-&gt;", "→") for part in typed[::2]]
+    return words[0] + "".join(f"<code>{code}</code>{after}" for code, after in zip(typed[1::2], words[1:], strict=True))
 
 
 def unit_word(unit: str, before: str = "") -> str:

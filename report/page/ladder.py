@@ -15,7 +15,7 @@ from thermospindle.report.typeset import figure, prose, table
 
 def section(found: Ladder) -> tuple[str, str]:
     """Title and HTML for `report.page.report.write_report`."""
-    grid = table(COLUMNS, [[prose(c) for c in cells(r)] for r in found.steps], caption=escape(LEGEND))
+    grid = table(COLUMNS, [[prose(c) for c in cells(r)] for r in found.steps], caption=prose(LEGEND))
     caption = f"Above: the error at every step, of all data and of the {found.left_out} predicted by fits that have not seen them. Below: residuals of every mode "
     caption += f"in every test at the first step and at '{escape(found.top.name)}'."
     drawn = figure(svg(ladder_plots.figure(found), "ladder", "Error at every step of the ladder, and residuals on the first and the last"), caption)

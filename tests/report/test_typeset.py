@@ -10,6 +10,7 @@ ROWS = [
     pytest.param("<b> & 'on'", "&lt;b&gt; &amp; &#39;on&#39;", id="escaped"),
     pytest.param("a pulse of 99.3 us, loose by 2 um, 3 N/um, us um", "a pulse of 99.3 µs, loose by 2 µm, 3\u00a0N/µm, us um", id="micro"),
     pytest.param("from 20 C to 44.1 C at C3", "from 20\u00a0°C to 44.1\u00a0°C at C3", id="degrees"),
+    pytest.param("by -3 %: `draft --size -3 <x>` +- 1", "by −3\u00a0%: <code>draft --size -3 &lt;x&gt;</code> ± 1", id="code stays as typed"),
     pytest.param("20 (fo-fc) - fo, T20_n-1", "20 (fo-fc) - fo, T20_n-1", id="names stay"),
 ]
 
