@@ -128,11 +128,11 @@ def _pressed(table: StiffnessTable) -> str:
     if not most:
         return ""
     limits = [
-        f"{limit / 1e6:.0f} of {kind}"
+        f"{limit / 1e6:.0f} MPa for {kind}"
         for kind, limit, own in (("ball bearings", OF_BALLS, "contact_angle_deg"), ("roller bearings", OF_ROLLERS, "clearance_um"))
         if any(own in values and np.isfinite(values[own]).any() for values in table.values.values())
     ]
-    return f"Largest contact pressure (Hertz): {', '.join(f'{name} {p:.0f}' for name, p in most.items())} MPa; the static limit of ISO 76 is {', '.join(limits)}."
+    return f"Largest contact pressure (Hertz): {', '.join(f'{name} {p:.0f}' for name, p in most.items())} MPa; the static limit of ISO 76 is {' and '.join(limits)}."
 
 
 def show_told_table(console: Console, table: StiffnessTable, radial_load: bool = False) -> None:

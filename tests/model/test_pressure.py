@@ -60,6 +60,6 @@ def test_tables_tell_it_of_what_rolls_and_say_the_limit(tmp_path, capsys: pytest
     assert main(["table", "tailstock", "--temperatures", "20", "40"]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert f"rear1 {max(told['rear1']['contact_pressure_MPa']):.0f}" in said
-    assert "the static limit of ISO 76 is 4200 of ball bearings, 4000 of roller bearings." in said
+    assert "the static limit of ISO 76 is 4200 MPa for ball bearings and 4000 MPa for roller bearings." in said
     assert main(["table", "mk7702", "--temperatures", "20"]) == 0
     assert "pressure" not in capsys.readouterr().out
