@@ -55,6 +55,8 @@ def _role(text: str, unit: str) -> Role | None:
     low = text.lower().strip(" :_-")
     if (axis := re.sub(r"[ _-]+(domain|axis|vector)$", "", low)) in AXES:
         return Role(AXES[axis], unit=unit)
+    if not unit and (axis_unit := re.fullmatch(r"([^\W_]+)_(hz|khz|s|ms)", low)) and axis_unit[1] in AXES:  # "frequency_kHz"
+        return Role(AXES[axis_unit[1]], unit=axis_unit[2].replace("hz", "Hz"))
     if low in ("hz", "s", "sec"):
         return Role("frequency" if low == "hz" else "time", unit=low)
     if low in ("ignore", ""):

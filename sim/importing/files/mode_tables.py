@@ -15,6 +15,7 @@ from thermospindle.sim.importing.measured import Content, ModeLine
 COLUMNS = {
     "test": "test", "condition": "test", "mode": "mode", "no": "mode", "number": "mode", "kind": "kind", "type": "kind",
     "frequency": "frequency", "frequency_hz": "frequency", "f": "frequency", "f_hz": "frequency", "freq": "frequency",
+    "frequency_khz": "kilohertz", "f_khz": "kilohertz", "freq_khz": "kilohertz",
     "frequency_sd_hz": "sd", "frequency_sd": "sd", "sd": "sd", "sd_hz": "sd", "damping_ratio": "damping", "damping": "damping", "zeta": "damping",
     "damping_ratio_sd": "damping_sd", "damping_%": "percent", "damping_percent": "percent", "zeta_%": "percent",
 }  # fmt: skip
@@ -32,8 +33,8 @@ def headings(file: Path) -> tuple[list[str], str, int] | None:
             continue
         for separator in ("\t", ";", ","):
             named = [COLUMNS.get(re.sub(r"[\s()\[\]]+", "_", cell.strip().strip('"').lower()).strip("_"), "") for cell in plain.split(separator)]
-            alone = named == ["frequency"] and _is_number(every[number + 1 :])
-            if "frequency" in named and (alone or {"mode", "kind", "damping", "percent", "test", "sd"} & {*named}):
+            alone = named in (["frequency"], ["kilohertz"]) and _is_number(every[number + 1 :])
+            if {"frequency", "kilohertz"} & {*named} and (alone or {"mode", "kind", "damping", "percent", "test", "sd"} & {*named}):
                 return named, separator, number
         if not line.lstrip().startswith(("#", "%")):
             return None
@@ -51,6 +52,8 @@ def from_modes(file: Path) -> Content:
     found = headings(file)
     assert found is not None
     named, separator, first = found
+    if "kilohertz" in named and {"frequency", "sd"} & {*named}:
+        raise BadInput(f"{file}: line {first + 1}: has frequencies in kHz and another column of them, or of their errors, in Hz; write all in Hz")
     modes = []
     try:
         rows = list(csv.reader(text_of(file).splitlines(), delimiter=separator))
@@ -64,8 +67,10 @@ def from_modes(file: Path) -> Content:
             raise BadInput(f"{where}: has {len(cells)} cells, the headings are {len(named)}")
         told = {name: cell.strip() for name, cell in zip(named, cells, strict=False) if name and cell.strip()}
         frequency = _number(where, told, "frequency", separator)
+        if (kilohertz := _number(where, told, "kilohertz", separator)) is not None:
+            frequency = 1e3 * kilohertz
         if frequency is None:
-            raise BadInput(f"{where}: frequency = '': a positive number in Hz is needed")
+            raise BadInput(f"{where}: frequency = '': a positive number is needed, in Hz, or in kHz under the heading frequency_kHz")
         damping = _number(where, told, "damping", separator)
         if (percent := _number(where, told, "percent", separator)) is not None:
             damping = percent / 100

@@ -156,9 +156,14 @@ def _numbers(file: Path, lines: list[tuple[int, str]], separator: str | None, co
         number, line = lines[index]
         row = _parse(_cells(line, separator), comma)
         if row is None or (rows and len(row) != len(rows[-1])):
+            above = _parse(_cells(lines[index - 1][1], separator), comma) if index else None
+            if row is not None and len(rows) == 1 and above is not None and len(above) == len(row):
+                last = lines[index + 1][0]
+                raise BadInput(f"{file}: line {last}: has {len(rows[0])} numbers, the lines before it {len(row)}; each must have as many: is the file cut off there?")
             if row is not None and rows and len(row) > 1:
                 raise BadInput(f"{file}: line {number}: has {len(row)} numbers, the lines after it {len(rows[-1])}; each must have as many")
             if not rows:
+                _refuse_gap(file, number, _cells(line, separator), len(above or ()), comma)
                 raise BadInput(f"{file}: line {number}: {line.strip()[:60]!r} stands below the numbers; nothing may follow them")
             if row is None:
                 _refuse_gap(file, number, _cells(line, separator), len(rows[-1]), comma)

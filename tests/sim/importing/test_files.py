@@ -14,6 +14,7 @@ from thermospindle.report.verbs.importing import bring
 from thermospindle.sim.campaign.campaign import read_campaign
 from thermospindle.sim.campaign.uff import write_frf
 from thermospindle.sim.identification.frf import out_of
+from thermospindle.sim.importing.files.mode_tables import from_modes
 from thermospindle.sim.importing.files.reading import content
 from thermospindle.sim.importing.mapping import FileForm
 
@@ -156,6 +157,10 @@ def test_lines_of_the_running_speed_are_said_and_left_as_measured(tmp_path):
         ("frequency,mode,kind\n1000,1,rockin\n", "line 2: kind = 'rockin': allowed are axial, rocking, lateral, unknown, or nothing"),
         ("f;H(1,1) real\n1;2\n2\n3;4;5\n4;5\n", "numbers"),
         ("f,H(1,1) real\n1,2\n2,3\n3,4\nend of data\n", "line 5: 'end of data' stands below the numbers"),
+        ("f,H(1,1) real,H(1,1) imag\n1,2,3\n2,3,4\n3,4,5\n4,5", "line 5: has 2 numbers, the lines before it 3; each must have as many: is the file cut off there"),
+        ("f,H(1,1) real,H(1,1) imag\n1,2,3\n2,3,4\n3,4,5\n4,5,1.2e-", "line 5: column 3: '1.2e-' is no number"),
+        ("mode,frequency,frequency_kHz\n1,1000,1\n", "line 1: has frequencies in kHz and another column"),
+        ("mode,frequency_kHz,sd\n1,1.2,0.01\n", "line 1: has frequencies in kHz and another column of them, or of their errors, in Hz; write all in Hz"),
         ("frequency,mode\n1000,1\nabc,2\n", "line 3: frequency = 'abc': is no number"),
         ("frequency,mode\n1_000,1\n", "line 2: frequency = '1_000': is no number"),
         ("frequency,mode\n1000,1\ninf,2\n", "line 3: frequency = 'inf': a positive number in Hz is needed"),
@@ -278,3 +283,15 @@ def test_geometry_of_data_set_2411(tmp_path):
     bare = content(tmp_path / "bare.unv", FileForm(file="x"))
     assert bare.places == {}
     assert bare.unscaled[305] == pytest.approx((0.0, -12.5, 15.0))
+
+
+@pytest.mark.parametrize("text", ["test,mode,frequency_kHz\ncold,1,1.0025\n", "frequency_kHz\n1.0025\n", "test;f (kHz)\ncold;1,0025\n"])
+def test_modes_may_be_told_in_kilohertz(tmp_path, text):
+    (tmp_path / "peaks.csv").write_text(text)
+    assert [m.frequency for m in from_modes(tmp_path / "peaks.csv").modes] == [pytest.approx(1002.5)]
+
+
+def test_lines_may_be_told_in_kilohertz(tmp_path):
+    heads, found = columns("real", "(m/s)/N")
+    frf = imported(tmp_path, "", table(tmp_path / "T20.csv", ["frequency_kHz", *heads], [FREQUENCY / 1e3, *found]))
+    np.testing.assert_allclose(frf.frequency, FREQUENCY, rtol=1e-9)
