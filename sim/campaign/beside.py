@@ -84,7 +84,11 @@ def beside(spindle: Spindle, points: tuple[Point, ...], test: Test, condition: C
 
 
 def left_out(campaign: Campaign) -> list[str]:
-    """A sentence for every test in whose FRFs lines of the running speed stand: those are compared with nothing."""
+    """A sentence that names the tests in whose FRFs lines of the running speed stand: those are compared with nothing. Of one test it names the lines too."""
     where = f"{campaign.folder / 'campaign.toml'}: " if campaign.folder else ""
-    found = [(t.id, out_of(t.frf, t.speed)) for t in campaign.tests if t.frf is not None]
-    return [f"{where}tests.{id_}: {lines.words()}" for id_, lines in found if lines.multiples]
+    every = [(t.id, out_of(t.frf, t.speed)) for t in campaign.tests if t.frf is not None]
+    found = [(id_, lines) for id_, lines in every if lines.multiples]
+    if len(found) < 2:
+        return [f"{where}tests.{id_}: {lines.words()}" for id_, lines in found]
+    each = ", ".join(f"{id_} ({lines.span}, {int(lines.out.sum())} lines)" for id_, lines in found)
+    return [f"{where}tests: lines of the running speed stand in the FRFs of {len(found)} tests, {each}, and are left out"]

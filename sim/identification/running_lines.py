@@ -37,6 +37,11 @@ class RunningLines:
     multiples: tuple[int, ...]
     frequency: tuple[float, ...]
 
+    @property
+    def span(self) -> str:
+        """The first multiple to the last."""
+        return "x to ".join(str(k) for k in sorted({self.multiples[0], self.multiples[-1]})) + "x"
+
     def words(self) -> str:
         """Which they are, in a sentence."""
         named = [f"{f:.1f} Hz ({k}x)" for k, f in zip(self.multiples, self.frequency, strict=True)]

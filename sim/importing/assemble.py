@@ -13,7 +13,6 @@ from thermospindle.model.errors import BadInput, Unanswered
 from thermospindle.model.machine import Point, Spindle
 from thermospindle.model.units import MINUTE, RPM
 from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Test
-from thermospindle.sim.identification.frf import out_of
 from thermospindle.sim.importing import units
 from thermospindle.sim.importing.files.reading import content
 from thermospindle.sim.importing.frfs import Placed, frf_of
@@ -311,10 +310,6 @@ def _test(id_: str, told: TestForm, found: Read, placed: list[Placed], quantity:
     if placed:
         frf, more = frf_of(id_, placed, quantity, form.band_Hz, speed, told.averages)
         notes += more
-        running = out_of(frf, speed)
-        if running.multiples:
-            files = listed(dict.fromkeys(p.curve.file.name for p in placed), 3)
-            notes.append(f"test {id_} ({files}): {running.words()} of what is compared; the files' own values are kept")
         if not any(r in frf.reference_nodes for r in frf.response_nodes):
             notes.append(f"test {id_}: no response at a hammer point: signs and directions of its FRFs cannot be checked")
     lines = list(found.modes.get(id_, []))

@@ -47,17 +47,18 @@ def from_peaks(curves: Sequence[Curve], speed: float) -> tuple[list[ModeLine], l
         else:
             own.append(mode)
     least = max(min(2, len(curves)), SHARED * len(curves))
-    modes, notes, turning = [], [], abs(speed) / (2 * np.pi)
+    modes, harmonics, turning = [], [], abs(speed) / (2 * np.pi)
     for group in groups:
         if len(group) < least or (len(group) < 3 and any(m.damping_ratio is None for m in group)):  # one spike of noise has no width
             continue
         mode = _median(group, step)
         nearest = turning * max(round(mode.frequency / turning), 1) if turning else -np.inf
         if abs(mode.frequency - nearest) <= step:
-            notes.append(f"{curves[0].file.name}: the peak at {mode.frequency:.5g} Hz is a multiple of the running speed, no mode")
+            harmonics.append(f"{mode.frequency:.5g}")
         else:
             modes.append(mode)
-    return modes, notes
+    which = f"the peak at {harmonics[0]} Hz is a multiple of the running speed, no mode" if len(harmonics) == 1 else f"peaks at {', '.join(harmonics)} Hz are multiples of the running speed, no modes"
+    return modes, [f"{curves[0].file.name}: {which}"] if harmonics else []
 
 
 def _median(group: Sequence[ModeLine], step: float) -> ModeLine:

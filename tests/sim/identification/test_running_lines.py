@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from thermospindle.cli import main
 from thermospindle.diagnosis.data.lines import line_data
 from thermospindle.diagnosis.data.observe import observe
 from thermospindle.model.machine import Condition
+from thermospindle.sim.campaign.beside import left_out
 from thermospindle.sim.campaign.campaign import Campaign, Noise, Test, condition_of, write_campaign
 from thermospindle.sim.identification.frf import Frf, out_of, without
 from thermospindle.sim.identification.modal import noise_model
@@ -124,6 +126,13 @@ def test_compare_warns_and_names_them(spindle, tmp_path, capsys):
     assert "campaign.toml: tests.t1: a line of the running speed stands in the FRFs, at 71" in warning
     assert "(6x)" in warning
     assert answer["rms_pull"] < 2.0
+
+
+def test_lines_of_several_tests_are_said_in_one_sentence(spindle):
+    frf = measured(spindle, 3)
+    several = campaign(spindle, with_spikes(frf, [5, 6, 13], 0.2), with_spikes(frf, [6], 0.2), frf)
+    [said] = left_out(several)
+    assert re.fullmatch(r"tests: lines of the running speed stand in the FRFs of 2 tests, t1 \(5x to 13x, \d+ lines\), t2 \(6x, \d+ lines\), and are left out", said)
 
 
 def test_multiples_on_the_ends_of_the_band_go_with_the_others(spindle):

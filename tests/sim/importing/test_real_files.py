@@ -95,7 +95,7 @@ def test_magnitudes_of_a_rotor_rig_make_modes_and_lines_of_its_speed_do_not(tmp_
     assert [r.frequency for r in turning.modes][:2] == pytest.approx([11.6, 14.4], abs=0.3)
     assert any("is a multiple of the running speed" in n for n in notes)
     notes = bring([AMH / "20Hz_1_hit.csv"], mapping=_only(tmp_path, head), out=tmp_path / "d").values["notes"]
-    assert sum("is a multiple of the running speed" in n for n in notes) == 2
+    assert [n.count(",") for n in notes if "Hz are multiples of the running speed, no modes" in n] == [2]  # two peaks in one sentence
 
 
 def _only(folder, head):
