@@ -2,8 +2,12 @@
 
 import importlib.util
 import json
+import re
 import subprocess
 import sys
+from html import unescape
+from pathlib import Path
+from urllib.parse import unquote
 
 import pytest
 
@@ -83,3 +87,18 @@ def test_the_site_builds_without_a_warning(tmp_path):
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "generated" / "mapping.html").is_file()
+    assert dead_links(tmp_path) == []
+
+
+def dead_links(site: Path) -> list[str]:
+    """What pages link to within the site and is not there: a file, or a place in a page."""
+    pages = {page: page.read_text(encoding="utf-8") for page in site.rglob("*.html")}
+    places = {page: set(re.findall(r'\bid="([^"]+)"', text)) for page, text in pages.items()}
+    dead = []
+    for page, text in pages.items():
+        for href in set(re.findall(r'<a [^>]*href="([^":]+)"', text)):
+            path, _, place = unquote(unescape(href)).partition("#")
+            target = (page.parent / path).resolve() if path else page
+            if not target.is_file() or (place and target in places and place not in places[target]):
+                dead.append(f"{page.relative_to(site)}: {href}")
+    return dead
