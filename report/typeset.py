@@ -76,7 +76,7 @@ def signed_short(value: float) -> str:
     """A signed number in few characters, with a true minus: one digit after the point below ten, powers of ten from 10,000."""
     if abs(value) < 0.05:
         return "0.0"
-    text = f"{value:+.1f}" if abs(value) < 9.95 else f"{value:+.0f}" if abs(value) < 9999.5 else f"{value:+.0e}".replace("e+0", "e")
+    text = f"{value:+z.1f}" if abs(value) < 9.95 else f"{value:+z.0f}" if abs(value) < 9999.5 else f"{value:+.0e}".replace("e+0", "e")
     return text.replace("-", "−")
 
 

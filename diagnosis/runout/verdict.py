@@ -226,7 +226,7 @@ def _verdict(
             return answer("unexplained", (), f"The lines are not those of the scene (misfit {chi2:.0f} for {count} numbers), most at "
                           f"{parts[worst].frequency[0]:.1f} Hz, and no effect explains that.")  # fmt: skip
         gained = (
-            f"the best effect, {first.effects[0]}, gains {first.delta_evidence:.1f} in ln evidence" if first else "no effect can be tried"
+            f"the best effect, {first.effects[0]}, gains {first.delta_evidence:z.1f} in ln evidence" if first else "no effect can be tried"
         )
         return answer("none", (), f"Imperfections of the size that the scene gives explain all lines (misfit {chi2:.0f} for {count} numbers); {gained} "
                       f"where {CLEAR:g} is asked.")  # fmt: skip

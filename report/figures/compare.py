@@ -176,7 +176,7 @@ def by_band(c: Comparison) -> Figure:
     looks: list[tuple[str, Normalize, str, Callable[[float], str]]] = [
         ("Shape: mean CSAC", Normalize(0, 1), "YlGnBu", _share),
         ("Amplitude: mean CSF", Normalize(0, 1), "YlGnBu", _share),
-        ("Shift of the model, %, by FDAC", Normalize(-far, far), "RdBu_r", lambda v: "0" if abs(v) < 0.05 else f"{v:+.1f}"),
+        ("Shift of the model, %, by FDAC", Normalize(-far, far), "RdBu_r", lambda v: "0" if abs(v) < 0.05 else f"{v:+z.1f}"),
     ]
     size = min(7.5, 170 / max(len(edges), 1))  # signed numbers stand side by side
     for axes, grid, (title, norm, colours, text) in zip(panels, values.values(), looks, strict=True):
@@ -225,7 +225,7 @@ def fdac_maps(c: Comparison) -> Figure:
         shifts: Mapping[tuple[float, float], float] = {(b.low, b.high): b.shift for b in found.bands if b.shift is not None}
         for (low, high), shift in shifts.items():
             axes.plot([low, high], np.array([low, high]) * (1 + shift), color="#c9371c", lw=1.4)
-        words = "" if found.whole.shift is None else f", shift {100 * found.whole.shift:+.2f} %".replace("-", "−")
+        words = "" if found.whole.shift is None else f", shift {100 * found.whole.shift:+z.2f} %".replace("-", "−")
         axes.set_title(f"{label(t.test, ', ')}{words}")
         axes.set(xlabel="measured frequency, Hz", ylabel="computed frequency, Hz", aspect="equal")
         axes.set(xlim=(lines[0], lines[-1]), ylim=(lines[0], lines[-1]))

@@ -72,7 +72,7 @@ def evidence_bars(names: Sequence[str], value: Array, paint: Sequence[str], ende
         beyond = v < low or v > high
         if beyond:
             axes.plot([1.02 * low if v < low else high], [y], marker="<" if v < low else ">", ms=6, color=INK, mec="white", zorder=4, clip_on=False)
-        told = f"{v:+.1f}" if abs(v) < 1000 else f"{v:+.0f}" if abs(v) < 1e9 else f"{v:+.1e}"
+        told = f"{v:+z.1f}" if abs(v) < 1000 else f"{v:+z.0f}" if abs(v) < 1e9 else f"{v:+.1e}"
         more = f"{', beyond the axis' if beyond else ''}{'' if settled else ', the fit has not arrived'}"
         axes.text(max(end, 0.0) + 0.012 * (high - low), y, told.replace("-", "−") + more, va="center", fontsize=8, color=INK)
     axes.axvline(0, color=INK, lw=0.8)

@@ -162,7 +162,7 @@ def _detectable(answer: dict[str, Any]) -> str:
 
 
 def _evidence(value: float) -> str:
-    return f"{value:+.1f}" if abs(value) < 1000 else f"{value:+.0f}"
+    return f"{value:+z.1f}" if abs(value) < 1000 else f"{value:+z.0f}"
 
 
 def _with_error(value: float, sd: float, digits: int = 3) -> str:

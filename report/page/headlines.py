@@ -29,7 +29,7 @@ def headlines(run: Run, table: Table) -> list[tuple[str, str, str]]:
         return [_preload([a.preload for a, _ in pairs], f"at {cold:g} °C", names)] if pairs else []
     cards = []
     if pairs:
-        angle = " / ".join(f"{np.degrees(b.contact_angle - a.contact_angle):+.2f}" for a, b in pairs)
+        angle = " / ".join(f"{np.degrees(b.contact_angle - a.contact_angle):+z.2f}" for a, b in pairs)
         radial = " / ".join(_change(a.radial_stiffness, b.radial_stiffness) for a, b in pairs)
         axial = " / ".join(_change(a.axial_stiffness, b.axial_stiffness) for a, b in pairs)
         cards = [
@@ -42,7 +42,7 @@ def headlines(run: Run, table: Table) -> list[tuple[str, str, str]]:
         named = (row.published_flexibility, "as published") if row.published_flexibility else (row.flexibility, "by the model")
         groups.setdefault(named, []).append(row.number)
     for (name, by), numbers in groups.items():
-        shifts = ", ".join(f"{s[0]:+.1f}" for n in numbers if (s := table.shift("computed", n)))
+        shifts = ", ".join(f"{s[0]:+z.1f}" for n in numbers if (s := table.shift("computed", n)))
         modes = f"Mode{'s' if len(numbers) > 1 else ''} {_listed(numbers)}"
         cards.append((f"{modes}: {name}, {by}", f"{shifts} Hz", f"computed shift from {cold:g} to {hot:g} °C"))
     return cards
@@ -103,7 +103,7 @@ def _frequency_misses(table: Table, measured: Peaks, own: Peaks) -> Iterator[str
     yield (
         f"The largest miss at {own.temperature:g} °C is mode {worst} ({kinds[worst]}): computed {own.value[worst][0]:.1f} Hz, "
         f"measured {f:.1f} Hz, {abs(miss):.1f} Hz or {100 * abs(miss) / f:.1f} % too {'high' if miss > 0 else 'low'}. "
-        f"Over all {len(off)} measured modes the difference runs from {min(off.values()):+.1f} to {max(off.values()):+.1f} Hz."
+        f"Over all {len(off)} measured modes the difference runs from {min(off.values()):+z.1f} to {max(off.values()):+z.1f} Hz."
     )
     for a, b in pairwise(sorted(off, key=lambda n: measured.value[n][0])):
         apart, mine = (p.value[b][0] - p.value[a][0] for p in (measured, own))
@@ -137,7 +137,7 @@ def _shift_misses(table: Table, label: str) -> Iterator[str]:
     for further, words in ((True, "further"), (False, "less far")):
         same_way = [(n, m, c) for n, _, m, _, c in sure if m * c > 0 and (abs(m) > abs(c)) == further]
         if same_way:
-            each = "; ".join(f"mode {n}: {m:+.1f} against {c:+.1f} Hz" for n, m, c in same_way)
+            each = "; ".join(f"mode {n}: {m:+z.1f} against {c:+z.1f} Hz" for n, m, c in same_way)
             modes = _listed([n for n, _, _ in same_way])
             yield f"Measured frequencies move {words} than computed ones in modes {modes} ({each})."
 

@@ -60,7 +60,7 @@ def _candidates(answer: dict[str, Any]) -> str:
             value, _, sd = minus(v.get("called") or plain_error(v["value"], v["sd"])).partition(" +- ")
             rows.append(
                 [
-                    escape(" + ".join(c["effects"])) if first else "", minus(f"{c['delta_evidence']:+.1f}") if first else "",
+                    escape(" + ".join(c["effects"])) if first else "", minus(f"{c['delta_evidence']:+z.1f}") if first else "",
                     f"{c['probability']:.3f}" if first else "", escape(name.split(".", 1)[1] if len(c["effects"]) == 1 else name),
                     escape(value) + (f" <small>± {sd}</small>" if sd else ""), unit_cell(v["unit"]),
                     ("yes" if c["believable"] else "no, at a limit") if first else "",

@@ -53,7 +53,7 @@ def _tolerances(found: Ladder) -> str:
     build = [(p.name, float(x)) for p, x in zip(r.model.parameters, r.nuisance, strict=True) if p.kind == kinds_of.BUILD]
     far = sorted((row for row in build if abs(row[1]) > STRETCHED), key=lambda row: -abs(row[1]))
     more = f" and {len(far) - MOST} more" if len(far) > MOST else ""
-    named = ", ".join(f"{name} ({x:+.1f})" for name, x in far[:MOST])
+    named = ", ".join(f"{name} ({x:+z.1f})" for name, x in far[:MOST])
     paid = f"beyond {STRETCHED:g} standard deviations are {named}{more}" if far else "none goes far"
     return f"The tolerances take the error from {drawn.error:.2f} to {r.error:.2f} standard errors; {paid}."
 
@@ -177,7 +177,7 @@ def _wrong_shifts(found: Ladder, r: Step) -> Iterator[tuple[float, str]]:
             if residual > WRONG:
                 more = "moves more" if abs(m1 - m0) > abs(c1 - c0) else "moves less"
                 how = "moves the other way" if (m1 - m0) * (c1 - c0) < 0 else more
-                yield residual, f"mode {mode} ({kind}) {how} than computed, {m1 - m0:+.1f} +- {sd:.2g} Hz against {c1 - c0:+.1f}"
+                yield residual, f"mode {mode} ({kind}) {how} than computed, {m1 - m0:+z.1f} +- {sd:.2g} Hz against {c1 - c0:+z.1f}"
 
 
 def _wrong_splits(found: Ladder, r: Step) -> Iterator[str]:

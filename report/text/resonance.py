@@ -122,7 +122,7 @@ def sentences(found: ResonanceMap) -> list[str]:
     if not crossed:
         excited = [c for c in found.coincidences if c.strength > 0] or list(found.coincidences)
         apart = min(excited, key=lambda c: abs(c.margin), default=None)
-        near = f"; nearest is {_line(apart)}, {100 * apart.margin:+.1f} % from {_mode(apart)}" if apart else ""
+        near = f"; nearest is {_line(apart)}, {100 * apart.margin:+z.1f} % from {_mode(apart)}" if apart else ""
         return [f"This spindle at {rpm} crosses no line between {low:g} and {high:g} C{near}."]
     said = []
     for alike in _same_line(crossed):
@@ -217,7 +217,7 @@ def _cells(c: Coincidence) -> list[str]:
         f"{c.frequency:.1f}",
         f"{1e9 * c.strength:.1f}",
         "-" if c.repeats else f"{1e9 * c.nrro:.1f}",
-        f"{100 * c.margin:+.1f}",
+        f"{100 * c.margin:+z.1f}",
     )
     return [c.line.name, cause, c.line.bearing, mode, *numbers]
 

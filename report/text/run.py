@@ -126,7 +126,7 @@ def show_run(console: Console, run: Run, out: Path) -> None:
         followed = [next((i for i, n in of_step.items() if n == number), None) for of_step in numbers]
         found = [None if i is None else step.point.modes[i] for i, step in zip(followed, run.steps, strict=True)]
         frequency = ["-" if m is None else f"{m.frequency:.1f}" for m in found]
-        shift = "-" if found[-1] is None else f"{found[-1].frequency - mode.frequency:+.1f}"
+        shift = "-" if found[-1] is None else f"{found[-1].frequency - mode.frequency:+z.1f}"
         group = max(group_energy(first.chain, mode).items(), key=lambda item: item[1])[0]
         rows = [beside[t.id].get(number - 1) for t in measured]
         own.append([str(number), mode.kind, group, *frequency, shift, *(f"{row.frequency:.0f}" if row else "" for row in rows)])

@@ -98,7 +98,7 @@ def cause_words(g: LineBeside) -> str:
 
 
 def _sizes(g: LineBeside) -> tuple[str, str, str]:
-    return _nm(g.measured), _nm(g.computed), f"{g.residual:+.1f}"
+    return _nm(g.measured), _nm(g.computed), f"{g.residual:+z.1f}"
 
 
 def _nm(value: float) -> str:

@@ -151,7 +151,7 @@ def would_change(d: RunoutDiagnosis) -> str:
         return f"A test {d.next[0].plan.changed} would tell {first} from {second}."
     rivals = [e for e in d.explanations if set(e.effects) - set(d.effects) and len(e.effects) <= len(d.effects)]
     rival = (
-        f"{' + '.join(rivals[0].effects)}, {rivals[0].delta_evidence - d.explanations[0].delta_evidence:.0f} in ln evidence"
+        f"{' + '.join(rivals[0].effects)}, {rivals[0].delta_evidence - d.explanations[0].delta_evidence:z.0f} in ln evidence"
         if rivals
         else "none"
     )
@@ -170,7 +170,7 @@ def show_runout_diagnosis(console: Console, answer: dict[str, Any]) -> None:
         for c in answer["candidates"][:5]:
             values = ", ".join(f"{k.split('.')[1]} {value_words(v)}" for k, v in c["parameters"].items())
             console.print(
-                f"  {' + '.join(c['effects'])}: {c['delta_evidence']:+.1f}, probability {c['probability']:.3f}; {values}", highlight=False
+                f"  {' + '.join(c['effects'])}: {c['delta_evidence']:+z.1f}, probability {c['probability']:.3f}; {values}", highlight=False
             )
         if answer["where"]:
             console.print("\nWithout any catalogue, larger than the scene gives:")

@@ -166,7 +166,7 @@ def _line(label: str, nominal: float, own: dict[str, Any]) -> list[str]:
         return [*cells, ", ".join(named) or "-", f"{sum(c['first'] for c in shares['of'].values()):.2f}"]
     if (sensitive := own.get("sensitivity")) is None:
         return [*cells, "-", "-"]
-    most = [f"{name} {c['value']:+.2f}" for name, c in sensitive["coefficients"].items() if c["clear"] and abs(c["value"]) >= 0.005][:2]
+    most = [f"{name} {c['value']:+z.2f}" for name, c in sensitive["coefficients"].items() if c["clear"] and abs(c["value"]) >= 0.005][:2]
     return [*cells, ", ".join(most) or "-", f"{sensitive['r2']:.3f}"]
 
 
@@ -179,7 +179,7 @@ def _show_fleet(console: Console, values: dict[str, Any]) -> None:
         rows.append(cells + ([r["verdict"] or "-", ", ".join(r["effects"] or [])] if diagnosed else []))
     show_grid(console, "The largest error first, in standard errors", head, rows, ("campaign", "verdict", "effects"))
     for o in values["outliers"][:OUTLIERS]:
-        console.print(f"{o['campaign']} stands apart: {o['of']} {o['z']:+.1f} robust standard deviations from the fleet's middle")
+        console.print(f"{o['campaign']} stands apart: {o['of']} {o['z']:+z.1f} robust standard deviations from the fleet's middle")
     if not values["outliers"]:
         console.print(f"None stands more than {APART:g} robust standard deviations from the fleet's middle.")
 

@@ -105,7 +105,7 @@ def taken(bench: Bench, s: Setting, e: Explanation) -> Setting:
 def table(found: Explanations) -> str:
     """As HTML, with what is left for no effect and for something unknown."""
     head = Markup("<p><b>{}</b>: {}</p>").format(found.word, found.reason)
-    rows = [(" + ".join(e.effects), f"{e.probability:.1%}", f"{e.delta_evidence:+.0f}") for e in found.rows]
+    rows = [(" + ".join(e.effects), f"{e.probability:.1%}", f"{e.delta_evidence:+z.0f}") for e in found.rows]
     rows += [("no effect", f"{found.none:.1%}", "0"), ("something unknown", f"{found.unknown:.1%}", "")]
     body = Markup("").join(Markup("<tr><th scope=row>{}</th><td>{}</td><td>{}</td></tr>").format(*row) for row in rows)
     return str(head + Markup("<table><thead><tr><th scope=col>explanation</th><th scope=col>probability</th><th scope=col>ln evidence</th></tr></thead><tbody>") + body + Markup("</tbody></table>"))

@@ -83,5 +83,5 @@ def said(found: Weighed) -> str:
     """The fit in a sentence."""
     values = ", ".join(f"{key} {plain_error(v, found.sd[key])}" for key, v in found.value.items() if "." in key)
     values = values.replace("+-", "±")
-    gain = f"ln evidence {found.gain:+.0f} over tolerances alone; " if values else ""
+    gain = f"ln evidence {found.gain:+z.0f} over tolerances alone; " if values else ""
     return f"Fitted to the lines, as spindle diagnose does. {values + '; ' if values else ''}{gain}chi2 per number {found.before:.3g} → {found.after:.3g}."

@@ -89,7 +89,7 @@ def numbers(found: Errors, tests: Sequence[str], damping: bool) -> str:
     head = Markup("").join(Markup("<th scope=col>{}</th>").format(t) for t in tests)
     rows = Markup("").join(
         Markup("<tr><th scope=row>{}</th>{}</tr>").format(
-            m, Markup("").join(Markup("<td>{}</td>").format("–" if (v := values.get((m, t))) is None else f"{v:+.2f}".replace("-", "−")) for t in tests)
+            m, Markup("").join(Markup("<td>{}</td>").format("–" if (v := values.get((m, t))) is None else f"{v:+z.2f}".replace("-", "−")) for t in tests)
         )
         for m in modes
     )

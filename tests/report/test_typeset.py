@@ -1,7 +1,10 @@
 """Words of the terminal as a page sets them."""
 
+import re
+
 import pytest
 
+from tests.conftest import ROOT
 from thermospindle.report.typeset import plain, plain_error, prose, signed, unit_cell, with_error
 
 ROWS = [
@@ -62,3 +65,10 @@ def test_units_in_cells_have_their_signs(unit, told):
 
 def test_odds_have_no_powers_of_ten():
     assert [plain(x, 2) for x in (437.2, 3.21, 99_600.0)] == ["440", "3.2", "100000"]
+
+
+def test_no_text_has_a_signed_nought_below_zero():
+    """A difference of nothing is +0.0 wherever a sign is asked: the format's z says so."""
+    texts = [file for file in sorted((ROOT / "report").rglob("*")) if file.suffix in (".py", ".j2")]
+    assert len(texts) > 50
+    assert [f"{file.name}: {found}" for file in texts for found in re.findall(r"\{[^{}]*:\+\.\d+f\}", file.read_text(encoding="utf-8"))] == []

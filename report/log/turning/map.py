@@ -115,7 +115,7 @@ def summary(found: ResonanceMap) -> str:
         "|---|---|---|---|---|---|---|---|",
     ]
     for c in strongest(found.coincidences)[:16]:
-        numbers = f"{c.condition.temperature:.1f} | {c.condition.speed / RPM:.0f} | {c.frequency:.0f} | {1e9 * c.strength:.1f} | {100 * c.margin:+.1f}"
+        numbers = f"{c.condition.temperature:.1f} | {c.condition.speed / RPM:.0f} | {c.frequency:.0f} | {1e9 * c.strength:.1f} | {100 * c.margin:+z.1f}"
         lines.append(f"| {c.line.name} | {c.line.cause} {c.line.bearing} | {c.mode.number} {c.mode.kind} | {numbers} |")
     return "\n".join([*lines, *made_from(found.spindle)]) + "\n"
 

@@ -32,7 +32,7 @@ def granted_words(d: Diagnosis, drawn: float) -> str:
 
 def _moved(x: float, p: Nuisance) -> str:
     times, unit = UNITS[p.kind]
-    return f"{p.name} {times * p.at(x):+.2g} {unit} ({x:+.1f} s.d.)"
+    return f"{p.name} {times * p.at(x):+.2g} {unit} ({x:+z.1f} s.d.)"
 
 
 def _constant(model: CampaignModel, rows: list[tuple[float, Nuisance]]) -> str:

@@ -120,7 +120,7 @@ def would_change(d: Diagnosis) -> str:
         test += f" {' + '.join(rivals[0].names)} would need a size that it cannot have."
     elif rivals and not d.tests:
         test = f" No other temperature or speed tells {' + '.join(v.candidates[0].names)} from {' + '.join(rivals[0].names)}."
-    rival = f"{' + '.join(rivals[0].names)}, {rivals[0].delta_evidence - v.candidates[0].delta_evidence:.0f} in ln evidence" if rivals else "none"
+    rival = f"{' + '.join(rivals[0].names)}, {rivals[0].delta_evidence - v.candidates[0].delta_evidence:z.0f} in ln evidence" if rivals else "none"
     return f"Data that the next best explanation ({rival}) predicts better would change that.{test}"
 
 
@@ -164,7 +164,7 @@ def show_diagnosis(console: Console, answer: dict[str, Any], verbose: bool = Tru
     if answer["candidates"]:
         console.print("\nExplanations, ln evidence over the model without effects and posterior probability:")
     for c in answer["candidates"][:5]:
-        console.print(f"  {' + '.join(c['effects'])}: {c['delta_evidence']:+.1f}, {_percent(c['probability'])}{'' if c['arrived'] else ', its fit has not arrived'}; {_values(c)}")
+        console.print(f"  {' + '.join(c['effects'])}: {c['delta_evidence']:+z.1f}, {_percent(c['probability'])}{'' if c['arrived'] else ', its fit has not arrived'}; {_values(c)}")
     best = answer["candidates"][0] if answer["candidates"] else None
     if best and answer["effects"]:
         for name, rows in best["law"].items():
