@@ -7,6 +7,7 @@ the command line adds when and how it was made (`stamp`).
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -58,7 +59,22 @@ def html(run: Run, extra_sections: Sequence[Section] = ()) -> str:
 
 def page(spindle: Spindle, conditions: str, sections: Sequence[Section], kind: str = "", of: str = "") -> str:
     """A page of the report's look with any sections, at `conditions` in words; `kind` (Run, Comparison, ...) begins its title, and what it is `of` follows."""
-    return str(_page().page(spindle, conditions, [(title, Markup(body)) for title, body in sections], kind, of, Markup(MADE)))
+    return str(_page().page(spindle, conditions, [(title, Markup(named(body, title))) for title, body in sections], kind, of, Markup(MADE)))
+
+
+SCROLLED = re.compile(r'<(figure class="chart wide"|div class="scroll")>(?=(?:<svg[^>]* aria-label="([^"]*)"|<table[^>]*>\s*<caption>(.*?)</caption>)?)', re.DOTALL)
+"""What scrolls sideways on a narrow page, with the description of its picture or the caption of its table."""
+
+
+def named(body: str, title: str) -> str:
+    """The HTML of a section in which all that scrolls, at which the Tab key stops, has a name: of its picture or table, or else the section's title."""
+
+    def name(found: re.Match[str]) -> str:
+        plain = Markup(found[3] or found[2] or escape(title)).striptags()
+        role = ' role="group"' if found[1].startswith("div") else ""  # a figure is one itself
+        return f'<{found[1]}{role} aria-label="{escape(plain)}">'
+
+    return SCROLLED.sub(name, body)
 
 
 def write_page(folder: Path, spindle: Spindle, tests: int, campaign: str, sections: Sequence[Section], kind: str, name: str = "") -> None:

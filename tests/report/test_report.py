@@ -18,7 +18,7 @@ from thermospindle.model.rotor.modes import group_energy
 from thermospindle.model.scene.reading import content_hash, load
 from thermospindle.report.page.comparison import Table, compared
 from thermospindle.report.page.headlines import headlines, misses
-from thermospindle.report.page.report import background, html, stamp, write_report
+from thermospindle.report.page.report import background, html, named, stamp, write_report
 from thermospindle.sim.campaign.campaign import ModeRow
 from thermospindle.sim.hammer.test import estimate_of
 from thermospindle.sim.operating import operating_point
@@ -220,6 +220,18 @@ def test_same_run_same_file_written_whole(run: Run, text: str, tmp_path: Path):
         write_report(replace(run, steps=()), path)
     assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
     assert path.read_text(encoding="utf-8") == text
+
+
+def test_what_scrolls_has_a_name(text: str) -> None:
+    """The Tab key stops there on a narrow page: a picture has its description, a table its caption, and one without the title of its section."""
+    scrolled = re.findall(r'<(?:figure class="chart wide"|div class="scroll")([^>]*)>', text)
+    assert len(scrolled) > 8
+    assert [s for s in scrolled if not re.search(r'aria-label="[^"]+"', s)] == []
+    assert 'role="group" aria-label="Versions"><table id="versions">' in text
+    assert 'role="group" aria-label="Natural frequencies and their shifts, Hz, with one standard error where it is known."><table id="frequencies">' in text
+    said = named('<figure class="chart wide"><svg role="img" aria-label="1 &lt; 2"></svg></figure><div class="scroll"><table><caption>a <b>"b"</b></caption></table></div>', "x")
+    assert 'wide" aria-label="1 &lt; 2"><svg' in said
+    assert 'aria-label="a &#34;b&#34;"><table' in said
 
 
 @pytest.fixture(scope="module")

@@ -128,6 +128,11 @@ def test_everything_is_reached_by_keyboard_with_a_name_and_a_visible_focus(tab):
         assert wanted in names, f"{wanted} is not reached: {names}"
 
 
+def test_tables_that_scroll_on_a_narrow_page_have_a_name(tab):
+    """The Tab key stops at them there, as at anything else."""
+    assert tab.run("[...document.querySelectorAll('.scroll, .rows')].filter(e => !e.getAttribute('aria-label')).length") == 0
+
+
 def test_a_slider_moves_by_arrow_keys(tab):
     choose(tab, "add", "preload_loss")
     tab.wait(f"!!{HANDLE.format('loss')}")
