@@ -1,12 +1,13 @@
-"""Imported FRFs beside those of the scene: a channel that is larger by the ratio of two units, and two channels that are each other's.
+"""Imported FRFs beside those of the scene: a channel that is larger by the ratio of two units, one that is reversed, and two channels that are each other's.
 
-A model is never right, and none of this is refused. A factor is told where every FRF of a channel has it in the median over the louder half of its lines; two channels where
-each fits the other's computed FRFs at least `BETTER` times as well as its own, in rms of ln magnitude about the median, which no factor changes.
+A model is never right, and none of this is refused. A factor is told where every FRF of a channel has it in the median over the louder half of its lines, the other sign where
+the phases of all are across from the computed ones there; two channels where each fits the other's computed FRFs at least `BETTER` times as well as its own, in rms of ln
+magnitude about the median, which no factor changes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -29,6 +30,8 @@ WITHIN, SCATTER = 0.15, 1.0
 """Relative, of a factor; and of ln ratio over the lines of an FRF, its median deviation up to which it is one."""
 SILENT = 1e-2
 """Of the largest FRF of a test, in rms: smaller ones are forbidden by symmetry, and their size is noise; so are lines below as much of its median."""
+ACROSS = -0.5
+"""Mean cosine between measured and computed phases, below which an FRF is reversed: between -0.8 and -1 where it is, and above -0.25 where joints are twice as stiff as drawn."""
 LARGEST = 1e30
 """Of any unit: a computed FRF as large as that is of a spindle that no bearing holds."""
 BETTER = 2.0
@@ -38,12 +41,14 @@ MOST_LINES = 1000
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """One FRF: ln of its measured and computed magnitude (n,), below what each is silence, and whether the model answers there at all."""
+    """One FRF: ln of its measured and computed magnitude (n,), the mean cosine between their phases over the louder half of the lines (0 where one of the two passes no
+    resonance: all lines may lie between two that are one), below what each magnitude is silence, and whether the model answers there at all."""
 
     response: int
     reference: int
     measured: Array
     computed: Array
+    cosine: float
     silence: tuple[float, float]
     loud: bool
 
@@ -54,7 +59,7 @@ class Pair:
 
 
 def likenesses(spindle: Spindle, campaign: Campaign) -> list[str]:
-    """What tells of units or channels mistaken, a sentence each."""
+    """What tells of units, signs or channels mistaken, a sentence each."""
     if not any(t.frf is not None for t in campaign.tests):
         return []
     try:
@@ -63,7 +68,7 @@ def likenesses(spindle: Spindle, campaign: Campaign) -> list[str]:
     except (BadInput, NoEquilibrium, OutsideRange) as error:
         return [f"the FRFs are not set beside those of {spindle.name}: {error}"]
     names = {p.node: f"{p.node} ({p.name})" for p in campaign.points}
-    return [*_factors(tests, names, spindle.name), *_swapped(tests, names, spindle.name)]
+    return [*_factors(tests, names, spindle.name), *_reversed(tests, names, spindle.name), *_swapped(tests, names, spindle.name)]
 
 
 def _pairs(spindle: Spindle, campaign: Campaign, test: Test) -> list[Pair]:
@@ -79,23 +84,27 @@ def _pairs(spindle: Spindle, campaign: Campaign, test: Test) -> list[Pair]:
     size = np.sqrt(np.mean(np.abs(computed) ** 2, axis=-1))
     x, a = (np.log(np.maximum(np.abs(value), 1e-300)) for value in (measured, computed))
     silence = tuple(float(np.log(SILENT) + np.median(value, axis=-1).max()) for value in (x, a))
+    loud = np.abs(computed) >= np.median(np.abs(computed), axis=-1, keepdims=True)
+    cosine = np.mean(np.cos(np.angle(measured * computed.conj())), axis=-1, where=loud)
+    turns = [np.cos(np.angle(v * v[..., :1].conj())).min(axis=-1) < ACROSS for v in (measured, computed)]
+    cosine = np.where(turns[0] & turns[1], cosine, 0.0)
     ends = [(i, j, r, h) for i, r in enumerate(own.measured.response_nodes) for j, h in enumerate(own.measured.reference_nodes)]
-    return [Pair(r, h, x[i, j], a[i, j], (silence[0], silence[1]), bool(size[i, j] > SILENT * size.max())) for i, j, r, h in ends]
+    return [Pair(r, h, x[i, j], a[i, j], float(cosine[i, j]), (silence[0], silence[1]), bool(size[i, j] > SILENT * size.max())) for i, j, r, h in ends]
 
 
-# ---------------------------------------------------------------- factors of units
+# ---------------------------------------------------------------- factors of units, and signs
 
 
-def _factors(tests: Sequence[Sequence[Pair]], names: Mapping[int, str], scene: str) -> Iterator[str]:
-    """A factor that all FRFs share, or all of a response, or of a hammer's point."""
-    told = [(p, _factor(p)) for pairs in tests for p in pairs if p.loud]
+def _shared(tests: Sequence[Sequence[Pair]], names: Mapping[int, str], judged: Callable[[Pair], float | None]) -> Iterator[tuple[str, float]]:
+    """Whose FRFs are all judged to be off by the same factor, and that: all there are, or else those of a response, or of a hammer's point."""
+    told = [(p, judged(p)) for pairs in tests for p in pairs if p.loud]
 
     def shared(own: Sequence[tuple[Pair, float | None]]) -> float | None:
         found = {factor for _, factor in own}
         return found.pop() if len(found) == 1 else None
 
     if (factor := shared(told)) is not None:
-        yield _said("all FRFs", factor, scene)
+        yield "all FRFs", factor
         return
     for what, key in (("the FRFs of response", "response"), ("the FRFs of the hammer at", "reference")):
         by_node: dict[int, list[tuple[Pair, float | None]]] = {}
@@ -103,7 +112,16 @@ def _factors(tests: Sequence[Sequence[Pair]], names: Mapping[int, str], scene: s
             by_node.setdefault(getattr(p, key), []).append((p, factor))
         for node, own in by_node.items():
             if (factor := shared(own)) is not None:
-                yield _said(f"{what} {names[node]}", factor, scene)
+                yield f"{what} {names[node]}", factor
+
+
+def _factors(tests: Sequence[Sequence[Pair]], names: Mapping[int, str], scene: str) -> list[str]:
+    return [_said(who, factor, scene) for who, factor in _shared(tests, names, _factor)]
+
+
+def _reversed(tests: Sequence[Sequence[Pair]], names: Mapping[int, str], scene: str) -> list[str]:
+    whose = _shared(tests, names, lambda p: -1.0 if p.cosine < ACROSS else None)
+    return [f"{who} have the other sign than those that {scene} has: does sensor or hammer look the other way than is told, as -X where +X is?" for who, _ in whose]
 
 
 def _factor(pair: Pair) -> float | None:

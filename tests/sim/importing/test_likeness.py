@@ -59,6 +59,43 @@ def test_a_factor_between_units_is_said_of_what_has_it(factor, spindle, foreign)
     assert likenesses(spindle, changed(foreign, lambda v: 3.0 * v)) == []
 
 
+@pytest.mark.parametrize("response", range(7))
+def test_a_sensor_that_is_reversed_is_said(response, spindle, foreign):
+    sign = np.where(np.arange(7) == response, -1.0, 1.0)
+    p = spindle.points[response]
+    [said] = likenesses(spindle, changed(foreign, lambda v: sign[:, None, None] * v))
+    assert said.startswith(f"the FRFs of response {p.node} ({p.name}) have the other sign than those that hdd_2003 has")
+
+
+def test_a_hammer_that_is_reversed_is_said(spindle, foreign):
+    [said] = likenesses(spindle, changed(foreign, lambda v: v * np.array([1.0, -1.0])[:, None]))
+    assert said.startswith(f"the FRFs of the hammer at {spindle.points[1].node} ({spindle.points[1].name}) have the other sign")
+    [said] = likenesses(spindle, changed(foreign, lambda v: -v))
+    assert said.startswith("all FRFs have the other sign")
+
+
+def test_lines_between_a_resonance_and_its_drawn_place_tell_no_sign(spindle, foreign):
+    """All of them are across there."""
+    frf = foreign.tests[0].frf
+    assert frf is not None
+    joints = tuple(replace(j, stiffness=tuple(0.6 * k for k in j.stiffness)) for j in spindle.structure.joints)
+    softer = replace(spindle, structure=replace(spindle.structure, joints=joints))
+    top = np.abs(frf.value[0, 0]).argmax()
+    below = (frf.frequency < 0.985 * frf.frequency[top]) & (frf.frequency > 0.93 * frf.frequency[top])
+    assert below.sum() > 10
+    narrow = replace(foreign, tests=(replace(foreign.tests[0], frf=replace(frf, frequency=frf.frequency[below], value=frf.value[..., below], sd=None, coherence=None)),))
+    assert [said for said in likenesses(softer, narrow) if "other sign" in said] == []
+
+
+@pytest.mark.parametrize(
+    ("scene", "campaign"),
+    [("hdd_2003", "virtual/soak_20_60"), ("hdd_2003", "measured/jang_2003"), ("free_shaft", "measured/modelab")],
+)
+def test_nothing_is_said_of_shipped_campaigns(scene, campaign):
+    folder = SCENE.parent / scene
+    assert likenesses(load(folder), read_campaign(folder / campaign)) == []
+
+
 @pytest.mark.parametrize(("a", "b"), [(0, 1), (0, 2), (2, 3), (3, 4), (4, 5), (5, 6)])
 def test_two_channels_exchanged_are_said(a, b, spindle, foreign):
     order = np.arange(7)
