@@ -7,6 +7,7 @@ everything that is open at once; `template.template` writes the mapping as a for
 assemble   from files and a mapping to a campaign, or to everything that is still open, at once
 files/     what is in a file of each kind
 frfs       from placed curves to the FRFs of one test: SI, one quantity, common lines, checks
+exchanged  whether the force of a time record is a response, and a response its force
 likeness   imported FRFs beside the scene's: units and channels that seem mistaken
 mapping    the form of a mapping file
 measured   what files hold before anything is decided about it: curves, time records, modes, places, questions

@@ -14,6 +14,7 @@ from thermospindle.model.machine import Point, Spindle
 from thermospindle.model.units import MINUTE, RPM
 from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Test
 from thermospindle.sim.importing import units
+from thermospindle.sim.importing.exchanged import exchanged
 from thermospindle.sim.importing.files.reading import content
 from thermospindle.sim.importing.frfs import Placed, frf_of
 from thermospindle.sim.importing.mapping import REST, FileForm, MappingForm, TestForm, fits, settings_of
@@ -172,7 +173,8 @@ def _records(contents: Sequence[Content], settings: dict[Path, FileForm]) -> tup
             lacking = "response" if all(m.force for m in motions) else "force"
             alone = f"; {FORCE_NEEDED}" if lacking == "force" else ""
             questions.append(Question(names, "test", f"the {lacking} record that goes with them: files of one hit have the same test{alone}"))
-    return groups, questions
+    wrong = {key: [q for path, motions in group if (q := exchanged(path, motions)) is not None] for key, group in groups.items()}
+    return {key: group for key, group in groups.items() if not wrong[key]}, [*questions, *(q for of in wrong.values() for q in of)]
 
 
 def _add(groups: Records, test: str, file: Path, motions: list[Motion]) -> None:

@@ -105,6 +105,20 @@ def test_hits_are_found_judged_and_averaged(folder, tmp_path, estimator):
         assert 0.4 < np.sqrt(np.mean(ratio**2)) < 3
 
 
+def test_force_and_response_exchanged_are_said_to_be(folder, tmp_path):
+    """What rings on was told to be the force: each hit seemed to be a double one. With the columns told it is read as ever."""
+    text = (folder / "hammer2.csv").read_text()
+    (tmp_path / "hammer2.csv").write_text(text.replace("force 2 [N],velocity 1 [mm/s]", "velocity 1 [mm/s],force 2 [N]", 1))
+    (tmp_path / "m.toml").write_text(MAPPING)
+    said = r"hammer2.csv: columns: whether force and response are exchanged: its force 'force 2 \[N\]' rings on, and its response 'velocity 1 \[mm/s\]' is a pulse"
+    with pytest.raises(Unanswered, match=said) as error:
+        bring([tmp_path / "hammer2.csv"], mapping=tmp_path / "m.toml", out=tmp_path / "c")
+    assert "double" not in str(error.value)
+    told = 'test = "T20"\ncolumns = { "force 2 [N]" = "velocity 1 [mm/s]", "velocity 1 [mm/s]" = "force 2 [N]" }'
+    (tmp_path / "m.toml").write_text(MAPPING.replace('test = "T20"', told, 1))
+    bring([tmp_path / "hammer2.csv"], mapping=tmp_path / "m.toml", out=tmp_path / "c")
+
+
 def test_a_dead_channel_is_one_sentence_and_can_be_left_out(folder, tmp_path, recwarn):
     rows = np.loadtxt(folder / "hammer1.csv", delimiter=",", skiprows=1)
     rows[:, 3] = 0.0
