@@ -20,7 +20,7 @@ from thermospindle.sim.campaign.campaign import Campaign, write_campaign
 from thermospindle.sim.importing.assemble import campaign_of, check_tests, read, spoken
 from thermospindle.sim.importing.mapping import MappingForm, read_mapping
 from thermospindle.sim.importing.measured import listed
-from thermospindle.sim.importing.places import misfits
+from thermospindle.sim.importing.places import misfits, shared
 from thermospindle.sim.importing.template import template
 
 
@@ -63,13 +63,20 @@ def bring(
 
 
 def _for_scene(form: MappingForm, mapping: Path | None, spindle: Spindle | None, scene: Path | None) -> tuple[MappingForm, list[str]]:
-    """The mapping for the scene given; where it names another one that all it names fits as well, as a copy with another name, with a sentence that says so. Else `BadInput`."""
+    """The mapping for the scene given; where it names another one, as a copy with another name, with a sentence that says so: points that it tells are the scene's, and nothing it
+    names is another. Else `BadInput`."""
     if spindle is None or form.spindle in (None, spindle.name):
         return form, []
     if wrong := misfits(form, spindle):
         has = f"and of what the mapping names {spindle.name} has {listed(wrong, 3)}"
         raise BadInput(f"{mapping}: spindle = {form.spindle!r}: --scene {scene} is {spindle.name!r}, {has}; a campaign is of one scene, so change one of the two or leave it out")
-    said = f"{mapping}: spindle = {form.spindle!r}, and --scene {scene} is {spindle.name!r}, which has all that the mapping names: it is taken for that"
+    if not (same := shared(form, spindle)):
+        raise BadInput(
+            f"{mapping}: spindle = {form.spindle!r}: --scene {scene} is {spindle.name!r}, and no [[points]] of the mapping tells with node, body and position_mm that they are one machine; "
+            "change one of the two names or leave it out"
+        )
+    nodes = f"node{'s' * (len(same) > 1)} {listed(same)} on the same bod{'ies' if len(same) > 1 else 'y'} in the same place{'s' * (len(same) > 1)}"
+    said = f"{mapping}: spindle = {form.spindle!r}, and --scene {scene} is {spindle.name!r}, which has {nodes}: it is taken for that under another name"
     return form.model_copy(update={"spindle": spindle.name}), [said]
 
 

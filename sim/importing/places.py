@@ -43,9 +43,16 @@ APART = 1.0 * MM
 """Further off, a point of the mapping is another than the scene's of the same node."""
 
 
+def shared(form: MappingForm, scene: Spindle) -> list[int]:
+    """Nodes that a mapping tells with body and place, and the scene has too: where none of `misfits` is about them, it is of the same machine."""
+    own = {p.node for p in scene.points}
+    return [p.node for p in form.points if p.node in own and p.body is not None and p.position_mm is not None]
+
+
 def misfits(form: MappingForm, scene: Spindle) -> list[str]:
     """What a mapping that was written for another scene names and this one has not, or has elsewhere, a clause each."""
     own = {p.node: p for p in scene.points}
+    shafts = {s.name: s for s in scene.structure.shafts}
     made = {p.node for p in form.points}
     names = {p.name for p in scene.points} | {p.name for p in form.points} | {str(c) for p in form.points for c in p.called}
     found = []
@@ -55,6 +62,8 @@ def misfits(form: MappingForm, scene: Spindle) -> list[str]:
             found.append(f"no point of node {point.node}")
         if point.body is not None and point.body not in scene.structure.parts:
             found.append(f"no body {point.body!r}")
+        elif base is not None and point.body is not None and resolved_body(shafts, point.body, base.position[2]) != base.body:
+            found.append(f"node {point.node} on {base.body}, not {point.body}")
         if base is not None and point.direction is not None and point.direction[1] != base.axis[1]:
             found.append(f"node {point.node} along {base.axis}, not {point.direction}")
         if base is not None and point.position_mm is not None and max(abs(a * MM - b) for a, b in zip(point.position_mm, base.position, strict=True)) > APART:

@@ -301,6 +301,7 @@ def test_points_on_a_flexible_shaft_are_told_by_its_name(tmp_path):
     ("right", "wrong", "told"),
     [
         ('body = "seat"', 'body = "table"', "has no body 'table';"),
+        ('body = "hub"', 'body = "seat"', "has node 1 on hub, not seat;"),
         ('direction = "-X"', 'direction = "-Y"', r"has node 3 along \+X, not -Y;"),
         ("[12.0, 0.0, 20.0]", "[12.0, 0.0, 35.0]", "has node 1 at 12, 0, 20 mm, not 12, 0, 35;"),
         ("[[tests]]", '[[files]]\nfile = "T20.csv"\nreference = 9\n[[tests]]', "has no point 9;"),
@@ -325,10 +326,19 @@ def test_a_mapping_serves_a_scene_that_was_renamed(tmp_path):
     (tmp_path / "m.toml").write_text(SPINDLE + HEAD)
     shutil.copytree(SCENE, tmp_path / "mine")
     said = bring([file], mapping=tmp_path / "m.toml", scene=tmp_path / "mine", out=tmp_path / "c").values["warnings"]
-    assert [w for w in said if "spindle = 'hdd_2003'" in w and "is 'mine', which has all that the mapping names" in w] == said
+    assert [w for w in said if "spindle = 'hdd_2003'" in w and "is 'mine', which has nodes 1, 3, 6 on the same bodies in the same places" in w] == said
     assert read_campaign(tmp_path / "c").spindle == "mine"
     assert bring([file], mapping=tmp_path / "m.toml", scene="hdd_2003", out=tmp_path / "d").values["warnings"] == []
     assert read_campaign(tmp_path / "d").spindle == "hdd_2003"
+
+
+def test_a_mapping_that_tells_no_point_is_of_no_renamed_scene(tmp_path):
+    """Nodes of the same numbers are no evidence: any two scenes have a node 1."""
+    heads, found = columns("real", "(m/s)/N")
+    file = table(tmp_path / "T20.csv", ["Frequency", *heads], [FREQUENCY, *found])
+    (tmp_path / "m.toml").write_text(SPINDLE + HEAD.split("[[points]]")[0])
+    with pytest.raises(BadInput, match=r"--scene five_bearing is 'five_bearing', and no \[\[points\]\] of the mapping tells .* that they are one machine"):
+        bring([file], mapping=tmp_path / "m.toml", scene="five_bearing", out=tmp_path / "c")
 
 
 def test_patterns_and_folders(tmp_path):
