@@ -39,9 +39,11 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
         place = "nothing tried explains them, nor do tolerances and measuring errors: units, points, and noise that the files do not tell come first"
         if free and free[0].names == (LEFT,):
             left = likeliest(found).fit
-            of = f" of {np.sqrt(found.base.fit.chi2 / n):.1f}" if left.mechanisms else ""  # where fits have ended, not what their quadratics promise
+            leaves, alone = f"{np.sqrt(left.chi2 / left.count):.1f}", f"{np.sqrt(found.base.fit.chi2 / n):.1f}"  # where fits have ended, not what their quadratics promise
+            beside = f" where {alone} are left without it" if leaves != alone else ", as many as without it"
+            of = beside if left.mechanisms else ""
             apart = ", and not the same in every test" if len(found.model.tests) > 1 else ""
-            place = f"the best leaves {np.sqrt(left.chi2 / left.count):.1f} standard errors{of}{apart}"
+            place = f"the best leaves {leaves} standard errors{of}{apart}"
         elif free and free[0].names == (MOVING,):
             moves = [f"a light resonance that the drawing lacks would have to move {_moves(found.model, r)}" for r in moving(found.model, found.base)]
             place = " and ".join(moves)
@@ -60,7 +62,7 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
             place = f"every mode drifts from test to test, {by}, more than two honest programs differ by"
         if not free or free[0].names == (UNTOLD,):
             return f"No effect of the catalogue explains the data: {place} (chi2 without effects: {chi2 / n:.2f} a number)."
-        rival = f"; the best of the catalogue, {' + '.join(lead.names)}, gains {lead.delta_evidence:.0f} in ln evidence" if lead else ""
+        rival = f"; the best of the catalogue, {' + '.join(lead.names)}, gains {lead.delta_evidence:z.0f} in ln evidence" if lead else ""
         no_better = not lead or free[0].delta_evidence >= lead.delta_evidence
         says = "No effect of the catalogue explains the data as well as free drift does" if no_better else "No effect of the catalogue is probable enough beside free drift"
         return f"{says}: {place}{rival} (chi2 without effects: {chi2 / n:.2f} a number)."
@@ -68,7 +70,7 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
     checked = ""
     if np.isfinite(after):
         how = "" if after < before else ", for it is less sure of them"
-        checked = f"; conditions left out are predicted with {after:.2f} instead of {before:.2f} standard errors, {gain:+.0f} in ln probability density{how}"
+        checked = f"; conditions left out are predicted with {after:.2f} instead of {before:.2f} standard errors, {gain:+z.0f} in ln probability density{how}"
     if word == "ambiguous":
         rows = [c for c in candidates if set(c.names) <= set(effects)]
         share = sum(c.probability for c in rows)

@@ -9,10 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from thermospindle.diagnosis.forward.nuisance import MassTerm
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import Matrices
 from thermospindle.model.rotor.distributed import spread
 from thermospindle.model.rotor.modes import Between
+from thermospindle.model.structure import MOVES
 from thermospindle.model.types import Array, Integers
 from thermospindle.sim.effects.effect import Measurement
 from thermospindle.sim.operating import OperatingPoint
@@ -54,6 +56,21 @@ def mass_between(point: OperatingPoint, drawing: Spindle) -> Between | None:
         return None
     mass, quartic, gyroscopic = spread(structure, drawing.materials, drawing.reference_temperature, point.chain.layout)
     return mass, quartic, point.chain.speed * gyroscopic
+
+
+def mass_changes(spindle: Spindle, terms: Sequence[MassTerm], dofs: Dofs) -> tuple[Array, Array]:
+    """What a standard deviation of each term adds to M and, per rad/s of the spindle, to G (k, n, n)."""
+    place = {dof: i for i, dof in enumerate(dofs)}
+    mass, gyroscopic = np.zeros((2, len(terms), len(dofs), len(dofs)))
+    for k, term in enumerate(terms):
+        for first, second, amount in term.entries:
+            i, j = place[first], place[second]
+            mass[k, i, j] = mass[k, j, i] = term.sd * amount
+        for name, inertia in term.polar:
+            i, j = (place[name, move] for move in MOVES[3:])
+            moment = term.sd * inertia * spindle.structure.body(name).speed_ratio
+            gyroscopic[k, i, j], gyroscopic[k, j, i] = moment, -moment
+    return mass, gyroscopic
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,8 +14,8 @@ import numpy as np
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.mode_table import ModeData, TestData
 from thermospindle.diagnosis.forward import nuisance as kinds_of
-from thermospindle.diagnosis.forward.linear import Linear, mass_between
-from thermospindle.diagnosis.forward.nuisance import Nuisance, ReferenceModes, Resonance, Unevenness, unevennesses
+from thermospindle.diagnosis.forward.linear import Dofs, Linear, mass_between, mass_changes
+from thermospindle.diagnosis.forward.nuisance import Nuisance, ReferenceModes, Resonance, Unevenness, mass_terms, unevennesses
 from thermospindle.diagnosis.forward.numbers import Numbers
 from thermospindle.diagnosis.forward.points import Applied, apart, aside, otherwise, replace_measuring, stretched, uneven
 from thermospindle.diagnosis.forward.response import Light, Response
@@ -55,7 +55,7 @@ class CampaignModel:
 
     def __getstate__(self) -> dict:
         """Without what was worked out: it is on its way to another process."""
-        return {k: v for k, v in self.__dict__.items() if k not in ("_points", "_responses", "_spindles", "kept", "thinned")}
+        return {k: v for k, v in self.__dict__.items() if k not in ("_heavier", "_points", "_responses", "_spindles", "kept", "thinned")}
 
     @cached_property
     def thinned(self) -> CampaignModel:
@@ -178,7 +178,8 @@ class CampaignModel:
             object.__setattr__(point, "_bare", worked_out)
         bare, between = worked_out
         stiffness, damping = self._discrepancy(t, bare, x)
-        whole = Matrices(bare.mass, bare.damping + damping, bare.stiffness + stiffness, bare.dofs)
+        mass, gyroscopic = self._otherwise_heavy(x, bare.dofs)
+        whole = Matrices(bare.mass + mass, bare.damping + damping + point.chain.speed * gyroscopic, bare.stiffness + stiffness, bare.dofs)
         return Linear(whole, self._struck(t, point, x), point.chain.layout, between)
 
     def _struck(self, t: int, point: OperatingPoint, x: Array) -> Measurement:
@@ -194,6 +195,22 @@ class CampaignModel:
     def hammer_gain(self, t: int, x: Array) -> Array:
         """Gain (n_ref,) of the hammer of each column of test `t`."""
         return self._gain(x, *self.numbers.hammers[t], self.numbers.hammer_of[t])
+
+    def _otherwise_heavy(self, x: Array, dofs: Dofs) -> tuple[Array, Array]:
+        """What bodies that have their mass otherwise than drawn add to M and, per rad/s, to G (n, n)."""
+        own = x[self.numbers.masses]
+        mass, gyroscopic = self.heavier(dofs)
+        return np.tensordot(own, mass, 1), np.tensordot(own, gyroscopic, 1)
+
+    def heavier(self, dofs: Dofs) -> tuple[Array, Array]:
+        """What a standard deviation of each way in which bodies may have their mass otherwise adds to M and, per rad/s, to G (k, n, n)."""
+        if dofs not in self._heavier:
+            self._heavier[dofs] = mass_changes(self.spindle, mass_terms(self.spindle), dofs)
+        return self._heavier[dofs]
+
+    @cached_property
+    def _heavier(self) -> dict[Dofs, tuple[Array, Array]]:
+        return {}
 
     def _discrepancy(self, t: int, linear: Matrices, x: Array) -> tuple[Array, Array]:
         w = self.reference.over(linear.dofs)

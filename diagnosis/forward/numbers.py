@@ -57,6 +57,11 @@ class Numbers:
         return [i for i, p in enumerate(self.parameters) if p.kind == kinds_of.UNEVEN]
 
     @cached_property
+    def masses(self) -> list[int]:
+        """Numbers of the parameters of how bodies have their mass."""
+        return [i for i, p in enumerate(self.parameters) if p.kind == kinds_of.MASSES]
+
+    @cached_property
     def temperature(self) -> list[int]:
         """For every test the number of its thermometer's parameter."""
         return [next(i for i, p in enumerate(self.parameters) if p.kind == kinds_of.TEMPERATURE and p.test == t) for t in range(len(self.tests))]

@@ -15,7 +15,7 @@ STEP = 0.02  # of a prior standard deviation, for differences
 
 
 def rates_of(model: CampaignModel, x: Array, effects_of: Sequence[Applied], old: Rates | None = None) -> Rates:
-    """dM, dC, dK by build tolerances, expansion of materials and rings, bearings apart, stiffness and inertia of balls, uneven joints and temperature, for every test; what structure alone moves is kept from `old`."""
+    """dM, dC, dK by build tolerances, expansion of materials and rings, bearings apart, stiffness and inertia of balls, uneven joints, temperature and how bodies have their mass, for every test; what structure alone moves is kept from `old`."""
     numbers, each, dofs, uneven = [], [], [], frozenset(model.numbers.uneven)
     for t, effects in enumerate(effects_of):
         base = model.operating(t, x, effects)
@@ -39,7 +39,9 @@ def rates_of(model: CampaignModel, x: Array, effects_of: Sequence[Applied], old:
             if moved.dofs != at.dofs:
                 moved = at
             found.append(products(*((getattr(moved, w) - getattr(at, w)) / apart for w in ("mass", "damping", "stiffness"))))
-        numbers.append(np.array(own))
+        masses = zip(*model.heavier(at.dofs), strict=True)
+        found += kept[len(own) :] or [products(mass, base.chain.speed * gyroscopic, np.zeros_like(mass)) for mass, gyroscopic in masses]
+        numbers.append(np.array([*own, *model.numbers.masses]))
         each.append(tuple(found))
         dofs.append(at.dofs)
     return Rates(tuple(numbers), tuple(each), tuple(dofs))

@@ -15,6 +15,7 @@ import numpy as np
 
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import Applied, CampaignModel
+from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.inference.fit import Fit
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.prior import Learned, as_stated
@@ -27,7 +28,8 @@ from thermospindle.model.types import Array
 ASKED = 5.0  # ln evidence
 NEAR = 0.05  # relative error of a size
 TRIES = 8  # sizes of an effect
-STEPS = 10  # at most, of everything else beside it
+SHARPER = 3.0  # times
+STEPS = 40  # at most, of everything else beside it
 SHOWS, HIDES = 3.0, 2.0  # standard errors of a typical size, from which an effect alone shows, and up to which it hides beside another
 
 
@@ -103,7 +105,8 @@ def visibility(model: CampaignModel, about: Fit, learned: Learned, m: Mechanism,
     can be built with it.
 
     The spindle `about` with the effect is taken for measured, without noise. Steps of Gauss and Newton move everything else until they gain little, with the
-    derivatives of `about` (the chord method: Ortega & Rheinboldt, *Iterative Solution of Nonlinear Equations*, 1970, 7.1) for as long as these lead on.
+    derivatives of `about` (the chord method: Ortega & Rheinboldt, *Iterative Solution of Nonlinear Equations*, 1970, 7.1) for as long as these lead on: first with errors so large that what is left
+    is no more than noise would be, and `SHARPER` from there, for peaks that moved by their widths lead nowhere by themselves.
     """
     base, shape = linearised(model, about), [q.neutral for q in m.shape]
     moved = _moved(model, about.nuisance, [(m.effect, m.values(size, shape))], base)
@@ -111,22 +114,30 @@ def visibility(model: CampaignModel, about: Fit, learned: Learned, m: Mechanism,
         return np.inf
     problem = Problem(model, (), replace(as_stated(learned.sizes), errors=learned.errors))
 
-    def beside(step: Array) -> Point:
+    def beside(step: Array, temper: float) -> Point:
         there = _moved(model, about.nuisance + step, [], base)
         if there is None:
             return Point(step, None, np.inf)
         left = [r - d for r, d in zip(there, moved, strict=True)]
-        return Point(step, left, problem.cost(step, 1.0, left))
+        return Point(step, left, problem.cost(step, temper, left))
 
-    here, lines, current = beside(np.zeros(problem.length)), base, True
+    here = beside(np.zeros(problem.length), 1.0)
+    temper = min(1.0, float(np.sqrt(sum(d.count for d in model.tests) / max(here.cost, 1e-300))))
+    here, lines, rates, current = replace(here, cost=temper**2 * here.cost), base, about.rates, True
     for _ in range(STEPS):
-        there = beside(here.p + problem.step(here.p, lines.slope(problem, here, 1.0), problem.precision + lines.information))
+        there = beside(here.p + problem.step(here.p, lines.slope(problem, here, temper), problem.precision + temper**2 * lines.information), temper)
         if there.cost < (1 - NEAR) * here.cost:
             here, current = there, False
-        elif current:
+            continue
+        if current and temper < 1.0:
+            temper = min(SHARPER * temper, 1.0)
+            here = replace(here, cost=problem.cost(here.p, temper, here.residuals))
+            continue
+        if current and rates is not about.rates:
             break
-        else:
-            lines, current = problem.linearisation(about.nuisance + here.p, about.rates), True
+        if current:  # it is not the lines that are old
+            rates = rates_of(model, about.nuisance + here.p, [[] for _ in model.tests], rates)
+        lines, current = problem.linearisation(about.nuisance + here.p, rates), True
     return float(np.sqrt(here.cost)) / learned.errors
 
 

@@ -24,6 +24,7 @@ from thermospindle.diagnosis.forward.nuisance import (
     GAIN,
     HAMMER,
     HAMMER_DRIFT,
+    MASSES,
     MISS,
     MISS_DRIFT,
     RECORD,
@@ -43,7 +44,7 @@ from thermospindle.sim.campaign.campaign import Noise
 NOISELESS = Noise(0.0, 0.0)
 CONDITIONS = (Condition(20.0), Condition(45.0, 7200 * RPM))
 FREQUENCY = np.arange(400.0, 6000.1, 40.0)
-KINDS = (BUILD, EXPANSION, COEFFICIENT, *APART, BALLS, CHANGE, FLUNG, TEMPERATURE, GAIN, DRIFT, HAMMER, HAMMER_DRIFT, MISS, MISS_DRIFT, STIFFNESS, DAMPING, RECORD)
+KINDS = (BUILD, EXPANSION, COEFFICIENT, *APART, BALLS, CHANGE, FLUNG, MASSES, TEMPERATURE, GAIN, DRIFT, HAMMER, HAMMER_DRIFT, MISS, MISS_DRIFT, STIFFNESS, DAMPING, RECORD)
 SCENES = {"reference": ROOT / "scenes" / "hdd_2003", "symmetric": ROOT / "tests" / "scenes" / "symmetric"}
 
 
@@ -91,7 +92,7 @@ def test_derivatives_of_lines(scene, quantity, decay):
     model, x = made(scene, quantity=quantity, window_decay=decay)
     worst = worst_by_kind(model, 1, x)
     assert set(worst) == set(KINDS) - {FLUNG}  # these scenes' balls have none
-    for kind in (GAIN, DRIFT, HAMMER, HAMMER_DRIFT, MISS, MISS_DRIFT, STIFFNESS, DAMPING, RECORD):
+    for kind in (GAIN, DRIFT, HAMMER, HAMMER_DRIFT, MISS, MISS_DRIFT, STIFFNESS, DAMPING, MASSES, RECORD):
         assert worst[kind] < 1e-4, kind
     for kind in (BUILD, EXPANSION, COEFFICIENT, *APART, BALLS, CHANGE, TEMPERATURE):
         assert worst[kind] < 5e-3, kind
@@ -134,7 +135,7 @@ def test_derivatives_of_a_flexible_shaft():
     worst = worst_by_kind(model, 1, x)
     for kind in (GAIN, DRIFT, HAMMER, HAMMER_DRIFT, RECORD):
         assert worst[kind] < 1e-8, kind
-    for kind in (MISS, MISS_DRIFT, BUILD, EXPANSION, COEFFICIENT, *APART, BALLS, CHANGE, FLUNG, TEMPERATURE, STIFFNESS, DAMPING):
+    for kind in (MISS, MISS_DRIFT, BUILD, EXPANSION, COEFFICIENT, *APART, BALLS, CHANGE, FLUNG, MASSES, TEMPERATURE, STIFFNESS, DAMPING):
         assert worst[kind] < 1e-2, kind
 
 

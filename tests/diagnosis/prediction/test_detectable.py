@@ -41,18 +41,26 @@ def test_what_is_left_at_the_smallest_size_is_worth_what_is_asked(plain):
         assert visibility(model.thinned, done, learned, m, m.size.neutral) == pytest.approx(0.0, abs=1e-9)
 
 
+def test_what_is_nearly_a_tolerance_is_fitted_away(plain):
+    """A sensor on the hub beside the hub's mass, its height and its inertias, each within its tolerance: what is left of it is little, and grows with it. Steps of Gauss and Newton alone led nowhere
+    from 65 mg, and left 5000 standard errors."""
+    model, done, learned, _ = plain
+    sensor = next(m for m in variants(effect("sensor_mass")) if m.choices == {"turning_share": 1.0})
+    assert [visibility(model.thinned, done, learned, sensor, size) for size in (0.0065, 0.065)] == pytest.approx([0.38, 3.8], rel=0.1)
+
+
 @pytest.mark.parametrize(
-    ("worse", "least", "most"),
+    ("name", "worse", "least", "most"),
     [
-        (lambda learned: replace(learned, errors=2.0), 0.45, 0.8),
-        (lambda learned: replace(learned, sizes={**learned.sizes, kinds_of.STIFFNESS_DRIFT: 1e-3, kinds_of.DAMPING_DRIFT: 0.03}), 0.3, 0.8),
+        ("channel_delay", lambda learned: replace(learned, errors=2.0), 0.45, 0.8),
+        ("preload_loss", lambda learned: replace(learned, sizes={**learned.sizes, kinds_of.STIFFNESS_DRIFT: 1e-3, kinds_of.DAMPING_DRIFT: 0.03}), 0.3, 0.8),
     ],
     ids=["errors twice as large", "modes that drift by a thousandth"],
 )
-def test_beside_a_model_that_is_worse_less_shows(plain, worse, least, most):
+def test_beside_a_model_that_is_worse_less_shows(plain, name, worse, least, most):
     """Errors and discrepancies are those learned, and not those that a fit starts with: what is stated of a good model is not stated of a bad one."""
     model, done, learned, looked = plain
-    m, size = smallest(model, done, learned, looked, 1)["sensor_mass"]
+    m, size = smallest(model, done, learned, looked, 1)[name]
     known, now = (visibility(model.thinned, done, of, m, m.size.neutral + size) for of in (learned, worse(learned)))
     assert least < now / known < most
     known, now = (screen(model, done, 1.0, of, [m], 1, turned=False)[0].visibility for of in (learned, worse(learned)))
