@@ -36,7 +36,7 @@ def hypothesis(names: tuple[str, ...], ln: float) -> Hypothesis:
     )  # fmt: skip
     learned = Learned({}, 1.0, (1.0,) * len(names), (0.1,) * len(names), (1.0,) * len(names))
     sizes = np.zeros((len(names), 2))
-    return Hypothesis(fit, Evidence(-1000.0 + ln, learned, np.zeros(n), np.eye(n), sizes, np.zeros((len(names), 2, 2)), 100.0))
+    return Hypothesis(fit, Evidence(-1000.0 + ln, learned, np.zeros(n), np.eye(n), sizes, *np.zeros((2, len(names), 2, 2)), 100.0))
 
 
 def made(gains: dict[str | tuple[str, ...], float], catalogue: int = 30, forms: int = 20) -> Search:

@@ -70,11 +70,11 @@ def with_unknown(found: Search) -> Search:
 
 
 def _as_unknown(h: Hypothesis) -> Hypothesis:
-    def beyond(m: Mechanism, sizes: Array, covariance: Array) -> Mechanism:
-        cannot = opposite(m, sizes, covariance) or (m.own_law and impossible(m, sizes, covariance))
+    def beyond(m: Mechanism, sizes: Array, covariance: Array, as_shaped: Array) -> Mechanism:
+        cannot = opposite(m, sizes, as_shaped) or (m.own_law and impossible(m, sizes, covariance))
         return replace(m, free=True, beyond=True) if cannot else m
 
-    mechanisms = tuple(map(beyond, h.mechanisms, h.evidence.sizes, h.evidence.size_covariance))
+    mechanisms = tuple(map(beyond, h.mechanisms, h.evidence.sizes, h.evidence.size_covariance, h.evidence.as_shaped))
     return replace(h, fit=replace(h.fit, mechanisms=mechanisms))
 
 
@@ -159,7 +159,7 @@ def _by_other_laws(h: Hypothesis, every: Sequence[Hypothesis]) -> float:
 def _can_be(h: Hypothesis) -> bool:
     """Whether it is weighed: a law of the data's own may be any, but of no size that the effect cannot have; and what would have to be of the opposite sign in
     every test is not there, whatever it gains."""
-    rows = [row for row in zip(h.mechanisms, h.evidence.sizes, h.evidence.size_covariance, strict=True) if not row[0].beyond]
+    rows = [row for row in zip(h.mechanisms, h.evidence.sizes, h.evidence.as_shaped, strict=True) if not row[0].beyond]
     return not ((any(m.own_law for m, *_ in rows) and beyond_limits(h)) or any(opposite(*row) for row in rows))
 
 

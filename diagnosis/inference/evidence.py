@@ -77,7 +77,7 @@ SWEEPS = 3  # at most, through the sizes of nuisances one after the other
 @dataclass(frozen=True, eq=False)
 class Evidence:
     """ln evidence; what was learned; posterior mean (n,) and covariance (n, n) of all parameters, and of the sizes of every mechanism in every
-    test: mean (mechanisms, tests) and covariance (mechanisms, tests, tests), in their units. `by_departing` is what of the ln evidence the mechanisms with a
+    test: mean (mechanisms, tests) and covariance (mechanisms, tests, tests), in their units, and the covariance `as_shaped`, with shape parameters as they are. `by_departing` is what of the ln evidence the mechanisms with a
     law gain by departing from it."""
 
     ln: float
@@ -86,6 +86,7 @@ class Evidence:
     covariance: Array
     sizes: Array
     size_covariance: Array
+    as_shaped: Array
     chi2: float
     by_departing: float = 0.0
 
@@ -151,20 +152,25 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
     mean, spread = fit.point + turn @ (mean - fit.point), turn @ spread @ turn.T
     truncation = ln_within_limits(fit, mean, spread, s)
     mean[[h.number for h in fit.held]] = fit.point[[h.number for h in fit.held]]
-    at, means, covariances = p, [], []
+    at, means, covariances, as_shaped = p, [], [], []
     tests = len(model.tests)
     for m, root, widths in zip(fit.mechanisms, fit.roots, own, strict=True):
-        part = slice(at, at + tests)
+        part, shape = slice(at, at + tests), slice(at + tests, at + tests + len(m.shape))
         means.append(m.size.neutral + root @ mean[part])
         covariances.append(root @ spread[part, part] @ root.T)
-        truncation += one_sided(model, m, widths, means[-1], covariances[-1])
-        at += tests + len(m.shape)
-    shape = (len(fit.mechanisms), tests)
+        told = spread[part, part] - spread[part, shape] @ np.linalg.pinv(spread[shape, shape], hermitian=True) @ spread[shape, part]
+        as_shaped.append(root @ told @ root.T)
+        truncation += one_sided(model, m, widths, means[-1], as_shaped[-1])
+        at = shape.stop
     by_law = [np.array([d == 0.0 or m.kind != "law" for _, d, _ in grid]) for m, grid in zip(fit.mechanisms, own_grids, strict=True)]
     held = reduce(np.multiply.outer, by_law, np.array(True)).ravel()
     ln = logsumexp(values) + truncation - (fit.owed / (2 * s**2) if fit.temper == 1.0 else 0.0)
     by_departing = logsumexp(values) - logsumexp(values[held]) + logsumexp(odds[held])
-    return Evidence(ln, learned, mean, spread, np.array(means).reshape(shape), np.array(covariances).reshape(*shape, tests), chi2, by_departing)
+    return Evidence(ln, learned, mean, spread, np.array(means).reshape(len(means), tests), _stacked(covariances, tests), _stacked(as_shaped, tests), chi2, by_departing)
+
+
+def _stacked(covariances: Sequence[Array], tests: int) -> Array:
+    return np.array(covariances).reshape(len(covariances), tests, tests)
 
 
 def _moves(grids: Mapping[str, Sequence[float]]) -> list[dict[str, float]]:

@@ -165,7 +165,7 @@ def one_sided(model: CampaignModel, mechanism: Mechanism, own: tuple[float, floa
     """ln of twice the posterior probability of the sign that limits allow: a size that may not be negative has half its prior.
 
     The sign is that of the size a which all tests share, about which `own` (width, departure, offset) lets them scatter: a_t = a (1 + r_t), of which the
-    posterior `mean` (n,) and `covariance` (n, n) are given; of what grows from a reference, of the sum of its slopes (conditional mean of jointly Gaussian quantities: Rasmussen & Williams, *Gaussian
+    posterior `mean` (n,) and `covariance` (n, n) are given, that with shape parameters as they are (`opposite`); of what grows from a reference, of the sum of its slopes (conditional mean of jointly Gaussian quantities: Rasmussen & Williams, *Gaussian
     Processes*, 2006, Eq. A.6).
     """
     sign = mechanism.size.sign
@@ -215,7 +215,8 @@ def apart_by(sizes: Array, covariance: Array) -> Array:
 
 def opposite(m: Mechanism, sizes: Array, covariance: Array) -> bool:
     """Whether a mechanism would need the sign that it cannot have: in every test (tests,), by more than twice its standard error, or by more than `CANNOT` in one and the
-    sign that it can have in none; where its law does nothing any sign would do."""
+    sign that it can have in none; where its law does nothing any sign would do. The `covariance` (tests, tests) is that with shape parameters as they are: an amount times what they make of it may be
+    told along a hyperbola, which never comes to the other sign, where a quadratic does (a flange that stiffened was named as one that loosens, by -0.0055 +- 0.004)."""
     sign, (low, high) = m.size.sign, m.size.limits
     beyond = sign * ((low if sign > 0 else high) - sizes) / np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     return bool(sign and (np.all(beyond > 2) or (beyond.max() > CANNOT and beyond.min() > -2)))

@@ -158,7 +158,7 @@ def test_an_effect_is_named_whatever_its_law(case):
 def test_a_size_that_cannot_be_is_no_law_of_its_own():
     found = made({"a": 20.0, "a'": 66.0, "~x": 60.0})
     negative = tuple(
-        replace(h, evidence=replace(h.evidence, sizes=np.array([[3.0, -10.0]]), size_covariance=1e-4 * np.eye(2)[None]))
+        replace(h, evidence=replace(h.evidence, sizes=np.array([[3.0, -10.0]]), size_covariance=1e-4 * np.eye(2)[None], as_shaped=1e-4 * np.eye(2)[None]))
         if any(m.own_law for m in h.mechanisms)
         else h
         for h in found.hypotheses
@@ -171,7 +171,8 @@ def test_a_size_that_cannot_be_is_no_law_of_its_own():
 
 @pytest.mark.parametrize(("sizes", "word"), [((-3.0, -4.0), "none"), ((-3.0, 4.0), "identified"), ((-0.1, -0.1), "identified"), ((3.0, 4.0), "identified")])
 def test_what_would_have_to_be_of_the_opposite_sign_everywhere_is_not_there(sizes, word):
-    """A compliance that would be negative in every test, by thirty standard errors, gains by what is wrong with the model; not so one that departs in one test."""
+    """A compliance that would be negative in every test, by thirty standard errors, gains by what is wrong with the model; not so one that departs in one test. Errors are those with shapes as they are:
+    of an amount times what a shape makes of it a quadratic says that it may be nothing, where it cannot."""
     found = made({"a": 40.0})
     size = replace(SIZE, limits=(0.0, 9.0))
 
@@ -179,7 +180,7 @@ def test_what_would_have_to_be_of_the_opposite_sign_everywhere_is_not_there(size
         if not h.mechanisms:
             return h
         m = replace(h.mechanisms[0], effect=replace(h.mechanisms[0].effect, parameters=(size,)))
-        own = replace(h.evidence, sizes=np.array([sizes]), size_covariance=0.01 * np.eye(2)[None])
+        own = replace(h.evidence, sizes=np.array([sizes]), size_covariance=25.0 * np.eye(2)[None], as_shaped=0.01 * np.eye(2)[None])
         return Hypothesis(replace(h.fit, mechanisms=(m,)), own)
 
     assert decide(replace(found, hypotheses=tuple(map(fitted, found.hypotheses)))).word == word
@@ -251,7 +252,7 @@ def test_what_cannot_be_does_not_say_what_is_left():
         squares = {(): 50.0, ("b",): 40.0, ("a",): 1.0}[h.names]
         sizes = np.array([[3.0, -10.0]]) if h.names == ("a",) else h.evidence.sizes
         covariance = 1e-4 * np.eye(2)[None] if h.names == ("a",) else h.evidence.size_covariance
-        return Hypothesis(replace(h.fit, chi2=squares * h.fit.count), replace(h.evidence, sizes=sizes, size_covariance=covariance))
+        return Hypothesis(replace(h.fit, chi2=squares * h.fit.count), replace(h.evidence, sizes=sizes, size_covariance=covariance, as_shaped=covariance))
 
     hypotheses = tuple(map(left, found.hypotheses))
     v = decide(replace(found, hypotheses=hypotheses, base=hypotheses[-1]))
@@ -270,7 +271,7 @@ def test_what_does_what_an_effect_cannot_is_something_unknown(best, word):
         if h.names != ("a",):
             return h
         m = replace(h.mechanisms[0], effect=replace(h.mechanisms[0].effect, parameters=(replace(SIZE, limits=(0.0, 9.0)),)))
-        return Hypothesis(replace(h.fit, mechanisms=(m,)), replace(h.evidence, sizes=sizes, size_covariance=0.01 * np.eye(2)[None]))
+        return Hypothesis(replace(h.fit, mechanisms=(m,)), replace(h.evidence, sizes=sizes, size_covariance=0.01 * np.eye(2)[None], as_shaped=0.01 * np.eye(2)[None]))
 
     v = decide(replace(found, hypotheses=tuple(map(fitted, found.hypotheses))))
     assert v.word == word
@@ -285,7 +286,7 @@ def test_an_effect_and_what_does_what_it_cannot_are_two():
 
     def fitted(h: Hypothesis) -> Hypothesis:
         sizes = np.array([[3.0, -10.0]]) if any(m.own_law for m in h.mechanisms) else h.evidence.sizes
-        return Hypothesis(h.fit, replace(h.evidence, sizes=sizes, size_covariance=1e-4 * np.eye(2)[None] if h.mechanisms else h.evidence.size_covariance))
+        return Hypothesis(h.fit, replace(h.evidence, sizes=sizes, size_covariance=1e-4 * np.eye(2)[None] if h.mechanisms else h.evidence.size_covariance, as_shaped=1e-4 * np.eye(2)[None] if h.mechanisms else h.evidence.size_covariance))
 
     v = decide(replace(found, hypotheses=tuple(map(fitted, found.hypotheses))))
     assert v.word == "unexplained"

@@ -150,7 +150,7 @@ def test_what_is_as_much_in_every_test_does_not_drift(sizes, said):
     """Another's dashpot beside the plate was told as damping that would have to drift, by +2.2272 in all eight tests."""
     found = made({"~x": 150.0})
     x, *rest = found.hypotheses
-    x = replace(x, evidence=replace(x.evidence, sizes=np.array([sizes]), size_covariance=1e-4 * np.eye(2)[None]))
+    x = replace(x, evidence=replace(x.evidence, sizes=np.array([sizes]), size_covariance=1e-4 * np.eye(2)[None], as_shaped=1e-4 * np.eye(2)[None]))
     v = decide(replace(found, hypotheses=(x, *rest)))
     assert v.word == "unexplained"
     assert said in v.reason

@@ -80,6 +80,14 @@ def test_a_shape_within_limits_is_the_integral_over_these(held, monkeypatch):
     assert (slope > 0) if held else (point[-1] > 0)
     assert found.ln == pytest.approx(by_quadrature, abs=0.02)
     assert (found.mean[-1] == 0.0) == held
+    known = np.flatnonzero(np.diag(found.covariance) > 1e-12)
+    precision = np.linalg.inv(found.covariance[np.ix_(known, known)])
+    others = known != len(point) - 1
+    [root], first = done.roots, len(plain.fit.nuisance)
+    part = np.isin(known[others], range(first, first + len(root)))
+    with_it = np.linalg.inv(precision[np.ix_(others, others)])[np.ix_(part, part)]  # the shape as it is: its row and column of the precision left out
+    assert found.as_shaped[0] == pytest.approx(root @ with_it @ root.T, rel=1e-6, abs=1e-9)
+    assert np.trace(found.as_shaped[0]) < np.trace(found.size_covariance[0]) or held
 
 
 def test_a_shape_with_a_law_of_the_datas_own_says_nothing_of_amounts():

@@ -104,7 +104,7 @@ def test_what_fell_behind_without_one_that_does_nothing_is_fitted_again(spindle,
     alone, both = (Hypothesis(f, evidence(model, f)) for f in (fit(model, of, tempers=TEMPERS[-2:]) for of in ([bond], [bond, modulus])))
     sizes = np.array([both.evidence.sizes[0], np.full(2, modulus.size.neutral + size)])
     covariance = np.array([1e-6 * np.eye(2)] * 2)
-    both = replace(both, evidence=replace(both.evidence, ln=0.0, sizes=sizes, size_covariance=covariance))
+    both = replace(both, evidence=replace(both.evidence, ln=0.0, sizes=sizes, size_covariance=covariance, as_shaped=covariance))
     assert both.idle == (False, size == 0.0)
     alone = replace(alone, evidence=replace(alone.evidence, ln=known))
     other = replace(alone, fit=replace(alone.fit, mechanisms=(modulus,)))
