@@ -244,7 +244,7 @@ def test_the_fit_to_the_lines_runs_to_its_end(chromium, tmp_path):
         chromium.wait(f"{chromium.model('message')}.text.includes('Fitted to the lines')", 1800)
         said = chromium.run(f"{chromium.model('message')}.text")
         assert float(re.search(r"ln evidence \+(\d+)", said)[1]) > 100
-        assert chromium.run(value) == pytest.approx(12.5, abs=1.0)
+        assert chromium.run(value) == pytest.approx(12.5, abs=2.7)  # three of its standard errors
         assert chromium.run(value) != before
         chromium.click(BUTTON.format("Undo"))
         chromium.wait(f"{value} === {before}", 60)
