@@ -11,7 +11,7 @@ import numpy as np
 
 from tests.blind.hidden import Hidden
 from tests.blind.laws import REFERENCE
-from tests.blind.world import Answer, Plan, Record, World, answer, lowest, points_struck
+from tests.blind.world import Answer, Plan, Record, World, answer, lowest, points_struck, ways_of_mass
 from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array
@@ -20,6 +20,9 @@ from thermospindle.sim.identification.frf import Frf
 
 HAMMERS_FROM = 2000
 """The first seed whose world has thermal motions that are off and hammers with gains of their own: seeds before it were judged without."""
+
+MASSES_FROM = 2140
+"""The first seed in whose world bodies have their mass otherwise than drawn."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,9 +73,14 @@ def drawn_world(random: np.random.Generator, spindle: Spindle) -> World:
     )
 
 
-def further(world: World, seed: int) -> World:
+def further(world: World, seed: int, spindle: Spindle) -> World:
     """With what worlds have from seed `HAMMERS_FROM` on: thermal motions that are off by a per cent, hammers whose force is off and drifts and that hit beside their points, another way in each
-    test."""
+    test; and from `MASSES_FROM` on bodies that have their mass otherwise, by some thousandths."""
+    if seed < HAMMERS_FROM:
+        return world
+    if seed >= MASSES_FROM:
+        own = np.random.default_rng([seed, 89])
+        world = replace(world, masses=tuple((float(own.choice([1e-3, 3e-3, 6e-3])) * own.standard_normal(ways_of_mass(spindle))).tolist()))
     random = np.random.default_rng([seed, 73])
     radial, axial = (float(f) for f in 1 + random.choice([3e-3, 0.01, 0.02]) * random.standard_normal(2))
     misses = {"miss": float(random.choice([5e-5, 2e-4])), "miss_drift": float(random.choice([0.0, 3e-5, 1e-4]))}
@@ -96,7 +104,7 @@ def campaign(
     """One campaign; the seed draws the world and the record (unless given), tolerances, errors and noise."""
     random = np.random.default_rng([seed, 61])
     own, rec = drawn_world(random, spindle), drawn_record(random)
-    own = further(own, seed) if seed >= HAMMERS_FROM else own
+    own = further(own, seed, spindle)
     world, record = world or own, record or rec
     built = spindle
     for parameter in toleranced(spindle):

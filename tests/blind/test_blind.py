@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 
 from tests.blind.alike import left, right, right_names
-from tests.blind.campaigns import HAMMERS_FROM, campaign, further, in_contact
+from tests.blind.campaigns import HAMMERS_FROM, MASSES_FROM, campaign, further, in_contact
 from tests.blind.laws import law
 from tests.blind.mechanisms import mechanisms
 from tests.blind.score import (
@@ -26,7 +26,7 @@ from tests.blind.score import (
 )
 from tests.blind.study import FURTHER, FURTHER_FROM, FURTHER_SHARE, SCENES, draw
 from tests.blind.visible import change, seen, visibility, visibility_beside
-from tests.blind.world import Record, World, answer
+from tests.blind.world import Record, World, answer, ways_of_mass
 from tests.conftest import ROOT
 from thermospindle.diagnosis.verdict import diagnose
 from thermospindle.model.machine import Condition
@@ -84,9 +84,13 @@ def test_every_difference_of_the_world_changes_the_frf():
         World(damping_error=0.03),
         World(motions=(1.02, 1.0)),
         World(motions=(1.0, 1.02)),
+        *(World(masses=tuple(0.01 * row)) for row in np.eye(ways_of_mass(spindle))[[5, 6, 10, 14, 15, 16, 19]]),
     ]
     for world in differences:
         assert np.abs(answer(spindle, Condition(WARM), world).frf(LINES) - base).max() > 1e-5 * np.abs(base).max(), world
+    polar, fast = World(masses=tuple(0.01 * np.eye(ways_of_mass(spindle))[18])), Condition(WARM, spindle.nominal_speed)
+    base = answer(spindle, fast, World()).frf(LINES)
+    assert np.abs(answer(spindle, fast, polar).frf(LINES) - base).max() > 1e-4 * np.abs(base).max()
 
 
 def test_hammers_of_later_worlds_have_gains_of_their_own():
@@ -101,7 +105,9 @@ def test_hammers_of_later_worlds_have_gains_of_their_own():
     assert np.ptp(missing, axis=0).min() > 1e-3
     assert np.ptp(steady, axis=0).max() < 1e-6 < np.ptp(steady, axis=1).min()
     assert np.ptp(drifting, axis=0).min() > 1e-3
-    assert further(World(), HAMMERS_FROM).hammer_gain > 0
+    assert further(World(), HAMMERS_FROM, drawn.spindle).hammer_gain > 0
+    assert not further(World(), MASSES_FROM - 1, drawn.spindle).masses
+    assert len(further(World(), MASSES_FROM, drawn.spindle).masses) == ways_of_mass(drawn.spindle)
     assert drawn.made().world.motions == World().motions
     assert drawn.made().world.hammer_gain == 0.0
 

@@ -17,6 +17,7 @@ from thermospindle.model.types import Array, ComplexArray
 
 SMALL = 1e-4  # share of a size, of a tolerance and of a prior width, at which its change is taken for linear
 MOTIONS_SD = 0.01  # relative, of thermal motions, of the three widths that worlds are drawn with
+MASSES_SD = 3e-3  # of shares of masses, alike
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +99,10 @@ def seen(made: Made, spindle: Spindle, lines: int = 160) -> Seen:
     for i in range(2 if plain.motions != World().motions else 0):
         further = [tuple(np.array(plain.motions) + by * MOTIONS_SD * SMALL * (np.arange(2) == i)) for by in (1, -1)]
         more, less = (all_tests(made.built, world=replace(plain, motions=motions)) for motions in further)
+        columns.append(column(more, less) / (2 * SMALL))
+    for i in range(len(plain.masses)):
+        further = [tuple(np.array(plain.masses) + by * MASSES_SD * SMALL * (np.arange(len(plain.masses)) == i)) for by in (1, -1)]
+        more, less = (all_tests(made.built, world=replace(plain, masses=masses)) for masses in further)
         columns.append(column(more, less) / (2 * SMALL))
     columns += _modal_columns(made, column, frequency, plain, spindle)
     return replace(found, columns=np.array(columns).T)

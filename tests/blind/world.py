@@ -48,6 +48,7 @@ class World:
     hammer_drift: float = 0.0  # of it from test to test
     miss: float = 0.0  # m, of each hammer beside its point, on either way, in all tests
     miss_drift: float = 0.0  # m, of it from test to test
+    masses: tuple[float, ...] = ()  # by what shares bodies and shafts have their mass otherwise (`distributed`)
 
 
 @dataclass(frozen=True)
@@ -153,7 +154,7 @@ def answer(
         spindle, condition, {b: _grooves(spindle, b, m, world.grooves_follow_faces) for b, m in motions.items()}, world.constant_kept
     )
     chain = rotor_base(spindle, replace(state, bearings=changed("bearings", state.bearings)))
-    chain = changed("chain", chain)
+    chain = changed("chain", distributed(chain, spindle, world.masses))
     if world.weak_mode is not None:
         chain = on_spring(chain, lowest(spindle), "weak", *world.weak_mode, excited(spindle))
     linear = matrices(chain)
@@ -168,6 +169,43 @@ def answer(
     ]
     responses = [row_of(chain, p.body, p.position, p.direction) for p in spindle.points]
     return Answer(linear, np.array(responses), np.array(references), gain, delay, changed("decay", 0.0), state.status)
+
+
+OF_A_BODY, OF_A_SHAFT = 5, 2
+
+
+def ways_of_mass(spindle: Spindle) -> int:
+    """How many shares tell how a spindle has its mass otherwise."""
+    shafts = spindle.structure.shafts
+    beams = {name for s in shafts for name in s.bodies}
+    return OF_A_BODY * sum(b.name not in beams for b in spindle.structure.bodies) + OF_A_SHAFT * len(shafts)
+
+
+def distributed(chain: RotorBase, spindle: Spindle, shares: Sequence[float]) -> RotorBase:
+    """Of every rigid body mass, inertias about x, y (of what turns the first for both) and z, and the height of its centre of mass in radii of gyration, off by five shares; of every shaft the masses of its
+    nodes off by two, one that grows to its end and one to the square of the way there."""
+    if not len(shares):
+        return chain
+    left, factor = list(shares), dict[str, float]()
+    beams = {name for s in spindle.structure.shafts for name in s.bodies}
+    drawn = {b.name for b in spindle.structure.bodies} - beams
+    bodies = {}
+    for b in chain.bodies:
+        if b.name in drawn:
+            m, x, y, polar, up = (left.pop(0) for _ in range(OF_A_BODY))
+            arm = np.sqrt(np.mean(b.inertia[:2]) / b.mass)
+            inertia = (b.inertia[0] * (1 + x), b.inertia[1] * (1 + (x if b.turns else y)), b.inertia[2] * (1 + polar))
+            bodies[b.name] = replace(b, mass=b.mass * (1 + m), inertia=inertia, z=b.z + up * float(arm))
+    for s in spindle.structure.shafts:
+        end, square = (left.pop(0) for _ in range(OF_A_SHAFT))
+        z = {b.name: b.z for b in chain.bodies if b.name in s.bodies}
+        low, high = min(z.values()), max(z.values())
+        along = {name: (at - low) / (high - low) for name, at in z.items()}
+        factor |= {name: 1 + end * a + square * a**2 for name, a in along.items()}
+    for b in chain.bodies:
+        if (f := factor.get(b.name)) is not None:
+            bodies[b.name] = replace(b, mass=f * b.mass, inertia=(f * b.inertia[0], f * b.inertia[1], f * b.inertia[2]))
+    return replace(chain, bodies=tuple(bodies.get(b.name, b) for b in chain.bodies))
 
 
 def points_struck(spindle: Spindle) -> Array:
