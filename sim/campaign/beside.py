@@ -83,6 +83,15 @@ def beside(spindle: Spindle, points: tuple[Point, ...], test: Test, condition: C
     return Beside(test, measured, operating_point(measured_at(spindle, points, test.frf), condition))
 
 
+def of_another(spindle: Spindle, campaign: Campaign) -> list[str]:
+    """A sentence where a campaign names another spindle, and no point of it is one of the scene's by body and place: a table of modes has none, and would be compared with any machine's."""
+    own = {(p.body, p.position) for p in spindle.points}
+    if campaign.spindle == spindle.name or any((p.body, p.position) in own for p in on_nodes(spindle, campaign.points)):
+        return []
+    where = campaign.folder / "campaign.toml" if campaign.folder else campaign.title
+    return [f"{where}: spindle = {campaign.spindle!r}, and the scene is {spindle.name!r}: no point of the campaign tells that they are one machine"]
+
+
 def left_out(campaign: Campaign) -> list[str]:
     """A sentence that names the tests in whose FRFs lines of the running speed stand: those are compared with nothing. Of one test it names the lines too."""
     where = f"{campaign.folder / 'campaign.toml'}: " if campaign.folder else ""

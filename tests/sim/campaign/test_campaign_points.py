@@ -1,17 +1,19 @@
 """A campaign's points on the bodies of a scene: of another spindle, and of the same one with another mesh."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from tests.conftest import ROOT
+from thermospindle.cli import main
 from thermospindle.diagnosis.compare.compare import compare
 from thermospindle.diagnosis.verdict import diagnose
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
-from thermospindle.sim.campaign.beside import beside, check_points
+from thermospindle.sim.campaign.beside import beside, check_points, of_another
 from thermospindle.sim.campaign.campaign import Campaign, Test, read_campaign
 from thermospindle.sim.identification.frf import Frf
 
@@ -22,6 +24,18 @@ FOREIGN = ROOT / "tests" / "data" / "foreign_bond"
 def test_a_foreign_campaign_is_refused_without_naming_every_segment(verb):
     with pytest.raises(BadInput, match=r"points\.1\.body = 'hub': no body of scene five_bearing; allowed are housing, spindle$"):
         verb(load(ROOT / "scenes" / "five_bearing"), read_campaign(FOREIGN))
+
+
+def test_a_campaign_of_another_name_without_a_point_of_the_scene_is_said_to_be(spindle, capsys):
+    """A table of modes was compared with any machine's without a word, for it has no points; one of a copy under another name that has the scene's points is its own."""
+    table = ROOT / "scenes" / "free_shaft" / "measured" / "modelab"
+    assert main(["compare", str(ROOT / "scenes" / "mk7702"), str(table), "--json"]) == 0
+    [said] = json.loads(capsys.readouterr().out)["warnings"]
+    assert said.endswith("campaign.toml: spindle = 'free_shaft', and the scene is 'mk7702': no point of the campaign tells that they are one machine")
+    assert of_another(load(ROOT / "scenes" / "free_shaft"), read_campaign(table)) == []
+    own = replace(written(spindle), spindle="a copy")
+    assert of_another(spindle, own) == []
+    assert len(of_another(spindle, replace(own, points=()))) == 1
 
 
 def written(spindle):
