@@ -55,6 +55,7 @@ CONTACT_SD = 1e-3
 let its groove grow away from its ball: of ceramic balls in steel that is a thousandth."""
 CONTACT_APART = 0.3  # of it, in each test by itself
 UNEVEN = "stiffness of a joint uneven"  # about the axis
+GYRATION = ", of the radius of gyration"
 MASSES = "distribution of mass"  # of a rigid body, where no tolerance holds it
 RECORD = "end of records"
 RESONANCE = "light resonance"
@@ -155,16 +156,16 @@ def _of_a_body(body: Body, spindle: Spindle) -> list[MassTerm]:
     t, inertia = spindle.tolerances, float(np.mean(body.inertia[:2]))
     arm = float(np.sqrt(body.mass * inertia))
 
-    def term(name: str, *entries: tuple[str, str, float]) -> MassTerm:
+    def term(name: str, *entries: tuple[str, str, float], of: str = "") -> MassTerm:
         own = tuple(((body.name, a), (body.name, b), amount) for a, b, amount in entries if {a, b} <= {*body.moves} and amount)
-        return MassTerm(f"{name} of {body.name}", t.hub if body.turns else t.structure, own)
+        return MassTerm(f"{name} of {body.name}{of}", t.hub if body.turns else t.structure, own)
 
-    found = [term("height of the centre of mass", ("x", "tilt_y", arm), ("y", "tilt_x", -arm))]
+    found = [term("height of the centre of mass", ("x", "tilt_y", arm), ("y", "tilt_x", -arm), of=GYRATION)]
     if body.turns:
         found.append(_polar(body.name, t.hub, [body]))
     else:
-        found += [term("centre of mass off along x", ("z", "tilt_y", -arm)), term("centre of mass off along y", ("z", "tilt_x", arm))]
-        found.append(term("product of inertia", ("tilt_x", "tilt_y", inertia)))
+        found += [term("place along x of the centre of mass", ("z", "tilt_y", -arm), of=GYRATION), term("place along y of the centre of mass", ("z", "tilt_x", arm), of=GYRATION)]
+        found.append(term("product of inertia", ("tilt_x", "tilt_y", inertia), of=" beside the other inertias"))
     if body.regions and not body.turns:  # of all others these are tolerances
         found.append(term("mass", *((m, m, body.mass) for m in MOVES[:3])))
         found += [term(f"inertia about {m[-1]}", (m, m, own)) for m, own in zip(MOVES[3:], body.inertia, strict=False)]

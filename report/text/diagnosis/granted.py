@@ -12,7 +12,7 @@ from thermospindle.report.text.compare import ALMOST
 from thermospindle.report.typeset import plain
 
 MOVED, NAMED = 0.5, 3  # standard deviations from which something is said to have moved, and how many of these are named
-PERCENT = (kinds_of.BUILD, kinds_of.EXPANSION, kinds_of.COEFFICIENT, kinds_of.GAIN, kinds_of.HAMMER, *kinds_of.APART, kinds_of.BALLS, kinds_of.CHANGE, kinds_of.UNEVEN, kinds_of.FLUNG)
+PERCENT = (kinds_of.BUILD, kinds_of.EXPANSION, kinds_of.COEFFICIENT, kinds_of.GAIN, kinds_of.HAMMER, *kinds_of.APART, kinds_of.BALLS, kinds_of.CHANGE, kinds_of.UNEVEN, kinds_of.FLUNG, kinds_of.MASSES)
 UNITS = {kinds_of.TEMPERATURE: (1.0, "K"), kinds_of.MISS: (1e3, "mm")} | dict.fromkeys(PERCENT, (100.0, "%"))
 
 

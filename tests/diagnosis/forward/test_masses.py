@@ -12,7 +12,7 @@ from tests.virtual_campaign import effect, model_of, virtual_campaign
 from thermospindle.diagnosis.decision.verdict import decide
 from thermospindle.diagnosis.forward.linear import mass_changes
 from thermospindle.diagnosis.forward.mechanism import variants
-from thermospindle.diagnosis.forward.nuisance import MASSES, mass_terms
+from thermospindle.diagnosis.forward.nuisance import GYRATION, MASSES, mass_terms
 from thermospindle.diagnosis.inference.search import search
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.chain import matrices, motion_rows
@@ -48,7 +48,7 @@ def of(body, found, dofs):
 
 @pytest.mark.parametrize(
     ("body", "name", "way"),
-    [("shaft", "height of the centre of mass", 2), ("shaft", "centre of mass off along x", 0), ("shaft", "centre of mass off along y", 1), ("seat", "centre of mass off along x", 0)],
+    [("shaft", "height of the centre of mass", 2), ("shaft", "place along x of the centre of mass", 0), ("shaft", "place along y of the centre of mass", 1), ("seat", "place along x of the centre of mass", 0)],
 )
 def test_a_centre_of_mass_that_is_off(spindle, body, name, way):
     """As two particles have it, a little taken away on one side of the centre and put on the other: first moment alone. Whole, it is off by a radius of gyration."""
@@ -59,7 +59,7 @@ def test_a_centre_of_mass_that_is_off(spindle, body, name, way):
     ends[:, 2] = own.z
     ends[:, way] += [arm, -arm]
     wanted = of(body, moved(spindle, body, ends, [own.mass / 2, -own.mass / 2]), point.chain.dofs)
-    assert of(body, found[f"{name} of {body}"][0], point.chain.dofs) == pytest.approx(wanted, abs=1e-12 * np.abs(wanted).max())
+    assert of(body, found[f"{name} of {body}{GYRATION}"][0], point.chain.dofs) == pytest.approx(wanted, abs=1e-12 * np.abs(wanted).max())
     assert np.abs(wanted).max() > 0
 
 
@@ -70,7 +70,7 @@ def test_a_product_of_inertia(spindle):
     arm = np.sqrt(np.mean(own.inertia[:2]) / own.mass)
     corners = [(a * arm, b * arm, own.z) for a in (1, -1) for b in (1, -1)]
     wanted = of("shaft", moved(spindle, "shaft", corners, [-0.25 * own.mass * np.sign(x * y) for x, y, _ in corners]), point.chain.dofs)
-    assert of("shaft", found["product of inertia of shaft"][0], point.chain.dofs) == pytest.approx(wanted, abs=1e-12 * np.abs(wanted).max())
+    assert of("shaft", found["product of inertia of shaft beside the other inertias"][0], point.chain.dofs) == pytest.approx(wanted, abs=1e-12 * np.abs(wanted).max())
 
 
 def test_masses_and_inertias_are_those_of_a_body_that_has_more(spindle):
