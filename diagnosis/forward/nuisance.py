@@ -141,10 +141,8 @@ class MassTerm:
 
 def mass_terms(spindle: Spindle) -> tuple[MassTerm, ...]:
     """What the toleranced parameters leave as drawn of the mass of rigid bodies and of shafts. A hub whose polar inertia was off by two thousandths beside the other had a disk on it, 30 in ln evidence."""
-    structure = spindle.structure
-    beams = {name for s in structure.shafts for name in s.bodies}
-    rigid = [m for b in structure.bodies if b.name not in beams for m in _of_a_body(b, spindle)]
-    shafts = [m for s in structure.shafts for m in _of_a_shaft(s, spindle)]
+    rigid = [m for b in spindle.structure.rigid_bodies for m in _of_a_body(b, spindle)]
+    shafts = [m for s in spindle.structure.shafts for m in _of_a_shaft(s, spindle)]
     return tuple(m for m in (*rigid, *shafts) if m.entries or m.polar)
 
 
@@ -290,7 +288,7 @@ def nuisances(
     if spindle.bearings and spindle.ball_inertia:
         found.append(Nuisance(FLUNG, FLUNG, FLUNG_SD))
     found += [Nuisance(UNEVEN, u.name, t.structure / np.sqrt(2), index=i) for i, u in enumerate(unevennesses(spindle))]  # of two that are off by as much each
-    found += [Nuisance(MASSES, m.name, m.sd, index=i) for i, m in enumerate(mass_terms(spindle))]
+    found += [Nuisance(MASSES, m.name, m.sd) for m in mass_terms(spindle)]
     found += [Nuisance(TEMPERATURE, f"temperature of {name}", t.temperature, test=k) for k, name in enumerate(tests)]
     for i in range(modes.seen):
         for j in range(i, len(modes.omega) if with_lines else i + 1):

@@ -73,9 +73,9 @@ def write_comparison(
     ids = {t.test.id for t in (c.tests if c else ())} | {t.test.id for t in turning}
     write_page(folder, spindle, len(ids), c.campaign if c else campaign, every, "Comparison", name)
     progress("page written")
-    for name, one in ((figures(c) if c else {}) | drawn).items():
-        save(one, folder, name)
-        progress(f"picture {name} written")
+    for called, one in ((figures(c) if c else {}) | drawn).items():
+        save(one, folder, called)
+        progress(f"picture {called} written")
     shown = [FrfsBeside(t.test, found.beside.measured, found.computed) for t in c.tests if (found := t.correlation) is not None] if c else []
     if c and shown:
         peaks = {t.test.id: [(m.number, m.kind, m.measured, m.sd, m.computed) for m in t.modes] for t in c.tests}

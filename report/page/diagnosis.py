@@ -60,8 +60,8 @@ def write_diagnosis(
         every += runout_diagnosis.sections(told, runout)
     count = (len(d.search.model.tests) if d else 0) + (len(turning.seen) if turning else 0)
     write_page(folder, spindle, count, answer["campaign"], every, "Diagnosis", name)
-    for name, one in (modal | runout).items():
-        save(one, folder, name, 130)
+    for called, one in (modal | runout).items():
+        save(one, folder, called, 130)
 
 
 def _verdict(answer: dict[str, Any]) -> str:

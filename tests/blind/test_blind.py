@@ -1,29 +1,14 @@
 """The blind study's own world: nothing of its own switched on it is the product's model, every hidden mechanism is seen, seeds repeat."""
 
-import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from rich.console import Console
 
 from tests.blind.alike import left, right, right_names
 from tests.blind.campaigns import HAMMERS_FROM, MASSES_FROM, campaign, further, in_contact
 from tests.blind.laws import law
 from tests.blind.mechanisms import mechanisms
-from tests.blind.score import (
-    above_noise,
-    element_found,
-    halved,
-    interval,
-    most_probable,
-    no_wrong_name,
-    outcome,
-    show,
-    sure,
-    told_elsewhere,
-    truth_probability,
-)
 from tests.blind.study import FURTHER, FURTHER_FROM, FURTHER_SHARE, SCENES, draw
 from tests.blind.visible import change, seen, visibility, visibility_beside
 from tests.blind.world import Record, World, answer, ways_of_mass
@@ -259,94 +244,3 @@ def test_right_names():
     assert right_names((), left_by, 200.0) == ["same"]
     assert right_names((), left_by, 4.0) == []
     assert right_names(("off",), left_by, 2.0) == ["off"]  # too little to be told
-
-
-def test_what_one_temperature_alone_shows_no_law_tells():
-    tests = [[20.0, 0], [40.0, 0], [60.0, 0], [60.0, 7200]]
-    assert not told_elsewhere({"tests": tests, "amounts": [[0.0, 0.2, 1.0, 1.0]]})
-    assert told_elsewhere({"tests": tests, "amounts": [[0.0, -0.4, 1.0, 1.0]]})
-    assert halved({"drafted": [10.0, 4.9]})
-    assert not halved({"drafted": [10.0, 5.1]})
-    assert above_noise({"drafted": [2.1, 1.0]})
-    assert not above_noise({"drafted": [1.9, 1.0]})
-
-
-def row(kind, verdict, effects=(), truth=(), none=0.0, unknown=0.0, candidates=(), drifts=(), elements=()):
-    names = [{"effects": list(e), "probability": p, "delta_evidence": 10 * p, "chi2_per_number": 1.0} for e, p in candidates]
-    return {
-        "seed": 1, "commit": "x", "kind": kind, "scene": SCENES[0], "hidden": ["h"] * len(truth), "sizes": [1.0] * len(truth),
-        "units": ["%"] * len(truth), "laws": ["linear"] * len(truth), "truth": [list(t) for t in truth], "elements": list(elements),
-        "visibility": [100.0] * len(truth), "leakage": 0.0, "learned": {"frequency_discrepancy": 0.01}, "verdict": verdict, "effects": list(effects), "probability": {"none": none, "unknown": unknown},
-        "candidates": names, "drifts": [list(d) for d in drifts], "rms": [1.0, 1.0], "seconds": 1.0, "error": "E",
-        "world": {"stiffness_error": 0.001, "damping_error": 0.01, "grooves_follow_faces": 0.0, "weak_mode": None}, "record": {"kind": "line", "told": "nothing"},
-    }  # fmt: skip
-
-
-def unseen(row, *visibility):
-    return row | {"visibility": list(visibility)}
-
-
-SCORED = [
-    (row("nothing", "none", none=0.97), "right", 0.97),
-    (row("nothing", "identified", ["a"], none=0.01, candidates=[(["a"], 0.99)]), "false alarm", 0.01),
-    (row("one", "identified", ["a"], [["a", "b"]], candidates=[(["a"], 0.7), (["b"], 0.2), (["c"], 0.1)]), "right", 0.9),
-    (row("one", "ambiguous", ["a", "c"], [["a"]], candidates=[(["a"], 0.5), (["c"], 0.5)]), "in the set", 0.5),
-    (row("one", "identified", ["c"], [["a"]], candidates=[(["c"], 1.0)]), "wrong", 0.0),
-    (row("one", "two effects", ["a", "c"], [["a"]], candidates=[(["a", "c"], 1.0)]), "wrong", 0.0),
-    (row("one", "unexplained", [], [["a"]], unknown=1.0), "unexplained", 0.0),
-    (row("one", "none", [], [["a"]], none=1.0), "missed", 0.0),
-    (row("two", "two effects", ["a", "c"], [["a"], ["c"]], candidates=[(["a", "c"], 0.9)]), "right", 0.9),
-    (row("two", "identified", ["a"], [["a"], ["c"]], candidates=[(["a"], 0.9)]), "half", 0.0),
-    (row("outside", "unexplained", [], [[]], unknown=0.8, drifts=[("plate damping", 9.0)], elements=["plate damping"]), "right", 0.8),
-    (row("outside", "identified", ["a"], [[]], candidates=[(["a"], 0.9)], elements=["plate"]), "wrong", 0.0),
-    (row("one", "error", [], [["a"]]), "error", 0.0),
-    (unseen(row("one", "none", [], [["a"]], none=0.9, candidates=[(["a"], 0.05), (["c"], 0.05)]), 2.0), "right", 0.95),
-    (unseen(row("one", "identified", ["c"], [["a"]], candidates=[(["c"], 1.0)]), 2.0), "wrong", 0.0),
-    (
-        unseen(row("two", "identified", ["a"], [["a"], ["c"]], candidates=[(["a"], 0.7), (["a", "c"], 0.1), (["c"], 0.2)]), 90.0, 2.0),
-        "right",
-        0.8,
-    ),
-    (unseen(row("two", "identified", ["c"], [["a"], ["c"]], candidates=[(["c"], 0.9)]), 90.0, 2.0), "half", 0.0),
-    (row("two", "identified", ["a"], [["a"], ["a", "c"]], candidates=[(["a"], 0.9)]), "right", 0.0),
-    (row("one", "identified", ["c"], [["a"]], candidates=[(["c"], 0.9)]) | {"right": [["c"]]}, "right", 0.9),
-    (row("one", "identified", ["a"], [["a"]], candidates=[(["a"], 0.9)]) | {"right": [["c"]]}, "wrong", 0.0),
-    (row("one", "unexplained", [], [["a"]], unknown=0.9) | {"right": [[]]}, "right", 0.9),
-    (row("outside", "identified", ["c"], [[]], candidates=[(["c"], 0.5)], unknown=0.4) | {"right": [["c"]]}, "right", 0.9),
-]
-
-
-@pytest.mark.parametrize(("told", "expected", "probability"), SCORED)
-def test_the_score_of_a_verdict(told, expected, probability):
-    assert outcome(told) == expected
-    assert truth_probability(told) == pytest.approx(probability)
-
-
-def test_what_was_stated_for_sure_is_judged_by_name_and_as_a_whole():
-    """One of two named for sure: no name is wrong, and one that shows is missing; nothing of what is not sure, or of none hidden."""
-    half, whole, wrong = (
-        row("two", "identified", names, [["a"], ["c"]], candidates=[(names, 0.999), (["b"], 0.001)]) for names in (["a"], ["a", "c"], ["b"])
-    )
-    assert [(sure(r), no_wrong_name(r)) for r in (half, whole, wrong)] == [(True, True), (True, True), (True, False)]
-    assert not sure(row("one", "identified", ["a"], [["a"]], candidates=[(["a"], 0.98)]))
-    assert not sure(row("nothing", "none", none=1.0))
-    console = Console(record=True, width=160)
-    with console.capture() as captured:
-        show(console, [r | {"seed": i} for i, r in enumerate((half, whole, wrong))])
-    assert re.search(r"names stated above 0.99, every one right: 2 of 3 .*\n  and nothing that shows left out: 1 of 3 ", captured.get())
-
-
-def test_the_table_of_scores():
-    rows = [r | {"seed": i} for i, (r, _, _) in enumerate(SCORED)]
-    console = Console(record=True, width=160)
-    with console.capture() as captured:
-        show(console, rows)
-    text = captured.get()
-    assert "22 campaigns, seeds 0 to 21" in text
-    assert "of these drawn with an effect in mind that cannot be it: 1; another effect than those in mind is right, too: 3" in text
-    assert "false alarm, nothing hidden: 1 of 2" in text
-    assert text.count("\n- ") == 11
-    assert element_found(SCORED[10][0])
-    assert not element_found(SCORED[11][0])
-    assert most_probable(SCORED[0][0]) == (0.97, True)
-    assert interval(0, 59)[1] == pytest.approx(1 - 0.025 ** (1 / 59))  # nothing of n: 1 - (alpha / 2)^(1 / n)

@@ -96,14 +96,12 @@ def seen(made: Made, spindle: Spindle, lines: int = 160) -> Seen:
             ]
             columns.append(column([b + made.world.miss * d for b, d in zip(base, aside, strict=True)]))
             columns += [column([b + made.world.miss_drift * d * (j == k) for j, (b, d) in enumerate(zip(base, aside, strict=True))]) for k in range(len(base))]
-    for i in range(2 if plain.motions != World().motions else 0):
-        further = [tuple(np.array(plain.motions) + by * MOTIONS_SD * SMALL * (np.arange(2) == i)) for by in (1, -1)]
-        more, less = (all_tests(made.built, world=replace(plain, motions=motions)) for motions in further)
-        columns.append(column(more, less) / (2 * SMALL))
-    for i in range(len(plain.masses)):
-        further = [tuple(np.array(plain.masses) + by * MASSES_SD * SMALL * (np.arange(len(plain.masses)) == i)) for by in (1, -1)]
-        more, less = (all_tests(made.built, world=replace(plain, masses=masses)) for masses in further)
-        columns.append(column(more, less) / (2 * SMALL))
+    for which, sd in (("motions", MOTIONS_SD), ("masses", MASSES_SD)):
+        own = getattr(plain, which)
+        for off in np.eye(len(own)) if own != getattr(World(), which) else ():
+            further = [tuple(np.array(own) + by * sd * SMALL * off) for by in (1, -1)]
+            more, less = (all_tests(made.built, world=replace(plain, **{which: values})) for values in further)
+            columns.append(column(more, less) / (2 * SMALL))
     columns += _modal_columns(made, column, frequency, plain, spindle)
     return replace(found, columns=np.array(columns).T)
 

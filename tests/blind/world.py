@@ -176,9 +176,7 @@ OF_A_BODY, OF_A_SHAFT = 5, 2
 
 def ways_of_mass(spindle: Spindle) -> int:
     """How many shares tell how a spindle has its mass otherwise."""
-    shafts = spindle.structure.shafts
-    beams = {name for s in shafts for name in s.bodies}
-    return OF_A_BODY * sum(b.name not in beams for b in spindle.structure.bodies) + OF_A_SHAFT * len(shafts)
+    return OF_A_BODY * len(spindle.structure.rigid_bodies) + OF_A_SHAFT * len(spindle.structure.shafts)
 
 
 def distributed(chain: RotorBase, spindle: Spindle, shares: Sequence[float]) -> RotorBase:
@@ -187,8 +185,7 @@ def distributed(chain: RotorBase, spindle: Spindle, shares: Sequence[float]) -> 
     if not len(shares):
         return chain
     left, factor = list(shares), dict[str, float]()
-    beams = {name for s in spindle.structure.shafts for name in s.bodies}
-    drawn = {b.name for b in spindle.structure.bodies} - beams
+    drawn = {b.name for b in spindle.structure.rigid_bodies}
     bodies = {}
     for b in chain.bodies:
         if b.name in drawn:
