@@ -150,10 +150,14 @@ def _doing_as_well(lead: Hypothesis, more: Collection[str], every: Sequence[Hypo
 
 
 def _by_other_laws(h: Hypothesis, every: Sequence[Hypothesis]) -> float:
-    """What of its ln evidence an explanation gains by departures from laws, and by laws of the data's own over those assumed (all of it where no fit with
-    these arrived)."""
-    assumed = [o for o in every if set(o.names) == set(h.names) and not any(m.own_law for m in o.mechanisms)]
+    """What of its ln evidence an explanation gains by departures from laws, and by laws of the data's own over those assumed: all of it where no fit with
+    these arrived, and where something free in it follows none."""
+    assumed = [o for o in every if set(o.names) == set(h.names) and not any(map(_lawless, o.mechanisms, o.evidence.learned.departures))]
     return h.evidence.ln - max((o.evidence.ln - o.evidence.by_departing for o in assumed), default=-np.inf)
+
+
+def _lawless(m: Mechanism, departs: float) -> bool:
+    return m.own_law or (m.free and departs >= DEPARTS)
 
 
 def _can_be(h: Hypothesis) -> bool:

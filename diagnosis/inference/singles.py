@@ -163,7 +163,7 @@ def lasting(
     least = evidence(model, about).ln + LITTLE
     gaining = [h for h in fitted(model, tasks, TEMPERS[:-1], about, most, expected, workers) if h.evidence.ln > least]
     tasks = [Task(h.mechanisms, (h.fit.point,), -np.inf) for h in gaining]
-    return fitted(model, tasks, TEMPERS[-1:], lead.fit, most, expected, workers)
+    return fitted(model, tasks, TEMPERS[-1:], lead.fit, most, expected, workers, beaten=lead.fit.cost)
 
 
 def better(found: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -222,18 +222,22 @@ def _chosen(rankings: Sequence[Sequence[Screened]], misfit: bool) -> list[Screen
 def fitted_in_steps(
     model, tasks: Sequence[Task], first: Collection[str], about: Fit, most: float, expected: Learned, workers
 ) -> tuple[list[Hypothesis], list[Hypothesis]]:
-    """All tasks fitted in steps of temper, after which what fell behind is left, but for those that promised most at `first`: the first of two causes that
+    """All tasks fitted in steps of temper, after which what fell behind is left, but for those that promised most at `first` as long as none explains the data: the first of two causes that
     shows while errors are enlarged need not be the one that tells more. Those that arrived, and all of the first step."""
     peaks = any(isinstance(d, LineData) for d in model.tests)  # a table's frequencies follow their parameters as far as these go
     alive, afresh = list(tasks), peaks and about.temper * np.sqrt(about.chi2 / about.count) > STALLED
     early: list[Hypothesis] = []
     found: list[Hypothesis] = []
+    count, beaten = sum(d.count for d in model.tests), np.inf  # a thinned model's lines weigh as much as all
     for temper in TEMPERS[EARLY:]:
-        found = fitted(model, alive, (temper,), about, most, expected, workers, afresh=afresh)
+        found = fitted(model, alive, (temper,), about, most, expected, workers, afresh=afresh, beaten=beaten)
         afresh, early = False, early or found
-        best = max((h.evidence.ln for h in found), default=-np.inf)
-        near = sorted((h for h in found if h.evidence.ln > best - FAR), key=lambda h: -h.evidence.ln)
+        ranked = sorted(found, key=lambda h: -h.evidence.ln)
+        near = [h for h in ranked if h.evidence.ln > ranked[0].evidence.ln - FAR]
+        explained = any(h.fit.chi2 < STRAIN**2 * count for h in ranked[:1])  # of two causes neither does that alone
         keep = {id(h) for kind in MOST for h in [h for h in near if h.mechanisms[0].kind == kind][:2]}
-        kept = [h for h in found if id(h) in keep or h.names[0] in first or h.evidence.ln > best - BEHIND]
+        kept = [h for h in (near if explained else found) if id(h) in keep or h.names[0] in first or h.evidence.ln > ranked[0].evidence.ln - BEHIND]
+        if temper == TEMPERS[-2]:  # what the best leaves of noise it leaves at the end, or less
+            beaten = min((h.fit.chi2 for h in found), default=np.inf) + 2 * FAR
         alive = [Task(h.mechanisms, (h.fit.point,), -np.inf) for h in sorted(kept, key=lambda h: -h.fit.cost)]  # what has furthest to go begins first
     return found, early
