@@ -133,6 +133,20 @@ def test_what_a_law_leaves_in_doubt_is_no_more_than_it_gained(a, b, behind, doub
     assert np.log(second / first) == pytest.approx((1 - 1 / COARSE) * doubt - np.log(1 + OWN_LAW) - behind, abs=1e-6)
 
 
+@pytest.mark.parametrize(("departs", "gain"), [(1.0, 70.0 / COARSE), (0.1, 70.0)])
+def test_what_gains_beside_something_free_that_follows_no_law_is_in_doubt(departs, gain):
+    """Blind campaign 2150, a compliance beside a warm standing part: `cooling_imbalance` with free rings beside it, 70 in ln evidence over these alone, was the answer, above 0.98; of the true two, 37 in ln evidence
+    before it, what the second gained over the first had counted a quarter, and of these all."""
+    found = made({("a", "~x"): 480.0, "~x": 410.0, ("b", "c"): 470.0, "b": 10.0, "c": 10.0})
+
+    def departing(h: Hypothesis) -> Hypothesis:
+        return replace(h, evidence=replace(h.evidence, learned=replace(h.evidence.learned, departures=(departs,)))) if h.names == ("~x",) else h
+
+    v = decide(replace(found, hypotheses=tuple(map(departing, found.hypotheses))))
+    odds = next(c.probability for c in v.free if c.names == ("a", "~x")) / next(c.probability for c in v.candidates if c.names == ("b", "c"))
+    assert np.log(odds) == pytest.approx(410.0 + gain - 470.0 + np.log(PRIOR["one and free"] / (30 * 20)) - np.log(PRIOR["two"] / 435), abs=1e-6)
+
+
 OWN_LAWS = {
     "one effect's": ({"a": 20.0, "a'": 60.0, "~x": 50.0}, "identified", {"a"}, ("a",)),
     "no better than the one assumed": ({"a": 60.0, "a'": 60.0, "~x": 50.0}, "identified", {"a"}, ()),

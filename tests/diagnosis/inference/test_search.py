@@ -4,26 +4,28 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from tests.hand_made_search import mechanism
 from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, virtual_campaign
 from thermospindle.diagnosis.decision.explanations import explanations
 from thermospindle.diagnosis.decision.verdict import decide
 from thermospindle.diagnosis.forward.mechanism import asked_at, variants, with_own_laws
 from thermospindle.diagnosis.forward.nuisance import STIFFNESS
-from thermospindle.diagnosis.inference import hypothesis
+from thermospindle.diagnosis.inference import hypothesis, singles
 from thermospindle.diagnosis.inference.evidence import evidence
-from thermospindle.diagnosis.inference.fit import fit
+from thermospindle.diagnosis.inference.fit import TEMPERS, fit
 from thermospindle.diagnosis.inference.freeform import free_forms, runs_against
-from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
-from thermospindle.diagnosis.inference.prior import CHANGING, steady, undrifted
+from thermospindle.diagnosis.inference.hypothesis import EARLY, Hypothesis, Task, settled
+from thermospindle.diagnosis.inference.prior import CHANGING, Learned, steady, undrifted
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.inference.remainder import Overlap
 from thermospindle.diagnosis.inference.screening import Screened, linearised, screen
 from thermospindle.diagnosis.inference.search import Search, _from_the_drawing, _other_ways, _without_what_does_nothing, search
-from thermospindle.diagnosis.inference.singles import HIDING, Singles, cost_of, lasting
+from thermospindle.diagnosis.inference.singles import FAR, HIDING, Singles, cost_of, fitted_in_steps, lasting
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
 from thermospindle.report.text.diagnosis.answer import told_values
@@ -184,6 +186,27 @@ def test_a_shape_in_a_valley_of_its_own_is_fitted_from_the_drawing(spindle):
     away = np.concatenate([found.nuisance + 3.0, found.point[len(found.nuisance) :]])
     stalled = Hypothesis(replace(found, point=away, cost=found.cost + 80.0), replace(h.evidence, ln=h.evidence.ln - 40.0))
     assert _from_the_drawing(model, stalled).evidence.ln == pytest.approx(h.evidence.ln, abs=1.0)
+
+
+@pytest.mark.parametrize(("left", "alive"), [(100.0, {"a"}), (300.0, {"a", "b"})])
+def test_what_promised_most_at_first_is_followed_until_one_explains_the_data(monkeypatch, left, alive):
+    """`b` promised most and is far behind `a`, which leaves `left` of 100 numbers: where that is noise, nothing is missing beside it."""
+    asked = []
+    count = SimpleNamespace(count=100)
+
+    def fitted(model, tasks, tempers, *of, **more):
+        asked.append({t.mechanisms[0].name for t in tasks})
+        gains = {"a": 0.0, "b": -FAR - 1}
+        return [
+            SimpleNamespace(names=(m.name,), mechanisms=(m,), evidence=SimpleNamespace(ln=gains[m.name]), fit=SimpleNamespace(chi2=left, cost=left, point=np.zeros(2)))
+            for m in (t.mechanisms[0] for t in tasks)
+        ]
+
+    monkeypatch.setattr(singles, "fitted", fitted)
+    tasks = [Task((mechanism(name),), (np.zeros(2),), -np.inf) for name in "ab"]
+    about = SimpleNamespace(temper=TEMPERS[EARLY], chi2=0.0, count=100)
+    fitted_in_steps(SimpleNamespace(tests=(count,)), tasks, {"b"}, about, np.inf, Learned({}, 1.0), 1)
+    assert asked == [{"a", "b"}, alive, alive]
 
 
 def test_a_model_without_effects_that_stalled_is_fitted_from_one_whose_effect_does_nothing(spindle):
