@@ -50,16 +50,11 @@ class Hypothesis:
         return any(m.free for m in self.mechanisms)
 
     @property
-    def shown(self) -> tuple[float, ...]:
-        """Of every mechanism how far its size is off neutral in the test that shows it most, in errors of its own."""
-        errors = np.sqrt(np.einsum("mtt->mt", self.evidence.size_covariance))
-        neutral = np.array([[m.size.neutral] for m in self.mechanisms])
-        return tuple((np.abs(self.evidence.sizes - neutral) / errors).max(axis=1).tolist())
-
-    @property
     def idle(self) -> tuple[bool, ...]:
         """Of every mechanism whether its sizes, in all tests, are its neutral value within three of their errors."""
-        return tuple(shown <= 3 for shown in self.shown)
+        errors = np.sqrt(np.einsum("mtt->mt", self.evidence.size_covariance))
+        neutral = np.array([[m.size.neutral] for m in self.mechanisms])
+        return tuple((np.abs(self.evidence.sizes - neutral) <= 3 * errors).all(axis=1).tolist())
 
     @property
     def excess(self) -> float:

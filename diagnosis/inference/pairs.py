@@ -32,7 +32,6 @@ from thermospindle.diagnosis.inference.singles import (
 LEADS = 2  # single mechanisms of the catalogue to which a second is joined, of those near the best
 SECONDS = 2  # of each kind, joined to each of them
 PAIRS = 8  # fitted at most
-SURELY = 10.0  # errors of its own by which a mechanism's size is off neutral, from which the others are not fitted without it
 EXCHANGED = 8  # effects tried in either's place
 ENOUGH = 5.0  # ln evidence that a second mechanism must promise beside one that leaves a misfit, and a third at least
 ASKED = {"law": LITTLE, "own law": ENOUGH, "free": PLENTY}
@@ -89,12 +88,15 @@ def without_one(model: CampaignModel, found: Sequence[Hypothesis], most: float, 
         at = len(model.parameters)
         for k, (m, idle) in enumerate(zip(lead.mechanisms, lead.idle, strict=True)):
             rest, own = (*lead.mechanisms[:k], *lead.mechanisms[k + 1 :]), len(model.tests) + len(m.shape)
-            surely = lead.shown[k] > SURELY  # what the others do without shows less
-            if rest and not surely and (with_laws(rest) not in known or (idle and known[with_laws(rest)] < lead.evidence.ln - LITTLE)):
+            if rest and (with_laws(rest) not in known or (idle and known[with_laws(rest)] < lead.evidence.ln - LITTLE)):
                 tasks.setdefault(with_laws(rest), Task(rest, (np.delete(lead.fit.point, slice(at, at + own)),), -np.inf))
             at += own
-    cost = min((h.fit.cost for h in leads.values()), default=np.inf)
-    return fitted(model, list(tasks.values()), TEMPERS[-2:], ranked[-1].fit, most, expected, workers, beaten=cost + 2 * FAR) if tasks else []
+    if not tasks:
+        return []
+    tried = fitted(model, list(tasks.values()), TEMPERS[-2:-1], ranked[-1].fit, most, expected, workers)
+    near = [h for h in tried if TEMPERS[-2] ** 2 * (h.fit.chi2 - ranked[-1].fit.chi2) < 2 * FAR]  # a thinned model's lines weigh as much as all
+    beaten = min(h.fit.cost for h in leads.values()) + 2 * FAR
+    return fitted(model, [Task(h.mechanisms, (h.fit.point,), -np.inf) for h in near], TEMPERS[-1:], ranked[-1].fit, most, expected, workers, beaten=beaten)
 
 
 def exchanged(
