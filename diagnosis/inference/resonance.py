@@ -62,14 +62,25 @@ def with_resonance(model: CampaignModel, h: Hypothesis, workers: int | None = No
         if not asked(Hypothesis(best, evidence(wider, best)), 0.0, FAR * clear) or not _resonates(model, resonance.at(sd * best.point[n : n + more])):
             return None  # smooth over the band, it would stand in for something else
         for _ in range(CENTRED):  # so that all explanations start about it as it is
-            resonance = resonance.at(sd * best.point[n : n + more])
-            wider, there = model.with_resonance(resonance), np.concatenate([best.point[:n], np.zeros(more), best.point[n + more :]])
+            resonance, left = _centred(resonance, best.point[n : n + more], moves)
+            wider, there = model.with_resonance(resonance), np.concatenate([best.point[:n], left, best.point[n + more :]])
             again = fit(wider, h.mechanisms, there, best.rates, TEMPERS[-1:], learned, best.moved)
             found = settled(wider, Hypothesis(again, evidence(wider, again)))
             best, learned = found.fit, found.evidence.learned
     except FAILED:
         return None
     return (wider, found) if asked(found, PLENTY, clear) else None
+
+
+def _centred(resonance: Resonance, fitted: Array, moves: bool) -> tuple[Resonance, Array]:
+    """The resonance about where its parameters (k + 4,) were fitted, and what is left of these: how its frequency drifts, unless it `moves`, for a table's stays narrow
+    about none."""
+    there = resonance.at(np.array([q.sd for q in resonance.nuisances]) * fitted)
+    left = np.zeros(len(fitted))
+    if moves:
+        return there, left
+    left[-2:] = fitted[-2:]
+    return replace(there, drift=resonance.drift), left
 
 
 def _resonates(model: CampaignModel, resonance: Resonance) -> bool:
