@@ -14,10 +14,13 @@ from tests.blind.world import World, answer, modal_errors, points_struck
 from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array, ComplexArray
+from thermospindle.sim.effects.temperature.expansion_mismatch import expanding, with_material
 
 SMALL = 1e-4  # share of a size, of a tolerance and of a prior width, at which its change is taken for linear
 MOTIONS_SD = 0.01  # relative, of thermal motions, of the three widths that worlds are drawn with
 MASSES_SD = 3e-3  # of shares of masses, alike
+COEFFICIENT_SD = 0.01  # relative, of each material's coefficient of expansion: what tables give of one alloy differs by as much
+INERTIA_SD = 0.1  # relative, of the balls' inertia loads: programs differ in the speed of the cage
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +105,12 @@ def seen(made: Made, spindle: Spindle, lines: int = 160) -> Seen:
             further = [tuple(np.array(own) + by * sd * SMALL * off) for by in (1, -1)]
             more, less = (all_tests(made.built, world=replace(plain, **{which: values})) for values in further)
             columns.append(column(more, less) / (2 * SMALL))
+    for name in made.built.used_materials:
+        material = made.built.materials[name]
+        more, less = (all_tests(with_material(made.built, expanding(material, by * COEFFICIENT_SD * SMALL))) for by in (1, -1))
+        columns.append(column(more, less) / (2 * SMALL))
+    more, less = (all_tests(replace(made.built, ball_inertia=made.built.ball_inertia * (1 + by * INERTIA_SD * SMALL))) for by in (1, -1))
+    columns.append(column(more, less) / (2 * SMALL))
     columns += _modal_columns(made, column, frequency, plain, spindle)
     return replace(found, columns=np.array(columns).T)
 
