@@ -175,8 +175,7 @@ def rubber(cold: float, warm: float) -> Effect:
 
 @pytest.mark.parametrize("moves", [False, True])
 def test_one_that_does_not_move_is_told_about_none(moves):
-    """How its frequency drifts stays within 0.5 % of none, however often its parameters are counted anew from where they were fitted: in blind campaign 2155, which had no resonance, one moved by 6 % and took
-    with it 500 in ln evidence of two effects."""
+    """How its frequency drifts stays within 0.5 % of none, however often its parameters are counted anew from where they were fitted: in blind campaign 2155, which had no resonance, one moved by 6 %."""
     seen = Resonance(1000.0, 0.02, (0.01, 0.0))
     fitted = np.array([0.5, 0.0, 1.0, 0.0, 2.0, -1.0])
     there, left = _centred(seen, fitted, moves)
