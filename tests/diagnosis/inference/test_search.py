@@ -192,7 +192,6 @@ def test_a_shape_in_a_valley_of_its_own_is_fitted_from_the_drawing(spindle):
 def test_what_promised_most_at_first_is_followed_until_one_explains_the_data(monkeypatch, left, alive):
     """`b` promised most and is far behind `a`, which leaves `left` of 100 numbers: where that is noise, nothing is missing beside it."""
     asked = []
-    count = SimpleNamespace(count=100)
 
     def fitted(model, tasks, tempers, *of, **more):
         asked.append({t.mechanisms[0].name for t in tasks})
@@ -205,7 +204,7 @@ def test_what_promised_most_at_first_is_followed_until_one_explains_the_data(mon
     monkeypatch.setattr(singles, "fitted", fitted)
     tasks = [Task((mechanism(name),), (np.zeros(2),), -np.inf) for name in "ab"]
     about = SimpleNamespace(temper=TEMPERS[EARLY], chi2=0.0, count=100)
-    fitted_in_steps(SimpleNamespace(tests=(count,)), tasks, {"b"}, about, np.inf, Learned({}, 1.0), 1)
+    fitted_in_steps(SimpleNamespace(tests=(SimpleNamespace(count=100),)), tasks, {"b"}, about, np.inf, Learned({}, 1.0), 1)
     assert asked == [{"a", "b"}, alive, alive]
 
 
