@@ -121,21 +121,37 @@ def operating_point(
     temperatures.
     """
     present = tuple(of_scene(spindle) if effects is None else effects)
-    for effect, values in present:
+    return acted_on(equilibrium(spindle, condition, present, expansion), present)
+
+
+SETTLING = ("condition", "spindle", "temperatures", "motions")
+"""Hooks of an effect that `equilibrium` asks."""
+
+
+def equilibrium(
+    spindle: Spindle, condition: Condition, effects: Sequence[tuple[Effect, Values]], expansion: Callable[[Spindle], dict[str, RingMotion]] | None = None
+) -> OperatingPoint:
+    """The operating point where the rings have settled, before any of the `effects` changes what bearings are there, or joints."""
+    for effect, values in effects:
         if effect.condition:
             condition = effect.condition(spindle, condition, values)
-    spindle = drawing(spindle, condition, present)
-    if expansion and (prescribing := [effect.name for effect, _ in present if effect.temperatures]):
+    spindle = drawing(spindle, condition, effects)
+    if expansion and (prescribing := [effect.name for effect, _ in effects if effect.temperatures]):
         raise ValueError(f"region temperatures are given, and {', '.join(prescribing)} would prescribe them")
-    motions = expansion(spindle) if expansion else expand(spindle, _region_temperatures(spindle, condition, present))
-    for effect, values in present:
+    motions = expansion(spindle) if expansion else expand(spindle, _region_temperatures(spindle, condition, effects))
+    for effect, values in effects:
         if effect.motions:
             motions = effect.motions(spindle, condition, values, motions)
-    state = loaded(spindle, solve(spindle, condition, motions))
-    for effect, values in present:
+    return OperatingPoint(spindle, condition, loaded(spindle, solve(spindle, condition, motions)))
+
+
+def acted_on(settled: OperatingPoint, effects: Sequence[tuple[Effect, Values]]) -> OperatingPoint:
+    """The operating point of an `equilibrium` under the same effects."""
+    state = settled.state
+    for effect, values in effects:
         if effect.pair:
-            state = effect.pair(spindle, condition, values, state)
-    return OperatingPoint(spindle, condition, state, present)
+            state = effect.pair(settled.spindle, settled.condition, values, state)
+    return OperatingPoint(settled.spindle, settled.condition, state, tuple(effects))
 
 
 def doubts(spindle: Spindle, points: Sequence[OperatingPoint]) -> list[str]:

@@ -27,11 +27,11 @@ from thermospindle.model.rotor.chain import Matrices, matrices
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.effects.effect import HOOKS, Effect, Measurement, Values
 from thermospindle.sim.effects.temperature.expansion_mismatch import expanding, with_material
-from thermospindle.sim.operating import OperatingPoint, operating_point
+from thermospindle.sim.operating import SETTLING, OperatingPoint, acted_on, equilibrium
 
 SIZE_STEP = 0.02  # of a size's or shape parameter's prior standard deviation, for differences
 THIN, ENOUGH_LINES = 4, 30  # lines left out of a thinned model, and how many of a test it keeps at least
-MEASURING = frozenset(HOOKS) - {"measurement"}
+ACTING = tuple(hook for hook in HOOKS if hook != "measurement")
 FAILED = (NoEquilibrium, OutsideRange, ValueError, RuntimeError, ZeroDivisionError, FloatingPointError, np.linalg.LinAlgError)
 """What a model says at parameter values where no spindle can be built; a fit then steps less far."""
 
@@ -55,7 +55,7 @@ class CampaignModel:
 
     def __getstate__(self) -> dict:
         """Without what was worked out: it is on its way to another process."""
-        return {k: v for k, v in self.__dict__.items() if k not in ("_heavier", "_points", "_responses", "_spindles", "kept", "thinned")}
+        return {k: v for k, v in self.__dict__.items() if k not in ("_equilibria", "_heavier", "_points", "_responses", "_spindles", "kept", "thinned")}
 
     @cached_property
     def thinned(self) -> CampaignModel:
@@ -107,24 +107,37 @@ class CampaignModel:
         return unevennesses(self.spindle)
 
     def operating(self, t: int, x: Array, effects: Applied) -> OperatingPoint:
-        """The operating point of test `t`, sizes within their limits; what differs in the measuring chain alone is not worked out again."""
+        """The operating point of test `t`, sizes within their limits; what differs in the measuring chain alone is not worked out again, nor rings that settle alike."""
         effects, own = within_limits(effects), self.numbers
-        acting = tuple((id(e), *v.values()) for e, v in effects if any(getattr(e, hook) for hook in MEASURING))
-        little = tuple(x[of].tobytes() for of in (own.expansion, own.coefficients, own.apart, own.balls[t], own.flung, own.uneven))
-        key = (t, x[: len(self.build)].tobytes(), float(x[own.temperature[t]]), little, acting)
+        little = tuple(x[of].tobytes() for of in (own.apart, own.balls[t], own.uneven))
+        at = (t, x[: len(self.build)].tobytes(), float(x[own.temperature[t]]), *(x[of].tobytes() for of in (own.expansion, own.coefficients, own.flung)))
+        key = (at, little, _asking(effects, ACTING))
         late = self._points.get(key)
         if late is not None:
             return replace_measuring(late, [*self.present, *effects])
         if len(self._points) > 6 * len(self.tests):
             self._points.clear()
-        condition, warmer = self.tests[t].condition, float(x[own.temperature[t]]) * self.parameters[own.temperature[t]].sd
-        built = self._built(t, x)
-        for i in own.flung:
-            built = replace(built, ball_inertia=max(built.ball_inertia * (1 + float(x[i]) * self.parameters[i].sd), 0.0))
         every = [*self._otherwise_than_drawn(t, x), *self.present, *effects]
-        late = self._points[key] = operating_point(built, replace(condition, temperature=condition.temperature + warmer), every)
+        late = self._points[key] = acted_on(self._settled(t, x, every, (at, _asking(effects, SETTLING))), every)
         late.chain  # noqa: B018 - worked out here, so that errors come here
         return late
+
+    def _settled(self, t: int, x: Array, every: Applied, key: tuple) -> OperatingPoint:
+        """The rings of test `t` in equilibrium under all that acts."""
+        if key not in self._equilibria:
+            if len(self._equilibria) > 6 * len(self.tests):
+                self._equilibria.clear()
+            own = self.numbers
+            condition, warmer = self.tests[t].condition, float(x[own.temperature[t]]) * self.parameters[own.temperature[t]].sd
+            built = self._built(t, x)
+            for i in own.flung:
+                built = replace(built, ball_inertia=max(built.ball_inertia * (1 + float(x[i]) * self.parameters[i].sd), 0.0))
+            self._equilibria[key] = equilibrium(built, replace(condition, temperature=condition.temperature + warmer), every)
+        return self._equilibria[key]
+
+    @cached_property
+    def _equilibria(self) -> dict:
+        return {}
 
     def _otherwise_than_drawn(self, t: int, x: Array) -> list[tuple[Effect, Values]]:
         """What bearings, balls, joints and rings are in test `t` that no drawing has, as effects that act before all others."""
@@ -300,6 +313,11 @@ class CampaignModel:
         """Which build tolerances leave the bearings alone."""
         ends = [p.apply(self.spindle, 0.01) for p in self.build]
         return [end.bearings is self.spindle.bearings and end.sets is self.spindle.sets for end in ends]
+
+
+def _asking(effects: Applied, hooks: Sequence[str]) -> tuple:
+    """What tells those of the effects that have one of these hooks from others."""
+    return tuple((id(e), *v.values()) for e, v in effects if any(getattr(e, hook) for hook in hooks))
 
 
 def within_limits(effects: Applied) -> list[tuple[Effect, Values]]:

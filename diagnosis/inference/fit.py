@@ -98,10 +98,10 @@ def fit(
     else:
         p = min(start, key=lambda start: problem.cost(start, tempers[0])).copy()
     p = problem.within_limits(p)
+    if rates is None:
+        rates = rates_of(problem.model, problem.parts(p)[0], problem.effects_of(p))
     for temper in (*_from_afar(problem, p, tempers[0]), *tempers):
         problem = at(temper)
-        if rates is None or temper == 1.0:  # with errors enlarged those from elsewhere lead as far
-            rates = rates_of(problem.model, problem.parts(p)[0], problem.effects_of(p), rates)
         p, lines, residuals, rates = _settled(problem, p, rates, temper, beaten)
         done = problem, p, rates, temper, lines, residuals
     return _finished(*done)
@@ -122,36 +122,37 @@ def _settled(problem: Problem, p: Array, rates: Rates, temper: float, beaten: fl
     last, count = temper == 1.0, sum(d.count for d in problem.model.tests)
     lines = problem.linearisation(p, rates)
     here = Point(p, lines.residuals, problem.cost(p, temper, lines.residuals))
-    current, rated, damping, growth, longest = True, True, LEAST_DAMPING, 2.0, LONGEST  # lines, and rates, of this very point
+    current, rated, damping, growth, longest = True, not last, LEAST_DAMPING, 2.0, LONGEST  # lines, and rates, of this very point
     for _ in range(MOST_STEPS[last]):
         gradient, normal = lines.slope(problem, here, temper), temper**2 * lines.information + problem.precision
         damped = np.diag(temper**2 * np.diag(lines.information) + problem.least_stiff)  # not what is stiff only with all others held
         move = problem.step(here.p, gradient, normal + damping * damped, longest)
-        promised = _promised(gradient, normal, move)
+        hoped = promised(gradient, normal, move)
         exact = current and rated
-        if promised < ENOUGH and exact:
+        if hoped < ENOUGH and exact:
             break
         there, corrected = problem.at(here.p + move, temper), False
-        if current and there.residuals is not None and here.cost - there.cost < KEPT * promised:
+        if current and there.residuals is not None and here.cost - there.cost < KEPT * hoped:
             stiff = normal + max(damping, RAISED_DAMPING) * damped
             best = _corrected(problem, lines, stiff, temper, there)
             there, corrected = best, best is not there
         gained = here.cost - there.cost
-        if gained < POOR * promised:
+        if gained < POOR * hoped:
             longest = LONGEST
-        elif gained > KEPT * promised and not corrected and problem.length_of(move) > 0.99 * longest:
+        elif gained > KEPT * hoped and not corrected and problem.length_of(move) > 0.99 * longest:
             longest *= 2
-        enough = max(ENOUGH, ENOUGH_FAR * (here.cost - count), NO_NEARER * (here.cost - beaten)) if last else max(1.0, ENOUGH_EARLY * here.cost)
+        no_nearer = last and gained < NO_NEARER * (here.cost - beaten)
+        enough = max(ENOUGH, ENOUGH_FAR * (here.cost - count)) if last else max(1.0, ENOUGH_EARLY * here.cost)
         if gained > 0:
             here, growth = there, 2.0
-            damping *= max(1 / 3, 1 - (2 * min(gained / promised, 1.0) - 1) ** 3)
-            if gained < enough and (exact or not last):
+            damping *= max(1 / 3, 1 - (2 * min(gained / hoped, 1.0) - 1) ** 3)
+            if (gained < enough and (exact or not last)) or (no_nearer and current):
                 break
         elif exact:
             damping, growth = max(2.5 * growth * damping, RAISED_DAMPING), 2 * growth
             if growth > MOST_GROWTH:
                 break
-        poor = (corrected and gained > 0) or gained < max(TRUSTED * promised, enough)
+        poor = (corrected and gained > 0) or gained < max(TRUSTED * hoped, enough) or no_nearer
         if poor and (gained > 0 or not exact):
             if last and (current or gained < enough):  # it is not the lines that are old
                 rates, rated = rates_of(problem.model, problem.parts(here.p)[0], problem.effects_of(here.p), rates), True
@@ -166,7 +167,7 @@ def _settled(problem: Problem, p: Array, rates: Rates, temper: float, beaten: fl
     return here.p, lines, here.residuals, rates
 
 
-def _promised(slope: Array, normal: Array, move: Array) -> float:
+def promised(slope: Array, normal: Array, move: Array) -> float:
     """By how much less a quadratic of half slope (n,) and half curvature (n, n) is after a move (n,)."""
     return -2 * float(slope @ move) - float(move @ normal @ move)
 
@@ -207,7 +208,7 @@ def _finished(problem: Problem, p: Array, rates: Rates, temper: float, lines: Li
         _moved(problem, p) if temper == 1.0 and problem.mechanisms else UNMOVED,
         held,
         problem.cost(p, temper, residuals),
-        max(_promised(slope, normal, rest), 0.0),
+        max(promised(slope, normal, rest), 0.0),
     )
 
 

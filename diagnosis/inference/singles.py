@@ -111,7 +111,8 @@ def _owed(
 
 def by_own_laws(model: CampaignModel, none: Hypothesis, tried: Singles, mechanisms: Sequence[Mechanism], workers) -> list[Hypothesis]:
     """Effects with laws of the data's own, fitted from what the best free form says. Where that does better than an effect which changes much the same by the
-    law assumed, the effect may do as well by another; screening, which is linear, need not have seen it. Not where that is far behind the best."""
+    law assumed, the effect may do as well by another; screening, which is linear, need not have seen it. Not where that is far behind the best; and to the end what keeps up
+    while errors are still enlarged."""
     told = max((h for h in tried.singles if h.free), key=lambda h: h.evidence.ln, default=none)
     best = max(tried.singles, key=lambda h: h.evidence.ln, default=none)
     if not told.free or told.evidence.ln < max(none.evidence.ln + PLENTY, best.evidence.ln - FAR):
@@ -125,6 +126,11 @@ def by_own_laws(model: CampaignModel, none: Hypothesis, tried: Singles, mechanis
                 start = Problem(model, (m,)).start({0: sizes - min(0.0, (sizes - m.size.limits[0]).min())})
                 start[: len(model.parameters)] = told.fit.nuisance
                 tasks.append(Task((m,), (start,), -np.inf))
+    if not tasks:
+        return []
+    early = fitted(model, [Task(told.mechanisms, (told.fit.point,), -np.inf), *tasks], TEMPERS[-2:-1], told.fit, tried.most, tried.expected, workers)
+    least = max((h.evidence.ln for h in early), default=np.inf) - BEHIND
+    tasks = [Task(h.mechanisms, (h.fit.point,), -np.inf) for h in early if not h.free and h.evidence.ln > least]
     return fitted(model, tasks, TEMPERS[-1:], told.fit, tried.most, tried.expected, workers, beaten=best.fit.cost + 2 * FAR)
 
 

@@ -7,16 +7,17 @@ small or too large for what grows otherwise than in proportion: a film that must
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
+from scipy.optimize import brentq
 
 from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import Applied, CampaignModel
 from thermospindle.diagnosis.forward.rates import rates_of
-from thermospindle.diagnosis.inference.fit import Fit
+from thermospindle.diagnosis.inference.fit import Fit, promised
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.prior import Learned, as_stated
 from thermospindle.diagnosis.inference.problem import Linearisation, Point, Problem, built
@@ -27,8 +28,9 @@ from thermospindle.model.types import Array
 
 ASKED = 5.0  # ln evidence
 NEAR = 0.05  # relative error of a size
-TRIES = 8  # sizes of an effect
-SHARPER = 3.0  # times
+TRIES = 8  # sizes of an effect, until one shows and another does not
+FARTHEST = float(np.log(10.0))  # that one is from the next
+GROWS = 3.0  # times
 STEPS = 40  # at most, of everything else beside it
 SHOWS, HIDES = 3.0, 2.0  # standard errors of a typical size, from which an effect alone shows, and up to which it hides beside another
 
@@ -67,31 +69,42 @@ def _shown(model: CampaignModel, about: Fit, learned: Learned, mechanisms: Seque
 
 
 def _smallest(model: CampaignModel, about: Fit, learned: Learned, task: tuple[float, Mechanism]) -> float | None:
-    """By the rule of three from the size of first order, then by halves between what is too small and too large, or cannot be built."""
     size, m = task
     sign = 1.0 if m.size.typical >= m.size.neutral else -1.0
     limit = abs((m.size.limits[1] if sign > 0 else m.size.limits[0]) - m.size.neutral)
-    low, high = 0.0, limit
-    size = min(size, limit)
+    late: list[tuple[float, Point]] = []  # the last size, and what was fitted beside it
+
+    def shown(size: float) -> float:
+        point = _fitted_beside(model, about, learned, m, sign * size, late)
+        late[:] = [(sign * size, point)] if np.isfinite(point.cost) else late
+        return float(np.sqrt(point.cost)) / learned.errors
+
+    return _size_that_shows(shown, m, min(size, limit), limit)
+
+
+def _size_that_shows(shown: Callable[[float], float], m: Mechanism, first: float, limit: float) -> float | None:
+    """The size, up to a `limit`, that shows by as many standard errors as are asked, where `shown` tells by how many one does: infinitely many where no spindle can be built with it.
+    By the rule of three from the `first` on, until one shows and another does not, and between them by Brent's method, in ln of both. None where the limit does not show."""
+
+    @cache
+    def above(ln_size: float) -> float:
+        """ln of how many times more than asked, nought where that is near."""
+        size = min(float(np.exp(ln_size)), limit)
+        seen = shown(size)
+        found = float(np.log(max(seen, 1e-300) / standard_errors(m, size, seen))) if np.isfinite(seen) else np.inf
+        return 0.0 if abs(found) < NEAR else float(np.clip(found, -FARTHEST, FARTHEST))
+
+    at = float(np.log(first))
     for _ in range(TRIES):
-        seen = visibility(model, about, learned, m, m.size.neutral + sign * size)
-        if not np.isfinite(seen):  # no spindle can be built with so much of it
-            high = size
-            size = (low + high) / 2
-            continue
-        asked = standard_errors(m, size, seen)
-        if abs(seen / asked - 1) < NEAR:
-            break
-        if seen < asked:
-            if size == limit:
-                return None
-            low = size
-        else:
-            high = size
-        size = float(np.clip(size * asked / max(seen, asked / 10), low, high))
-        if size in (low, high) and size != limit:
-            size = (low + high) / 2
-    return size if np.isfinite(seen) else None
+        if above(at) == 0.0:
+            return float(np.exp(at))
+        following = min(at - above(at), float(np.log(limit)))
+        if following == at:
+            return None
+        if above(at) * above(following) < 0.0:
+            return float(np.exp(brentq(above, at, following, xtol=NEAR)))
+        at = following
+    return None
 
 
 def standard_errors(m: Mechanism, size: float, seen: float) -> float:
@@ -102,43 +115,64 @@ def standard_errors(m: Mechanism, size: float, seen: float) -> float:
 
 def visibility(model: CampaignModel, about: Fit, learned: Learned, m: Mechanism, size: float) -> float:
     """Standard errors, as `learned`, that are left of an effect of `size` in all tests after all else is fitted anew beside it; infinite where no spindle
-    can be built with it.
+    can be built with it."""
+    return float(np.sqrt(_fitted_beside(model, about, learned, m, size - m.size.neutral).cost)) / learned.errors
 
-    The spindle `about` with the effect is taken for measured, without noise. Steps of Gauss and Newton move everything else until they gain little, with the
-    derivatives of `about` (the chord method: Ortega & Rheinboldt, *Iterative Solution of Nonlinear Equations*, 1970, 7.1) for as long as these lead on: first with errors so large that what is left
-    is no more than noise would be, and `SHARPER` from there, for peaks that moved by their widths lead nowhere by themselves.
+
+def _fitted_beside(model: CampaignModel, about: Fit, learned: Learned, m: Mechanism, size: float, known: Sequence[tuple[float, Point]] = ()) -> Point:
+    """All else (P,), beside `about`, fitted to an effect of `size` less its neutral one, of infinite cost where no spindle can be built with it.
+
+    The spindle `about` with the effect is taken for measured, without noise. First a share of its size that does no more than noise would, then `GROWS` times as much and so on, everything else
+    going on from where it went (a homotopy: Allgower & Georg, *Numerical Continuation Methods*, 1990), or from a size that is `known` and as near: peaks that moved by
+    their widths lead nowhere by themselves.
     """
     base, shape = linearised(model, about), [q.neutral for q in m.shape]
-    moved = _moved(model, about.nuisance, [(m.effect, m.values(size, shape))], base)
-    if moved is None:
-        return np.inf
     problem = Problem(model, (), replace(as_stated(learned.sizes), errors=learned.errors))
 
-    def beside(step: Array, temper: float) -> Point:
-        there = _moved(model, about.nuisance + step, [], base)
-        if there is None:
-            return Point(step, None, np.inf)
-        left = [r - d for r, d in zip(there, moved, strict=True)]
-        return Point(step, left, problem.cost(step, temper, left))
+    def made(size: float) -> list[Array] | None:
+        return _moved(model, about.nuisance, [(m.effect, m.values(m.size.neutral + size, shape))], base)
 
-    here = beside(np.zeros(problem.length), 1.0)
-    temper = min(1.0, float(np.sqrt(sum(d.count for d in model.tests) / max(here.cost, 1e-300))))
-    here, lines, rates, current = replace(here, cost=temper**2 * here.cost), base, about.rates, True
+    nothing, whole = np.zeros(problem.length), made(size)
+    if whole is None:
+        return Point(nothing, None, np.inf)
+    near = [(of, point) for of, point in known if 1 / GROWS <= size / of <= GROWS]
+    if near:
+        of, point = near[0]
+        return _beside(problem, about, base, whole, point.p * size / of)
+    far = problem.cost(nothing, 1.0, whole)
+    share, at = min(1.0, float(np.sqrt(sum(d.count for d in model.tests) / max(far, 1e-300)))), nothing
+    while share < 1.0:
+        moved, following = made(share * size), min(GROWS * share, 1.0)
+        at = (at if moved is None else _beside(problem, about, base, moved, at).p) * following / share
+        share = following
+    return _beside(problem, about, base, whole, at)
+
+
+def _beside(problem: Problem, about: Fit, base: Linearisation, moved: Sequence[Array], start: Array) -> Point:
+    """All else (P,), beside `about`, where it leaves least of residuals that have `moved`. Steps of Gauss and Newton until they gain little, with the derivatives of `about` (the
+    chord method: Ortega & Rheinboldt, *Iterative Solution of Nonlinear Equations*, 1970, 7.1) for as long as these lead on."""
+    model = problem.model
+
+    def at(step: Array) -> Point:
+        there = _moved(model, about.nuisance + step, [], base)
+        left = None if there is None else [r - d for r, d in zip(there, moved, strict=True)]
+        return Point(step, left, np.inf if left is None else problem.cost(step, 1.0, left))
+
+    here = min((at(step) for step in (start, np.zeros(len(start)))), key=lambda point: point.cost)
+    lines, rates, current = base, about.rates, True
     for _ in range(STEPS):
-        there = beside(here.p + problem.step(here.p, lines.slope(problem, here, temper), problem.precision + temper**2 * lines.information), temper)
+        slope, normal = lines.slope(problem, here, 1.0), problem.precision + lines.information
+        move = problem.step(here.p, slope, normal)
+        there = at(here.p + move)
         if there.cost < (1 - NEAR) * here.cost:
             here, current = there, False
             continue
-        if current and temper < 1.0:
-            temper = min(SHARPER * temper, 1.0)
-            here = replace(here, cost=problem.cost(here.p, temper, here.residuals))
-            continue
-        if current and rates is not about.rates:
+        if current and (rates is not about.rates or promised(slope, normal, move) < NEAR * here.cost):
             break
         if current:  # it is not the lines that are old
             rates = rates_of(model, about.nuisance + here.p, [[] for _ in model.tests], rates)
         lines, current = problem.linearisation(about.nuisance + here.p, rates), True
-    return float(np.sqrt(here.cost)) / learned.errors
+    return here
 
 
 def _moved(model: CampaignModel, x: Array, effects: Applied, base: Linearisation) -> list[Array] | None:
