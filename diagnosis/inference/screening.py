@@ -18,7 +18,7 @@ from thermospindle.diagnosis.inference.gaussian import Nuisances, impossible
 from thermospindle.diagnosis.inference.prior import Learned, as_stated
 from thermospindle.diagnosis.inference.problem import Linearisation, Problem
 from thermospindle.model.parallel import in_parallel
-from thermospindle.model.types import Array
+from thermospindle.model.types import Array, Integers
 from thermospindle.sim.effects.effect import HOOKS
 
 SEEN = tuple(hook for hook in HOOKS if hook != "imperfections")
@@ -53,7 +53,7 @@ class _Beside:
 
 
 def screen(
-    model: CampaignModel, about: Fit, temper: float, learned: Learned, mechanisms: Sequence[Mechanism], workers: int | None = None, turned: bool = True
+    model: CampaignModel, about: Fit, temper: float, learned: Learned, mechanisms: Sequence[Mechanism], workers: int | None = None
 ) -> list[Screened]:
     """Every one of `mechanisms` beside the model `about`, its errors 1 / `temper` times the data's and sizes of discrepancies as `learned`, or smaller;
     and the best of each name, and kind of law, once more with its shape `turned`."""
@@ -66,7 +66,7 @@ def screen(
     beside = _Beside(model, about, sizes, cho_factor(at.information + prior.precision), evidence(model, here, near, kept=kept).ln, near, kept)
     found = in_parallel(partial(_screened, beside), list(mechanisms), workers)
     found = [replace(s, mechanism=m) for s, m in zip(found, mechanisms, strict=True)]
-    best = {(s.mechanism.name, s.mechanism.kind): s for s in sorted(found, key=lambda s: s.gain) if turned and s.visibility > 0 and s.mechanism.shape}
+    best = {(s.mechanism.name, s.mechanism.kind): s for s in sorted(found, key=lambda s: s.gain) if s.visibility > 0 and s.mechanism.shape}
     others = in_parallel(partial(_turned, beside), list(best.values()), workers)
     return found + [replace(s, mechanism=drawn.mechanism) for s, drawn in zip(others, best.values(), strict=True)]
 
@@ -101,39 +101,62 @@ def _turned(beside: _Beside, drawn: Screened) -> Screened:
     return replace(best, visibility=drawn.visibility)
 
 
+def visibilities(model: CampaignModel, about: Fit, learned: Learned, mechanisms: Sequence[Mechanism]) -> list[float]:
+    """Standard errors by which the typical size of each of `mechanisms` shows beside the model `about`, its discrepancies and errors of the sizes `learned`."""
+    prior = Problem(model, about.mechanisms, replace(as_stated(learned.sizes, about.mechanisms), errors=learned.errors))
+    factors = cho_factor(linearised(model, about).information + prior.precision)
+    return [_visibility(_by_size(Problem(model, [*about.mechanisms, m]), about, np.zeros(len(m.shape)))[1], m, factors, learned.errors) for m in mechanisms]
+
+
+def _by_size(problem: Problem, about: Fit, shape: Array) -> tuple[Array, list[tuple[Array, Integers, float, float]]]:
+    """The parameters (n,) of the fitted model with the last mechanism at no size beside, its `shape` parameters so many prior standard deviations from neutral; and of every test what that
+    mechanism's size does there: its derivatives' products with all others' (first,), with themselves and with the residuals."""
+    at, k, first = linearised(problem.model, about), len(about.mechanisms), len(about.point)
+    p = np.concatenate([about.point, np.zeros(problem.length - first)])
+    p[problem.length - len(shape) :] = shape
+    x, own_sizes, shapes = problem.parts(p)
+    rows = []
+    for t, (residual, derivatives, numbers) in enumerate(at.rows):
+        try:
+            column = problem.by_size(t, x, problem.applied(t, own_sizes, shapes), k)
+        except FAILED:
+            column = np.zeros(len(residual))
+        rows.append((derivatives @ column, numbers, float(column @ column), float(column @ residual)))
+    return p, rows
+
+
+def _visibility(rows: Sequence[tuple[Array, Integers, float, float]], mechanism: Mechanism, factors: tuple[Array, bool], errors: float) -> float:
+    """Standard errors by which the typical size of a mechanism, one in all tests, shows beside all else, of which the information with the prior's has these `factors`."""
+    typical, square = np.zeros(len(factors[0])), 0.0
+    for cross, numbers, of_test, _ in rows:
+        typical[numbers] += cross
+        square += of_test
+    left = square - float(typical @ cho_solve(factors, typical))
+    return float(abs(mechanism.size.typical - mechanism.size.neutral) * np.sqrt(max(left, 0.0))) / errors
+
+
 def _promised(problem: Problem, beside: _Beside, shape: Array) -> Screened:
     """The quadratic of the fitted model, with the sizes of the last mechanism beside its parameters; its `shape` parameters stay where they are, in prior
     standard deviations from neutral."""
     model, about, mechanism, first = beside.model, beside.about, problem.mechanisms[-1], len(beside.about.point)
-    p = np.concatenate([about.point, np.zeros(problem.length - first)])
-    p[problem.length - len(shape) :] = shape
-    x, own_sizes, shapes = problem.parts(p)
+    p, rows = _by_size(problem, about, shape)
+    visibility = _visibility(rows, mechanism, beside.factors, beside.sizes.errors)
+    if visibility == 0.0:
+        return Screened(mechanism, -np.inf, p, 0.0)
+    _, own_sizes, shapes = problem.parts(p)
     at = linearised(model, about)
     gradient, information = np.zeros(problem.length), np.zeros((problem.length, problem.length))
     gradient[:first], information[:first, :first] = at.gradient, at.information
-    typical, square = np.zeros(first), 0.0  # of one size in all tests
-    for t, (residual, derivatives, numbers) in enumerate(at.rows):
-        effects = problem.applied(t, own_sizes, shapes)
-        try:
-            column = problem.by_size(t, x, effects, len(about.mechanisms))
-        except FAILED:
-            column = np.zeros(len(residual))
+    for t, (cross, numbers, square, slope) in enumerate(rows):
         weights, own = problem.roots[-1][t, : t + 1], slice(first, first + t + 1)
-        cross, of_test = derivatives @ column, float(column @ column)
-        gradient[own] += weights * float(column @ residual)
+        gradient[own] += weights * slope
         information[numbers, own] += np.outer(cross, weights)
-        information[own, own] += np.outer(weights, weights) * of_test
-        typical[numbers] += cross
-        square += of_test
+        information[own, own] += np.outer(weights, weights) * square
     information[first:, :first] = information[:first, first:].T
     whole = replace(
         about, mechanisms=problem.mechanisms, point=p, sizes=own_sizes, shapes=tuple(tuple(float(v) for v in s) for s in shapes),
         roots=problem.roots, chi2=at.chi2, gradient=gradient, information=information, by_test=(),
     )  # fmt: skip
-    left = square - float(typical @ cho_solve(beside.factors, typical))
-    visibility = float(abs(mechanism.size.typical - mechanism.size.neutral) * np.sqrt(max(left, 0.0))) / beside.sizes.errors
-    if visibility == 0.0:
-        return Screened(mechanism, -np.inf, p, 0.0)
     found = evidence(model, whole, beside.near, kept=beside.kept)
     start = found.mean
     start[problem.length - len(shape) :] = shape

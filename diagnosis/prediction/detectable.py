@@ -21,7 +21,7 @@ from thermospindle.diagnosis.inference.fit import Fit, promised
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.prior import Learned, as_stated
 from thermospindle.diagnosis.inference.problem import Linearisation, Point, Problem, built
-from thermospindle.diagnosis.inference.screening import Screened, linearised, screen
+from thermospindle.diagnosis.inference.screening import Screened, linearised, visibilities
 from thermospindle.diagnosis.inference.search import Search
 from thermospindle.model.parallel import in_parallel
 from thermospindle.model.types import Array
@@ -63,8 +63,8 @@ def unseen_beside(found: Search, accepted: Hypothesis) -> tuple[str, ...]:
 def _shown(model: CampaignModel, about: Fit, learned: Learned, mechanisms: Sequence[Mechanism]) -> dict[str, float]:
     """Standard errors of the typical size of every effect beside what is fitted already, of the variant that shows most."""
     seen: dict[str, float] = {}
-    for s in screen(model, about, 1.0, learned, mechanisms, turned=False):
-        seen[s.mechanism.name] = max(s.visibility, seen.get(s.mechanism.name, 0.0))
+    for m, shows in zip(mechanisms, visibilities(model, about, learned, mechanisms), strict=True):
+        seen[m.name] = max(shows, seen.get(m.name, 0.0))
     return seen
 
 

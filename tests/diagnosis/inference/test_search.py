@@ -75,7 +75,7 @@ def test_a_promise_is_over_the_model_without_it_at_the_same_place(spindle):
     about, mechanism = fit(model), variants(effect("preload_loss"))[0]
     learned = steady(evidence(model, about).learned)
     late = replace(about, gradient=about.gradient + 10.0, information=1.1 * about.information)
-    fresh, old = (screen(model, at, 1.0, learned, [mechanism], 1, turned=False)[0].gain for at in (about, late))
+    fresh, old = (screen(model, at, 1.0, learned, [mechanism], 1)[0].gain for at in (about, late))
     assert old == pytest.approx(fresh, abs=1e-6)
     at = np.append(about.point, np.zeros(2))
     one, other = (replace(about, mechanisms=(m,), point=at) for m in free_forms(spindle)[:2])  # at the very same parameters

@@ -12,7 +12,7 @@ from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
-from thermospindle.diagnosis.inference.screening import screen
+from thermospindle.diagnosis.inference.screening import screen, visibilities
 from thermospindle.diagnosis.prediction import detectable
 from thermospindle.diagnosis.prediction.detectable import ASKED, smallest, visibility
 from thermospindle.model.machine import Condition
@@ -63,7 +63,7 @@ def test_beside_a_model_that_is_worse_less_shows(plain, name, worse, least, most
     m, size = smallest(model, done, learned, looked, 1)[name]
     known, now = (visibility(model.thinned, done, of, m, m.size.neutral + size) for of in (learned, worse(learned)))
     assert least < now / known < most
-    known, now = (screen(model, done, 1.0, of, [m], 1, turned=False)[0].visibility for of in (learned, worse(learned)))
+    known, now = (visibilities(model, done, of, [m])[0] for of in (learned, worse(learned)))
     assert least < now / known < 0.97  # what drifts is beside what tolerances take already
 
 
