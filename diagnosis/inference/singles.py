@@ -106,7 +106,18 @@ def _owed(
         least = max(PLENTY, max((s.gain for s in promised), default=0.0) - CLOSE)
         late = [s for s in promised if s.gain > least and delivered.get(s.mechanism.name, -np.inf) < s.gain - OCCAM]
         tasks += [task_of((), none.fit, s, -np.inf, far=True) for s in late[:count]]
-    return fitted(model, tasks, TEMPERS[-1:], none.fit, most, expected, workers)
+    best = max(singles, key=lambda h: h.evidence.ln, default=none)
+    return fitted(model, _keeping_up(model, tasks, best, most, expected, workers), TEMPERS[-1:], none.fit, most, expected, workers, beaten=best.fit.cost + 2 * FAR)
+
+
+def _keeping_up(model: CampaignModel, tasks: Sequence[Task], beside: Hypothesis, most: float, expected: Learned, workers) -> list[Task]:
+    """Of some tasks those that keep up with an explanation while errors are still enlarged, from where they are then."""
+    if not tasks:
+        return []
+    early = fitted(model, [Task(beside.mechanisms, (beside.fit.point,), -np.inf), *tasks], TEMPERS[-2:-1], beside.fit, most, expected, workers)
+    least = max((h.evidence.ln for h in early), default=np.inf) - BEHIND
+    known = with_laws(beside.mechanisms)
+    return [Task(h.mechanisms, (h.fit.point,), -np.inf) for h in early if h.evidence.ln > least and with_laws(h.mechanisms) != known]
 
 
 def by_own_laws(model: CampaignModel, none: Hypothesis, tried: Singles, mechanisms: Sequence[Mechanism], workers) -> list[Hypothesis]:
@@ -126,11 +137,7 @@ def by_own_laws(model: CampaignModel, none: Hypothesis, tried: Singles, mechanis
                 start = Problem(model, (m,)).start({0: sizes - min(0.0, (sizes - m.size.limits[0]).min())})
                 start[: len(model.parameters)] = told.fit.nuisance
                 tasks.append(Task((m,), (start,), -np.inf))
-    if not tasks:
-        return []
-    early = fitted(model, [Task(told.mechanisms, (told.fit.point,), -np.inf), *tasks], TEMPERS[-2:-1], told.fit, tried.most, tried.expected, workers)
-    least = max((h.evidence.ln for h in early), default=np.inf) - BEHIND
-    tasks = [Task(h.mechanisms, (h.fit.point,), -np.inf) for h in early if not h.free and h.evidence.ln > least]
+    tasks = _keeping_up(model, tasks, told, tried.most, tried.expected, workers)
     return fitted(model, tasks, TEMPERS[-1:], told.fit, tried.most, tried.expected, workers, beaten=best.fit.cost + 2 * FAR)
 
 

@@ -158,7 +158,9 @@ def _beside(problem: Problem, about: Fit, base: Linearisation, moved: Sequence[A
         left = None if there is None else [r - d for r, d in zip(there, moved, strict=True)]
         return Point(step, left, np.inf if left is None else problem.cost(step, 1.0, left))
 
-    here = min((at(step) for step in (start, np.zeros(len(start)))), key=lambda point: point.cost)
+    left = [-d for d in moved]
+    nothing = Point(np.zeros(len(start)), left, problem.cost(np.zeros(len(start)), 1.0, left))
+    here = min(nothing, at(start), key=lambda point: point.cost) if start.any() else nothing
     lines, rates, current = base, about.rates, True
     for _ in range(STEPS):
         slope, normal = lines.slope(problem, here, 1.0), problem.precision + lines.information
