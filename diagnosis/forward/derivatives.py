@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
-from thermospindle.diagnosis.forward.linear import Linear, Products, Rates, pairs, products, same_chain, together
+from thermospindle.diagnosis.forward.linear import Linear, Pairs, Rates, pairs, products, same_chain, together
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.forward.points import Applied, aside
 from thermospindle.diagnosis.forward.response import Response
@@ -23,16 +23,15 @@ def nuisance_jacobian(model: CampaignModel, t: int, x: Array, effects: Applied, 
     data, linear = model.tests[t], model.linear(t, x, effects)
     response = model.standing(t, x, effects, linear)
     if isinstance(response, Table):
-        r, found = response.residual, response.moved(together([rates.products[t], *_by_discrepancies(model, t, linear)]))
+        r, found = response.residual, response.moved(together([rates.products[t], *(pairs(*of) for of in _by_discrepancies(model, t, linear, x))]))
         numbers = np.concatenate([rates.numbers[t], *[row[0] for row in model.numbers.discrepancies[t]]])
         return r, np.concatenate([found, np.zeros((more, len(r)))]), numbers
     assert isinstance(data, LineData)
     (own, channel), (struck, hammer) = model.numbers.gains[t], model.numbers.hammers[t]
     missed, way = model.numbers.misses[t]
-    discrepancies = model.numbers.discrepancies[t]
     record = [] if model.numbers.record is None else [model.numbers.record]
     lights = model.lights(t, linear.matrices.dofs, x)
-    numbers = np.concatenate([rates.numbers[t], *[row[0] for row in discrepancies], own, struck, missed, np.array(record, int), *[n for _, n in lights]])
+    numbers = np.concatenate([rates.numbers[t], *[row[0] for row in model.numbers.discrepancies[t]], own, struck, missed, np.array(record, int), *[n for _, n in lights]])
     n_resp, n_ref, lines = response.value.shape
     weight = np.sqrt(2) / data.sd
     jacobian = np.zeros((len(numbers) + more, 2, n_resp, n_ref, lines))
@@ -44,9 +43,8 @@ def nuisance_jacobian(model: CampaignModel, t: int, x: Array, effects: Applied, 
         return first + len(moved)
 
     at = fill(0, response.moved(rates.products[t]))
-    w = response.over(model.reference.over(linear.matrices.dofs))
-    for power, (_, i, j, size) in enumerate(discrepancies):
-        for moved in response.moved_together(w, power, i, j, size * np.where(i == j, 0.5, 1.0)):
+    for columns, power, paired, size in _by_discrepancies(model, t, linear, x):
+        for moved in response.moved_together(response.over(columns), power, paired, size):
             at = fill(at, moved)
     for k, c in enumerate(channel):
         for row in np.flatnonzero(model.numbers.channel_of[t][:n_resp] == c):
@@ -72,10 +70,13 @@ def nuisance_jacobian(model: CampaignModel, t: int, x: Array, effects: Applied, 
     return model.whitened(t, response.value, data.value), jacobian.reshape(len(jacobian), -1), numbers
 
 
-def _by_discrepancies(model: CampaignModel, t: int, linear: Linear) -> list[Products]:
-    """What discrepancies of stiffness change in test `t`, and those of damping."""
-    w = model.reference.over(linear.matrices.dofs)
-    return [pairs(w, power, i, j, size * np.where(i == j, 0.5, 1.0)) for power, (_, i, j, size) in enumerate(model.numbers.discrepancies[t])]
+def _by_discrepancies(model: CampaignModel, t: int, linear: Linear, x: Array) -> list[tuple[Array, int, Pairs, Array]]:
+    """What discrepancies of stiffness change in test `t`, and those of damping: vectors (n, m), a power of s, pairs of vectors, and the size of each."""
+    w, ((_, i, j, stiffness), (_, a, b, damping)) = model.reference.over(linear.matrices.dofs), model.numbers.discrepancies[t]
+    modes, k = w.shape[1], len(i)
+    beside = w @ model.turned(t, x).by_pairs(i, j)
+    turned = [(i, modes + np.arange(k)), (j, modes + k + np.arange(k))]
+    return [(np.hstack([w, beside]), 0, turned, stiffness), (w, 1, [(a, b)], damping * np.where(a == b, 0.5, 1.0))]
 
 
 def column(model: CampaignModel, t: int, x: Array, first: Applied, second: Applied, apart: float) -> Array:

@@ -20,6 +20,8 @@ from thermospindle.sim.effects.effect import Measurement
 from thermospindle.sim.operating import OperatingPoint
 
 Dofs = tuple[tuple[str, str], ...]
+Pairs = Sequence[tuple[Integers, Integers]]
+"""Numbers (k,) of a first and of a second vector of k parameters, once or more."""
 
 CHAIN = ("response_rows", "reference_rows", "gain", "delay", "decay")
 EXACT = 1e-11  # of the largest singular value of a change: products that are left out
@@ -104,11 +106,13 @@ def products(mass: Array, damping: Array, stiffness: Array) -> Products:
     return Products(1, moves, moves, np.array(power, int), np.concatenate(left, axis=1), np.concatenate(right, axis=1))
 
 
-def pairs(vectors: Array, power: int, i: Integers, j: Integers, size: Array) -> Products:
-    """Products of k parameters, of each `size` s^`power` (u_i u_j^T + u_j u_i^T), u the columns of `vectors` (n, m)."""
-    every, k = np.arange(len(i)), len(i)
-    both = np.stack([i, j], axis=1)
-    return Products(k, every, 2 * every, np.full(2 * k, power), vectors[:, both.ravel()] * np.repeat(size, 2), vectors[:, both[:, ::-1].ravel()])
+def pairs(vectors: Array, power: int, of: Pairs, size: Array) -> Products:
+    """Products of k parameters, of each `size` s^`power` times the sum over pairs i, j `of` its own of u_i u_j^T + u_j u_i^T, u the columns of `vectors` (n, m)."""
+    k, rows = len(size), 2 * len(of)
+    first = np.stack([n for i, j in of for n in (i, j)], axis=1).ravel()
+    second = np.stack([n for i, j in of for n in (j, i)], axis=1).ravel()
+    every = np.arange(k)
+    return Products(k, every, rows * every, np.full(rows * k, power), vectors[:, first] * np.repeat(size, rows), vectors[:, second])
 
 
 def together(every: Sequence[Products]) -> Products:

@@ -15,8 +15,8 @@ from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.mode_table import ModeData, TestData
 from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.linear import Dofs, Linear, mass_between, mass_changes
-from thermospindle.diagnosis.forward.nuisance import Nuisance, ReferenceModes, Resonance, Unevenness, mass_terms, unevennesses
-from thermospindle.diagnosis.forward.numbers import Numbers
+from thermospindle.diagnosis.forward.nuisance import Nuisance, ReferenceModes, Resonance, Turned, Unevenness, mass_terms, unevennesses
+from thermospindle.diagnosis.forward.numbers import Discrepancies, Numbers
 from thermospindle.diagnosis.forward.points import Applied, apart, aside, otherwise, replace_measuring, stretched, uneven
 from thermospindle.diagnosis.forward.response import Light, Response
 from thermospindle.diagnosis.forward.table import Table
@@ -226,14 +226,12 @@ class CampaignModel:
         return {}
 
     def _discrepancy(self, t: int, linear: Matrices, x: Array) -> tuple[Array, Array]:
-        w = self.reference.over(linear.dofs)
-        added = []
-        for number, i, j, size in self.numbers.discrepancies[t]:
-            modal = np.zeros((len(self.reference.omega),) * 2)
-            np.add.at(modal, (i, j), size * x[number])
-            modal = np.where(modal == 0, modal.T, modal)
-            added.append(w @ modal @ w.T)
-        return added[0], added[1]
+        w, (_, damping) = self.reference.over(linear.dofs), self.numbers.discrepancies[t]
+        return w @ self.turned(t, x).whole @ w.T, w @ _modal(damping, x, len(self.reference.omega)) @ w.T
+
+    def turned(self, t: int, x: Array) -> Turned:
+        """What test `t` has of a stiffness between modes otherwise than the model."""
+        return self.reference.turned(_modal(self.numbers.discrepancies[t][0], x, len(self.reference.omega)))
 
     # ------------------------------------------------------------ residuals
 
@@ -313,6 +311,14 @@ class CampaignModel:
         """Which build tolerances leave the bearings alone."""
         ends = [p.apply(self.spindle, 0.01) for p in self.build]
         return [end.bearings is self.spindle.bearings and end.sets is self.spindle.sets for end in ends]
+
+
+def _modal(discrepancies: Discrepancies, x: Array, modes: int) -> Array:
+    """Discrepancies over the modal matrix (modes, modes), each as it is stated."""
+    number, i, j, size = discrepancies
+    found = np.zeros((modes, modes))
+    np.add.at(found, (i, j), size * x[number])
+    return np.where(found == 0, found.T, found)
 
 
 def _asking(effects: Applied, hooks: Sequence[str]) -> tuple:

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
-from thermospindle.diagnosis.forward.linear import Linear, Products
+from thermospindle.diagnosis.forward.linear import Linear, Pairs, Products
 from thermospindle.diagnosis.forward.record import RecordEnd
 from thermospindle.model.rotor.chain import Matrices
 from thermospindle.model.rotor.modes import LARGE, Poles, poles
@@ -198,18 +198,22 @@ class Response:
             found += _over(right[:, power == p] @ left[:, power == p].T, self._forced(int(p)))
         return found
 
-    def moved_together(self, columns: Array, power: int, i: Integers, j: Integers, size: Array) -> Iterator[ComplexArray]:
-        """Derivatives (k, n_resp, n_ref, L) by factors of `size` (k,) s^`power` (u_i u_j^T + u_j u_i^T) in the dynamic stiffness, u the `columns` (r, m): a few at
-        a time, for they fill memory rather than a cache."""
+    def moved_together(self, columns: Array, power: int, of: Pairs, size: Array) -> Iterator[ComplexArray]:
+        """Derivatives (k, n_resp, n_ref, L) by factors of `size` (k,) s^`power` times the sum over pairs i, j `of` each of u_i u_j^T + u_j u_i^T in the dynamic stiffness, u the `columns` (r, m):
+        a few at a time, for they fill memory rather than a cache."""
         read, driven = self.read(columns), self.driven(columns, np.full(columns.shape[1], power))
-        for at in range(0, len(i), TOGETHER):
-            a, b, times = i[at : at + TOGETHER], j[at : at + TOGETHER], size[at : at + TOGETHER]
-            found = (times[:, None, None] * read[a])[:, :, None] * driven[b][:, None]
-            found += (times[:, None, None] * read[b])[:, :, None] * driven[a][:, None]
+        both = [pair for i, j in of for pair in ((i, j), (j, i))]
+        for at in range(0, len(size), TOGETHER):
+            few = slice(at, at + TOGETHER)
+            times = size[few]
+            first, *others = ((times[:, None, None] * read[a[few]])[:, :, None] * driven[b[few]][:, None] for a, b in both)
+            found = first
+            for other in others:
+                found += other
             if (end := self._late) is not None:
-                powers = np.full(len(a), power)
-                kicked = [end.kicked(columns[:, one] * times, columns[:, other], powers) for one, other in ((a, b), (b, a))]
-                found += self._cut * end.moved(kicked[0] + kicked[1])
+                powers = np.full(len(times), power)
+                kicked = np.sum([end.kicked(columns[:, a[few]] * times, columns[:, b[few]], powers) for a, b in both], axis=0)
+                found += self._cut * end.moved(kicked)
             yield found
 
     def read(self, columns: Array) -> ComplexArray:
