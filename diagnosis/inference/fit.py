@@ -24,6 +24,7 @@ from thermospindle.model.types import Array
 TEMPERS = (3e-4, 3e-3, 0.03, 0.3, 1.0)
 MOST_STEPS = (30, 40)  # while errors are taken too large, and at the end
 LEAST_DAMPING, RAISED_DAMPING = 1e-7, 1e-3  # of a parameter's own curvature, at first and after a step that was refused
+SHORTENED, SHORTER = 3, 4.0  # steps refused one after the other, each so much shorter than the one before: a bent valley asks for shorter steps along it, and damping would hold all that is little known
 MOST_GROWTH = 2.0**6  # of the damping, one refusal after the other
 ENOUGH = 0.3  # of the cost, from which a fit goes on
 ENOUGH_FAR, ENOUGH_EARLY = 5e-3, 0.02  # share of what is left beyond noise, and of all the cost while errors are taken too large, likewise
@@ -123,10 +124,11 @@ def _settled(problem: Problem, p: Array, rates: Rates, temper: float, beaten: fl
     lines = problem.linearisation(p, rates)
     here = Point(p, lines.residuals, problem.cost(p, temper, lines.residuals))
     current, rated, damping, growth, longest = True, not last, LEAST_DAMPING, 2.0, LONGEST  # lines, and rates, of this very point
+    refused, trusted = 0, np.inf  # steps one after the other, and the length of the next
     for _ in range(MOST_STEPS[last]):
         gradient, normal = lines.slope(problem, here, temper), temper**2 * lines.information + problem.precision
         damped = np.diag(temper**2 * np.diag(lines.information) + problem.least_stiff)  # not what is stiff only with all others held
-        move = problem.step(here.p, gradient, normal + damping * damped, longest)
+        move = problem.step(here.p, gradient, normal + damping * damped, min(longest, trusted))
         hoped = promised(gradient, normal, move)
         exact = current and rated
         if hoped < ENOUGH and exact:
@@ -146,9 +148,14 @@ def _settled(problem: Problem, p: Array, rates: Rates, temper: float, beaten: fl
         if gained > 0:
             here, growth = there, 2.0
             damping *= max(1 / 3, 1 - (2 * min(gained / hoped, 1.0) - 1) ** 3)
-            if (gained < enough and (exact or not last)) or (no_nearer and current):
+            bent = last and gained < POOR * hoped and refused < SHORTENED  # it may go on in shorter steps
+            if (gained < enough and (exact or not last) and not bent) or (no_nearer and current):
                 break
+            refused, trusted = (refused + 1, problem.length_of(move) / SHORTER) if gained < enough and exact else (0, 2 * trusted)
+        elif exact and refused < SHORTENED:
+            refused, trusted = refused + 1, problem.length_of(move) / SHORTER
         elif exact:
+            trusted = np.inf
             damping, growth = max(2.5 * growth * damping, RAISED_DAMPING), 2 * growth
             if growth > MOST_GROWTH:
                 break
