@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,11 +12,11 @@ from scipy import optimize
 from tests.virtual_campaign import drawn, effect, fitted, mode_campaign, model_of, virtual_campaign
 from thermospindle.diagnosis.forward.mechanism import asked_at, variants, with_own_laws
 from thermospindle.diagnosis.inference.evidence import evidence
-from thermospindle.diagnosis.inference.fit import AFAR, TEMPERS, _from_afar, fit
+from thermospindle.diagnosis.inference.fit import AFAR, TEMPERS, _from_afar, _settled, fit
 from thermospindle.diagnosis.inference.freeform import free_forms
 from thermospindle.diagnosis.inference.hypothesis import scan
 from thermospindle.diagnosis.inference.prior import steady
-from thermospindle.diagnosis.inference.problem import Problem
+from thermospindle.diagnosis.inference.problem import Linearisation, Problem
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
 from thermospindle.sim.operating import operating_point
@@ -53,6 +54,37 @@ def test_a_fit_rests_where_the_gradient_is_right(spindle):
         slope = (problem.cost(p + step, 1.0) - problem.cost(p - step, 1.0)) / 2e-3
         curvature = 2 * (done.information[i, i] + 1.0)
         assert slope == pytest.approx(2 * (done.gradient[i] + p[i]), abs=2e-3 * np.sqrt(curvature))
+
+
+class Ring(Problem):
+    """Two parameters, known well across a circle of radius 1 about (0, -1), and little along it: they are to be at an angle of 2.6 on it."""
+
+    def __init__(self):
+        self.length, self.tests = 2, 1
+        self.model = SimpleNamespace(tests=[SimpleNamespace(count=3)])
+        self.precision, self.least_stiff, self.reach = 1e-3 * np.eye(2), np.full(2, 1e-3), np.ones(2)
+        self.low, self.high = np.full(2, -np.inf), np.full(2, np.inf)
+
+    def parts(self, p):
+        return p, np.zeros((0, 1)), []
+
+    def effects_of(self, p):
+        return [[]]
+
+    def residuals(self, p):
+        return [np.array([100 * (np.hypot(p[0], p[1] + 1) - 1), *(3 * (p - [np.sin(2.6), np.cos(2.6) - 1]))])]
+
+    def linearisation(self, p, rates):
+        across = np.array([p[0], p[1] + 1]) / np.hypot(p[0], p[1] + 1)
+        return Linearisation(2, [(self.residuals(p)[0], np.column_stack([100 * across, 3 * np.eye(2)]), np.arange(2))])
+
+
+def test_a_bent_valley_is_followed_to_its_end(monkeypatch):
+    """In steps as short as its bends ask for. A fit had ended where a long one gained next to nothing, 30 in ln evidence behind, and of two effects of another program's campaign the wrong one was named."""
+    monkeypatch.setattr("thermospindle.diagnosis.inference.fit.rates_of", lambda model, x, effects, rates: rates)
+    problem = Ring()
+    p, *_ = _settled(problem, np.array([0.3, np.sqrt(1 - 0.09) - 1]), None, 1.0, np.inf)
+    assert np.arctan2(p[0], p[1] + 1) == pytest.approx(2.6, abs=0.02)
 
 
 def bounded(low: list[float], high: list[float]) -> Problem:
