@@ -132,11 +132,12 @@ class CampaignModel:
             built = self._built(t, x)
             for i in own.flung:
                 built = replace(built, ball_inertia=max(built.ball_inertia * (1 + float(x[i]) * self.parameters[i].sd), 0.0))
-            self._equilibria[key] = equilibrium(built, replace(condition, temperature=condition.temperature + warmer), every)
-        return self._equilibria[key]
+            self._equilibria[key] = equilibrium(built, replace(condition, temperature=condition.temperature + warmer), every), every
+        return self._equilibria[key][0]
 
     @cached_property
-    def _equilibria(self) -> dict:
+    def _equilibria(self) -> dict[tuple, tuple[OperatingPoint, Applied]]:
+        """With the effects, which their keys tell apart by where they are in memory: as long as they are kept no other comes there."""
         return {}
 
     def _otherwise_than_drawn(self, t: int, x: Array) -> list[tuple[Effect, Values]]:
