@@ -130,9 +130,12 @@ def _settled(problem: Problem, p: Array, rates: Rates, temper: float, beaten: fl
         damped = np.diag(temper**2 * np.diag(lines.information) + problem.least_stiff)  # not what is stiff only with all others held
         move = problem.step(here.p, gradient, normal + damping * damped, min(longest, trusted))
         hoped = promised(gradient, normal, move)
-        exact = current and rated
+        exact, limited = current and rated, problem.length_of(move) > 0.99 * trusted
         if hoped < ENOUGH and exact:
-            break
+            if not limited:
+                break
+            refused, trusted = SHORTENED, np.inf  # shorter steps lead nowhere
+            continue
         there, corrected = problem.at(here.p + move, temper), False
         if current and there.residuals is not None and here.cost - there.cost < KEPT * hoped:
             stiff = normal + max(damping, RAISED_DAMPING) * damped
@@ -148,11 +151,11 @@ def _settled(problem: Problem, p: Array, rates: Rates, temper: float, beaten: fl
         if gained > 0:
             here, growth = there, 2.0
             damping *= max(1 / 3, 1 - (2 * min(gained / hoped, 1.0) - 1) ** 3)
-            bent = last and gained < POOR * hoped and refused < SHORTENED  # it may go on in shorter steps
-            if (gained < enough and (exact or not last) and not bent) or (no_nearer and current):
+            bent = last and exact and gained < min(POOR * hoped, enough) and refused < SHORTENED  # it may go on in shorter steps
+            if (gained < enough and (exact or not last) and not (last and (bent or limited))) or (no_nearer and current):
                 break
-            refused, trusted = (refused + 1, problem.length_of(move) / SHORTER) if gained < enough and exact else (0, 2 * trusted)
-        elif exact and refused < SHORTENED:
+            refused, trusted = (refused + 1, problem.length_of(move) / SHORTER) if bent else (0, 2 * trusted)
+        elif exact and last and refused < SHORTENED:
             refused, trusted = refused + 1, problem.length_of(move) / SHORTER
         elif exact:
             trusted = np.inf
