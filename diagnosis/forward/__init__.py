@@ -1,6 +1,7 @@
 """The forward model of a campaign: what the spindle, its tolerances and effects make of every number measured, with exact derivatives.
 
 ===========  ========================================================================================================
+reference    modes of the reference condition, and what a constant error of the stiffness between them does
 nuisance     build tolerances, measuring errors, and the model's own constant discrepancy
 numbers      which nuisance parameters are what
 mechanism    what an effect changes, and its law as a prior over conditions

@@ -15,8 +15,8 @@ from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.mode_table import ModeData, TestData
 from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.forward.model import CampaignModel
-from thermospindle.diagnosis.forward.nuisance import COINCIDE
 from thermospindle.diagnosis.forward.rates import rates_of
+from thermospindle.diagnosis.forward.reference import COINCIDE
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.ladder.fitting import Settled
 from thermospindle.model.types import Array
