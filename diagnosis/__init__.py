@@ -3,6 +3,7 @@
 ============  ====================================================================================================
 data/         a campaign as FRF lines, or mode tables with covariances: what the diagnosis takes as data
 prediction/   what a model predicts: its modes, the next test, the smallest sizes that would have shown
+parameters/   what a fit may move: sizes of effects, and tolerances and errors beside them
 forward/      what the model makes of every number measured, with exact derivatives
 inference/    mechanisms and free forms fitted to FRFs or mode tables together, and the evidence for each
 decision/     posterior probabilities, and the answer with the least expected loss

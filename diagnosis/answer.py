@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from thermospindle.diagnosis.forward.nuisance import BUILD, GAIN, TEMPERATURE
 from thermospindle.diagnosis.inference.hypothesis import DEPARTS
+from thermospindle.diagnosis.parameters.nuisance import BUILD, GAIN, TEMPERATURE
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.formats import DIAGNOSIS, migrated
 from thermospindle.sim.effects.effect import Effect

@@ -12,12 +12,12 @@ from thermospindle.diagnosis.data.lines import line_data
 from thermospindle.diagnosis.data.mode_table import TestData, mode_data
 from thermospindle.diagnosis.decision.verdict import Verdict, decide
 from thermospindle.diagnosis.forward.making import campaign_model, expected_noise
-from thermospindle.diagnosis.forward.mechanism import Mechanism, strongest, unmoved, variants
 from thermospindle.diagnosis.forward.model import FAILED, SIZE_STEP, CampaignModel
 from thermospindle.diagnosis.inference.freeform import free_forms
 from thermospindle.diagnosis.inference.hypothesis import DEPARTS, Hypothesis
 from thermospindle.diagnosis.inference.search import Search, search
 from thermospindle.diagnosis.misfit.patterns import Chosen, choose_for
+from thermospindle.diagnosis.parameters.mechanism import Mechanism, strongest, unmoved, variants
 from thermospindle.diagnosis.prediction.detectable import smallest, unseen_beside
 from thermospindle.diagnosis.prediction.next_test import NextTest, next_tests
 from thermospindle.model.machine import Condition, Spindle

@@ -8,13 +8,13 @@ from types import SimpleNamespace
 import numpy as np
 
 from thermospindle.diagnosis.decision.verdict import Verdict
-from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.inference.evidence import Evidence
 from thermospindle.diagnosis.inference.fit import Fit
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.prior import Learned
 from thermospindle.diagnosis.inference.screening import Screened
 from thermospindle.diagnosis.inference.search import Search
+from thermospindle.diagnosis.parameters.mechanism import Mechanism
 from thermospindle.model.machine import Condition
 from thermospindle.sim.effects.effect import Effect, Parameter
 

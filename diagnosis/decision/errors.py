@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from thermospindle.diagnosis.decision.conditions import conditions_of
-from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.evidence import amplitudes_apart, at_one_size, left_out, turned
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
+from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.model.types import Array
 
 STILL_OWED = 0.1  # of chi2, up to which a fit that promises so much less has arrived

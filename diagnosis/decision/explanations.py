@@ -16,12 +16,12 @@ from math import comb
 import numpy as np
 from scipy.special import softmax
 
-from thermospindle.diagnosis.forward import nuisance as kinds_of
-from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.inference.gaussian import impossible, opposite
 from thermospindle.diagnosis.inference.hypothesis import DEPARTS, LITTLE, PLENTY, STRAIN, Hypothesis
 from thermospindle.diagnosis.inference.remainder import SMALL, Overlap
 from thermospindle.diagnosis.inference.search import Search
+from thermospindle.diagnosis.parameters import nuisance as kinds_of
+from thermospindle.diagnosis.parameters.mechanism import Mechanism
 from thermospindle.model.types import Array
 
 PRIOR = {"none": 0.5, "one": 0.32, "two": 0.08, "free": 0.05, "two free": 0.02, "one and free": 0.02, "three": 0.01}

@@ -7,14 +7,14 @@ import numpy as np
 from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.decision.explanations import Names, beyond_limits, likeliest, named_part
 from thermospindle.diagnosis.decision.loss import NEGLIGIBLE, in_all
-from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.model import CampaignModel
-from thermospindle.diagnosis.forward.nuisance import Resonance
 from thermospindle.diagnosis.inference.gaussian import apart_by
 from thermospindle.diagnosis.inference.hypothesis import LITTLE, STRAIN, Hypothesis
 from thermospindle.diagnosis.inference.remainder import ALIKE, Overlap
 from thermospindle.diagnosis.inference.resonance import moving, shown
 from thermospindle.diagnosis.inference.search import Search
+from thermospindle.diagnosis.parameters import nuisance as kinds_of
+from thermospindle.diagnosis.parameters.nuisance import Resonance
 
 UNTOLD = "nothing tried"  # what explains data that are missed grossly
 SAME = 3.0  # errors of their difference, within which sizes are the same

@@ -21,12 +21,12 @@ from thermospindle.diagnosis.decision.explanations import (
 )
 from thermospindle.diagnosis.decision.loss import MOSTLY, least_loss, mostly_named
 from thermospindle.diagnosis.decision.reason import LEFT, MOVING, NUMERICS, UNTOLD
-from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.inference.evidence import left_out
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.remainder import ALIKE, Overlap, overlap
 from thermospindle.diagnosis.inference.resonance import moving
 from thermospindle.diagnosis.inference.search import Search
+from thermospindle.diagnosis.parameters import nuisance as kinds_of
 
 GROSS = 25.0  # chi2 a number, five times the errors, from which nothing has explained the data whatever else explains them no better
 MUCH = 0.5  # squares of the errors, from which what is left and changes tells of something else

@@ -1,10 +1,6 @@
 """The forward model of a campaign: what the spindle, its tolerances and effects make of every number measured, with exact derivatives.
 
 ===========  ========================================================================================================
-reference    modes of the reference condition, and what a constant error of the stiffness between them does
-nuisance     build tolerances, measuring errors, and the model's own constant discrepancy
-numbers      which nuisance parameters are what
-mechanism    what an effect changes, and its law as a prior over conditions
 linear       one test's linear model, and how its matrices change with parameters
 response     FRFs at the lines of a test, with what their derivatives need
 record       what records that end too early leave out of them

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from thermospindle.diagnosis.forward.nuisance import MassTerm
+from thermospindle.diagnosis.parameters.masses import MassTerm
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import Matrices
 from thermospindle.model.rotor.distributed import spread

@@ -10,8 +10,8 @@ import numpy as np
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.mode_table import TestData
 from thermospindle.diagnosis.forward.model import FAILED, Applied, CampaignModel
-from thermospindle.diagnosis.forward.nuisance import RANGE_K, Nuisance, changes_of, nuisances
-from thermospindle.diagnosis.forward.reference import reference_modes
+from thermospindle.diagnosis.parameters.nuisance import RANGE_K, Nuisance, changes_of, nuisances
+from thermospindle.diagnosis.parameters.reference import reference_modes
 from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import matrices

@@ -13,14 +13,15 @@ import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.mode_table import ModeData, TestData
-from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.linear import Dofs, Linear, mass_between, mass_changes
-from thermospindle.diagnosis.forward.nuisance import Nuisance, Resonance, Unevenness, mass_terms, unevennesses
-from thermospindle.diagnosis.forward.numbers import Discrepancies, Numbers
 from thermospindle.diagnosis.forward.points import Applied, apart, aside, otherwise, replace_measuring, stretched, uneven
-from thermospindle.diagnosis.forward.reference import ReferenceModes, Turned
 from thermospindle.diagnosis.forward.response import Light, Response
 from thermospindle.diagnosis.forward.table import Table
+from thermospindle.diagnosis.parameters import nuisance as kinds_of
+from thermospindle.diagnosis.parameters.masses import mass_terms
+from thermospindle.diagnosis.parameters.nuisance import Nuisance, Resonance, Unevenness, unevennesses
+from thermospindle.diagnosis.parameters.numbers import Discrepancies, Numbers
+from thermospindle.diagnosis.parameters.reference import ReferenceModes, Turned
 from thermospindle.model.built.tolerance import Toleranced
 from thermospindle.model.errors import NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Spindle

@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from thermospindle.diagnosis.forward.nuisance import DIRECTIONS, RANGE_K, Unevenness
+from thermospindle.diagnosis.parameters.nuisance import DIRECTIONS, RANGE_K, Unevenness
 from thermospindle.model.bearing.pair import PairState
 from thermospindle.model.machine import Condition, Point, RingMotion, Spindle
 from thermospindle.model.rotor.chain import Layout, RotorBase, row_of

@@ -14,11 +14,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from thermospindle.diagnosis.forward.linear import Rates
-from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.inference.prior import UNMOVED, Learned
 from thermospindle.diagnosis.inference.problem import LONGEST, Linearisation, Point, Problem
+from thermospindle.diagnosis.parameters.mechanism import Mechanism
 from thermospindle.model.types import Array
 
 TEMPERS = (3e-4, 3e-3, 0.03, 0.3, 1.0)

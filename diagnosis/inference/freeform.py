@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from thermospindle.diagnosis.forward.mechanism import Mechanism, asked_at
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.gaussian import CANNOT
 from thermospindle.diagnosis.inference.problem import Problem
+from thermospindle.diagnosis.parameters.mechanism import Mechanism, asked_at
 from thermospindle.model.bearing.pair import BearingState, PairState
 from thermospindle.model.built.tolerance import scaled_preload
 from thermospindle.model.machine import Condition, RingMotion, Spindle

@@ -12,10 +12,10 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import lsq_linear
 from scipy.special import binom, chdtrc, log_ndtr, ndtr
 
-from thermospindle.diagnosis.forward.mechanism import Mechanism, grown, size_covariance
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.fit import Fit
 from thermospindle.diagnosis.inference.prior import Root
+from thermospindle.diagnosis.parameters.mechanism import Mechanism, grown, size_covariance
 from thermospindle.model.types import Array
 
 CANNOT = 3.0  # standard errors, from which a mechanism would need what it cannot have

@@ -8,13 +8,13 @@ from functools import partial
 
 import numpy as np
 
-from thermospindle.diagnosis.forward import nuisance as kinds_of
-from thermospindle.diagnosis.forward.mechanism import Mechanism, shared
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.evidence import Evidence, evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit
 from thermospindle.diagnosis.inference.prior import Learned, steady
 from thermospindle.diagnosis.inference.problem import Problem
+from thermospindle.diagnosis.parameters import nuisance as kinds_of
+from thermospindle.diagnosis.parameters.mechanism import Mechanism, shared
 from thermospindle.model.parallel import in_parallel
 from thermospindle.model.types import Array
 

@@ -7,7 +7,6 @@ from functools import partial
 
 import numpy as np
 
-from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.fit import TEMPERS
 from thermospindle.diagnosis.inference.hypothesis import DEPARTS, LITTLE, PLENTY, Hypothesis, Task, fitted, scan
@@ -28,6 +27,7 @@ from thermospindle.diagnosis.inference.singles import (
     task_of,
     with_laws,
 )
+from thermospindle.diagnosis.parameters.mechanism import Mechanism
 
 LEADS = 2  # single mechanisms of the catalogue to which a second is joined, of those near the best
 SECONDS = 2  # of each kind, joined to each of them

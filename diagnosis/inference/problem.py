@@ -9,13 +9,13 @@ from functools import cached_property
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.derivatives import column, nuisance_jacobian
 from thermospindle.diagnosis.forward.linear import Rates
-from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import FAILED, SIZE_STEP, Applied, CampaignModel
 from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.inference.prior import UNMOVED, Learned, precision_and_variances, roots_of
+from thermospindle.diagnosis.parameters import nuisance as kinds_of
+from thermospindle.diagnosis.parameters.mechanism import Mechanism
 from thermospindle.model.types import Array, Integers
 
 NONE: Integers = np.zeros(0, int)

@@ -15,12 +15,12 @@ import numpy as np
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.forward.derivatives import by_products_of_shares
 from thermospindle.diagnosis.forward.model import CampaignModel
-from thermospindle.diagnosis.forward.nuisance import SHARE_SD, Resonance
 from thermospindle.diagnosis.forward.response import Light
 from thermospindle.diagnosis.inference.fit import Fit
 from thermospindle.diagnosis.inference.prior import Learned
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.inference.screening import linearised
+from thermospindle.diagnosis.parameters.nuisance import SHARE_SD, Resonance
 from thermospindle.model.types import Array, ComplexArray
 
 LAGS = 12  # lines over which residuals are compared

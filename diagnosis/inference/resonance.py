@@ -10,14 +10,14 @@ from functools import partial
 import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
-from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
-from thermospindle.diagnosis.forward.nuisance import Resonance
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit
 from thermospindle.diagnosis.inference.hypothesis import EARLY, PLENTY, STRAIN, Hypothesis, settled
 from thermospindle.diagnosis.inference.prior import DRIFTING
 from thermospindle.diagnosis.inference.remainder import DRIFTS, LOOKED, light_resonance, overlap
+from thermospindle.diagnosis.parameters.mechanism import Mechanism
+from thermospindle.diagnosis.parameters.nuisance import Resonance
 from thermospindle.model.parallel import in_parallel
 from thermospindle.model.types import Array
 

@@ -9,7 +9,6 @@ from functools import partial
 import numpy as np
 
 from thermospindle.diagnosis.forward.hit import hit_found
-from thermospindle.diagnosis.forward.mechanism import Mechanism, with_own_laws
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, fit
@@ -29,6 +28,7 @@ from thermospindle.diagnosis.inference.singles import (
     fit_singles,
     of_each_name,
 )
+from thermospindle.diagnosis.parameters.mechanism import Mechanism, with_own_laws
 from thermospindle.model.parallel import in_parallel, meanwhile
 from thermospindle.model.types import Array
 

@@ -16,9 +16,9 @@ from thermospindle.diagnosis.data.mode_table import ModeData, TestData
 from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.forward.rates import rates_of
-from thermospindle.diagnosis.forward.reference import COINCIDE
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.ladder.fitting import Settled
+from thermospindle.diagnosis.parameters.reference import COINCIDE
 from thermospindle.model.types import Array
 
 MOST = 5  # groups of modes; of more modes every fifth is left out at once

@@ -9,9 +9,9 @@ import numpy as np
 
 from thermospindle.diagnosis.data.mode_table import ModeData
 from thermospindle.diagnosis.data.observe import Observation
-from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.model import Applied, CampaignModel
 from thermospindle.diagnosis.ladder.fitting import Settled
+from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.diagnosis.prediction.modes import BEYOND, Predicted, predicted
 from thermospindle.diagnosis.prediction.partners import BELIEVABLE, numbered, paired
 from thermospindle.model.types import Array

@@ -14,7 +14,6 @@ from functools import cache, partial
 import numpy as np
 from scipy.optimize import brentq
 
-from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.forward.model import Applied, CampaignModel
 from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.inference.fit import Fit, promised
@@ -23,6 +22,7 @@ from thermospindle.diagnosis.inference.prior import Learned, as_stated
 from thermospindle.diagnosis.inference.problem import Linearisation, Point, Problem, built
 from thermospindle.diagnosis.inference.screening import Screened, linearised, visibilities
 from thermospindle.diagnosis.inference.search import Search
+from thermospindle.diagnosis.parameters.mechanism import Mechanism
 from thermospindle.model.parallel import in_parallel
 from thermospindle.model.types import Array
 

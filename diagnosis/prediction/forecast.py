@@ -14,13 +14,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from thermospindle.diagnosis.data.mode_table import ModeData
-from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.derivatives import nuisance_jacobian
-from thermospindle.diagnosis.forward.mechanism import size_covariance
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
 from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.inference.hypothesis import LITTLE, Hypothesis, settled
 from thermospindle.diagnosis.inference.problem import Problem
+from thermospindle.diagnosis.parameters import nuisance as kinds_of
+from thermospindle.diagnosis.parameters.mechanism import size_covariance
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.modes import kinds, poles_below

@@ -9,7 +9,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from thermospindle.diagnosis.forward.nuisance import TEMPERATURE
+from thermospindle.diagnosis.parameters.nuisance import TEMPERATURE
 from thermospindle.diagnosis.runout.verdict import RunoutDiagnosis
 from thermospindle.diagnosis.verdict import Diagnosis
 from thermospindle.model.machine import Spindle

@@ -8,10 +8,10 @@ from itertools import pairwise
 import numpy as np
 
 from thermospindle.diagnosis.decision.loss import NAMING
-from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.ladder.forms import AS_DRAWN
 from thermospindle.diagnosis.ladder.ladder import CLEAR, DISCREPANCY, MODES, TOLERANCES, Ladder
 from thermospindle.diagnosis.ladder.step import Step
+from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.diagnosis.prediction.next_test import in_words
 from thermospindle.diagnosis.verdict import Diagnosis
 from thermospindle.report.typeset import plain, plain_error

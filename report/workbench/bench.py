@@ -16,7 +16,7 @@ from thermospindle.diagnosis.compare.before_after import held_out
 from thermospindle.diagnosis.compare.compare import TestComparison, compare, rms_residual
 from thermospindle.diagnosis.compare.fit import Fitted, Free, fit
 from thermospindle.diagnosis.data.observe import Observation, observe
-from thermospindle.diagnosis.forward.mechanism import REFERENCE_WIDTH
+from thermospindle.diagnosis.parameters.mechanism import REFERENCE_WIDTH
 from thermospindle.diagnosis.runout.lines import modal_tests
 from thermospindle.model.built.tolerance import Toleranced, deviated, toleranced
 from thermospindle.model.errors import BadInput, NoEquilibrium, OutsideRange

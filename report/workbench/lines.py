@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from itertools import product
 
 from thermospindle.diagnosis.compare.before_after import without
-from thermospindle.diagnosis.forward import nuisance as kinds_of
-from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
 from thermospindle.diagnosis.inference.problem import Problem
+from thermospindle.diagnosis.parameters import nuisance as kinds_of
+from thermospindle.diagnosis.parameters.mechanism import variants
 from thermospindle.diagnosis.verdict import campaign_data
 from thermospindle.model.errors import BadInput, NoEquilibrium
 from thermospindle.report.text.diagnosis.answer import parameters_of

@@ -19,7 +19,7 @@ from scipy.optimize import lsq_linear, minimize
 from tests.blind.campaigns import Made
 from tests.blind.visible import SMALL, Seen, change
 from tests.blind.world import Answer, World
-from thermospindle.diagnosis.forward.mechanism import Mechanism, variants, with_own_laws
+from thermospindle.diagnosis.parameters.mechanism import Mechanism, variants, with_own_laws
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.effects import CATALOGUE, usable

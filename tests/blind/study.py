@@ -35,13 +35,13 @@ from tests.blind.world import Plan, World
 from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.decision.explanations import coarsening, likeliest
 from thermospindle.diagnosis.draft.draft import draft
-from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.inference.evidence import evidence, left_out
 from thermospindle.diagnosis.inference.fit import TEMPERS, fit
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
 from thermospindle.diagnosis.inference.prior import steady
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.inference.remainder import overlap
+from thermospindle.diagnosis.parameters.mechanism import variants
 from thermospindle.diagnosis.verdict import Diagnosis, diagnose
 from thermospindle.model.machine import Spindle
 from thermospindle.model.scene.reading import load

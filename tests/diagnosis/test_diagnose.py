@@ -11,7 +11,7 @@ import pytest
 from tests.conftest import DATA, SCENE
 from tests.virtual_campaign import mode_campaign, model_of
 from thermospindle.diagnosis.decision.conditions import conditions_of
-from thermospindle.diagnosis.forward.mechanism import variants
+from thermospindle.diagnosis.parameters.mechanism import variants
 from thermospindle.diagnosis.verdict import diagnose, unable
 from thermospindle.model.machine import Condition, Law
 from thermospindle.model.units import RPM

@@ -14,12 +14,12 @@ from tests.virtual_campaign import mode_campaign, model_of
 from thermospindle.cli import main
 from thermospindle.diagnosis.draft.draft import draft
 from thermospindle.diagnosis.draft.laws import fit_law, laws
-from thermospindle.diagnosis.forward.mechanism import Mechanism, variants, with_own_laws
 from thermospindle.diagnosis.inference.evidence import evidence, left_out
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.freeform import free_forms
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
 from thermospindle.diagnosis.inference.problem import Problem
+from thermospindle.diagnosis.parameters.mechanism import Mechanism, variants, with_own_laws
 from thermospindle.diagnosis.verdict import _drift
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition

@@ -7,8 +7,8 @@ import pytest
 
 from tests.diagnosis.mode_tables import tables
 from thermospindle.diagnosis.decision.conditions import conditions_of
-from thermospindle.diagnosis.forward.nuisance import GAIN, TEMPERATURE
 from thermospindle.diagnosis.forward.rates import STEP, rates_of
+from thermospindle.diagnosis.parameters.nuisance import GAIN, TEMPERATURE
 from thermospindle.diagnosis.verdict import campaign_data
 from thermospindle.model.machine import Law
 from thermospindle.model.material import BEYOND

@@ -14,10 +14,10 @@ from tests.conftest import SCENE
 from tests.diagnosis.mode_tables import SD, tables
 from thermospindle.cli import main
 from thermospindle.diagnosis.decision.explanations import Candidate
-from thermospindle.diagnosis.forward import nuisance as kinds_of
-from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.ladder.forms import FORMS
 from thermospindle.diagnosis.ladder.ladder import CLEAR, DISCREPANCY, TOLERANCES, ladder, named_by
+from thermospindle.diagnosis.parameters import nuisance as kinds_of
+from thermospindle.diagnosis.parameters.mechanism import variants
 from thermospindle.diagnosis.prediction.next_test import ModePrediction, NextTest
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM

@@ -7,7 +7,7 @@ import pytest
 
 import thermospindle as ts
 from tests.conftest import ROOT
-from thermospindle.diagnosis.forward import nuisance as kinds_of
+from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.diagnosis.verdict import diagnose
 from thermospindle.model.scene.reading import load
 from thermospindle.report.text.diagnosis.answer import diagnosis_json

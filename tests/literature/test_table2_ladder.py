@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from tests.conftest import SCENE
-from thermospindle.diagnosis.forward.nuisance import STIFFNESS
 from thermospindle.diagnosis.ladder.ladder import CLEAR, DISCREPANCY, TOLERANCES, ladder
+from thermospindle.diagnosis.parameters.nuisance import STIFFNESS
 from thermospindle.report.text.ladder import remaining
 from thermospindle.sim.campaign.campaign import read_campaign
 

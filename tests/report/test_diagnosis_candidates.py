@@ -9,11 +9,11 @@ import pytest
 from tests.conftest import ROOT
 from tests.virtual_campaign import effect, mode_campaign, model_of
 from thermospindle.diagnosis.decision.explanations import Candidate
-from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.inference.evidence import evidence, left_out
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.problem import Problem
+from thermospindle.diagnosis.parameters.mechanism import variants
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
 from thermospindle.report.text.diagnosis.answer import _candidate

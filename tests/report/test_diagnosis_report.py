@@ -18,10 +18,10 @@ from thermospindle.cli import main
 from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.decision.errors import arrived, whole
 from thermospindle.diagnosis.decision.explanations import Candidate
-from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.inference.evidence import evidence, left_out
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
+from thermospindle.diagnosis.parameters.mechanism import variants
 from thermospindle.diagnosis.prediction.next_test import ModePrediction, NextTest
 from thermospindle.diagnosis.runout.verdict import diagnose_runout
 from thermospindle.diagnosis.verdict import Drift

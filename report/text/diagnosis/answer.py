@@ -10,11 +10,11 @@ from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.decision.errors import arrived, as_drawn, whole
 from thermospindle.diagnosis.decision.explanations import Candidate
 from thermospindle.diagnosis.decision.loss import NAMING
-from thermospindle.diagnosis.forward import nuisance as kinds_of
-from thermospindle.diagnosis.forward.mechanism import Mechanism
 from thermospindle.diagnosis.inference.evidence import Evidence, left_out
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.resonance import shown
+from thermospindle.diagnosis.parameters import nuisance as kinds_of
+from thermospindle.diagnosis.parameters.mechanism import Mechanism
 from thermospindle.diagnosis.verdict import Diagnosis, Drift
 from thermospindle.model.machine import Spindle
 from thermospindle.model.types import Array

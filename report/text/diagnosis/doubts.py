@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from thermospindle.diagnosis.decision.explanations import named_part
-from thermospindle.diagnosis.forward.mechanism import Mechanism
+from thermospindle.diagnosis.parameters.mechanism import Mechanism
 from thermospindle.diagnosis.verdict import Diagnosis
 from thermospindle.model.types import Array
 from thermospindle.report.typeset import plain, plain_error, unit_word

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from thermospindle.diagnosis.forward import nuisance as kinds_of
 from thermospindle.diagnosis.forward.model import CampaignModel
-from thermospindle.diagnosis.forward.nuisance import Nuisance
+from thermospindle.diagnosis.parameters import nuisance as kinds_of
+from thermospindle.diagnosis.parameters.nuisance import Nuisance
 from thermospindle.diagnosis.verdict import Diagnosis
 from thermospindle.report.text.compare import ALMOST
 from thermospindle.report.typeset import plain

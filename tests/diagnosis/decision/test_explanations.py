@@ -11,10 +11,10 @@ from scipy.signal import lfilter
 from tests.hand_made_search import SIZE, by_departing, made, mechanism, total
 from thermospindle.diagnosis.decision.explanations import COARSE, OWN_LAW, PRIOR, coarsening, discount
 from thermospindle.diagnosis.decision.verdict import Verdict, decide
-from thermospindle.diagnosis.forward.nuisance import BUILD, DAMPING, STIFFNESS
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.remainder import SMALL, Overlap, between_tests
 from thermospindle.diagnosis.inference.screening import Screened
+from thermospindle.diagnosis.parameters.nuisance import BUILD, DAMPING, STIFFNESS
 
 
 def test_probabilities_are_bayes():

@@ -13,7 +13,7 @@ from thermospindle.diagnosis.decision import reason
 from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.decision.loss import FALSE_ALARM, MISSED, WRONG
 from thermospindle.diagnosis.decision.verdict import decide
-from thermospindle.diagnosis.forward.nuisance import BUILD, DAMPING_DRIFT, EXPANSION, EXPANSION_SD, STIFFNESS_DRIFT, Nuisance
+from thermospindle.diagnosis.parameters.nuisance import BUILD, DAMPING_DRIFT, EXPANSION, EXPANSION_SD, STIFFNESS_DRIFT, Nuisance
 from thermospindle.model.machine import Condition
 
 CASES = {

@@ -11,7 +11,10 @@ from tests.conftest import ROOT
 from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, truth, virtual_campaign
 from thermospindle.diagnosis.forward.derivatives import column, nuisance_jacobian
 from thermospindle.diagnosis.forward.linear import products, together
-from thermospindle.diagnosis.forward.nuisance import (
+from thermospindle.diagnosis.forward.rates import rates_of
+from thermospindle.diagnosis.forward.response import Response
+from thermospindle.diagnosis.ladder.left_out import LeftOut, unseen
+from thermospindle.diagnosis.parameters.nuisance import (
     APART,
     BALLS,
     BUILD,
@@ -32,9 +35,6 @@ from thermospindle.diagnosis.forward.nuisance import (
     TEMPERATURE,
     changes_of,
 )
-from thermospindle.diagnosis.forward.rates import rates_of
-from thermospindle.diagnosis.forward.response import Response
-from thermospindle.diagnosis.ladder.left_out import LeftOut, unseen
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.modes import poles
 from thermospindle.model.scene.reading import load

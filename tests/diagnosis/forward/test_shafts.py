@@ -13,7 +13,7 @@ from tests.virtual_campaign import model_of, virtual_campaign
 from thermospindle.diagnosis.compare.compare import compare
 from thermospindle.diagnosis.forward.linear import mass_between
 from thermospindle.diagnosis.forward.making import BEYOND, IN_BAND, MOST_MODES
-from thermospindle.diagnosis.forward.reference import reference_modes
+from thermospindle.diagnosis.parameters.reference import reference_modes
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.chain import matrices
 from thermospindle.model.rotor.modes import kinds, oscillating, poles_below, with_mass_between

@@ -7,12 +7,12 @@ import pytest
 
 from tests.conftest import ROOT
 from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, virtual_campaign
-from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.hypothesis import Task, _fit_one
 from thermospindle.diagnosis.inference.prior import steady
 from thermospindle.diagnosis.inference.screening import screen
+from thermospindle.diagnosis.parameters.mechanism import variants
 from thermospindle.diagnosis.verdict import Diagnosis, diagnose
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load

@@ -11,7 +11,10 @@ from scipy import stats
 from tests.conftest import ROOT
 from tests.virtual_campaign import fitted, model_of, truth, virtual_campaign
 from thermospindle.diagnosis.forward.model import CampaignModel
-from thermospindle.diagnosis.forward.nuisance import (
+from thermospindle.diagnosis.forward.points import otherwise
+from thermospindle.diagnosis.inference.evidence import evidence
+from thermospindle.diagnosis.inference.fit import fit
+from thermospindle.diagnosis.parameters.nuisance import (
     APART,
     BUILD,
     DAMPING,
@@ -22,9 +25,6 @@ from thermospindle.diagnosis.forward.nuisance import (
     STIFFNESS_DRIFT,
     TEMPERATURE,
 )
-from thermospindle.diagnosis.forward.points import otherwise
-from thermospindle.diagnosis.inference.evidence import evidence
-from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM

@@ -11,20 +11,6 @@ from scipy.linalg import block_diag
 from scipy.stats import multivariate_normal
 
 from tests.diagnosis.inference.toy import toy
-from thermospindle.diagnosis.forward import nuisance as kinds_of
-from thermospindle.diagnosis.forward.nuisance import (
-    BUILD,
-    DAMPING,
-    DAMPING_DRIFT,
-    DAMPING_DRIFT_SD,
-    DAMPING_SD,
-    DRIFT,
-    EXPANSION,
-    STIFFNESS,
-    STIFFNESS_DRIFT,
-    STIFFNESS_DRIFT_SD,
-    Nuisance,
-)
 from thermospindle.diagnosis.inference.evidence import FARTHER, OFFSET, WIDER, WIDTHS, Learned, evidence, left_out, own_grid
 from thermospindle.diagnosis.inference.fit import Fit
 from thermospindle.diagnosis.inference.gaussian import Quadratic, ln_integral, marginal, posterior, under
@@ -37,6 +23,20 @@ from thermospindle.diagnosis.inference.prior import (
     nuisance_root,
     nuisance_variances,
     precision_and_variances,
+)
+from thermospindle.diagnosis.parameters import nuisance as kinds_of
+from thermospindle.diagnosis.parameters.nuisance import (
+    BUILD,
+    DAMPING,
+    DAMPING_DRIFT,
+    DAMPING_DRIFT_SD,
+    DAMPING_SD,
+    DRIFT,
+    EXPANSION,
+    STIFFNESS,
+    STIFFNESS_DRIFT,
+    STIFFNESS_DRIFT_SD,
+    Nuisance,
 )
 from thermospindle.model.machine import Condition
 

@@ -10,13 +10,13 @@ import pytest
 from scipy import optimize
 
 from tests.virtual_campaign import drawn, effect, fitted, mode_campaign, model_of, virtual_campaign
-from thermospindle.diagnosis.forward.mechanism import asked_at, variants, with_own_laws
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import AFAR, TEMPERS, _from_afar, _settled, fit
 from thermospindle.diagnosis.inference.freeform import free_forms
 from thermospindle.diagnosis.inference.hypothesis import scan
 from thermospindle.diagnosis.inference.prior import steady
 from thermospindle.diagnosis.inference.problem import Linearisation, Problem
+from thermospindle.diagnosis.parameters.mechanism import asked_at, variants, with_own_laws
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
 from thermospindle.sim.operating import operating_point

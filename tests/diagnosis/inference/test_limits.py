@@ -11,15 +11,15 @@ from scipy.stats import norm
 
 from tests.diagnosis.inference.toy import toy
 from tests.virtual_campaign import effect
-from thermospindle.diagnosis.forward.mechanism import variants
-from thermospindle.diagnosis.forward.nuisance import (
+from thermospindle.diagnosis.inference.evidence import Learned, amplitudes_apart, evidence
+from thermospindle.diagnosis.inference.fit import Held
+from thermospindle.diagnosis.inference.gaussian import impossible, opposite
+from thermospindle.diagnosis.parameters.mechanism import variants
+from thermospindle.diagnosis.parameters.nuisance import (
     DAMPING,
     DRIFT,
     STIFFNESS,
 )
-from thermospindle.diagnosis.inference.evidence import Learned, amplitudes_apart, evidence
-from thermospindle.diagnosis.inference.fit import Held
-from thermospindle.diagnosis.inference.gaussian import impossible, opposite
 from thermospindle.sim.effects.effect import Parameter
 
 

@@ -9,13 +9,13 @@ import pytest
 
 from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, virtual_campaign
 from thermospindle.diagnosis.decision.verdict import decide
-from thermospindle.diagnosis.forward.mechanism import variants
-from thermospindle.diagnosis.forward.nuisance import BUILD, HAMMER, HAMMER_DRIFT, MISS_DRIFT
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.freeform import free_forms
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
 from thermospindle.diagnosis.inference.search import search
+from thermospindle.diagnosis.parameters.mechanism import variants
+from thermospindle.diagnosis.parameters.nuisance import BUILD, HAMMER, HAMMER_DRIFT, MISS_DRIFT
 from thermospindle.model.built.tolerance import deviated
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM

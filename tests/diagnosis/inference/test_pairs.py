@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, virtual_campaign
-from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.inference import pairs
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, fit
@@ -17,6 +16,7 @@ from thermospindle.diagnosis.inference.pairs import exchanged, joined, joined_ea
 from thermospindle.diagnosis.inference.prior import steady
 from thermospindle.diagnosis.inference.screening import Screened
 from thermospindle.diagnosis.inference.singles import Singles, fit_singles
+from thermospindle.diagnosis.parameters.mechanism import variants
 from thermospindle.diagnosis.verdict import diagnose
 from thermospindle.model.machine import Condition
 

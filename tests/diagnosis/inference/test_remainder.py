@@ -12,13 +12,13 @@ import pytest
 from tests.blind.hidden_structure import on_spring
 from tests.virtual_campaign import drawn, effect, model_of, virtual_campaign
 from thermospindle.diagnosis.forward.derivatives import nuisance_jacobian
-from thermospindle.diagnosis.forward.nuisance import RESONANCE, STIFFNESS_DRIFT, Resonance
 from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
 from thermospindle.diagnosis.inference.remainder import by_frequency
 from thermospindle.diagnosis.inference.resonance import _centred, _resonates, moving, shown, with_resonance
+from thermospindle.diagnosis.parameters.nuisance import RESONANCE, STIFFNESS_DRIFT, Resonance
 from thermospindle.diagnosis.verdict import diagnose
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.machine import Condition

@@ -13,8 +13,6 @@ from tests.hand_made_search import mechanism
 from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, virtual_campaign
 from thermospindle.diagnosis.decision.explanations import explanations
 from thermospindle.diagnosis.decision.verdict import decide
-from thermospindle.diagnosis.forward.mechanism import asked_at, variants, with_own_laws
-from thermospindle.diagnosis.forward.nuisance import STIFFNESS
 from thermospindle.diagnosis.inference import hypothesis, singles
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, fit
@@ -26,6 +24,8 @@ from thermospindle.diagnosis.inference.remainder import Overlap
 from thermospindle.diagnosis.inference.screening import Screened, linearised, screen
 from thermospindle.diagnosis.inference.search import Search, _from_the_drawing, _other_ways, _without_what_does_nothing, search
 from thermospindle.diagnosis.inference.singles import FAR, HIDING, Singles, cost_of, fitted_in_steps, lasting
+from thermospindle.diagnosis.parameters.mechanism import asked_at, variants, with_own_laws
+from thermospindle.diagnosis.parameters.nuisance import STIFFNESS
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
 from thermospindle.report.text.diagnosis.answer import told_values

@@ -8,8 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 from scipy.stats import multivariate_normal
 
-from thermospindle.diagnosis.forward.mechanism import REFERENCE_DEPARTURE, REFERENCE_WIDTH, Mechanism, size_covariance
-from thermospindle.diagnosis.forward.nuisance import (
+from thermospindle.diagnosis.inference.fit import Fit
+from thermospindle.diagnosis.inference.prior import AGEING
+from thermospindle.diagnosis.parameters.mechanism import REFERENCE_DEPARTURE, REFERENCE_WIDTH, Mechanism, size_covariance
+from thermospindle.diagnosis.parameters.nuisance import (
     BUILD,
     DAMPING,
     DAMPING_SD,
@@ -20,8 +22,6 @@ from thermospindle.diagnosis.forward.nuisance import (
     TEMPERATURE,
     Nuisance,
 )
-from thermospindle.diagnosis.inference.fit import Fit
-from thermospindle.diagnosis.inference.prior import AGEING
 from thermospindle.model.machine import Condition
 from thermospindle.sim.effects.effect import Effect, Parameter
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from tests.virtual_campaign import drawn, effect, model_of, virtual_campaign
-from thermospindle.diagnosis.forward import nuisance as kinds_of
-from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.screening import screen, visibilities
+from thermospindle.diagnosis.parameters import nuisance as kinds_of
+from thermospindle.diagnosis.parameters.mechanism import variants
 from thermospindle.diagnosis.prediction import detectable
 from thermospindle.diagnosis.prediction.detectable import ASKED, smallest, visibility
 from thermospindle.model.machine import Condition

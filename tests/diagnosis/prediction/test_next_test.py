@@ -10,11 +10,11 @@ import pytest
 
 from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, virtual_campaign
 from thermospindle.diagnosis.decision.explanations import Candidate
-from thermospindle.diagnosis.forward.mechanism import variants
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.problem import Problem
+from thermospindle.diagnosis.parameters.mechanism import variants
 from thermospindle.diagnosis.prediction import next_test
 from thermospindle.diagnosis.prediction.forecast import ModePrediction, Standing, covariance, forecast, standing
 from thermospindle.diagnosis.prediction.next_test import _weighed, next_tests, of_both, planned

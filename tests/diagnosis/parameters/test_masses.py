@@ -11,9 +11,10 @@ from tests.conftest import ROOT
 from tests.virtual_campaign import effect, model_of, virtual_campaign
 from thermospindle.diagnosis.decision.verdict import decide
 from thermospindle.diagnosis.forward.linear import mass_changes
-from thermospindle.diagnosis.forward.mechanism import variants
-from thermospindle.diagnosis.forward.nuisance import GYRATION, MASSES, mass_terms
 from thermospindle.diagnosis.inference.search import search
+from thermospindle.diagnosis.parameters.masses import GYRATION, mass_terms
+from thermospindle.diagnosis.parameters.mechanism import variants
+from thermospindle.diagnosis.parameters.nuisance import MASSES
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.chain import matrices, motion_rows
 from thermospindle.model.scene.reading import load

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from thermospindle.diagnosis.forward.reference import ReferenceModes
+from thermospindle.diagnosis.parameters.reference import ReferenceModes
 
 OMEGA = 2 * np.pi * np.array([700.0, 705.0, 1500.0, 1900.0, 4000.0, 7000.0])
 SEEN = 4

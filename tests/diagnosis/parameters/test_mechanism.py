@@ -9,11 +9,11 @@ import pytest
 
 from tests.conftest import ROOT
 from tests.virtual_campaign import mode_campaign, model_of, virtual_campaign
-from thermospindle.diagnosis.forward.mechanism import Mechanism, likeness, size_covariance, strongest, variants, with_own_laws
-from thermospindle.diagnosis.forward.nuisance import RECORD
 from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.inference.freeform import alike, as_told_by, free_forms
 from thermospindle.diagnosis.inference.problem import Problem
+from thermospindle.diagnosis.parameters.mechanism import Mechanism, likeness, size_covariance, strongest, variants, with_own_laws
+from thermospindle.diagnosis.parameters.nuisance import RECORD
 from thermospindle.model.machine import Addition, Condition
 from thermospindle.model.rotor.chain import motion_rows
 from thermospindle.model.scene.reading import load

@@ -10,9 +10,9 @@ import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.mode_table import TestData
-from thermospindle.diagnosis.forward import nuisance as kinds_of
-from thermospindle.diagnosis.forward.nuisance import Nuisance
-from thermospindle.diagnosis.forward.reference import ReferenceModes
+from thermospindle.diagnosis.parameters import nuisance as kinds_of
+from thermospindle.diagnosis.parameters.nuisance import Nuisance
+from thermospindle.diagnosis.parameters.reference import ReferenceModes
 from thermospindle.model.types import Array, Integers
 
 Discrepancies = tuple[Integers, Integers, Integers, Array]
