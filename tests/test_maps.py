@@ -2,6 +2,7 @@
 
 import ast
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -27,3 +28,9 @@ def test_no_room_is_crowded(package):
 
 def test_the_walk_sees_packages():
     assert len(PACKAGES) > 20
+
+
+def test_the_wheel_has_every_package():
+    told = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]["packages"]
+    there = {".".join(("thermospindle", *p.relative_to(ROOT).parts)) for p in PACKAGES}
+    assert set(told) == there | {"thermospindle", "thermospindle.scenes"}
