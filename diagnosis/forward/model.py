@@ -120,11 +120,11 @@ class CampaignModel:
         if len(self._points) > 6 * len(self.tests):
             self._points.clear()
         every = [*self._otherwise_than_drawn(t, x), *self.present, *effects]
-        late = self._points[key] = acted_on(self._settled(t, x, every, (at, _asking(effects, SETTLING))), every)
+        late = self._points[key] = acted_on(self._with_settled_rings(t, x, every, (at, _asking(effects, SETTLING))), every)
         late.chain  # noqa: B018 - worked out here, so that errors come here
         return late
 
-    def _settled(self, t: int, x: Array, every: Applied, key: tuple) -> OperatingPoint:
+    def _with_settled_rings(self, t: int, x: Array, every: Applied, key: tuple) -> OperatingPoint:
         """The rings of test `t` in equilibrium under all that acts."""
         if key not in self._equilibria:
             if len(self._equilibria) > 6 * len(self.tests):

@@ -116,51 +116,79 @@ def _from_afar(problem: Problem, p: Array, first: float) -> Sequence[float]:
     return before[near[-1] :] if far > 1.0 and near else ()
 
 
+@dataclass(frozen=True)
+class _Pace:
+    """How the next step is taken: how stiff, how much stiffer after a refusal, how far derivatives are believed, and how short it is after steps that were `refused` one after the other."""
+
+    damping: float = LEAST_DAMPING
+    growth: float = 2.0
+    longest: float = LONGEST
+    refused: int = 0
+    trusted: float = np.inf
+
+    def unshortened(self) -> _Pace:
+        """Where shorter steps lead nowhere."""
+        return replace(self, refused=SHORTENED, trusted=np.inf)
+
+    def shorter(self, length: float) -> _Pace:
+        return replace(self, refused=self.refused + 1, trusted=length / SHORTER)
+
+    def longer(self) -> _Pace:
+        return replace(self, refused=0, trusted=2 * self.trusted)
+
+    def looser(self, kept: float) -> _Pace:
+        """After a step that kept so much of what it promised (Madsen et al., algorithm 3.16)."""
+        return replace(self, damping=self.damping * max(1 / 3, 1 - (2 * min(kept, 1.0) - 1) ** 3), growth=2.0)
+
+    def stiffer(self) -> _Pace:
+        return replace(self, damping=max(2.5 * self.growth * self.damping, RAISED_DAMPING), growth=2 * self.growth, trusted=np.inf)
+
+
 def _settled(problem: Problem, p: Array, rates: Rates, temper: float, beaten: float) -> tuple[Array, Linearisation, Sequence[Array], Rates]:
     """Levenberg-Marquardt steps at one temper until the cost stands still, damped as in Madsen, Nielsen & Tingleff, *Methods for Non-Linear Least
     Squares Problems*, 2004, algorithm 3.16. Derivatives are taken anew only where a step does not do what it promises, or gains little; at the last temper the
-    rates too, for the cost stands still where the gradient is right."""
+    rates too, for the cost stands still where the gradient is right. There a step that is refused is shortened before it is made stiffer."""
     last, count = temper == 1.0, sum(d.count for d in problem.model.tests)
     lines = problem.linearisation(p, rates)
-    here = Point(p, lines.residuals, problem.cost(p, temper, lines.residuals))
-    current, rated, damping, growth, longest = True, not last, LEAST_DAMPING, 2.0, LONGEST  # lines, and rates, of this very point
-    refused, trusted = 0, np.inf  # steps one after the other, and the length of the next
+    here, pace = Point(p, lines.residuals, problem.cost(p, temper, lines.residuals)), _Pace()
+    current, rated = True, not last  # lines, and rates, of this very point
     for _ in range(MOST_STEPS[last]):
         gradient, normal = lines.slope(problem, here, temper), temper**2 * lines.information + problem.precision
         damped = np.diag(temper**2 * np.diag(lines.information) + problem.least_stiff)  # not what is stiff only with all others held
-        move = problem.step(here.p, gradient, normal + damping * damped, min(longest, trusted))
-        hoped = promised(gradient, normal, move)
-        exact, limited = current and rated, problem.length_of(move) > 0.99 * trusted
+        move = problem.step(here.p, gradient, normal + pace.damping * damped, min(pace.longest, pace.trusted))
+        length, hoped = problem.length_of(move), promised(gradient, normal, move)
+        exact, limited = current and rated, length > 0.99 * pace.trusted
         if hoped < ENOUGH and exact:
             if not limited:
                 break
-            refused, trusted = SHORTENED, np.inf  # shorter steps lead nowhere
+            pace = pace.unshortened()
             continue
         there, corrected = problem.at(here.p + move, temper), False
         if current and there.residuals is not None and here.cost - there.cost < KEPT * hoped:
-            stiff = normal + max(damping, RAISED_DAMPING) * damped
+            stiff = normal + max(pace.damping, RAISED_DAMPING) * damped
             best = _corrected(problem, lines, stiff, temper, there)
             there, corrected = best, best is not there
         gained = here.cost - there.cost
         if gained < POOR * hoped:
-            longest = LONGEST
-        elif gained > KEPT * hoped and not corrected and problem.length_of(move) > 0.99 * longest:
-            longest *= 2
-        no_nearer = last and gained < NO_NEARER * (here.cost - beaten)
+            pace = replace(pace, longest=LONGEST)
+        elif gained > KEPT * hoped and not corrected and length > 0.99 * pace.longest:
+            pace = replace(pace, longest=2 * pace.longest)
         enough = max(ENOUGH, ENOUGH_FAR * (here.cost - count)) if last else max(1.0, ENOUGH_EARLY * here.cost)
+        no_nearer = last and gained < NO_NEARER * (here.cost - beaten)
+        shortens = last and exact and pace.refused < SHORTENED
         if gained > 0:
-            here, growth = there, 2.0
-            damping *= max(1 / 3, 1 - (2 * min(gained / hoped, 1.0) - 1) ** 3)
-            bent = last and exact and gained < min(POOR * hoped, enough) and refused < SHORTENED  # it may go on in shorter steps
-            if (gained < enough and (exact or not last) and not (last and (bent or limited))) or (no_nearer and current):
+            here = there
+            bent = shortens and gained < min(POOR * hoped, enough)  # it may go on in shorter steps
+            rests = gained < enough and (exact and not bent and not limited if last else True)
+            if rests or (no_nearer and current):
                 break
-            refused, trusted = (refused + 1, problem.length_of(move) / SHORTER) if bent else (0, 2 * trusted)
-        elif exact and last and refused < SHORTENED:
-            refused, trusted = refused + 1, problem.length_of(move) / SHORTER
+            pace = pace.looser(gained / hoped)
+            pace = pace.shorter(length) if bent else pace.longer()
+        elif shortens:
+            pace = pace.shorter(length)
         elif exact:
-            trusted = np.inf
-            damping, growth = max(2.5 * growth * damping, RAISED_DAMPING), 2 * growth
-            if growth > MOST_GROWTH:
+            pace = pace.stiffer()
+            if pace.growth > MOST_GROWTH:
                 break
         poor = (corrected and gained > 0) or gained < max(TRUSTED * hoped, enough) or no_nearer
         if poor and (gained > 0 or not exact):

@@ -113,12 +113,6 @@ def standard_errors(m: Mechanism, size: float, seen: float) -> float:
     return float(np.sqrt(2 * ASKED + np.log1p((m.size.prior_sd * seen / size) ** 2)))
 
 
-def visibility(model: CampaignModel, about: Fit, learned: Learned, m: Mechanism, size: float) -> float:
-    """Standard errors, as `learned`, that are left of an effect of `size` in all tests after all else is fitted anew beside it; infinite where no spindle
-    can be built with it."""
-    return float(np.sqrt(_fitted_beside(model, about, learned, m, size - m.size.neutral).cost)) / learned.errors
-
-
 def _fitted_beside(model: CampaignModel, about: Fit, learned: Learned, m: Mechanism, size: float, known: Sequence[tuple[float, Point]] = ()) -> Point:
     """All else (P,), beside `about`, fitted to an effect of `size` less its neutral one, of infinite cost where no spindle can be built with it.
 

@@ -14,7 +14,7 @@ from thermospindle.diagnosis.inference.screening import screen, visibilities
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.diagnosis.parameters.mechanism import variants
 from thermospindle.diagnosis.prediction import detectable
-from thermospindle.diagnosis.prediction.detectable import ASKED, smallest, visibility
+from thermospindle.diagnosis.prediction.detectable import ASKED, _fitted_beside, smallest
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
 
@@ -29,6 +29,11 @@ def plain(spindle):
     done = fit(model)
     learned = evidence(model, done).learned
     return model, done, learned, screen(model, done, 1.0, learned, [v for name in NAMES for v in variants(effect(name))], 1)
+
+
+def visibility(model, about, learned, m, size):
+    """Standard errors, as `learned`, that are left of an effect of `size` in all tests after all else is fitted anew beside it."""
+    return float(np.sqrt(_fitted_beside(model, about, learned, m, size - m.size.neutral).cost)) / learned.errors
 
 
 def test_what_is_left_at_the_smallest_size_is_worth_what_is_asked(plain):
