@@ -2,8 +2,8 @@
 
 The residuals are those of `compare` (frequencies and dampings in standard errors, with their correlations, a missing mode as an error of
 `BELIEVABLE`), over the tests that are fitted; every parameter has its prior beside them, so what the tests do not tell stays where it is
-expected. Least squares in a trust region within limits: Branch, Coleman, Li, *SIAM J. Sci. Comput.* 21 (1999) 1-23. No model discrepancy is
-granted, and effects keep their law: for whether an effect is there at all `diagnose` is the tool.
+expected. Least squares in a rectangular trust region within limits, on one of which it may begin: Voglis & Lagaris, WSEAS Int. Conf. Appl. Math. (2004); one that is scaled by
+how far limits are (Branch, Coleman, Li, *SIAM J. Sci. Comput.* 21 (1999) 1-23) leads nowhere from there. No model discrepancy is granted, and effects keep their law: for whether an effect is there at all `diagnose` is the tool.
 """
 
 from __future__ import annotations
@@ -89,7 +89,6 @@ def fit(
             columns.append((residuals(moved) - here) / (moved[i] - z[i]))
         return np.stack(columns, axis=1)
 
-    inside = np.clip(z0, low + 1e-9 * (high - low), high - 1e-9 * (high - low))
-    found = least_squares(residuals, inside, jacobian, bounds=(low, high), max_nfev=LONGEST, ftol=NEARLY, xtol=STILL)
+    found = least_squares(residuals, z0, jacobian, bounds=(low, high), method="dogbox", max_nfev=LONGEST, ftol=NEARLY, xtol=STILL)
     error = sd * np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac)))
     return Fitted(named(found.x), {p.name: float(e) for p, e in zip(parameters, error, strict=True)}, int(found.nfev))

@@ -1,4 +1,4 @@
-"""Modes of FRFs that are magnitudes alone: peaks that several of them share, each fitted by one mode."""
+"""Modes of FRFs that are magnitudes alone: peaks that several of them share, or that stand alone, each fitted by one mode."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from thermospindle.sim.identification.modal import scatter
 from thermospindle.sim.importing.measured import Curve, ModeLine
 
 PROMINENCE = 2.0  # of a peak over the valleys beside it, as a ratio
-SHARED = 0.2  # of the FRFs of a test that must show a peak at one place, two at least where there are several
+SHARED = 0.2  # of the FRFs of a test that show a peak at one place, two at least where there are several, from which it is a mode whatever is near
+ALONE = 2.0  # half-power widths from other modes, beyond which a peak that fewer show is a mode, too, and not one of these on the flank of another
 TOGETHER = 0.25  # half-power widths between peaks of different FRFs that are one mode's, but one and a half lines at least
 ABOVE_NOISE = 7.0  # standard deviations of the lines' own scatter, by which a peak stands over the valleys beside it
 AROUND = 12  # lines on each side of a peak that its fit sees at least
@@ -28,7 +29,8 @@ def from_peaks(curves: Sequence[Curve], speed: float) -> tuple[list[ModeLine], l
     Frequency and damping are the medians over these FRFs, standard errors their scatter over the root of their number, 0.05 of a line at
     least; of a peak in fewer than three FRFs those of the fit, and 0.05 half-power widths at least, and such a peak has a damping or is none.
     What is one peak is told by half-power widths, not by lines, so that finer lines lose no mode. Shapes and close pairs are beyond magnitudes.
-    At a speed (rad/s) peaks at its multiples are no modes: the notes name them.
+    At a speed (rad/s) peaks at its multiples are no modes: the notes name them, and what is left out because
+    few FRFs show it near another mode.
     """
     found: list[ModeLine] = []
     step = float(np.median(np.diff(curves[0].frequency)))
@@ -47,18 +49,28 @@ def from_peaks(curves: Sequence[Curve], speed: float) -> tuple[list[ModeLine], l
         else:
             own.append(mode)
     least = max(min(2, len(curves)), SHARED * len(curves))
-    modes, harmonics, turning = [], [], abs(speed) / (2 * np.pi)
-    for group in groups:
-        if len(group) < least or (len(group) < 3 and any(m.damping_ratio is None for m in group)):  # one spike of noise has no width
-            continue
+    modes, harmonics, unsure, turning = [], [], [], abs(speed) / (2 * np.pi)
+    for group in sorted(groups, key=lambda g: len(g) < least):  # those that enough FRFs share first
         mode = _median(group, step)
         nearest = turning * max(round(mode.frequency / turning), 1) if turning else -np.inf
+        if len(group) < 3 and any(m.damping_ratio is None for m in group):  # one spike of noise has no width
+            continue
         if abs(mode.frequency - nearest) <= step:
             harmonics.append(f"{mode.frequency:.5g}")
+        elif len(group) < least and any(abs(mode.frequency - m.frequency) < ALONE * max(_width(mode), _width(m)) for m in modes):
+            unsure.append(f"{mode.frequency:.5g}")
         else:
             modes.append(mode)
-    which = f"the peak at {harmonics[0]} Hz is a multiple of the running speed, no mode" if len(harmonics) == 1 else f"peaks at {', '.join(harmonics)} Hz are multiples of the running speed, no modes"
-    return modes, [f"{curves[0].file.name}: {which}"] if harmonics else []
+    notes, name = [], curves[0].file.name
+    if harmonics:
+        notes.append(f"{name}: {_peaks(harmonics, 'a multiple of the running speed, no mode', 'multiples of the running speed, no modes')}")
+    if unsure:
+        notes.append(f"{name}: {_peaks(unsure, 'left out', 'left out')}: too few of its FRFs show it there, and another mode is near")
+    return sorted(modes, key=lambda m: m.frequency), notes
+
+
+def _peaks(at: Sequence[str], one: str, several: str) -> str:
+    return f"the peak at {at[0]} Hz is {one}" if len(at) == 1 else f"peaks at {', '.join(at)} Hz are {several}"
 
 
 def _median(group: Sequence[ModeLine], step: float) -> ModeLine:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.conftest import SCENE
+from tests.conftest import DATA, SCENE
 from thermospindle.diagnosis.compare.compare import compare
 from thermospindle.diagnosis.compare.fit import Free, fit
 from thermospindle.diagnosis.data.observe import observe
@@ -76,6 +76,17 @@ def test_limits_hold(campaign, observed, spindle):
     found = fit([Free("hub mass", 0.0, 0.0, 0.5, (-0.001, 0.001))], lambda v: deviated(spindle, v), campaign, observed)
     assert -0.001 <= found.value["hub mass"] <= 0.001
     assert abs(found.value["hub mass"]) > 0.00099, "the paper's spindle asks for more than so little"
+
+
+@pytest.mark.parametrize("start", [0.0, 12.5])
+def test_a_fit_that_begins_on_a_limit_goes_as_far(spindle, start):
+    foreign = read_campaign(DATA / "foreign_bond")
+
+    def built(values):
+        return replace(spindle, effects=(Addition("bond_softening", values),))
+
+    found = fit([Free("hot_compliance", start, 0.0, 12.5, (0.0, 100.0))], built, foreign, observe(foreign, spindle), [t.id for t in foreign.tests[3:]])
+    assert found.value["hot_compliance"] == pytest.approx(23.6, abs=0.1)  # of tests up to 40 C; of all, 12.3
 
 
 def test_nothing_to_fit_or_to_fit_to_is_an_error(campaign, observed, spindle):

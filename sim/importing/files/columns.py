@@ -201,6 +201,9 @@ def _value(file: Path, parts: Mapping[str, Column], settings: FileForm) -> tuple
     if "complex" in found:
         return np.asarray(found["complex"], complex), []
     if "real" in found and "imaginary" in found:
+        said = {c.role.unit for k in ("real", "imaginary") if (c := parts[k]).role and c.role.unit}
+        if len(said) > 1 and settings.unit is None:
+            return None, [Question(file.name, "unit", f"the unit of {name}: their headings say {listed(sorted(said))}")]
         return found["real"].real + 1j * found["imaginary"].real, []
     if "real" in found or "imaginary" in found:
         missing = "imaginary" if "real" in found else "real"

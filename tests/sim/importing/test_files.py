@@ -187,6 +187,16 @@ def test_phases_that_look_like_another_unit_than_their_heading_are_asked(tmp_pat
     np.testing.assert_allclose(frf.value, FRF.value, rtol=1e-8)
 
 
+def test_parts_of_one_FRF_in_two_units_are_asked(tmp_path):
+    """Settled by one key; before, the unit of the real part was taken for both."""
+    heads, found = columns("real", "(m/s)/N")
+    assert sum("imag" in h for h in heads) > 1
+    file = table(tmp_path / "T20.csv", ["Frequency [Hz]", *(h.replace("(m/s)/N", "m/N") if "imag" in h else h for h in heads)], [FREQUENCY, *found])
+    with pytest.raises(BadInput, match=r"unit: the unit of .*: their headings say \(m/s\)/N, m/N"):
+        imported(tmp_path, "", file)
+    np.testing.assert_allclose(imported(tmp_path, '[[files]]\nfile = "T20.csv"\nunit = "(m/s)/N"\n', file).value, FRF.value, rtol=1e-8)
+
+
 def test_a_sweep_in_uneven_steps(tmp_path):
     """Lines of a logarithmic sweep are kept as they are, through the campaign's file too; a conjugated one is refused as any other."""
     lines = np.geomspace(400.0, 700.0, 400)

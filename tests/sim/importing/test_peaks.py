@@ -53,3 +53,21 @@ def test_noise_makes_no_modes_on_fine_lines(cold: OperatingPoint, step: float) -
     modes, _ = from_peaks(magnitudes(cold, step, 7, noise=0.03), 0.0)
     assert modes[0].frequency == pytest.approx(CLEAR[0], abs=1.0)
     assert all(min(abs(m.frequency - f) for f in CLEAR) < 10.0 for m in modes)
+
+
+def test_a_peak_that_one_FRF_alone_shows_is_a_mode_where_no_other_is_near(cold: OperatingPoint) -> None:
+    """More FRFs show no fewer modes: one mode in all of three, another in the first alone; and one beside the first mode in one alone is left out, and named."""
+    lines = np.arange(400.0, 3000.0, 1.0)
+
+    def single(f0: float, damping: float = 0.01) -> np.ndarray:
+        return 1 / (1 - (lines / f0) ** 2 + 2j * damping * lines / f0)
+
+    with_another = single(800.0) + 0.5 * single(2000.0)
+    beside = 0.05 * single(800.0) + single(815.0)
+    curves = [Curve(Path("T20.csv"), "", End(k), End(1), lines, np.abs(v)) for k, v in enumerate((with_another, single(800.0), single(800.0), beside), 1)]
+    modes, notes = from_peaks(curves[:3], 0.0)
+    assert [m.frequency for m in modes] == pytest.approx([800.0, 2000.0], abs=1.0)
+    assert not notes
+    modes, notes = from_peaks(curves, 0.0)
+    assert [m.frequency for m in modes] == pytest.approx([800.0, 2000.0], abs=1.0)
+    assert notes == ["T20.csv: the peak at 815.27 Hz is left out: too few of its FRFs show it there, and another mode is near"]
