@@ -97,10 +97,10 @@ def sprung(chain: RotorBase, names: Sequence[str], rate: float, mass: float) -> 
     """
     own = [e for e in chain.elements if e.name in names]
     if mass > 0.0:
-        body, first = chain.body(own[0].b), own[0]
+        first = own[0]
         ring = Body(f"{first.name} sprung ring", mass, (0.0, 0.0, 0.0), first.z, ("z",), False, ())
         stiffness = np.diag([0.0, 0.0, rate, 0.0, 0.0])
-        spring = Element(f"{first.name} preload spring", "bearings", body.name, ring.name, first.z, stiffness, np.zeros((5, 5)))
+        spring = Element(f"{first.name} preload spring", "bearings", first.b, ring.name, first.z, stiffness, np.zeros((5, 5)))
         elements = [replace(e, slides=ring.name) if e.name in names else e for e in chain.elements]
         return replace(chain, bodies=(*chain.bodies, ring), elements=(*elements, spring))
     if len(own) > 1:

@@ -49,7 +49,8 @@ def from_peaks(curves: Sequence[Curve], speed: float) -> tuple[list[ModeLine], l
         else:
             own.append(mode)
     least = max(min(2, len(curves)), SHARED * len(curves))
-    modes, harmonics, unsure, turning = [], [], [], abs(speed) / (2 * np.pi)
+    modes: list[ModeLine] = []
+    harmonics, unsure, turning = [], [], abs(speed) / (2 * np.pi)
     for group in sorted(groups, key=lambda g: len(g) < least):  # those that enough FRFs share first
         mode = _median(group, step)
         nearest = turning * max(round(mode.frequency / turning), 1) if turning else -np.inf

@@ -16,6 +16,7 @@ from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.chain import Element, RotorBase, matrices, motion_rows, rotor_base
+from thermospindle.model.rotor.chain import sprung as on_a_spring
 from thermospindle.model.rotor.elements import ELEMENTS
 from thermospindle.model.rotor.modes import frf, group_energy, modes, point_rows, poles
 from thermospindle.model.scene.reading import load
@@ -284,3 +285,16 @@ def test_an_impossible_inertia_is_refused_and_not_clipped(spindle, cold):
     chain = rotor_base(spindle, cold)
     with pytest.raises(ValueError, match=r"'hub' turns and has inertia .* which no body has"):
         mjcf.chain_spec(replace(chain, bodies=tuple(odd if b is hub else b for b in chain.bodies)), 1e-6)
+
+
+@pytest.mark.parametrize("outer", ["housing", "ground"])
+def test_a_ring_on_its_spring_may_slide_on_what_stands_still(outer):
+    """A shaft of 2 kg on a bearing whose ring of 0.1 kg slides on a spring: two masses and two springs in a row, whatever carries the spring; the ground is no body."""
+    bodies = [Body("shaft", 2.0, (1.0, 1.0, 1.0), 0.0, ("z",), False, ())]
+    if outer != "ground":
+        bodies.append(Body(outer, 1.0, (1.0, 1.0, 1.0), 0.0, (), False, ()))
+    bearing = Element("b", "bearings", "shaft", outer, 0.0, np.diag([0.0, 0.0, 5e7, 0.0, 0.0]), np.zeros((5, 5)))
+    found = matrices(on_a_spring(RotorBase(tuple(bodies), (bearing,), 0.0), ["b"], 1e6, 0.1))
+    assert found.dofs == (("shaft", "z"), ("b sprung ring", "z"))
+    assert found.mass == pytest.approx(np.diag([2.0, 0.1]))
+    assert found.stiffness == pytest.approx(np.array([[5e7, -5e7], [-5e7, 5.1e7]]))

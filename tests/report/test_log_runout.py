@@ -18,11 +18,12 @@ from thermospindle.model.bearing.kinematics import row_kinematics
 from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
-from thermospindle.model.units import TO_MM
+from thermospindle.model.scene.reading import load
+from thermospindle.model.units import RPM, TO_MM
 from thermospindle.report.figures.runout import RANGE, motion_figure, polar_figure, spectrum_figure, waterfall_figure
 from thermospindle.report.log.read import read_log
 from thermospindle.report.log.told import describe
-from thermospindle.report.log.turning.runout import log_signals, orbit_pieces, write_runout_log
+from thermospindle.report.log.turning.runout import log_signals, orbit_pieces, rolling_elements, write_runout_log
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.posing import cage_turns, frame_indices, turning_poses
 from thermospindle.sim.running.runout import X, Y, runout, with_imperfections
@@ -120,6 +121,22 @@ def test_balls_go_round_with_the_cage(record):
     time = record.signals.time[frame_indices(record)]
     assert (turned[-1] - turned[0]) / (time[-1] - time[0]) == pytest.approx(kin.cage, rel=1e-9)
     assert kin.cage / (2 * np.pi) == pytest.approx(69.44, abs=0.01)
+
+
+def test_rollers_are_drawn_row_by_row_and_go_round_with_their_cage(tmp_path):
+    """The tailstock stands on two rows of rollers in front, and on balls behind: its record once ended in a StopIteration."""
+    point = operating_point(load("tailstock"), Condition(20.0, 1500 * RPM))
+    made = runout(point, 0.1, path="linear")
+    [rollers] = point.spindle.roller_bearings
+    kind, drawn = rolling_elements(rollers)
+    centres = drawn.centers.as_arrow_array().flatten().to_numpy().reshape(-1, 3)
+    assert kind == "rollers"
+    assert len(centres) == rollers.rows * rollers.rollers
+    assert sorted({round(float(z), 3) for z in centres[:, 2]}) == pytest.approx(sorted(TO_MM * (rollers.z + o) for o in rollers.offsets), abs=1e-3)
+    assert np.hypot(*centres[:, :2].T) == pytest.approx(TO_MM * rollers.pitch_diameter / 2)
+    assert set(cage_turns(made)) == {b.name for b in point.spindle.rolling}
+    write_runout_log(made, (), tmp_path / "runout.rrd")
+    read_log(tmp_path / "runout.rrd")
 
 
 def test_the_orbit_grows_without_gaps(record):

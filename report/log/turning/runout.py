@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 
+from thermospindle.model.bearing.definitions import Bearing, RollerBearing
 from thermospindle.model.rotor.look import stripe_meshes
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM, TO_MM, TO_NM
@@ -99,16 +100,29 @@ def log_model(recording: rr.RecordingStream, runout: Runout, moved: dict[str, tu
         recording.send_columns(at("model", body), [time], rr.Transform3D.columns(translation=translation, quaternion=turn))
         for mesh in (*meshes, *(s for s in stripes if s.body == body)):
             log_mesh(recording, at("model", body, mesh.region), mesh)
-    for name, turn in cage_turns(runout).items():
-        bearing = spindle.bearing(name)
-        azimuth = 2 * np.pi * np.arange(bearing.balls) / bearing.balls
-        centres = TO_MM * np.stack(
-            [bearing.pitch_diameter / 2 * np.cos(azimuth), bearing.pitch_diameter / 2 * np.sin(azimuth), 0 * azimuth + bearing.z], axis=1
-        )
-        entity = at("model", f"balls of {name} bearing")
-        recording.send_columns(entity, [time], rr.Transform3D.columns(quaternion=turn))
-        balls = rr.Ellipsoids3D(centers=centres, radii=[TO_MM * bearing.ball_diameter / 2] * bearing.balls, colors=[BALL], fill_mode="solid")
-        recording.log(at("model", f"balls of {name} bearing", "balls"), balls, static=True)
+    turned = cage_turns(runout)
+    for bearing in spindle.rolling:
+        if bearing.name not in turned:
+            continue
+        kind, drawn = rolling_elements(bearing)
+        entity = f"{kind} of {bearing.name} bearing"
+        recording.send_columns(at("model", entity), [time], rr.Transform3D.columns(quaternion=turned[bearing.name]))
+        recording.log(at("model", entity, kind), drawn, static=True)
+
+
+def rolling_elements(bearing: Bearing | RollerBearing) -> tuple[str, rr.Ellipsoids3D | rr.Cylinders3D]:
+    """What a bearing's rolling elements are called, and they themselves where they are at first, in mm."""
+    azimuth = 2 * np.pi * np.arange(bearing.balls) / bearing.balls
+
+    def centres(z: float) -> Array:
+        return TO_MM * np.stack([bearing.pitch_diameter / 2 * np.cos(azimuth), bearing.pitch_diameter / 2 * np.sin(azimuth), 0 * azimuth + z], axis=1)
+
+    radius = TO_MM * bearing.ball_diameter / 2
+    if isinstance(bearing, RollerBearing):
+        every = np.concatenate([centres(bearing.z + offset) for offset in bearing.offsets])
+        lengths = [TO_MM * bearing.roller_length] * bearing.elements
+        return "rollers", rr.Cylinders3D(centers=every, radii=[radius] * bearing.elements, lengths=lengths, colors=[BALL], fill_mode="solid")
+    return "balls", rr.Ellipsoids3D(centers=centres(bearing.z), radii=[radius] * bearing.balls, colors=[BALL], fill_mode="solid")
 
 
 def log_numbers(recording: rr.RecordingStream, runout: Runout) -> None:
