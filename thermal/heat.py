@@ -214,7 +214,8 @@ def _agreed(
         try:
             nodal = cold + _bearing_heat(model, model.bearing @ cold, response @ model.bearing.T, last) @ response
         except OutsideRange as error:
-            raise OutsideRange(f"{error}; {back:.0%} of a load that is added there comes back through its heat, and 100% is runaway" if back > 0.5 else str(error)) from None
+            near = f"it runs away, or nearly: of a load that is added {back:.0%} come back through its heat, and at 100% there is no steady state; on the way " if back > 0.5 else ""
+            raise OutsideRange(f"{near}{error}") from None
         if np.abs(nodal).max() > RUNAWAY:
             back = 1.0
             break

@@ -11,6 +11,7 @@ from thermospindle.model import sense
 from thermospindle.model.bearing.definitions import ToldAngle
 from thermospindle.model.bearing.pair import joined
 from thermospindle.model.bearing.roller import RollerState
+from thermospindle.model.errors import listed
 from thermospindle.model.machine import Condition, LinearBearing
 from thermospindle.model.pressure import OF_BALLS, OF_ROLLERS, pressures
 from thermospindle.model.units import MM, RPM
@@ -76,18 +77,29 @@ def _soft(found: Looked) -> Iterator[str]:
 
 
 def _preload(found: Looked) -> Iterator[str]:
+    yield from (f"bearing {b.name} carries nothing at the reference temperature, at rest" for b in found.reference.state.bearings if not b.in_contact)
     for state in (found.hot, found.turning):
         if isinstance(state, str):
             if state:
                 yield f"no state {state}"
             continue
         where = f"at {state.condition.temperature:g} C" + (f" and {state.condition.speed / RPM:.0f} rpm" if state.condition.speed else "")
-        pairs = [(b, state.state.bearing(b.name)) for b in found.reference.state.bearings]
+        pairs = [(b, state.state.bearing(b.name)) for b in found.reference.state.bearings if b.in_contact]
         yield from (f"bearing {b.name} loses contact {where}" for b, now in pairs if not now.in_contact)
         for what, far in (("less than half", lambda ratio: ratio < 0.5), ("more than twice", lambda ratio: ratio > 2.0)):
             moved = [f"{b.name} {now.preload:.3g} of {b.preload:.3g} N" for b, now in pairs if now.in_contact and far(now.preload / b.preload)]
             if moved:
                 yield f"{where} the preload is {what} that of the reference: {', '.join(moved)}"
+
+
+def _half_sprung(found: Looked) -> Iterator[str]:
+    """Rows that are loaded the same way, of which the spring moves some."""
+    for s in found.spindle.sets:
+        own = [found.spindle.bearing(n) for n in s.bearings]
+        on = {b.name for b in own if s.spring is not None and b.name in s.spring.rings_of}
+        beside = [b.name for b in own if b.name not in on and any(b.sense == found.spindle.bearing(n).sense for n in on)]
+        if beside:
+            yield f"set {s.name}: {listed(beside)} {'is' if len(beside) == 1 else 'are'} loaded the same way as {listed(sorted(on))}, and only the latter on the spring; sprung_bearings names all rows whose rings slide together"
 
 
 def _pressed(found: Looked) -> Iterator[str]:
@@ -149,4 +161,4 @@ def _constant(b: LinearBearing) -> bool:
     return len(b.temperature) * len(b.speed) == 1
 
 
-OF_BEARINGS: tuple[Callable[[Looked], Iterator[str]], ...] = (_loose, _same_place, _contacts, _angles, _soft, _preload, _pressed, _pushed, _sense, _tables)
+OF_BEARINGS: tuple[Callable[[Looked], Iterator[str]], ...] = (_loose, _same_place, _contacts, _angles, _soft, _preload, _half_sprung, _pressed, _pushed, _sense, _tables)

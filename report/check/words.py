@@ -27,12 +27,16 @@ def sentences(values: Mapping[str, Any]) -> list[str]:
     """What the whole is, in a few sentences."""
     turning, standing = values["parts"]["turning"], values["parts"]["standing"]
     low, high = values["temperature_range_C"]
+    geared = {name: r for kind in ("shafts", "bodies") for name, p in values[kind].items() if (r := p["speed_ratio"]) not in (0.0, 1.0)}
+    turning = [f"{name} (at {geared[name]:g} times the spindle's speed)" if name in geared else name for name in turning]
     found = [f"Turning: {listed(turning) or 'nothing'}" + (f" ({values['turning_mass_kg']:.4g} kg)" if turning else "") + f". Standing: {listed(standing) or 'the ground alone'}."]
     for name, s in values["sets"].items():
         slides = f"; the rings of {listed(s['sprung'])} slide on {_spring(s)}" if s["sprung"] else ""
         found.append(f"Set {name}: {listed(s['bearings'])}, {s['arrangement']}, preload {s['preload_N']:g} N, {s['kind']}{slides}.")
     if values["sets"]:
         found.append(f"Balls with {values['ball_inertia']:.0%} of their inertia." if values["ball_inertia"] else "Balls without inertia: speed changes no bearing.")
+    if values["bearings"] and turning and "ring_growth" not in values["effects"]["of_the_scene"] + list(values["effects"]["nothing_to_act_on"]):
+        found.append("Rings do not grow by their own rotation; the effect ring_growth takes that in.")
     found += [_rollers(name, b) for name, b in values["bearings"].items() if b["kind"] == "roller row"]
     if values["axial_load_N"]:
         found.append(f"External axial load {values['axial_load_N']:g} N along z.")
@@ -61,7 +65,7 @@ def grids(values: Mapping[str, Any]) -> list[tuple[str, list[str], list[list[str
     bearings = [
         [
             name, f"{b['z_mm']:g}", f"{b['inner_on']} - {b['outer_on']}", b.get("sense", "-"),
-            f"{b['preload_N']:.4g}" if "preload_N" in b else "-", f"{b['contact_angle_deg']:.2f}" if "contact_angle_deg" in b else "-",
+            f"{b['preload_N'] + 0.0:.4g}" if "preload_N" in b else "-", f"{b['contact_angle_deg']:.2f}" if "contact_angle_deg" in b else "-",
             f"{b['load_lines_meet_axis_at_mm']:.1f}" if "contact_angle_deg" in b else "-",
             ", ".join(dict.fromkeys(f"{b[f'radial_stiffness{y}_N_per_um']:.4g}" for y in ("", "_y"))), f"{b['axial_stiffness_N_per_um']:.4g}",
         ]
@@ -117,7 +121,7 @@ def _across_axis(s: Mapping[str, Any]) -> str:
 
 
 def _spring(s: Mapping[str, Any]) -> str:
-    return "a constant force" if s["rate_N_per_m"] is None else f"a spring of {s['rate_N_per_m']:g} N/m"
+    return "a constant force, which friction holds in vibration and against what `static` adds" if s["rate_N_per_m"] is None else f"a spring of {s['rate_N_per_m']:g} N/m"
 
 
 def of_words(rows: list[list[str]], k: int) -> bool:

@@ -140,7 +140,8 @@ def show_warmup(console: Console, warmup: Warmup) -> None:
 
 def told(warmup: Warmup) -> str:
     """Where a warm-up ends, what it passes through on the way, and how near to running away it is."""
-    end, first = warmup.steady, first_row(warmup)
+    end, begin = warmup.steady, warmup.moments[0].preload
+    first = max((b.name for b in warmup.spindle.bearings), key=lambda b: abs(end.preload[b] - begin[b]) / max(abs(begin[b]), 1e-9), default=None)
     warm = ", ".join(f"{name} {t:.1f} C" for name, t in end.bearing_temperatures.items()) or f"the hottest region {max(end.temperatures.values()):.1f} C"
     pressed = "" if first is None else f", the preload of {first} goes from {warmup.moments[0].preload[first]:.2f} to {end.preload[first]:.2f} N"
     near = f"it is near runaway, {warmup.feedback:.0%} of a load that is added come back as heat" if warmup.feedback > NEAR else "it does not run away"

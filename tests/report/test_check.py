@@ -62,6 +62,16 @@ def test_the_set_of_five_bearings_is_understood(capsys: pytest.CaptureFixture[st
         assert b["load_lines_meet_axis_at_mm"] == pytest.approx(b["z_mm"] + sense * reach, abs=1e-5)
 
 
+def test_gears_and_rings_that_do_not_grow_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", str(SCENES["five_bearing"])]) == 0
+    assert "Rings do not grow by their own rotation; the effect ring_growth takes that in." in " ".join(capsys.readouterr().out.split())
+    text = SCENES["rotor"].read_text(encoding="utf-8")
+    assert text.count("turns = true") == 2  # the shaft, and its disc
+    (tmp_path / "spindle.toml").write_text(text.replace("turns = true", "turns = true\nspeed_ratio = -1.5"), encoding="utf-8")
+    assert main(["check", str(tmp_path)]) == 0
+    assert "(at -1.5 times the spindle's speed)" in " ".join(capsys.readouterr().out.split())
+
+
 def test_the_key_names_what_is_in_the_picture() -> None:
     """A shaft on bearings given by numbers has nothing that stands, no rigid body and no joint; a machine in its housing has them."""
     words = {}
@@ -184,6 +194,8 @@ ODD = [
     ("free_shaft", "[tolerances]", "[[effects]]\nname = \"preload_loss\"\n[tolerances]", "effect preload_loss: nothing to act on here"),
     ("hdd_2003", 'between = ["seat", "shaft"]', 'between = ["hub", "shaft"]', "joint flange: 'hub' turns and 'shaft' does not"),
     ("hdd", "preload_N = 16.0", "preload_N = 900.0", "under preload and the loads told; balls leave dents from 4200 MPa, the static limit of ISO 76"),
+    ("machine-tool", 'sprung_bearings = ["rear1", "rear2"]', 'sprung_bearings = ["rear1"]', "rear2 is loaded the same way as rear1, and only the latter on the spring"),
+    ("hdd", "reference_temperature_C = 20.0", "axial_load_N = 60.0\nreference_temperature_C = 20.0", "carries nothing at the reference temperature, at rest"),
     ("rotor", "nominal_speed_rpm = 4000.0", "nominal_speed_rpm = 7200.0", "lies at the nominal speed"),
     ("rotor", "outer_mm = [[30, 600]]", "outer_mm = [[30, 300], [150, 300]]", "its diameter jumps from 30 to 150 mm at z_mm = 300"),
 ]  # fmt: skip
