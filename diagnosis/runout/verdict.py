@@ -256,6 +256,7 @@ def _verdict(
         if not np.isfinite(before) or after < FALLS * before
         else ", less than threefold, since the size an imperfection has is known but roughly"
     )
+    beside = f", and no second one beside it gains the {CLEAR:g} that are asked" if pairs else ""
     return answer(
-        "identified", first.effects, f"{first.effects[0]} leads every other explanation by more than {AHEAD:g} in ln evidence{fall}{falls}.", near
+        "identified", first.effects, f"{first.effects[0]} leads every other effect alone by more than {AHEAD:g} in ln evidence{beside}{fall}{falls}.", near
     )

@@ -14,11 +14,13 @@ from thermospindle.diagnosis.runout.compare import LineBeside, RunoutBeside
 from thermospindle.diagnosis.runout.explanation import Explanation
 from thermospindle.diagnosis.runout.moved import MovedLine, leading, moved_lines
 from thermospindle.diagnosis.runout.verdict import RunoutDiagnosis
+from thermospindle.model.machine import Spindle
 from thermospindle.model.units import TO_NM
 from thermospindle.report.figures.common import INK, PALE, STYLE, cells, label, logarithmic, residual_bar, residual_norm, spread
 from thermospindle.report.figures.diagnosis import NAMED, OTHER, evidence_bars
 from thermospindle.report.figures.runout import BAND, REPEATS
-from thermospindle.report.typeset import signed_short
+from thermospindle.report.typeset import plain, signed_short
+from thermospindle.sim.effects.effect import called
 
 PANELS = 6  # tests whose lines are drawn, those that agree least
 LABELS = 9  # lines of a test with names
@@ -35,11 +37,11 @@ def comparison_figures(found: Sequence[RunoutBeside]) -> dict[str, Figure]:
     return {"runout_lines": lines_figure(found), "runout_pulls": pulls_figure(found)}
 
 
-def diagnosis_figures(d: RunoutDiagnosis) -> dict[str, Figure]:
+def diagnosis_figures(d: RunoutDiagnosis, spindle: Spindle) -> dict[str, Figure]:
     """All pictures of a diagnosis of runout, by the name of their file."""
     drawn = {}
     if d.explanations:
-        drawn["runout_explanations"] = explanations(d)
+        drawn["runout_explanations"] = explanations(d, spindle)
     lead = leading(d)
     moved = moved_lines(d, lead) if lead else []
     if lead and moved:
@@ -138,18 +140,18 @@ def pulls_figure(found: Sequence[RunoutBeside]) -> Figure:
 # ---------------------------------------------------------------- diagnose
 
 
-def explanations(d: RunoutDiagnosis) -> Figure:
+def explanations(d: RunoutDiagnosis, spindle: Spindle) -> Figure:
     """ln evidence of explanations over the scene without effects."""
     best = sorted(d.explanations, key=lambda e: -e.delta_evidence)[:BARS]
     paint = [NAMED if set(e.effects) <= set(d.effects) and (len(e.effects) == 1) != (d.verdict == "two effects") else OTHER for e in best]
-    return evidence_bars([explanation_words(e) for e in best], np.array([e.delta_evidence for e in best]), paint)
+    return evidence_bars([explanation_words(e, spindle) for e in best], np.array([e.delta_evidence for e in best]), paint)
 
 
-def explanation_words(e: Explanation) -> str:
+def explanation_words(e: Explanation, spindle: Spindle) -> str:
     """Effects with what was chosen for them: ring, order, bearing."""
     words = []
     for v in e.variants:
-        chosen = ", ".join(f"{p.name} {v.values[p.name]:g}" for p in v.effect.parameters[1:] if p.choices)
+        chosen = ", ".join(f"{p.name} {called(p, v.values[p.name], spindle) or plain(v.values[p.name])}" for p in v.effect.parameters[1:] if p.choices)
         words.append(v.effect.name + (f" ({chosen})" if chosen else ""))
     return " + ".join(words)
 

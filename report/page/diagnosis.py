@@ -54,7 +54,7 @@ def write_diagnosis(
 ) -> None:
     """`report.html`, and every picture as SVG and PNG, into a folder that exists; `turning` is the diagnosis of runout, `told` its answer; `name` is that of the campaign's folder."""
     modal = figures(d) if d else {}
-    runout = diagnosis_figures(turning) if turning else {}
+    runout = diagnosis_figures(turning, spindle) if turning else {}
     every = sections(d, answer, modal) if d else []
     if told:
         every += runout_diagnosis.sections(told, runout)

@@ -15,7 +15,7 @@ from thermospindle.diagnosis.runout.verdict import CLEAR, RunoutDiagnosis
 from thermospindle.model.machine import Spindle
 from thermospindle.model.units import RPM, TO_UM
 from thermospindle.report.text.diagnosis.answer import named
-from thermospindle.report.text.diagnosis.words import next_words, value_words
+from thermospindle.report.text.diagnosis.words import behind, next_words, value_words
 from thermospindle.report.typeset import known
 from thermospindle.sim.effects.effect import Effect
 
@@ -151,14 +151,15 @@ def would_change(d: RunoutDiagnosis) -> str:
         return f"A test {d.next[0].plan.changed} would tell {first} from {second}."
     rivals = [e for e in d.explanations if set(e.effects) - set(d.effects) and len(e.effects) <= len(d.effects)]
     rival = (
-        f"{' + '.join(rivals[0].effects)}, {rivals[0].delta_evidence - d.explanations[0].delta_evidence:z.0f} in ln evidence"
+        f"{' + '.join(rivals[0].effects)}, {behind(d.explanations[0].delta_evidence - rivals[0].delta_evidence)}"
         if rivals
         else "none"
     )
     return f"Records that the next best explanation ({rival}) predicts better would change that."
 
 
-def show_runout_diagnosis(console: Console, answer: dict[str, Any]) -> None:
+def show_runout_diagnosis(console: Console, answer: dict[str, Any], verbose: bool = False) -> None:
+    """The verdict, what leads to it and the next test; the rest of the explanations, what is larger than the scene gives and smallest sizes where `verbose`."""
     named = f": {', '.join(answer['effects'])}" if answer["effects"] else ""
     console.print(f"runout: {answer['verdict']}{named}", style="bold")
     console.print(answer["reason"], highlight=False)
@@ -167,12 +168,12 @@ def show_runout_diagnosis(console: Console, answer: dict[str, Any]) -> None:
     console.print(f"rms residual {error['before']:.2f} -> {error['after']:.2f}", highlight=False)
     if answer["verdict"] not in ("none",):
         console.print("\nBest explanations (ln evidence over the scene's own imperfections):")
-        for c in answer["candidates"][:5]:
+        for c in answer["candidates"][: 5 if verbose else 2]:
             values = ", ".join(f"{k.split('.')[1]} {value_words(v)}" for k, v in c["parameters"].items())
             console.print(
                 f"  {' + '.join(c['effects'])}: {c['delta_evidence']:+z.1f}, probability {c['probability']:.3f}; {values}", highlight=False
             )
-        if answer["where"]:
+        if answer["where"] and (verbose or answer["verdict"] == "unexplained"):
             console.print("\nWithout any catalogue, larger than the scene gives:")
             for w in answer["where"][:5]:
                 c = w["change"][0]
@@ -189,5 +190,8 @@ def show_runout_diagnosis(console: Console, answer: dict[str, Any]) -> None:
             f"  {g['test']}: {g['frequency_Hz']:.1f} Hz, {g['order']:.3f} orders, {g['amplitude_um']:.3g} um at node {g['node']}",
             highlight=False,
         )
-    small = ", ".join(f"{k} {v:.2g}" for k, v in sorted(answer["detectable"].items()))
-    console.print(f"\nSmallest size these records would have shown ({CLEAR:g} in ln evidence): {small}", highlight=False)
+    if verbose or answer["verdict"] == "none":
+        small = ", ".join(f"{name} {row['size']:.2g} {row['unit']}" for name, row in sorted(answer["detectable_in"].items()))
+        console.print(f"\nSmallest size these records would have shown ({CLEAR:g} in ln evidence): {small}", highlight=False)
+    if not verbose:
+        console.print("--verbose shows every explanation, what would be larger than the scene gives, and what these records could have shown.", style="dim", highlight=False)

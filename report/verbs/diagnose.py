@@ -45,7 +45,7 @@ def diagnose(
     """Which physics the scene lacks to explain a campaign; `predictions` is an earlier diagnosis: did what it predicted come true?"""
     asked = dict(locals()) | {"verb": "diagnose"}
     (spindle, catalogue), whole = with_effects(scene, effect_files), without(read_campaign(campaign), held_out_tests)
-    turning = _of_runout(spindle, catalogue, whole)
+    turning = _of_runout(spindle, catalogue, whole, verbose)
     tests = modal_tests(whole)
     where = {KEY: CURRENT[DIAGNOSIS], "campaign": tests.title, "scene_hash": content_hash(spindle)}
     if turning and not tests.tests:
@@ -126,7 +126,7 @@ def draft(diagnosis: Path, name: str | None = None, element: str | None = None, 
 
 
 def _of_runout(
-    spindle: Spindle, catalogue: tuple[Effect, ...], campaign: Campaign
+    spindle: Spindle, catalogue: tuple[Effect, ...], campaign: Campaign, verbose: bool
 ) -> tuple[dict[str, Any], Callable[[Console], None], RunoutDiagnosis] | None:
     """The diagnosis of the runout tests of a campaign as JSON, how it is told, and itself; None where it has none."""
     tests = sum(test.runout is not None for test in campaign.tests)
@@ -135,4 +135,4 @@ def _of_runout(
     with progress_bar(tests + 3) as progress:
         found = diagnose_runout(spindle, campaign, catalogue, progress)
     values = runout_diagnosis_json(found, catalogue, spindle)
-    return values, lambda console: show_runout_diagnosis(console, values), found
+    return values, lambda console: show_runout_diagnosis(console, values, verbose), found

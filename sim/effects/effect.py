@@ -40,7 +40,7 @@ class Parameter:
     source: str
     choices: tuple[float, ...] = ()
     counts: str = ""
-    """What its choices are the numbers of, from 0: "bearings" a spindle's ball bearings, "all bearings" those of any kind, "sets" what shares a preload.
+    """What its choices are the numbers of, from 0: "bearings" a spindle's ball bearings, "all bearings" those of any kind, "sets" what shares a preload, "rings" the inner and the outer one of a bearing.
     One that is -1 where neutral stands for all of them there."""
 
     @property
@@ -87,7 +87,7 @@ def fitted_to(effect: Effect, spindle: Spindle) -> Effect:
 
 def _counted(spindle: Spindle) -> dict[str, list[str]]:
     """Names of what parameters may count (`Parameter.counts`)."""
-    return {"bearings": [b.name for b in spindle.bearings], "all bearings": [b.name for b in spindle.all_bearings], "sets": [s.name for s in spindle.sets]}
+    return {"bearings": [b.name for b in spindle.bearings], "all bearings": [b.name for b in spindle.all_bearings], "sets": [s.name for s in spindle.sets], "rings": ["inner", "outer"]}
 
 
 def called(p: Parameter, value: float, spindle: Spindle) -> str | None:

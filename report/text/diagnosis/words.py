@@ -120,8 +120,15 @@ def would_change(d: Diagnosis) -> str:
         test += f" {' + '.join(rivals[0].names)} would need a size that it cannot have."
     elif rivals and not d.tests:
         test = f" No other temperature or speed tells {' + '.join(v.candidates[0].names)} from {' + '.join(rivals[0].names)}."
-    rival = f"{' + '.join(rivals[0].names)}, {rivals[0].delta_evidence - v.candidates[0].delta_evidence:z.0f} in ln evidence" if rivals else "none"
+    rival = f"{' + '.join(rivals[0].names)}, {behind(v.candidates[0].delta_evidence - rivals[0].delta_evidence)}" if rivals else "none"
     return f"Data that the next best explanation ({rival}) predicts better would change that.{test}"
+
+
+def behind(gap: float) -> str:
+    """In words by how much less ln evidence an explanation has than the best."""
+    if abs(gap) < 0.5:
+        return "level with it in ln evidence"
+    return f"{gap:.0f} behind it in ln evidence" if gap > 0 else f"{-gap:.0f} ahead of it in ln evidence, but less likely beforehand"
 
 
 def hidden_words(names: list[str]) -> str:

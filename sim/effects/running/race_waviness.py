@@ -82,6 +82,7 @@ EFFECT = Effect(
             meaning="0 the inner race, 1 the outer one",
             source="either may be worse: both are ground the same way",
             choices=(0.0, 1.0),
+            counts="rings",
         ),
         bearing_parameter("either may be worse: both come from one lot"),
     ),
