@@ -43,10 +43,13 @@ def test_a_users_tests(pytester):
         def test_is_loaded_once(spindle):
             assert spindle("hdd_2003") is spindle("hdd_2003")
             assert spindle.point("hdd_2003", 20) is spindle.point("hdd_2003", 20.0)
+
+        def test_names_no_mode():
+            assert_frequency_shift("hdd_2003", mode="rockin 1", from_C=20, to_C=60, shift_Hz=-20, within=2)
         """
     )
     result = pytester.runpytest_inprocess(*PLUGIN, "-p", "no:cacheprovider")
-    result.assert_outcomes(passed=2, failed=1)
+    result.assert_outcomes(passed=2, failed=2)
     result.stdout.fnmatch_lines(
         [
             "*hdd_2003: axial 3 moves by -13.92 Hz from 20 to 60 C; wanted -20 +- 2 Hz",
@@ -55,7 +58,9 @@ def test_a_users_tests(pytester):
             "*moved by the stiffness of: *",
         ]
     )
+    result.stdout.fnmatch_lines(["*mode = 'rockin 1': did you mean rocking 1? hdd_2003 has axial 1 to *"])
     assert "_pair(scene" not in result.stdout.str()
+    assert "get_close_matches" not in result.stdout.str()  # nothing of the package's own lines
 
 
 def test_a_failure_shows_the_mode_and_its_neighbours():

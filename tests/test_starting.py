@@ -111,7 +111,8 @@ def test_every_key_of_a_scene_is_in_some_template() -> None:
     [
         (["new", "a/b", "--like", "hdd"], "is no name of a folder"),
         (["new", "a\nb", "--like", "hdd"], "is no name of a folder"),
-        (["new", "x", "--like", "tractor"], "invalid choice: 'tractor'"),
+        (["new", "x", "--like", "lamp"], "argument --like: 'lamp' is unknown; allowed are hdd, machine-tool, grinding, rotor"),
+        (["new", "x", "--like", "rottor"], "argument --like: 'rottor' is unknown; did you mean rotor?"),
         (["new", "x"], "--like"),
     ],
 )

@@ -11,6 +11,7 @@ from math import inf, isfinite
 from pathlib import Path
 from typing import Any, NoReturn
 
+from thermospindle.model.errors import instead
 from thermospindle.model.files.cells import plain_number
 from thermospindle.model.rotor.elements import ELEMENTS, HAMMER
 from thermospindle.model.shaft import THEORIES
@@ -32,6 +33,10 @@ class _Parser(argparse.ArgumentParser):
         if action.option_strings and "--" in arg_strings:  # `--speed=--`, of which Python 3.11 makes an empty list
             raise argparse.ArgumentError(action, "'--' is no value")
         return super()._get_values(action, arg_strings)  # type: ignore[misc]
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is not None and value not in action.choices:
+            raise argparse.ArgumentError(action, f"{value!r} is unknown; {instead(str(value), map(str, action.choices))}")
 
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"spindle: {message}; see {self.prog} --help\n")

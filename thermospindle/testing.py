@@ -43,6 +43,7 @@ UNITS = {"receptance": "m/N", "mobility": "(m/s)/N", "accelerance": "(m/s2)/N"}
 
 def _asked(positive: Sequence[str] = (), **numbers: float) -> None:
     """`BadInput` for a number that an assertion cannot be asked with; those named in `positive` are above nothing."""
+    __tracebackhide__ = True
     from thermospindle.front import number
 
     for name, value in numbers.items():
@@ -186,6 +187,7 @@ def assert_agreement(scene: Scene, campaign: str | Path | Any, *, rms: float) ->
 
 
 def _loaded(scene: Scene) -> Spindle:
+    __tracebackhide__ = True
     if not isinstance(scene, str | Path):
         return scene
     from thermospindle.model.scene.reading import scene_path
@@ -196,6 +198,7 @@ def _loaded(scene: Scene) -> Spindle:
 
 @lru_cache(maxsize=32)
 def _read(file: Path, changed: int) -> Spindle:
+    __tracebackhide__ = True
     from thermospindle.front import load
 
     return load(file)
@@ -205,6 +208,7 @@ _POINTS: dict[tuple[str, float, float], OperatingPoint] = {}
 
 
 def _point(spindle: Spindle, temperature: float, speed: float) -> OperatingPoint:
+    __tracebackhide__ = True
     from thermospindle.front import number, odd, soaked
     from thermospindle.model.scene.reading import content_hash
 
@@ -219,10 +223,12 @@ def _point(spindle: Spindle, temperature: float, speed: float) -> OperatingPoint
 
 
 def _of(scene: Scene, temperature: float, speed: float) -> OperatingPoint:
+    __tracebackhide__ = True
     return _point(_loaded(scene), temperature, speed)
 
 
 def _pair(scene: Scene, from_C: float, to_C: float, *speeds: float) -> tuple[OperatingPoint, OperatingPoint]:
+    __tracebackhide__ = True
     spindle = _loaded(scene)
     return _point(spindle, from_C, speeds[0]), _point(spindle, to_C, speeds[1])
 
@@ -232,6 +238,9 @@ def _pair(scene: Scene, from_C: float, to_C: float, *speeds: float) -> tuple[Ope
 
 def _index(point: OperatingPoint, mode: str | int) -> int:
     """Place of a mode among those of its condition. Raises `BadInput` with those there are."""
+    __tracebackhide__ = True
+    from difflib import get_close_matches
+
     from thermospindle.model.errors import BadInput
 
     found = point.modes
@@ -240,7 +249,8 @@ def _index(point: OperatingPoint, mode: str | int) -> int:
     if not text.isdigit() or not 1 <= int(text) <= len(own) or (isinstance(mode, str) and not kind):
         counts = {k: sum(m.kind == k for m in found) for k in dict.fromkeys(m.kind for m in found)}
         there = ", ".join(f"{k} 1 to {n}" for k, n in counts.items())
-        raise BadInput(f"mode = {mode!r}: {point.spindle.name} has {there} at {point.condition.temperature:g} C, or whole numbers 1 to {len(found)}")
+        near = "" if kind in ("", *counts) or not text.isdigit() else "".join(f"did you mean {k} {text}? " for k in get_close_matches(kind, counts, n=1))
+        raise BadInput(f"mode = {mode!r}: {near}{point.spindle.name} has {there} at {point.condition.temperature:g} C, or whole numbers 1 to {len(found)}")
     return own[int(text) - 1]
 
 
@@ -252,6 +262,7 @@ def _partners(first: OperatingPoint, then: OperatingPoint) -> list[int]:
 
 
 def _partner(first: OperatingPoint, then: OperatingPoint, index: int, partners: Sequence[int]) -> Mode:
+    __tracebackhide__ = True
     if partners[index] < 0:
         t = then.condition.temperature
         head = f"{_called(first, index + 1)}, {first.modes[index].frequency:.1f} Hz: no mode at {t:g} C has its shape, so it cannot be followed"
