@@ -23,7 +23,7 @@ WORDS = {
     "pulls": (
         "Residuals of every mode in every test",
         "Computed less measured, in standard errors of the measurement: estimator, repeats, temperature and the model's own "
-        "numerical floor. Grey: not paired with any mode within the believable error. Below: how many modes only one side has.",
+        "numerical floor. Without a number: not paired with any mode within the believable error. Below: how many modes only one side has.",
     ),
     "frfs": ("FRFs over each other", "Measured FRFs (coloured) and those of the model (dashed) at the same points, lines and window: driving points first, then the loudest."),
     "bands": (
@@ -32,7 +32,7 @@ WORDS = {
         "too. The shift by FDAC: by how much the computed frequencies must come down to be most like the measured ones (FDAC); grey where no shift "
         "is better than another.",
     ),
-    "channels": ("Correlation by FRF", "Every FRF over all its lines. Grey: symmetry forbids an answer, so there is nothing to compare."),
+    "channels": ("Correlation by FRF", "Every FRF over all its lines. Without a number: symmetry forbids an answer, so there is nothing to compare."),
     "fdac": (
         "FDAC",
         "Correlation of the computed FRFs at one frequency with the measured ones at another, for the tests that agree best and worst. "

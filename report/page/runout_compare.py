@@ -20,7 +20,7 @@ CAPTIONS = {
     "runout_lines": "Every line at the probe where it is largest. Blue: as computed, over what the chance of the balls' start and the build leave open; a "
     "line of several balls or bearings is their sum by chance.",
     "runout_pulls": "Computed less measured amplitude, at the probe where they differ most, in standard deviations of the record, of chance and of how "
-    "spindles of one drawing scatter. Grey: not a line of its own in that record.",
+    "spindles of one drawing scatter. Without a number: not a line of its own in that record.",
 }
 
 

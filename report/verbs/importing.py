@@ -101,8 +101,9 @@ def _proposed(form: MappingForm) -> list[str]:
         hit = [f"hit at {f.reference} in {f.file}" for f in form.files if f.test == t.id and f.reference is not None]
         if any(told) or len(of) > 1 or hit:
             said.append(f"{t.id}: {', '.join(x for x in (*told, f'{len(of)} files' if len(of) > 1 else '', *hit) if x)}")
-    if len(form.files) > 2 and len({f.test for f in form.files}) == len(form.files) and all(t.temperature_C is None for t in form.tests):
-        said.append(f"{len(form.files)} files, a test each: where hammer or sensor roved and they are one test, give them the same test")
+    told = [f.test for f in form.files if f.test is not None]
+    if len(told) > 2 and len(set(told)) == len(told) and all(t.temperature_C is None for t in form.tests):
+        said.append(f"{len(told)} files, a test each: where hammer or sensor roved and they are one test, give them the same test")
     return said
 
 

@@ -22,13 +22,13 @@ from thermospindle.model.scene.form import Point as PointTable
 MODE_COLUMNS = ("test", "mode", "kind", "frequency_Hz", "frequency_sd_Hz", "damping_ratio", "damping_ratio_sd")
 
 
-def _plain_name(text: str) -> str:
+def plain_name(text: str) -> str:
     if not text or not text.isascii() or not all(c.isalnum() or c in "._+-" for c in text) or text.startswith("."):
         raise ValueError("must be letters, digits, '.', '_', '+' or '-', as the name of a file in the campaign's folder")
     return text
 
 
-PlainName = Annotated[str, AfterValidator(_plain_name), Field(max_length=200)]
+PlainName = Annotated[str, AfterValidator(plain_name), Field(max_length=200)]
 
 
 class Table(BaseModel):

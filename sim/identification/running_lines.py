@@ -47,7 +47,7 @@ class RunningLines:
         named = [f"{f:.1f} Hz ({k}x)" for k, f in zip(self.multiples, self.frequency, strict=True)]
         each = ", ".join(named) if len(named) <= NAMED else f"{', '.join(named[: NAMED - 1])} and {len(named) - NAMED + 1} more up to {named[-1]}"
         many = len(self.multiples) > 1
-        return f"{'lines' if many else 'a line'} of the running speed stand{'' if many else 's'} in the FRFs, at {each}: {int(self.out.sum())} lines are left out"
+        return f"{'lines' if many else 'a line'} of the running speed stand{'' if many else 's'} in the FRFs, at {each}: {int(self.out.sum())} lines are left out where modes are fitted"
 
 
 def running_lines(frequency: Array, value: ComplexArray, speed: float) -> RunningLines:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from thermospindle.sim.importing import units
 from thermospindle.sim.importing.exchanged import exchanged
 from thermospindle.sim.importing.files.reading import content
 from thermospindle.sim.importing.frfs import Placed, frf_of
-from thermospindle.sim.importing.mapping import REST, FileForm, MappingForm, TestForm, fits, settings_of
+from thermospindle.sim.importing.mapping import REST, FileForm, MappingForm, TestForm, fits, settings_of, test_of
 from thermospindle.sim.importing.measured import FORCE_NEEDED, Content, Curve, End, ModeLine, Motion, Question, listed, words_of
 from thermospindle.sim.importing.names import plain
 from thermospindle.sim.importing.peaks import from_peaks
@@ -218,13 +219,12 @@ def _a(quantity: str) -> str:
 
 def _conditions(found: Read, form: MappingForm, scene: Spindle | None, mapping: Path | None) -> list[Question]:
     """What tests and the campaign as a whole leave open."""
-    forms = {t.id: t for t in form.tests}
     questions = []
-    for id_ in forms:
-        if id_ not in found.tests and found.tests:
+    for id_ in (t.id for t in form.tests):
+        if found.tests and not any(fnmatchcase(name, id_) for name in found.tests):
             raise BadInput(f"{mapping}: tests: id = {id_!r}: no file makes such a test; there are {listed(found.tests)}")
     for key, text in (("temperature_C", "the temperature of the spindle, C,"), ("speed_rpm", "the speed, rpm (0 at rest),")):
-        missing = [t for t in found.tests if t not in forms or getattr(forms[t], key) is None]
+        missing = [t for t in found.tests if getattr(test_of(form, t), key) is None]
         if missing:
             questions.append(Question(", ".join(missing), key, f"{text} of the test{'s' * (len(missing) > 1)}"))
     if form.spindle is None and scene is None:
@@ -256,14 +256,13 @@ def campaign_of(found: Read, form: MappingForm, scene: Spindle | None, files: Se
         head = f"{count} thing{'s are' if count > 1 else ' is'} not told by the files:"
         tail = f"answer them in {mapping}" if mapping else "--mapping NEW.toml writes a form to answer them in"
         raise Unanswered(head, spoken(found, files), tail)
-    forms = {t.id: t for t in form.tests}
     settings = {c.file: settings_of(form, c.file) for c in found.contents}
     notes = list(found.notes)
     placed = {t: [p for c in curves if (p := _placed(c, form, found.points, settings[c.file])) is not None] for t, curves in found.curves.items()}
     _check_left_out(found, form, settings, mapping)
     said = [p.quantity for every in placed.values() for p in every]
     quantity: str = form.quantity or (max(said, key=said.count) if said else "mobility")
-    tests = tuple(_test(t, forms[t], found, placed.get(t, []), quantity, form, notes) for t in found.tests)
+    tests = tuple(_test(t, test_of(form, t), found, placed.get(t, []), quantity, form, notes) for t in found.tests)
     used = {n for t in tests if t.frf for n in (*t.frf.response_nodes, *t.frf.reference_nodes)}
     points = tuple(p for node, p in sorted(found.points.items()) if node in used)
     title = form.title or f"imported from {listed((f.name for f in files), 3)}"

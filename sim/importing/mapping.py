@@ -5,6 +5,7 @@ A value "?" is an open question, as if the key were not there.
 
 from __future__ import annotations
 
+import re
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -16,7 +17,7 @@ from thermospindle.model.files.formats import CURRENT, MAPPING, migrated
 from thermospindle.model.scene.fields import first_error, format_of, read_toml
 from thermospindle.model.scene.form import Finite, Name, NotNegative, Positive
 from thermospindle.model.scene.measuring import Point as PointForm
-from thermospindle.sim.campaign.form import PlainName, Table
+from thermospindle.sim.campaign.form import PlainName, Table, plain_name
 
 OPEN = "?"
 REST = "*"
@@ -53,12 +54,17 @@ class FileForm(Table):
     leave_out: list[str] = Field(default_factory=list)
 
 
+def _pattern(text: str) -> str:
+    plain_name(re.sub(r"[*?]", "x", text))
+    return text
+
+
 class TestForm(Table):
-    """What a test was done in; see the campaign's own form for the keys."""
+    """What a test was done in; see the campaign's own form for the keys. `id` is a name or a pattern like "*"."""
 
     __test__ = False
 
-    id: PlainName
+    id: Annotated[str, AfterValidator(_pattern), Field(max_length=200)]
     temperature_C: Temperature | None = None
     speed_rpm: Finite | None = None
     hammer_level_N: Positive | None = None
@@ -161,3 +167,15 @@ def settings_of(form: MappingForm, file: Path) -> FileForm:
             own["leave_out"] = [*told.get("leave_out", []), *own.get("leave_out", [])]
             told |= own | {"file": file.name}
     return FileForm.model_validate(told)
+
+
+def test_of(form: MappingForm, name: str) -> TestForm:
+    """What the mapping says of one test, all tables whose `id` fits it taken together, later ones first."""
+    told: dict[str, Any] = {}
+    for table in form.tests:
+        if fnmatchcase(name, table.id):
+            told |= table.model_dump(exclude_unset=True)
+    return TestForm.model_validate(told | {"id": name})
+
+
+test_of.__test__ = False  # type: ignore[attr-defined]

@@ -13,7 +13,8 @@ from thermospindle.sim.importing.measured import Curve, ModeLine
 
 PROMINENCE = 2.0  # of a peak over the valleys beside it, as a ratio
 SHARED = 0.2  # of the FRFs of a test that show a peak at one place, two at least where there are several, from which it is a mode whatever is near
-ALONE = 2.0  # half-power widths from other modes, beyond which a peak that fewer show is a mode, too, and not one of these on the flank of another
+CLEAR = 10.0  # times the valleys beside it, from which a peak that fewer show is a mode, too, where no other mode is near
+ALONE = 2.0  # half-power widths from other modes, beyond which none is near: nearer it may be one of these on the flank of another
 TOGETHER = 0.25  # half-power widths between peaks of different FRFs that are one mode's, but one and a half lines at least
 ABOVE_NOISE = 7.0  # standard deviations of the lines' own scatter, by which a peak stands over the valleys beside it
 AROUND = 12  # lines on each side of a peak that its fit sees at least
@@ -29,10 +30,10 @@ def from_peaks(curves: Sequence[Curve], speed: float) -> tuple[list[ModeLine], l
     Frequency and damping are the medians over these FRFs, standard errors their scatter over the root of their number, 0.05 of a line at
     least; of a peak in fewer than three FRFs those of the fit, and 0.05 half-power widths at least, and such a peak has a damping or is none.
     What is one peak is told by half-power widths, not by lines, so that finer lines lose no mode. Shapes and close pairs are beyond magnitudes.
-    At a speed (rad/s) peaks at its multiples are no modes: the notes name them, and what is left out because
-    few FRFs show it near another mode.
+    At a speed (rad/s) peaks at its multiples are no modes: the notes name them, and what is left out because few
+    FRFs show it, not clearly or near another mode.
     """
-    found: list[ModeLine] = []
+    found: list[tuple[ModeLine, float]] = []  # with how far each stands above its valleys, as a ratio
     step = float(np.median(np.diff(curves[0].frequency)))
     for curve in curves:
         size = np.asarray(curve.value, float)
@@ -40,9 +41,10 @@ def from_peaks(curves: Sequence[Curve], speed: float) -> tuple[list[ModeLine], l
         noise = scatter(size[None, None])[0, 0]
         for top, drop in zip(tops.tolist(), of["prominences"], strict=True):
             if size[top] * -np.expm1(-drop) > ABOVE_NOISE * noise[top] and (mode := _peak(curve.frequency, size, top, drop, step)) is not None:
-                found.append(mode)
+                found.append((mode, float(np.exp(drop))))
     groups: list[list[ModeLine]] = []
-    for mode in sorted(found, key=lambda m: m.frequency):
+    outstanding = [mode for mode, above in found if above > CLEAR]
+    for mode in sorted((mode for mode, _ in found), key=lambda m: m.frequency):
         own = next((g for g in reversed(groups) if _together(mode, g, step)), None)
         if own is None:
             groups.append([mode])
@@ -56,17 +58,19 @@ def from_peaks(curves: Sequence[Curve], speed: float) -> tuple[list[ModeLine], l
         nearest = turning * max(round(mode.frequency / turning), 1) if turning else -np.inf
         if len(group) < 3 and any(m.damping_ratio is None for m in group):  # one spike of noise has no width
             continue
-        if abs(mode.frequency - nearest) <= step:
+        clear = len(group) >= least or any(m in outstanding for m in group)
+        near = len(group) < least and any(abs(mode.frequency - m.frequency) < ALONE * max(_width(mode), _width(m)) for m in modes)
+        if clear and abs(mode.frequency - nearest) <= step:
             harmonics.append(f"{mode.frequency:.5g}")
-        elif len(group) < least and any(abs(mode.frequency - m.frequency) < ALONE * max(_width(mode), _width(m)) for m in modes):
-            unsure.append(f"{mode.frequency:.5g}")
-        else:
+        elif clear and not near:
             modes.append(mode)
+        else:
+            unsure.append(f"{mode.frequency:.5g}")
     notes, name = [], curves[0].file.name
     if harmonics:
         notes.append(f"{name}: {_peaks(harmonics, 'a multiple of the running speed, no mode', 'multiples of the running speed, no modes')}")
     if unsure:
-        notes.append(f"{name}: {_peaks(unsure, 'left out', 'left out')}: too few of its FRFs show it there, and another mode is near")
+        notes.append(f"{name}: {_peaks(unsure, 'left out', 'left out')}: too few of its FRFs show it, or not clearly enough beside other modes")
     return sorted(modes, key=lambda m: m.frequency), notes
 
 

@@ -16,6 +16,7 @@ from thermospindle.sim.importing.mapping import REST
 from thermospindle.sim.importing.measured import End, Question, listed
 from thermospindle.sim.importing.names import conditions_of, hit_at, plain, tests_of
 
+EXAMPLES = {"temperature_C": "20.0", "speed_rpm": "7200.0"}
 HEAD = """\
 # What the files do not tell. Put an answer in the place of each "?"; a key that is left out, or "?", is open.
 # Then run the same command again. Everything here may be edited; units are in the names of the keys.
@@ -50,8 +51,12 @@ def template(found: Read, files: Sequence[Path], scene: Spindle | None) -> str:
         node = hit_at(file)
         lines += _asked(own[file], node if node in found.points else None)
     renamed = {plain(f.stem): test for f, test in tests.items()}
-    for test in dict.fromkeys(renamed.get(t, t) for t in found.tests):
-        lines += ["", "[[tests]]", f"id = {toml(test)}", *_condition(test)]
+    names = list(dict.fromkeys(renamed.get(t, t) for t in found.tests))
+    shared = [key for key in EXAMPLES if len(names) > 2 and not any(key in conditions_of(t) for t in names)]
+    if shared:
+        lines += ["", "[[tests]]", f'id = "*"    # all {len(names)} of them; the table of one test, below, may say otherwise', *(f'{key} = "?"' for key in shared)]
+    for test in names:
+        lines += ["", "[[tests]]", f"id = {toml(test)}", *_condition(test, shared)]
     lines += [line for block in _points(found, scene) for line in block]
     return "\n".join([*lines, "", MORE])
 
@@ -96,13 +101,11 @@ def _asked(questions: Sequence[Question], hit: int | None = None) -> list[str]:
     return lines
 
 
-def _condition(test: str) -> list[str]:
-    """Temperature and speed, read off the name where it seems to tell them."""
+def _condition(test: str, shared: Sequence[str]) -> list[str]:
+    """Temperature and speed, read off the name where it seems to tell them; what is asked of all tests together as a comment."""
     told = conditions_of(test)
-    return [
-        f"{key} = {told[key]:g}    # read off the name {test!r}; correct it where it is wrong" if key in told else f'{key} = "?"'
-        for key in ("temperature_C", "speed_rpm")
-    ]
+    asked = [f"# {key} = {EXAMPLES[key]}    # where it is another" if key in shared else f'{key} = "?"' for key in EXAMPLES]
+    return [f"{key} = {told[key]:g}    # read off the name {test!r}; correct it where it is wrong" if key in told else line for key, line in zip(EXAMPLES, asked, strict=True)]
 
 
 def _told(place: tuple[float, ...] | None, unscaled: tuple[float, ...] | None) -> str:

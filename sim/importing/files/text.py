@@ -12,6 +12,7 @@ from thermospindle.model.errors import BadInput
 
 SEPARATORS = ("\t", ";", ",", None)  # None: any white space
 COMMENT = re.compile(r"^\s*(#|%|//|!)+\s?")
+FORTRAN = re.compile(r"^([-+]?(?:\d+\.?\d*|\.\d+))[dD]([-+]?\d+)$")  # 1.5D-03, as Fortran writes double precision
 NUMBER_LIKE = re.compile(r"[-+]?\d[\d.,' ]*([eE][-+]?\d+)?")
 THOUSANDS = re.compile(r"[-+]?\d{1,3}([.,' ]\d{3})+([.,]\d+)?")
 LONGEST_HEADING = 200
@@ -143,7 +144,7 @@ def _number(text: str, comma: bool) -> float | complex:
     elif "_" in text:
         raise ValueError(text)
     try:
-        return float(text)
+        return float(FORTRAN.sub(r"\1e\2", text))
     except ValueError:
         plain = text.strip("()").replace(" ", "").replace("i", "j").replace("*", "")
         return complex(plain)

@@ -197,6 +197,12 @@ def test_parts_of_one_FRF_in_two_units_are_asked(tmp_path):
     np.testing.assert_allclose(imported(tmp_path, '[[files]]\nfile = "T20.csv"\nunit = "(m/s)/N"\n', file).value, FRF.value, rtol=1e-8)
 
 
+def test_exponents_of_fortran_are_read(tmp_path):
+    (tmp_path / "a.csv").write_text("Frequency [Hz],H(1,1) real [m/N],H(1,1) imag [m/N]\n" + "".join(f"{f:.1f},1.5D-06,-2.5d-07\n" for f in range(100, 160)))
+    [curve] = content(tmp_path / "a.csv", FileForm(file="a.csv")).curves
+    assert curve.value == pytest.approx(np.full(60, 1.5e-6 - 2.5e-7j))
+
+
 def test_a_sweep_in_uneven_steps(tmp_path):
     """Lines of a logarithmic sweep are kept as they are, through the campaign's file too; a conjugated one is refused as any other."""
     lines = np.geomspace(400.0, 700.0, 400)

@@ -49,6 +49,21 @@ def test_the_form_is_written_and_filled_in(tmp_path, capsys):
     assert [p.node for p in read_campaign(tmp_path / "c").points] == [1, 3, 6]
 
 
+def test_what_all_tests_lack_is_answered_once(tmp_path):
+    """One table for all tests, and one of a test that says otherwise; the form asks so, and a pattern that no test fits is refused."""
+    heads, found = columns("real", "(m/s)/N")
+    files = [table(tmp_path / f"run{k}.csv", ["Frequency [Hz]", *heads], [FREQUENCY, *found]) for k in range(3)]
+    bring(files, scene=SCENE, mapping=tmp_path / "form.toml")
+    text = (tmp_path / "form.toml").read_text()
+    assert text.count('speed_rpm = "?"') == text.count('temperature_C = "?"') == 1
+    (tmp_path / "form.toml").write_text(text.replace('speed_rpm = "?"', "speed_rpm = 0.0").replace('temperature_C = "?"', "temperature_C = 20.0").replace('id = "run2"\n# temperature_C = 20.0', 'id = "run2"\ntemperature_C = 35.0'))
+    bring(files, scene=SCENE, mapping=tmp_path / "form.toml", out=tmp_path / "c")
+    assert [(t.id, t.temperature, t.speed) for t in read_campaign(tmp_path / "c").tests] == [("run0", 20.0, 0.0), ("run1", 20.0, 0.0), ("run2", 35.0, 0.0)]
+    (tmp_path / "form.toml").write_text(text.replace('id = "*"', 'id = "T*"'))
+    with pytest.raises(BadInput, match=r"id = 'T\*': no file makes such a test; there are run0, run1, run2"):
+        bring(files, scene=SCENE, mapping=tmp_path / "form.toml", out=tmp_path / "d")
+
+
 @pytest.mark.parametrize(("names", "roving"), [(("p1", "p2", "p3"), True), (("T20", "T40", "T60"), False)])
 def test_files_that_may_be_one_roving_test_are_said_to_be(tmp_path, names, roving):
     """Nine numbered files of a shaft became nine tests without a word."""
