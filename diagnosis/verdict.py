@@ -28,7 +28,7 @@ from thermospindle.sim.campaign.campaign import Campaign, Noise, Test, condition
 from thermospindle.sim.effects import CATALOGUE, of_scene, usable
 from thermospindle.sim.effects.effect import Effect
 
-STEPS = 7  # of progress, beside one a test
+STEPS = (4.0, 7.0, 18.0, 15.0, 6.0, 2.0, 8.0)  # of progress, beside one a test: about how long each takes, in what reading a test takes
 
 
 @dataclass(frozen=True, eq=False)

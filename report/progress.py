@@ -6,7 +6,7 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 
 from rich.console import Console
@@ -19,22 +19,23 @@ FIRST, EVERY = 10.0, 30.0
 
 
 @contextmanager
-def progress_bar(steps: int) -> Iterator[Callable[[str], None]]:
-    """A function that takes what has been done, and counts it as one of so many steps."""
+def progress_bar(steps: int | Sequence[float]) -> Iterator[Callable[[str], None]]:
+    """A function that takes what has been done, and counts it as one of so many steps, or the next of those that take as long as told, in any unit."""
+    takes = [1.0] * steps if isinstance(steps, int) else list(steps)
     console = Console(stderr=True, markup=False)
     if not console.is_terminal:
-        with plain_lines(steps) as told:
+        with plain_lines(takes) as told:
             yield told
         return
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task("starting", total=steps)
-        yield lambda done: bar.update(task, advance=1, description=done)
+        task, left = bar.add_task("starting", total=sum(takes)), iter(takes)
+        yield lambda done: bar.update(task, advance=next(left, 0.0), description=done)
 
 
 @contextmanager
-def plain_lines(steps: int | None = None) -> Iterator[Callable[[str], None]]:
-    """The same in lines, told at their times however long a step takes; without `steps` where nobody knows how many there will be."""
+def plain_lines(takes: Sequence[float] | None = None) -> Iterator[Callable[[str], None]]:
+    """The same in lines, told at their times however long a step takes; without what they take where nobody knows how many there will be."""
     began, done, last = time.monotonic(), 0, "starting"
     needed = 0.0  # for what has been done
     ended = threading.Event()
@@ -47,7 +48,7 @@ def plain_lines(steps: int | None = None) -> Iterator[Callable[[str], None]]:
         wait = FIRST
         while not ended.wait(wait) and sys.stderr is not None:  # closed by the caller: `print` would take standard output
             with suppress(OSError, ValueError):  # whoever read it has gone
-                print(_line(time.monotonic() - began, needed, done, steps, last), file=sys.stderr, flush=True)
+                print(_line(time.monotonic() - began, needed, done, takes, last), file=sys.stderr, flush=True)
             wait = EVERY
 
     teller = threading.Thread(target=tell, daemon=True)
@@ -59,15 +60,15 @@ def plain_lines(steps: int | None = None) -> Iterator[Callable[[str], None]]:
         teller.join()
 
 
-def _line(seconds: float, needed: float, done: int, steps: int | None, last: str) -> str:
-    """What has been done after `seconds`, of which the steps that have ended `needed` so many; a step that takes longer than those leaves at least what they foretell of the others."""
-    if steps is None:
+def _line(seconds: float, needed: float, done: int, takes: Sequence[float] | None, last: str) -> str:
+    """What has been done after `seconds`, of which the steps that have ended `needed` so many; a step that takes longer than those foretell leaves at least what they foretell of the others."""
+    if takes is None:
         return f"{_duration(seconds)}: {visible(last)}"
-    left = ""
+    left, steps = "", len(takes)
     if 0 < done < steps:
-        each, late = needed / done, seconds - needed
-        others = each * (steps - done - 1)
-        left = f", about {_duration(others + each - late)} left" if late < each else f", more than {_duration(others)} left" if others >= 1 else ""
+        unit, late = needed / sum(takes[:done]), seconds - needed
+        this, others = unit * takes[done], unit * sum(takes[done + 1 :])
+        left = f", about {_duration(others + this - late)} left" if late < this else f", more than {_duration(others)} left" if others >= 1 else ""
     return f"{_duration(seconds)}: {min(done, steps)} of {steps} steps done{left}; last: {visible(last)}"
 
 

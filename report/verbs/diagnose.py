@@ -56,7 +56,7 @@ def diagnose(
             _write(None, answer, spindle, folder, of_runout, answer, name=whole.name)
 
         return answered(told | where, show_runout, out, asked, alone, of_another(spindle, whole))
-    with progress_bar(len(tests.tests) + verdict.STEPS) as progress:
+    with progress_bar([*[1.0] * len(tests.tests), *verdict.STEPS]) as progress:
         found = verdict.diagnose(spindle, tests, catalogue, progress)
     values = diagnosis_json(found) | where
     if predictions:

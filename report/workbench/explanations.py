@@ -89,7 +89,7 @@ def find(bench: Bench, s: Setting, progress: Callable[[str], None]) -> Explanati
 
 def steps(bench: Bench, s: Setting) -> int:
     """Of the progress of `find`."""
-    return verdict.STEPS + len(bench.shown) - len(s.left_out)
+    return len(verdict.STEPS) + len(bench.shown) - len(s.left_out)
 
 
 def taken(bench: Bench, s: Setting, e: Explanation) -> Setting:

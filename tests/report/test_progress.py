@@ -12,6 +12,7 @@ import pytest
 from tests.conftest import ROOT
 from thermospindle.cli import main
 from thermospindle.diagnosis.data.observe import observe
+from thermospindle.diagnosis.verdict import STEPS
 from thermospindle.report import progress
 from thermospindle.report.verbs import compare
 
@@ -42,10 +43,17 @@ def test_long_work_tells_plain_lines_and_short_work_none(impatient: None, capsys
 
 def test_the_time_that_is_left_does_not_grow_while_a_step_takes_long():
     """Of four steps the first took 10 s and the second goes on: its own 10 s run down, then the other two are what is left at least."""
-    told = [progress._line(seconds, 10.0, 1, 4, "first") for seconds in (10.0, 18.0, 19.0, 60.0, 600.0)]
+    told = [progress._line(seconds, 10.0, 1, [1.0] * 4, "first") for seconds in (10.0, 18.0, 19.0, 60.0, 600.0)]
     assert [line.split(", ", 1)[1].split(" left")[0] for line in told] == ["about 30 s", "about 22 s", "about 21 s", "more than 20 s", "more than 20 s"]
-    assert "3 of 4 steps done; last: third" in progress._line(600.0, 30.0, 3, 4, "third")
-    assert "about 5 s left" in progress._line(35.0, 30.0, 3, 4, "third")
+    assert "3 of 4 steps done; last: third" in progress._line(600.0, 30.0, 3, [1.0] * 4, "third")
+    assert "about 5 s left" in progress._line(35.0, 30.0, 3, [1.0] * 4, "third")
+
+
+def test_steps_that_take_longer_are_told_to_do_so():
+    """Eight tests are read in 8 s; what fits effects takes eighteen times as long as one of these."""
+    takes = [*[1.0] * 8, *STEPS]
+    assert f"about {sum(STEPS):.0f} s left" in progress._line(8.0, 8.0, 8, takes, "read")
+    assert "8 of 15 steps done" in progress._line(8.0, 8.0, 8, takes, "read")
 
 
 @pytest.mark.parametrize("verb", ["compare", pytest.param("ladder", marks=pytest.mark.slow)])
