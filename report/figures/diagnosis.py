@@ -17,7 +17,7 @@ from thermospindle.diagnosis.verdict import Diagnosis
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
-from thermospindle.report.figures.common import INK, STYLE
+from thermospindle.report.figures.common import INK, STYLE, label
 from thermospindle.report.typeset import unit_cell
 
 NAMED, OTHER, FREE = "#1f6f5c", "#8c9aa8", "#d9b36c"
@@ -60,7 +60,7 @@ def evidence_bars(names: Sequence[str], value: Array, paint: Sequence[str], ende
     """Bars of ln evidence `value` (n,) in the colours `paint`, with their numbers. The axis is that of fits that have `ended` where they arrive, others are hatched;
     a bar that goes on beyond the axis ends in an arrow."""
     ended = [True] * len(names) if ended is None else ended
-    figure = Figure(figsize=(8.6, 0.85 + 0.27 * len(names)), layout="constrained")
+    figure = Figure(figsize=(8.6, 0.85 + (0.13 + 0.14 * max(n.count("\n") + 1 for n in names)) * len(names)), layout="constrained")
     axes = figure.add_subplot()
     shown = value[np.array(ended)] if any(ended) else value
     low, high = min(float(shown.min()), 0.0), max(float(shown.max()), 1.0)
@@ -141,14 +141,14 @@ def errors(d: Diagnosis) -> Figure:
     panels = 1 if np.isnan(unseen[0]).all() else 2
     figure = Figure(figsize=(8.6, 3.0), layout="constrained")
     every = figure.subplots(1, panels, sharey=True, squeeze=False)[0]
-    place, tests = np.arange(len(model.tests)), [t.test.id for t in model.tests]
+    place, tests = np.arange(len(model.tests)), [label(t.test) for t in model.tests]
     every[0].plot(place, as_drawn(model), "o", mfc="none", color=INK, label="as drawn, nothing fitted")
-    for k, (label, h, marker, paint) in enumerate(shown):
+    for k, (name, h, marker, paint) in enumerate(shown):
         for axes, value in zip(every, (fitted(model, h), unseen[k]), strict=False):
-            axes.plot(place, value, marker, ms=7 - 3 * k, color=paint, label=label)
+            axes.plot(place, value, marker, ms=7 - 3 * k, color=paint, label=name)
     for axes, title in zip(every, ("Error left, fitted to all tests", "Each condition predicted from all others"), strict=False):
         axes.axhline(1.0, color=INK, lw=0.8, ls="--")
-        axes.set_xticks(place, tests, rotation=30 if len(tests) > 6 or panels > 1 else 0)
+        axes.set_xticks(place, tests, fontsize=7, rotation=0 if panels * len(tests) <= 16 else 90)
         axes.set_xlim(-0.6, len(tests) - 0.4)
         axes.set_title(title)
         axes.grid(visible=False, axis="x")

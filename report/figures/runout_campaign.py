@@ -153,7 +153,7 @@ def explanation_words(e: Explanation, spindle: Spindle) -> str:
     for v in e.variants:
         chosen = ", ".join(f"{p.name} {called(p, v.values[p.name], spindle) or plain(v.values[p.name])}" for p in v.effect.parameters[1:] if p.choices)
         words.append(v.effect.name + (f" ({chosen})" if chosen else ""))
-    return " + ".join(words)
+    return "\n+ ".join(words)
 
 
 @rc_context(STYLE)

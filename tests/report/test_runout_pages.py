@@ -144,7 +144,7 @@ def test_a_diagnosis_of_runout_alone_has_its_page(spindle, campaign, diagnosed, 
 
 def test_bars_are_the_evidence_and_marks_the_lines(diagnosed, spindle):
     widths = [bar.get_width() for bar in explanations(diagnosed, spindle).axes[0].patches]
-    assert all("bearing upper" in text.get_text() or "bearing lower" in text.get_text() for text in explanations(diagnosed, spindle).axes[0].get_yticklabels() if "(" in text.get_text())
+    assert all("bearing upper" in text.get_text() or "bearing lower" in text.get_text() for text in explanations(diagnosed, spindle).axes[0].get_yticklabels() if "(" in text.get_text() and "bearing" in text.get_text())
     assert widths == sorted((e.delta_evidence for e in diagnosed.explanations), reverse=True)[: len(widths)]
     lead = leading(diagnosed)
     assert lead.effects == ("ball_size",)
