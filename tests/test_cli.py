@@ -2,6 +2,7 @@
 
 import json
 import re
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -98,7 +99,10 @@ def test_run_and_inspect(capsys, short_scene, tmp_path):
     found = answer(capsys, "run", short_scene, "--temperatures", 20, 60, "--element", "reduced", "--out", out, "--json")
     assert [c["temperature_C"] for c in found["conditions"]] == [20, 60]
     names = {p.name for p in out.iterdir()}
-    assert {"report.html", "run.rrd", "table.csv", "modes.csv", "campaign", "spindle_20C.xml", "spindle_60C.xml", MARK} == names
+    assert {"report.html", "pictures", "run.rrd", "table.csv", "modes.csv", "campaign", "spindle_20C.xml", "spindle_60C.xml", MARK} == names
+    drawn = [ElementTree.parse(p).getroot() for p in (out / "pictures").iterdir()]
+    assert len(drawn) == (out / "report.html").read_text(encoding="utf-8").count("<svg ")
+    assert all(d.tag == "{http://www.w3.org/2000/svg}svg" and d[0].text for d in drawn)
     log = answer(capsys, "inspect", out / "run.rrd", "--json")
     assert set(log) == {"warnings", *ANSWERS["inspect"]}
     campaign = read_campaign(out / "campaign")

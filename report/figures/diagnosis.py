@@ -148,7 +148,7 @@ def errors(d: Diagnosis) -> Figure:
             axes.plot(place, value, marker, ms=7 - 3 * k, color=paint, label=name)
     for axes, title in zip(every, ("Error left, fitted to all tests", "Each condition predicted from all others"), strict=False):
         axes.axhline(1.0, color=INK, lw=0.8, ls="--")
-        axes.set_xticks(place, tests, fontsize=7, rotation=0 if panels * len(tests) <= 16 else 90)
+        axes.set_xticks(place, tests, fontsize=7 if panels * len(tests) <= 12 else 6, rotation=0 if panels * len(tests) <= 16 else 90)
         axes.set_xlim(-0.6, len(tests) - 0.4)
         axes.set_title(title)
         axes.grid(visible=False, axis="x")

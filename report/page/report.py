@@ -45,9 +45,26 @@ MADE = "<!-- made by -->"
 """Where `stamp` writes the command and the date."""
 
 def write_report(run: Run, path: Path, extra_sections: Sequence[Section] = ()) -> None:
-    """Write the report to `path`, whole or not at all."""
+    """Write the report to `path`, whole or not at all, and its pictures by themselves into the folder `pictures` beside it."""
+    text = html(run, extra_sections)
     with whole(Path(path)) as file:
-        file.write_text(html(run, extra_sections), encoding="utf-8")
+        file.write_text(text, encoding="utf-8")
+    beside = Path(path).parent / "pictures"
+    beside.mkdir(exist_ok=True)
+    for name, picture in drawn(text).items():
+        (beside / f"{name}.svg").write_text(picture, encoding="utf-8")
+
+
+def drawn(page: str) -> dict[str, str]:
+    """The pictures of a page as SVG files of their own, on white, by their descriptions in small letters with dashes; of several with one description the later ones are numbered."""
+    found: dict[str, str] = {}
+    for picture in re.finditer(r'<svg viewBox="(\S+) (\S+) (\S+) (\S+)"[^>]*aria-label="([^"]*)"[^>]*>(.*?)</svg>', page, re.DOTALL):
+        left, top, width, height, description, inside = picture.groups()
+        name = re.sub(r"[^a-z0-9]+", "-", Markup(description).unescape().lower().replace("µ", "u")).strip("-")
+        name = next(n for n in (name, *(f"{name}-{k}" for k in range(2, 1000))) if n not in found)
+        head = f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" width="{width}pt" height="{height}pt" viewBox="{left} {top} {width} {height}">'
+        found[name] = f'{head}<title>{description}</title><rect x="{left}" y="{top}" width="{width}" height="{height}" fill="white"/>{inside}</svg>\n'
+    return found
 
 
 def html(run: Run, extra_sections: Sequence[Section] = ()) -> str:

@@ -143,7 +143,7 @@ def show_run(console: Console, run: Run, out: Path) -> None:
     show_grid(console, "Modal peaks of the virtual hammer test, Hz +- standard error", ("mode", *every), peaks)
     if any("-" in row for row in peaks):
         console.print(f"-: no peak was found. {_struck(run.spindle)}")
-    console.print(f"\n{out}: report.html, run.rrd, table.csv, modes.csv, spindle_*.xml, campaign/", highlight=False, soft_wrap=True)
+    console.print(f"\n{out}: report.html, pictures/, run.rrd, table.csv, modes.csv, spindle_*.xml, campaign/", highlight=False, soft_wrap=True)
     console.print(f"Open in a browser: {(out / 'report.html').resolve().as_uri()}", highlight=False, soft_wrap=True)
 
 
