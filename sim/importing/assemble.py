@@ -18,7 +18,7 @@ from thermospindle.sim.importing import units
 from thermospindle.sim.importing.exchanged import exchanged
 from thermospindle.sim.importing.files.reading import content
 from thermospindle.sim.importing.frfs import Placed, frf_of
-from thermospindle.sim.importing.mapping import REST, FileForm, MappingForm, TestForm, fits, settings_of, test_of
+from thermospindle.sim.importing.mapping import REST, FileForm, MappingForm, TestForm, fits, settings_of, told_of
 from thermospindle.sim.importing.measured import FORCE_NEEDED, Content, Curve, End, ModeLine, Motion, Question, listed, words_of
 from thermospindle.sim.importing.names import plain
 from thermospindle.sim.importing.peaks import from_peaks
@@ -224,7 +224,7 @@ def _conditions(found: Read, form: MappingForm, scene: Spindle | None, mapping: 
         if found.tests and not any(fnmatchcase(name, id_) for name in found.tests):
             raise BadInput(f"{mapping}: tests: id = {id_!r}: no file makes such a test; there are {listed(found.tests)}")
     for key, text in (("temperature_C", "the temperature of the spindle, C,"), ("speed_rpm", "the speed, rpm (0 at rest),")):
-        missing = [t for t in found.tests if getattr(test_of(form, t), key) is None]
+        missing = [t for t in found.tests if getattr(told_of(form, t), key) is None]
         if missing:
             questions.append(Question(", ".join(missing), key, f"{text} of the test{'s' * (len(missing) > 1)}"))
     if form.spindle is None and scene is None:
@@ -262,7 +262,7 @@ def campaign_of(found: Read, form: MappingForm, scene: Spindle | None, files: Se
     _check_left_out(found, form, settings, mapping)
     said = [p.quantity for every in placed.values() for p in every]
     quantity: str = form.quantity or (max(said, key=said.count) if said else "mobility")
-    tests = tuple(_test(t, test_of(form, t), found, placed.get(t, []), quantity, form, notes) for t in found.tests)
+    tests = tuple(_test(t, told_of(form, t), found, placed.get(t, []), quantity, form, notes) for t in found.tests)
     used = {n for t in tests if t.frf for n in (*t.frf.response_nodes, *t.frf.reference_nodes)}
     points = tuple(p for node, p in sorted(found.points.items()) if node in used)
     title = form.title or f"imported from {listed((f.name for f in files), 3)}"

@@ -169,13 +169,10 @@ def settings_of(form: MappingForm, file: Path) -> FileForm:
     return FileForm.model_validate(told)
 
 
-def test_of(form: MappingForm, name: str) -> TestForm:
+def told_of(form: MappingForm, name: str) -> TestForm:
     """What the mapping says of one test, all tables whose `id` fits it taken together, later ones first."""
     told: dict[str, Any] = {}
     for table in form.tests:
         if fnmatchcase(name, table.id):
             told |= table.model_dump(exclude_unset=True)
     return TestForm.model_validate(told | {"id": name})
-
-
-test_of.__test__ = False  # type: ignore[attr-defined]
