@@ -15,6 +15,8 @@ COLDEST, HOTTEST = -40.0, 120.0
 """C. Below, rolling-bearing greases no longer lubricate; above, bearing steel that is not stabilised grows (SKF, Rolling bearings, 2018)."""
 FASTEST = 2.5e6
 """mm rev/min, speed times pitch diameter: what ball bearings reach with ceramic balls and oil-air (Abele et al., CIRP Annals 59, 2010)."""
+STRONGEST = 1e9
+"""Pa: rho v^2, the hoop stress of a thin ring by its own rotation (Timoshenko, *Strength of Materials*, part 2, 1956), that quenched steel does not bear for long."""
 DEEPEST = 0.01
 """Deformation of both contacts over the ball's diameter. The static capacity of ISO 76, 4.2 GPa, is reached at about a third of it."""
 
@@ -39,6 +41,12 @@ def of_conditions(spindle: Spindle, conditions: Sequence[Condition]) -> list[str
         f"end at about {FASTEST:.2g}"
         for reached, names in alike.items()
     ]
+    for shaft in spindle.structure.shafts:
+        rims = [(max(s.outer), spindle.materials[s.material].density) for s in shaft.segments] if shaft.turns else []
+        radius, density = max(rims, default=(0.0, 0.0), key=lambda rim: rim[0] ** 2 * rim[1])
+        rim = abs(shaft.speed_ratio) * fastest * radius
+        if density * rim**2 > STRONGEST:
+            said.append(f"{fastest / RPM:g} rpm means {rim:.0f} m/s at the largest diameter of shaft {shaft.name!r}, where a ring bears {np.sqrt(STRONGEST / density):.0f} m/s of its own rotation")
     return said
 
 

@@ -10,6 +10,7 @@ import pytest
 from rich.console import Console
 
 from thermospindle.model.machine import Condition
+from thermospindle.model.scene.reading import load
 from thermospindle.model.sense import of_conditions
 from thermospindle.model.units import RPM
 from thermospindle.report.text.resonance import sentences, show_map
@@ -71,3 +72,12 @@ def test_a_warning_of_every_bearing_is_one(spindle):
     merged, alone = of_conditions(replace(named, bearings=(*named.bearings, other)), [Condition(20.0, 400_000 * RPM)])
     assert "in the front, rear and third bearings; ball" in merged
     assert "n dm of 1.44e+07 mm rev/min in the large bearing; ball bearings end at about 2.5e+06" in alone
+
+
+def test_a_shaft_that_its_own_rotation_tears_is_doubted():
+    """Steel of 7800 kg/m3 bears 1 GPa as a ring at 358 m/s."""
+    spindle = load("mk7702")
+    radius = max(max(s.outer) for s in spindle.structure.shafts[0].segments)
+    assert not of_conditions(spindle, [Condition(20.0, 300.0 / radius)])
+    [said] = of_conditions(spindle, [Condition(20.0, 400.0 / radius)])
+    assert "400 m/s at the largest diameter of shaft 'spindle'" in said
