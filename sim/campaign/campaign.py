@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from thermospindle.model.errors import BadInput
+from thermospindle.model.errors import BadInput, listed
 from thermospindle.model.files.cells import cells, name_of
 from thermospindle.model.files.formats import CAMPAIGN, CURRENT, KEY
 from thermospindle.model.files.whole import whole
@@ -110,7 +110,9 @@ def read_campaign(folder: Path, limits: Limits = LIMITS) -> Campaign:
     folder = folder.parent if folder.name == "campaign.toml" else folder
     file = folder / "campaign.toml"
     if not file.is_file():
-        raise BadInput(f"{folder}: no campaign there; expected a folder with campaign.toml")
+        within = sorted(p.parent.name for p in folder.glob("*/campaign.toml")) if folder.is_dir() else []
+        meant = f"; within it {'is' if len(within) == 1 else 'are'} {listed(within[:5])}" if within else ""
+        raise BadInput(f"{folder}: no campaign there; expected a folder with campaign.toml{meant}")
     raw = read_file(CAMPAIGN, file)
     table = checked(file, raw)
     points = tuple(p.point() for p in table.points)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.conftest import SCENE
 from tests.made_campaign import FREQUENCY, POINTS, ascii_58, rotor_frf, sets_of
 from thermospindle.model.errors import BadInput
 from thermospindle.model.units import RPM
@@ -132,6 +133,8 @@ def test_another_point_than_the_hammers_is_known_where_no_line_shows_power() -> 
 
 
 def test_missing_folder_is_named(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match=r"measured: no campaign there; expected a folder with campaign.toml; within it is jang_2003"):
+        read_campaign(SCENE / "measured")
     with pytest.raises(BadInput, match="nowhere: no campaign there"):
         read_campaign(tmp_path / "nowhere")
 
