@@ -117,8 +117,9 @@ def test_an_inertia_is_tilted_no_further_than_a_body_can_be() -> None:
 def test_warm_up_tells_whose_preload_and_watts(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["warmup", FIVE, "--minutes", "1"]) == 0
     said = capsys.readouterr().out
-    assert said.splitlines()[1].split()[-1] == "front1"
-    assert said.splitlines()[2].split()[-1] == "preload"
+    assert re.search(r"the preload of (front|rear)\d goes from [\d.]+ to [\d.]+ N", " ".join(said.split()))
+    heads = [line.split()[-1:] for line in said.splitlines()]
+    assert heads[heads.index(["front1"]) + 1] == ["preload"]
     assert " mW" not in said
 
 

@@ -52,6 +52,17 @@ def test_shaft_bending_of_a_uniform_beam(spindle):
     assert found == pytest.approx(cantilever(11.5e-3, bending, shear, tension), rel=1e-9, abs=1e-20)
 
 
+def test_the_far_bearing_is_met_through_the_bent_shaft(spindle):
+    """Its compliance and 0.3 of that of the drawn 5 mm steel between the bearings add up; the near one is met as it is."""
+    plain, bent = (at(spindle, Condition(20.0), shaft_bending, scale=scale).chain for scale in (0.0, 0.3))
+    bending, tension = STEEL[0] * np.pi / 4 * 2.5e-3**4, STEEL[0] * np.pi * 2.5e-3**2
+    near, far = sorted(spindle.bearings, key=lambda b: b.z)
+    added = 0.3 * cantilever(far.z - near.z, bending, 6 * 1.3 / (7 + 6 * 0.3) * tension / 2.6, tension)
+    (a, b), (c, d) = ([next(e.stiffness for e in own.elements if e.name == name) for own in (plain, bent)] for name in (far.name, near.name))
+    assert np.linalg.inv(b) - np.linalg.inv(a) == pytest.approx(added, rel=1e-6, abs=1e-6 * np.abs(added).max())
+    assert d == pytest.approx(c)
+
+
 def test_shaft_bending_hanging_down_is_the_mirror_image(spindle):
     beam = shaft_bending.pieces(spindle, 20.0)
     up, down = shaft_bending.flexibility(beam, 5e-3, 16.5e-3), shaft_bending.flexibility(beam, 16.5e-3, 5e-3)
