@@ -284,7 +284,7 @@ def _modes(
 
     sd = np.sqrt(np.diag(spread))
     cost = 2 * (fit.shape.shape[1] + fit.participation.shape[1]) * np.log(lines.count)
-    sure = (sd[:a] < damping * frequency) & (sd[a:] < damping / 2) & (weight > FAINT * cost)
+    sure = believed(lines, poles) & (sd[:a] < damping * frequency) & (sd[a:] < damping / 2) & (weight > FAINT * cost)  # the last refinement may have led a pole out of the band
     moved = 0
     for pole, offset in twice:
         near = np.flatnonzero(np.abs(poles - pole) < -pole.real)
