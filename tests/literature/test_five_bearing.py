@@ -93,9 +93,9 @@ def test_computed_radial_stiffness_is_near_the_rated_one(five):
 
 
 def test_assumed_balls_carry_what_the_catalogue_says(five):
-    """Hertz's constant of the assumed balls is within an eighth of what the catalogue's rigidities ask for."""
+    """What the catalogue's rigidities ask for, over Hertz's constant of the assumed balls: a ninth less in front, a twentieth less behind."""
     for b in five.bearings:
-        assert b.constant_factor == pytest.approx(1.0, abs=0.125)
+        assert b.constant_factor == pytest.approx(0.892 if b.name.startswith("front") else 0.946, abs=0.005)
 
 
 def test_a_catalogue_entry_in_the_wrong_order_is_refused():
