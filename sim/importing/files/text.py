@@ -144,8 +144,10 @@ def _number(text: str, comma: bool) -> float | complex:
     elif "_" in text:
         raise ValueError(text)
     try:
-        return float(FORTRAN.sub(r"\1e\2", text))
+        return float(text)
     except ValueError:
+        if double := FORTRAN.match(text):
+            return float(f"{double[1]}e{double[2]}")
         plain = text.strip("()").replace(" ", "").replace("i", "j").replace("*", "")
         return complex(plain)
 
