@@ -9,6 +9,7 @@ effects of the catalogue, but nothing of the diagnosis.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from itertools import product
 from typing import Any
@@ -17,7 +18,7 @@ import numpy as np
 from scipy.optimize import lsq_linear, minimize
 
 from tests.blind.campaigns import Made
-from tests.blind.visible import SMALL, Seen, change
+from tests.blind.visible import SMALL, Beside, Seen, change
 from tests.blind.world import Answer, World
 from thermospindle.diagnosis.parameters.mechanism import Mechanism, variants, with_own_laws
 from thermospindle.model.machine import Condition, Spindle
@@ -35,7 +36,7 @@ SOUGHT = 60  # shapes between these, at most, where none of them leaves nothing
 def right(made: Made, spindle: Spindle, of: Seen, catalogue: Sequence[Effect] = CATALOGUE) -> list[list[str]]:
     """Of every hidden piece the effects of the catalogue that are a right answer."""
     changes = [change(made, spindle, of, h, SMALL, World()) for h in made.hidden]
-    wholes = [_whole(of, d) for d in changes]
+    wholes = [of.beside(d[:, None]).whole for d in changes]
     return [right_names(h.names, row, whole) for h, row, whole in zip(made.hidden, left(made, spindle, of, changes, catalogue), wholes, strict=True)]
 
 
@@ -43,27 +44,24 @@ def left(made: Made, spindle: Spindle, of: Seen, changes: Sequence[Array], catal
     """What each effect leaves of `changes` (N,) each, in standard errors; of its variants the least."""
     found: list[dict[str, float]] = [{} for _ in changes]
     conditions = [Condition(p.temperature, p.speed) for p in made.plans]
-    base = [_frf(made.built, c, [], of) for c in conditions]
+    base = [_Before.at(made.built, c, of) for c in conditions]
 
-    def rest_of(m: Mechanism, d: Array, shape: list[float]) -> float:
-        return _least(of, d, *_by_size(made.built, m, shape, conditions, base, of))
+    wanted = [of.beside(d[:, None]) for d in changes]
+
+    def rest_of(m: Mechanism, d: Beside, shape: list[float]) -> float:
+        return _least(d, *_by_size(made.built, m, shape, conditions, base, of))
 
     named = [v for e in usable(spindle, tuple(catalogue)) for v in variants(e)]
     for m in [*named, *with_own_laws(named, spindle, conditions)]:
         if not any(getattr(m.effect, hook) for hook in ("spindle", "temperatures", "motions", "pair", "chain", "measurement")):
             continue
         tried = [(shape, _by_size(made.built, m, shape, conditions, base, of)) for shape in _shapes(m)]
-        for d, row in zip(changes, found, strict=True):
-            rest, shape = min((_least(of, d, *columns), shape) for shape, columns in tried)
-            if m.shape and SAME < rest < _whole(of, d) * (1 - MOSTLY):
+        for d, row in zip(wanted, found, strict=True):
+            rest, shape = min((_least(d, *columns), shape) for shape, columns in tried)
+            if m.shape and SAME < rest < d.whole * (1 - MOSTLY):
                 rest = min(rest, _between(m, shape, partial(rest_of, m, d)))
             row[m.name] = min(row.get(m.name, np.inf), rest)
     return found
-
-
-def _whole(of: Seen, d: Array) -> float:
-    """Standard errors of a change `d` (N,)."""
-    return float(np.sqrt(max(of.inner(d[:, None], d[:, None])[0, 0], 0.0)))
 
 
 def _between(m: Mechanism, start: Sequence[float], rest: Callable[[list[float]], float]) -> float:
@@ -99,41 +97,61 @@ def _shapes(m: Mechanism) -> list[list[float]]:
     return [neutral, *alone]
 
 
+@dataclass(frozen=True, eq=False)
+class _Before:
+    """One test without effects."""
+
+    answer: Answer
+    frf: ComplexArray
+    ways: tuple[ComplexArray, ComplexArray]
+
+    @staticmethod
+    def at(built: Spindle, condition: Condition, of: Seen) -> _Before:
+        answer = _answer(built, condition, [])
+        return _Before(answer, answer.frf(of.frequency), answer.ways(of.frequency))
+
+    def change(self, after: Answer, of: Seen) -> ComplexArray:
+        """What the FRFs change by up to another answer that is all but the same: where the same is measured, by its matrices to the first order."""
+        before = self.answer
+        same = all(np.array_equal(getattr(after, name), getattr(before, name)) for name in ("responses", "references", "gain", "delay", "decay"))
+        if same and after.linear.mass.shape == before.linear.mass.shape:
+            return before.moved(of.frequency, self.ways, after.linear)
+        return after.frf(of.frequency) - self.frf
+
+
 def _by_size(
-    built: Spindle, m: Mechanism, shape: list[float], conditions: Sequence[Condition], base: Sequence[ComplexArray], of: Seen
-) -> tuple[Array, Array, Array]:
+    built: Spindle, m: Mechanism, shape: list[float], conditions: Sequence[Condition], base: Sequence[_Before], of: Seen
+) -> tuple[Beside, Array, Array]:
     """Changes (N, k) by one prior standard deviation of the size in each test, or in all at once of what lasts, and the limits (k,) of these."""
     up = m.size.neutral + SMALL * m.size.prior_sd <= m.size.limits[1]
     step = SMALL if up else -SMALL
     values = m.values(m.size.neutral + step * m.size.prior_sd, shape)
-    moved = []
+    moved, nothing = [], [np.zeros_like(b.frf) for b in base]
     for t, (condition, before) in enumerate(zip(conditions, base, strict=True)):
         try:
-            after = _frf(built, condition, [(m.effect, values)], of)
+            own = before.change(_answer(built, condition, [(m.effect, values)]), of) / step
         except (ValueError, RuntimeError, ArithmeticError):
-            after = before
-        moved.append(of.whitened([(after - before) / step if k == t else np.zeros_like(b) for k, b in enumerate(base)]))
-    columns = np.array([np.sum(moved, axis=0)] if m.effect.lasting or m.effect.exact else moved).T
+            continue
+        moved.append(of.whitened([*nothing[:t], own, *nothing[t + 1 :]]))
+    acting = [row for row in moved if row.any()] or [of.whitened(nothing)]
+    columns = np.array([np.sum(acting, axis=0)] if m.effect.lasting or m.effect.exact else acting).T
     low, high = ((limit - m.size.neutral) / m.size.prior_sd for limit in m.size.limits)
-    return columns, np.full(columns.shape[1], low), np.full(columns.shape[1], high)
+    return of.beside(columns), np.full(columns.shape[1], low), np.full(columns.shape[1], high)
 
 
-def _frf(built: Spindle, condition: Condition, effects: list[tuple[Any, Any]], of: Seen) -> ComplexArray:
+def _answer(built: Spindle, condition: Condition, effects: list[tuple[Any, Any]]) -> Answer:
     point = operating_point(built, condition, effects)
     how = point.measurement
-    return Answer(point.linear, how.response_rows, how.reference_rows, how.gain, how.delay, how.decay, "").frf(of.frequency)
+    return Answer(point.linear, how.response_rows, how.reference_rows, how.gain, how.delay, how.decay, "")
 
 
-def _least(of: Seen, d: Array, columns: Array, low: Array, high: Array) -> float:
-    """Standard errors left of a change `d` (N,) beside sizes within their limits."""
-    acting = columns.any(axis=0)
-    whole = float(of.inner(d[:, None], d[:, None])[0, 0])
-    if acting.any():
-        own = columns[:, acting]
-        square, cross = of.inner(own, own), of.inner(own, d[:, None])[:, 0]
+def _least(d: Beside, columns: Beside, low: Array, high: Array) -> float:
+    """Standard errors left of a change `d` (N, 1) beside sizes within their limits."""
+    square, cross, whole = columns.inner(columns), columns.inner(d)[:, 0], float(d.inner(d)[0, 0])
+    if columns.changes.any():
         scale = np.sqrt(np.maximum(np.diag(square), 1e-300))
         lower = np.linalg.cholesky(square / scale[:, None] / scale[None, :] + 1e-9 * np.eye(len(scale)))
-        ends = (low[acting] * scale, np.maximum(high[acting] * scale, low[acting] * scale + 1e-12))
+        ends = (low * scale, np.maximum(high * scale, low * scale + 1e-12))
         sizes = lsq_linear(lower.T, np.linalg.solve(lower, cross / scale), ends).x / scale
         whole += float(sizes @ square @ sizes) - 2 * float(cross @ sizes)
     return float(np.sqrt(max(whole, 0.0)))

@@ -225,6 +225,18 @@ def test_right_answers_are_what_effects_do():
     assert whirl == []
 
 
+@pytest.mark.parametrize(("scene", "turns"), [(SCENES[0], 1.0), (FURTHER, 0.0), (FURTHER, 1.0)])
+def test_a_small_change_of_the_frfs_is_what_other_matrices_do(scene, turns):
+    """To the first order, by central differences of a mobility that is solved anew, where gyroscopic moments make matrices unsymmetric and where not."""
+    spindle = load(ROOT / scene)
+    at = answer(spindle, Condition(30.0, turns * spindle.nominal_speed), World())
+    frequency = np.linspace(*spindle.hammer.band, 12)
+    own, factor = at.linear, np.random.default_rng(3).normal(size=at.linear.mass.shape)
+    low, high = (replace(own, stiffness=own.stiffness * (1 + by * factor), damping=own.damping * (1 + by * factor), mass=own.mass * (1 + by)) for by in (-1e-7, 1e-7))
+    moved = at.moved(frequency, at.ways(frequency), high)
+    assert moved == pytest.approx((replace(at, linear=high).frf(frequency) - replace(at, linear=low).frf(frequency)) / 2, abs=1e-4 * np.abs(moved).max())
+
+
 def test_a_mass_is_a_disk_of_some_shape():
     """At the centre of the hub and without inertia, which a disk as its prior has it is not: its height and its radius of gyration are sought."""
     drawn = draw(736)

@@ -42,10 +42,36 @@ class Seen:
     def _lower(self) -> Array:
         return np.asarray(np.linalg.cholesky(np.eye(self.columns.shape[1]) + self.columns.T @ self.columns))
 
+    def beside(self, changes: Array) -> Beside:
+        """Changes (N, m), with what all else can take of them; of one that is nothing in a test nothing is multiplied there."""
+        tests = len(self.sd)
+        columns, parts = self.columns.reshape(2, tests, -1, self.columns.shape[1]), changes.reshape(2, tests, -1, changes.shape[1])
+        alike = np.zeros((self.columns.shape[1], changes.shape[1]))
+        for t in range(tests):
+            acting = parts[:, t].any(axis=(0, 1))
+            alike[:, acting] += sum(c[t].T @ p[t][:, acting] for c, p in zip(columns, parts, strict=True))
+        return Beside(changes, np.linalg.solve(self._lower, alike))
+
     def inner(self, one: Array, other: Array) -> Array:
         """Products (m, n) of changes (N, m) and (N, n) after all else has taken of them what it can."""
-        of_one, of_other = (np.linalg.solve(self._lower, self.columns.T @ c) for c in (one, other))
-        return np.asarray(one.T @ other - of_one.T @ of_other)
+        return self.beside(one).inner(self.beside(other))
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """Changes (N, m), and their products (k, m) with what all else does, so that products of what it leaves cost one product each."""
+
+    changes: Array
+    taken: Array
+
+    def inner(self, other: Beside) -> Array:
+        """Products (m, n) of what is left of these and of others."""
+        return np.asarray(self.changes.T @ other.changes - self.taken.T @ other.taken)
+
+    @property
+    def whole(self) -> float:
+        """Standard errors of what is left of one change (N, 1)."""
+        return float(np.sqrt(max(self.inner(self)[0, 0], 0.0)))
 
 
 def seen(made: Made, spindle: Spindle, lines: int = 160) -> Seen:
@@ -153,7 +179,7 @@ def _of_each_test(moved: Array, tests: int) -> Array:
 
 
 def _shows(of: Seen, changes: Sequence[Array]) -> float:
-    return float(np.sqrt(max(min(of.inner(d[:, None], d[:, None])[0, 0] for d in changes), 0.0)))
+    return min(of.beside(d[:, None]).whole for d in changes)
 
 
 def _modal_columns(made: Made, column, frequency: Array, plain: World, spindle: Spindle) -> list[Array]:

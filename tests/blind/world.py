@@ -110,6 +110,27 @@ class Answer:
         moved = -s * there[:, :, None] * back[:, None] * self._channels(frequency)
         return moved, s * moved
 
+    def moved(self, frequency: Array, ways: tuple[ComplexArray, ComplexArray], to: Matrices) -> ComplexArray:
+        """Derivative (n_resp, n_ref, n) of the mobility along what other matrices are more than these, by the `ways` of these."""
+        s, (there, back) = 2j * np.pi * frequency + self.decay, ways
+        total = np.zeros((len(self.responses), len(self.references), len(s)), complex)
+        for power, name in enumerate(("stiffness", "damping", "mass")):
+            more = getattr(to, name) - getattr(self.linear, name)
+            own = np.flatnonzero(more.any(axis=0) | more.any(axis=1))
+            total -= np.moveaxis(there[:, :, own] @ (more[np.ix_(own, own)] @ back[:, own]), 0, -1) * s ** (power + 1)
+        return total * self._channels(frequency)
+
+    def ways(self, frequency: Array) -> tuple[ComplexArray, ComplexArray]:
+        """Displacements of the responses under forces anywhere (lines, n_resp, n), and of everything under the hammers (lines, n, n_ref)."""
+        s = 2j * np.pi * frequency + self.decay
+        if len(self.linear.mass) > LARGE:
+            p = poles(self.linear)
+            by_line = 1 / (s[:, None] - p.value)
+            return (self.responses @ p.right * by_line[:, None]) @ p.left, p.right @ (by_line[:, :, None] * (p.left @ self.references.T))
+        own = self.linear
+        across = replace(self, linear=replace(own, mass=own.mass.T, damping=own.damping.T, stiffness=own.stiffness.T))
+        return across._solved(s, self.responses.T).swapaxes(1, 2), self._solved(s, self.references.T)
+
     def _solved(self, s: ComplexArray, forces: Array) -> ComplexArray:
         """Displacements (lines, n, k) under `forces` (n, k)."""
         m, c, k = self.linear.mass, self.linear.damping, self.linear.stiffness
