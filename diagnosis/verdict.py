@@ -142,13 +142,13 @@ def campaign_data(spindle: Spindle, campaign: Campaign, progress: Callable[[str]
     """The model of a campaign beside the data of all its tests; BadInput for points on bodies that the scene has not."""
     check_points(spindle, campaign)
     noise = expected_noise(spindle)
-    data = in_parallel(partial(_data, campaign.noise, noise), campaign.tests, done=lambda d: progress(f"{d.test.id} read"))
+    data = in_parallel(partial(_data, campaign.noise, noise, spindle.tolerances.gain), campaign.tests, done=lambda d: progress(f"{d.test.id} read"))
     return campaign_model(spindle, campaign, data)
 
 
-def _data(stated: Noise | None, expected: Noise, test: Test) -> TestData:
+def _data(stated: Noise | None, expected: Noise, gain: float, test: Test) -> TestData:
     condition = condition_of(test)
-    return line_data(test, condition, stated, expected) if test.frf is not None else mode_data(test, condition)
+    return line_data(test, condition, stated, expected) if test.frf is not None else mode_data(test, condition, gain)
 
 
 def _own_laws(found: Search, verdict: Verdict) -> tuple[Drift, ...]:

@@ -11,7 +11,8 @@ import numpy as np
 
 from thermospindle.model.machine import Point
 from thermospindle.model.units import RPM
-from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Noise, Test
+from thermospindle.sim.campaign.campaign import Campaign, Noise, Test
+from thermospindle.sim.campaign.modes import ModeRow
 from thermospindle.sim.identification.frf import Frf
 
 POINTS = (

@@ -16,7 +16,8 @@ from thermospindle.diagnosis.parameters import nuisance
 from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array, ComplexArray
-from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Noise, Test, condition_of
+from thermospindle.sim.campaign.campaign import Campaign, Noise, Test, condition_of
+from thermospindle.sim.campaign.modes import ModeRow, ShapeAt
 from thermospindle.sim.effects import CATALOGUE, of_scene
 from thermospindle.sim.effects.effect import Effect, Values
 from thermospindle.sim.identification.frf import POWER, Frf
@@ -89,9 +90,10 @@ def virtual_campaign(
 
 def mode_campaign(
     spindle: Spindle, conditions: Sequence[Condition], seed: int, effects: Sequence[tuple[Effect, Values]] = (), damping: bool = True,
-    errors: Drawn | None = None,
+    errors: Drawn | None = None, shapes: Sequence[int] = (), real: bool = False,
 ) -> Campaign:
-    """Tables of the modes in the hammer's band, frequencies to 1e-4 and damping ratios to 1 %."""
+    """Tables of the modes in the hammer's band, frequencies to 1e-4 and damping ratios to 1 %, and shapes at the nodes `shapes` to 1 % of their largest
+    in either part, or the `real` one alone of which they show the most."""
     random = np.random.default_rng(2000 + seed)
     built = spindle
     for p, x in zip(toleranced(spindle), errors.build if errors else (), strict=False):
@@ -105,15 +107,22 @@ def mode_campaign(
             sd, ratio_sd = 1e-4 * mode.frequency, 0.01 * mode.damping_ratio
             frequency = mode.frequency + sd * random.standard_normal()
             ratio = mode.damping_ratio + ratio_sd * random.standard_normal()
-            rows.append(ModeRow(f"test_{t}", k + 1, mode.kind, frequency, sd, ratio if damping else None, ratio_sd if damping else None))
+            places = [[p.node for p in spindle.points].index(n) for n in shapes]
+            seen = point.measurement.response_rows[places] @ mode.shape
+            told = ()
+            if len(seen):
+                seen = seen * np.exp(-0.5j * np.angle(np.sum(seen**2))) / np.abs(seen).max()
+                seen = seen + 0.01 * (random.standard_normal(len(seen)) + 1j * random.standard_normal(len(seen)))
+                told = tuple(ShapeAt(n, complex(v.real) if real else complex(v), 0.01) for n, v in zip(shapes, seen, strict=True))
+            rows.append(ModeRow(f"test_{t}", k + 1, mode.kind, frequency, sd, ratio if damping else None, ratio_sd if damping else None, told))
         tests.append(Test(f"test_{t}", condition.temperature, condition.speed, modes=tuple(rows)))
-    return Campaign("virtual modes", spindle.name, "mobility", (), tuple(tests), lumped_shafts=bool(spindle.structure.shafts))
+    return Campaign("virtual modes", spindle.name, "mobility", spindle.points if shapes else (), tuple(tests), lumped_shafts=bool(spindle.structure.shafts))
 
 
 def model_of(spindle: Spindle, campaign: Campaign) -> CampaignModel:
     """The model that the diagnosis makes of a campaign."""
     expected = expected_noise(spindle)
-    data = [line_data(t, condition_of(t), campaign.noise, expected) if t.frf else mode_data(t, condition_of(t)) for t in campaign.tests]
+    data = [line_data(t, condition_of(t), campaign.noise, expected) if t.frf else mode_data(t, condition_of(t), spindle.tolerances.gain) for t in campaign.tests]
     return campaign_model(spindle, campaign, data)
 
 

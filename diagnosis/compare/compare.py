@@ -161,19 +161,19 @@ def compare(
 
 
 def _shape_nodes(o: Observation) -> tuple[int, ...]:
-    """The nodes at which a test shows shapes; none of a table."""
-    return () if o.test.frf is None else o.test.frf.reference_nodes if by_hammer(o) else o.test.frf.response_nodes
+    """The nodes at which a test shows shapes."""
+    return o.test.shape_nodes if o.test.frf is None else o.test.frf.reference_nodes if by_hammer(o) else o.test.frf.response_nodes
 
 
 def _as_measured(spindle: Spindle, campaign: Campaign, o: Observation) -> Predicted:
     """Modes predicted for a test, with shapes at its response points."""
-    found = predict(measured_at(spindle, campaign.points, o.test.frf), o, of_scene(spindle), lumped=campaign.lumped_shafts)
+    found = predict(measured_at(spindle, campaign.points, o.test), o, of_scene(spindle), lumped=campaign.lumped_shafts)
     return found if o.shape is None else replace(found, shape=found.shape[:, : o.shape.shape[1]])
 
 
 def _at_its_temperature(spindle: Spindle, campaign: Campaign, o: Observation, p: Predicted, partner: Integers) -> Observation:
     """The observation with the error of its temperature among its errors."""
-    here = measured_at(spindle, campaign.points, o.test.frf)
+    here = measured_at(spindle, campaign.points, o.test)
     slope = temperature_slope(here, o, p, of_scene(spindle), campaign.lumped_shafts).reshape(2, -1)
     return with_temperature(o, np.where(partner >= 0, slope[:, partner], 0.0).ravel(), spindle.tolerances.temperature)
 

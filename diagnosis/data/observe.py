@@ -31,8 +31,8 @@ class Observation:
 
     `covariance` (2m, 2m) of [ln frequency, ln damping]; damping not measured is NaN with infinite variance. `shape` (m, n_resp) and
     `shape_sd` are relative to the largest component; `residue` (m, n_ref) is that of the receptance between each reference and the
-    channel with the largest component, `residue_sd` (m,) relative. They are None for a table of modes, which says the `kind` of each
-    mode instead.
+    channel with the largest component, `residue_sd` (m,) relative. A table of modes has no residues, shapes where it tells them, and says the
+    `kind` of each mode.
     """
 
     test: Test
@@ -80,10 +80,10 @@ def _repeated(o: Observation, others: list[Observation]) -> Observation:
     """Without the modes that no other test shows anything like: a pole of the noise appears once, a mode of the machine again.
     A mode of another test speaks for one mode only: what splits a peak in two has the shape of both.
 
-    Less than three tests with shapes are taken as they are.
+    Less than three tests of FRFs are taken as they are.
     """
-    shown = [other.modes for other in others if other.shape is not None]
-    if o.shape is None or len(shown) < 2:
+    shown = [other.modes for other in others if other.residue is not None]
+    if o.residue is None or len(shown) < 2:
         return o
     again = np.zeros(len(o.frequency), bool)
     for modes in shown:
@@ -92,9 +92,9 @@ def _repeated(o: Observation, others: list[Observation]) -> Observation:
 
 
 def _only(o: Observation, kept: NDArray[np.bool_]) -> Observation:
-    """Some of the modes of a test that has shapes."""
+    """Some of the modes of a test of FRFs."""
     if o.shape is None or o.shape_sd is None or o.residue is None or o.residue_sd is None:
-        raise ValueError("a table of modes has no shapes")
+        raise ValueError("a table of modes has no residues")
     both = np.concatenate([kept, kept])
     return replace(
         o,
@@ -146,4 +146,9 @@ def _from_table(test: Test) -> Observation:
     )
     variance = np.concatenate([sd_f**2 + FREQUENCY_FLOOR**2, sd_z**2 + DAMPING_FLOOR**2])
     kinds = tuple(r.kind for r in rows)
-    return Observation(test, condition_of(test), frequency, damping, np.diag(variance), None, None, None, None, kinds)
+    shape = shape_sd = None
+    if test.shape_nodes:
+        shape = np.array([[at.value for at in r.shape] for r in rows])
+        largest = np.abs(shape).max(axis=1, keepdims=True)
+        shape, shape_sd = shape / largest, np.array([[at.sd for at in r.shape] for r in rows]) / largest
+    return Observation(test, condition_of(test), frequency, damping, np.diag(variance), shape, shape_sd, None, None, kinds)

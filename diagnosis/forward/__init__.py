@@ -4,7 +4,8 @@
 linear       one test's linear model, and how its matrices change with parameters
 response     FRFs at the lines of a test, with what their derivatives need
 record       what records that end too early leave out of them
-table        poles and their derivatives for a table of modes
+table        poles and shapes, and their derivatives, for a table of modes
+shapes       a measured shape beside the nearest that a model has
 rates        how the matrices change with tolerances, temperature and ring expansion
 points       operating points that differ in the measuring chain alone, or in how far the rings expand
 model        residuals of every test in standard errors

@@ -8,12 +8,14 @@ import numpy as np
 
 from thermospindle.diagnosis.data.mode_table import ModeData
 from thermospindle.diagnosis.forward.linear import Linear, Products
-from thermospindle.model.rotor.modes import kinds, oscillating, poles_below, with_mass_between
+from thermospindle.diagnosis.forward.shapes import ShapeBeside
+from thermospindle.model.rotor.modes import Poles, kinds, oscillating, poles_below, with_mass_between
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.identification import pairing
 from thermospindle.sim.identification.pairing import ModeSet
 
 REACH = 2.5  # times the highest measured frequency, up to which modes of the model may be those of a table
+TURN = 0.03  # relative distance of modes of a kind, below which they turn among themselves at the slightest asymmetry
 
 
 class Table:
@@ -24,20 +26,25 @@ class Table:
 
     @cached_property
     def residual(self) -> Array:
-        """Frequencies and the dampings that are known, computed less measured in standard errors (N,)."""
+        """Frequencies and the dampings and shapes that are known, computed less measured in standard errors (N,)."""
         data = self._data
-        every, shape = poles_below(self._linear.matrices, REACH * float(data.frequency.max()), self._linear.between)
-        pole = every[self._partners(every, shape)] - self._linear.chain.decay
+        if data.shapes:
+            pole = self._poles.value[self._own]
+        else:
+            every, shape = poles_below(self._linear.matrices, self._reach, self._linear.between)
+            pole = every[self._partners(every, shape)]
+        pole = pole - self._linear.chain.decay
         frequency, damping = np.abs(pole) / (2 * np.pi), -pole.real / np.abs(pole)
         known = np.isfinite(data.damping_sd)
         by_frequency = np.log(frequency / data.frequency) / data.frequency_sd
         by_damping = np.log(np.maximum(damping[known], 1e-9) / data.damping[known]) / data.damping_sd[known]
-        return np.concatenate([by_frequency, by_damping])
+        return np.concatenate([by_frequency, by_damping, *(own.residual for own in self._shapes)])
 
     def moved(self, by: Products) -> Array:
         """Derivatives (k, N) of the residual by the parameters that change M, C and K as `by` says: first-order perturbation of the poles,
         -left (p^2 dM + p dC + dK) right (Lancaster 1964, AIAA J. 2, 1659)."""
-        data, (pole, right, left) = self._data, self._modes
+        data, own = self._data, self._own
+        pole, right, left = self._poles.value[own], self._poles.right[:, own], self._poles.left[own]
         moved = np.zeros((len(pole), by.count), complex)
         if len(by.of):
             moved[:, by.of] = -np.add.reduceat(pole[:, None] ** by.power * (left @ by.left) * (right.T @ by.right), by.first, axis=1)
@@ -45,20 +52,69 @@ class Table:
         by_frequency = (moved * seen.conj()).real / np.abs(seen) ** 2
         by_damping = moved.real / seen.real - by_frequency
         known = np.isfinite(data.damping_sd)
-        return np.concatenate([by_frequency / data.frequency_sd[:, None], by_damping[known] / data.damping_sd[known, None]]).T
+        of_poles = [by_frequency / data.frequency_sd[:, None], by_damping[known] / data.damping_sd[known, None]]
+        return np.concatenate([*of_poles, *self._shapes_moved(by)]).T
+
+    def _shapes_moved(self, by: Products) -> list[Array]:
+        """Derivatives (N, k) of the residual of every shape. That of a right vector over those of other modes than its group's is
+        right_j (left_j (p^2 dM + p dC + dK) right) / (p_j - p), p its own pole: first order again, for the terms of the pole's own change add up to
+        a multiple of the vector (Adhikari 1999, AIAA J. 37, 1452)."""
+        if not self._shapes:
+            return []
+        p, found = self._poles, []
+        felt, seen = p.left @ by.left, self._seen(np.arange(len(p.value)))
+        for group, own in zip(self._groups, self._shapes, strict=True):
+            moved = np.zeros((len(seen), by.count), complex)
+            others = np.setdiff1d(np.arange(len(p.value)), group)
+            for j, share in zip(group.tolist(), own.combination, strict=True):
+                each = felt[others] * p.value[j] ** by.power * (p.right[:, j] @ by.right)
+                if len(by.of):
+                    moved[:, by.of] += share * np.add.reduceat((seen[:, others] / (p.value[others] - p.value[j])) @ each, by.first, axis=1)
+            found.append(own.moved(moved).T)
+        return found
 
     @cached_property
-    def _modes(self) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Pole, right and left vector of every mode of the table."""
-        p = with_mass_between(self._linear.matrices, self._linear.between)
-        found = oscillating(p, REACH * float(self._data.frequency.max()))
-        own = np.array(found)[self._partners(p.value[found], p.right[:, found])]
-        return p.value[own], p.right[:, own], p.left[own]
+    def _shapes(self) -> list[ShapeBeside]:
+        return [ShapeBeside(own, self._seen(group)) for own, group in zip(self._data.shapes, self._groups, strict=False)] if self._data.shapes else []
+
+    def _seen(self, modes: Integers) -> ComplexArray:
+        """Shapes (n, k) of modes of `_poles` at the table's points, as the measuring chain shows them."""
+        chain, n = self._linear.chain, len(self._data.test.shape_nodes)
+        shown = chain.gain[:n, None] * np.exp(-1j * np.abs(self._poles.value[modes]) * chain.delay[:n, None])
+        return chain.response_rows[:n] @ self._poles.right[:, modes] * shown
+
+    @cached_property
+    def _groups(self) -> list[Integers]:
+        """The modes of `_poles` that may be each mode of the table: its own first, and those of its kind within `TURN` of it."""
+        p, found = self._poles, self._found
+        axial = np.array([kind == "axial" for kind in kinds(self._linear.matrices, p.right[:, found])])
+        near = [found[(np.abs(np.log(np.abs(p.value[found] / p.value[j]))) <= TURN) & (axial == axial[found == j])] for j in self._own.tolist()]
+        return [np.concatenate([[j], group[group != j]]) for j, group in zip(self._own.tolist(), near, strict=True)]
+
+    @property
+    def _reach(self) -> float:
+        return REACH * float(self._data.frequency.max())
+
+    @cached_property
+    def _poles(self) -> Poles:
+        return with_mass_between(self._linear.matrices, self._linear.between)
+
+    @cached_property
+    def _found(self) -> Integers:
+        return np.array(oscillating(self._poles, self._reach))
+
+    @cached_property
+    def _own(self) -> Integers:
+        """Which of `_poles` is which mode of the table."""
+        return self._found[self._partners(self._poles.value[self._found], self._poles.right[:, self._found])]
 
     def _partners(self, pole: ComplexArray, shape: ComplexArray) -> Integers:
-        """Which pole, in order of frequency, is which mode of the table: of its kind, near in ln frequency."""
-        computed = ModeSet(np.abs(pole) / (2 * np.pi), kind=kinds(self._linear.matrices, shape))
-        partner = pairing.partners(ModeSet(self._data.frequency, kind=self._data.kind), computed, pairing.OF_A_TABLE)
+        """Which pole, in order of frequency, is which mode of the table: of its shape, or its kind, near in ln frequency."""
+        data, n = self._data, len(self._data.test.shape_nodes)
+        at = (self._linear.chain.response_rows[:n] @ shape).T if data.shapes else None
+        computed = ModeSet(np.abs(pole) / (2 * np.pi), at, kinds(self._linear.matrices, shape))
+        policy = pairing.OF_SHAPES if data.shapes else pairing.OF_A_TABLE
+        partner = pairing.partners(ModeSet(data.frequency, data.shape, data.kind), computed, policy)
         if np.any(partner < 0):
             raise ValueError("the model has fewer modes than the table")
         return partner

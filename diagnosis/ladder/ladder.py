@@ -80,12 +80,17 @@ class Ladder:
 
     @property
     def top(self) -> Step:
-        """Where the ladder leads: the last step, the best of alternatives and of what a beam lacks, or that without effects where none is accepted."""
+        """Where the ladder leads: the last step, the best of alternatives and of what a beam lacks that is asked for, or that without effects where none is accepted."""
         word = "" if self.diagnosis is None else self.diagnosis.verdict.word
         if word in ("none", "unexplained"):
             return self.step(DISCREPANCY)
-        if word == "ambiguous" or (word and self.left_out == MODES):
-            return max((s for s in self.steps if s.fitted), key=lambda s: s.evidence)
+        fitted = [s for s in self.steps if s.fitted]
+        if word == "ambiguous":
+            return max(fitted, key=lambda s: s.evidence)
+        if self.diagnosis is not None and self.left_out == MODES:
+            named = self.diagnosis.verdict.effects
+            asked = [s for s in fitted if not s.effects or s.effects[-1] in named or s.evidence - self.step(s.above).evidence > CLEAR]
+            return max(asked, key=lambda s: s.evidence)
         return self.steps[-1]
 
 

@@ -74,8 +74,7 @@ def _without(model: CampaignModel, t: int, group: LeftOut) -> TestData:
     data = model.tests[t]
     if isinstance(data, ModeData) and t in group.modes and not group.modes[t].all():
         kept = np.flatnonzero(np.logical_not(group.modes[t]))
-        frequency, frequency_sd, damping, damping_sd = (column[kept] for column in (data.frequency, data.frequency_sd, data.damping, data.damping_sd))
-        return ModeData(data.test, data.condition, frequency, frequency_sd, damping, damping_sd, tuple(data.kind[i] for i in kept.tolist()))
+        return data.only(kept)
     nothing = np.zeros((0 if not isinstance(data, LineData) else len(data.value), len(model.scenes[t].hammer.hammer_nodes), 0))
     quantity = data.quantity if isinstance(data, LineData) else "receptance"
     return LineData(data.test, data.condition, np.zeros(0), nothing.astype(complex), nothing, quantity, "left out", 0)
@@ -113,7 +112,8 @@ def missed(found: Settled, tests: Sequence[TestData], group: LeftOut) -> Missed:
 
 
 def _rows(data: TestData, modes: Array | None, count: int) -> Array:
-    """Which residuals (count,) of a test are left out: its frequencies, then the dampings that are known."""
+    """Which residuals (count,) of a test are left out: its frequencies, then the dampings that are known, then its shapes."""
     if modes is None or not isinstance(data, ModeData):
         return np.ones(count, bool)
-    return np.concatenate([modes, modes[np.isfinite(data.damping_sd)]])
+    of_shapes = np.repeat(modes, [own.count for own in data.shapes]) if data.shapes else np.zeros(0, bool)
+    return np.concatenate([modes, modes[np.isfinite(data.damping_sd)], of_shapes])

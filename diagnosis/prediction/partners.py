@@ -87,9 +87,9 @@ def group(o: Observation, p: Predicted, partner: Integers, mode: int) -> list[in
 def shapes(o: Observation, p: Predicted, partner: Integers) -> dict[int, tuple[ComplexArray, ComplexArray]]:
     """Measured and computed shape (n,) of the paired measured modes: the computed one is its partner's, in a close group the combination nearest to it. They are at the responses, or of a
     roving hammer at the references; of a mode whose group has as many members as there are points any shape is a combination, and there is none to compare."""
-    if o.shape is None or o.residue is None:
+    if o.shape is None:
         return {}
-    measured, computed = (o.residue, p.participation) if by_hammer(o) else (o.shape, p.shape)
+    measured, computed = (o.residue, p.participation) if o.residue is not None and by_hammer(o) else (o.shape, p.shape)
     found = {}
     for i in np.flatnonzero(partner >= 0).tolist():
         basis = computed[partner[group(o, p, partner, i)]].T

@@ -65,13 +65,15 @@ def _shaft_of(spindle: Spindle, point: Point) -> Shaft | None:
     return next((s for s in spindle.structure.shafts if s.name == point.body or (s.name == name and number.isdecimal())), None)
 
 
-def measured_at(spindle: Spindle, points: tuple[Point, ...], frf: Frf | None) -> Spindle:
-    """The spindle with a test's response points first and its hammer points, or as it is for a table of modes."""
-    if frf is None:
+def measured_at(spindle: Spindle, points: tuple[Point, ...], test: Test) -> Spindle:
+    """The spindle with a test's response points first and its hammer points; of a table of modes with the points of its shapes, or as it is where it tells none."""
+    responses = test.shape_nodes if test.frf is None else test.frf.response_nodes
+    if not responses:
         return spindle
-    nodes = (*frf.response_nodes, *(n for n in frf.reference_nodes if n not in frf.response_nodes))
+    references = responses[:1] if test.frf is None else test.frf.reference_nodes
+    nodes = (*responses, *(n for n in references if n not in responses))
     by_node = {p.node: p for p in on_nodes(spindle, points)}
-    hammer = replace(spindle.hammer, hammer_nodes=frf.reference_nodes)
+    hammer = replace(spindle.hammer, hammer_nodes=references)
     return replace(spindle, points=tuple(by_node[n] for n in nodes), hammer=hammer)
 
 
@@ -80,7 +82,7 @@ def beside(spindle: Spindle, points: tuple[Point, ...], test: Test, condition: C
     if test.frf is None:
         return None
     measured = without(test.frf, out_of(test.frf, test.speed).out | (test.frf.frequency <= 0))
-    return Beside(test, measured, operating_point(measured_at(spindle, points, test.frf), condition))
+    return Beside(test, measured, operating_point(measured_at(spindle, points, test), condition))
 
 
 def of_another(spindle: Spindle, campaign: Campaign) -> list[str]:

@@ -6,40 +6,25 @@ the keys of the file and SI in the dataclasses; temperatures are C, angular spee
 
 from __future__ import annotations
 
-import csv
 import tomllib
 from collections.abc import Mapping
-from dataclasses import asdict, astuple, dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 
 from thermospindle.model.errors import BadInput, listed
-from thermospindle.model.files.cells import cells, name_of
 from thermospindle.model.files.formats import CAMPAIGN, CURRENT, KEY
 from thermospindle.model.files.whole import whole
 from thermospindle.model.machine import Condition, Point
-from thermospindle.model.scene.fields import first_error, read_file
+from thermospindle.model.scene.fields import read_file
 from thermospindle.model.units import MINUTE, MM, RPM
-from thermospindle.sim.campaign.form import MODE_COLUMNS, ModeTable, checked, in_unit, toml
+from thermospindle.sim.campaign.form import checked, in_unit, toml
+from thermospindle.sim.campaign.modes import ModeRow, read_modes, with_shapes, write_modes, write_shapes
 from thermospindle.sim.campaign.runout_record import RunoutRecord, read_runout, same, write_runout
 from thermospindle.sim.campaign.uff import LARGEST, read_frf, write_frf
 from thermospindle.sim.identification.frf import LIMITS, Frf, Limits, check_frf, record_length
-
-
-@dataclass(frozen=True)
-class ModeRow:
-    """One identified mode of one test; None where the table is empty."""
-
-    test: str
-    mode: int
-    kind: str
-    frequency: float  # Hz
-    frequency_sd: float  # Hz, one standard deviation
-    damping_ratio: float | None = None
-    damping_ratio_sd: float | None = None
 
 
 @dataclass(frozen=True)
@@ -69,6 +54,11 @@ class Test:
     window_decay: float = 0.0  # 1/s, damping that an exponential window exp(-decay t) has left in the FRFs
     runout: RunoutRecord | None = field(default=None, compare=False)
     pretrigger: float = 0.0  # s from the start of a record to the middle of the hit
+
+    @property
+    def shape_nodes(self) -> tuple[int, ...]:
+        """Where its table of modes tells shapes."""
+        return tuple(at.node for at in self.modes[0].shape) if self.modes else ()
 
     def __repr__(self) -> str:
         told = [f"{self.temperature:g} C", f"{self.speed / RPM:.6g} rpm"] + [repr(self.frf)] * (self.frf is not None) + [f"{len(self.modes)} modes"] * bool(self.modes)
@@ -116,7 +106,9 @@ def read_campaign(folder: Path, limits: Limits = LIMITS) -> Campaign:
     raw = read_file(CAMPAIGN, file)
     table = checked(file, raw)
     points = tuple(p.point() for p in table.points)
-    rows = _read_modes(folder / table.modes, [t.id for t in table.tests]) if table.modes else []
+    rows = read_modes(folder / table.modes, [t.id for t in table.tests]) if table.modes else []
+    if table.shapes:
+        rows = with_shapes(folder / table.shapes, rows, [p.node for p in points])
     tests = []
     for t in table.tests:
         speed, soak = t.speed_rpm * RPM, None if t.soak_time_min is None else t.soak_time_min * MINUTE
@@ -144,43 +136,13 @@ def _check_size(file: Path, frf: Frf) -> None:
             raise BadInput(f"{file}: holds {np.abs(array).max():.3g}: no structure answers so; the file is damaged")
 
 
-def _read_modes(file: Path, tests: list[str]) -> list[ModeRow]:
-    if not file.is_file():
-        raise BadInput(f"{file}: no such file")
-    try:
-        reader = csv.reader(file.read_text(encoding="utf-8").splitlines(), strict=True)
-        lines = [(reader.line_num, line) for line in reader]
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise BadInput(f"{file}: not a CSV file in UTF-8: {error}") from None
-    if not lines or tuple(lines[0][1]) != MODE_COLUMNS:
-        raise BadInput(f"{file}: line 1: the columns must be {','.join(MODE_COLUMNS)}")
-    rows: list[ModeRow] = []
-    for number, line in lines[1:]:
-        where = f"{file}: line {number}"
-        if len(line) != len(MODE_COLUMNS):
-            raise BadInput(f"{where}: has {len(line)} cells; {len(MODE_COLUMNS)} are needed")
-        raw = {key: name_of(text) if key in ("test", "kind") else text for key, text in zip(MODE_COLUMNS, line, strict=True) if text}
-        try:
-            row = ModeRow(*dict(ModeTable.model_validate(raw)).values())
-        except ValidationError as error:
-            raise BadInput(first_error(where, raw, ModeTable, error)) from None
-        if row.test not in tests:
-            raise BadInput(f"{where}: test = {row.test!r}: no such test; allowed are {', '.join(tests)}")
-        if row.damping_ratio is None and row.damping_ratio_sd is not None:
-            raise BadInput(f"{where}: damping_ratio_sd = {row.damping_ratio_sd}: without a damping_ratio it must be empty")
-        if (row.test, row.mode) in [(r.test, r.mode) for r in rows]:
-            raise BadInput(f"{where}: mode = {row.mode}: test {row.test} has this mode already; each stands once")
-        rows.append(row)
-    return rows
-
-
 # ---------------------------------------------------------------- writing
 
 
 def write_campaign(campaign: Campaign, folder: Path, replace: bool = False) -> None:
     """Write the folder of a campaign, whole or not at all: beside its place first, then moved there.
 
-    Each test's FRFs go to `<id>.uff`, its runout to `<id>_runout.csv`, all modes to `modes.csv`. Raises `BadInput` for what `read_campaign` would refuse, and for a
+    Each test's FRFs go to `<id>.uff`, its runout to `<id>_runout.csv`, all modes to `modes.csv`, their shapes to `shapes.csv`. Raises `BadInput` for what `read_campaign` would refuse, and for a
     folder that is not empty, unless `replace` is set and it holds a campaign, which is then lost.
     """
     folder = Path(folder).absolute()
@@ -198,8 +160,11 @@ def _write_files(campaign: Campaign, folder: Path, text: str) -> None:
     """Make the folder of a campaign, `text` its campaign.toml, and read it back: what would not come back the same is refused."""
     folder.mkdir()
     (folder / "campaign.toml").write_text(text, encoding="utf-8")
-    if any(test.modes for test in campaign.tests):
-        _write_modes(folder / "modes.csv", campaign)
+    rows = [row for test in campaign.tests for row in test.modes]
+    if rows:
+        write_modes(folder / "modes.csv", rows)
+    if any(row.shape for row in rows):
+        write_shapes(folder / "shapes.csv", rows)
     for test in campaign.tests:
         if test.frf is not None:
             if test.frf.quantity != campaign.quantity:
@@ -223,14 +188,6 @@ def _exact(campaign: Campaign) -> list[tuple[Any, ...]]:
     return points + [(t.id, t.temperature, t.level, t.repeat, t.window_decay, t.pretrigger, t.conditions, t.frf, t.modes) for t in campaign.tests]
 
 
-def _write_modes(file: Path, campaign: Campaign) -> None:
-    with file.open("w", encoding="utf-8", newline="") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(MODE_COLUMNS)
-        for test in campaign.tests:
-            writer.writerows(cells(astuple(row)) for row in test.modes)
-
-
 def _toml_text(campaign: Campaign) -> str:
     modes = "modes.csv" if any(t.modes for t in campaign.tests) else None
     head = {
@@ -241,6 +198,7 @@ def _toml_text(campaign: Campaign) -> str:
         "note": campaign.note,
         "lumped_shafts": campaign.lumped_shafts or None,
         "modes": modes,
+        "shapes": "shapes.csv" if any(t.shape_nodes for t in campaign.tests) else None,
     }
     noise = [] if campaign.noise is None else [("[noise]", asdict(campaign.noise))]
     points = [

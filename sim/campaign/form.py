@@ -20,6 +20,7 @@ from thermospindle.model.scene.form import Finite, Name, NotNegative, Positive, 
 from thermospindle.model.scene.form import Point as PointTable
 
 MODE_COLUMNS = ("test", "mode", "kind", "frequency_Hz", "frequency_sd_Hz", "damping_ratio", "damping_ratio_sd")
+SHAPE_COLUMNS = ("test", "mode", "node", "real", "imaginary", "sd")
 
 
 def plain_name(text: str) -> str:
@@ -63,6 +64,7 @@ class CampaignTable(Table):
     note: str = ""
     lumped_shafts: bool = False
     modes: PlainName | None = None
+    shapes: PlainName | None = None
     noise: NoiseTable | None = None
     points: list[PointTable] = []
     tests: list[TestTable] = Field(min_length=1)
@@ -82,6 +84,19 @@ class ModeTable(BaseModel):
     damping_ratio_sd: CellPositive | None = None
 
 
+CellNumber = Annotated[float, BeforeValidator(plain_number), Field(ge=-1e15, le=1e15, allow_inf_nan=False)]
+
+
+class ShapeTable(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    test: str
+    mode: Annotated[int, BeforeValidator(plain_number), Field(ge=1, le=1000)]
+    node: Annotated[int, BeforeValidator(plain_number)]
+    real: CellNumber
+    imaginary: CellNumber = 0.0
+    sd: CellPositive
+
+
 def checked(file: Path, raw: dict[str, Any]) -> CampaignTable:
     """The tables of the parsed `campaign.toml`; nodes, test ids and files stand once."""
     try:
@@ -91,8 +106,10 @@ def checked(file: Path, raw: dict[str, Any]) -> CampaignTable:
     once: dict[str, list[Any]] = {
         "points: node": [p.node for p in table.points],
         "tests: id": [t.id for t in table.tests],
-        "file": [name for name in (table.modes, *(t.frf for t in table.tests), *(t.runout for t in table.tests)) if name],
+        "file": [name for name in (table.modes, table.shapes, *(t.frf for t in table.tests), *(t.runout for t in table.tests)) if name],
     }
+    if table.shapes and not table.modes:
+        raise BadInput(f"{file}: shapes = {table.shapes!r}: are those of modes, and modes are missing; a table of them is needed beside")
     for t in table.tests:
         if t.frf and table.quantity == "displacement":
             raise BadInput(

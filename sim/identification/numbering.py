@@ -10,7 +10,8 @@ import numpy as np
 
 from thermospindle.model.rotor.modes import point_rows
 from thermospindle.model.units import RPM
-from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Test
+from thermospindle.sim.campaign.campaign import Campaign, Test
+from thermospindle.sim.campaign.modes import ModeRow
 from thermospindle.sim.identification.pairing import FOLLOWED_BY_KIND, IDENTIFIED, ModeSet, by_kind, follow, pairs
 from thermospindle.sim.operating import OperatingPoint, operating_point
 from thermospindle.sim.run import Run, Step

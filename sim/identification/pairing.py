@@ -65,6 +65,8 @@ OF_A_TABLE = Policy(width=1.0, kind=9.0)
 """Modes of a table, whose shapes nobody told, and those of a model that fits it: squares, for two modes of a kind on one side of two measured ones cost
 the same either way in absolute differences, and would swap at random."""
 
+OF_SHAPES = Policy(width=1.0, mixing=0.03)
+"""The same where the table tells shapes: of modes that these do not part, the nearest."""
 
 SHIFT, STRENGTH = 0.01, float(np.log(3))
 """Standard deviations of ln frequency and ln strength about what all pairs share, at least: a model that is right but for what all modes share."""

@@ -108,6 +108,7 @@ class MappingForm(Table):
     band_Hz: Band | None = None
     frequency_sd_Hz: Positive | None = None
     damping_sd_percent: Positive | None = None
+    shape_sd_percent: Positive | None = None
     files: list[FileForm] = Field(default_factory=list)
     tests: list[TestForm] = Field(default_factory=list)
     points: list[MadePoint] = Field(default_factory=list)

@@ -70,6 +70,7 @@ class ModeLine:
     frequency_sd: float | None = None
     damping_ratio: float | None = None
     damping_ratio_sd: float | None = None
+    shape: tuple[tuple[End, complex], ...] = ()
 
 
 @dataclass(frozen=True)

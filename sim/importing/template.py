@@ -41,6 +41,8 @@ def template(found: Read, files: Sequence[Path], scene: Spindle | None) -> str:
         lines.append('frequency_sd_Hz = "?"    # how sure hand-picked frequencies are: one standard deviation')
     if any(m.damping_ratio is not None and m.damping_ratio_sd is None for every in found.modes.values() for m in every):
         lines.append("# damping_sd_percent = 10.0    # how sure their dampings are: one standard deviation in per cent of each; without, they are shown and judge nothing")
+    if any(m.shape for every in found.modes.values() for m in every):
+        lines.append("# shape_sd_percent = 5.0    # how sure their shapes are: one standard deviation in per cent of the largest of each; without, they are left out")
     common, own = _shared(found.questions, files)
     for suffix, questions in common.items():
         many = sum(f.suffix == suffix for f in files)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from thermospindle.model.machine import Condition
-from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Noise, Test
+from thermospindle.sim.campaign.campaign import Campaign, Noise, Test
+from thermospindle.sim.campaign.modes import ModeRow
 from thermospindle.sim.identification.frf import Frf
 from thermospindle.sim.operating import operating_point
 

@@ -3,7 +3,8 @@
 import numpy as np
 
 from thermospindle.model.machine import Condition
-from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Test
+from thermospindle.sim.campaign.campaign import Campaign, Test
+from thermospindle.sim.campaign.modes import ModeRow
 from thermospindle.sim.operating import operating_point
 
 SD = 0.05  # Hz

@@ -14,7 +14,8 @@ from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import build, content_hash, load
-from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Test
+from thermospindle.sim.campaign.campaign import Campaign, Test
+from thermospindle.sim.campaign.modes import ModeRow
 from thermospindle.sim.effects import of_scene
 from thermospindle.sim.effects.own import effect_of
 from thermospindle.sim.operating import operating_point

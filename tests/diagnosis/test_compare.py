@@ -15,7 +15,8 @@ from thermospindle.diagnosis.data.observe import DAMPING_FLOOR, FREQUENCY_FLOOR,
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Addition, Condition
 from thermospindle.report.text.compare import comparison_json
-from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Test, read_campaign
+from thermospindle.sim.campaign.campaign import Campaign, Test, read_campaign
+from thermospindle.sim.campaign.modes import ModeRow
 from thermospindle.sim.effects import by_name
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.run import as_campaign, run

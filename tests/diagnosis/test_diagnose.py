@@ -16,7 +16,8 @@ from thermospindle.diagnosis.verdict import diagnose, unable
 from thermospindle.model.machine import Condition, Law
 from thermospindle.model.units import RPM
 from thermospindle.report.text.diagnosis.answer import diagnosis_json
-from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Test, read_campaign
+from thermospindle.sim.campaign.campaign import Campaign, Test, read_campaign
+from thermospindle.sim.campaign.modes import ModeRow
 from thermospindle.sim.effects import by_name
 from thermospindle.sim.operating import operating_point
 

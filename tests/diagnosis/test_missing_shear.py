@@ -1,4 +1,4 @@
-"""The diagnosis of a measured free shaft whose scene has the plainest beam: one condition, four frequencies of a table."""
+"""The diagnosis of a measured free shaft whose scene has the plainest beam: one condition, four frequencies and shapes of a table."""
 
 from dataclasses import replace
 

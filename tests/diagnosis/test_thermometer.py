@@ -11,7 +11,8 @@ from thermospindle.diagnosis.data.observe import FREQUENCY_FLOOR, Observation
 from thermospindle.diagnosis.prediction.modes import predict
 from thermospindle.diagnosis.prediction.temperature import temperature_slope, whitened, with_temperature
 from thermospindle.model.machine import Condition
-from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Test
+from thermospindle.sim.campaign.campaign import Campaign, Test
+from thermospindle.sim.campaign.modes import ModeRow
 from thermospindle.sim.operating import operating_point
 
 

@@ -24,7 +24,8 @@ from thermospindle.report.page.compare import sections, write_comparison
 from thermospindle.report.text.compare import comparison_json, constant_words, show_comparison, verdict
 from thermospindle.report.typeset import with_error
 from thermospindle.report.verbs.compare import _beyond
-from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Noise, Test
+from thermospindle.sim.campaign.campaign import Campaign, Noise, Test
+from thermospindle.sim.campaign.modes import ModeRow
 from thermospindle.sim.identification.frf import Frf
 from thermospindle.sim.operating import operating_point
 

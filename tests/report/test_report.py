@@ -19,7 +19,7 @@ from thermospindle.model.scene.reading import content_hash, load
 from thermospindle.report.page.comparison import Table, compared
 from thermospindle.report.page.headlines import headlines, misses
 from thermospindle.report.page.report import background, html, named, stamp, write_report
-from thermospindle.sim.campaign.campaign import ModeRow
+from thermospindle.sim.campaign.modes import ModeRow
 from thermospindle.sim.hammer.test import estimate_of
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.run import Run

@@ -22,7 +22,8 @@ from thermospindle.report.page.compare import write_comparison
 from thermospindle.report.page.diagnosis import write_diagnosis
 from thermospindle.report.text.runout_compare import SHOWN, cause_words, show_runout_comparison
 from thermospindle.report.text.runout_diagnosis import runout_diagnosis_json
-from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Test
+from thermospindle.sim.campaign.campaign import Campaign, Test
+from thermospindle.sim.campaign.modes import ModeRow
 from thermospindle.sim.campaign.simulated import runout_campaign
 from thermospindle.sim.effects import CATALOGUE, by_name
 from thermospindle.sim.operating import operating_point

@@ -156,12 +156,22 @@ def _nodes(record: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _mode(record: Mapping[str, Any]) -> ModeLine | None:
-    """Frequency and viscous damping of a set of modal data; None where it is a static shape or holds none."""
+    """Frequency, viscous damping and shape of a set of modal data; None where it is a static shape or holds none."""
     if "eig" in record:
         pole = complex(record["eig"])
         if pole.imag > 0:
-            return ModeLine("", "unknown", abs(pole) / (2 * np.pi), None, -pole.real / abs(pole) if pole.real < 0 else None)
+            return ModeLine("", "unknown", abs(pole) / (2 * np.pi), None, -pole.real / abs(pole) if pole.real < 0 else None, shape=_shape(record))
     normal = record.get("analysis_type") == 2
     frequency = float(record.get("freq", record.get("record12_field2", 0.0)) or 0.0) if normal else 0.0  # 2414: record 12 holds them
     damping = float(record.get("modal_damp_vis", record.get("record12_field5", 0.0)) or 0.0)
-    return ModeLine("", "unknown", frequency, None, damping if 0 < damping < 1 else None) if frequency > 0 else None
+    return ModeLine("", "unknown", frequency, None, damping if 0 < damping < 1 else None, shape=_shape(record)) if frequency > 0 else None
+
+
+def _shape(record: Mapping[str, Any]) -> tuple[tuple[End, complex], ...]:
+    """What a set of modal data tells of how its nodes move, in displacement, velocity or acceleration alike."""
+    names = next((n for n in (("r1", "r2", "r3"), ("x", "y", "z")) if all(k in record for k in n)), ())
+    nodes = np.asarray(record.get("node_nums", ()), int)
+    columns = [np.asarray(record[name], complex) for name in names]
+    if any(len(column) != len(nodes) for column in columns):
+        return ()
+    return tuple((End(int(node), f"+{axis}"), complex(v)) for axis, column in zip("XYZ", columns, strict=False) for node, v in zip(nodes, column, strict=True))

@@ -270,6 +270,23 @@ def test_derivatives_of_mode_tables():
             assert max(worst_by_kind(model, t, x).values()) < 5e-3
 
 
+@pytest.mark.parametrize(("name", "real"), [("reference", False), ("reference", True), ("symmetric", False)])
+def test_derivatives_of_shapes(name, real):
+    """At rest, where two modes of a plane each coincide, and at speed, where whirls part."""
+    scene = load(SCENES[name])
+    model = model_of(scene, mode_campaign(scene, CONDITIONS, 3, shapes=[p.node for p in scene.points], real=real))
+    data = model.tests[0]
+    assert data.count == 2 * len(data.frequency) + len(data.frequency) * (len(scene.points) - 1) * (1 if real else 2)
+    x = 0.1 * np.random.default_rng(2).standard_normal(len(model.parameters))
+    for t in (0, 1):
+        r, jacobian, numbers = nuisance_jacobian(model, t, x, [], rates_of(model, x, [[] for _ in model.tests]))
+        assert len(r) == model.tests[t].count
+        shapes = slice(2 * len(data.frequency), None)  # the others are a hundred times as sure
+        wanted = differences(model, t, x, numbers)[shapes]
+        error = np.abs(jacobian.T[shapes] - wanted).max(axis=0)
+        assert np.all(error < 0.04 * np.abs(wanted).max(axis=0) + 2e-3 * np.abs(wanted).max())
+
+
 @pytest.mark.parametrize("decay", [8.0, -3.0])
 def test_derivatives_of_mode_tables_under_a_window(decay):
     """One that was not corrected, or corrected though there was none, at speed: damping ratios are those seen, a quarter more than the poles' own. Their

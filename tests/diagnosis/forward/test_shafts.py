@@ -19,7 +19,8 @@ from thermospindle.model.rotor.chain import matrices
 from thermospindle.model.rotor.modes import kinds, oscillating, poles_below, with_mass_between
 from thermospindle.model.scene.reading import build, load
 from thermospindle.model.units import RPM
-from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Noise, Test
+from thermospindle.sim.campaign.campaign import Campaign, Noise, Test
+from thermospindle.sim.campaign.modes import ModeRow
 from thermospindle.sim.operating import operating_point
 
 NOISELESS = Noise(0.0, 0.0)

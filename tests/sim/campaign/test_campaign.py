@@ -127,7 +127,7 @@ def test_nothing_is_left_of_a_write_that_fails(folder: Path, monkeypatch: pytest
     def full(*_: object) -> None:
         raise OSError("no space left on device")
 
-    monkeypatch.setattr("thermospindle.sim.campaign.campaign._write_modes", full)
+    monkeypatch.setattr("thermospindle.sim.campaign.campaign.write_modes", full)
     with pytest.raises(OSError, match="no space"):
         write_campaign(campaign(title="other"), folder, replace=True)
     assert read_campaign(folder) == campaign()

@@ -15,7 +15,8 @@ from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
 from thermospindle.report.page.comparison import compared
 from thermospindle.report.page.headlines import misses
-from thermospindle.sim.campaign.campaign import Campaign, ModeRow, Test
+from thermospindle.sim.campaign.campaign import Campaign, Test
+from thermospindle.sim.campaign.modes import ModeRow
 from thermospindle.sim.identification.numbering import measured_rows, numbered
 from thermospindle.sim.identification.pairing import by_kind
 from thermospindle.sim.operating import operating_point
