@@ -42,8 +42,8 @@ class _Row:
 def loaded(spindle: Spindle, state: PairState) -> PairState:
     """The state with its rows where the scene's radial load displaces them; the state itself where there is none.
 
-    Stiffness is the tangent there, forces those of the most loaded ball or roller. Raises `NoEquilibrium` where nothing bears the load, and for
-    rings that slide on springs with a rate, whose motion under it is not modelled.
+    Stiffness is the tangent there, forces those of the most loaded ball or roller. Rings on a spring with a rate slide, without friction, as far as
+    their rows push them. Raises `NoEquilibrium` where nothing bears the load.
     """
     if not any(spindle.radial_load):
         return state
@@ -55,15 +55,21 @@ def loaded(spindle: Spindle, state: PairState) -> PairState:
 
 def motion(spindle: Spindle, state: PairState) -> tuple[RotorBase, Array]:
     """The chain at a centred state, and the motion (n,) of its degrees of freedom under the scene's radial load; raises as `loaded`."""
-    if any(s.spring is not None and s.spring.rate is not None for s in spindle.sets):
-        raise NoEquilibrium("a radial load is for rings fixed in their seats or on constant force; rings that slide on a spring with a rate are not modelled under it")
-    chain = rotor_base(spindle, state)
+    chain = rotor_base(_rings_apart(spindle), state)
     rows = [_ball(chain, b) for b in state.bearings] + [_roller(chain, b) for b in state.linear if isinstance(b, RollerState)]
     own = {row.name for row in rows}
     linear = matrices(replace(chain, elements=tuple(e for e in chain.elements if e.name not in own)))
     carrier = turning_at(chain, spindle.radial_load_z)
     load = motion_rows(chain, carrier.name, (0.0, 0.0, spindle.radial_load_z))[:2].T @ np.array(spindle.radial_load)
     return chain, _motion(linear.stiffness, np.diag(linear.mass), rows, load, float(np.hypot(*spindle.radial_load)))
+
+
+def _rings_apart(spindle: Spindle) -> Spindle:
+    """With every ring on a spring with a rate as a body of its own, of some mass, which no balance asks for."""
+    mass = float(np.median([b.mass for b in spindle.structure.bodies]))
+    springs = [s.spring for s in spindle.sets]
+    sets = [s if spring is None or spring.rate is None or spring.mass > 0 else replace(s, spring=replace(spring, mass=mass)) for s, spring in zip(spindle.sets, springs, strict=True)]
+    return replace(spindle, sets=tuple(sets))
 
 
 def _ball(chain: RotorBase, b: BearingState) -> _Row:

@@ -16,7 +16,7 @@ from thermospindle.model.bearing.row import reference_motion
 from thermospindle.model.errors import BadInput, NoEquilibrium
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor import mjcf
-from thermospindle.model.rotor.chain import point_row, rotor_base
+from thermospindle.model.rotor.chain import matrices, motion_rows, point_row, rotor_base, turning_at
 from thermospindle.model.rotor.loaded import loaded, motion
 from thermospindle.model.rotor.static import static
 from thermospindle.model.scene.reading import build
@@ -142,6 +142,53 @@ def test_the_front_rows_bear_most_of_a_load_at_the_nose(five: Spindle) -> None:
     along = -shares(state)[:, 0]
     assert along.sum() == pytest.approx(1000.0, rel=1e-6)
     assert along[0] > along[1] > along[2] > 0 > along[3:].sum()  # a lever: the rear set is lifted
+
+
+def on_spring(rate: float | None, mass: float = 0.0) -> Spindle:
+    """The small shaft whose upper row's ring slides on a spring."""
+    file = ROOT / "tests" / "scenes" / "inner_turning_spring" / "spindle.toml"
+    own = build(raw_of(file), file)
+    [pair] = own.sets
+    assert pair.spring is not None
+    return replace(own, sets=(replace(pair, spring=replace(pair.spring, rate=rate, mass=mass)),))
+
+
+def test_a_ring_on_a_spring_slides_under_the_load() -> None:
+    """A soft spring keeps its force: each row has the 16 N it was set to. One without end stiff is a fixed ring, which the rows' own axial push under a radial load
+    makes 16.5 N. Between them the spring's force goes with how far the ring slid."""
+    [_, fixed], [_, soft], [_, stiff] = (under(on_spring(rate), (20.0, 5.0), 0.01) for rate in (None, 1.0, 1e12))
+    for a, b, c in zip(fixed.bearings, stiff.bearings, soft.bearings, strict=True):
+        assert b.preload == pytest.approx(a.preload, rel=1e-5)
+        assert b.stiffness == pytest.approx(a.stiffness, rel=1e-4, abs=1e-6 * np.abs(a.stiffness).max())
+        assert a.preload > 16.4
+        assert c.preload == pytest.approx(16.0, rel=1e-6)
+    rate = 2e6
+    pushed, state = under(on_spring(rate), (20.0, 5.0), 0.01)
+    lower, upper = state.bearings
+    assert shares(state).sum(axis=0) == pytest.approx([-20.0, -5.0], rel=1e-6)
+    chain, moved = motion(pushed, solve(pushed, Condition(20.0), {b.name: reference_motion(20.0) for b in pushed.ringed}))
+    housing = moved[chain.dofs.index(("housing", "z"))]
+    ring = moved[chain.dofs.index(("upper sprung ring", "z"))]
+    assert upper.preload - 16.0 == pytest.approx(abs(rate * (ring - housing)), rel=1e-4)
+    assert lower.preload == pytest.approx(upper.preload, rel=1e-6)
+
+
+@pytest.mark.parametrize("mass", [0.0, 2e-3])
+def test_stiffness_behind_a_spring_is_the_derivative_of_the_motion(mass: float) -> None:
+    spindle, step = on_spring(2e6, mass), 0.05
+    point = next(p for p in spindle.points if p.direction == (1.0, 0.0, 0.0))
+    moved = []
+    for more in (-step, step):
+        pushed = replace(spindle, radial_load=(20.0 + more, 0.0), radial_load_z=point.position[2])
+        chain, u = motion(pushed, solve(pushed, Condition(20.0), {b.name: reference_motion(20.0) for b in pushed.ringed}))
+        moved.append(float(point_row(chain, point) @ u))
+    pushed, state = under(spindle, (20.0, 0.0), point.position[2])
+    linear = matrices(rotor_base(pushed, state))
+    row = point_row(rotor_base(pushed, state), point)
+    load = np.zeros(len(linear.mass))
+    load += motion_rows(rotor_base(pushed, state), turning_at(rotor_base(pushed, state), point.position[2]).name, (0.0, 0.0, point.position[2]))[0]
+    compliance = float(row @ np.linalg.solve(linear.stiffness, load))
+    assert (moved[1] - moved[0]) / (2 * step) == pytest.approx(compliance, rel=2e-3)
 
 
 def rollers() -> Spindle:
