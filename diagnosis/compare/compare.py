@@ -19,7 +19,7 @@ from thermospindle.diagnosis.data.observe import Observation, observe
 from thermospindle.diagnosis.prediction.modes import Predicted, predict
 from thermospindle.diagnosis.prediction.partners import BELIEVABLE, by_hammer, crossings, group, numbered, partners, shapes
 from thermospindle.diagnosis.prediction.temperature import temperature_slope, whitened, with_temperature
-from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.machine import Condition, Point, Spindle
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.campaign.beside import beside, check_points, measured_at
 from thermospindle.sim.campaign.campaign import Campaign, Test
@@ -67,9 +67,20 @@ class PairedMode:
         return (self.damping_computed - self.damping_measured) / self.damping_sd
 
 
+@dataclass(frozen=True, eq=False)
+class PairedShape:
+    """The shape that a table tells of mode `number`: measured (n,) with its errors `sd` (n,), and the computed one in its size and phase (n,), at points of the campaign."""
+
+    number: int
+    measured: ComplexArray
+    sd: Array
+    computed: ComplexArray
+    points: tuple[Point, ...]
+
+
 @dataclass(frozen=True)
 class TestComparison:
-    """One test; `missing` measured and `extra` computed frequencies (Hz), `correlation` of its FRFs if it has any."""
+    """One test; `missing` measured and `extra` computed frequencies (Hz), `correlation` of its FRFs if it has any, `shapes` that its table tells of paired modes."""
 
     __test__ = False  # not one of pytest's
 
@@ -82,6 +93,7 @@ class TestComparison:
     count: int  # of those there are
     offsets: Mapping[tuple[int, int], Array]  # by mode number and 0 for its frequency, 1 for its damping: what a relative error of one does to the residuals (2m,)
     beyond: str = ""  # the state of the bearings, where the model gives no FRFs of it
+    shapes: tuple[PairedShape, ...] = ()
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.test.id}: {len(self.modes)} modes paired, {len(self.missing)} missing, {len(self.extra)} more computed>"
@@ -273,4 +285,14 @@ def _test(
         len(rows) + len(lost),
         offsets,
         own.point.state.status if own is not None and correlation is None else "",
+        _told(campaign, o, shown, {i: number[int(partner[i])] for i in shown}),
     )
+
+
+def _told(campaign: Campaign, o: Observation, shown: Mapping[int, tuple[ComplexArray, ComplexArray]], number: Mapping[int, int]) -> tuple[PairedShape, ...]:
+    """Shapes of a table of modes beside the computed ones."""
+    if o.test.frf is not None or o.shape_sd is None:
+        return ()
+    by_node = {p.node: p for p in campaign.points}
+    points = tuple(by_node[n] for n in o.test.shape_nodes)
+    return tuple(PairedShape(number[i], measured, o.shape_sd[i], computed, points) for i, (measured, computed) in shown.items())

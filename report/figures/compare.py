@@ -1,4 +1,4 @@
-"""Pictures of a comparison: map of residuals, FRFs over each other, FDAC, correlation by band and by FRF. Every function returns a figure."""
+"""Pictures of a comparison: map of residuals, shapes, FRFs over each other, FDAC, correlation by band and by FRF. Every function returns a figure."""
 
 from __future__ import annotations
 
@@ -16,11 +16,14 @@ from matplotlib.lines import Line2D
 from thermospindle.diagnosis.compare.compare import Comparison, PairedMode, TestComparison
 from thermospindle.diagnosis.compare.correlation import Band, Correlation, Pair
 from thermospindle.model.types import Array
+from thermospindle.model.units import MM
 from thermospindle.report.figures.common import INK, PALE, STYLE, cells, colour, label, residual_bar, residual_norm
 from thermospindle.report.typeset import UNITS, signed_short
 from thermospindle.sim.identification.frf import decibel
 
 MOST, MOST_ALONE = 3, 6  # FRFs over each other, of every test and of one alone
+ACROSS, FEW = 4, 4  # shapes in a row, and points along an axis from which these are drawn over height
+MEASURED = "#c9371c"
 NUMBER = 0.04  # of the width of an FRF that the number of a mode takes
 FDAC_LINES = 260  # about, of an FDAC map
 
@@ -30,6 +33,8 @@ def figures(c: Comparison) -> dict[str, Figure]:
     drawn: dict[str, Figure] = {}
     if any(t.modes for t in c.tests):
         drawn["pulls"] = residual_map(c)
+    if any(t.shapes for t in c.tests):
+        drawn["shapes"] = shapes(c)
     if with_frfs(c):
         drawn |= {"frfs": overlay(c), "bands": by_band(c), "channels": by_frf(c), "fdac": fdac_maps(c)}
     return drawn
@@ -84,6 +89,41 @@ def _grid(c: Comparison, modes: Sequence[int], value: Callable[[PairedMode], flo
             number = value(m)
             grid[modes.index(m.number), k] = np.nan if number is None else number
     return grid
+
+
+@rc_context(STYLE)
+def shapes(c: Comparison) -> Figure:
+    """Measured and computed shapes of the first test that tells any: over height where its points stand along the axis in one direction, else point by point."""
+    test = next(t for t in c.tests if t.shapes)
+    told = sorted(test.shapes, key=lambda own: own.number)
+    columns = min(len(told), ACROSS)
+    rows = -(-len(told) // columns)
+    points = told[0].points
+    heights = np.array([p.position[2] / MM for p in points])
+    along = len({round(float(z), 6) for z in heights}) == len(points) >= FEW and len({p.axis[1] for p in points}) == 1
+    order = np.argsort(heights) if along else np.arange(len(points))
+    at = heights[order] if along else np.arange(len(points), dtype=float)
+    figure = _figure(1.0 + 2.6 * columns, 0.8 + 1.9 * rows)
+    panels = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
+    frequency = {m.number: m.measured for m in test.modes}
+    for axes, own in zip_longest(panels.flat, told):
+        if own is None:
+            axes.set_axis_off()
+            continue
+        turn = np.exp(-0.5j * np.angle(np.sum(own.measured**2)))  # what moves in phase is real
+        measured, computed = ((shape * turn).real[order] for shape in (own.measured, own.computed))
+        axes.plot(at, computed, color=INK, lw=0.9, marker="_", ms=9, mew=1.2, ls=(0, (4, 2)) if along else "none")
+        axes.errorbar(at, measured, own.sd[order], color=MEASURED, fmt="o", ms=3.5, lw=0.9, capsize=1.5)
+        axes.axhline(0.0, color=PALE, lw=0.6)
+        axes.set_title(f"{own.number}   {frequency[own.number]:.4g} Hz")
+        if not along:
+            axes.set_xticks(at, [p.name or str(p.node) for p in points], rotation=90, fontsize=7)
+    if along:
+        figure.supxlabel("height of the point, mm", fontsize=8.5)
+    figure.supylabel("of the largest", fontsize=8.5)
+    handles = [Line2D([], [], color=MEASURED, marker="o", ms=3.5, ls="none", label=f"measured, {label(test.test, ', ')}"), Line2D([], [], color=INK, lw=0.9, marker="_", ms=9, ls=(0, (4, 2)) if along else "none", label="computed")]
+    figure.legend(handles=handles, loc="outside upper right", ncols=2)
+    return figure
 
 
 @rc_context(STYLE)

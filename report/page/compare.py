@@ -25,6 +25,10 @@ WORDS = {
         "Computed less measured, in standard errors of the measurement: estimator, repeats, temperature and the model's own "
         "numerical floor. Without a number: not paired with any mode within the believable error. Below: how many modes only one side has.",
     ),
+    "shapes": (
+        "Shapes, measured and computed",
+        "Shapes that the table tells, real parts where what moves in phase is real, with one standard error, and the computed ones in their size; of the first test that tells any.",
+    ),
     "frfs": ("FRFs over each other", "Measured FRFs (coloured) and those of the model (dashed) at the same points, lines and window: driving points first, then the loudest."),
     "bands": (
         "Correlation by band",
@@ -45,7 +49,7 @@ def sections(c: Comparison) -> list[Section]:
     """What the comparison adds to a report: the map of residuals and errors in a table, then what its FRFs say, where it has any."""
     found: list[Section] = []
     drawn = {name: svg(one, f"compare-{name}", WORDS[name][0]) for name, one in figures(c).items()}
-    modal = "".join(figure(drawn[name], WORDS[name][1]) for name in ("pulls",) if name in drawn)
+    modal = "".join(figure(drawn[name], WORDS[name][1]) for name in ("pulls", "shapes") if name in drawn)
     found.append(("Measured beside computed", _summary(c) + modal + _table(c)))
     spectral = [name for name in ("frfs", "bands", "channels", "fdac") if name in drawn]
     if spectral:

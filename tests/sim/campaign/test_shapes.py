@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.conftest import SCENE
+from tests.conftest import ROOT, SCENE
 from tests.made_campaign import campaign
 from tests.virtual_campaign import mode_campaign, model_of
 from thermospindle.diagnosis.compare.compare import compare
@@ -16,6 +16,7 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
+from thermospindle.report.figures.compare import figures
 from thermospindle.sim.campaign.campaign import Campaign, read_campaign, write_campaign
 from thermospindle.sim.campaign.modes import ShapeAt
 
@@ -89,6 +90,28 @@ def test_a_table_with_shapes_is_compared_by_them(scene) -> None:
     assert all(m.mac is not None and m.mac > 0.995 for t in found.tests for m in t.modes)
     assert set(found.comac) == set(nodes)
     assert all(m.mac is None for t in compare(scene, mode_campaign(scene, CONDITIONS, 1)).tests for m in t.modes)
+
+
+@pytest.mark.parametrize("of", ["points of bodies", "points along a shaft"])
+def test_shapes_are_drawn_point_by_point_or_over_height(scene, of) -> None:
+    if of == "points along a shaft":
+        shaft = ROOT / "scenes" / "free_shaft"
+        found = compare(load(shaft), read_campaign(shaft / "measured" / "modelab"))
+    else:
+        found = compare(scene, mode_campaign(scene, CONDITIONS, 1, shapes=[p.node for p in scene.points]))
+    first = found.tests[0]
+    picture = figures(found)["shapes"]
+    drawn = [axes for axes in picture.axes if axes.axison]
+    assert [axes.get_title(loc="left").split()[0] for axes in drawn] == [str(n) for n in sorted(own.number for own in first.shapes)]
+    for axes, own in zip(drawn, sorted(first.shapes, key=lambda own: own.number), strict=True):
+        at, computed = axes.lines[0].get_data()
+        order = np.argsort([p.position[2] for p in own.points]) if of == "points along a shaft" else np.arange(len(own.points))
+        assert list(at) == pytest.approx(sorted(1e3 * p.position[2] for p in own.points) if of == "points along a shaft" else range(len(own.points)))
+        alike = np.abs(np.vdot(own.computed[order], computed)) / np.linalg.norm(own.computed) / np.linalg.norm(computed)
+        assert alike > 0.99
+        assert np.abs(own.measured - own.computed).max() < 0.2
+    labels = [t.get_text() for t in drawn[-1].get_xticklabels()]
+    assert ("hub_top0" in labels) == (of == "points of bodies")
 
 
 def test_residuals_of_shapes_have_the_scatter_that_is_told(scene) -> None:
