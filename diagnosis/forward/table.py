@@ -75,7 +75,8 @@ class Table:
 
     @cached_property
     def _shapes(self) -> list[ShapeBeside]:
-        return [ShapeBeside(own, self._seen(group)) for own, group in zip(self._data.shapes, self._groups, strict=False)] if self._data.shapes else []
+        groups = self._groups if self._data.shapes else []
+        return [ShapeBeside(own, self._seen(group)) for own, group in zip(self._data.shapes, groups, strict=True)]
 
     def _seen(self, modes: Integers) -> ComplexArray:
         """Shapes (n, k) of modes of `_poles` at the table's points, as the measuring chain shows them."""

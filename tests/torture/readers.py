@@ -29,6 +29,7 @@ from tests.torture.wholes import (
     modes,
     one_array,
     own_uff,
+    shapes,
     small_uff,
     stiffness,
     study_key,
@@ -58,6 +59,15 @@ def _campaign_of_modes(file: Path) -> None:
         (file.parent / name).write_bytes(modes(name))
     for test in read_campaign(file.parent).tests:
         assert all(np.isfinite([r.frequency, r.frequency_sd]).all() and r.frequency > 0 for r in test.modes or ())
+
+
+def _campaign_of_shapes(file: Path) -> None:
+    for name in ("campaign.toml", "modes.csv"):
+        (file.parent / name).write_bytes(shapes(name))
+    for test in read_campaign(file.parent).tests:
+        for row in test.modes:
+            assert [at.node for at in row.shape] == list(test.shape_nodes)
+            assert all(np.isfinite([at.value.real, at.value.imag, at.sd]).all() and at.sd > 0 for at in row.shape)
 
 
 def _campaign_of_frfs(file: Path) -> None:
@@ -172,6 +182,7 @@ READERS = {
     "scene": Reader("spindle.toml", lambda: tuple(f.read_bytes() for f in FILES.values()), load),
     "campaign": Reader("campaign.toml", lambda: (modes("campaign.toml"),), _campaign_of_modes),
     "modes": Reader("modes.csv", lambda: (modes("modes.csv"),), _campaign_of_modes),
+    "shapes": Reader("shapes.csv", lambda: (shapes("shapes.csv"),), _campaign_of_shapes),
     "campaign-uff": Reader("T20_n0.uff", lambda: (own_uff(), small_uff()), _campaign_of_frfs),
     "uff": Reader("lab.uff", uffs, _to_import),
     "csv": Reader("lab.csv", lambda: (TABLE,), _to_campaign),

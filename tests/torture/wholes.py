@@ -113,6 +113,12 @@ def modes(name: str) -> bytes:
 
 
 @cache
+def shapes(name: str) -> bytes:
+    """A file of the campaign whose modes have shapes."""
+    return (ROOT / "scenes" / "free_shaft" / "measured" / "modelab" / name).read_bytes()
+
+
+@cache
 def arrays() -> bytes:
     buffer = BytesIO()
     np.savez(buffer, frequency=np.arange(100.0, 200.0), H_3_1=np.ones(100) * (1 + 1j))
