@@ -155,6 +155,9 @@ def _nodes(record: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
     return np.asarray(record["node_nums"], int), np.stack([np.asarray(record[k], float) for k in "xyz"], axis=-1)
 
 
+COMPLEX = (5, 6)  # data types of a set: in single and in double precision
+
+
 def _mode(record: Mapping[str, Any]) -> ModeLine | None:
     """Frequency, viscous damping and shape of a set of modal data; None where it is a static shape or holds none."""
     if "eig" in record:
@@ -169,9 +172,14 @@ def _mode(record: Mapping[str, Any]) -> ModeLine | None:
 
 def _shape(record: Mapping[str, Any]) -> tuple[tuple[End, complex], ...]:
     """What a set of modal data tells of how its nodes move, in displacement, velocity or acceleration alike."""
-    names = next((n for n in (("r1", "r2", "r3"), ("x", "y", "z")) if all(k in record for k in n)), ())
     nodes = np.asarray(record.get("node_nums", ()), int)
-    columns = [np.asarray(record[name], complex) for name in names]
-    if any(len(column) != len(nodes) for column in columns):
+    if "data_at_node" in record:  # 2414: real and imaginary parts beside each other where values are complex
+        values = np.asarray(record["data_at_node"], float)
+        if values.ndim != 2 or len(values) != len(nodes) or (record.get("data_type") in COMPLEX and values.shape[1] % 2):
+            return ()
+        columns = list((values[:, ::2] + 1j * values[:, 1::2] if record.get("data_type") in COMPLEX else values + 0j).T)
+    else:
+        columns = [np.asarray(record[name], complex) for name in ("r1", "r2", "r3") if name in record]
+    if len(columns) < 3 or any(len(column) != len(nodes) for column in columns):
         return ()
     return tuple((End(int(node), f"+{axis}"), complex(v)) for axis, column in zip("XYZ", columns, strict=False) for node, v in zip(nodes, column, strict=True))

@@ -69,7 +69,12 @@ def test_modes_and_units_of_real_uff():
     [mode] = content(UFF / "dataset55.unv", FileForm(file="x")).modes
     assert mode.frequency == pytest.approx(abs(complex(-0.90604, 25.080)) / (2 * np.pi))
     assert mode.damping_ratio == pytest.approx(0.90604 / abs(complex(-0.90604, 25.080)))
-    assert content(UFF / "dataset2414_node.unv", FileForm(file="x")).modes[0].frequency == pytest.approx(23383.2)
+    [solid] = content(UFF / "dataset2414_node.unv", FileForm(file="x")).modes
+    assert solid.frequency == pytest.approx(23383.2)
+    assert len(solid.shape) == 3 * 18
+    first = {end.direction: value for end, value in solid.shape if end.node == 3992}
+    assert (first["+X"], first["+Y"]) == (pytest.approx(0.0195655), pytest.approx(13.0354))
+    assert len(mode.shape) == 3 * 7
     [curve] = content(UFF / "dataset151_164_58_55.unv", FileForm(file="x")).curves
     assert curve.value[0].real == pytest.approx(1.73331e-4 * 0.224808943 / 39.3700787, rel=1e-6)
     geometry = content(UFF / "dataset15.unv", FileForm(file="x"))
