@@ -107,10 +107,9 @@ def mode_campaign(
             sd, ratio_sd = 1e-4 * mode.frequency, 0.01 * mode.damping_ratio
             frequency = mode.frequency + sd * random.standard_normal()
             ratio = mode.damping_ratio + ratio_sd * random.standard_normal()
-            places = [[p.node for p in spindle.points].index(n) for n in shapes]
-            seen = point.measurement.response_rows[places] @ mode.shape
-            told = ()
-            if len(seen):
+            told: tuple[ShapeAt, ...] = ()
+            if shapes:
+                seen = point.measurement.response_rows[[[p.node for p in spindle.points].index(n) for n in shapes]] @ mode.shape
                 seen = seen * np.exp(-0.5j * np.angle(np.sum(seen**2))) / np.abs(seen).max()
                 seen = seen + 0.01 * (random.standard_normal(len(seen)) + 1j * random.standard_normal(len(seen)))
                 told = tuple(ShapeAt(n, complex(v.real) if real else complex(v), 0.01) for n, v in zip(shapes, seen, strict=True))
