@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from thermospindle.diagnosis.data.mode_table import mode_data
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.parallel import in_parallel
 from thermospindle.model.types import Array, ComplexArray
@@ -137,18 +138,10 @@ def _from_frf(test: Test, noise: Noise) -> Observation:
 
 
 def _from_table(test: Test) -> Observation:
-    rows = sorted(test.modes, key=lambda r: r.frequency)
-    frequency = np.array([r.frequency for r in rows])
-    damping = np.array([np.nan if r.damping_ratio is None else r.damping_ratio for r in rows])
-    sd_f = np.array([r.frequency_sd for r in rows]) / frequency
-    sd_z = np.array(
-        [np.inf if r.damping_ratio_sd is None or r.damping_ratio is None else r.damping_ratio_sd / r.damping_ratio for r in rows]
-    )
-    variance = np.concatenate([sd_f**2 + FREQUENCY_FLOOR**2, sd_z**2 + DAMPING_FLOOR**2])
-    kinds = tuple(r.kind for r in rows)
-    shape = shape_sd = None
-    if test.shape_nodes:
-        shape = np.array([[at.value for at in r.shape] for r in rows])
+    data = mode_data(test, condition_of(test), gain=0.0)
+    variance = np.concatenate([data.frequency_sd**2 + FREQUENCY_FLOOR**2, data.damping_sd**2 + DAMPING_FLOOR**2])
+    shape, shape_sd = data.shape, data.shape_sd
+    if shape is not None and shape_sd is not None:
         largest = np.abs(shape).max(axis=1, keepdims=True)
-        shape, shape_sd = shape / largest, np.array([[at.sd for at in r.shape] for r in rows]) / largest
-    return Observation(test, condition_of(test), frequency, damping, np.diag(variance), shape, shape_sd, None, None, kinds)
+        shape, shape_sd = shape / largest, shape_sd / largest
+    return Observation(test, data.condition, data.frequency, data.damping, np.diag(variance), shape, shape_sd, None, None, data.kind)

@@ -15,7 +15,7 @@ from thermospindle.model.rotor.chain import Matrices
 from thermospindle.model.rotor.distributed import spread
 from thermospindle.model.rotor.modes import Between
 from thermospindle.model.structure import MOVES
-from thermospindle.model.types import Array, Integers
+from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.effects.effect import Measurement
 from thermospindle.sim.operating import OperatingPoint
 
@@ -48,6 +48,11 @@ class Linear:
         matrices = on(self.matrices, first.matrices, second.matrices, ("mass", "damping", "stiffness"))
         chain = self.chain if same_chain(first.chain, second.chain) else on(self.chain, first.chain, second.chain, CHAIN)
         return replace(self, matrices=matrices, chain=chain)
+
+
+def shown(chain: Measurement, pole: ComplexArray, right: ComplexArray) -> ComplexArray:
+    """Shapes (k, n_resp) of modes with poles (k,) as they are seen and right vectors (n, k), with the gains and delays of their channels."""
+    return (chain.response_rows @ right).T * (chain.gain * np.exp(-1j * np.abs(pole[:, None]) * chain.delay))
 
 
 def mass_between(point: OperatingPoint, drawing: Spindle) -> Between | None:

@@ -7,15 +7,14 @@ from functools import cached_property
 import numpy as np
 
 from thermospindle.diagnosis.data.mode_table import ModeData
-from thermospindle.diagnosis.forward.linear import Linear, Products
+from thermospindle.diagnosis.forward.linear import Linear, Products, shown
 from thermospindle.diagnosis.forward.shapes import ShapeBeside
 from thermospindle.model.rotor.modes import Poles, kinds, oscillating, poles_below, with_mass_between
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.identification import pairing
-from thermospindle.sim.identification.pairing import ModeSet
+from thermospindle.sim.identification.pairing import MIXING, ModeSet
 
 REACH = 2.5  # times the highest measured frequency, up to which modes of the model may be those of a table
-TURN = 0.03  # relative distance of modes of a kind, below which they turn among themselves at the slightest asymmetry
 
 
 class Table:
@@ -80,16 +79,15 @@ class Table:
 
     def _seen(self, modes: Integers) -> ComplexArray:
         """Shapes (n, k) of modes of `_poles` at the table's points, as the measuring chain shows them."""
-        chain, n = self._linear.chain, len(self._data.test.shape_nodes)
-        shown = chain.gain[:n, None] * np.exp(-1j * np.abs(self._poles.value[modes]) * chain.delay[:n, None])
-        return chain.response_rows[:n] @ self._poles.right[:, modes] * shown
+        chain, p = self._linear.chain, self._poles
+        return shown(chain, p.value[modes] - chain.decay, p.right[:, modes])[:, : len(self._data.test.shape_nodes)].T
 
     @cached_property
     def _groups(self) -> list[Integers]:
-        """The modes of `_poles` that may be each mode of the table: its own first, and those of its kind within `TURN` of it."""
+        """The modes of `_poles` that may be each mode of the table: its own first, and those of its kind within `MIXING` of it."""
         p, found = self._poles, self._found
         axial = np.array([kind == "axial" for kind in kinds(self._linear.matrices, p.right[:, found])])
-        near = [found[(np.abs(np.log(np.abs(p.value[found] / p.value[j]))) <= TURN) & (axial == axial[found == j])] for j in self._own.tolist()]
+        near = [found[(np.abs(np.log(np.abs(p.value[found] / p.value[j]))) <= MIXING) & (axial == axial[found == j])] for j in self._own.tolist()]
         return [np.concatenate([[j], group[group != j]]) for j, group in zip(self._own.tolist(), near, strict=True)]
 
     @property

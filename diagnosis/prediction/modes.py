@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from thermospindle.diagnosis.data.observe import Observation
-from thermospindle.diagnosis.forward.linear import Linear, mass_between
+from thermospindle.diagnosis.forward.linear import Linear, mass_between, shown
 from thermospindle.diagnosis.forward.model import Applied
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import matrices
@@ -61,6 +61,5 @@ def predicted(linear: Linear, highest: float) -> Predicted:
     own, chain = with_mass_between(linear.matrices, linear.between), linear.chain
     found = oscillating(own, highest)
     pole, right = own.value[found] - chain.decay, own.right[:, found]
-    seen = chain.gain * np.exp(-1j * np.abs(pole[:, None]) * chain.delay)
     participation = own.left[found] @ chain.reference_rows.T * (1 + chain.decay / pole[:, None])
-    return Predicted(pole, (chain.response_rows @ right).T * seen, participation, kinds(linear.matrices, right))
+    return Predicted(pole, shown(chain, pole, right), participation, kinds(linear.matrices, right))

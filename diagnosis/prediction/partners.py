@@ -17,10 +17,10 @@ from thermospindle.diagnosis.prediction.modes import Predicted
 from thermospindle.model.types import ComplexArray, Integers
 from thermospindle.model.units import RPM
 from thermospindle.sim.identification import pairing
-from thermospindle.sim.identification.pairing import COMPARED, COMPUTED, in_order, kept_in_order
+from thermospindle.sim.identification.pairing import COMPARED, COMPUTED, MIXING, in_order, kept_in_order
 
 BELIEVABLE = 0.08  # relative frequency error up to which two modes are taken for the same
-ALONE = 0.03  # relative distance to the next mode from which a shape is trusted
+ALONE = MIXING  # relative distance to the next mode from which a shape is trusted
 DISTINCT = 0.3  # 1 - MAC with its partner below which even a close mode is known by its shape
 
 

@@ -42,13 +42,16 @@ class Policy:
     alike: float = -1.0  # difference in shape cost up to which shapes tell nothing of two modes, and what pairs share decides; below zero they always tell
 
 
+MIXING = 0.03
+"""Relative distance of two modes below which they turn in their plane at the slightest asymmetry, so that no shape of one alone is trusted."""
+
 FOLLOWED = Policy(width=0.1)
 """Modes of one model at two conditions: as many as there are go on; modes that cross keep their shapes."""
 FOLLOWED_BY_KIND = Policy(width=0.1, other_kind=np.inf)
 """The same, and what is axial stays axial."""
 IDENTIFIED = Policy(width=0.02, limit=0.02)
 """Modes identified in a virtual test, and those of the model that was tested: they differ by the identification's error only."""
-MEASURED = Policy(width=0.3, alone=1.25, mixing=0.03)
+MEASURED = Policy(width=0.3, alone=1.25, mixing=MIXING)
 """Modes measured at two conditions, of which either may lack some; shapes without likeness in spaces without likeness cost 1.5."""
 COMPARED = Policy(width=0.08, power=1, alone=4.0, kind=3.0, alike=0.1)
 """Measured modes and those of a model that may be wrong."""
@@ -65,7 +68,7 @@ OF_A_TABLE = Policy(width=1.0, kind=9.0)
 """Modes of a table, whose shapes nobody told, and those of a model that fits it: squares, for two modes of a kind on one side of two measured ones cost
 the same either way in absolute differences, and would swap at random."""
 
-OF_SHAPES = Policy(width=1.0, mixing=0.03)
+OF_SHAPES = Policy(width=1.0, mixing=MIXING)
 """The same where the table tells shapes: of modes that these do not part, the nearest."""
 
 SHIFT, STRENGTH = 0.01, float(np.log(3))

@@ -11,6 +11,7 @@ exchanged  whether the force of a time record is a response, and a response its 
 likeness   imported FRFs beside the scene's: units and channels that seem mistaken
 mapping    the form of a mapping file
 measured   what files hold before anything is decided about it: curves, time records, modes, places, questions
+modes      the modes of one test as rows of a campaign, with errors and shapes
 names      what names of files seem to tell: temperature, speed, hammer, and which files are one test
 peaks      modes of FRFs that are magnitudes alone
 places     which point of the campaign each end of a curve is

@@ -14,13 +14,13 @@ from thermospindle.model.errors import BadInput, Unanswered
 from thermospindle.model.machine import Point, Spindle
 from thermospindle.model.units import MINUTE, RPM
 from thermospindle.sim.campaign.campaign import Campaign, Test
-from thermospindle.sim.campaign.modes import ModeRow, ShapeAt
 from thermospindle.sim.importing import units
 from thermospindle.sim.importing.exchanged import exchanged
 from thermospindle.sim.importing.files.reading import content
 from thermospindle.sim.importing.frfs import Placed, frf_of
 from thermospindle.sim.importing.mapping import REST, FileForm, MappingForm, TestForm, fits, settings_of, told_of
 from thermospindle.sim.importing.measured import FORCE_NEEDED, Content, Curve, End, ModeLine, Motion, Question, listed, words_of
+from thermospindle.sim.importing.modes import rows_of
 from thermospindle.sim.importing.names import plain
 from thermospindle.sim.importing.peaks import from_peaks
 from thermospindle.sim.importing.places import place, points_of, unplaced
@@ -300,36 +300,6 @@ def _placed(curve: Curve, form: MappingForm, points: dict[int, Point], settings:
     return Placed(curve, response, reference, told[0], told[1] * a * b)
 
 
-def _damping_sd(mode: ModeLine, form: MappingForm) -> float | None:
-    return None if mode.damping_ratio is None or form.damping_sd_percent is None else mode.damping_ratio * form.damping_sd_percent / 100
-
-
-def _shapes(id_: str, lines: Sequence[ModeLine], form: MappingForm, points: dict[int, Point]) -> tuple[list[tuple[ShapeAt, ...]], list[str]]:
-    """The shape of every mode of a test at the points that all of them tell, and what became of them in words."""
-    none: list[tuple[ShapeAt, ...]] = [() for _ in lines]
-    told = sum(bool(m.shape) for m in lines)
-    if not told:
-        return none, []
-    if form.shape_sd_percent is None:
-        return none, [f"test {id_}: shapes of {told} modes left out; shape_sd_percent in the mapping tells how sure they are, and keeps them"]
-    placed = [dict(p for end, v in m.shape if (p := _shape_at(end, v, form, points)) is not None) for m in lines]
-    nodes = sorted(set.intersection(*(set(p) for p in placed)))
-    if len(nodes) < 2:
-        there = listed(sorted({end.node for m in lines for end, _ in m.shape}), 6)
-        return none, [f"test {id_}: shapes of {told} of {len(lines)} modes left out: they are told at nodes {there}, of which fewer than two are points of the campaign in all modes"]
-    if still := [m.frequency for m, p in zip(lines, placed, strict=True) if not any(p[n] for n in nodes)]:
-        return none, [f"test {id_}: shapes left out: at the points of the campaign the mode of {still[0]:g} Hz does not move"]
-    sizes = [max(abs(p[n]) for n in nodes) for p in placed]
-    shapes = [tuple(ShapeAt(n, p[n] / size, form.shape_sd_percent / 100) for n in nodes) for p, size in zip(placed, sizes, strict=True)]
-    return shapes, [f"test {id_}: shapes of {len(lines)} modes at nodes {listed(nodes, 12)}, each divided by its largest, to {form.shape_sd_percent:g} % of that"]
-
-
-def _shape_at(end: End, value: complex, form: MappingForm, points: dict[int, Point]) -> tuple[int, complex] | None:
-    """Node and value along the direction of the campaign's point; None of what no point is, or moves across it."""
-    at = place(end, form, points)
-    return None if at is None or points[at[0]].axis[1] != end.direction[1] else (at[0], value * at[1])
-
-
 def _test(id_: str, told: TestForm, found: Read, placed: list[Placed], quantity: str, form: MappingForm, notes: list[str]) -> Test:
     assert told.temperature_C is not None
     assert told.speed_rpm is not None
@@ -349,13 +319,8 @@ def _test(id_: str, told: TestForm, found: Read, placed: list[Placed], quantity:
         lines += peaks
         if not peaks and frf is None:
             raise BadInput(f"{files}: magnitudes without phase, and no peak in them that a mode explains; a table of modes by hand can be imported")
-    lines = sorted(lines, key=lambda m: m.frequency)
-    shapes, more = _shapes(id_, lines, form, found.points)
+    rows, more = rows_of(id_, lines, form, found.points)
     notes += more
-    rows = tuple(
-        ModeRow(id_, k, m.kind, m.frequency, m.frequency_sd or form.frequency_sd_Hz or 0.0, m.damping_ratio, m.damping_ratio_sd or _damping_sd(m, form), shape)
-        for k, (m, shape) in enumerate(zip(lines, shapes, strict=True), 1)
-    )
     soak = None if told.soak_time_min is None else told.soak_time_min * MINUTE
     decay = told.window_decay_1_per_s + found.window.get(id_, 0.0)
     before = told.pretrigger_s or found.pretrigger.get(id_, 0.0)

@@ -245,7 +245,7 @@ def test_a_mass_is_a_disk_of_some_shape():
     of = seen(made, drawn.spindle, 40)
     d = change(made, drawn.spindle, of, made.hidden[0], 1e-4, World())
     rest = left(made, drawn.spindle, of, [d], effects)[0]["added_disk"]
-    assert rest < 0.2 * np.sqrt(of.inner(d[:, None], d[:, None])[0, 0])
+    assert rest < 0.2 * of.beside(d[:, None]).whole
 
 
 def test_right_names():

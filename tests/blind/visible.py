@@ -52,10 +52,6 @@ class Seen:
             alike[:, acting] += sum(c[t].T @ p[t][:, acting] for c, p in zip(columns, parts, strict=True))
         return Beside(changes, np.linalg.solve(self._lower, alike))
 
-    def inner(self, one: Array, other: Array) -> Array:
-        """Products (m, n) of changes (N, m) and (N, n) after all else has taken of them what it can."""
-        return self.beside(one).inner(self.beside(other))
-
 
 @dataclass(frozen=True, eq=False)
 class Beside:

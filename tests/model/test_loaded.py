@@ -183,11 +183,9 @@ def test_stiffness_behind_a_spring_is_the_derivative_of_the_motion(mass: float) 
         chain, u = motion(pushed, solve(pushed, Condition(20.0), {b.name: reference_motion(20.0) for b in pushed.ringed}))
         moved.append(float(point_row(chain, point) @ u))
     pushed, state = under(spindle, (20.0, 0.0), point.position[2])
-    linear = matrices(rotor_base(pushed, state))
-    row = point_row(rotor_base(pushed, state), point)
-    load = np.zeros(len(linear.mass))
-    load += motion_rows(rotor_base(pushed, state), turning_at(rotor_base(pushed, state), point.position[2]).name, (0.0, 0.0, point.position[2]))[0]
-    compliance = float(row @ np.linalg.solve(linear.stiffness, load))
+    chain, z = rotor_base(pushed, state), point.position[2]
+    load = motion_rows(chain, turning_at(chain, z).name, (0.0, 0.0, z))[0]
+    compliance = float(point_row(chain, point) @ np.linalg.solve(matrices(chain).stiffness, load))
     assert (moved[1] - moved[0]) / (2 * step) == pytest.approx(compliance, rel=2e-3)
 
 

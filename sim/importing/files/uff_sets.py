@@ -20,6 +20,7 @@ from thermospindle.sim.importing.measured import Content, Curve, End, ModeLine, 
 FRF, COHERENCE, RECORD = 4, 6, 1
 AXES = {0: "", 1: "+X", 2: "+Y", 3: "+Z", -1: "-X", -2: "-Y", -3: "-Z"}
 LEFT = {2: "auto spectrum", 3: "cross spectrum", 9: "power spectral density", 12: "spectrum", 0: "unnamed function"}
+COMPLEX = (5, 6)  # data types of sets 55 and 2414: in single and in double precision
 RATIO = {8: "m/N", 11: "(m/s)/N", 12: "(m/s^2)/N"}
 
 
@@ -153,9 +154,6 @@ def _joined(motions: list[Motion]) -> tuple[Motion, ...]:
 
 def _nodes(record: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
     return np.asarray(record["node_nums"], int), np.stack([np.asarray(record[k], float) for k in "xyz"], axis=-1)
-
-
-COMPLEX = (5, 6)  # data types of a set: in single and in double precision
 
 
 def _mode(record: Mapping[str, Any]) -> ModeLine | None:

@@ -1,11 +1,9 @@
-"""What the files do not tell: the mapping file, its form, the questions it leaves open, and modes picked by hand."""
+"""What the files do not tell: the mapping file, its form, and the questions it leaves open."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-import pyuff
-from pyuff.datasets.dataset_55 import prepare_55
 
 from tests.conftest import ROOT, SCENE
 from tests.made_campaign import FREQUENCY
@@ -147,66 +145,6 @@ def test_answers_alone_are_said_to_be_of_no_use(tmp_path):
     assert any("answers alone, without the force that was hit with, are no measurement that can be used" in item for item in caught.value.items), caught.value.items
 
 
-def test_frequencies_alone_are_modes(tmp_path):
-    """A frequency a row is enough, the documentation says; a table with the one heading `frequency` was asked which FRF it was."""
-    file = tmp_path / "picked.csv"
-    file.write_text("frequency\n1002.5\n1545.0\n")
-    told = tmp_path / "told.toml"
-    told.write_text('frequency_sd_Hz = 0.5\nspindle = "hdd_2003"\n[[tests]]\nid = "picked"\ntemperature_C = 20\nspeed_rpm = 0\n')
-    bring([file], mapping=told, out=tmp_path / "c")
-    assert [m.frequency for m in read_campaign(tmp_path / "c").tests[0].modes] == [1002.5, 1545.0]
-
-
-def test_how_sure_dampings_are_may_be_told_for_all_of_them(tmp_path):
-    """The form offers it where a table tells none; it is no question, for without it dampings are compared in per cent."""
-    file, form = tmp_path / "picked.csv", tmp_path / "form.toml"
-    file.write_text("frequency,damping_%\n1002.5,0.5\n1545.0,\n")
-    bring([file], mapping=form)
-    assert "# damping_sd_percent = 10.0" in form.read_text()
-    answers = 'frequency_sd_Hz = 0.5\nspindle = "hdd_2003"\n[[tests]]\nid = "picked"\ntemperature_C = 20\nspeed_rpm = 0\n'
-    for name, told, expected in (("without", "", [None, None]), ("with", "damping_sd_percent = 10.0\n", [pytest.approx(0.0005), None])):
-        mapping = tmp_path / f"{name}.toml"
-        mapping.write_text(told + answers)
-        bring([file], mapping=mapping, out=tmp_path / name)
-        assert [m.damping_ratio_sd for m in read_campaign(tmp_path / name).tests[0].modes] == expected
-    file.write_text("frequency,damping_%,damping_ratio_sd\n1002.5,0.5,0.001\n")
-    bring([file], mapping=tmp_path / "sure.toml")
-    assert "damping_sd_percent" not in (tmp_path / "sure.toml").read_text()
-
-
-def test_shapes_of_a_modal_analysis(tmp_path):
-    """Two sets 55: a normal mode in real numbers and an eigenvalue with a complex shape, in all directions of all nodes; the scene's points take what is along
-    theirs, and a node that is none of them is passed over."""
-    scene = load(SCENE)
-    nodes = np.array([*(p.node for p in scene.points), 99])
-    random = np.random.default_rng(4)
-    real, turned = random.standard_normal((3, len(nodes))), random.standard_normal((3, len(nodes))) + 1j * random.standard_normal((3, len(nodes)))
-    common = {f"id{k}": "NONE" for k in range(1, 6)} | {"model_type": 1, "data_ch": 2, "spec_data_type": 8, "load_case": 1, "node_nums": nodes, "n_data_per_node": 3}
-    normal = common | {"analysis_type": 2, "data_type": 2, "mode_n": 1, "freq": 1002.0, "modal_m": 1.0, "modal_damp_vis": 0.006, "modal_damp_his": 0.0}
-    eigen = common | {"analysis_type": 3, "data_type": 5, "mode_n": 2, "eig": complex(-60.0, 9700.0), "modal_a": 1 + 0j, "modal_b": 1 + 0j}
-    file, told = tmp_path / "analysis.uff", tmp_path / "told.toml"
-    for first, shape, own in ((True, real, normal), (False, turned, eigen)):
-        data = prepare_55(**own, **dict(zip(("r1", "r2", "r3"), shape, strict=True)))
-        pyuff.UFF(str(file)).write_sets(data, "overwrite" if first else "add")
-    answers = 'frequency_sd_Hz = 0.5\n{}[[tests]]\nid = "analysis"\ntemperature_C = 20\nspeed_rpm = 0\n'
-    told.write_text(answers.format(""))
-    notes = bring([file], scene=SCENE, mapping=told, out=tmp_path / "without").values["notes"]
-    assert any("shapes of 2 modes left out; shape_sd_percent in the mapping" in n for n in notes)
-    assert read_campaign(tmp_path / "without").tests[0].shape_nodes == ()
-    told.write_text(answers.format("shape_sd_percent = 3.0\n"))
-    notes = bring([file], scene=SCENE, mapping=told, out=tmp_path / "with").values["notes"]
-    assert any("shapes of 2 modes at nodes 1, 2, 3" in n for n in notes)
-    test = read_campaign(tmp_path / "with").tests[0]
-    assert test.shape_nodes == tuple(p.node for p in scene.points)
-    for mode, shape in zip(test.modes, (real, turned), strict=True):
-        along = np.array([np.array(p.direction) @ shape[:, k] for k, p in enumerate(scene.points)])
-        found = np.array([at.value for at in mode.shape])
-        assert found == pytest.approx(along / np.abs(along).max(), abs=1e-5)
-        assert {at.sd for at in mode.shape} == {0.03}
-    bring([file], scene=SCENE, mapping=tmp_path / "form.toml")
-    assert "# shape_sd_percent = 5.0" in (tmp_path / "form.toml").read_text()
-
-
 @pytest.mark.parametrize(("rows", "count"), [(("1,5,2,25,3,5", "2,5,2,35,3,6"), 6), (("1,2,25,3,5", "2,2,35,3,6"), 5)])
 def test_commas_for_columns_and_decimals_are_named(tmp_path, rows, count):
     """It was asked what column 1 to column 6 are, under three headings."""
@@ -290,15 +228,6 @@ def test_missing_pairs_leave_the_largest_rectangle(tmp_path):
     assert any("H(6,1) left out" in n for n in notes)
 
 
-def test_modes_picked_by_hand(tmp_path):
-    """The easiest start: a frequency a row, damping in percent, a decimal comma."""
-    (tmp_path / "peaks.csv").write_text("test;mode;frequency [Hz];damping %\nT20;1;1002,5;0,5\nT20;2;1545;\n")
-    (tmp_path / "m.toml").write_text('spindle = "hdd_2003"\nfrequency_sd_Hz = 0.5\n[[tests]]\nid = "T20"\ntemperature_C = 20.0\nspeed_rpm = 0.0\n')
-    bring([tmp_path / "peaks.csv"], mapping=tmp_path / "m.toml", out=tmp_path / "c")
-    rows = read_campaign(tmp_path / "c").tests[0].modes
-    assert [(r.mode, r.frequency, r.frequency_sd, r.damping_ratio) for r in rows] == [(1, 1002.5, 0.5, 0.005), (2, 1545.0, 0.5, None)]
-
-
 def test_files_of_one_test_are_put_together_in_the_form(tmp_path):
     """A file a hammer point, in decibels over micrometres, decimal comma, UTF-16 with its mark: nothing is left to be asked."""
     force = FRF.value / (2j * np.pi * FREQUENCY) * 1e6
@@ -330,8 +259,6 @@ def test_a_question_about_all_files_is_answered_once(tmp_path):
 
 
 def test_points_on_a_flexible_shaft_are_told_by_its_name(tmp_path):
-    from thermospindle.model.scene.reading import load
-
     scene = load("mk7702")
     shaft = scene.structure.shafts[0]
     height = scene.points[0].position[2]
