@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import cmath
 from collections.abc import Sequence
 
+from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Point
 from thermospindle.sim.campaign.modes import ModeRow, ShapeAt
 from thermospindle.sim.importing.mapping import MappingForm
@@ -35,6 +37,9 @@ def _shapes(test: str, lines: Sequence[ModeLine], form: MappingForm, points: dic
     if form.shape_sd_percent is None:
         return none, [f"test {test}: shapes of {told} modes left out; shape_sd_percent in the mapping tells how sure they are, and keeps them"]
     placed = [dict(p for end, v in m.shape if (p := _shape_at(end, v, form, points)) is not None) for m in lines]
+    for m, seen in zip(lines, placed, strict=True):
+        if bad := [node for node, value in seen.items() if not cmath.isfinite(value)]:
+            raise BadInput(f"test {test}: the shape of the mode of {m.frequency:g} Hz is NaN or infinite at node {bad[0]}; mend its file, or take shape_sd_percent out of the mapping, which leaves shapes out")
     nodes = sorted(set.intersection(*(set(p) for p in placed)))
     if len(nodes) < 2:
         there = listed(sorted({end.node for m in lines for end, _ in m.shape}), 6)

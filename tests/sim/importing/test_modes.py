@@ -8,6 +8,7 @@ import pyuff
 from pyuff.datasets.dataset_55 import prepare_55
 
 from tests.conftest import SCENE
+from thermospindle.model.errors import BadInput
 from thermospindle.model.scene.reading import load
 from thermospindle.report.verbs.importing import bring
 from thermospindle.sim.campaign.campaign import read_campaign
@@ -80,3 +81,23 @@ def test_shapes_of_a_modal_analysis(tmp_path):
         assert {at.sd for at in mode.shape} == {0.03}
     bring([file], scene=SCENE, mapping=tmp_path / "form.toml")
     assert "# shape_sd_percent = 5.0" in (tmp_path / "form.toml").read_text()
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_shape_that_is_no_number_is_refused_by_its_mode(tmp_path, value):
+    """It was refused as line 2 of a file of the campaign that was being written, which nobody has; without shapes the file makes its campaign."""
+    nodes = np.array([p.node for p in load(SCENE).points])
+    ones = np.ones(len(nodes))
+    wrong = np.where(nodes == 2, value, 1.0)
+    common = {f"id{k}": "NONE" for k in range(1, 6)} | {"model_type": 1, "analysis_type": 2, "data_ch": 2, "spec_data_type": 8, "data_type": 2, "n_data_per_node": 3}
+    mode = {"load_case": 1, "mode_n": 1, "freq": 1002.0, "modal_m": 1.0, "modal_damp_vis": 0.006, "modal_damp_his": 0.0, "node_nums": nodes}
+    pyuff.UFF(str(tmp_path / "lab.uff")).write_sets(prepare_55(**common, **mode, r1=ones, r2=ones, r3=wrong), "overwrite")
+    told = tmp_path / "told.toml"
+    answers = 'frequency_sd_Hz = 0.5\n{}[[tests]]\nid = "lab"\ntemperature_C = 20\nspeed_rpm = 0\n'
+    told.write_text(answers.format("shape_sd_percent = 3.0\n"))
+    with pytest.raises(BadInput, match="test lab: the shape of the mode of 1002 Hz is NaN or infinite at node 2; mend its file, or take shape_sd_percent out of the mapping"):
+        bring([tmp_path / "lab.uff"], scene=SCENE, mapping=told, out=tmp_path / "c")
+    assert not (tmp_path / "c").exists()
+    told.write_text(answers.format(""))
+    bring([tmp_path / "lab.uff"], scene=SCENE, mapping=told, out=tmp_path / "c")
+    assert [m.frequency for m in read_campaign(tmp_path / "c").tests[0].modes] == [1002.0]
