@@ -59,12 +59,13 @@ from thermospindle.sim.effects.structure import (
     shear,
     support_anisotropy,
 )
-from thermospindle.sim.effects.temperature import cooling_imbalance, expansion_mismatch, loose_inserts, soak_lag, thermal_gradient
+from thermospindle.sim.effects.temperature import cooling_imbalance, expansion_mismatch, fixture_lag, loose_inserts, soak_lag, thermal_gradient
 
 CATALOGUE: tuple[Effect, ...] = (
     # temperature and expansion
     thermal_gradient.EFFECT,
     soak_lag.EFFECT,
+    fixture_lag.EFFECT,
     expansion_mismatch.EFFECT,
     loose_inserts.EFFECT,
     cooling_imbalance.EFFECT,

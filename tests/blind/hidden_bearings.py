@@ -23,8 +23,8 @@ def of_rings(spindle: Spindle) -> list[Mechanism]:
     found = [
         Mechanism("preload falls", "%", 1.0, 40.0, ("preload_loss",), "preload",
                   {"spindle": lambda s, a, _: scaled_preload(s, max(1 + a / 100, 0.02))}, sign=-1),
-        Mechanism("turning part warmer", "K", 0.3, 8.0, ("thermal_gradient", "soak_lag", "cooling_imbalance"), "rings", {"temperatures": _warmer(turning)}),
-        Mechanism("standing part warmer", "K", 0.3, 8.0, ("thermal_gradient", "soak_lag", "cooling_imbalance"), "rings", {"temperatures": _warmer(standing)}),
+        Mechanism("turning part warmer", "K", 0.3, 8.0, ("thermal_gradient", "soak_lag", "fixture_lag", "cooling_imbalance"), "rings", {"temperatures": _warmer(turning)}),
+        Mechanism("standing part warmer", "K", 0.3, 8.0, ("thermal_gradient", "soak_lag", "fixture_lag", "cooling_imbalance"), "rings", {"temperatures": _warmer(standing)}),
         Mechanism("outer rings grow", "um", 0.02, 0.8, ("clearance_opening", "ring_growth", "loose_inserts", "expansion_mismatch"),
                   "rings apart radially", {"motions": _moved(None, "outer_r")}, sign=1),
         Mechanism("inner rings shrink", "um", 0.02, 0.8, ("clearance_opening", "loose_inserts", "expansion_mismatch"),

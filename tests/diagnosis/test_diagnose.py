@@ -8,17 +8,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.conftest import DATA, SCENE
-from tests.virtual_campaign import mode_campaign, model_of
+from tests.conftest import DATA, ROOT, SCENE
+from tests.virtual_campaign import drawn, mode_campaign, model_of, virtual_campaign
 from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.parameters.mechanism import variants
 from thermospindle.diagnosis.verdict import diagnose, unable
 from thermospindle.model.machine import Condition, Law
+from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
 from thermospindle.report.text.diagnosis.answer import diagnosis_json
 from thermospindle.sim.campaign.campaign import Campaign, Test, read_campaign
 from thermospindle.sim.campaign.modes import ModeRow
 from thermospindle.sim.effects import by_name
+from thermospindle.sim.effects.effect import scale_parameter
 from thermospindle.sim.operating import operating_point
 
 
@@ -116,3 +118,21 @@ def test_a_hidden_effect_is_named_with_its_size(spindle):
 def test_a_softening_bond_of_another_program(spindle):
     found = diagnose(spindle, read_campaign(DATA / "foreign_bond"))
     assert (found.verdict.word, found.verdict.effects) == ("identified", ("bond_softening",))
+
+
+@pytest.mark.slow
+def test_a_turning_part_that_is_warmer_is_no_wrong_thermometer():
+    """Blind campaigns 941 and 2216: a warmer turning part, where outer rings turn, was named `thermometer_error`, the nearest that could be. Its law is not the effect's: a step."""
+    symmetric = load(ROOT / "tests" / "scenes" / "symmetric" / "spindle.toml")
+
+    def warmer(spindle, condition, values, before):
+        rise = values["scale"] / (1 + np.exp((37.0 - condition.temperature) / 2.0))
+        return {name: t + rise * (spindle.region(name).part == "rotating") for name, t in before.items()}
+
+    hidden = replace(by_name("fixture_lag"), parameters=(scale_parameter(3.5, 1.0, (0.0, 9.0), "K", "hidden"),), temperatures=warmer)
+    conditions = [Condition(t) for t in (20.0, 30.0, 40.0, 60.0)] + [Condition(50.0, 5500 * RPM)]
+    campaign = virtual_campaign(symmetric, conditions, 2, [(hidden, {"scale": 3.5})], drawn(symmetric, len(conditions), 2))
+    asked = ("fixture_lag", "thermometer_error", "soak_lag", "thermal_gradient", "clearance_opening", "modulus_softening")
+    verdict = diagnose(symmetric, campaign, tuple(by_name(n) for n in asked)).verdict
+    assert "fixture_lag" in verdict.effects
+    assert verdict.candidates[0].names == ("fixture_lag",)

@@ -42,11 +42,15 @@ def motions(spindle: Spindle, condition: Condition, values: Values, by_bearing: 
 
 
 def share(condition: Condition, values: Values) -> float:
-    """Share of the rotating part's rise that is missing; `hub_share` itself where no soak time is told."""
-    first = values["hub_share"]
+    """Share of the rotating part's rise that is missing."""
+    return left_after(condition, values["hub_share"], values["nominal_soak"])
+
+
+def left_after(condition: Condition, first: float, soak: float) -> float:
+    """Share of a rise that is missing after a condition's soak time, if `first` is after `soak` seconds; `first` itself where no soak time is told."""
     if first == 0.0 or not np.isfinite(condition.soak_time):
         return first
-    return float(first ** (condition.soak_time / values["nominal_soak"]))
+    return float(first ** (condition.soak_time / soak))
 
 
 EFFECT = Effect(
@@ -96,7 +100,7 @@ EFFECT = Effect(
         "bearing modes fall less from cold to hot than computed, at rest as well as turning, and the upper bearing's modes as "
         "much as the lower's; nothing at the reference temperature"
     ),
-    resembles=("expansion_mismatch", "loose_inserts", "constant_force_preload", "preload_loss", "clearance_opening"),
+    resembles=("fixture_lag", "expansion_mismatch", "loose_inserts", "constant_force_preload", "preload_loss", "clearance_opening"),
     valid="the rotating part is isothermal (Biot number far below 1) and the stationary part has the chamber's temperature",
     temperatures=temperatures,
     motions=motions,

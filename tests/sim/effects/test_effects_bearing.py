@@ -24,7 +24,7 @@ from thermospindle.sim.effects.bearing import (
     preload_loss,
     ring_growth,
 )
-from thermospindle.sim.effects.temperature import expansion_mismatch, loose_inserts, soak_lag, thermal_gradient
+from thermospindle.sim.effects.temperature import expansion_mismatch, fixture_lag, loose_inserts, soak_lag, thermal_gradient
 from thermospindle.sim.operating import operating_point
 from thermospindle.thermal.expansion import expand
 
@@ -36,6 +36,7 @@ MODULES = (
     clearance_opening,
     constant_force_preload,
     expansion_mismatch,
+    fixture_lag,
     grease_damping,
     hertz_amplitude,
     loose_inserts,
@@ -88,6 +89,7 @@ def test_effects_of_speed_rest_at_rest(spindle, module):
     [
         (thermal_gradient, Condition(20.0, 7200 * RPM), 1, 1),
         (soak_lag, REST, 1, 1),
+        (fixture_lag, REST, -1, -1),
         (expansion_mismatch, REST, -1, -1),
         (loose_inserts, REST, -1, -1),
         (preload_loss, REST, -1, -1),

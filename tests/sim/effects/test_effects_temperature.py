@@ -11,7 +11,7 @@ from thermospindle.model.machine import Condition, Friction, Law, Region
 from thermospindle.model.rotor.modes import modes
 from thermospindle.model.units import RPM
 from thermospindle.sim.effects.bearing import preload_loss
-from thermospindle.sim.effects.temperature import expansion_mismatch, loose_inserts, soak_lag, thermal_gradient
+from thermospindle.sim.effects.temperature import expansion_mismatch, fixture_lag, loose_inserts, soak_lag, thermal_gradient
 from thermospindle.sim.operating import operating_point
 from thermospindle.thermal import conduction, friction, heat
 from thermospindle.thermal.expansion import expand
@@ -114,6 +114,19 @@ def test_soak_lag_scales_the_rotating_part(spindle, soak, share):
         assert motions[name].ball_strain == pytest.approx((1 - 0.2 * share) * whole.ball_strain, rel=1e-9)
         assert motions[name].outer_strain == pytest.approx((1 - 0.6 * share) * whole.outer_strain, rel=1e-9)
         assert motions[name].temperature == pytest.approx(60 - 0.2 * share * 40)
+
+
+@pytest.mark.parametrize(("soak", "share"), [(np.inf, 0.25), (2700.0, 0.25), (5400.0, 0.0625), (0.0, 1.0)])
+def test_fixture_lag_scales_the_standing_part(spindle, soak, share):
+    """Inner rings move in proportion, outer ones wholly; balls have the mean of both rings."""
+    values = {"standing_share": 0.25, "nominal_soak": 2700.0}
+    condition = replace(REST, soak_time=soak)
+    motions = expand(spindle, fixture_lag.EFFECT.temperatures(spindle, condition, values, {g.name: 60.0 for g in spindle.regions}))
+    for name, whole in expand(spindle, 60.0).items():
+        assert motions[name].inner_r == pytest.approx((1 - share) * whole.inner_r, rel=1e-9, abs=1e-15)
+        assert motions[name].outer_r == pytest.approx(whole.outer_r, rel=1e-12)
+        assert motions[name].ball_strain == pytest.approx((1 - share / 2) * whole.ball_strain, rel=1e-9)
+        assert motions[name].temperature == pytest.approx(60 - share * 20)
 
 
 # ------------------------------------------------------------------ expansion
