@@ -59,7 +59,14 @@ from thermospindle.sim.effects.structure import (
     shear,
     support_anisotropy,
 )
-from thermospindle.sim.effects.temperature import cooling_imbalance, expansion_mismatch, fixture_lag, loose_inserts, soak_lag, thermal_gradient
+from thermospindle.sim.effects.temperature import (
+    cooling_imbalance,
+    expansion_mismatch,
+    fixture_lag,
+    loose_inserts,
+    soak_lag,
+    thermal_gradient,
+)
 
 CATALOGUE: tuple[Effect, ...] = (
     # temperature and expansion
