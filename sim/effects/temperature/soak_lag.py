@@ -4,19 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from thermospindle.model.machine import Condition, RingMotion, Spindle
 from thermospindle.sim.effects.effect import ROWS, SECTION, Effect, Parameter, Values
+from thermospindle.sim.effects.temperature.lag import EQUATION, held_back, left_after, nominal_soak
 
 
 def temperatures(spindle: Spindle, condition: Condition, values: Values, by_region: dict[str, float]) -> dict[str, float]:
-    missing = share(condition, values)
-    if missing == 0.0:
-        return by_region
-    reference = spindle.reference_temperature
-    turning = {g.name for g in spindle.regions if g.part == "rotating"}
-    return {name: t - missing * (t - reference) if name in turning else t for name, t in by_region.items()}
+    return held_back(spindle, share(condition, values), by_region, turning=True)
 
 
 def motions(spindle: Spindle, condition: Condition, values: Values, by_bearing: dict[str, RingMotion]) -> dict[str, RingMotion]:
@@ -43,22 +37,14 @@ def motions(spindle: Spindle, condition: Condition, values: Values, by_bearing: 
 
 def share(condition: Condition, values: Values) -> float:
     """Share of the rotating part's rise that is missing."""
-    return left_after(condition, values["hub_share"], values["nominal_soak"])
-
-
-def left_after(condition: Condition, first: float, soak: float) -> float:
-    """Share of a rise that is missing after a condition's soak time, if `first` is after `soak` seconds; `first` itself where no soak time is told."""
-    if first == 0.0 or not np.isfinite(condition.soak_time):
-        return first
-    return float(first ** (condition.soak_time / soak))
+    return left_after(condition, values["hub_share"], values)
 
 
 EFFECT = Effect(
     name="soak_lag",
     title="The hub has not reached chamber temperature",
     equation=(
-        "T_rotating = T_ref + (1 - s) (T - T_ref); s = hub_share, or after a told soak time t s = exp(-t / tau) with "
-        "tau = nominal_soak / ln(1 / hub_share): Newton's law of cooling of a lumped body; "
+        f"T_rotating = T_ref + (1 - s) (T - T_ref); {EQUATION.format(share='hub_share')}; "
         "T_ball = T_ref + (1 - ball_share s) (T - T_ref), T_turning groove = (T_ball + T_rotating) / 2"
     ),
     parameters=(
@@ -72,16 +58,7 @@ EFFECT = Effect(
             meaning="share of the rotating part's temperature rise that is missing after the nominal soak",
             source="assumed: 45 minutes into a half-hour time constant of a hub that air and ball contacts warm",
         ),
-        Parameter(
-            "nominal_soak",
-            "s",
-            neutral=2700.0,
-            typical=2700.0,
-            prior_sd=900.0,
-            limits=(60.0, 86400.0),
-            meaning="soak time after which hub_share is missing; matters only in tests that tell their soak time",
-            source="assumed: three quarters of an hour, a usual soak of a small spindle",
-        ),
+        nominal_soak("hub_share"),
         Parameter(
             "ball_share",
             "1",
