@@ -3,6 +3,7 @@
 ============  ====================================================================================================
 effect        what a physical effect is: equation, parameters, pure functions of one step each
 known         every effect there is, a user's own among them, and the spindle of a scene with its effects found
+lag           a part that has not soaked: what effects of a lag share
 own           a user's own effect: a Python file, or an entry point
 roles         what a scene's parts are for, and the changes that several effects make to them
 rules         the rules every effect keeps

@@ -11,6 +11,5 @@ fixture_lag         the other way round: the standing part, bolted to a fixture 
 thermal_gradient    the running bearings heat themselves: their friction leaves shaft and inner rings hotter than the
                     hub
 cooling_imbalance   a cooled housing round a warm shaft
-lag                 no effect: what those share in which a part has not soaked
 ==================  ====================================================================================================
 """

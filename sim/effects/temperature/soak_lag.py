@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from thermospindle.model.machine import Condition, RingMotion, Spindle
 from thermospindle.sim.effects.effect import ROWS, SECTION, Effect, Parameter, Values
-from thermospindle.sim.effects.temperature.lag import EQUATION, held_back, left_after, nominal_soak
+from thermospindle.sim.effects.lag import EQUATION, held_back, left_after, nominal_soak
 
 
 def temperatures(spindle: Spindle, condition: Condition, values: Values, by_region: dict[str, float]) -> dict[str, float]:
