@@ -11,7 +11,7 @@ from scipy.linalg import block_diag
 from scipy.stats import multivariate_normal
 
 from tests.diagnosis.inference.toy import toy
-from thermospindle.diagnosis.inference.evidence import FARTHER, OFFSET, WIDER, WIDTHS, Learned, evidence, left_out, own_grid
+from thermospindle.diagnosis.inference.evidence import FARTHER, OFFSET, WIDER, WIDTHS, Learned, evidence, finer, left_out, own_grid
 from thermospindle.diagnosis.inference.fit import Fit
 from thermospindle.diagnosis.inference.gaussian import Quadratic, ln_integral, marginal, posterior, under
 from thermospindle.diagnosis.inference.prior import (
@@ -84,12 +84,26 @@ def test_mean_and_covariance_are_the_posterior():
     assert np.all(np.abs(found.sizes[0] - 1.6) < 5 * np.sqrt(np.diag(found.size_covariance[0])))
 
 
-@pytest.mark.parametrize("size", [0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2])
+@pytest.mark.parametrize("size", [0.0, 1e-4, 3e-4, 5.5e-4, 1e-3, 1.7e-3, 3e-3, 1e-2])
 def test_the_size_of_the_discrepancy_is_learned(size):
-    """Of twenty campaigns at least eighteen learn the size that they were drawn with; drift and damping, of which there is none, none."""
+    """Of twenty campaigns at least eighteen learn the size that they were drawn with, or one within a factor of two, though it be between the places of its grid; drift and damping, of which
+    there is none, none."""
     right = [evidence(made.model, made.fit).learned for made in (toy(seed, size) for seed in range(20))]
-    assert sum(learned.sizes[STIFFNESS] == size for learned in right) >= 18
+    assert sum(size / 2 < learned.sizes[STIFFNESS] < 2 * size or learned.sizes[STIFFNESS] == size for learned in right) >= 18
     assert sum(learned.sizes[DAMPING] == 0.0 and learned.sizes[DRIFT] == 0.0 for learned in right) >= 14
+
+
+def test_between_two_places_of_a_grid_there_are_two_more():
+    assert finer((0.0, 1e-3, 3e-3)) == (0.001, 0.0014, 0.0021, 0.003)
+
+
+@pytest.mark.parametrize("size", [5.5e-4, 1.7e-3])
+def test_a_size_between_two_places_loses_nothing(size):
+    """Against the evidence at the very size that was drawn, of which a prior wrong by 1.8 loses 0.2 for every number that it is of."""
+    for seed in range(5):
+        made = toy(seed, size)
+        found = evidence(made.model, made.fit)
+        assert found.ln > evidence(made.model, made.fit, [Learned({**found.learned.sizes, STIFFNESS: size}, found.learned.errors)]).ln - 0.5
 
 
 def test_a_model_that_is_wrong_may_be_wrong_in_what_an_effect_does():
