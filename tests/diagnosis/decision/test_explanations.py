@@ -122,6 +122,20 @@ def test_a_little_more_beside_a_law_that_does_not_hold_is_no_second_effect(gaine
     assert (v.word, v.effects[0]) == (word, "first")
 
 
+@pytest.mark.parametrize(("lasts", "word"), [(True, "two effects"), (False, "ambiguous")])
+def test_what_lasts_is_not_what_is_wrong_in_a_law(lasts, word):
+    """Blind campaign 2292: a compliance of the bearings whose law does not hold, and beside it a mass on the hub, the same in every test, by 9 in ln evidence of which a quarter counted."""
+    found = made({("first", "more"): 614.0, "first": 600.0, "more": 20.0})
+
+    def made_so(h: Hypothesis) -> Hypothesis:
+        mechanisms = tuple(replace(m, effect=replace(m.effect, lasting=lasts)) if m.name == "more" else m for m in h.mechanisms)
+        h = replace(h, fit=replace(h.fit, mechanisms=mechanisms))
+        return by_departing(h, 100.0) if h.names == ("first",) else h
+
+    v = decide(replace(found, hypotheses=tuple(map(made_so, found.hypotheses))))
+    assert (v.word, v.effects[0]) == (word, "first")
+
+
 @pytest.mark.parametrize(("a", "b", "behind", "doubt"), [(0.0, 0.0, 9.0, 0.0), (15.0, 0.0, 9.0, 15.0), (15.0, 15.0, 9.0, 0.0), (900.0, 15.0, 9.0, 285.0), (15.0, 0.0, 1.0, 0.0)])
 def test_what_a_law_leaves_in_doubt_is_no_more_than_it_gained(a, b, behind, doubt):
     """Two effects that explain as much with the same second one: by departures of `a` and a law of `b`'s own, which lose in ln evidence as much of what the
