@@ -16,7 +16,7 @@ from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.campaign.campaign import Campaign, Noise, Test, condition_of
 from thermospindle.sim.identification.frf import out_of, without
 from thermospindle.sim.identification.modal import noise_model
-from thermospindle.sim.identification.pairing import REPEATED, ModeSet, pairs
+from thermospindle.sim.identification.pairing import REPEATED, ModeSet, at_shared, pairs
 from thermospindle.sim.identification.remembered import extracted
 
 FREQUENCY_FLOOR = 3e-5  # relative: finite elements and bearing equilibrium of the model itself
@@ -54,6 +54,13 @@ class Observation:
         return ModeSet(self.frequency, self.shape, self.kind or (), strength)
 
     @property
+    def nodes(self) -> tuple[int, ...]:
+        """The points that shapes are at, in their order; none without shapes."""
+        if self.shape is None:
+            return ()
+        return self.test.shape_nodes if self.test.frf is None else self.test.frf.response_nodes
+
+    @property
     def channels(self) -> int | None:
         """How many points the shapes have, None without shapes."""
         return None if self.shape is None else self.shape.shape[1]
@@ -83,12 +90,12 @@ def _repeated(o: Observation, others: list[Observation]) -> Observation:
 
     Less than three tests of FRFs are taken as they are.
     """
-    shown = [other.modes for other in others if other.residue is not None]
+    shown = [other for other in others if other.residue is not None]
     if o.residue is None or len(shown) < 2:
         return o
     again = np.zeros(len(o.frequency), bool)
-    for modes in shown:
-        again[pairs(o.modes, modes, REPEATED)[:, 0]] = True
+    for other in shown:
+        again[pairs(*at_shared(o.modes, other.modes, o.nodes, other.nodes), REPEATED)[:, 0]] = True
     return _only(o, again)
 
 

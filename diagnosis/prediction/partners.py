@@ -7,7 +7,6 @@ number of its partner.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from itertools import combinations, count
 
 import numpy as np
@@ -17,7 +16,7 @@ from thermospindle.diagnosis.prediction.modes import Predicted
 from thermospindle.model.types import ComplexArray, Integers
 from thermospindle.model.units import RPM
 from thermospindle.sim.identification import pairing
-from thermospindle.sim.identification.pairing import COMPARED, COMPUTED, MIXING, in_order, kept_in_order
+from thermospindle.sim.identification.pairing import COMPARED, COMPUTED, MIXING, at_shared, in_order, kept_in_order
 
 BELIEVABLE = 0.08  # relative frequency error up to which two modes are taken for the same
 ALONE = MIXING  # relative distance to the next mode from which a shape is trusted
@@ -50,9 +49,7 @@ def numbered(observed: Sequence[Observation], predicted: Sequence[Predicted]) ->
     found = {order[0]: {i: i + 1 for i in range(len(predicted[order[0]].frequency))}} if order else {}
     for t in order[1:]:
         near = min(found, key=lambda s: abs(state[s][0] - state[t][0]) + abs(state[s][1] - state[t][1]))
-        before, now = predicted[near].modes(), predicted[t].modes()
-        if predicted[near].shape.shape[1] != predicted[t].shape.shape[1]:
-            before = replace(before, shape=None)
+        before, now = at_shared(predicted[near].modes(), predicted[t].modes(), observed[near].nodes, observed[t].nodes)
         partner = kept_in_order(pairing.partners(before, now, COMPUTED), before, now, ALONE)
         followed = {int(j): found[near][i] for i, j in enumerate(partner) if j >= 0}
         new = count(1 + max(max(f.values(), default=0) for f in found.values()))

@@ -14,7 +14,7 @@ mode and one without a partner (`by_common`).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -88,6 +88,19 @@ class ModeSet:
     shape: ComplexArray | None = None
     kind: Sequence[str] = ()
     strength: Array | None = None
+
+
+def at_shared(a: ModeSet, b: ModeSet, nodes: Sequence[int], others: Sequence[int]) -> tuple[ModeSet, ModeSet]:
+    """Two sets whose shapes are at points of their own, `nodes` (n,) of `a` and `others` of `b` (their first columns): with those at the points that both have, in one order, and without
+    any where there are none. As they are where neither tells its points."""
+    if tuple(nodes) == tuple(others):
+        return a, b
+    both = [n for n in nodes if n in others]
+
+    def at(modes: ModeSet, own: Sequence[int]) -> ModeSet:
+        return replace(modes, shape=modes.shape[:, [list(own).index(n) for n in both]] if both and modes.shape is not None else None)
+
+    return at(a, nodes), at(b, others)
 
 
 def mac(a: ArrayLike, b: ArrayLike) -> Array:

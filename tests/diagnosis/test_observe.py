@@ -7,7 +7,8 @@ import numpy as np
 from tests.diagnosis.hidden_modes import hidden
 from thermospindle.diagnosis.data.observe import _repeated
 from thermospindle.diagnosis.prediction.modes import predict
-from thermospindle.diagnosis.prediction.partners import paired, partners
+from thermospindle.diagnosis.prediction.partners import numbered, paired, partners
+from thermospindle.sim.identification.frf import Frf
 
 
 def with_pole(o, like, off):
@@ -45,3 +46,21 @@ def test_a_mode_that_nobody_predicts_is_no_ones_partner(spindle):
         strange = replace(o, frequency=np.append(o.frequency, 650.0)[order], shape=np.vstack([o.shape, odd])[order], residue=o.residue[[0, *range(m)]])
         assert partners(strange, p)[0] == -1
         assert paired(strange, p)[1:].tolist() == paired(o, p).tolist()
+
+
+def at_points(o, order):
+    """A test whose sensors stood at these of its points alone, in this order."""
+    nodes = tuple(10 + i for i in order)
+    frf = Frf(np.array([100.0]), np.zeros((len(nodes), 1, 1), complex), nodes, (nodes[0],), "mobility")
+    return replace(o, test=replace(o.test, frf=frf), shape=o.shape[:, order], shape_sd=o.shape_sd[:, order])
+
+
+def test_tests_may_have_sensors_at_other_points(spindle):
+    """A mode shows again, and has its number, by its shape at the points that both tests have, whichever of their channels these are."""
+    some, every = [6, 0, 3, 5, 1], list(range(7))
+    first, *others = hidden(spindle, [], 5)
+    predicted = [predict(spindle, o, ()) for o in (first, *others)]
+    here, alike, moved = at_points(first, every), [at_points(o, every) for o in others], [at_points(o, some) for o in others]
+    assert _repeated(here, moved).frequency.tolist() == _repeated(here, alike).frequency.tolist() == first.frequency.tolist()
+    seen = [predicted[0], *(replace(p, shape=p.shape[:, some]) for p in predicted[1:])]
+    assert numbered([here, *moved], seen) == numbered([here, *alike], predicted)

@@ -19,6 +19,7 @@ from thermospindle.sim.identification.pairing import (
     REPEATED,
     ModeSet,
     Policy,
+    at_shared,
     cost,
     in_order,
     kept_in_order,
@@ -187,3 +188,12 @@ def test_repeats_ask_for_a_likeness_of_shape():
     assert pairs(a, like, REPEATED).tolist() == [[0, 0]]
     assert pairs(a, unlike, REPEATED).tolist() == []
     assert pairs(a, known([1400.0], np.array([[1.0, 0.0]])), REPEATED).tolist() == []
+
+
+def test_shapes_are_compared_at_the_points_that_both_have():
+    """In one order, whatever points else a test has; nothing where none is shared."""
+    a, b = known([100.0], np.array([[1.0, 2.0, 3.0]])), known([100.0], np.array([[9.0, 3.0, 1.0]]))
+    first, second = at_shared(a, b, (11, 12, 13), (20, 13, 11))
+    assert first.shape.tolist() == second.shape.tolist() == [[1.0, 3.0]]
+    assert [m.shape for m in at_shared(a, b, (11, 12, 13), (1, 2, 3))] == [None, None]
+    assert at_shared(a, b, (11, 12, 13), (11, 12, 13)) == (a, b)
