@@ -38,10 +38,12 @@ STEPS = 200  # of quantisation within an extreme, below which held samples tell 
 
 @dataclass(frozen=True, eq=False)
 class Hit:
-    """One hit: `force` (n,) and `response` (channels, n), `PRE_TRIGGER` before it, the response as `recorded` too; `where` names it."""
+    """One hit: the `force` (n,) of its pulse counted positive, and its `sense`, -1 where it was recorded negative; `response` (channels, n), `PRE_TRIGGER` before it, the response as `recorded`
+    too; `where` names it."""
 
     where: str
     force: Array
+    sense: float
     response: Array
     recorded: Array
 
@@ -94,12 +96,15 @@ def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form
         what = f"all {len(hits)} hits are left out ({'; '.join(n.split(': left out, ')[-1] for n in notes[:3])})" if hits else "no hit is found in its force"
         return FromRecords((), 0.0, 0, tuple(notes), (Question(every, "records", f"a usable hit: {what}; double_hit_share and overload set what is refused"),))
     n = min(len(h.force) for h in good)
-    force: Array = np.array([[h.force[:n] for h in good]], float) * scales[0]
+    pulse: Array = np.array([[h.force[:n] for h in good]], float) * scales[0]
+    force = pulse * np.array([h.sense for h in good])[:, None]
+    if (against := sum(h.sense < 0 for h in good)):
+        notes.append(f"{name}: the force of {against} of {len(good)} hits is recorded negative, and is taken as it stands: a blow against the direction of its point")
     response: Array = np.array([[h.response[:, :n] for h in good]]) * np.array(scales[1:])[:, None]
     end = form.exponential_end or _needed(response)
     decay = -np.log(end) / (n * step)
     band = (form.band_Hz[0], form.band_Hz[1]) if form.band_Hz else _within(_band(force, step), measured)
-    contact = max(_contact(f, step) for f in force[0])
+    contact = max(_contact(f, step) for f in pulse[0])
     windows = Windows(contact + 1e-3, float(decay))
     found = estimate(step * np.arange(float(n)), force, response, windows, band, tuple(range(len(ends))), (0,))
     from_ = 0 if form.band_Hz else _first(found.h1, len(good))
@@ -122,7 +127,7 @@ def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form
         + ("no exponential window" if end == 1 else f"exponential window down to {end:g}")
         + ("; below, nothing is coherent with the force" if from_ else "")
     )
-    pushed = np.where(force[0] > TOUCHING * force[0].max(axis=-1, keepdims=True), force[0], 0.0)
+    pushed = np.where(pulse[0] > TOUCHING * pulse[0].max(axis=-1, keepdims=True), pulse[0], 0.0)
     middle = step * float((pushed @ (np.arange(float(n)) + 0.5) / pushed.sum(axis=-1)).mean())
     return FromRecords(tuple(curves), float(decay), len(good), tuple(notes), (), middle)
 
@@ -170,7 +175,8 @@ def _hits(path: Path, motions: Sequence[Motion], step: float, form: RecordForm) 
     strongest = max(np.abs(f - np.median(f)).max() for f in forces)
     for force, response in zip(forces, responses, strict=True):
         quiet = force - np.median(force)
-        quiet = quiet * np.sign(quiet[np.argmax(np.abs(quiet))])
+        sense = float(np.sign(quiet[np.argmax(np.abs(quiet))]))
+        quiet = sense * quiet
         starts = _starts(quiet, strongest, round(form.apart_s / step))
         length = round(form.hit_length_s / step) if form.hit_length_s else min([*np.diff(starts), len(force) - (starts[-1] if starts else 0) + lead])
         for start in starts:
@@ -183,7 +189,7 @@ def _hits(path: Path, motions: Sequence[Motion], step: float, form: RecordForm) 
             before = response[:, max(start - BEFORE * lead, 0) : start]
             still, drift = _still(response[:, cut], before, lead - pad, accelerations)
             drifts.append(drift)
-            found.append(Hit(where, np.pad(quiet[cut], (pad, 0)), np.pad(still, ((0, 0), (pad, 0))), response[:, cut]))
+            found.append(Hit(where, np.pad(quiet[cut], (pad, 0)), sense, np.pad(still, ((0, 0), (pad, 0))), response[:, cut]))
     worst = np.max(drifts, axis=0, initial=0.0) if drifts else np.zeros(len(moving))
     wandering = [f"{m.where} {f'{d:.0%}' if d < 1 else 'more than its answer'}" for m, d in zip(moving, worst, strict=True) if d > TOLD]
     return found, [f"{path.name}: offset and drift taken out, in shares of the largest value: {', '.join(wandering)}"] if wandering else []

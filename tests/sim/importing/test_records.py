@@ -173,6 +173,22 @@ def test_a_hit_a_row_and_no_hit(tmp_path):
     assert np.abs(test.frf.value - model).max() < 1e-3 * np.abs(model).max()
 
 
+@pytest.mark.parametrize(("of_force", "of_answer", "struck"), [(-1, -1, "1"), (1, -1, "1"), (-1, 1, "1"), (-1, 1, "1:-Z")])
+def test_signs_are_kept(tmp_path, of_force, of_answer, struck):
+    """A blow in the other direction, recorded so, is the same FRF; one sign of the two alone is another, unless the reference says so, and a negative force is told. It was turned, silently, and
+    its answer not."""
+    random = np.random.default_rng(5)
+    force, answer = zip(*(hit(random) for _ in range(4)), strict=True)
+    np.savez(tmp_path / "hammer1.npz", fs=RATE, force=of_force * np.array(force), velocity2=of_answer * np.array(answer)[:, 1, 0])
+    told = MAPPING.replace('test = "T20"', f'test = "T20"\nreference = "{struck}"\ncolumns = {{ force = "force [N]", velocity2 = "velocity 2 [m/s]" }}', 1)
+    (tmp_path / "m.toml").write_text(told + "[records]\nband_Hz = [50.0, 1000.0]\n")
+    notes = bring([tmp_path / "hammer1.npz"], mapping=tmp_path / "m.toml", out=tmp_path / "c").values["notes"]
+    assert any("4 of 4 hits is recorded negative" in n for n in notes) == (of_force < 0)
+    test = read_campaign(tmp_path / "c").tests[0]
+    model = exact(test.frf.frequency, test.window_decay)[1:, :1]
+    assert np.abs(test.frf.value - (-1) ** ("-Z" in struck) * of_force * of_answer * model).max() < 1e-3 * np.abs(model).max()
+
+
 @pytest.mark.parametrize(("told", "kept"), [("", (400.0, 6000.0)), ("[records]\nband_Hz = [100.0, 1000.0]\n", (100.0, 1000.0))], ids=["the scene's", "told"])
 def test_records_are_kept_in_the_band_that_the_scene_is_measured_in(tmp_path, told, kept):
     """Where the mapping tells none, and said in one sentence; what lies beyond is poles that cost time and tell nothing of the scene."""
