@@ -30,7 +30,6 @@ from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.campaign.beside import Beside
 
 SILENT = 1e-6  # of the largest FRF of the test; smaller computed ones are forbidden by symmetry and have no shape to compare
-LARGEST = 1e30  # of any unit: a computed FRF as large as that is none
 FEWEST = 8  # lines of a band that is worth a number
 LOUDER, NEARLY = 3.0, 0.25  # dB, from which a factor that all FRFs share is told; within which, or within this part of it, they share it
 SHIFT_STEP = 5e-4  # relative, between the shifts tried
@@ -126,11 +125,12 @@ class Correlation:
 
 
 def correlate(beside: Beside) -> Correlation | None:
-    """All correlations of one test; None where the model has no FRFs at its condition: with no bearing in contact the free shaft's matrices are singular, and rounding alone is left."""
+    """All correlations of one test; None where no bearing is in contact at its condition: FRFs of what then moves freely say nothing of a machine that was measured."""
+    state = beside.point.state
+    if state.bearings and not state.linear and not any(b.stiffness.any() for b in state.bearings):
+        return None
     frequency, measured = beside.measured.frequency, beside.measured.value
     computed = beside.computed(frequency)
-    if not np.abs(computed).max(initial=0.0) < LARGEST:
-        return None
     x, a = _stacked(measured), _stacked(computed)
     inner = np.abs(np.sum(x.conj() * a, axis=0))
     sizes = np.array([np.sum(np.abs(v) ** 2, axis=0) for v in (x, a)])

@@ -25,6 +25,10 @@ LINE, LESSER = 0.04, 0.05
 """Of the largest motion, below which a mode moves along a line, and of the largest orbit's area, above which one of the other sense counts."""
 FREE = 5e-8
 """Of the largest pole: what oscillates slower is a free body's rounding error."""
+PARALLEL = 1e10
+"""Condition of a block's vectors, from which a sum over its poles would have less than six digits."""
+LINES = 256
+"""Lines of an FRF that are solved for at once."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +71,12 @@ class Poles:
     value: ComplexArray
     right: ComplexArray
     blocks: tuple[Block, ...]
+
+    @property
+    def parallel(self) -> bool:
+        """Whether vectors of two poles are one to rounding, as of a body that nothing holds, nor damps: its double pole at zero has a single vector, and FRFs are no sum over poles."""
+        size = np.abs(self.value)
+        return bool((size <= FREE * size.max()).any() and any(np.linalg.cond(b.vectors, 1) > PARALLEL for b in self.blocks))
 
     @cached_property
     def left(self) -> ComplexArray:
@@ -125,12 +135,18 @@ def _poles(mass: Array, damping: Array, stiffness: Array, own: Integers) -> tupl
     return value, Block(own, vectors * scale[:, None], inverse)
 
 
+POWER = {"receptance": 0, "mobility": 1, "accelerance": 2}
+"""Of s, by which an FRF is more than the receptance."""
+
+
 def frf(linear: Matrices, response: Array, reference: Array, frequency: Array | ComplexArray, kind: str = "receptance") -> ComplexArray:
     """Exact FRF (n_resp, n_ref, n_freq) between response rows (n_resp, n) and force rows (n_ref, n) at `frequency` (Hz).
 
     `kind`: receptance m/N, mobility (m/s)/N, accelerance (m/s2)/N.
     """
     p = poles(linear)
+    if p.parallel:
+        return _solved(linear, np.atleast_2d(response), np.atleast_2d(reference), np.asarray(2j * np.pi * np.atleast_1d(frequency), complex), POWER[kind])
     at_response = np.atleast_2d(response) @ p.right
     at_reference = p.left @ np.atleast_2d(reference).T
     s = 2j * np.pi * np.asarray(frequency)
@@ -142,7 +158,16 @@ def frf(linear: Matrices, response: Array, reference: Array, frequency: Array | 
     value = (2 * residue.real) @ (s * term) - (2 * (residue * pole.conj()).real) @ term
     if real.any():
         value += residues[:, :, real] @ (1 / (s - p.value[real][:, None]))
-    return value * s ** {"receptance": 0, "mobility": 1, "accelerance": 2}[kind]
+    return value * s ** POWER[kind]
+
+
+def _solved(linear: Matrices, response: Array, reference: Array, s: ComplexArray, power: int) -> ComplexArray:
+    """s^power times response (n_resp, n) (s^2 M + s C + K)^-1 reference^T (n_ref, n), line by line (n_freq,), which asks nothing of the poles."""
+    parts = []
+    for at in np.array_split(s, max(len(s) // LINES, 1)):
+        x = at[:, None, None]
+        parts.append(np.moveaxis(response @ np.linalg.solve(x**2 * linear.mass + x * linear.damping + linear.stiffness, reference.T) * x**power, 0, -1))
+    return np.concatenate(parts, axis=-1)
 
 
 def point_rows(spindle: Spindle, chain: RotorBase, nodes: tuple[int, ...] | None = None) -> Array:

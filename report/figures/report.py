@@ -75,7 +75,7 @@ def trend(key: str, temperature: Sequence[float], curves: Mapping[str, Mapping[s
     if np.ptp(every) < LEVEL * abs(every.mean()):  # else the axis would be divided into digits that say nothing
         axes.set_ylim(*sorted((every.mean() * (1 - LEVEL), every.mean() * (1 + LEVEL))))
     if from_zero:
-        axes.set_ylim(0, 1.15 * max(max(series) for values in curves.values() for series in values.values()) or 1.0)
+        axes.set_ylim(1.15 * min(every.min(), 0.0), 1.15 * max(every.max(), 0.0) or 1.0)
     handles = axes.get_lines()[: len(next(iter(curves.values())))]
     if len(handles) > FEW:  # no room among the curves
         figure.set_size_inches(3.55, 2.45 + 0.2 * -(-len(handles) // COLUMNS))

@@ -42,9 +42,9 @@ def headlines(run: Run, table: Table) -> list[tuple[str, str, str]]:
         named = (row.published_flexibility, "as published") if row.published_flexibility else (row.flexibility, "by the model")
         groups.setdefault(named, []).append(row.number)
     for (name, by), numbers in groups.items():
-        shifts = ", ".join(f"{s[0]:+z.1f}" for n in numbers if (s := table.shift("computed", n)))
+        shifts = [f"{s[0]:+z.1f}" if (s := table.shift("computed", n)) else "gone" for n in numbers]  # as where bearings have lost contact
         modes = f"Mode{'s' if len(numbers) > 1 else ''} {_listed(numbers)}"
-        cards.append((f"{modes}: {name}, {by}", f"{shifts} Hz", f"computed shift from {cold:g} to {hot:g} °C"))
+        cards.append((f"{modes}: {name}, {by}", ", ".join(shifts) + " Hz" if set(shifts) != {"gone"} else "gone", f"computed shift from {cold:g} to {hot:g} °C"))
     return cards
 
 
@@ -52,16 +52,16 @@ def _preload(of: Sequence[float], at: str, names: str) -> tuple[str, str, str]:
     """A card of the preload of every bearing, once where all have the same."""
     if max(of) - min(of) < SAME:
         return "Preload", f"{of[0]:.1f} N", at
-    return "Preload", " / ".join(f"{n:.0f}" for n in of) + " N", f"{names}, {at}"
+    return "Preload", " / ".join(f"{n:z.0f}" for n in of) + " N", f"{names}, {at}"
 
 
 def _preload_change(of: Sequence[tuple[float, float]], cold: float, hot: float, names: str) -> tuple[str, str, str]:
     """A card of what becomes of it (before, after), once where all have the same."""
     if np.ptp(of, axis=0).max() >= SAME:
-        return "Preload", " / ".join(f"{a:.0f}\u00a0→\u00a0{b:.0f}" for a, b in of) + " N", f"{names}, from {cold:g} to {hot:g} °C"
+        return "Preload", " / ".join(f"{a:z.0f}\u00a0→\u00a0{b:z.0f}" for a, b in of) + " N", f"{names}, from {cold:g} to {hot:g} °C"
     before, after = of[0]
-    told = f"none at {cold:g} °C" if not before else f"{100 * after / before:.0f} % of it is left at {hot:g} °C" if after < before else f"{_change(before, after)} at {hot:g} °C"
-    return "Preload", f"{before:.1f} → {after:.1f} N", told
+    told = f"none at {cold:g} °C" if not before else f"{100 * after / before:z.0f} % of it is left at {hot:g} °C" if after < before else f"{_change(before, after)} at {hot:g} °C"
+    return "Preload", f"{before:z.1f} → {after:z.1f} N", told
 
 
 def _change(before: float, after: float) -> str:

@@ -15,7 +15,7 @@ from thermospindle.model.bearing.row import reference_motion
 from thermospindle.model.built.tolerance import toleranced
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor import mjcf
-from thermospindle.model.rotor.chain import Element, RotorBase, matrices, motion_rows, rotor_base
+from thermospindle.model.rotor.chain import Element, Matrices, RotorBase, matrices, motion_rows, rotor_base
 from thermospindle.model.rotor.chain import sprung as on_a_spring
 from thermospindle.model.rotor.elements import ELEMENTS
 from thermospindle.model.rotor.modes import frf, group_energy, modes, point_rows, poles
@@ -126,6 +126,22 @@ def test_frf_is_the_inverse_of_the_dynamic_stiffness(spindle, kind, rpm):
         direct = rows @ np.linalg.solve(linear.stiffness - w**2 * linear.mass + 1j * w * linear.damping, hammers.T)
         direct *= (1j * w) ** ("receptance", "mobility", "accelerance").index(kind)
         assert found[:, :, i] == pytest.approx(direct, rel=1e-8, abs=1e-9 * np.abs(direct).max())
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.01])
+@pytest.mark.parametrize("kind", ["receptance", "mobility", "accelerance"])
+def test_what_nothing_holds_moves_as_a_free_body(kind, offset):
+    """F = m a of a hub on bearings that have lost contact, beside a plate on a spring: poles at zero are double and have one vector, of which a sum over poles made 1e276."""
+    mass, inertia, plate, spring = 0.018, 4e-6, 0.3, 1e7
+    linear = Matrices(np.diag([mass, inertia, plate]), np.zeros((3, 3)), np.diag([0.0, 0.0, spring]), (("hub", "z"), ("hub", "tilt_x"), ("plate", "z")))
+    assert poles(linear).parallel
+    frequency = np.array([20.0, 500.0, 1000.0])
+    s = 2j * np.pi * frequency
+    row = np.array([1.0, offset, 0.0])
+    found = frf(linear, np.stack([row, [0, 0, 1.0]]), row[None], frequency, kind)
+    power = {"receptance": 0, "mobility": 1, "accelerance": 2}[kind]
+    assert found[0, 0] == pytest.approx(s ** (power - 2) * (1 / mass + offset**2 / inertia), rel=1e-12)
+    assert found[1, 0] == pytest.approx(np.zeros(3), abs=1e-12)
 
 
 def test_heavily_damped_poles_keep_the_frf_exact():
