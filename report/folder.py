@@ -28,6 +28,8 @@ def whole_folder(path: Path, scene: bool = False) -> Iterator[Path]:
     Raises `BadInput` if something stands at `path` that spindle did not write, or that was changed since; or a scene, in whose place only another `scene` comes.
     """
     path = path.resolve()
+    if path in (here := Path.cwd(), *here.parents):  # also what an empty name is
+        raise BadInput(f"--out {path}: is where you stand, or above it, and would be replaced; name a new or empty folder")
     _refuse_foreign(path)
     if not scene and (path / "spindle.toml").is_file():
         raise BadInput(f"--out {path}: holds a scene, spindle.toml; name a new or empty folder")

@@ -220,6 +220,8 @@ def check_structure(file: Path, spindle: Spindle) -> None:
         if joint.material and joint.material not in spindle.materials:
             allowed = ", ".join(spindle.materials)
             raise BadInput(f"{file}: structure.joints.{joint.name}.material = {joint.material!r}: allowed are {allowed}")
+        if len(set(joint.bodies)) < len(joint.bodies):
+            raise BadInput(f"{file}: structure.joints.{joint.name}.between: {joint.bodies[0]!r} stands twice; a joint lies between two bodies, or a body and ground")
         for name in joint.bodies:
             if name not in (*names, "ground"):
                 raise BadInput(

@@ -139,7 +139,10 @@ def read_toml(file: Path) -> dict[str, Any]:
     if not file.is_file():  # a pipe would be waited for
         raise BadInput(f"{file}: no such file")
     try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
+        return tomllib.loads(file.read_text(encoding="utf-8-sig"))  # a byte order mark is what some editors begin a file with
+    except UnicodeDecodeError as error:
+        line = error.object[: error.start].count(b"\n") + 1
+        raise BadInput(f"{file}: line {line} has a byte that is no UTF-8 ({error.object[error.start]:#04x}), as of another encoding: save the file as UTF-8") from None
     except RecursionError:
         raise BadInput(f"{file}: its tables are nested too deep to be read") from None
     except ValueError as error:  # of TOML, of UTF-8, of numbers with thousands of digits

@@ -235,7 +235,7 @@ def values_of_file(spindle: Spindle) -> tuple[dict[str, Any], bool]:
         elif key in spindle.provenance:
             values[key] = node
 
-    walk(tomllib.loads(spindle.file.read_text(encoding="utf-8")), "")
+    walk(tomllib.loads(spindle.file.read_text(encoding="utf-8-sig")), "")
     return values, content_hash(load(spindle.file)) == content_hash(spindle)
 
 

@@ -75,7 +75,7 @@ def read(
     for c in contents:
         own = settings[c.file].test or plain(c.file.stem)
         if not (c.curves or c.motions or c.modes or c.places or c.unscaled or c.coherence or c.questions):
-            raise BadInput(f"{c.file}: holds no FRF, no time record, no modes and no geometry")
+            raise BadInput(f"{c.file}: holds no FRF of a motion, no time record, no modes and no geometry" + (f"; {'; '.join(c.notes)}" if c.notes else ""))
         for x in c.curves:
             if x.value.shape != x.frequency.shape:
                 raise BadInput(f"{c.file}: {x.where}: {x.value.size} values at {x.frequency.size} frequencies; there must be as many")

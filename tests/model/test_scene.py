@@ -109,6 +109,7 @@ REFUSED = [
     ("turning-ring", lambda r: r["bearing_pair"].update(turning_ring="inner"), "turning_ring = 'inner'", "rotating part"),
     ("tandem", lambda r: r["bearing_pair"].update(arrangement="tandem"), "bearing_pair", "preload_kind must be spring"),
     ("joint-end", lambda r: named(r["structure"]["joints"], "mount").update(between=["ground", "bas"]), "'bas' is no body", "allowed are"),
+    ("joint-twice", lambda r: named(r["structure"]["joints"], "mount").update(between=["base", "base"]), "structure.joints.mount.between: 'base' stands twice", "two bodies"),
     ("body-twice", lambda r: named(r["structure"]["bodies"], "seat").update(name="base"), "'base' is taken", "must differ"),
     (
         "no-inertia",
@@ -146,6 +147,17 @@ def test_a_file_that_is_not_there_or_not_toml(tmp_path):
         load(tmp_path)
     (tmp_path / "spindle.toml").write_text("title = ", encoding="utf-8")
     with pytest.raises(BadInput, match="not a TOML file"):
+        load(tmp_path)
+
+
+def test_encodings_of_other_editors(tmp_path):
+    """A byte order mark is read; a letter in Latin-1 is named by its line."""
+    text = FILE.read_bytes()
+    (tmp_path / "spindle.toml").write_bytes(b"\xef\xbb\xbf" + text)
+    load(tmp_path)
+    first, rest = text.split(b"\n", maxsplit=1)
+    (tmp_path / "spindle.toml").write_bytes(first + b"\n# Pr\xfcfstand\n" + rest)
+    with pytest.raises(BadInput, match=r"line 2 has a byte that is no UTF-8 \(0xfc\).*save the file as UTF-8"):
         load(tmp_path)
 
 

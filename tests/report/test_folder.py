@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from pathlib import Path
 
 import pytest
 
@@ -62,3 +63,13 @@ def test_a_file_in_the_way_is_named(tmp_path):
     with pytest.raises(BadInput, match=r"file is a file, so no folder can be made in it"):
         write(tmp_path / "file" / "deep" / "out", a="1")
     assert (tmp_path / "file").read_text() == "precious"
+
+
+@pytest.mark.parametrize("name", ["", ".", ".."])
+def test_where_one_stands_is_not_replaced(tmp_path, monkeypatch, name):
+    """An empty name, as of a shell's variable that is not set, is the folder one stands in: replaced, even an empty one leaves the shell in a folder that is gone."""
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    with pytest.raises(BadInput, match="is where you stand"):
+        write(Path(name), a="1")
+    assert list((tmp_path / "here").iterdir()) == []

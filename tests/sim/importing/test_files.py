@@ -114,6 +114,15 @@ def test_uff_binary_and_ascii(tmp_path):
     np.testing.assert_allclose(frf.value[0, 0], FRF.value[0, 0] * 1e-3 / 4.4482216152605, rtol=1e-10)
 
 
+def test_a_uff_value_that_is_no_number_is_named(tmp_path):
+    """By file, set and frequency; it was told of the folder that was to be written."""
+    value = FRF.value[0, 0].copy()
+    value[5:8] = np.nan
+    (tmp_path / "a.unv").write_bytes(ascii_58(FREQUENCY, value, 6, True))
+    with pytest.raises(BadInput, match=rf"a\.unv: .*set \d+.*: its value at {FREQUENCY[5]:g} Hz is no number, and 2 more lines"):
+        imported(tmp_path, '[[files]]\nfile = "a.unv"\ntest = "T20"\n', tmp_path / "a.unv")
+
+
 def test_one_frf_a_file(tmp_path):
     """Roving hammer, a file for each position, told by response and reference."""
     files, mapping = [], ""
