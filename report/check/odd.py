@@ -7,10 +7,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from thermospindle.diagnosis.forward.linear import mass_between
 from thermospindle.model.machine import Point, Spindle
+from thermospindle.model.rotor.modes import poles_below
 from thermospindle.model.rotor.static import FREE
 from thermospindle.model.shaft import SAME_HEIGHT, Shaft
-from thermospindle.model.units import MM, RPM
+from thermospindle.model.units import HERTZ, MM, RPM
 from thermospindle.report.check.looked import Looked
 from thermospindle.report.check.odd_bearings import OF_BEARINGS
 from thermospindle.sim.effects import of_scene
@@ -29,6 +31,8 @@ LEAST_DENSITY = 100.0
 """kg/m3: foams have more, and whoever writes g/cm3 has 1 to 20."""
 OFF = 1.0 * MM
 """How far from its body's surface a point may lie: sensors have bases."""
+COARSE = 2e-3
+"""Of a frequency, by which masses at nodes may put it off: more than measured ones are known to."""
 MANY_STEPS = 1e6
 """Of integration in a virtual hammer test, some minutes of computing for a flexible shaft."""
 
@@ -151,7 +155,23 @@ def _hammer(found: Looked) -> Iterator[str]:
         yield f"the slowest mode has not died out when the record of {test.record_length:g} s ends; a longer one, or an exponential window, is needed"
     steps = test.hits * len(test.hammer_nodes) * test.record_length / test.step
     if steps > MANY_STEPS and found.spindle.structure.shafts:
-        yield f"a virtual hammer test takes {steps / 1e6:.1f} million steps of {1e6 * test.step:.2g} us, for the shortest elements of the shaft; longest_element_mm makes them longer"
+        yield f"a virtual hammer test takes {steps / 1e6:.1f} million steps of {1e6 * test.step:.2g} us, for the shortest elements of the shaft: places closer together than longest_element_mm make them, or that itself"
+
+
+def _mesh(found: Looked) -> Iterator[str]:
+    """Modes of shafts that come out low for their masses are at nodes."""
+    between, high = mass_between(found.reference, found.spindle), found.spindle.hammer.band[1]
+    if between is None:
+        return
+    lumped, spread = (np.sort(np.abs(poles_below(found.reference.linear, high, mass)[0])) for mass in (None, between))
+    count = min(len(lumped), len(spread))
+    off = np.abs(lumped[:count] / spread[:count] - 1)
+    if count and off.max() > COARSE:
+        k = int(np.argmax(off))
+        yield (
+            f"the shaft's elements are long for the band of the hammer test: the mode at {spread[k] / HERTZ:.0f} Hz is off by {100 * off[k]:.2g} % in modes, FRFs and virtual tests, whose masses are at "
+            "nodes; half of longest_element_mm makes that a quarter"
+        )
 
 
 def _running(found: Looked) -> Iterator[str]:
@@ -187,5 +207,5 @@ def _count(n: int, one: str, many: str = "") -> str:
 
 
 QUESTIONS: tuple[Callable[[Looked], Iterator[str]], ...] = (
-    *OF_BEARINGS, _seats, _materials, _free, _undamped, _damping, _critical, _sections, _points, _hammer, _running, _effects,
+    *OF_BEARINGS, _seats, _materials, _free, _undamped, _damping, _critical, _sections, _points, _hammer, _mesh, _running, _effects,
 )  # fmt: skip
