@@ -16,6 +16,7 @@ from thermospindle.model import sense
 from thermospindle.model.bearing.pair import PairState, solve
 from thermospindle.model.bearing.stiffness_table import StiffnessTable, tabulate
 from thermospindle.model.built.imperfections import Imperfections
+from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.machine import Condition, RingMotion, Spindle
 from thermospindle.model.pressure import pressures
 from thermospindle.model.rotor import mjcf
@@ -142,7 +143,10 @@ def equilibrium(
     for effect, values in effects:
         if effect.motions:
             motions = effect.motions(spindle, condition, values, motions)
-    return OperatingPoint(spindle, condition, loaded(spindle, solve(spindle, condition, motions)))
+    try:
+        return OperatingPoint(spindle, condition, loaded(spindle, solve(spindle, condition, motions)))
+    except NoEquilibrium as error:
+        raise NoEquilibrium(f"at {condition.temperature:g} C and {condition.speed / RPM:g} rpm {'; '.join([str(error), *sense.of_conditions(spindle, [condition])])}") from None
 
 
 def acted_on(settled: OperatingPoint, effects: Sequence[tuple[Effect, Values]]) -> OperatingPoint:
