@@ -85,7 +85,7 @@ def _preload(found: Looked) -> Iterator[str]:
             continue
         where = f"at {state.condition.temperature:g} C" + (f" and {state.condition.speed / RPM:.0f} rpm" if state.condition.speed else "")
         pairs = [(b, state.state.bearing(b.name)) for b in found.reference.state.bearings if b.in_contact]
-        yield from (f"bearing {b.name} loses contact {where}" for b, now in pairs if not now.in_contact)
+        yield from (f"bearing {b.name} has lost contact {where}" for b, now in pairs if not now.in_contact)
         for what, far in (("less than half", lambda ratio: ratio < 0.5), ("more than twice", lambda ratio: ratio > 2.0)):
             moved = [f"{b.name} {now.preload:.3g} of {b.preload:.3g} N" for b, now in pairs if now.in_contact and far(now.preload / b.preload)]
             if moved:
@@ -140,7 +140,7 @@ def _pushed(found: Looked) -> Iterator[str]:
 
 def _sense(found: Looked) -> Iterator[str]:
     spindle = found.spindle
-    yield from sense.of_conditions(spindle, [*(Condition(t) for t in spindle.temperatures), Condition(spindle.temperatures[0], spindle.nominal_speed)])
+    yield from sense.of_conditions(spindle, [*(Condition(t) for t in (spindle.reference_temperature, *spindle.temperatures)), Condition(spindle.temperatures[0], spindle.nominal_speed)])
     yield from sense.of_states(spindle, [p.state.bearings for p in (found.reference, found.hot, found.turning) if not isinstance(p, str)])
 
 

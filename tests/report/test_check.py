@@ -179,6 +179,7 @@ ODD = [
     ("mk7702", "z_mm = 101.0", "z_mm = 81.0", "bearings front1 and front2 sit at the same place, z_mm = 81, between the same parts"),
     ("mk7702", "damping_ratio = 0.015\norigins = { damping_ratio = \"assumed\", axial", "damping_ratio = 0.9\norigins = { damping_ratio = \"assumed\", axial", "of critical"),
     ("five_bearing", "temperature_range_C = [20.0, 60.0]", "temperature_range_C = [20.0, 160.0]", "160 C lies outside"),
+    ("hdd_2003", "reference_temperature_C = 20.0", "reference_temperature_C = 295.0", "295 C lies outside -40 to 120 C"),
     ("five_bearing", "nominal_speed_rpm = 8000.0", "nominal_speed_rpm = 40000.0", "means a speed factor n dm of 3.8e+06"),
     ("five_bearing", "[[82, 13], [133, 23], [120, 8], [75, 100]", "[[82, 13], [133, 23], [120, 8], [90, 100]", "begins at a radius of 37.5 mm, and the shaft 'spindle' has 45 mm there"),
     ("five_bearing", "band_Hz = [300.0, 4000.0]", "band_Hz = [1000.0, 4000.0]", "natural frequencies below the band"),
