@@ -87,6 +87,10 @@ class Rigid:
 
     of: object
 
+    @property
+    def state(self):
+        return self.of.state
+
     def frf(self, frequency, window_decay=0.0):
         return np.ones((7, 2, 1)) / (2j * np.pi * frequency)
 
