@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from thermospindle.model.errors import BadInput
-from thermospindle.model.files.whole import whole
+from thermospindle.model.files.whole import check_not_here, whole
 
 MARK = "made-by-spindle.json"
 """File that every output folder holds: how it was made, its answer, and a digest of every file that was written beside it."""
@@ -28,8 +28,7 @@ def whole_folder(path: Path, scene: bool = False) -> Iterator[Path]:
     Raises `BadInput` if something stands at `path` that spindle did not write, or that was changed since; or a scene, in whose place only another `scene` comes.
     """
     path = path.resolve()
-    if path in (here := Path.cwd(), *here.parents):  # also what an empty name is
-        raise BadInput(f"--out {path}: is where you stand, or above it, and would be replaced; name a new or empty folder")
+    check_not_here(path)  # before what it holds is looked at
     _refuse_foreign(path)
     if not scene and (path / "spindle.toml").is_file():
         raise BadInput(f"--out {path}: holds a scene, spindle.toml; name a new or empty folder")

@@ -174,7 +174,7 @@ def compare(
 
 def _shape_nodes(o: Observation) -> tuple[int, ...]:
     """The nodes at which a test shows shapes."""
-    return o.test.shape_nodes if o.test.frf is None else o.test.frf.reference_nodes if by_hammer(o) else o.test.frf.response_nodes
+    return o.test.frf.reference_nodes if o.test.frf is not None and by_hammer(o) else o.test.response_nodes
 
 
 def _as_measured(spindle: Spindle, campaign: Campaign, o: Observation) -> Predicted:

@@ -54,13 +54,6 @@ class Observation:
         return ModeSet(self.frequency, self.shape, self.kind or (), strength)
 
     @property
-    def nodes(self) -> tuple[int, ...]:
-        """The points that shapes are at, in their order; none without shapes."""
-        if self.shape is None:
-            return ()
-        return self.test.shape_nodes if self.test.frf is None else self.test.frf.response_nodes
-
-    @property
     def channels(self) -> int | None:
         """How many points the shapes have, None without shapes."""
         return None if self.shape is None else self.shape.shape[1]
@@ -95,7 +88,7 @@ def _repeated(o: Observation, others: list[Observation]) -> Observation:
         return o
     again = np.zeros(len(o.frequency), bool)
     for other in shown:
-        again[pairs(*at_shared(o.modes, other.modes, o.nodes, other.nodes), REPEATED)[:, 0]] = True
+        again[pairs(*at_shared(o.modes, other.modes, o.test.response_nodes, other.test.response_nodes), REPEATED)[:, 0]] = True
     return _only(o, again)
 
 

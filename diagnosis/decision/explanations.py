@@ -137,10 +137,9 @@ def _weighed(h: Hypothesis, every: Sequence[Hypothesis], coarse: float) -> float
     if not parts:
         return h.evidence.ln
     lead = max(parts, key=lambda o: o.evidence.ln)
-    gain = h.evidence.ln - lead.evidence.ln
-    if all(m.lasting for m in h.mechanisms if m.name not in lead.names):
-        return _weighed(lead, every, coarse) + gain
-    in_doubt = min(gain, *(_by_other_laws(o, every) for o in [lead, *_doing_as_well(lead, set(h.names) - set(lead.names), every)]))
+    gain, more = h.evidence.ln - lead.evidence.ln, set(h.names) - set(lead.names)
+    lasts = all(m.lasting for m in h.mechanisms if m.name in more)
+    in_doubt = 0.0 if lasts else min(gain, *(_by_other_laws(o, every) for o in [lead, *_doing_as_well(lead, more, every)]))
     return _weighed(lead, every, coarse) + gain - (1 - 1 / coarse) * max(in_doubt, 0.0)
 
 

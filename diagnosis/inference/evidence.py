@@ -64,6 +64,17 @@ UNCALIBRATED = {1.0: 0.0, 3.0: -2.0}
 is off by some per cent, which a sensor's gain would have to explain in part."""
 ODDS = {kinds_of.BUILD: WIDER, kinds_of.EXPANSION: FARTHER, kinds_of.HAMMER: UNCALIBRATED}
 """By kind of nuisance, of sizes of which one is that of the scene or of the model itself."""
+BETWEEN = 2  # places between two of a grid that are not nothing
+
+
+def finer(grid: Sequence[float]) -> tuple[float, ...]:
+    """What is not nothing of a grid, with places `BETWEEN`. Dozens of numbers share the size of a drift: between places that are three times apart they lose some 0.2 in ln evidence each,
+    which one effect that takes one channel's part of it would win."""
+    sizes = [size for size in grid if size > 0]
+    return *(float(f"{f:.2g}") for low, high in pairwise(sizes) for f in np.geomspace(low, high, BETWEEN + 1, endpoint=False)), sizes[-1]
+
+
+FINER = {kind: finer(grid) for kind, grid in GRIDS.items() if kind not in ODDS}
 WIDTHS = (0.5, 1.0, 2.0, 4.0)  # of a size, in its own prior standard deviations
 DEPARTURES = (0.0, 0.1, 0.3, 1.0)  # from a law, of the size
 FREE_WIDTHS = (0.1, 0.3, 1.0, 3.0, 10.0)  # of what has no law: its width is to be learned
@@ -72,7 +83,6 @@ OFFSET = -12.0
 FARTHEST = 3.0  # times what a shape parameter does at the fitted size of a test, of what it does at the size that all share
 ROUNDED = 1.0  # of chi2, which is never negative: what rounding may take from a quadratic that stands for a fit
 SWEEPS = 3  # at most, through the sizes of nuisances one after the other
-BETWEEN = 2  # places between two of a grid that are not nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,11 +154,10 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
                     values, s = there, scale
             if logsumexp(values) - before < 0.01:
                 break
-        fine = {kind: finer(tuple(grid)) for kind, grid in grids.items() if kind not in ODDS}
         for _ in range(SWEEPS):
             before = logsumexp(values)
-            for kind, by in product(fine, (1, -1)):
-                while (size := _beside(fine[kind], sizes[kind], by)) is not None and logsumexp(there := each(s, {**sizes, kind: size})) > logsumexp(values):
+            for kind, by in product([kind for kind in FINER if kind in sizes], (1, -1)):
+                while (size := _beside(FINER[kind], sizes[kind], by)) is not None and logsumexp(there := each(s, {**sizes, kind: size})) > logsumexp(values):
                     values, sizes = there, {**sizes, kind: size}
             if logsumexp(values) - before < 0.1:
                 break
@@ -193,14 +202,6 @@ def _moves(grids: Mapping[str, Sequence[float]]) -> list[dict[str, float]]:
         as_drawn = {kind: grids[kind][0] for kind in kinds_of.DISCREPANCIES if kind in grids}
         found += [{**as_drawn, kinds_of.BUILD: times} for times in grids[kinds_of.BUILD]]
     return found
-
-
-@lru_cache(maxsize=64)
-def finer(grid: tuple[float, ...]) -> tuple[float, ...]:
-    """What is not nothing of a grid, with places `BETWEEN`. Dozens of numbers share the size of a drift: between places that are three times apart they lose some 0.2 in ln evidence each,
-    which one effect that takes one channel's part of it would win."""
-    sizes = [size for size in grid if size > 0]
-    return *(float(f"{f:.2g}") for low, high in pairwise(sizes) for f in np.geomspace(low, high, BETWEEN + 1, endpoint=False)), sizes[-1]
 
 
 def _beside(grid: Sequence[float], size: float, by: int) -> float | None:

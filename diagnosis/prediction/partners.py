@@ -49,7 +49,7 @@ def numbered(observed: Sequence[Observation], predicted: Sequence[Predicted]) ->
     found = {order[0]: {i: i + 1 for i in range(len(predicted[order[0]].frequency))}} if order else {}
     for t in order[1:]:
         near = min(found, key=lambda s: abs(state[s][0] - state[t][0]) + abs(state[s][1] - state[t][1]))
-        before, now = at_shared(predicted[near].modes(), predicted[t].modes(), observed[near].nodes, observed[t].nodes)
+        before, now = at_shared(predicted[near].modes(), predicted[t].modes(), observed[near].test.response_nodes, observed[t].test.response_nodes)
         partner = kept_in_order(pairing.partners(before, now, COMPUTED), before, now, ALONE)
         followed = {int(j): found[near][i] for i, j in enumerate(partner) if j >= 0}
         new = count(1 + max(max(f.values(), default=0) for f in found.values()))

@@ -27,6 +27,12 @@ NEW, OLD = "new", "old"
 """Folders of a work folder: what is being written, and what it replaces; the thing in each has the name of its place."""
 
 
+def check_not_here(path: Path) -> None:
+    """`BadInput` where the folder in which one stands, or one above it, would be replaced: an empty name is such a one, too, and a shell would stand in what is gone."""
+    if path.is_dir() and (path := path.resolve()) in (here := Path.cwd(), *here.parents):
+        raise BadInput(f"{path}: is where you stand, or above it, and would be replaced; name a new or empty folder")
+
+
 @contextmanager
 def whole(path: Path) -> Iterator[Path]:
     """Where to write the file or folder that shall stand at `path`: it is moved there when the block ends well, removed otherwise.
@@ -35,6 +41,7 @@ def whole(path: Path) -> Iterator[Path]:
     the system has it, where nothing can be written; it and a `BadInput` of the block name `path` and not the work folder.
     """
     path = Path(path).absolute()
+    check_not_here(path)
     _tidy(path)
     work, lock = _work_folder(path)
     try:

@@ -163,13 +163,14 @@ def _mesh(found: Looked) -> Iterator[str]:
     between, high = mass_between(found.reference, found.spindle), found.spindle.hammer.band[1]
     if between is None:
         return
-    lumped, spread = (np.sort(np.abs(poles_below(found.reference.linear, high, mass)[0])) for mass in (None, between))
+    lumped = [m.frequency for m in found.reference.modes]
+    spread = np.sort(np.abs(poles_below(found.reference.linear, high, between)[0])) / HERTZ
     count = min(len(lumped), len(spread))
     off = np.abs(lumped[:count] / spread[:count] - 1)
     if count and off.max() > COARSE:
         k = int(np.argmax(off))
         yield (
-            f"the shaft's elements are long for the band of the hammer test: the mode at {spread[k] / HERTZ:.0f} Hz is off by {100 * off[k]:.2g} % in modes, FRFs and virtual tests, whose masses are at "
+            f"the shaft's elements are long for the band of the hammer test: the mode at {spread[k]:.0f} Hz is off by {100 * off[k]:.2g} % in modes, FRFs and virtual tests, whose masses are at "
             "nodes; half of longest_element_mm makes that a quarter"
         )
 

@@ -67,7 +67,7 @@ def _shaft_of(spindle: Spindle, point: Point) -> Shaft | None:
 
 def measured_at(spindle: Spindle, points: tuple[Point, ...], test: Test) -> Spindle:
     """The spindle with a test's response points first and its hammer points; of a table of modes with the points of its shapes, or as it is where it tells none."""
-    responses = test.shape_nodes if test.frf is None else test.frf.response_nodes
+    responses = test.response_nodes
     if not responses:
         return spindle
     references = responses[:1] if test.frf is None else test.frf.reference_nodes

@@ -60,6 +60,11 @@ class Test:
         """Where its table of modes tells shapes."""
         return tuple(at.node for at in self.modes[0].shape) if self.modes else ()
 
+    @property
+    def response_nodes(self) -> tuple[int, ...]:
+        """Where its sensors stood: of its FRFs, or where its table of modes tells shapes."""
+        return self.shape_nodes if self.frf is None else self.frf.response_nodes
+
     def __repr__(self) -> str:
         told = [f"{self.temperature:g} C", f"{self.speed / RPM:.6g} rpm"] + [repr(self.frf)] * (self.frf is not None) + [f"{len(self.modes)} modes"] * bool(self.modes)
         return f"<{type(self).__name__} {self.id}: {', '.join(told + ['runout'] * (self.runout is not None))}>"

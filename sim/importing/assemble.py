@@ -79,6 +79,9 @@ def read(
         for x in c.curves:
             if x.value.shape != x.frequency.shape:
                 raise BadInput(f"{c.file}: {x.where}: {x.value.size} values at {x.frequency.size} frequencies; there must be as many")
+            if len(wrong := np.flatnonzero(~np.isfinite(x.value))):
+                more = f", and {len(wrong) - 1} more lines are none either" if len(wrong) > 1 else ""
+                raise BadInput(f"{c.file}: {x.where}: its value at {x.frequency[wrong[0]]:g} Hz is no number{more}; take the FRF out of the file, or export it again")
         if c.curves or c.questions or c.motions:
             curves.setdefault(own, []).extend(_turned(x, settings[c.file]) for x in c.curves)
         coherence.setdefault(own, {}).update(c.coherence)

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from thermospindle.model.errors import BadInput
+from thermospindle.model.files.whole import whole
 from thermospindle.report.folder import MARK, mark, whole_folder
 
 
@@ -73,3 +74,11 @@ def test_where_one_stands_is_not_replaced(tmp_path, monkeypatch, name):
     with pytest.raises(BadInput, match="is where you stand"):
         write(Path(name), a="1")
     assert list((tmp_path / "here").iterdir()) == []
+
+
+def test_nor_does_a_campaign_come_there(tmp_path, monkeypatch):
+    """Whatever is written whole: an import to an empty name replaced the folder."""
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    with pytest.raises(BadInput, match="is where you stand"), whole(Path("")) as folder:
+        folder.mkdir()

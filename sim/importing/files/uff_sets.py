@@ -100,10 +100,6 @@ def _curve(
     file: Path, where: str, record: Mapping[str, Any], ends: tuple[End, End], system: Mapping[str, Any] | None, settings: FileForm
 ) -> tuple[Curve, list[Question]]:
     """One FRF, and what its units and its quantity leave open or say against each other."""
-    wrong = np.flatnonzero(~np.isfinite(record["data"]))
-    if len(wrong):
-        more = f", and {len(wrong) - 1} more lines are none either" if len(wrong) > 1 else ""
-        raise BadInput(f"{file}: {where}: its value at {record['x'][wrong[0]]:g} Hz is no number{more}; take the set out of the file, or export it again")
     number, below = record["ordinate_spec_data_type"], record["orddenom_spec_data_type"]
     top, bottom = (record[f"{side}_axis_units_lab"].strip() for side in ("ordinate", "orddenom"))
     word = record["ordinate_axis_lab"].strip()

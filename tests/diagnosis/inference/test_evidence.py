@@ -84,12 +84,11 @@ def test_mean_and_covariance_are_the_posterior():
     assert np.all(np.abs(found.sizes[0] - 1.6) < 5 * np.sqrt(np.diag(found.size_covariance[0])))
 
 
-@pytest.mark.parametrize("size", [0.0, 1e-4, 3e-4, 5.5e-4, 1e-3, 1.7e-3, 3e-3, 1e-2])
-def test_the_size_of_the_discrepancy_is_learned(size):
-    """Of twenty campaigns at least eighteen learn the size that they were drawn with, or one within a factor of two, though it be between the places of its grid; drift and damping, of which
-    there is none, none."""
+@pytest.mark.parametrize(("size", "within"), [(0.0, 1.0), (1e-4, 1.6), (3e-4, 1.6), (5.5e-4, 2.0), (1e-3, 1.6), (1.7e-3, 2.0), (3e-3, 1.6), (1e-2, 1.6)])
+def test_the_size_of_the_discrepancy_is_learned(size, within):
+    """Of twenty campaigns at least eighteen learn the size that they were drawn with, or the next place of its grid; drift and damping, of which there is none, none."""
     right = [evidence(made.model, made.fit).learned for made in (toy(seed, size) for seed in range(20))]
-    assert sum(size / 2 < learned.sizes[STIFFNESS] < 2 * size or learned.sizes[STIFFNESS] == size for learned in right) >= 18
+    assert sum(size / within < learned.sizes[STIFFNESS] < within * size or learned.sizes[STIFFNESS] == size for learned in right) >= 18
     assert sum(learned.sizes[DAMPING] == 0.0 and learned.sizes[DRIFT] == 0.0 for learned in right) >= 14
 
 

@@ -123,6 +123,15 @@ def test_a_uff_value_that_is_no_number_is_named(tmp_path):
         imported(tmp_path, '[[files]]\nfile = "a.unv"\ntest = "T20"\n', tmp_path / "a.unv")
 
 
+def test_an_array_value_that_is_no_number_is_named(tmp_path):
+    """Of any file: it is asked where FRFs of all kinds of files come together."""
+    value = FRF.value.copy()
+    value[0, 0, 5] = np.inf
+    np.savez(tmp_path / "T20.npz", frequency=FREQUENCY, H=value, response_nodes=FRF.response_nodes, reference_nodes=FRF.reference_nodes)
+    with pytest.raises(BadInput, match=rf"T20\.npz: .*: its value at {FREQUENCY[5]:g} Hz is no number; take"):
+        imported(tmp_path, '[[files]]\nfile = "T20.npz"\nunit = "(m/s)/N"\n', tmp_path / "T20.npz")
+
+
 def test_one_frf_a_file(tmp_path):
     """Roving hammer, a file for each position, told by response and reference."""
     files, mapping = [], ""
