@@ -22,21 +22,22 @@ CONDITIONS = (Condition(20.0), Condition(40.0))
 SIZE = Parameter("size", "1", 0.0, 1.0, 1.0, (-9.0, 9.0), "", "")
 
 
-def mechanism(name: str) -> Mechanism:
-    """A free form where the name starts with `~`; with a law of the data's own where it ends with an apostrophe."""
-    return Mechanism(Effect(name.rstrip("'"), "", "", (SIZE,), "", (), ""), {}, (), free=name.startswith("~"), own_law=name.endswith("'"))
+def mechanism(name: str, shaped: bool = False) -> Mechanism:
+    """With a shape parameter where it is `shaped`; a free form where the name starts with `~`; with a law of the data's own where it ends with an apostrophe."""
+    return Mechanism(Effect(name.rstrip("'"), "", "", (SIZE,), "", (), ""), {}, (SIZE,) * shaped, free=name.startswith("~"), own_law=name.endswith("'"))
 
 
-def hypothesis(names: tuple[str, ...], ln: float) -> Hypothesis:
-    n, count = 2 * len(names), 100
+def hypothesis(names: tuple[str, ...], ln: float, shape: float | None = None) -> Hypothesis:
+    """With the same `shape` in all, where they have one."""
+    n, count = (2 if shape is None else 3) * len(names), 100
     by_test = tuple((50.0, np.zeros(n), np.zeros((n, n))) for _ in CONDITIONS)
     fit = Fit(
-        tuple(mechanism(k) for k in names), np.zeros(n), np.zeros((len(names), 2)), ((),) * len(names), (np.eye(2),) * len(names), 100.0,
+        tuple(mechanism(k, shape is not None) for k in names), np.zeros(n), np.zeros((len(names), 2)), (() if shape is None else (shape,),) * len(names), (np.eye(2),) * len(names), 100.0,
         np.zeros(n), np.zeros((n, n)), by_test, count, None, 1.0,
     )  # fmt: skip
     learned = Learned({}, 1.0, (1.0,) * len(names), (0.1,) * len(names), (1.0,) * len(names))
     sizes = np.zeros((len(names), 2))
-    return Hypothesis(fit, Evidence(-1000.0 + ln, learned, np.zeros(n), np.eye(n), sizes, *np.zeros((2, len(names), 2, 2)), 100.0))
+    return Hypothesis(fit, Evidence(-1000.0 + ln, learned, np.zeros(n), np.eye(n), sizes, *np.zeros((2, len(names), 2, 2)), 100.0, -1000.0 + ln))
 
 
 def made(gains: dict[str | tuple[str, ...], float], catalogue: int = 30, forms: int = 20) -> Search:

@@ -16,7 +16,7 @@ from math import comb
 import numpy as np
 from scipy.special import softmax
 
-from thermospindle.diagnosis.inference.gaussian import impossible, opposite
+from thermospindle.diagnosis.inference.gaussian import CANNOT, impossible, opposite
 from thermospindle.diagnosis.inference.hypothesis import DEPARTS, LITTLE, PLENTY, STRAIN, Hypothesis
 from thermospindle.diagnosis.inference.remainder import SMALL, Overlap
 from thermospindle.diagnosis.inference.search import Search
@@ -169,17 +169,17 @@ def _can_be(h: Hypothesis) -> bool:
 
 
 def _named_as(h: Hypothesis, every: Sequence[Hypothesis], alike: Mapping[str, frozenset[str]], by: float) -> list[Hypothesis]:
-    """The explanations of the catalogue that an explanation with free forms is: those whose effects change the same beside the same others, and do as well. They do where they are behind by
-    a `LITTLE` of ln evidence; or where they leave as little of the data, and no more than a `PLENTY` of what they are behind is the price of shapes and sizes that an effect has and a free form
-    has not: it says nothing of whether something else acts. ln evidence is divided `by` what it is worth."""
+    """The explanations of the catalogue that an explanation with free forms is: those whose effects change the same beside the same others, and do as well. They do where they are behind by no more than
+    a `LITTLE` of ln evidence; or where no more than `CANNOT` standard errors of the data, and of what is known of their shapes, tell the two apart: the price of sizes and shapes that an effect
+    has, and a free form has not, says nothing of whether something else acts. ln evidence is divided `by` what it is worth."""
     means = [alike.get(m.name, frozenset()) if m.free else {m.name} for m in h.mechanisms]
 
     def same(names: Names) -> bool:
         return len(names) == len(means) and any(all(n in of for n, of in zip(row, means, strict=True)) for row in permutations(names))
 
     def does_as_well(o: Hypothesis) -> bool:
-        behind, leaves_more = h.evidence.ln - o.evidence.ln, (o.evidence.chi2 - h.evidence.chi2) / 2
-        return behind < LITTLE * by or max(behind / PLENTY, leaves_more / LITTLE) < by
+        behind, leaves_more = h.evidence.ln - o.evidence.ln, h.evidence.as_fitted - o.evidence.as_fitted
+        return behind < LITTLE * by or (2 * leaves_more < CANNOT**2 * by and o.farthest_shape < CANNOT)
 
     return [o for o in every if not o.free and same(o.names) and does_as_well(o)] if h.free else []
 

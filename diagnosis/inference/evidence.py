@@ -89,7 +89,8 @@ SWEEPS = 3  # at most, through the sizes of nuisances one after the other
 class Evidence:
     """ln evidence; what was learned; posterior mean (n,) and covariance (n, n) of all parameters, and of the sizes of every mechanism in every
     test: mean (mechanisms, tests) and covariance (mechanisms, tests, tests), in their units, and the covariance `as_shaped`, with shape parameters as they are. `by_departing` is what of the ln evidence the mechanisms with a
-    law gain by departing from it."""
+    law gain by departing from it, and `as_fitted` ln of the probability of the data with the mechanisms' parameters at their mean, nuisances integrated: ln evidence without the price of
+    these parameters (Besag, *J. R. Statist. Soc. B* 51 (1989) 579: p(data) = p(data | theta) p(theta) / p(theta | data), at any theta)."""
 
     ln: float
     learned: Learned
@@ -99,6 +100,7 @@ class Evidence:
     size_covariance: Array
     as_shaped: Array
     chi2: float
+    as_fitted: float
     by_departing: float = 0.0
 
     def __repr__(self) -> str:
@@ -165,11 +167,16 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
     own = [tuple(grid)[k] for grid, k in zip(own_grids, best, strict=True)]
     scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
     learned = Learned(sizes, s, *(tuple(of) for of in zip(*own, strict=True)))
-    mean, spread = posterior(scaled, nuisances or integrated(model, fit, s, sizes), mechanism_root(model, fit.mechanisms, learned))
+    nuisances = nuisances or integrated(model, fit, s, sizes)
+    mean, spread = posterior(scaled, nuisances, mechanism_root(model, fit.mechanisms, learned))
     chi2 = whole.at(mean)
+    held = [h.number for h in fit.held]
+    own_mean = np.where(np.isin(np.arange(p, len(mean)), held), fit.point[p:], mean[p:])
+    owed = fit.owed / (2 * s**2) if fit.temper == 1.0 else 0.0
+    as_fitted = marginal(scaled, nuisances).at(own_mean) - fit.count * np.log(s) - owed
     mean, spread = fit.point + turn @ (mean - fit.point), turn @ spread @ turn.T
     truncation = ln_within_limits(fit, mean, spread, s)
-    mean[[h.number for h in fit.held]] = fit.point[[h.number for h in fit.held]]
+    mean[held] = fit.point[held]
     at, means, covariances, as_shaped = p, [], [], []
     tests = len(model.tests)
     for m, root, widths in zip(fit.mechanisms, fit.roots, own, strict=True):
@@ -181,10 +188,10 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
         truncation += one_sided(model, m, widths, means[-1], as_shaped[-1])
         at = shape.stop
     by_law = [np.array([d == 0.0 or m.kind != "law" for _, d, _ in grid]) for m, grid in zip(fit.mechanisms, own_grids, strict=True)]
-    held = reduce(np.multiply.outer, by_law, np.array(True)).ravel()
-    ln = logsumexp(values) + truncation - (fit.owed / (2 * s**2) if fit.temper == 1.0 else 0.0)
-    by_departing = logsumexp(values) - logsumexp(values[held]) + logsumexp(odds[held])
-    return Evidence(ln, learned, mean, spread, np.array(means).reshape(len(means), tests), _stacked(covariances, tests), _stacked(as_shaped, tests), chi2, by_departing)
+    lawful = reduce(np.multiply.outer, by_law, np.array(True)).ravel()
+    by_departing = logsumexp(values) - logsumexp(values[lawful]) + logsumexp(odds[lawful])
+    told = np.array(means).reshape(len(means), tests), _stacked(covariances, tests), _stacked(as_shaped, tests)
+    return Evidence(float(logsumexp(values)) + truncation - owed, learned, mean, spread, *told, chi2, as_fitted, by_departing)
 
 
 def _stacked(covariances: Sequence[Array], tests: int) -> Array:

@@ -47,6 +47,10 @@ class Marginal:
     b: Array
     a: Array
 
+    def at(self, p: Array) -> float:
+        """ln of the integral over the nuisances alone."""
+        return float(self.constant + self.b @ p - p @ self.a @ p / 2)
+
     def integrated(self, roots: Sequence[Array]) -> Array:
         """ln of the integral (g_1 g_2 ...,) over the priors of all mechanisms, each with every one of its `roots` (g_k, m_k, m_k): one mechanism
         after the other, by Schur complements."""

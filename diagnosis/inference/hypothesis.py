@@ -57,6 +57,12 @@ class Hypothesis:
         return tuple((np.abs(self.evidence.sizes - neutral) <= 3 * errors).all(axis=1).tolist())
 
     @property
+    def farthest_shape(self) -> float:
+        """Of all shape parameters how far the farthest is from what is known of it, in its prior's standard deviations; nothing where there are none."""
+        rows = zip(self.mechanisms, self.fit.shapes, strict=True)
+        return max((abs(u - q.neutral) / q.prior_sd for m, row in rows for q, u in zip(m.shape, row, strict=True)), default=0.0)
+
+    @property
     def excess(self) -> float:
         """What is left beyond noise, in squares of the errors a number."""
         return max(self.fit.chi2 / self.fit.count - 1.0, 0.0)

@@ -13,7 +13,7 @@ from tests.blind.hidden import Hidden
 from tests.blind.laws import REFERENCE
 from tests.blind.world import Answer, Plan, Record, World, answer, lowest, points_struck, ways_of_mass
 from thermospindle.model.built.tolerance import toleranced
-from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.machine import Condition, HammerTest, Spindle
 from thermospindle.model.types import Array
 from thermospindle.sim.campaign.campaign import Campaign, Noise, Test
 from thermospindle.sim.identification.frf import Frf
@@ -23,6 +23,10 @@ HAMMERS_FROM = 2000
 
 MASSES_FROM = 2140
 """The first seed in whose world bodies have their mass otherwise than drawn."""
+
+
+BY_HAND = 2e-4
+"""How far (m) from its point a hammer is known to hit before its misses are told from each other, of the two that worlds have."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +87,7 @@ def further(world: World, seed: int, spindle: Spindle) -> World:
         world = replace(world, masses=tuple((float(own.choice([1e-3, 3e-3, 6e-3])) * own.standard_normal(ways_of_mass(spindle))).tolist()))
     random = np.random.default_rng([seed, 73])
     radial, axial = (float(f) for f in 1 + random.choice([3e-3, 0.01, 0.02]) * random.standard_normal(2))
-    misses = {"miss": float(random.choice([5e-5, 2e-4])), "miss_drift": float(random.choice([0.0, 3e-5, 1e-4]))}
+    misses = {"miss": float(random.choice([5e-5, BY_HAND])), "miss_drift": float(random.choice([0.0, 3e-5, 1e-4]))}
     return replace(world, motions=(radial, axial), hammer_gain=float(random.choice([1e-3, 5e-3, 0.02])), hammer_drift=float(random.choice([0.0, 1e-3, 4e-3])), **misses)
 
 
@@ -171,7 +175,7 @@ def measured(at: Answer, spindle: Spindle, record: Record, random: np.random.Gen
         use = (lines >= hammer.band[0]) & (lines <= hammer.band[1])
         frequency, window = lines[use], np.exp(-record.decay * step * np.arange(samples))
         value = at.transformed(frequency, record)
-        force = half_sine(frequency, np.pi * np.sqrt(hammer.hammer_mass / hammer.tip_stiffness))
+        force = force_of(frequency, hammer)
         # white noise in time whose spectrum, averaged over the hits, has the data sheet's share of the largest answer where the force is whole
         largest = np.abs(value).max(axis=(0, 2), keepdims=True)
         level = record.times * hammer.noise_of_largest * largest * np.sqrt(record.hits) / np.sqrt(np.sum(window**2))
@@ -184,6 +188,18 @@ def measured(at: Answer, spindle: Spindle, record: Record, random: np.random.Gen
         if record.told == "sd":
             sd = np.sqrt(np.sum(np.abs(hits - value) ** 2, axis=0) / (record.hits - 1) / record.hits)
     return Frf(frequency, value, nodes, hammer.hammer_nodes, "mobility", sd=sd)
+
+
+def error_of_hits(frequency: Array, hammer: HammerTest, record: Record) -> Array:
+    """Standard error (n,) of lines of the mean of hits, over the largest value under the window, with that window undone. The force falls with frequency, so that noise over it rises; and white noise
+    in time hides as much with a window as without, which takes as much of the answer (Parseval)."""
+    window = np.exp(-record.decay / hammer.sample_rate * np.arange(round(record.length * hammer.sample_rate)))
+    return np.asarray(record.times * hammer.noise_of_largest / np.sqrt(np.mean(window**2)) / force_of(frequency, hammer))
+
+
+def force_of(frequency: Array, hammer: HammerTest) -> Array:
+    """Magnitude of the spectrum of a hit over its value at 0 Hz."""
+    return half_sine(frequency, np.pi * np.sqrt(hammer.hammer_mass / hammer.tip_stiffness))
 
 
 def half_sine(frequency: Array, length: float) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.blind.alike import left, right, right_names
-from tests.blind.campaigns import HAMMERS_FROM, MASSES_FROM, campaign, further, in_contact
+from tests.blind.campaigns import HAMMERS_FROM, MASSES_FROM, campaign, further, in_contact, measured
 from tests.blind.laws import law
 from tests.blind.mechanisms import mechanisms
 from tests.blind.study import FURTHER, FURTHER_FROM, FURTHER_SHARE, SCENES, draw
@@ -201,6 +201,21 @@ def test_visibility_beside_a_weak_mode_is_what_it_is_without():
         for of in (replace(made, world=replace(made.world, stiffness_error=1e-3, weak_mode=weak)) for weak in (None, (1e-4, 1500.0, 0.02)))
     ]
     assert seen_by[1] == pytest.approx(seen_by[0], rel=0.05)
+
+
+@pytest.mark.parametrize("record", [Record(), Record("rectangular", 0.15, 1.0, 4), Record("exponential", 0.15, 0.1, 4, times=2.0)], ids=lambda r: r.kind)
+def test_noise_by_which_changes_are_measured_is_the_noise_of_the_lines(record):
+    """Of as many campaigns as are enough to tell it to some per cent; of a window that was undone as much more as the window takes of the noise."""
+    drawn = draw(2)
+    made = campaign(drawn.spindle, drawn.tests[:1], [], 5, World(), record)
+    of = seen(made, drawn.spindle)
+    at = answer(made.built, Condition(drawn.tests[0].temperature, drawn.tests[0].speed), World(), (), drawn.tests[0].place(drawn.spindle))
+    frfs = [measured(at, drawn.spindle, record, np.random.default_rng(seed)) for seed in range(40)]
+    scatter = np.std([f.value for f in frfs], axis=0, ddof=1)
+    lines = [int(np.argmin(np.abs(frfs[0].frequency - f))) for f in of.frequency]
+    window = np.exp(-record.decay * np.linspace(0.0, record.length, 10_000))
+    stated = of.sd[0] * np.sqrt(len(frfs[0].frequency) / len(of.frequency)) * np.sqrt(np.mean(window**2))
+    assert np.sqrt(np.mean((scatter[..., lines] / stated) ** 2)) == pytest.approx(1.0, abs=0.05)
 
 
 def test_visibility_grows_with_size_and_gains_hide_a_gain():

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tests.blind.campaigns import Made, beside, faces_struck
+from tests.blind.campaigns import BY_HAND, Made, beside, error_of_hits, faces_struck
 from tests.blind.hidden import Hidden
 from tests.blind.world import World, answer, modal_errors, points_struck
 from thermospindle.model.built.tolerance import toleranced
@@ -70,7 +70,7 @@ class Beside:
         return float(np.sqrt(max(self.inner(self)[0, 0], 0.0)))
 
 
-def seen(made: Made, spindle: Spindle, lines: int = 160) -> Seen:
+def seen(made: Made, spindle: Spindle, lines: int = 320) -> Seen:
     """The same of one campaign, linear, about the built spindle."""
     hammer = spindle.hammer
     frequency = np.linspace(*hammer.band, lines)
@@ -82,10 +82,13 @@ def seen(made: Made, spindle: Spindle, lines: int = 160) -> Seen:
     base = all_tests(made.built)
     dense = made.campaign.tests[0].frf.frequency.size / lines  # type: ignore[union-attr]
     sd = []
-    for v in base:
-        largest = np.abs(v).max(axis=(0, 2), keepdims=True)
-        of_value = hammer.noise_of_value * (made.record.kind == "line")
-        sd.append(made.record.times * np.sqrt((of_value * np.abs(v)) ** 2 + (hammer.noise_of_largest * largest) ** 2) / np.sqrt(dense))
+    for test, v in zip(made.campaign.tests, base, strict=True):
+        largest = np.abs(test.frf.value).max(axis=(0, 2), keepdims=True)  # type: ignore[union-attr]  # of all lines: peaks are narrower than these lines are apart
+        if made.record.kind == "line":
+            error = made.record.times * np.sqrt((hammer.noise_of_value * np.abs(v)) ** 2 + (hammer.noise_of_largest * largest) ** 2)
+        else:
+            error = np.broadcast_to(error_of_hits(frequency, hammer, made.record) * largest, v.shape)
+        sd.append(error / np.sqrt(dense))
     found = Seen(frequency, tuple(sd), np.zeros((0, 0)))
 
     def column(values: Sequence[ComplexArray], other: Sequence[ComplexArray] = base) -> Array:
@@ -119,7 +122,7 @@ def seen(made: Made, spindle: Spindle, lines: int = 160) -> Seen:
                 (answer(made.built, Condition(p.temperature, p.speed), plain, (), p.place(spindle), hits).frf(frequency) - b) / 1e-4
                 for p, b in zip(made.plans, base, strict=True)
             ]
-            columns.append(column([b + made.world.miss * d for b, d in zip(base, aside, strict=True)]))
+            columns.append(column([b + max(made.world.miss, BY_HAND) * d for b, d in zip(base, aside, strict=True)]))
             columns += [column([b + made.world.miss_drift * d * (j == k) for j, (b, d) in enumerate(zip(base, aside, strict=True))]) for k in range(len(base))]
     for which, sd in (("motions", MOTIONS_SD), ("masses", MASSES_SD)):
         own = getattr(plain, which)
