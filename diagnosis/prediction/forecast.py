@@ -21,6 +21,7 @@ from thermospindle.diagnosis.inference.hypothesis import LITTLE, Hypothesis, set
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.diagnosis.parameters.mechanism import size_covariance
+from thermospindle.model.bearing.pair import IN_CONTACT
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.modes import kinds, poles_below
@@ -167,7 +168,7 @@ def _modes(model: CampaignModel, problem: Problem, p: Array, amounts: Array, pla
     there = _unmade(model, plan)
     x, effects = _acting(there, problem, p, amounts)
     point = there.operating(0, x, effects)
-    if (status := point.state.status) != "in contact":  # a spindle that rattles has no modes to be read
+    if (status := point.state.status) != IN_CONTACT:  # a spindle that rattles has no modes to be read
         raise NoEquilibrium(status)
     linear = there.linear(0, x, effects)
     pole, _ = poles_below(linear.matrices, model.spindle.hammer.band[1], linear.between)

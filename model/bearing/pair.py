@@ -26,6 +26,8 @@ from thermospindle.model.types import Array
 TOUCHING = 1e-9
 """Contact force, over that of the preload, below which a ball is loose."""
 
+IN_CONTACT = "in contact"
+
 
 @dataclass(frozen=True)
 class BearingState(ByDirection):
@@ -209,7 +211,7 @@ def _many_positions(
 def contact_status(bearings: tuple[BearingState, ...]) -> str:
     """The status of a pair: that all bearings are in contact, or which of them is not."""
     loose = [b.name for b in bearings if not b.in_contact]
-    return "in contact" if not loose else f"{' and '.join(loose)} bearing lost contact"
+    return IN_CONTACT if not loose else f"{' and '.join(loose)} bearing lost contact"
 
 
 def damping_time(spindle: Spindle, b: Bearing) -> float:

@@ -17,6 +17,7 @@ from rich.console import Console
 from thermospindle.model.machine import Spindle
 from thermospindle.model.units import RPM, TO_UM
 from thermospindle.report.text.grid import grid, show_grid
+from thermospindle.report.text.states import of_bearings
 from thermospindle.report.typeset import table, write_csv
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.running.lines import FoundLine
@@ -114,7 +115,7 @@ def show_runout(console: Console, answer: dict[str, Any], where: str) -> None:
     """`where` names what the probes look at."""
     nominal = f" ({answer['speed_from']})" if answer["speed_from"] != "--speed" else ""
     title = f"Runout at {answer['temperature_C']:g} C, {answer['speed_rpm']:g} rpm{nominal}, {answer['revolutions']} revolutions, um"
-    title += f" (bearings {answer['status']})"
+    title += f" ({of_bearings(answer['status'])})"
     quoted = grid(title, ("", f"radial\n({where} x)", f"radial\n({where} y)", "axial"), words=("",))
     for key, meaning in STATISTICS.items():
         quoted.add_row(meaning, *(f"{answer[key][d]:.4f}" for d in MAIN))
@@ -199,7 +200,7 @@ def runout_section(runout: Runout, answer: dict[str, Any]) -> tuple[str, str]:
         for g in answer["lines"][:SHOWN]
     ]  # fmt: skip
     text = (
-        f"<p>{answer['revolutions']} revolutions at {answer['temperature_C']:g} °C and {answer['speed_rpm']:.6g} rpm, bearings {answer['status']}, "
+        f"<p>{answer['revolutions']} revolutions at {answer['temperature_C']:g} °C and {answer['speed_rpm']:.6g} rpm, {of_bearings(answer['status'])}, "
         f"imperfections {answer['imperfections']}. The repeatable part is made of the lines at whole multiples of the turning frequency.</p>"
         f"{table(('nm', f'radial ({escape(where)} x)', f'radial ({escape(where)} y)', 'axial'), quoted)}"
         f"{''.join(drawn.values())}"
