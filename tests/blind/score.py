@@ -2,7 +2,7 @@
 
 Shares have Clopper and Pearson's 95 % interval (*Biometrika* 26 (1934) 404). The log score is the mean of ln of the probability that was stated
 for the truth, no less than ln 0.001 each (Good, *J. R. Statist. Soc. B* 14 (1952) 107). A hidden piece whose change of the FRFs is less than sqrt(10)
-standard errors, 5 in ln evidence, after what tolerances could take of it, need not be found, and may be; from twice that on it counts as visible.
+standard errors, 5 in ln evidence, after what tolerances, and the other piece where there are two, could take of it, need not be found, and may be; from twice that on it counts as visible.
 """
 
 from __future__ import annotations
@@ -43,9 +43,19 @@ def nameless(row: Row) -> bool:
     return row["kind"] == "outside" or any(not names for names in truths(row))
 
 
+def shows(row: Row) -> bool:
+    """Whether anything that is hidden shows."""
+    return any(v >= SHOWS for v in row["visibility"])
+
+
+def beside(row: Row) -> list[float]:
+    """How visible every hidden piece is beside the other, as much of which as there is in every test could do its part: of two of which each does what the other does, either is the whole answer."""
+    return row.get("visibility_beside") or row["visibility"]
+
+
 def needed(row: Row) -> list[bool]:
-    """Of every hidden piece whether it shows, and must be in a true answer."""
-    return [v >= SHOWS for v in row["visibility"]]
+    """Of every hidden piece whether it shows, also beside the other, and must be in a true answer."""
+    return [v >= SHOWS for v in beside(row)]
 
 
 def outcome(row: Row) -> str:
@@ -55,7 +65,7 @@ def outcome(row: Row) -> str:
     if verdict == "error":
         return "error"
     if verdict == "none":
-        return "missed" if any(needed(row)) else "right"
+        return "missed" if shows(row) else "right"
     if row["kind"] == "nothing":
         return "false alarm"
     if verdict == "unexplained":
@@ -70,7 +80,7 @@ def outcome(row: Row) -> str:
 
 
 def visible(row: Row) -> bool:
-    return bool(row["visibility"]) and min(row["visibility"]) >= VISIBLE
+    return bool(row["visibility"]) and min(beside(row)) >= VISIBLE
 
 
 def element_found(row: Row) -> bool:
@@ -83,13 +93,15 @@ def element_found(row: Row) -> bool:
 
 def halved(row: Row) -> bool:
     """Whether the effect that `draft` writes halves the error of temperatures predicted from all others."""
-    before, after = row["drafted"]
+    before, after = row["drafted"][:2]
     return bool(after < before / 2)
 
 
 def above_noise(row: Row) -> bool:
-    """Whether half the error without effects is more than noise alone, one standard error, leaves."""
-    return bool(row["drafted"][0] > 2.0)
+    """Whether half the error without effects is more than is left where nothing is hidden: with noise and with all that differs from test to test; rows from before that was asked have noise alone, one
+    standard error."""
+    before, _, *least = row["drafted"]
+    return bool(before > 2 * (least[0] if least else 1.0))
 
 
 def told_elsewhere(row: Row) -> bool:
@@ -110,13 +122,13 @@ def true_names(row: Row, names: Sequence[str]) -> bool:
     """Whether every name is one of a hidden piece's, each of another, and no piece that shows is without one."""
     pieces = [[k for k, truth in enumerate(truths(row)) if name in truth] for name in names]
     return any(
-        len(set(chosen)) == len(names) and all(k in chosen for k, shows in enumerate(needed(row)) if shows) for chosen in product(*pieces)
+        len(set(chosen)) == len(names) and all(k in chosen for k, asked in enumerate(needed(row)) if asked) for chosen in product(*pieces)
     )
 
 
 def _answers(row: Row) -> list[tuple[float, bool]]:
     """The stated probability of nothing, of something unknown and of every candidate, and whether it is true."""
-    found = [(row["probability"]["none"], not any(needed(row))), (row["probability"]["unknown"], nameless(row))]
+    found = [(row["probability"]["none"], not shows(row)), (row["probability"]["unknown"], nameless(row))]
     return found + [(c["probability"], bool(row["hidden"]) and true_names(row, c["effects"])) for c in row["candidates"]]
 
 

@@ -41,11 +41,13 @@ from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
 from thermospindle.diagnosis.inference.prior import steady
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.inference.remainder import overlap
+from thermospindle.diagnosis.inference.search import search
 from thermospindle.diagnosis.parameters.mechanism import variants
-from thermospindle.diagnosis.verdict import Diagnosis, diagnose
+from thermospindle.diagnosis.verdict import Diagnosis, campaign_data, diagnose
 from thermospindle.model.machine import Spindle
 from thermospindle.model.scene.reading import load
 from thermospindle.report.text.diagnosis.answer import diagnosis_json
+from thermospindle.sim.campaign.campaign import Campaign
 from thermospindle.sim.effects import CATALOGUE, usable
 from thermospindle.sim.effects.own import effect_of
 from thermospindle.sim.study.executors import on_cluster
@@ -145,7 +147,7 @@ def judge(seed: int, without: Sequence[str] = ()) -> dict[str, Any]:
         "learned": told["learned"],
         "noise": sorted(set(told["noise"].values())),
         "seconds": seconds,
-        "drafted": drafted(found, told) if told["verdict"] == "unexplained" and told["where"] else None,
+        "drafted": drafted(found, told, without_hidden(drawn, made)) if told["verdict"] == "unexplained" and told["where"] else None,
     }
 
 
@@ -175,9 +177,14 @@ def weighed(found: Diagnosis) -> dict[str, Any]:
     }
 
 
-def drafted(found: Diagnosis, told: dict[str, Any]) -> list[float]:
-    """Root mean square error, in standard errors, of conditions predicted from all others: without effects, and with the effect of one's own that
-    `spindle draft` writes of the first drift."""
+def without_hidden(drawn: Drawn, made: Made) -> Campaign:
+    """The same tests of the same machine with the same errors and noise, and nothing hidden."""
+    return campaign(drawn.spindle, drawn.tests, (), drawn.seed, made.world, made.record).campaign
+
+
+def drafted(found: Diagnosis, told: dict[str, Any], plain: Campaign) -> list[float]:
+    """Root mean square error, in standard errors, of conditions predicted from all others: without effects; with the effect of one's own that
+    `spindle draft` writes of the first drift; and of the `plain` campaign without effects, of which thermometers, channels and hits that differ from test to test leave more than noise."""
     with TemporaryDirectory() as folder:
         answer, file = Path(folder) / "diagnosis.json", Path(folder) / "drafted.py"
         answer.write_text(json.dumps(told), encoding="utf-8")
@@ -192,7 +199,8 @@ def drafted(found: Diagnosis, told: dict[str, Any]) -> list[float]:
         own = fit(model, (m,), starts, tempers=TEMPERS[1:], learned=prior)
         fits.append(settled(model, Hypothesis(own, evidence(model, own))))
     best = max(fits, key=lambda h: h.evidence.ln)
-    return [left_out(model, h.fit, h.evidence, groups)[0] for h in (base, best)]
+    least = search(campaign_data(found.spindle, plain), [], [])
+    return [left_out(m, h.fit, h.evidence, groups)[0] for m, h in ((model, base), (model, best), (least.model, least.base))]
 
 
 def commit() -> str:

@@ -17,6 +17,7 @@ from tests.blind.score import (
     sure,
     told_elsewhere,
     truth_probability,
+    visible,
 )
 from tests.blind.study import SCENES
 
@@ -110,3 +111,15 @@ def test_what_one_temperature_alone_shows_no_law_tells():
     assert not halved({"drafted": [10.0, 5.1]})
     assert above_noise({"drafted": [2.1, 1.0]})
     assert not above_noise({"drafted": [1.9, 1.0]})
+    assert above_noise({"drafted": [3.1, 1.6, 1.5]})
+    assert not above_noise({"drafted": [3.1, 3.0, 1.6]})
+
+
+def test_of_two_that_do_the_same_either_is_the_whole_answer():
+    """Grooves that shrank and a weaker preload of 40 standard errors each, and 3 beside the other (blind campaign 2398): either name is right, and that nothing is missing is not."""
+    both = row("two", "identified", ["preload_loss"], [["preload_loss"], ["clearance_opening"]])
+    assert outcome(both | {"visibility_beside": [50.0, 50.0]}) == "half"
+    alike = {"visibility": [50.0, 40.0], "visibility_beside": [3.0, 2.6]}
+    assert outcome(both | alike) == "right"
+    assert not visible(both | alike)
+    assert outcome(row("two", "none", [], [["preload_loss"], ["clearance_opening"]]) | alike) == "missed"
