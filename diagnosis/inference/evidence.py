@@ -11,7 +11,7 @@ width and its departure from its law (the mean over the grid). What is quoted is
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, reduce
 from itertools import pairwise, product, zip_longest
@@ -135,8 +135,7 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
     def each(s: float, sizes: Mapping[str, float], nuisances: Nuisances | None = None) -> Array:
         """ln evidence of every combination of widths, departures and offsets of the mechanisms, by its prior odds."""
         scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
-        wider = sum(of[sizes.get(kind, 1.0)] for kind, of in ODDS.items())
-        return marginal(scaled, nuisances or integrated(model, fit, s, sizes)).integrated(roots) + odds - fit.count * np.log(s) + wider
+        return marginal(scaled, nuisances or integrated(model, fit, s, sizes)).integrated(roots) + odds - fit.count * np.log(s) + _odds(sizes)
 
     nuisances = None
     if near:
@@ -144,25 +143,7 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
         values, s, sizes, nuisances = max(every, key=lambda row: logsumexp(row[0]))
     else:
         scales = [1.0] if fit.temper < 1.0 else [float(s) for s in _error_scales(whole, fit.count)]
-        s, sizes = scales[len(scales) // 2], {kind: grid[0] for kind, grid in grids.items()}
-        values = each(s, sizes)
-        for _ in range(SWEEPS):
-            before = logsumexp(values)
-            for move in _moves(grids):
-                if (to := {**sizes, **move}) != sizes and logsumexp(there := each(s, to)) > logsumexp(values):
-                    values, sizes = there, to
-            for scale in scales:
-                if scale != s and logsumexp(there := each(scale, sizes)) > logsumexp(values):
-                    values, s = there, scale
-            if logsumexp(values) - before < 0.01:
-                break
-        for _ in range(SWEEPS):
-            before = logsumexp(values)
-            for kind, by in product([kind for kind in FINER if kind in sizes], (1, -1)):
-                while (size := _beside(FINER[kind], sizes[kind], by)) is not None and logsumexp(there := each(s, {**sizes, kind: size})) > logsumexp(values):
-                    values, sizes = there, {**sizes, kind: size}
-            if logsumexp(values) - before < 0.1:
-                break
+        values, s, sizes = _likeliest(each, grids, scales)
     best = np.unravel_index(int(np.argmax(values)), [len(grid) for grid in own_grids]) if own_grids else ()
     own = [tuple(grid)[k] for grid, k in zip(own_grids, best, strict=True)]
     scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
@@ -173,7 +154,7 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
     held = [h.number for h in fit.held]
     own_mean = np.where(np.isin(np.arange(p, len(mean)), held), fit.point[p:], mean[p:])
     owed = fit.owed / (2 * s**2) if fit.temper == 1.0 else 0.0
-    as_fitted = marginal(scaled, nuisances).at(own_mean) - fit.count * np.log(s) - owed
+    as_fitted = marginal(scaled, nuisances).at(own_mean) - fit.count * np.log(s) + _odds(sizes) - owed
     mean, spread = fit.point + turn @ (mean - fit.point), turn @ spread @ turn.T
     truncation = ln_within_limits(fit, mean, spread, s)
     mean[held] = fit.point[held]
@@ -192,6 +173,35 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
     by_departing = logsumexp(values) - logsumexp(values[lawful]) + logsumexp(odds[lawful])
     told = np.array(means).reshape(len(means), tests), _stacked(covariances, tests), _stacked(as_shaped, tests)
     return Evidence(float(logsumexp(values)) + truncation - owed, learned, mean, spread, *told, chi2, as_fitted, by_departing)
+
+
+def _odds(sizes: Mapping[str, float]) -> float:
+    """Prior odds (ln) of sizes that may be other than the scene's or the model's own."""
+    return sum(of[sizes.get(kind, 1.0)] for kind, of in ODDS.items())
+
+
+def _likeliest(each: Callable[[float, Mapping[str, float]], Array], grids: Mapping[str, Sequence[float]], scales: Sequence[float]) -> tuple[Array, float, dict[str, float]]:
+    """The ln evidence that `each` gives, the errors of `scales` and the sizes of discrepancies of `grids`, and between their places, that have most of it: one after the other, until that moves nothing."""
+    s, sizes = scales[len(scales) // 2], {kind: grid[0] for kind, grid in grids.items()}
+    values = each(s, sizes)
+    for _ in range(SWEEPS):
+        before = logsumexp(values)
+        for move in _moves(grids):
+            if (to := {**sizes, **move}) != sizes and logsumexp(there := each(s, to)) > logsumexp(values):
+                values, sizes = there, to
+        for scale in scales:
+            if scale != s and logsumexp(there := each(scale, sizes)) > logsumexp(values):
+                values, s = there, scale
+        if logsumexp(values) - before < 0.01:
+            break
+    for _ in range(SWEEPS):
+        before = logsumexp(values)
+        for kind, by in product([kind for kind in FINER if kind in sizes], (1, -1)):
+            while (size := _beside(FINER[kind], sizes[kind], by)) is not None and logsumexp(there := each(s, {**sizes, kind: size})) > logsumexp(values):
+                values, sizes = there, {**sizes, kind: size}
+        if logsumexp(values) - before < 0.1:
+            break
+    return values, s, sizes
 
 
 def _stacked(covariances: Sequence[Array], tests: int) -> Array:

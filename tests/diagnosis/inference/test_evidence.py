@@ -84,6 +84,20 @@ def test_mean_and_covariance_are_the_posterior():
     assert np.all(np.abs(found.sizes[0] - 1.6) < 5 * np.sqrt(np.diag(found.size_covariance[0])))
 
 
+def test_what_data_are_worth_with_mechanisms_as_fitted_has_no_price_of_their_sizes():
+    """Their probability at the sizes that have most, over those of nuisances alone."""
+    made = toy(3, 1e-3, hidden=1.6)
+    found = evidence(made.model, made.fit)
+    prior = made.prior(*(found.learned.sizes[k] for k in (STIFFNESS, DAMPING, DRIFT)), found.learned.own)
+    jacobian, y, n = np.concatenate(made.jacobians), np.concatenate(made.y), len(made.model.parameters)
+    covariance = found.learned.errors**2 * np.eye(len(y)) + jacobian[:, :n] @ prior[:n, :n] @ jacobian[:, :n].T
+    left = y - jacobian[:, n:] @ found.mean[n:]
+    assert found.as_fitted == pytest.approx(multivariate_normal(np.zeros(len(y)), covariance).logpdf(left) + len(y) / 2 * np.log(2 * np.pi), abs=1e-5)
+    own = multivariate_normal(np.zeros(3), prior[n:, n:]).logpdf(found.mean[n:])
+    told = multivariate_normal(found.mean[n:], found.covariance[n:, n:]).logpdf(found.mean[n:])
+    assert found.as_fitted == pytest.approx(made.ln(prior, found.learned.errors) - own + told, abs=1e-4)  # Besag
+
+
 @pytest.mark.parametrize(("size", "within"), [(0.0, 1.0), (1e-4, 1.6), (3e-4, 1.6), (5.5e-4, 2.0), (1e-3, 1.6), (1.7e-3, 2.0), (3e-3, 1.6), (1e-2, 1.6)])
 def test_the_size_of_the_discrepancy_is_learned(size, within):
     """Of twenty campaigns at least eighteen learn the size that they were drawn with, or the next place of its grid; drift and damping, of which there is none, none."""
@@ -253,6 +267,7 @@ def test_how_far_thermal_motions_are_off_is_learned(off, times):
         own = [q.kind == EXPANSION for q in made.model.parameters]
         prior[own, own] *= wider**2
         assert found.ln == pytest.approx(made.ln(prior, found.learned.errors) + FARTHER[wider], abs=1e-6)
+        assert found.as_fitted == pytest.approx(found.ln, abs=1e-6)  # of nothing that is fitted
 
 
 @pytest.mark.parametrize(("hidden", "much"), [(2.0, False), ((1.2, 4.0, 1.1), True)])
