@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from thermospindle.diagnosis.decision.explanations import TOO_SURE
 from thermospindle.diagnosis.decision.verdict import Verdict
 from thermospindle.diagnosis.inference.evidence import Evidence
 from thermospindle.diagnosis.inference.fit import Fit
@@ -41,12 +42,12 @@ def hypothesis(names: tuple[str, ...], ln: float, shape: float | None = None) ->
 
 
 def made(gains: dict[str | tuple[str, ...], float], catalogue: int = 30, forms: int = 20) -> Search:
-    """A search that found `gains` in ln evidence over the model without effects; so many mechanisms were screened."""
+    """A search that found `gains` in ln evidence over the model without effects, as much as it is worth (`TOO_SURE`); so many mechanisms were screened."""
     spindle = SimpleNamespace(tolerances=SimpleNamespace(temperature=0.2))
     tests = tuple(SimpleNamespace(condition=c, count=50) for c in CONDITIONS)
     model = SimpleNamespace(parameters=(), tests=tests, spindle=spindle, resonances=())
     none = hypothesis((), 0.0)
-    others = [hypothesis((k,) if isinstance(k, str) else k, v) for k, v in gains.items()]
+    others = [hypothesis((k,) if isinstance(k, str) else k, TOO_SURE * v) for k, v in gains.items()]
     screened = [Screened(mechanism(f"effect_{i}"), 0.0, np.zeros(2), 1.0) for i in range(catalogue)]
     screened += [Screened(mechanism(f"~form_{i}"), 0.0, np.zeros(2), 1.0) for i in range(forms)]
     return Search(model, none, tuple(sorted([none, *others], key=lambda h: -h.evidence.ln)), tuple(screened))
@@ -57,4 +58,4 @@ def total(v: Verdict) -> float:
 
 
 def by_departing(h: Hypothesis, gained: float) -> Hypothesis:
-    return replace(h, evidence=replace(h.evidence, by_departing=gained))
+    return replace(h, evidence=replace(h.evidence, by_departing=TOO_SURE * gained))

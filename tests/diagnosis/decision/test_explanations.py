@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import lfilter
 
 from tests.hand_made_search import SIZE, by_departing, hypothesis, made, mechanism, total
-from thermospindle.diagnosis.decision.explanations import COARSE, OWN_LAW, PRIOR, coarsening, discount
+from thermospindle.diagnosis.decision.explanations import COARSE, OWN_LAW, PRIOR, TOO_SURE, coarsening, discount
 from thermospindle.diagnosis.decision.verdict import Verdict, decide
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.remainder import SMALL, Overlap, between_tests
@@ -48,7 +48,7 @@ def test_each_way_to_act_has_its_share_of_an_explanation():
     found = made({"a": 30.0, "b": 30.0})
     own = [replace(mechanism("a"), choices={"bearing": float(k)}) for k in range(2)]
     h = next(h for h in found.hypotheses if h.names == ("a",))
-    both = [replace(h, fit=replace(h.fit, mechanisms=(m,)), evidence=replace(h.evidence, ln=h.evidence.ln - 2.0 * k)) for k, m in enumerate(own)]
+    both = [replace(h, fit=replace(h.fit, mechanisms=(m,)), evidence=replace(h.evidence, ln=h.evidence.ln - 2.0 * TOO_SURE * k)) for k, m in enumerate(own)]
     every = tuple(sorted([*(o for o in found.hypotheses if o is not h), *both], key=lambda h: -h.evidence.ln))
     shown = [Screened(m, 0.0, np.zeros(2), 1.0) for m in own]
     v = decide(replace(found, hypotheses=every, screened=(*found.screened, *shown)))
@@ -77,8 +77,8 @@ def test_evidence_is_worth_less_where_the_model_is_seen_to_be_wrong(sizes, error
 def test_noise_that_a_window_spreads_over_lines_counts_as_often_as_it_says_something():
     """A second effect of 23 in ln evidence, of a third fewer numbers for a window's noise: blind campaign 2000 named one of two, for that counted a quarter on top of it."""
     best = made({"a": 30.0}).hypotheses[0]
-    assert discount(best, Overlap(1.5, 0.0, 1.5)) == 1.5
-    assert discount(best, Overlap(1.5, 0.1, 1.9)) == 1.9 * COARSE
+    assert discount(best, Overlap(1.5, 0.0, 1.5)) == 1.5 * TOO_SURE
+    assert discount(best, Overlap(1.5, 0.1, 1.9)) == 1.9 * COARSE * TOO_SURE
 
 
 @pytest.mark.parametrize("share", [0.0, 0.6, 0.95])
@@ -229,7 +229,7 @@ def test_a_free_form_that_changes_the_same_as_an_effect_is_that_effect(named, le
         if h.free or not h.mechanisms:
             return replace(h, evidence=replace(h.evidence, as_fitted=0.0))
         shaped = hypothesis(tuple(n + "'" * m.own_law for n, m in zip(h.names, h.mechanisms, strict=True)), h.evidence.ln + 1000.0, shape)
-        return replace(shaped, evidence=replace(shaped.evidence, as_fitted=-leaves))
+        return replace(shaped, evidence=replace(shaped.evidence, as_fitted=-TOO_SURE * leaves))
 
     def told(gains) -> Verdict:
         found = made(gains)
@@ -309,7 +309,7 @@ def test_what_does_what_an_effect_cannot_is_something_unknown(best, word):
     assert v.word == word
     assert total(v) == pytest.approx(1.0)
     if word == "unexplained":
-        assert "what a does would have to drift, by sizes that it cannot have (66 in ln evidence); the best of the catalogue, b, gains 40 in ln evidence" in v.reason
+        assert "what a does would have to drift, by sizes that it cannot have (99 in ln evidence); the best of the catalogue, b, gains 60 in ln evidence" in v.reason  # 1.5 times as much
 
 
 def test_an_effect_and_what_does_what_it_cannot_are_two():

@@ -148,7 +148,7 @@ def test_drift_that_misses_the_data_grossly_is_not_told_as_what_explains_them(le
 )
 def test_what_is_as_much_in_every_test_does_not_drift(sizes, said):
     """Another's dashpot beside the plate was told as damping that would have to drift, by +2.2272 in all eight tests."""
-    found = made({"~x": 150.0})
+    found = made({"~x": 100.0})
     x, *rest = found.hypotheses
     x = replace(x, evidence=replace(x.evidence, sizes=np.array([sizes]), size_covariance=1e-4 * np.eye(2)[None], as_shaped=1e-4 * np.eye(2)[None]))
     v = decide(replace(found, hypotheses=(x, *rest)))
