@@ -136,13 +136,14 @@ def coarsening(best: Hypothesis, same: Overlap) -> float:
 
 def _weighed(h: Hypothesis, every: Sequence[Hypothesis], coarse: float) -> float:
     """ln evidence, of which what one mechanism more gains counts a `coarse`-th as far as the best explanation without it, and every other that does as well, gains as
-    much by laws that are not its effects' own: what is wrong in a law looks like a little of something else. Not like what lasts: that is the same wherever the law gives more or less."""
+    much by laws that are not its effects' own: what is wrong in a law looks like a little of something else. Not like what lasts by what it is, a mass: that is the same wherever the law gives more or less. What was
+    chosen to last, as a preload that was lost at assembly, is like what the drawing may be off by."""
     parts = [o for o in every if o.mechanisms and set(o.names) < set(h.names)]
     if not parts:
         return h.evidence.ln
     lead = max(parts, key=lambda o: o.evidence.ln)
     gain, more = h.evidence.ln - lead.evidence.ln, set(h.names) - set(lead.names)
-    lasts = all(m.lasting for m in h.mechanisms if m.name in more)
+    lasts = all(m.effect.lasting for m in h.mechanisms if m.name in more)
     in_doubt = 0.0 if lasts else min(gain, *(_by_other_laws(o, every) for o in [lead, *_doing_as_well(lead, more, every)]))
     return _weighed(lead, every, coarse) + gain - (1 - 1 / coarse) * max(in_doubt, 0.0)
 
