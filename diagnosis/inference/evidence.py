@@ -149,12 +149,12 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
     scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
     learned = Learned(sizes, s, *(tuple(of) for of in zip(*own, strict=True)))
     nuisances = nuisances or integrated(model, fit, s, sizes)
-    mean, spread = posterior(scaled, nuisances, mechanism_root(model, fit.mechanisms, learned))
+    mean, spread, left = posterior(scaled, nuisances, mechanism_root(model, fit.mechanisms, learned))
     chi2 = whole.at(mean)
     held = [h.number for h in fit.held]
     own_mean = np.where(np.isin(np.arange(p, len(mean)), held), fit.point[p:], mean[p:])
     owed = fit.owed / (2 * s**2) if fit.temper == 1.0 else 0.0
-    as_fitted = marginal(scaled, nuisances).at(own_mean) - fit.count * np.log(s) + _odds(sizes) - owed
+    as_fitted = left.at(own_mean) - fit.count * np.log(s) + _odds(sizes) - owed
     mean, spread = fit.point + turn @ (mean - fit.point), turn @ spread @ turn.T
     truncation = ln_within_limits(fit, mean, spread, s)
     mean[held] = fit.point[held]
@@ -335,7 +335,7 @@ def left_out(model: CampaignModel, fit: Fit, found: Evidence, groups: Sequence[S
         rest = [t for t in every if t not in group]
         if rest:
             q = together(rest)
-            mean, _ = posterior(q, under(prior, q.a[:p, :p]), own)
+            mean, *_ = posterior(q, under(prior, q.a[:p, :p]), own)
             total += sum(by_test[t].at(mean) for t in group)
             count += sum(counts[t] for t in group)
             density += whole - ln_density(rest)

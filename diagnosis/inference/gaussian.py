@@ -127,8 +127,8 @@ def _apart(q: Quadratic, nuisances: Nuisances) -> tuple[Marginal, Array, Array]:
     return Marginal(constant, q.b[p:] - a.T @ b, q.a[p:, p:] - a.T @ a), b, a
 
 
-def posterior(q: Quadratic, nuisances: Nuisances, own: Array) -> tuple[Array, Array]:
-    """Mean (n,) and covariance (n, n), where the mechanisms have the prior `own` own^T (m, m)."""
+def posterior(q: Quadratic, nuisances: Nuisances, own: Array) -> tuple[Array, Array, Marginal]:
+    """Mean (n,) and covariance (n, n), where the mechanisms have the prior `own` own^T (m, m), and the marginal of these."""
     left, b, a = _apart(q, nuisances)
     half = solve_triangular(_factor(own.T @ left.a @ own), own.T, lower=True)
     covariance = half.T @ half
@@ -137,6 +137,7 @@ def posterior(q: Quadratic, nuisances: Nuisances, own: Array) -> tuple[Array, Ar
     return (
         np.concatenate([nuisances.back(b[:, None])[:, 0] - beside @ mean, mean]),
         np.block([[nuisances.covariance - coupled @ beside.T, coupled], [coupled.T, covariance]]),
+        left,
     )
 
 

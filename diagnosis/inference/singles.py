@@ -29,6 +29,7 @@ from thermospindle.diagnosis.inference.screening import Screened, screen
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.diagnosis.parameters.mechanism import Mechanism
 from thermospindle.model.parallel import in_parallel, meanwhile
+from thermospindle.model.types import Array
 
 BEHIND, FAR = 12.0, 200.0  # tempered ln evidence behind the best from which a mechanism is not followed, and from which not even the best two of a kind
 MOST = {"law": 14, "own law": 4, "free": 4}  # mechanisms fitted at most, of the catalogue with their laws and with laws of the data's own, and free forms
@@ -251,18 +252,19 @@ def _from_scan(
     found: list[Screened] = []
     for kind, count in SCANNED.items():
         ways = {s.mechanism.name: s for s in reversed(looked) if s.mechanism.kind == kind and s.visibility > 0}  # the first of each, which has all its shape
-        costs = in_parallel(partial(_least_cost, model, expected), [s.mechanism for s in ways.values()], workers)
-        ranked = [s for _, s in sorted(zip(costs, ways.values(), strict=True), key=lambda row: row[0])[:count]]
-        tasks = [Task((s.mechanism,), scan(model, (s.mechanism,)), -np.inf) for s in ranked]
+        mechanisms = [s.mechanism for s in ways.values()]
+        scanned = in_parallel(partial(_scanned, model, expected), mechanisms, workers)
+        ranked = sorted(zip(scanned, mechanisms, strict=True), key=lambda row: row[0][0])[:count]
+        tasks = [Task((m,), (start,), -np.inf) for (_, start), m in ranked]
         led = sorted(fitted(model, tasks, TEMPERS[1:2], about, most, expected, workers), key=lambda h: -h.evidence.ln)[:FROM_SCAN]
         found += [ways[h.names[0]] for h in led if (h.names[0], kind) not in chosen]
     return found
 
 
-def _least_cost(model: CampaignModel, expected: Learned, m: Mechanism) -> float:
-    """Of sizes of a mechanism with all else as drawn, and errors enlarged most."""
+def _scanned(model: CampaignModel, expected: Learned, m: Mechanism) -> tuple[float, Array]:
+    """The least cost of sizes of a mechanism with all else as drawn, and errors enlarged most, and the parameters there."""
     problem = Problem(model.thinned, (m,), steady(expected, (m,)))
-    return min(problem.cost(start, TEMPERS[1]) for start in scan(model, (m,)))
+    return min(((problem.cost(start, TEMPERS[1]), start) for start in scan(model, (m,))), key=lambda row: row[0])
 
 
 def fitted_in_steps(

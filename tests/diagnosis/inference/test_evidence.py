@@ -203,7 +203,7 @@ def test_the_posterior_beside_nuisances_that_are_kept_is_that_of_all_together():
         kept = under(Root(scale, beside), q.a[:4, :4])
         prior = block_diag(np.diag(scale**2) + beside @ beside.T, own @ own.T)[:n, :n]
         gain = prior @ jacobian[:, :n].T @ np.linalg.inv(np.eye(40) + jacobian[:, :n] @ prior @ jacobian[:, :n].T)
-        mean, covariance = posterior(q, kept, own[:m, :m])
+        mean, covariance, _ = posterior(q, kept, own[:m, :m])
         assert mean == pytest.approx(gain @ y, abs=1e-10)
         assert covariance == pytest.approx(prior - gain @ jacobian[:, :n] @ prior, abs=1e-10)
         whole = multivariate_normal(np.zeros(40), np.eye(40) + jacobian[:, :n] @ prior @ jacobian[:, :n].T)
