@@ -24,12 +24,12 @@ from thermospindle.diagnosis.parameters.numbers import Discrepancies, Numbers
 from thermospindle.diagnosis.parameters.reference import ReferenceModes, Turned
 from thermospindle.model.built.tolerance import Toleranced
 from thermospindle.model.errors import NoEquilibrium, OutsideRange
-from thermospindle.model.machine import Spindle
+from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import Matrices, matrices
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.effects.effect import HOOKS, Effect, Measurement, Values
 from thermospindle.sim.effects.temperature.expansion_mismatch import expanding, with_material
-from thermospindle.sim.operating import SETTLING, OperatingPoint, acted_on, equilibrium
+from thermospindle.sim.operating import SETTLING, OperatingPoint, acted_on, equilibrium, operating_point
 
 SIZE_STEP = 0.02  # of a size's or shape parameter's prior standard deviation, for differences
 THIN, ENOUGH_LINES = 4, 30  # lines left out of a thinned model, and how many of a test it keeps at least
@@ -154,6 +154,19 @@ class CampaignModel:
         if x[own.apart].any():
             names, rows = [b.name for b in self.spindle.all_bearings], [(self.parameters[i], float(x[i])) for i in own.apart]
             found.append(apart(*({names[p.index]: v * p.sd for p, v in rows if p.kind == kind} for kind in kinds_of.APART)))
+        return found
+
+    @cached_property
+    def by_condition(self) -> Array:
+        """Relative changes (tests, 2, modes) that temperature and speed make in the frequency and the damping of the modes seen, from the reference condition, of the spindle as drawn; none of
+        one that cannot be built."""
+        reference = matrices(operating_point(self.spindle, Condition(self.spindle.reference_temperature), self.present).chain)
+        found = np.zeros((len(self.tests), 2, self.reference.seen))
+        for t in range(len(self.tests)):
+            try:
+                found[t] = self.reference.moved(reference, self.linear(t, np.zeros(len(self.parameters)), []).matrices)
+            except FAILED:
+                continue
         return found
 
     def _otherwise(self, t: int, x: Array) -> tuple[Effect, Values]:

@@ -65,7 +65,7 @@ class Fit:
     count: int
     rates: Rates
     temper: float
-    moved: Array = field(default_factory=lambda: UNMOVED)  # (mechanisms, tests, 2, modes), of frequency and damping of every mode, relative
+    moved: Array = field(default_factory=lambda: UNMOVED)  # (1 + mechanisms, tests, 2, modes), of frequency and damping of every mode, relative
     held: tuple[Held, ...] = ()
     cost: float = np.nan  # chi2, its errors 1 / temper times the data's, and priors: those that it was fitted with
     owed: float = 0.0  # by how much less the quadratic promises, which no step has found
@@ -82,7 +82,7 @@ def fit(
     model: CampaignModel, mechanisms: Sequence[Mechanism] = (), start: Array | Sequence[Array] | None = None, rates: Rates | None = None,
     tempers: Sequence[float] = TEMPERS, learned: Learned | None = None, moved: Array = UNMOVED, beaten: float = np.inf,
 ) -> Fit:
-    """The fit with the reference widths of all priors, or those `learned`, with what may be misjudged of mechanisms that `moved` the modes; of several
+    """The fit with the reference widths of all priors, or those `learned`, with what may be misjudged of conditions and mechanisms that `moved` the modes; of several
     starts from the one of least cost, and from there with errors as much larger at first as it is `AFAR`. While they are taken too large, the thinned model serves.
     What ends above the cost `beaten` need not end exactly.
 
@@ -243,7 +243,7 @@ def _finished(problem: Problem, p: Array, rates: Rates, temper: float, lines: Li
         sum(d.count for d in problem.model.tests),
         rates,
         temper,
-        _moved(problem, p) if temper == 1.0 and problem.mechanisms else UNMOVED,
+        _moved(problem, p) if temper == 1.0 else UNMOVED,
         held,
         problem.cost(p, temper, residuals),
         max(promised(slope, normal, rest), 0.0),
@@ -261,20 +261,17 @@ def _held(problem: Problem, p: Array, slope: Array, normal: Array) -> tuple[Held
 
 
 def _moved(problem: Problem, p: Array) -> Array:
-    """Relative changes (mechanisms, tests, 2, modes) that each mechanism makes in the frequency and the damping of the reference modes, to first order."""
+    """Relative changes (1 + mechanisms, tests, 2, modes) that the conditions, and each mechanism, make in the frequency and the damping of the reference modes, to first order."""
     model, (x, sizes, shapes) = problem.model, problem.parts(p)
-    omega, damping = model.reference.omega[: model.reference.seen], model.reference.damping[: model.reference.seen]
-    found = np.zeros((len(problem.mechanisms), problem.tests, 2, len(omega)))
+    own = model.reference
+    found = np.zeros((1 + len(problem.mechanisms), *model.by_condition.shape))
+    found[0] = model.by_condition
     for t in range(problem.tests):
         plain = model.linear(t, x, []).matrices
-        shape = np.linalg.solve(plain.mass, model.reference.over(plain.dofs)[:, : len(omega)])
-        for k, (mechanism, (effect, values)) in enumerate(zip(problem.mechanisms, problem.applied(t, sizes, shapes), strict=True)):
+        for k, (mechanism, (effect, values)) in enumerate(zip(problem.mechanisms, problem.applied(t, sizes, shapes), strict=True), 1):
             if values[mechanism.size.name] == mechanism.size.neutral:
                 continue
             acting = model.linear(t, x, [(effect, values)]).matrices
             if acting.dofs == plain.dofs:
-                of_k, of_m, of_c = (
-                    np.einsum("ni,nj,ji->i", shape, getattr(acting, w) - getattr(plain, w), shape) for w in ("stiffness", "mass", "damping")
-                )
-                found[k, t] = (of_k - omega**2 * of_m) / (2 * omega**2), of_c / (2 * damping * omega)
+                found[k, t] = own.moved(plain, acting)
     return found

@@ -29,14 +29,14 @@ REFERENCE = {
     kinds_of.EXPANSION: 1.0,
 }
 """Widths in which nuisances of unknown size are counted; build tolerances and hammers' gains in those that the scene states, thermal motions in `EXPANSION_SD`."""
-ACTION = 3.0  # times the relative error of frequencies, which what the model says of an effect may be wrong by
+ACTION = 3.0  # times the relative error of frequencies, by which what the model says of temperature, of speed and of an effect may be wrong
 AGEING = 2.0
 """What a gain that drifts is off by at the first and the last test, going straight with their order, times what it scatters by: amplifiers warm up, calibrations age. Chosen on one
 campaign of another's simulator with nothing hidden, in which a sensor lost 2 % over nine tests and scattered by 0.3 %."""
 Own = tuple[float, float, float]
 """Width in a size's own prior standard deviations, departure and offset of one mechanism."""
 UNMOVED = np.zeros((0, 0, 2, 0))
-"""Of a model without effects, and of fits with errors enlarged, which are a place to start from."""
+"""Of fits with errors enlarged, which are a place to start from."""
 NOTHING = 1e-4  # of a reference width: what stands for a size of zero where a prior must be inverted
 
 
@@ -99,10 +99,10 @@ def nuisance_variances(model: CampaignModel, sizes: Mapping[str, float]) -> Arra
 
 
 def misjudged(model: CampaignModel, sizes: Mapping[str, float], moved: Array) -> Array:
-    """Root (P, k) of the prior covariance that an effect misjudged adds to the drift of modes.
+    """Root (P, k) of the prior covariance that what is misjudged of conditions and effects adds to the drift of modes.
 
-    A model whose frequencies are constantly wrong is wrong, too, in what an effect does: of the relative change of frequency and of damping that each
-    mechanism makes of a mode, `moved` (mechanisms, tests, 2, modes), a share is wrong, the same in all tests: `ACTION` times the relative error of the
+    A model whose frequencies are constantly wrong is wrong, too, in what temperature, speed and an effect do: of the relative change of frequency and of damping that
+    conditions and each mechanism make of a mode, `moved` (1 + mechanisms, tests, 2, modes), a share is wrong, the same in all tests: `ACTION` times the relative error of the
     frequencies, or what was learned of it.
     """
     share = max(ACTION * sizes.get(kinds_of.STIFFNESS, 0.0), sizes.get(kinds_of.ACTION, 0.0))

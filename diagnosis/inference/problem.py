@@ -35,7 +35,7 @@ class Point:
 class Problem:
     """A campaign and the mechanisms that act in it, as a least-squares problem over p = [x, z_1, u_1, z_2, u_2, ...].
 
-    Priors have their reference widths, or those `learned`, with what may be misjudged of mechanisms that `moved` the modes.
+    Priors have their reference widths, or those `learned`, with what may be misjudged of conditions and mechanisms that `moved` the modes.
     """
 
     def __init__(

@@ -41,6 +41,13 @@ class ReferenceModes:
         place = {dof: i for i, dof in enumerate(self.dofs)}
         return np.array([self.weighted[place[dof]] if dof in place else np.zeros(len(self.omega)) for dof in dofs])
 
+    def moved(self, plain: Matrices, acting: Matrices) -> Array:
+        """Relative changes (2, seen) of the frequency and the damping of the modes seen from one state to another of the same dofs, to first order."""
+        omega, damping = self.omega[: self.seen], self.damping[: self.seen]
+        shape = np.linalg.solve(plain.mass, self.over(plain.dofs)[:, : self.seen])
+        of_k, of_m, of_c = (np.einsum("ni,nj,ji->i", shape, getattr(acting, w) - getattr(plain, w), shape) for w in ("stiffness", "mass", "damping"))
+        return np.array([(of_k - omega**2 * of_m) / (2 * omega**2), of_c / (2 * damping * omega)])
+
 
 @dataclass(frozen=True, eq=False)
 class Turned:

@@ -6,11 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 from tests.conftest import ROOT
 from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, truth, virtual_campaign
 from thermospindle.diagnosis.forward.derivatives import column, nuisance_jacobian
 from thermospindle.diagnosis.forward.linear import products, together
+from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.forward.response import Response
 from thermospindle.diagnosis.ladder.left_out import LeftOut, unseen
@@ -342,3 +344,34 @@ def test_the_truth_leaves_noise(scene):
         r = np.concatenate([model.residual(t, x, []) for t in (0, 1)])
         assert np.mean(r**2) == pytest.approx(1.0, abs=0.06)
         assert np.mean(np.concatenate([model.residual(t, 0 * x, []) for t in (0, 1)]) ** 2) > 10
+
+
+def test_what_conditions_do_to_modes_is_what_their_frequencies_do(scene):
+    """Of the drawing, to first order, against the poles where they are told apart: nothing at the reference, and 1.5 K above it to a twentieth of the most that a mode moves."""
+    campaign = mode_campaign(scene, (Condition(20.0), Condition(21.5)), 3)
+    model = model_of(scene, campaign)
+    found = model.by_condition
+    assert found.shape == (2, 2, model.reference.seen)
+    assert np.abs(found[0]).max() < 1e-9
+    linear = [model.linear(t, np.zeros(len(model.parameters)), []).matrices for t in (0, 1)]
+    cold, warm = (np.sqrt(eigh(m.stiffness, m.mass, eigvals_only=True)) for m in linear)
+    first = int(np.argmin(np.abs(cold - model.reference.omega[0])))
+    wanted = np.log(warm / cold)[first : first + model.reference.seen]
+    assert np.abs(wanted).max() > 1e-4
+    for i, j in ((0, 1), (2, 3)):  # of a pair, which is in no order of its own, the sum
+        assert found[1, 0, [i, j]].sum() == pytest.approx(wanted[[i, j]].sum(), abs=0.05 * np.abs(wanted).max())
+    assert found[1, 0].sum() == pytest.approx(wanted.sum(), abs=0.05 * np.abs(wanted).max())
+
+
+def test_a_test_that_cannot_be_worked_out_has_no_change_by_its_condition(scene, monkeypatch):
+    model, _ = made(scene)
+    assert model.by_condition[1].any()
+    linear = CampaignModel.linear
+
+    def unbuilt(self, t, x, effects):
+        if t == 1:
+            raise ValueError("no spindle")
+        return linear(self, t, x, effects)
+
+    monkeypatch.setattr(CampaignModel, "linear", unbuilt)
+    assert not replace(model).by_condition[1].any()

@@ -15,7 +15,7 @@ from thermospindle.diagnosis.inference.freeform import free_forms
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
 from thermospindle.diagnosis.inference.search import search
 from thermospindle.diagnosis.parameters.mechanism import variants
-from thermospindle.diagnosis.parameters.nuisance import BUILD, HAMMER, HAMMER_DRIFT, MISS_DRIFT
+from thermospindle.diagnosis.parameters.nuisance import ACTION, BUILD, HAMMER, HAMMER_DRIFT, MISS_DRIFT
 from thermospindle.model.built.tolerance import deviated
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
@@ -136,3 +136,22 @@ def test_a_drawing_that_is_off_is_no_missing_effect(spindle):
     assert v.word == "none"
     assert found.base.evidence.learned.sizes[BUILD] > 1.0
     assert "The drawing is off by more than its tolerances" in v.reason
+
+
+@pytest.mark.parametrize(("share", "learned"), [(0.0, {0.0}), (0.1, {0.1})])
+def test_what_temperature_does_to_each_mode_otherwise_is_no_missing_effect(spindle, share, learned):
+    """Every mode's change of frequency with temperature off by a tenth of it, alike in all tests: blind campaign 2464 was `ball_material` for that, beside which what an effect does might be off, and what temperature does might not.
+    Of a model that is right the size learned is none."""
+    made = mode_campaign(spindle, [Condition(t) for t in (20.0, 35.0, 50.0, 60.0)], 3)
+    cold = made.tests[0].modes
+    off = share * np.random.default_rng(3).standard_normal(len(cold))
+    tests = [
+        replace(t, modes=tuple(replace(m, frequency=c.frequency * (m.frequency / c.frequency) ** (1 + e)) for m, c, e in zip(t.modes, cold, off, strict=True)))
+        for t in made.tests
+    ]
+    named = [m for name in ("ball_material", "soak_lag", "modulus_softening", "expansion_mismatch") for m in variants(effect(name))]
+    found = search(model_of(spindle, replace(made, tests=tuple(tests))), named, free_forms(spindle), workers=1)
+    verdict = decide(found)
+    assert verdict.word == "none"
+    assert found.base.evidence.learned.sizes[ACTION] in learned
+    assert ("what temperature and speed do to each mode being wrong by about 10% of it" in verdict.reason) == (share > 0)
