@@ -59,7 +59,7 @@ def screen(
     and the best of each name, and kind of law, once more with its shape `turned`."""
     about = replace(about, temper=temper)
     sizes = Learned(learned.sizes, learned.errors if temper == 1.0 else 1.0)
-    prior = Problem(model, about.mechanisms, replace(as_stated(learned.sizes, about.mechanisms), errors=sizes.errors))
+    prior = Problem(model, about.mechanisms, replace(as_stated(learned.sizes, about.mechanisms), errors=sizes.errors), about.moved)
     at = linearised(model, about)  # where a fit has not arrived its own derivatives are of an earlier point
     here, near = replace(about, chi2=at.chi2, gradient=at.gradient, information=at.information, by_test=()), (sizes, *smaller(sizes))
     kept = tuple(integrated(model, here, n.errors, n.sizes) for n in near)
@@ -103,7 +103,7 @@ def _turned(beside: _Beside, drawn: Screened) -> Screened:
 
 def visibilities(model: CampaignModel, about: Fit, learned: Learned, mechanisms: Sequence[Mechanism]) -> list[float]:
     """Standard errors by which the typical size of each of `mechanisms` shows beside the model `about`, its discrepancies and errors of the sizes `learned`."""
-    prior = Problem(model, about.mechanisms, replace(as_stated(learned.sizes, about.mechanisms), errors=learned.errors))
+    prior = Problem(model, about.mechanisms, replace(as_stated(learned.sizes, about.mechanisms), errors=learned.errors), about.moved)
     factors = cho_factor(linearised(model, about).information + prior.precision)
     return [_visibility(_by_size(Problem(model, [*about.mechanisms, m]), about, np.zeros(len(m.shape)))[1], m, factors, learned.errors) for m in mechanisms]
 

@@ -121,7 +121,7 @@ def _fitted_beside(model: CampaignModel, about: Fit, learned: Learned, m: Mechan
     their widths lead nowhere by themselves.
     """
     base, shape = linearised(model, about), [q.neutral for q in m.shape]
-    problem = Problem(model, (), replace(as_stated(learned.sizes), errors=learned.errors))
+    problem = Problem(model, (), replace(as_stated(learned.sizes), errors=learned.errors), about.moved)
 
     def made(size: float) -> list[Array] | None:
         return _moved(model, about.nuisance, [(m.effect, m.values(m.size.neutral + size, shape))], base)
