@@ -166,6 +166,8 @@ def first_error(where: str | Path, raw: Any, form: type[BaseModel], error: Valid
     for part in location:
         if part == "[key]":  # pydantic's word for a name that is itself wrong
             continue
+        if isinstance(value, int | float | str):
+            break  # a number alone, which stands for a law of one
         try:
             value = value[part]
         except (KeyError, IndexError, TypeError):
