@@ -29,7 +29,7 @@ def of_verdict(found: Search, word: str, effects: Names, candidates, free, none:
     if word == "none":
         best = f"; the best effect, {' + '.join(candidates[0].names)}, has a probability of {candidates[0].probability:.1%}" if candidates else ""
         sizes = found.base.evidence.learned.sizes
-        wrong, change, misjudged = (sizes.get(kind, 0.0) for kind in (kinds_of.STIFFNESS, kinds_of.CHANGE, kinds_of.ACTION))
+        wrong, change, misjudged = (sizes.get(kind, 0.0) for kind in (kinds_of.STIFFNESS, kinds_of.CHANGE, kinds_of.OF_CONDITIONS))
         which = "; one condition cannot tell that from a missing effect" if len(conditions_of(found.model.spindle, found.model.tests)) == 1 else ""
         constant = f", the model's frequencies being constantly wrong by about {wrong:.1g} of each{which}" if wrong > NUMERICS[0] else ""
         otherwise = f", what speed does to the balls' stiffness being wrong by about {change:.0%} of it, and what temperature does by a little" if change else ""

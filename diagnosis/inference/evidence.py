@@ -52,6 +52,7 @@ GRIDS = {
     kinds_of.CHANGE: (0.0, 0.01, 0.03),
     kinds_of.EXPANSION: (1.0, 3.0, 6.0),
     kinds_of.ACTION: (0.0, 0.01, 0.03, 0.1),
+    kinds_of.OF_CONDITIONS: (0.0, 0.01, 0.03, 0.1),
 }
 WIDER = {1.0: 0.0, 2.0: -12.0, 4.0: -13.0, 8.0: -14.0}
 """Prior odds (ln) that a drawing is off by so many times the build tolerances that the scene states, assumed, and less than those of any two effects: one
@@ -62,7 +63,9 @@ one effect is in one of a hundred."""
 UNCALIBRATED = {1.0: 0.0, 3.0: -2.0}
 """Prior odds (ln) that hammers' gains are off by three times what the scene's channels are, assumed: a hammer whose calibration is old, or that always hits askew by 10 to 15 degrees,
 is off by some per cent, which a sensor's gain would have to explain in part."""
-ODDS = {kinds_of.BUILD: WIDER, kinds_of.EXPANSION: FARTHER, kinds_of.HAMMER: UNCALIBRATED}
+OTHERWISE = {0.0: 0.0, 0.01: 0.0, 0.03: -2.0, 0.1: -4.0}
+"""Prior odds (ln) that what temperature and speed do to a mode is off by such a share of it, assumed: one spindle in eight by 3 %, one in sixty by a tenth, which a missing effect may be as well."""
+ODDS = {kinds_of.BUILD: WIDER, kinds_of.EXPANSION: FARTHER, kinds_of.HAMMER: UNCALIBRATED, kinds_of.OF_CONDITIONS: OTHERWISE}
 """By kind of nuisance, of sizes of which one is that of the scene or of the model itself."""
 BETWEEN = 2  # places between two of a grid that are not nothing
 
@@ -125,7 +128,8 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
     whole = Quadratic(t2 * whole.constant, t2 * whole.b, t2 * whole.a)
     p = len(fit.nuisance)
     kinds = {q.kind for q in model.parameters}
-    kinds |= {kinds_of.ACTION} if fit.moved.any() else set()
+    kinds |= {kinds_of.OF_CONDITIONS} if fit.moved.any() else set()
+    kinds |= {kinds_of.ACTION} if fit.moved[1:].any() else set()
     grids = {kind: grid for kind, grid in GRIDS.items() if kind in kinds} | ({kinds_of.BUILD: tuple(WIDER)} if wide else {})  # last: modes may be off instead
     own_grids = [own_grid(m) for m in fit.mechanisms]
     conditions = tuple(d.condition for d in model.tests)
@@ -177,7 +181,7 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
 
 def _odds(sizes: Mapping[str, float]) -> float:
     """Prior odds (ln) of sizes that may be other than the scene's or the model's own."""
-    return sum(of[sizes.get(kind, 1.0)] for kind, of in ODDS.items())
+    return sum(of[sizes[kind]] for kind, of in ODDS.items() if kind in sizes)
 
 
 def _likeliest(each: Callable[[float, Mapping[str, float]], Array], grids: Mapping[str, Sequence[float]], scales: Sequence[float]) -> tuple[Array, float, dict[str, float]]:

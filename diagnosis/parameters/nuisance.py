@@ -63,7 +63,8 @@ DISCREPANCIES = (STIFFNESS, DAMPING, STIFFNESS_DRIFT, DAMPING_DRIFT)
 STIFFNESS_SD = 1e-3  # relative error of a frequency at the reference width
 DAMPING_SD = 0.03  # relative error of a damping ratio at the reference width
 STIFFNESS_DRIFT_SD, DAMPING_DRIFT_SD = 1e-4, 0.01  # of one mode in one test, at the reference width
-ACTION = "action of effects"  # no nuisance's kind, but a size that is learned: by what share temperature, speed and effects do to a mode other than the model says
+ACTION, OF_CONDITIONS = "action of effects", "action of temperature and speed"
+"""No kinds of nuisances, but sizes that are learned: by what share effects, and temperature and speed by themselves, do to a mode other than the model says."""
 DRIFT_SD = 1e-3  # of one channel's gain from test to test, at the reference width
 SHARE_SD = 0.03  # root of the mass that a mode carries along in a light resonance, over its own modal mass
 RESONANCE_SD = (0.02, 0.5)  # relative, of its frequency and of its damping ratio, about where it was seen

@@ -259,4 +259,5 @@ LEARNED = {
     kinds_of.MISS_DRIFT: "hammer_miss_m",
     kinds_of.CHANGE: "bearing_change_discrepancy",
     kinds_of.ACTION: "action_of_effects",
+    kinds_of.OF_CONDITIONS: "action_of_conditions",
 }

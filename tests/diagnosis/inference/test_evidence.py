@@ -17,6 +17,7 @@ from thermospindle.diagnosis.inference.gaussian import Quadratic, ln_integral, m
 from thermospindle.diagnosis.inference.prior import (
     ACTION,
     AGEING,
+    UNMOVED,
     Root,
     mechanism_root,
     misjudged,
@@ -119,22 +120,22 @@ def test_a_size_between_two_places_loses_nothing(size):
         assert found.ln > evidence(made.model, made.fit, [Learned({**found.learned.sizes, STIFFNESS: size}, found.learned.errors)]).ln - 0.5
 
 
-def test_a_model_that_is_wrong_may_be_wrong_in_what_an_effect_does():
-    """In proportion: nothing for a model that is right, or a mode that does not move; `ACTION` times the frequencies' error of what moves."""
+def test_a_model_that_is_wrong_may_be_wrong_in_what_conditions_and_an_effect_do():
+    """In proportion: nothing for a model that is right, or a mode that does not move; `ACTION` times the frequencies' error of what moves, or the share that was learned of either."""
     parameters = [Nuisance(BUILD, "b", 0.01)] + [
         Nuisance(kind, kind, sd, test=t, modes=(i, i))
         for kind, sd in ((STIFFNESS_DRIFT, STIFFNESS_DRIFT_SD), (DAMPING_DRIFT, DAMPING_DRIFT_SD)) for t in (0, 1) for i in (0, 1)
     ]  # fmt: skip
     model = SimpleNamespace(parameters=parameters)
-    moved = np.zeros((1, 2, 2, 2))
-    moved[0, 0, 0, 1], moved[0, 1, 0, 1], moved[0, 1, 1, 0] = (
+    moved = np.zeros((2, 2, 2, 2))
+    moved[1, 0, 0, 1], moved[1, 1, 0, 1], moved[1, 1, 1, 0] = (
         0.01,
         0.02,
         -0.3,
     )  # frequency of the second mode in both tests, damping of the first in one
     right = {STIFFNESS: 0.0, STIFFNESS_DRIFT: 0.0, DAMPING_DRIFT: DAMPING_DRIFT_SD}
     assert nuisance_variances(model, right).tolist() == [1, 0, 0, 0, 0, 1, 1, 1, 1]
-    assert misjudged(model, right, moved).shape == (9, 0)
+    assert misjudged(model, right, moved).shape == misjudged(model, right, UNMOVED).shape == (9, 0)
     found = misjudged(model, right | {STIFFNESS: 0.01}, moved)
     one_number = ACTION * 0.01 / STIFFNESS_DRIFT_SD * np.array([0.01, 0.02])
     assert found[[2, 4], 0] == pytest.approx(one_number)  # of one mode in all tests
@@ -142,8 +143,11 @@ def test_a_model_that_is_wrong_may_be_wrong_in_what_an_effect_does():
     assert np.count_nonzero(found) == 3
     learned = misjudged(model, right | {kinds_of.ACTION: 0.1}, moved)  # by what an effect of another's may do otherwise, whatever the frequencies are
     assert learned[[2, 4], 0] == pytest.approx(0.1 / STIFFNESS_DRIFT_SD * np.array([0.01, 0.02]))
-    opposed = misjudged(model, right | {STIFFNESS: 0.01}, np.concatenate([moved, -moved]))
+    opposed = misjudged(model, right | {STIFFNESS: 0.01}, np.concatenate([moved, -moved[1:]]))
     assert opposed @ opposed.T == pytest.approx(2 * found @ found.T)  # two mechanisms may be misjudged though together they move nothing
+    by_condition = moved[::-1]
+    assert misjudged(model, right | {kinds_of.ACTION: 0.1}, by_condition).shape == (9, 0)
+    assert misjudged(model, right | {kinds_of.OF_CONDITIONS: 0.1}, by_condition) == pytest.approx(learned)
 
 
 def test_gains_age_with_the_order_of_the_tests():

@@ -221,14 +221,16 @@ def test_what_a_mechanism_moves(spindle):
     model = model_of(spindle, made)
     thermal = next(m for m in variants(lost) if m.choices.get("thermal_share") == 1.0)
     done = fit(model, (thermal,))
-    assert done.moved.shape == (1, 2, 2, model.reference.seen)
-    assert np.abs(done.moved[0, 0]).max() < 1e-2 * np.abs(done.moved[0, 1]).max()
-    assert fit(model).moved.size == 0
+    assert done.moved.shape == (2, 2, 2, model.reference.seen)
+    assert np.array_equal(done.moved[0], model.by_condition)
+    assert np.array_equal(fit(model).moved, done.moved[:1])
+    by_effect = done.moved[1]
+    assert np.abs(by_effect[0]).max() < 1e-2 * np.abs(by_effect[1]).max()
     acting = [(thermal.effect, thermal.values(float(done.sizes[0, 1]), []))]
     plain, with_it = (operating_point(spindle, COLD_AND_WARM[1], effects).modes_below(6000.0) for effects in ((), acting))
     change = np.array([np.log(b.frequency / a.frequency) for a, b in zip(plain, with_it, strict=True)])
     assert np.abs(change).max() > 1e-3
-    assert done.moved[0, 1, 0, : len(change)] == pytest.approx(change, abs=0.3 * np.abs(change).max())  # of modes at rest
+    assert by_effect[1, 0, : len(change)] == pytest.approx(change, abs=0.3 * np.abs(change).max())  # of modes at rest
 
 
 def test_of_several_starts_the_best_is_taken(spindle):

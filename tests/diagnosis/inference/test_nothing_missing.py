@@ -15,7 +15,7 @@ from thermospindle.diagnosis.inference.freeform import free_forms
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis, settled
 from thermospindle.diagnosis.inference.search import search
 from thermospindle.diagnosis.parameters.mechanism import variants
-from thermospindle.diagnosis.parameters.nuisance import ACTION, BUILD, HAMMER, HAMMER_DRIFT, MISS_DRIFT
+from thermospindle.diagnosis.parameters.nuisance import BUILD, HAMMER, HAMMER_DRIFT, MISS_DRIFT, OF_CONDITIONS
 from thermospindle.model.built.tolerance import deviated
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
@@ -153,5 +153,5 @@ def test_what_temperature_does_to_each_mode_otherwise_is_no_missing_effect(spind
     found = search(model_of(spindle, replace(made, tests=tuple(tests))), named, free_forms(spindle), workers=1)
     verdict = decide(found)
     assert verdict.word == "none"
-    assert found.base.evidence.learned.sizes[ACTION] in learned
+    assert found.base.evidence.learned.sizes[OF_CONDITIONS] in learned
     assert ("what temperature and speed do to each mode being wrong by about 10% of it" in verdict.reason) == (share > 0)
