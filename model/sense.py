@@ -17,6 +17,7 @@ FASTEST = 2.5e6
 """mm rev/min, speed times pitch diameter: what ball bearings reach with ceramic balls and oil-air (Abele et al., CIRP Annals 59, 2010)."""
 STRONGEST = 1e9
 """Pa: rho v^2, the hoop stress of a thin ring by its own rotation (Timoshenko, *Strength of Materials*, part 2, 1956), that quenched steel does not bear for long."""
+AGAINST = 0.01  # of its preload, or of 1 N, by which a row is loaded against its sense
 DEEPEST = 0.01
 """Deformation of both contacts over the ball's diameter. The static capacity of ISO 76, 4.2 GPa, is reached at about a third of it."""
 
@@ -53,10 +54,12 @@ def of_conditions(spindle: Spindle, conditions: Sequence[Condition]) -> list[str
 def of_states(spindle: Spindle, states: Iterable[Sequence[BearingState]]) -> list[str]:
     """What is doubtful about loaded bearings, given all bearings of every state."""
     deepest: dict[str, float] = {}
+    least: dict[str, float] = {}
     for state in states:
         for b in state:
             deepest[b.name] = max(deepest.get(b.name, 0.0), b.deformation)
-    return of_depths(spindle, deepest)
+            least[b.name] = min(least.get(b.name, 0.0), b.preload if b.in_contact else 0.0)
+    return [*of_depths(spindle, deepest), *of_loads(spindle, least)]
 
 
 def of_depths(spindle: Spindle, deepest: Mapping[str, float]) -> list[str]:
@@ -66,6 +69,16 @@ def of_depths(spindle: Spindle, deepest: Mapping[str, float]) -> list[str]:
         f"{DEEPEST:.0%} no bearing stays elastic, and Hertz's theory does not hold"
         for name, depth in deepest.items()
         if depth > DEEPEST * spindle.bearing(name).ball_diameter
+    ]
+
+
+def of_loads(spindle: Spindle, least: Mapping[str, float]) -> list[str]:
+    """Rows that their neighbours or an axial load press the wrong way; `least` is the axial load (N) along the row's sense, by bearing."""
+    return [
+        f"the {name} bearing is loaded against its sense, by {-load:.4g} N: its balls are taken to roll on the other side of their grooves, as deep-groove bearings let them; one of angular contact "
+        "has no shoulder there and comes apart"
+        for name, load in least.items()
+        if load < -AGAINST * max(spindle.bearing(name).preload, 1.0)
     ]
 
 

@@ -169,7 +169,10 @@ def _positions(spindle: Spindle, rows: Mapping[str, BallRow], group: Sequence[Be
     sliding = [name for names, _, _ in springs for name in names]
     fixed = tuple((row, towards[name]) for name, row in rows.items() if name not in sliding)
     sleeves = tuple(Sleeve(tuple(rows[n] for n in names), towards[names[0]], push, rate) for names, push, rate in springs)
-    hub, *slid = equilibrium(Rings(fixed, sleeves, outside + spindle.axial_load), centres)
+    try:
+        hub, *slid = equilibrium(Rings(fixed, sleeves, outside + spindle.axial_load), centres)
+    except NoEquilibrium as error:
+        raise NoEquilibrium(f"{error} under axial_load_N = {spindle.axial_load:g}" if spindle.axial_load else str(error)) from None
     moved = {name: towards[name] * hub for name in rows}
     for (names, _, _), r in zip(springs, slid, strict=True):
         moved |= dict.fromkeys(names, r)

@@ -14,7 +14,7 @@ from thermospindle.model import machine as m
 from thermospindle.model.bearing.catalogue import CatalogueRow, derived
 from thermospindle.model.bearing.definitions import PreloadSpring, ToldAngle
 from thermospindle.model.scene.bearing_numbers import Numbers
-from thermospindle.model.scene.fields import Place, Positive, Share, Span, Table
+from thermospindle.model.scene.fields import Once, Place, Positive, Share, Span, Table
 from thermospindle.model.units import DEGREE, MM
 
 Three = Annotated[tuple[Positive, Positive, Positive], Strict(False)]
@@ -268,8 +268,8 @@ class BearingPair(_Preloaded):
 class BearingSet(_Preloaded):
     """Ball rows preloaded together; `sprung_bearings` names those whose rings slide on the spring."""
 
-    bearings: list[str] = Field(min_length=1)
-    sprung_bearings: list[str] = Field(default_factory=list)
+    bearings: Annotated[list[str], Field(min_length=1), Once]
+    sprung_bearings: Annotated[list[str], Once] = Field(default_factory=list)
 
     @model_validator(mode="after")
     def _spring_of_the_set(self) -> BearingSet:
@@ -306,8 +306,6 @@ def check_sets(rows: Mapping[str, Bearing], pair: BearingPair | None, sets: Mapp
         for bearing_name in own.bearings:
             if bearing_name not in rows:
                 raise ValueError(f"sets.{name}.bearings: {bearing_name!r} is no ball row; allowed are {', '.join(rows)}")
-            if own.bearings.count(bearing_name) > 1:
-                raise ValueError(f"sets.{name}.bearings: {bearing_name!r} stands twice; a set names each of its rows once")
         senses = {rows[n].sense for n in own.bearings}
         if len(senses) == 1 and own.preload_kind == "rigid":
             raise ValueError(f"sets.{name}.preload_kind = 'rigid': all its rows are loaded the same way and cannot preload each other; it must be spring")

@@ -64,6 +64,17 @@ def _rising(span: tuple[float, float]) -> tuple[float, float]:
     return span
 
 
+def _each_once(entries: list[Any]) -> list[Any]:
+    for entry in entries:
+        if entries.count(entry) > 1:
+            raise ValueError(f"{entry!r} stands twice; each may stand once")
+    return entries
+
+
+Once = AfterValidator(_each_once)
+"""Of a list in which nothing may stand twice."""
+
+
 # tables are strict, so that a number in quotes is none; only a TOML array may stand for a tuple of numbers
 Span = Annotated[tuple[Place, Place], Strict(False), AfterValidator(_rising)]
 Radii = Annotated[tuple[Radius, Place], Strict(False), AfterValidator(_rising)]

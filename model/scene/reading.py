@@ -24,7 +24,7 @@ from thermospindle.model.bearing.pair import solve
 from thermospindle.model.bearing.row import reference_motion
 from thermospindle.model.built.drawn import GRADES, drawn
 from thermospindle.model.built.tolerance import deviated
-from thermospindle.model.errors import BadInput
+from thermospindle.model.errors import BadInput, NoEquilibrium
 from thermospindle.model.files.formats import KEY, SCENE, migrated
 from thermospindle.model.machine import Bearing, Condition, Provenance, Spindle
 from thermospindle.model.rotor.beam import with_shafts
@@ -93,7 +93,10 @@ def build(raw: dict[str, Any], file: Path) -> Spindle:
     check_structure(file, spindle)
     spindle = _as_built(file, _with_section_inertia(spindle))
     if form.hammer_test.step_us is None:
-        spindle = replace(spindle, hammer=replace(spindle.hammer, step=chosen_step(spindle)))
+        try:
+            spindle = replace(spindle, hammer=replace(spindle.hammer, step=chosen_step(spindle)))
+        except NoEquilibrium as error:
+            raise BadInput(f"{file}: {error} at the reference; allowed is what they bear") from None
     own = form.imperfections
     if own.seed is not None and own.grade is not None:
         spindle = replace(spindle, imperfections=drawn(spindle, own.seed, GRADES[own.grade]))

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, Strict, model_validator
 
 from thermospindle.model import structure as m
-from thermospindle.model.scene.fields import Both, Name, NotNegative, Place, Positive, Share, Table, TwoNames, one_damping
+from thermospindle.model.scene.fields import Both, Name, NotNegative, Once, Place, Positive, Share, Table, TwoNames, one_damping
 from thermospindle.model.shaft import Shaft
 from thermospindle.model.units import MM
 
@@ -24,7 +24,7 @@ class StructureBody(Table):
     polar_inertia_kg_m2: Inertia | None = None
     z_mm: Place | None = None
     regions: list[str] = Field(default_factory=list)
-    moves: list[Literal["x", "y", "z", "tilt_x", "tilt_y"]] = Field(min_length=1)
+    moves: Annotated[list[Literal["x", "y", "z", "tilt_x", "tilt_y"]], Field(min_length=1), Once]
     turns: bool = False
     role: Literal["base", "seat", "shaft", "hub", "housing"] | None = None
     speed_ratio: Annotated[float, Field(ge=-100, le=100)] = 1.0

@@ -10,14 +10,14 @@ from typing import Any
 
 from rich.console import Console
 
-from thermospindle.model.errors import BadInput, Unanswered
+from thermospindle.model.errors import BadInput
 from thermospindle.model.files.whole import whole
 from thermospindle.model.machine import Spindle
 from thermospindle.model.units import RPM
 from thermospindle.report.progress import progress_bar
 from thermospindle.report.verbs.answer import Answer, with_effects
 from thermospindle.sim.campaign.campaign import Campaign, write_campaign
-from thermospindle.sim.importing.assemble import campaign_of, check_tests, read, spoken
+from thermospindle.sim.importing.assemble import campaign_of, check_tests, read, spoken, unanswered
 from thermospindle.sim.importing.mapping import MappingForm, read_mapping
 from thermospindle.sim.importing.measured import listed
 from thermospindle.sim.importing.places import misfits, shared
@@ -44,20 +44,24 @@ def bring(
     spindle = with_effects(scene, effect_files)[0] if scene is not None else None
     form = read_mapping(None if fresh else mapping)
     form, renamed = _for_scene(form, mapping, spindle, scene)
-    steps = len(files) * (2 if fresh and out is None else 1)
+    steps = len(files) * (2 if fresh else 1)
+    mapping = None if mapping is None else Path(mapping)
     with progress_bar(steps) as done:
         found = read(files, form, spindle, mapping, done)
         check_tests(found, files)
         if fresh and mapping is not None:
-            with whole(Path(mapping)) as file:
+            with whole(mapping) as file:
                 file.write_text(template(found, files, spindle), encoding="utf-8")
-        if out is None:
             filled = read_mapping(mapping)
-            return _form_written(Path(str(mapping)), spoken(found, files), spoken(read(files, filled, spindle, mapping, done), files), _proposed(filled))
-    try:
-        campaign, notes = campaign_of(found, form, spindle, files, mapping)
-    except Unanswered as error:
-        raise Unanswered(error.head, error.items, f"{mapping} is written: {error.tail}" if fresh else error.tail) from None
+            left, proposed = spoken(read(files, filled, spindle, mapping, done), files), _proposed(filled)
+            if out is None:
+                return _form_written(mapping, spoken(found, files), left, proposed)
+            if left:
+                raise unanswered(left, f"answer them in {mapping}, which is written")
+            if found.questions:
+                raise BadInput(f"{mapping} is written, and nothing is open in it: {'; '.join(proposed)}, read off the names of the files, to be checked in it; then the same command makes the campaign")
+    campaign, notes = campaign_of(found, form, spindle, files, mapping)
+    assert out is not None  # a fresh form has been returned
     write_campaign(campaign, Path(out))
     return _written(campaign, Path(out), notes, None if scene is None else Path(scene), [*renamed, *([] if spindle is None else _doubts(campaign, spindle))])
 

@@ -48,14 +48,15 @@ def table(
         out,
         {"verb": "table"} | asked,
         lambda folder, _: write_table(found, folder / "table.csv"),
-        [*sense.of_conditions(spindle, conditions), *_depths(spindle, found), *_speed_left_out(spindle, found)],
+        [*sense.of_conditions(spindle, conditions), *_loads(spindle, found), *_speed_left_out(spindle, found)],
     )
 
 
-def _depths(spindle: Spindle, found: StiffnessTable) -> list[str]:
-    rows = {b.name for b in spindle.bearings}
-    deepest = {name: 1e-6 * float(np.max(values["deformation_um"])) for name, values in found.values.items() if name in rows}
-    return sense.of_depths(spindle, deepest)
+def _loads(spindle: Spindle, found: StiffnessTable) -> list[str]:
+    rows = {b.name: found.values[b.name] for b in spindle.bearings}
+    deepest = {name: 1e-6 * float(np.max(values["deformation_um"])) for name, values in rows.items()}
+    least = {name: float(np.nanmin(values["preload_N"], initial=0.0)) for name, values in rows.items()}
+    return [*sense.of_depths(spindle, deepest), *sense.of_loads(spindle, least)]
 
 
 def _speed_left_out(spindle: Spindle, found: StiffnessTable) -> list[str]:

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from thermospindle.model.units import MINUTE, RPM
 from thermospindle.sim.campaign.campaign import Campaign, Test
 from thermospindle.sim.importing import units
 from thermospindle.sim.importing.exchanged import exchanged
+from thermospindle.sim.importing.files.labels import end, same_end
 from thermospindle.sim.importing.files.reading import content
 from thermospindle.sim.importing.frfs import Placed, frf_of
 from thermospindle.sim.importing.mapping import REST, FileForm, MappingForm, TestForm, fits, settings_of, told_of
@@ -64,6 +66,7 @@ def read(
         contents.append(content(f, settings[f]))
         progress(f.name)
     _check_columns(form, contents, mapping)
+    _check_ends(form, contents, settings, mapping)
     points, questions = points_of(form, scene)
     notes = [n for c in contents for n in c.notes]
     questions += [q for c in contents for q in (*c.questions, *open_units(c.file.name, c.motions))]
@@ -79,6 +82,8 @@ def read(
         for x in c.curves:
             if x.value.shape != x.frequency.shape:
                 raise BadInput(f"{c.file}: {x.where}: {x.value.size} values at {x.frequency.size} frequencies; there must be as many")
+            if not np.any(x.value) and x.magnitude_only:
+                raise BadInput(f"{c.file}: {x.where}: zero on every line; a dead channel is not allowed: tell it as \"ignore\" in columns")
             if len(wrong := np.flatnonzero(~np.isfinite(x.value))):
                 more = f", and {len(wrong) - 1} more lines are none either" if len(wrong) > 1 else ""
                 raise BadInput(f"{c.file}: {x.where}: its value at {x.frequency[wrong[0]]:g} Hz is no number{more}; take the FRF out of the file, or export it again")
@@ -130,6 +135,18 @@ def _check_columns(form: MappingForm, contents: Sequence[Content], mapping: Path
             called = [n for n in names if not re.fullmatch(r"(column )?\d+", n)] or [n for n in names if not n.isdigit()]
             there = listed(called, 12) or "none, for UFF and tables of modes say themselves what they hold"
             raise BadInput(f"{mapping}: files: columns: {wrong[0]!r} is no column of {table.file}; there are {there}")
+
+
+def _check_ends(form: MappingForm, contents: Sequence[Content], settings: dict[Path, FileForm], mapping: Path | None) -> None:
+    """`BadInput` for a point that the mapping tells of files whose headings all tell others: which of the two is meant nobody knows."""
+    for table, key in product(form.files, ("response", "reference")):
+        own = [c for c in contents if fits(table, c.file) and getattr(settings[c.file], key) == getattr(table, key)]
+        told = [getattr(x, key) for c in own for x in c.curves] + [m.end for c in own for m in c.motions if m.force == (key == "reference")]
+        if getattr(table, key) is not None and told and not any(same_end(end(str(getattr(table, key))), e) for e in told):
+            raise BadInput(
+                f"{mapping}: files: {key} = {getattr(table, key)!r}: the headings of {table.file} say {listed(dict.fromkeys(e.label for e in told))}; allowed is what a heading leaves open, or "
+                f'the way that it looks, as in "{told[0].label.partition(":")[0]}:-Z", and columns tells another heading'
+            )
 
 
 def _together(questions: Sequence[Question]) -> tuple[Question, ...]:
@@ -252,14 +269,16 @@ def spoken(found: Read, files: Sequence[Path]) -> list[str]:
     return [words_of(q, {"files": [f.name for f in files], "tests": found.tests}) for q in found.questions]
 
 
+def unanswered(sentences: Sequence[str], tail: str) -> Unanswered:
+    """What is open, and in the `tail` where it is answered."""
+    return Unanswered(f"{len(sentences)} thing{'s are' if len(sentences) > 1 else ' is'} not told by the files:", sentences, tail)
+
+
 def campaign_of(found: Read, form: MappingForm, scene: Spindle | None, files: Sequence[Path], mapping: Path | None) -> tuple[Campaign, list[str]]:
     """The campaign of all files, and what was done to them. Raises `Unanswered` with all that is open, `BadInput` for FRFs that no structure has."""
     check_tests(found, files)
     if found.questions:
-        count = len(found.questions)
-        head = f"{count} thing{'s are' if count > 1 else ' is'} not told by the files:"
-        tail = f"answer them in {mapping}" if mapping else "--mapping NEW.toml writes a form to answer them in"
-        raise Unanswered(head, spoken(found, files), tail)
+        raise unanswered(spoken(found, files), f"answer them in {mapping}" if mapping else "--mapping NEW.toml writes a form to answer them in")
     settings = {c.file: settings_of(form, c.file) for c in found.contents}
     notes = list(found.notes)
     placed = {t: [p for c in curves if (p := _placed(c, form, found.points, settings[c.file])) is not None] for t, curves in found.curves.items()}

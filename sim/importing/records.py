@@ -99,7 +99,7 @@ def frfs_of(files: Sequence[tuple[Path, Sequence[Motion]]], reference: End, form
     pulse: Array = np.array([[h.force[:n] for h in good]], float) * scales[0]
     force = pulse * np.array([h.sense for h in good])[:, None]
     if (against := sum(h.sense < 0 for h in good)):
-        notes.append(f"{name}: the force of {against} of {len(good)} hits is recorded negative, and is taken as it stands: a blow against the direction of its point")
+        notes.append(f"{name}: the force of {against} of {len(good)} hits is recorded negative, and is taken as it stands: a blow against the direction of {reference.label if reference.direction else 'its point'}")
     response: Array = np.array([[h.response[:, :n] for h in good]]) * np.array(scales[1:])[:, None]
     end = form.exponential_end or _needed(response)
     decay = -np.log(end) / (n * step)

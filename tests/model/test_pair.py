@@ -11,7 +11,9 @@ from thermospindle.model.bearing.definitions import SENSE
 from thermospindle.model.bearing.pair import bearing_state, solve
 from thermospindle.model.bearing.row import reference_deformation, reference_motion, row_at
 from thermospindle.model.built.tolerance import scaled_preload
+from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.machine import Condition, Law, RingMotion
+from thermospindle.model.sense import of_states
 
 
 def motions(spindle, **moves):
@@ -122,6 +124,19 @@ def test_the_locating_bearing_takes_the_axial_load(spindle, ring_of):
     load = {b.name: b.preload for b in solve(spring, Condition(20.0), motions(spindle)).bearings}
     assert load[ring_of] == pytest.approx(16.0, rel=1e-9)
     assert load["lower" if ring_of == "upper" else "upper"] == pytest.approx(14.0 if ring_of == "upper" else 18.0, rel=1e-9)
+
+
+@pytest.mark.parametrize(("load", "against"), [(10.0, None), (40.0, 24.0), (-40.0, None)])
+def test_a_row_that_an_axial_load_turns_is_said_to_be_loaded_against_its_sense(spindle, load, against):
+    """What a constant force does not hold the located row has to, backwards where the load is more."""
+    spring = sprung(replace(spindle, axial_load=load), "upper")
+    said = of_states(spring, [solve(spring, Condition(20.0), motions(spindle)).bearings])
+    assert said == ([] if against is None else [s for s in said if s.startswith(f"the lower bearing is loaded against its sense, by {against:g} N: ")][:1])
+
+
+def test_a_load_that_rows_never_bear_is_named(spindle):
+    with pytest.raises(NoEquilibrium, match=r"no axial equilibrium .* under axial_load_N = 1e\+09"):
+        solve(sprung(replace(spindle, axial_load=1e9), "upper"), Condition(20.0), motions(spindle))
 
 
 def test_hub_movement_is_that_of_the_hub(spindle):

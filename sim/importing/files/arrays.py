@@ -171,6 +171,8 @@ def _flat(name: str, value: Any) -> Iterator[tuple[str, Any]]:
     if isinstance(value, Mapping):
         for key, member in value.items():
             yield from _flat(f"{name}.{key}", member)
+    elif isinstance(value, list | np.ndarray) and len(np.shape(value)) == 1 and len(value) and all(isinstance(v, str) for v in value):  # a cell array
+        yield name, [v.strip() for v in value]
     elif isinstance(value, str) or (isinstance(value, np.ndarray) and value.dtype.kind in "US"):
         yield name, str(value) if np.ndim(value) == 0 else [str(v) for v in np.ravel(value)]
     elif value is not None and np.asarray(value).dtype.kind in "fciub":

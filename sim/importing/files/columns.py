@@ -12,7 +12,7 @@ import numpy as np
 from thermospindle.model.errors import BadInput
 from thermospindle.model.types import Array
 from thermospindle.sim.identification.frf import even
-from thermospindle.sim.importing.files.labels import ROLES, Role, end, role_of
+from thermospindle.sim.importing.files.labels import ROLES, Role, end, role_of, told_of_end
 from thermospindle.sim.importing.files.text import TextTable
 from thermospindle.sim.importing.mapping import REST, FileForm
 from thermospindle.sim.importing.measured import FORCE_NEEDED, Content, Curve, End, Motion, Question, listed
@@ -182,10 +182,7 @@ def _curves(file: Path, columns: Sequence[Column], settings: FileForm) -> tuple[
             if not open_:
                 continue
             value = np.zeros(n, complex)  # never used: stands for the FRF, so that what else is open of it is asked at once
-        if response == End() and settings.response is not None:
-            response = end(str(settings.response))
-        if reference == End() and settings.reference is not None:
-            reference = end(str(settings.reference))
+        response, reference = told_of_end(response, settings.response), told_of_end(reference, settings.reference)
         told = next((c for k, c in parts.items() if k not in ("coherence", "sd", "phase")), None)
         unit = settings.unit or (told.role.unit if told and told.role else "")
         coherence, sd = (np.asarray(parts[k].values.real, float) if k in parts else None for k in ("coherence", "sd"))
@@ -249,9 +246,8 @@ def _motions(file: Path, columns: Sequence[Column], moving: Sequence[Column], se
         assert c.role is not None
         force = c.role.kind == "force"
         place = c.role.reference if force else c.role.response
-        told = settings.reference if force else settings.response
-        if not place.label and told is not None and (force or sum(not (m.role and m.role.kind == "force") for m in moving) == 1):
-            place = end(str(told))
+        if place.label or force or sum(not (m.role and m.role.kind == "force") for m in moving) == 1:
+            place = told_of_end(place, settings.reference if force else settings.response)
         value = np.atleast_2d(np.asarray(c.values.real, float))
         value = value if value.shape[-1] >= value.shape[0] else value.T
         found.append(Motion(file, c.name, place if place.label else End(name="" if force else c.name), force, step or 1.0, value, c.role.unit))

@@ -91,9 +91,8 @@ def _role(text: str, unit: str) -> Role | None:
         if any(w.rstrip("0123456789") in known for w in words):
             glued = next((re.sub(r"\D", "", w) for w in words if w.rstrip("0123456789") in known), "")
             place = end(pair[1]) if pair else End(number or int(glued or 0))
-            name = re.fullmatch(r"\s*\w+?\s+([A-Za-z]\w*|\d+:[+-][XYZ])\s*", text)
-            if not place.label and name and not name[1].isdigit():
-                place = end(name[1])
+            if (pair is None and (called := re.fullmatch(r"\s*[^\W\d_]+[\s_]*(\d+\s*:?\s*[+-]?\s*[XYZxyz]\s*[+-]?)\s*", text))) or (not place.label and (called := re.fullmatch(r"\s*\w+?\s+([A-Za-z]\w*)\s*", text))):  # "acceleration 3:-X"
+                place = end(called[1])
             return Role(kind, "", place if kind == "response" else End(), place if kind == "force" else End(), unit)
     return None
 
@@ -105,6 +104,21 @@ def end(text: str) -> End:
         return End(name=text.strip())
     axis = match[3].upper() if match[3] else ""
     return End(int(match[1]), ((match[2] or match[4] or "+") + axis) if axis else "")
+
+
+def told_of_end(heading: End, told: str | int | None) -> End:
+    """An end as its heading has it, with what a mapping tells beside: all of one that the heading leaves open, and the direction of the same one."""
+    if told is None:
+        return heading
+    own = end(str(told))
+    if not heading.label:
+        return own
+    return replace(heading, direction=own.direction) if own.direction and same_end(own, heading) else heading
+
+
+def same_end(one: End, other: End) -> bool:
+    """Whether two ends are of one place, whichever way each looks."""
+    return (one.node, one.name) == (other.node, other.name)
 
 
 def _without_unit(text: str) -> tuple[str, str]:

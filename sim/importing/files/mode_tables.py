@@ -15,11 +15,14 @@ from thermospindle.sim.importing.measured import Content, ModeLine
 COLUMNS = {
     "test": "test", "condition": "test", "mode": "mode", "no": "mode", "number": "mode", "kind": "kind", "type": "kind",
     "frequency": "frequency", "frequency_hz": "frequency", "f": "frequency", "f_hz": "frequency", "freq": "frequency",
-    "frequency_khz": "kilohertz", "f_khz": "kilohertz", "freq_khz": "kilohertz",
+    "natural_frequency": "frequency", "natural_frequency_hz": "frequency", "eigenfrequency": "frequency", "eigenfrequency_hz": "frequency", "natural_freq": "frequency", "natural_freq_hz": "frequency", "fn": "frequency", "fn_hz": "frequency",
+    "freq_hz": "frequency", "hz": "frequency", "frequenz": "frequency", "frequenz_hz": "frequency", "eigenfrequenz": "frequency", "eigenfrequenz_hz": "frequency",
+    "frequency_khz": "kilohertz", "f_khz": "kilohertz", "freq_khz": "kilohertz", "natural_frequency_khz": "kilohertz", "khz": "kilohertz",
     "frequency_sd_hz": "sd", "frequency_sd": "sd", "sd": "sd", "sd_hz": "sd", "damping_ratio": "damping", "damping": "damping", "zeta": "damping",
     "damping_ratio_sd": "damping_sd", "damping_%": "percent", "damping_percent": "percent", "zeta_%": "percent",
 }  # fmt: skip
-"""Headings in small letters, with blanks and brackets as _: what they are."""
+"""Headings in small letters, with blanks, points and brackets as _: what they are."""
+FREQUENCIES = {"frequency", "kilohertz"}
 KINDS = ("axial", "rocking", "lateral", "unknown")
 """What modes are paired by."""
 
@@ -32,13 +35,30 @@ def headings(file: Path) -> tuple[list[str], str, int] | None:
         if not plain.strip():
             continue
         for separator in ("\t", ";", ","):
-            named = [COLUMNS.get(re.sub(r"[\s()\[\]]+", "_", cell.strip().strip('"').lower()).strip("_"), "") for cell in plain.split(separator)]
+            named = _named(plain, separator)
             alone = named in (["frequency"], ["kilohertz"]) and _is_number(every[number + 1 :])
-            if {"frequency", "kilohertz"} & {*named} and (alone or {"mode", "kind", "damping", "percent", "test", "sd"} & {*named}):
+            if FREQUENCIES & {*named} and (alone or {"mode", "kind", "damping", "percent", "test", "sd"} & {*named}):
                 return named, separator, number
         if not line.lstrip().startswith(("#", "%")):
             return None
     return None
+
+
+def _named(line: str, separator: str) -> list[str]:
+    """What each heading of a line is, "" where it is none of a table of modes."""
+    return [COLUMNS.get(re.sub(r"[\s.()\[\]]+", "_", cell.strip().strip('"').lower()).strip("_"), "") for cell in line.split(separator)]
+
+
+def without_frequency(file: Path) -> str:
+    """Why a file that is no table of numbers is none of modes either, where its headings have something of one; else empty."""
+    for line in text_of(file).splitlines():
+        plain = COMMENT.sub("", line)
+        for separator in ("\t", ";", ","):
+            if {*_named(plain, separator)} & {"test", "mode", "kind", "damping", "percent"} and len(cells := plain.split(separator)) > 1:
+                return f"{file}: a table of modes without a heading for the frequency; found are {', '.join(c.strip() for c in cells)}; allowed are frequency_Hz, natural frequency, f, frequency_kHz and the like"
+        if plain.strip() and not line.lstrip().startswith(("#", "%")):
+            break
+    return ""
 
 
 def _is_number(lines: list[str]) -> bool:

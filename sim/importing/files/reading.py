@@ -7,7 +7,7 @@ from pathlib import Path
 from thermospindle.model.errors import BadInput
 from thermospindle.sim.importing.files.arrays import read_arrays
 from thermospindle.sim.importing.files.columns import from_arrays, from_table
-from thermospindle.sim.importing.files.mode_tables import from_modes, headings
+from thermospindle.sim.importing.files.mode_tables import from_modes, headings, without_frequency
 from thermospindle.sim.importing.files.text import read_table
 from thermospindle.sim.importing.files.uff_sets import from_uff
 from thermospindle.sim.importing.mapping import FileForm
@@ -29,7 +29,12 @@ def content(file: Path, settings: FileForm) -> Content:
         return from_uff(file, settings)
     if headings(file) is not None:
         return from_modes(file)
-    return from_table(read_table(file), settings)
+    try:
+        return from_table(read_table(file), settings)
+    except BadInput:
+        if why := without_frequency(file):
+            raise BadInput(why) from None
+        raise
 
 
 def _begins_as_uff(file: Path) -> bool:

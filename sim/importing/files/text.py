@@ -48,6 +48,7 @@ def read_table(file: Path) -> TextTable:
     """The one table of numbers of a text file. Raises `BadInput` where there is none, or where a line among the numbers has other cells."""
     lines = [(number, line) for number, line in enumerate(text_of(file).splitlines(), 1) if line.strip(" \t;,")]
     separator, comma = _manner(file, [line for _, line in lines])
+    lines = _with_values(lines, separator, comma)
     rows, first = _numbers(file, lines, separator, comma)
     width = len(rows[0])
     above = [COMMENT.sub("", line) for _, line in lines[:first]]
@@ -66,6 +67,20 @@ def read_table(file: Path) -> TextTable:
     except (TypeError, ValueError):
         values = np.array(rows, complex)
     return TextTable(file, heading, unit, values)
+
+
+def _with_values(lines: list[tuple[int, str]], separator: str | None, comma: bool) -> list[tuple[int, str]]:
+    """Without the lines at either end of the numbers that have a first cell alone: of an analyser's band where it has no values."""
+
+    def alone(line: str) -> bool:
+        first, *others = (c.strip().strip('"') for c in line.split(separator))
+        return bool(others) and NUMBER_LIKE.fullmatch(first) is not None and {*map(str.lower, others)} <= {"", "nan"}
+
+    while lines and alone(lines[-1][1]):
+        lines = lines[:-1]
+    start = next((k for k, (_, line) in enumerate(lines) if alone(line) or len(_parse(_cells(line, separator), comma) or ()) > 1), 0)
+    end = next((k for k in range(start, len(lines)) if not alone(lines[k][1])), start)
+    return [*lines[:start], *lines[end:]]
 
 
 def _refuse_commas(file: Path, above: list[str], separator: str | None, line: str) -> None:

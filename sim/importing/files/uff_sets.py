@@ -13,7 +13,7 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.scene.fields import LARGEST, SMALLEST
 from thermospindle.sim.campaign.uff import AXIS, FORCE, KINDS, STANDARD_ERROR, read_uff
 from thermospindle.sim.importing import units
-from thermospindle.sim.importing.files.labels import end
+from thermospindle.sim.importing.files.labels import end, told_of_end
 from thermospindle.sim.importing.mapping import FileForm
 from thermospindle.sim.importing.measured import Content, Curve, End, ModeLine, Motion, Question
 
@@ -91,9 +91,7 @@ def _end(record: Mapping[str, Any], side: str, told: str | int | None) -> End:
     node, direction, name = int(record[f"{side}_node"]), AXES.get(int(record[f"{side}_dir"]), ""), record[f"{side}_ent_name"].strip()
     if node == 0 and told is not None:
         return end(str(told))
-    if node == 0 and name not in ("", "NONE"):
-        return End(0, direction, name)
-    return End(node, direction)
+    return told_of_end(End(0, direction, name) if node == 0 and name not in ("", "NONE") else End(node, direction), told)
 
 
 def _curve(

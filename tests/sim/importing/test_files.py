@@ -67,6 +67,38 @@ def test_arrays_of_numpy_and_matlab(tmp_path):
         np.testing.assert_array_equal(frf.value, FRF.value)
 
 
+def test_points_may_be_told_by_a_cell_array_of_names(tmp_path):
+    from scipy.io import savemat
+
+    names = {1: "hub_top0", 3: "hub_side0", 6: "seat90"}
+    cells = {key: np.array([names[n] for n in nodes], object) for key, nodes in (("resp", FRF.response_nodes), ("ref", FRF.reference_nodes))}
+    savemat(tmp_path / "T20.mat", {"lab": {"freq": FREQUENCY, "H": FRF.value, **cells}})
+    frf = imported(tmp_path, '[[files]]\nfile = "T20.*"\nunit = "(m/s)/N"\n', tmp_path / "T20.mat")
+    assert (frf.response_nodes, frf.reference_nodes) == (FRF.response_nodes, FRF.reference_nodes)
+    np.testing.assert_array_equal(frf.value, FRF.value)
+
+
+@pytest.mark.parametrize(("first", "last"), [("{},{}", "{},{}"), ("{},nan", "{},NaN")])
+def test_lines_without_values_at_the_ends_are_left_out(tmp_path, first, last):
+    """Also the first one below the headings, which was taken for them; one in between is refused (`test_damaged_text_is_one_sentence`)."""
+    heads, found = columns("real", "(m/s)/N")
+    file = table(tmp_path / "T20.csv", ["Frequency [Hz]", *heads], [FREQUENCY, *found])
+    head, *rows = file.read_text().splitlines()
+    blank = ["," * (len(heads) - 1) if told == "{},{}" else ",".join(["nan"] * len(heads)) for told in (first, last)]
+    rows[0], rows[-1] = (f"{row.split(',')[0]},{rest}" for row, rest in zip((rows[0], rows[-1]), blank, strict=True))
+    file.write_text("\n".join([head, *rows]) + "\n")
+    frf = imported(tmp_path, "", file)
+    np.testing.assert_allclose(frf.frequency, FREQUENCY[1:-1])
+    np.testing.assert_allclose(frf.value, FRF.value[:, :, 1:-1], rtol=1e-8, atol=1e-12)
+
+
+def test_a_magnitude_without_values_is_a_dead_channel(tmp_path, recwarn):
+    file = table(tmp_path / "T20.csv", ["Frequency [Hz]", "H(1,1) mag [g/N]", "H(3,1) mag [g/N]"], [FREQUENCY, np.abs(FRF.value[0, 0]), 0 * FREQUENCY])
+    with pytest.raises(BadInput, match=r"T20.csv: H\(3,1\) mag \[g/N\]: zero on every line; a dead channel is not allowed"):
+        imported(tmp_path, "", file)
+    assert not [w for w in recwarn if issubclass(w.category, RuntimeWarning)]
+
+
 def test_values_and_frequencies_of_different_number_are_refused(tmp_path):
     np.savez(tmp_path / "T20.npz", frequency=FREQUENCY[:-1], H11=FRF.value[0, 0])
     with pytest.raises(BadInput, match="301 values at 300 frequencies"):
@@ -172,6 +204,7 @@ def test_lines_of_the_running_speed_are_said_and_left_as_measured(tmp_path):
         ("f;H(1,1) real;H(1,1) imag\n900,5;2,1;3,2\n1.000,5;4,4;5,6\n900,7;5,2;6,1\n", "line 3: column 1: '1.000,5' is no number; .* thousands are written without a sep"),
         ("f;H(1,1) real\n1.000,5;4,4\n1.001,5;5,2\n", "'1.001,5': thousands are written without a separator"),
         ("f,H(1,1) real,H(1,1) imag,H(1,1) real\n1,2,3,4\n2,3,4,5\n", "'H\\(1,1\\) real' and 'H\\(1,1\\) real': two columns for the real of the same FRF"),
+        ("test,mode,pitch,damping\ncold,1,935.5,0.01\n", "a table of modes without a heading for the frequency; found are test, mode, pitch, damping; allowed are frequency_Hz"),
         ("frequency,mode,kind\n1000,1,rockin\n", "line 2: kind = 'rockin': allowed are axial, rocking, lateral, unknown, or nothing"),
         ("f;H(1,1) real\n1;2\n2\n3;4;5\n4;5\n", "numbers"),
         ("f,H(1,1) real\n1,2\n2,3\n3,4\nend of data\n", "line 5: 'end of data' stands below the numbers"),
@@ -317,6 +350,12 @@ def test_geometry_of_data_set_2411(tmp_path):
     bare = content(tmp_path / "bare.unv", FileForm(file="x"))
     assert bare.places == {}
     assert bare.unscaled[305] == pytest.approx((0.0, -12.5, 15.0))
+
+
+@pytest.mark.parametrize("text", ["test,Natural frequency [Hz]\ncold,1002.5\n", "test;Eigenfrequenz [Hz]\ncold;1002,5\n", "mode\tFreq. (Hz)\n1\t1002.5\n", "mode,Hz\n1,1002.5\n"])
+def test_frequencies_of_modes_have_many_names(tmp_path, text):
+    (tmp_path / "peaks.csv").write_text(text)
+    assert [m.frequency for m in content(tmp_path / "peaks.csv", FileForm(file="x")).modes] == [pytest.approx(1002.5)]
 
 
 @pytest.mark.parametrize("text", ["test,mode,frequency_kHz\ncold,1,1.0025\n", "frequency_kHz\n1.0025\n", "test;f (kHz)\ncold;1,0025\n"])

@@ -50,6 +50,21 @@ def test_the_form_is_written_and_filled_in(tmp_path, capsys):
     assert [p.node for p in read_campaign(tmp_path / "c").points] == [1, 3, 6]
 
 
+@pytest.mark.parametrize(("name", "left"), [("T20_n0", 0), ("T20", 1)])
+def test_a_form_that_names_fill_in_is_not_said_to_be_open(tmp_path, name, left):
+    """With --out too: what the names of files tell stands in the form, to be checked, and the same command again makes the campaign."""
+    heads, found = columns("real", "(m/s)/N")
+    file = table(tmp_path / f"{name}.csv", ["Frequency", *heads], [FREQUENCY, *found])
+    asked = {"mapping": tmp_path / "lab.toml", "scene": ROOT / "scenes" / "hdd_2003", "out": tmp_path / "c"}
+    said = r"1 thing is not told by the files: \(1\) T20: speed_rpm.*answer them in .*lab.toml, which is written" if left else "lab.toml is written, and nothing is open in it: T20_n0: 20 C, 0 rpm, read off the names"
+    with pytest.raises(BadInput, match=said):
+        bring([file], **asked)
+    assert not (tmp_path / "c").exists()
+    if not left:
+        bring([file], **asked)
+        assert read_campaign(tmp_path / "c").tests[0].temperature == 20.0
+
+
 def test_what_all_tests_lack_is_answered_once(tmp_path):
     """One table for all tests, and one of a test that says otherwise; the form asks so, and a pattern that no test fits is refused."""
     heads, found = columns("real", "(m/s)/N")

@@ -23,7 +23,8 @@ def test_units_of_frfs(text, found):
     [
         ("H(3,1) real [g/N]", "H", "real", ("3", "1"), "g/N"), ("Re H(3:+X, 1)", "H", "real", ("3:+X", "1"), ""), ("FRF(hub, seat) dB", "H", "decibel", ("hub", "seat"), ""),
         ("Magnitude", "H", "magnitude", ("", ""), ""), ("Coherence(3,1)", "coherence", "", ("3", "1"), ""), ("Frequency (Hz)", "frequency", "", ("", ""), "Hz"),
-        ("force [N]", "force", "", ("", ""), "N"), ("acceleration 3 [g]", "response", "", ("3", ""), "g"), ("Time [s]", "time", "", ("", ""), "s"),
+        ("force [N]", "force", "", ("", ""), "N"), ("force 1:-X [N]", "force", "", ("", "1:-X"), "N"), ("acceleration 3:+Y [m/s2]", "response", "", ("3:+Y", ""), "m/s2"),
+        ("response 3Z", "response", "", ("3:+Z", ""), ""), ("acc_3", "response", "", ("3", ""), ""), ("acceleration 3 [g]", "response", "", ("3", ""), "g"), ("Time [s]", "time", "", ("", ""), "s"),
         ("frequency_kHz", "frequency", "", ("", ""), "kHz"), ("f_Hz", "frequency", "", ("", ""), "Hz"), ("time_ms", "time", "", ("", ""), "ms"),
         ("hub/seat mag [um/N]", "H", "magnitude", ("hub", "seat"), "um/N"), ("3+Z/1+Z Phase (deg)", "H", "phase", ("3:+Z", "1:+Z"), "deg"),
         ("Acceleration/Force Magnitude [g/N]", "H", "magnitude", ("", ""), "g/N"), ("H(3,1) mag [dB]", "H", "decibel", ("3", "1"), ""),

@@ -138,6 +138,39 @@ def test_a_dead_channel_is_one_sentence_and_can_be_left_out(folder, tmp_path, re
         bring([tmp_path / "hammer1.csv"], mapping=tmp_path / "m.toml", out=tmp_path / "d")
 
 
+@pytest.mark.parametrize(
+    ("heading", "told", "turned"),
+    [("velocity 2 [mm/s]", "", 1), ("velocity 2:-Z [mm/s]", "", -1), ("velocity 2 [mm/s]", 'columns = { "velocity 2 [mm/s]" = "velocity 2:-Z [mm/s]" }', -1)],
+)
+def test_a_sensor_that_looks_the_other_way_is_turned(folder, tmp_path, heading, told, turned):
+    """The direction of a column of a time record counts, as that of an FRF does."""
+    text = (folder / "hammer1.csv").read_text()
+    (tmp_path / "hammer1.csv").write_text(text.replace("velocity 2 [mm/s]", heading, 1))
+    (tmp_path / "m.toml").write_text(MAPPING.replace('test = "T20"', f'test = "T20"\n{told}', 1))
+    bring([tmp_path / "hammer1.csv"], mapping=tmp_path / "m.toml", out=tmp_path / "c")
+    (tmp_path / "plain.toml").write_text(MAPPING)
+    bring([folder / "hammer1.csv"], mapping=tmp_path / "plain.toml", out=tmp_path / "d")
+    frf, plain = (read_campaign(tmp_path / name).tests[0].frf for name in "cd")
+    np.testing.assert_allclose(frf.value[1], turned * plain.value[1])
+    np.testing.assert_allclose(frf.value[0], plain.value[0])
+
+
+def test_a_reference_of_the_mapping_turns_the_one_of_the_heading_and_is_no_other(folder, tmp_path):
+    """A force sensor that reads pressure as negative; and a point that no heading tells is refused, where it was not used before, without a word."""
+    rows = np.loadtxt(folder / "hammer1.csv", delimiter=",", skiprows=1)
+    rows[:, 1] *= -1
+    np.savetxt(tmp_path / "hammer1.csv", rows, delimiter=",", header="Time [s],force 1 [N],velocity 1 [mm/s],velocity 2 [mm/s]", comments="", fmt="%.9g")
+    (tmp_path / "m.toml").write_text(MAPPING)
+    with pytest.raises(BadInput, match="negative real part"):
+        bring([tmp_path / "hammer1.csv"], mapping=tmp_path / "m.toml", out=tmp_path / "c")
+    (tmp_path / "m.toml").write_text(MAPPING.replace('test = "T20"', 'test = "T20"\nreference = "1:-Z"', 1))
+    answer = bring([tmp_path / "hammer1.csv"], mapping=tmp_path / "m.toml", out=tmp_path / "c")
+    assert "a blow against the direction of 1:-Z" in "\n".join(answer.values["notes"])
+    (tmp_path / "m.toml").write_text(MAPPING.replace('test = "T20"', 'test = "T20"\nreference = "nose"', 1))
+    with pytest.raises(BadInput, match=r"m.toml: files: reference = 'nose': the headings of hammer\* say 1; allowed is what a heading leaves open, or the way that it looks, as in \"1:-Z\""):
+        bring([tmp_path / "hammer1.csv"], mapping=tmp_path / "m.toml", out=tmp_path / "d")
+
+
 def test_time_records_of_a_uff_file(tmp_path):
     """Dataset 58, function type 1: force and responses of three hits one after the other, a file for each kind of channel."""
     import pyuff
