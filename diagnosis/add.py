@@ -76,7 +76,9 @@ def new_scene(
     """
     file = scene_path(target)
     old = load(file)
-    effects = [fitted_to(by_name(name, catalogue), old) for name in dict.fromkeys(names)]
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise BadInput(f"{twice[0]}: is named twice; an effect is added once")
+    effects = [fitted_to(by_name(name, catalogue), old) for name in names]
     for effect in effects:
         if why := refusal(effect, old):
             raise BadInput(f"{file}: effect {effect.name}: {why}")
@@ -183,6 +185,8 @@ def _by_effect(effects: Sequence[Effect], by_hand: Sequence[tuple[str, float]]) 
         if len(owners) != 1:
             allowed = ", ".join(f"{e.name}.{p}" for e in effects for p in e.neutral())
             raise BadInput(f"--set {key}={value:g}: names {'no' if not owners else 'more than one'} parameter; allowed are {allowed}")
+        if name in found[owners[0]]:
+            raise BadInput(f"--set {key}={value:g}: {name} of {owners[0]} is set twice; each may be once")
         found[owners[0]][name] = value
     return found
 

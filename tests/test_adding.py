@@ -116,6 +116,10 @@ NOT_ADDED = [
     (["bond_softening", "--set", "transition"], "not of the form name=value"),
     (["bond_softening", "--set", "transition=hot"], "'hot' is not a number"),
     (["bond_softening", "--set", "transition=nan"], "nan"),
+    (["bond_softening", "--set", "bearing=upper"], "bearing: 'upper' is not a number; a bearing, a set or a channel goes by its number"),
+    (["bond_softening", "--set", "hot_compliance=200.0001"], "hot_compliance = 200.0001 nm/N: allowed is 0 to 200"),
+    (["bond_softening", "--set", "width=1", "width=2"], "--set width=2: width of bond_softening is set twice; each may be once"),
+    (["bond_softening", "bond_softening"], "bond_softening: is named twice; an effect is added once"),
     (["bond_softening", "--from", "nowhere.json"], "nowhere.json: cannot be read"),
     (["bond_softening", "--from", str(SCENE / "spindle.toml")], "is not an answer of spindle diagnose"),
     (

@@ -120,6 +120,7 @@ def test_stopped_while_it_is_loaded():
         (["map", SCENE, "--multiples", "100000"], "up to 100"),
         (["modes", "n" * 5000], "File name too long"),
         (["table", SCENE, "--temperatures", "20", "--out", "/proc/x"], "--out /proc/x: No such file or directory; name a place where you may write"),
+        (["simulate", SCENE, "--temperatures", "20", "150", "--out", "nowhere"], "--temperatures 150: lower and upper bearing lost contact at 150 C: a spindle that rattles has no FRFs"),
         (["inspect", "nowhere.rrd"], "no such file"),
     ],
     ids=lambda a: " ".join(map(str, a))[-40:] if isinstance(a, list) else None,

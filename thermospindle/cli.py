@@ -17,6 +17,7 @@ import shlex
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, redirect_stdout
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -78,7 +79,8 @@ def _run(arguments: list[str]) -> int:
     try:
         _ask_to_write(asked.get("out"))
         _keep_what_is_asked_for(asked)
-        answer = getattr(import_module(f"thermospindle.report.verbs.{module}"), function)(**asked)
+        with _alone_on_stdout(as_json):
+            answer = getattr(import_module(f"thermospindle.report.verbs.{module}"), function)(**asked)
     except OSError as error:
         if told := _not_writable(error, asked):
             raise BadInput(told) from None
@@ -95,6 +97,25 @@ def _run(arguments: list[str]) -> int:
         sys.stdout.flush()
     answer.then()
     return 0
+
+
+@contextmanager
+def _alone_on_stdout(as_json: bool) -> Iterator[None]:
+    """Whatever is printed while a verb works, by an effect of one's own or a process that it starts, goes to standard error where one JSON object is asked for."""
+    try:
+        kept = os.dup(1) if as_json else -1
+    except OSError:  # closed by the caller
+        kept = -1
+    if kept < 0:
+        yield
+        return
+    try:
+        os.dup2(2, 1)
+        with redirect_stdout(sys.stderr):
+            yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
 
 
 def _ask_to_write(out: Path | None) -> None:

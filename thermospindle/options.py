@@ -112,7 +112,11 @@ def _setting(text: str) -> tuple[str, float]:
     name, equals, value = text.partition("=")
     if not (name and equals):
         raise argparse.ArgumentTypeError(f"{text!r} is not of the form name=value")
-    return name, _number(value)
+    try:
+        return name, _number(value)
+    except argparse.ArgumentTypeError as error:
+        named = "; a bearing, a set or a channel goes by its number, as spindle effects EFFECT tells it" if value.strip().isidentifier() else ""
+        raise argparse.ArgumentTypeError(f"{name}: {error}{named}") from None
 
 
 # ---------------------------------------------------------------- verbs and their options

@@ -173,6 +173,7 @@ def assert_margin(
 def assert_agreement(scene: Scene, campaign: str | Path | Any, *, rms: float) -> None:
     """A campaign's frequencies and dampings agree with the scene: rms error of at most `rms` standard errors (`spindle compare`)."""
     __tracebackhide__ = True
+    from thermospindle.diagnosis.prediction.partners import BELIEVABLE
     from thermospindle.front import compare
 
     _asked(["rms"], rms=rms)
@@ -180,6 +181,8 @@ def assert_agreement(scene: Scene, campaign: str | Path | Any, *, rms: float) ->
     if not found.rms_residual <= rms:
         rows = sorted(((abs(m.residual), t.test.id, m) for t in found.tests for m in t.modes), key=lambda row: -row[0])
         worst = [f"  {test}: {m.kind} mode measured at {m.measured:.2f} Hz, computed {m.computed - m.measured:+.2f} Hz, {m.residual:+.1f} s.e." for _, test, m in rows[:5]]
+        lost = [f"  {t.test.id}: measured at {f:.2f} Hz, no computed mode within {BELIEVABLE:.0%}" for t in found.tests for f in t.missing]
+        worst = [*lost, *worst][:5]
         raise AssertionError("\n".join([f"{found.campaign} is {found.rms_residual:.2f} standard errors (rms) from {found.spindle}; wanted at most {rms:g}; the worst are", *worst]))
 
 

@@ -84,8 +84,9 @@ class Place(BaseModel):
         return self
 
 
-def place_of(diagnosis: Path, element: str | None) -> tuple[Place, float, tuple[str, ...]]:
-    """The first that would have to drift, or `element`, the reference temperature (C) of the scene, and the effects that the verdict names, without which that would drift. Raises `BadInput` where the file holds none, one that
+def place_of(diagnosis: Path, element: str | None) -> tuple[Place, float, tuple[str, ...], bool]:
+    """The first that would have to drift, or `element`, the reference temperature (C) of the scene, the effects that the verdict names, without which that would drift, and whether the build tolerances
+    of the answer are those fitted beside it. Raises `BadInput` where the file holds none, one that
     changes by nothing, or a name that cannot stand in a Python file."""
     if not diagnosis.is_file():
         raise BadInput(f"{diagnosis}: cannot be read: no such file")
@@ -95,6 +96,7 @@ def place_of(diagnosis: Path, element: str | None) -> tuple[Place, float, tuple[
         if not -273.15 < reference < LARGEST:
             raise ValueError
         elements = [str(p["element"]) for p in told["where"]]
+        beside = {str(e) for e in told.get("tolerances_beside", ())}
         named = tuple(str(e) for e in told.get("effects", ())) if told.get("verdict") in NAMING else ()
         found = [Place.model_validate(p) for p in told["where"] if element in (None, p["element"])][:1]
     except OSError as error:
@@ -111,7 +113,7 @@ def place_of(diagnosis: Path, element: str | None) -> tuple[Place, float, tuple[
     _check_plain(place.element, place.unit, diagnosis.name, *((*(place.effect.at or ()), *place.effect.values) if place.effect else ()))
     if not place.of_tests(place.key).any():
         raise BadInput(f"{diagnosis}: where: {place.element} changes by 0 in every test; there is nothing to draft")
-    return place, reference, named
+    return place, reference, named, place.element in beside | {*named}
 
 
 def correlated(covariance: Array) -> tuple[Array, Array]:

@@ -17,13 +17,15 @@ NEAR = 10.0  # criterion within which rivals are named in the file
 
 @dataclass(frozen=True)
 class Draft:
-    """The text of an effect file, of which element it is, how well its law fits in a sentence, and whether that leaves it in `doubt`; and the effects that the diagnosis named instead."""
+    """The text of an effect file, of which element it is, how well its law fits in a sentence, and whether that leaves it in `doubt`; the effects that the diagnosis named instead, and whether
+    the build tolerances of its answer go with the draft."""
 
     text: str
     element: str
     fits: str
     doubt: bool
     named: tuple[str, ...] = ()
+    with_build: bool = False
 
 
 def draft(diagnosis: Path, name: str, element: str | None = None) -> Draft:
@@ -31,7 +33,7 @@ def draft(diagnosis: Path, name: str, element: str | None = None) -> Draft:
 
     The first element that would have to drift is taken, or `element`. Raises `BadInput` where the file holds none, or one that changes by nothing.
     """
-    place, reference, named = place_of(diagnosis, element)
+    place, reference, named, with_build = place_of(diagnosis, element)
     temperature, speed = place.of_tests("temperature_C"), np.abs(place.of_tests("speed_rpm"))
     change, covariance = place.logarithmic
     top = float(speed.max()) or 1.0
@@ -50,7 +52,7 @@ def draft(diagnosis: Path, name: str, element: str | None = None) -> Draft:
         limits=[_about(v) for v in best.values[:2]],
         fits=fits,
     )
-    return Draft(text, place.element, fits, doubt, named)
+    return Draft(text, place.element, fits, doubt, named, with_build)
 
 
 def _fits(best: Fitted) -> tuple[str, bool]:

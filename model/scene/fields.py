@@ -171,11 +171,11 @@ def first_error(where: str | Path, raw: Any, form: type[BaseModel], error: Valid
 
     Entries of a list of tables go by their id, node or name; those of another list by their number, the first being 1.
     """
-    problem = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
+    problem = min(error.errors(), key=lambda e: (e["type"] != "extra_forbidden", e["type"] == "model_type"))  # of two forms that a value may have, the one that it has
     location = problem["loc"]
     words, value = [], raw
     for part in location:
-        if part == "[key]":  # pydantic's word for a name that is itself wrong
+        if part == "[key]" or (isinstance(part, str) and "[" in part and not (isinstance(value, Mapping) and part in value)):  # pydantic's words for a name that is itself wrong, and for a form
             continue
         if isinstance(value, int | float | str):
             break  # a number alone, which stands for a law of one
@@ -210,6 +210,8 @@ def _told(kind: str, message: str, value: Any) -> str:
     """pydantic's words in those of a file: what it calls a tuple is a list in brackets, and neither a number in quotes nor nan is one."""
     if isinstance(value, float) and not np.isfinite(value):
         return "input should be a finite number"
+    if kind == "model_type":
+        return "input should be a table"
     if kind in ("tuple_type", "list_type"):
         return "input should be a list in brackets, as [1.0, 2.0]"
     if kind in ("float_type", "int_type") and isinstance(value, str) and value.replace(".", "", 1).strip().isdigit():

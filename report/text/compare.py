@@ -12,6 +12,8 @@ from thermospindle.diagnosis.compare.before_after import BeforeAfter
 from thermospindle.diagnosis.compare.compare import Comparison, PairedMode, TestComparison
 from thermospindle.diagnosis.compare.constant import constant_errors
 from thermospindle.diagnosis.compare.correlation import Band
+from thermospindle.diagnosis.prediction.partners import BELIEVABLE
+from thermospindle.model.errors import listed
 from thermospindle.model.units import RPM
 from thermospindle.report.text.grid import grid, show_grid
 from thermospindle.report.typeset import known
@@ -99,18 +101,21 @@ def verdict(c: Comparison) -> str:
     words = "agrees with the tests within their errors" if c.rms_residual < AGREES else "nearly agrees with the tests" if c.rms_residual < ALMOST else "does not agree with the tests"
     sentence = f"{c.spindle} {words}: rms residual {c.rms_residual:.3g} standard errors"
     every = [(t, m) for t in c.tests for m in t.modes]
-    if not every or c.rms_residual < AGREES:
+    if c.rms_residual < AGREES or not (every or any(t.missing for t in c.tests)):
         return f"{sentence}."
-    alone = max(abs(m.residual) for _, m in every)
+    alone = max((abs(m.residual) for _, m in every), default=0.0)
     if alone < c.rms_residual and not any(t.missing for t in c.tests):
         return f"{sentence}; {TOGETHER.format(alone)}."
+    if lost := [f"{f:.5g} Hz of {t.test.id}" for t in c.tests for f in t.missing]:
+        several = len(lost) > 1
+        sentence += f"; no computed mode is within {BELIEVABLE:.0%} of the measured one{'s' * several} at {listed(lost[:4])}{' and others' if len(lost) > 4 else ''}, which count{'' if several else 's'} as that much"
     alike = [(t, m) for t, m in every if not unlike(m)]
     if not alike:
         return f"{sentence}; no computed mode near a measured one has its shape."
     t, m = max(alike, key=lambda row: abs(row[1].residual))
     _, largest = far = max(alike, key=lambda row: abs(row[1].error))
     in_hertz = "" if largest is m else f"; in Hz it is {_mode(*far)} {_off(largest)}"
-    return f"{sentence}; furthest off in standard errors is {_mode(t, m)} {_off(m)} ({abs(m.residual):.3g} standard errors){in_hertz}."
+    return f"{sentence}; {'of the others ' if lost else ''}furthest off in standard errors is {_mode(t, m)} {_off(m)} ({abs(m.residual):.3g} standard errors){in_hertz}."
 
 
 MOST = 0.5  # of the squares of all errors, from which what is the same at all conditions is most of them

@@ -27,8 +27,9 @@ from thermospindle.report.verbs.answer import (
 )
 from thermospindle.sim.campaign.campaign import write_campaign
 from thermospindle.sim.campaign.simulated import runout_campaign
+from thermospindle.sim.effects import of_scene
 from thermospindle.sim.hammer.test import stages
-from thermospindle.sim.operating import doubts
+from thermospindle.sim.operating import doubts, operating_point
 from thermospindle.sim.run import Run
 from thermospindle.sim.run import run as whole_chain
 
@@ -120,6 +121,7 @@ def simulate(
             campaign = runout_campaign(spindle, conditions, seconds, element or LINEAR, seed, NM * noise_nm, progress=progress)
         odd, kind = sense.of_conditions(spindle, conditions), "runout tests"
     else:
+        _refuse_rattling(spindle, [Condition(t, speed_rpm * RPM) for t in steps])
         result = _virtual_tests(spindle, steps, speed_rpm, element, seed)
         campaign, odd, kind = text.campaign_of(result), _doubts(result, element), "tests"
     write_campaign(campaign, out)
@@ -162,6 +164,14 @@ def report(
 def _virtual_tests(spindle: Spindle, temperatures: Sequence[float], speed_rpm: float, element: str | None, seed: int) -> Run:
     with progress_bar(2 * len(temperatures) + stages(spindle.hammer, len(temperatures))) as progress:
         return whole_chain(spindle, temperatures, speed_rpm * RPM, element, seed, progress)
+
+
+def _refuse_rattling(spindle: Spindle, conditions: Sequence[Condition]) -> None:
+    """BadInput where no bearing is left in contact: what flies free and rattles has no FRFs that a campaign may hold."""
+    for c in conditions:
+        state = operating_point(spindle, c, of_scene(spindle)).state
+        if state.bearings and not state.linear and not any(b.in_contact for b in state.bearings):
+            raise BadInput(f"--temperatures {c.temperature:g}: {state.status} at {c.temperature:g} C: a spindle that rattles has no FRFs; allowed is where a bearing is in contact, as `spindle table` tells")
 
 
 def _write_impact(result: Run, folder: Path) -> None:

@@ -21,7 +21,7 @@ from thermospindle.report.progress import progress_bar
 from thermospindle.report.text.compare import comparison_json, show_before_after, show_comparison
 from thermospindle.report.text.runout_compare import runout_comparison_json, show_errors, show_runout_comparison
 from thermospindle.report.verbs.answer import Answer, answered, with_effects, write_json
-from thermospindle.sim.campaign.beside import left_out, of_another
+from thermospindle.sim.campaign.beside import doubtful, left_out
 from thermospindle.sim.campaign.campaign import Campaign, read_campaign
 
 
@@ -44,7 +44,7 @@ def compare(
     if turning and not tests.tests:
         values = {"spindle": spindle.name, "campaign": whole.title, **turning[0]}
         alone = write_json("comparison.json", lambda folder: _write(None, spindle, folder, *turning[2:], whole.title, name=whole.name))
-        return answered(values, turning[1], out, asked, alone, of_another(spindle, whole))
+        return answered(values, turning[1], out, asked, alone, doubtful(spindle, whole))
     with progress_bar((3 if earlier else 2) * len(tests.tests)) as progress:
         observed = observe(tests, spindle, progress)
         comparison = beside(spindle, tests, observed, progress)
@@ -63,7 +63,7 @@ def compare(
             turning[1](console)
 
     write = write_json("comparison.json", lambda folder: _write(comparison, spindle, folder, *(turning[2:] if turning else ()), name=whole.name))
-    return answered(values, show, out, asked, write, [*of_another(spindle, whole), *left_out(tests), *_beyond(comparison), *_louder(comparison)])
+    return answered(values, show, out, asked, write, [*doubtful(spindle, whole), *left_out(tests), *_beyond(comparison), *_louder(comparison)])
 
 
 def _beyond(c: Comparison) -> list[str]:

@@ -27,7 +27,7 @@ from thermospindle.report.text.diagnosis.answer import diagnosis_json
 from thermospindle.report.text.diagnosis.words import show_diagnosis
 from thermospindle.report.text.runout_diagnosis import runout_diagnosis_json, show_runout_diagnosis
 from thermospindle.report.verbs.answer import Answer, answered, with_effects, write_json
-from thermospindle.sim.campaign.beside import left_out, of_another
+from thermospindle.sim.campaign.beside import doubtful, left_out
 from thermospindle.sim.campaign.campaign import Campaign, read_campaign
 from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.effects.own import effect_of
@@ -55,7 +55,7 @@ def diagnose(
             write_json("diagnosis.json")(folder, answer)
             _write(None, answer, spindle, folder, of_runout, answer, name=whole.name)
 
-        return answered(told | where, show_runout, out, asked, alone, of_another(spindle, whole))
+        return answered(told | where, show_runout, out, asked, alone, doubtful(spindle, whole))
     with progress_bar([*[1.0] * len(tests.tests), *verdict.STEPS]) as progress:
         found = verdict.diagnose(spindle, tests, catalogue, progress)
     values = diagnosis_json(found) | where
@@ -73,7 +73,7 @@ def diagnose(
         write_json("diagnosis.json")(folder, answer)
         _write(found, answer, spindle, folder, *((turning[2], turning[0]) if turning else ()), name=whole.name)
 
-    return answered(values, show, out, asked, write, [*of_another(spindle, whole), *left_out(tests), *_found(found)])
+    return answered(values, show, out, asked, write, [*doubtful(spindle, whole), *left_out(tests), *_found(found)])
 
 
 def _found(found: verdict.Diagnosis) -> list[str]:
@@ -116,11 +116,12 @@ def draft(diagnosis: Path, name: str | None = None, element: str | None = None, 
         names = " and ".join(written.named)
         adding = f"spindle add SCENE {' '.join(written.named)} --from {shlex.quote(str(diagnosis))} --out NEW_SCENE"
         warnings.append(f"{diagnosis} names {names}, and nothing has to be drafted: {adding}; this draft is of {written.element}, which would have to drift instead")
+    fitted = f" --from {shlex.quote(str(diagnosis))}" if written.with_build else ""
     values = {"effect": called, "file": str(out), "equation": effect.equation, "parameters": effect.typical(), "warnings": warnings}
 
     def show(console: Console) -> None:
         console.print(f"{out}: {effect.title}; {effect.equation}" + ("" if written.doubt else f"; {written.fits}"))
-        console.print(f"Read it, edit it, then: spindle add SCENE {called} --effect {shlex.quote(str(out))} --from {shlex.quote(str(diagnosis))} --out NEW_SCENE")
+        console.print(f"Read it, edit it, then: spindle add SCENE {called} --effect {shlex.quote(str(out))}{fitted} --out NEW_SCENE")
 
     return Answer(values, show)
 

@@ -10,7 +10,7 @@ from rich.console import Console
 from thermospindle.diagnosis.ladder.ladder import ladder as climb
 from thermospindle.report.text.ladder_table import growing, ladder_json, show_ladder
 from thermospindle.report.verbs.answer import Answer, answered, with_effects, write_json
-from thermospindle.sim.campaign.beside import of_another
+from thermospindle.sim.campaign.beside import doubtful
 from thermospindle.sim.campaign.campaign import read_campaign
 from thermospindle.sim.effects import by_name
 
@@ -35,4 +35,4 @@ def ladder(
         write_ladder(found, folder)
 
     write = write_json("ladder.json", pictures)
-    return answered(ladder_json(found), lambda console: show_ladder(console, found), out, asked, write, of_another(spindle, tests))
+    return answered(ladder_json(found), lambda console: show_ladder(console, found), out, asked, write, doubtful(spindle, tests))

@@ -15,9 +15,12 @@ from matplotlib.figure import Figure
 from rich.console import Console
 
 from thermospindle.diagnosis.fleet import Fleet, apart
+from thermospindle.model import sense
 from thermospindle.model.files.formats import SCENE
+from thermospindle.model.machine import Condition
 from thermospindle.model.scene.fields import read_file
 from thermospindle.model.scene.reading import content_hash, scene_path
+from thermospindle.model.units import RPM
 from thermospindle.report.figures import study as figures
 from thermospindle.report.figures.common import save_all
 from thermospindle.report.figures.designs import compared
@@ -55,6 +58,7 @@ def study(file: Path, cluster: str | None = None, effect_files: Sequence[Path] =
         raw = read_file(SCENE, scene)
         check(asked, raw, scene, spindle, catalogue)
         of = cases(asked, raw, scene, spindle, catalogue)
+    doubts = [] if asked.kind == FLEET else sense.of_conditions(spindle, [Condition(t, n * RPM) for t in asked.temperatures or spindle.temperatures for n in (min(asked.speeds), max(asked.speeds))])
     scenes = ", ".join(s.name for s in spindles)
     place = Path("out") / asked.file.stem if out is None else Path(out)
     key: dict[str, Any] = {"study": asked.digest, "scene": content_hash(spindle), "effects": [digest(Path(f)) for f in effect_files]}
@@ -73,7 +77,7 @@ def study(file: Path, cluster: str | None = None, effect_files: Sequence[Path] =
         write(folder.path / SUMMARY, json.dumps(values, indent=1))
         save_all(drawn, folder.path, 140)
         write_study_log(spindles, values, table, drawn, folder.path / LOG)
-    values |= {"out": str(place), "parts": folder.count, "parts_found": there, "warnings": _warnings(values)}
+    values |= {"out": str(place), "parts": folder.count, "parts_found": there, "warnings": [*doubts, *_warnings(values)]}
 
     def show(console: Console) -> None:
         console.print(f"{asked.title}: {of.count} cases of {scenes}" + (f", {there} of {folder.count} parts found there" if there else ""))

@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from thermospindle.model import sense
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition, Point, Spindle
 from thermospindle.model.shaft import SAME_HEIGHT, Shaft
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.model.units import MM
-from thermospindle.sim.campaign.campaign import Campaign, Test
+from thermospindle.sim.campaign.campaign import Campaign, Test, condition_of
 from thermospindle.sim.identification.frf import POWER, Frf, out_of, without
 from thermospindle.sim.operating import OperatingPoint, operating_point
 
@@ -83,6 +84,11 @@ def beside(spindle: Spindle, points: tuple[Point, ...], test: Test, condition: C
         return None
     measured = without(test.frf, out_of(test.frf, test.speed).out | (test.frf.frequency <= 0))
     return Beside(test, measured, operating_point(measured_at(spindle, points, test), condition))
+
+
+def doubtful(spindle: Spindle, campaign: Campaign) -> list[str]:
+    """What is odd about a campaign before it is compared with a scene, a sentence each."""
+    return [*of_another(spindle, campaign), *sense.of_conditions(spindle, [condition_of(t) for t in campaign.tests])]
 
 
 def of_another(spindle: Spindle, campaign: Campaign) -> list[str]:

@@ -147,7 +147,7 @@ def checked(effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
         low, high = known[name].limits
         unit = "" if known[name].unit == "1" else f" {known[name].unit}"
         if not low <= value <= high:
-            raise BadInput(f"effect {effect.name}: {name} = {value:g}{unit}: allowed is {low:g} to {high:g}")
+            raise BadInput(f"effect {effect.name}: {name} = {value:.12g}{unit}: allowed is {low:g} to {high:g}")
         if known[name].choices and value != round(value):
             raise BadInput(f"effect {effect.name}: {name} = {value:g}: it counts or chooses; allowed are whole numbers from {low:g} to {high:g}")
     return effect.neutral() | dict(values)

@@ -17,7 +17,11 @@ from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any, SupportsIndex
 
+import numpy as np
+
+from thermospindle.model.bearing.pair import PairState
 from thermospindle.model.errors import BadInput, NoEquilibrium, OutsideRange
+from thermospindle.model.rotor.chain import RotorBase
 from thermospindle.sim.effects.effect import HOOKS, Effect
 
 GROUP = "thermospindle.effects"
@@ -38,7 +42,7 @@ class Guarded:
             answer = self.function(*arguments)
         except STATES:
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise BadInput(f"{_line(self.where, error, self.function)}: effect {self.effect}: its {self.hook} {_said(error)}") from None
         wanted, keys = HOOKS[self.hook], tuple(answer) if isinstance(answer, dict) else ()
         if not isinstance(answer, wanted):
@@ -47,7 +51,23 @@ class Guarded:
         if wanted is dict and set(keys) != set(arguments[-1]):
             said = f"returned the keys {', '.join(map(str, keys))}; it must return those it was given, {', '.join(arguments[-1])}"
             raise BadInput(f"{_line(self.where, None, self.function)}: effect {self.effect}: its {self.hook} {said}")
+        if said := _misshapen(answer):
+            raise BadInput(f"{_line(self.where, None, self.function)}: effect {self.effect}: its {self.hook} gives {said}")
         return answer
+
+
+def _misshapen(answer: Any) -> str:
+    """What of an answer's elements or bearings is no matrix that a chain can have; empty where all are."""
+    parts = [("element", e) for e in answer.elements] if isinstance(answer, RotorBase) else [("bearing", b) for b in answer.bearings] if isinstance(answer, PairState) else []
+    for what, part in parts:
+        for key in ("stiffness", "damping"):
+            try:
+                matrix = np.asarray(getattr(part, key))
+            except ValueError as error:  # rows of different length
+                return f"{what} {part.name!r} a {key} that is no matrix: {error}"
+            if matrix.shape != (5, 5) or matrix.dtype.kind not in "fiu":
+                return f"{what} {part.name!r} a {key} of shape {matrix.shape}, {matrix.dtype}; it must be (5, 5) real numbers"
+    return ""
 
 
 @dataclass(frozen=True)

@@ -318,6 +318,18 @@ def test_drafts_of_what_is_not_there_are_refused(slipping, tmp_path):
         draft(empty, "own")
 
 
+@pytest.mark.parametrize(("beside", "told"), [(["preload"], True), (["mount stiffness"], False)])
+def test_what_add_is_told_to_take_goes_with_the_draft(slipping, tmp_path, capsys, beside, told):
+    """The build tolerances of an answer only where they were fitted beside what is drafted: of another explanation `add` refuses them."""
+    _, _, answer = slipping
+    source = tmp_path / "d.json"
+    source.write_text(json.dumps(json.loads(answer.read_text()) | {"tolerances_beside": beside}), encoding="utf-8")
+    assert main(["draft", str(source), "--out", str(tmp_path / "own.py")]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert ("--from" in said) == told
+    assert "spindle add SCENE own --effect" in said
+
+
 def test_temperatures_beyond_a_law_are_drafted_too(tmp_path):
     """Found by `make torture`: the middle between 50 and 600 C lies outside the limits of the sigmoid's, from where no fit may start."""
     from tests.torture.wholes import diagnosis

@@ -131,6 +131,8 @@ def test_furthest_off_says_in_what(found):
     told = verdict(replace(found, tests=(replace(found.tests[0], modes=tuple(modes)),)))
     assert f"furthest off in standard errors is the {modes[0].kind} mode at {modes[0].measured:.0f} Hz of T20" in told
     assert f"({abs(modes[0].residual):.3g} standard errors); in Hz it is the {modes[1].kind} mode at {modes[1].measured:.0f} Hz of T20" in told
+    lost = verdict(replace(found, tests=(replace(found.tests[0], missing=(3000.0,)),)))
+    assert "no computed mode is within 8% of the measured one at 3000 Hz of T20, which counts as that much; of the others furthest off in standard errors is" in lost
     strange = tuple(replace(m, mac=0.0) for m in modes)
     assert "no computed mode near a measured one has its shape" in verdict(replace(found, tests=(replace(found.tests[0], modes=strange),)))
 

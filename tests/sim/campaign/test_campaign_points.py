@@ -13,7 +13,7 @@ from thermospindle.diagnosis.verdict import diagnose
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
-from thermospindle.sim.campaign.beside import beside, check_points, of_another
+from thermospindle.sim.campaign.beside import beside, check_points, doubtful, of_another
 from thermospindle.sim.campaign.campaign import Campaign, Test, read_campaign, write_campaign
 from thermospindle.sim.identification.frf import Frf
 
@@ -39,6 +39,13 @@ def test_a_campaign_of_another_name_without_a_point_of_the_scene_is_said_to_be(s
     own = replace(written(spindle), spindle="a copy")
     assert of_another(spindle, own) == []
     assert len(of_another(spindle, replace(own, points=()))) == 1
+
+
+def test_temperatures_that_no_spindle_bears_are_said_of_a_campaign(spindle):
+    own = written(spindle)
+    assert doubtful(spindle, own) == []
+    [said] = doubtful(spindle, replace(own, tests=(replace(own.tests[0], temperature=600.0),)))
+    assert said.startswith("600 C lies outside -40 to 120 C")
 
 
 def written(spindle):

@@ -3,6 +3,7 @@
 import json
 import pickle
 import re
+import subprocess
 import sys
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
@@ -44,6 +45,36 @@ def test_the_documentation_shows_the_file_whole_and_it_is_under_40_lines():
     page = (ROOT / "docs" / "site" / "own_effect.md").read_text(encoding="utf-8")
     assert "{literalinclude} ../air_film.py" in page
     assert len(TEXT.splitlines()) < 40
+
+
+@pytest.mark.parametrize(
+    ("matrices", "said"),
+    [
+        ("np.zeros((6, 6)), damping", "gives element 'air film' a stiffness of shape (6, 6), float64; it must be (5, 5) real numbers"),
+        ("np.zeros((5, 5)), 1j * damping", "gives element 'air film' a damping of shape (5, 5), complex128; it must be (5, 5) real numbers"),
+        ("[[1.0], [1.0, 2.0]], damping", "gives element 'air film' a stiffness that is no matrix"),
+        ("exit(3), damping", "raises SystemExit: 3"),
+    ],
+)
+def test_matrices_that_no_chain_has_are_one_sentence(tmp_path, capsys, matrices, said):
+    file = tmp_path / "film.py"
+    file.write_text(TEXT.replace("np.zeros((5, 5)), damping", matrices), encoding="utf-8")
+    assert main(["add", str(SCENE), "air_film", "--effect", str(file), "--out", str(tmp_path / "new")]) == 2
+    error = capsys.readouterr().err
+    assert re.search(r"film.py:\d+: effect air_film: its chain ", error)
+    assert said in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "new").exists()
+
+
+def test_what_an_effect_prints_is_no_part_of_the_answer(tmp_path):
+    """By itself, by what it starts, and in the processes that work for a verb: with --json standard output is one object."""
+    file = tmp_path / "film.py"
+    file.write_text(TEXT.replace("    c = values", "    print('in chain')\n    c = values") + "\nimport os\nprint('hello')\nos.system('echo sub')\n", encoding="utf-8")
+    command = [sys.executable, str(ROOT / "spindle.py"), "add", str(SCENE), "air_film", "--effect", str(file), "--out", str(tmp_path / "new"), "--json"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert json.loads(done.stdout)["added"][0]["effect"] == "air_film"
+    assert {"hello", "sub", "in chain"} <= {*done.stderr.splitlines()}
 
 
 def test_damping_of_the_film_from_reynolds_equation(film):
