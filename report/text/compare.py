@@ -102,13 +102,14 @@ def verdict(c: Comparison) -> str:
     sentence = f"{c.spindle} {words}: rms residual {c.rms_residual:.3g} standard errors"
     every = [(t, m) for t in c.tests for m in t.modes]
     if c.rms_residual < AGREES or not (every or any(t.missing for t in c.tests)):
-        return f"{sentence}."
+        turned = [f"{m.measured:.0f} Hz of {t.test.id}" for t, m in every if unlike(m)]
+        return f"{sentence}; but the shape measured at {_first(turned)} has nothing of the computed one (MAC below {UNLIKE:g})." if turned else f"{sentence}."
     alone = max((abs(m.residual) for _, m in every), default=0.0)
     if alone < c.rms_residual and not any(t.missing for t in c.tests):
         return f"{sentence}; {TOGETHER.format(alone)}."
     if lost := [f"{f:.5g} Hz of {t.test.id}" for t in c.tests for f in t.missing]:
         several = len(lost) > 1
-        sentence += f"; no computed mode is within {BELIEVABLE:.0%} of the measured one{'s' * several} at {listed(lost[:4])}{' and others' if len(lost) > 4 else ''}, which count{'' if several else 's'} as that much"
+        sentence += f"; no computed mode is within {BELIEVABLE:.0%} of the measured one{'s' * several} at {_first(lost)}, which count{'' if several else 's'} as that much"
     alike = [(t, m) for t, m in every if not unlike(m)]
     if not alike:
         return f"{sentence}; no computed mode near a measured one has its shape."
@@ -142,6 +143,11 @@ def constant_words(c: Comparison) -> str:
 def unlike(m: PairedMode) -> bool:
     """Whether the measured shape of a paired mode has nothing of the computed one."""
     return m.mac is not None and m.mac < UNLIKE
+
+
+def _first(places: Sequence[str]) -> str:
+    """Where, the first of many."""
+    return listed([*places[:4], *(["other places"] if len(places) > 4 else [])])
 
 
 def _mode(t: TestComparison, m: PairedMode) -> str:

@@ -131,6 +131,11 @@ def test_furthest_off_says_in_what(found):
     told = verdict(replace(found, tests=(replace(found.tests[0], modes=tuple(modes)),)))
     assert f"furthest off in standard errors is the {modes[0].kind} mode at {modes[0].measured:.0f} Hz of T20" in told
     assert f"({abs(modes[0].residual):.3g} standard errors); in Hz it is the {modes[1].kind} mode at {modes[1].measured:.0f} Hz of T20" in told
+    agreeing = [replace(t, missing=(), residuals=0 * t.residuals) for t in found.tests]
+    assert verdict(replace(found, tests=tuple(agreeing))).endswith("0 standard errors.")
+    agreeing[0] = replace(agreeing[0], modes=tuple(replace(m, mac=0.03 if k == 2 else m.mac) for k, m in enumerate(agreeing[0].modes)))
+    said = verdict(replace(found, tests=tuple(agreeing)))
+    assert f"; but the shape measured at {modes[2].measured:.0f} Hz of T20 has nothing of the computed one (MAC below 0.1)." in said
     lost = verdict(replace(found, tests=(replace(found.tests[0], missing=(3000.0,)),)))
     assert "no computed mode is within 8% of the measured one at 3000 Hz of T20, which counts as that much; of the others furthest off in standard errors is" in lost
     strange = tuple(replace(m, mac=0.0) for m in modes)
