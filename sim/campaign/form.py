@@ -77,7 +77,7 @@ class ModeTable(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)  # not strict: a CSV file holds text
     test: str
     mode: Annotated[int, BeforeValidator(plain_number), Field(ge=1, le=1000)]
-    kind: Name
+    kind: Annotated[Name, AfterValidator(str.lower)]  # modes are paired by it
     frequency_Hz: CellPositive
     frequency_sd_Hz: CellPositive
     damping_ratio: Annotated[float, BeforeValidator(plain_number), Field(gt=0, lt=1)] | None = None

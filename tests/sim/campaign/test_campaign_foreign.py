@@ -183,3 +183,10 @@ def test_papers_measured_modes_read() -> None:
     assert {m.frequency_sd for t in read.tests for m in t.modes} == {1.0}
     assert {m.damping_ratio for t in read.tests for m in t.modes} == {None}
     assert "assumed" in read.note
+
+
+def test_kinds_of_modes_may_be_written_with_capitals(tmp_path: Path) -> None:
+    """Modes are paired by them: `Axial` was paired with a rocking mode."""
+    for name in ("campaign.toml", "modes.csv"):
+        (tmp_path / name).write_text((SCENE / "measured" / "jang_2003" / name).read_text(encoding="utf-8").replace(",axial,", ",Axial,"), encoding="utf-8")
+    assert [m.kind for m in read_campaign(tmp_path).tests[0].modes] == ["axial", "axial", "rocking", "rocking", "axial"]
