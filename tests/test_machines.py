@@ -62,7 +62,7 @@ def test_refusals_are_one_sentence(words: str, why: str, capsys: pytest.CaptureF
 
 
 BROKEN = [
-    ('["front1", "front2", "front3"]', '["front1", "front1", "front3"]', "sets.front.bearings: 'front1' stands twice"),
+    ('["front1", "front2", "front3"]', '["front1", "front1", "front3"]', "sets.front.bearings = ['front1', 'front1', 'front3']: 'front1' stands twice; each may stand once"),
     ('["rear1", "rear2"]', '["rear1", "rear2", "front3"]', "bearings.front3: is in 2 sets (front, rear)"),
     ('["front1", "front2", "front3"]', '["front1", "front3"]', "bearings.front2: is in no set"),
     ('name = "nose_y"', 'name = "nose"', "measuring.points: name = 'nose' stands twice"),
