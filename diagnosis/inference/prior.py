@@ -105,10 +105,10 @@ def misjudged(model: CampaignModel, sizes: Mapping[str, float], moved: Array) ->
     conditions and each mechanism make of a mode, `moved` (1 + mechanisms, tests, 2, modes), a share is wrong, the same in all tests: `ACTION` times the relative error of the
     frequencies at least, or what was learned of either.
     """
-    if not moved.any():
-        return np.zeros((len(model.parameters), 0))
     least, kinds = ACTION * sizes.get(kinds_of.STIFFNESS, 0.0), (kinds_of.OF_CONDITIONS, *[kinds_of.ACTION] * (len(moved) - 1))
     shares = np.array([max(least, sizes.get(kind, 0.0)) for kind in kinds])
+    if not (shares.any() and moved.any()):
+        return np.zeros((len(model.parameters), 0))
     found = np.zeros((len(model.parameters), len(moved), *moved.shape[2:]))
     for i, q in enumerate(model.parameters):
         if q.kind in DRIFTING:
