@@ -175,7 +175,7 @@ THEORY = {
     "Equilibrium of the bearings": ("model.bearing.pair", "model.bearing.springs", "model.rotor.loaded"),
     "Rotor and base": ("model.rotor.chain", "model.rotor.beam", "model.rotor.modes"),
     "What excites a running spindle": ("model.bearing.kinematics", "sim.running.excitation"),
-    "The hammer test and its FRFs": ("sim.hammer.estimate", "sim.importing.records"),
+    "The hammer test and its FRFs": ("sim.hammer.estimate", "sim.importing.records.hits", "sim.importing.records.spectra"),
     "Poles of a measurement": ("sim.identification.poles", "sim.identification.modal", "sim.identification.running_lines"),
     "Measured beside computed": ("diagnosis.compare.compare",),
     "Lines, noise and evidence": ("diagnosis.data.lines", "diagnosis.data.window", "diagnosis.forward.record", "diagnosis.inference.evidence", "diagnosis.inference.search"),

@@ -17,7 +17,9 @@ from thermospindle.model.units import RPM
 from thermospindle.report.progress import progress_bar
 from thermospindle.report.verbs.answer import Answer, with_effects
 from thermospindle.sim.campaign.campaign import Campaign, write_campaign
-from thermospindle.sim.importing.assemble import campaign_of, check_tests, read, spoken, unanswered
+from thermospindle.sim.importing.asked import spoken, unanswered
+from thermospindle.sim.importing.assemble import campaign_of, read
+from thermospindle.sim.importing.checks import check_tests
 from thermospindle.sim.importing.mapping import MappingForm, read_mapping
 from thermospindle.sim.importing.measured import listed
 from thermospindle.sim.importing.places import misfits, shared

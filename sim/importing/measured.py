@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from thermospindle.model.machine import Point
 from thermospindle.model.types import Array
 
 FORCE_NEEDED = "answers alone, without the force that was hit with, are no measurement that can be used"
@@ -97,6 +98,25 @@ class Content:
     notes: tuple[str, ...] = ()
     questions: tuple[Question, ...] = ()
     names: tuple[str, ...] = ()  # of the columns or arrays that a mapping's `columns` may tell
+
+
+@dataclass(frozen=True, eq=False)
+class Read:
+    """All files as read: `tests` by id with the curves, modes, window and time before the hit of each, `notes`, and what is open."""
+
+    contents: tuple[Content, ...]
+    curves: dict[str, list[Curve]]
+    modes: dict[str, list[ModeLine]]
+    window: dict[str, float]
+    pretrigger: dict[str, float]
+    ends: tuple[tuple[str, End], ...]  # of what file, every end that is not placed
+    points: dict[int, Point]
+    notes: tuple[str, ...]
+    questions: tuple[Question, ...]
+
+    @property
+    def tests(self) -> list[str]:
+        return list(dict.fromkeys([*self.curves, *self.modes]))
 
 
 def words_of(question: Question, every: Mapping[str, Sequence[str]]) -> str:

@@ -10,10 +10,9 @@ from thermospindle.model.files.formats import CURRENT, KEY, MAPPING
 from thermospindle.model.machine import Spindle
 from thermospindle.model.units import MM
 from thermospindle.sim.campaign.form import in_unit, toml
-from thermospindle.sim.importing.assemble import Read
 from thermospindle.sim.importing.files.labels import ROLES
 from thermospindle.sim.importing.mapping import REST
-from thermospindle.sim.importing.measured import End, Question, listed
+from thermospindle.sim.importing.measured import End, Question, Read, listed
 from thermospindle.sim.importing.names import conditions_of, hit_at, plain, tests_of
 
 EXAMPLES = {"temperature_C": "20.0", "speed_rpm": "7200.0"}
