@@ -101,6 +101,7 @@ def test_two_runs_do_not_write_into_one_folder(tmp_path, capsys, undrawn):
         (DRAWN.replace("monte-carlo", "sweep") + '[vary]\n"bearing_pair.preload_N" = ["x"]\n', "preload_N = 'x'"),
         (DRAWN.replace("monte-carlo", "sweep") + '[vary]\n"structure.joints.flang.damping_ratio" = [0.1]\n', "did you mean flange"),
         (DRAWN.replace("monte-carlo", "sweep") + '[vary]\n"bearing_pair.preload_N" = {from = 12, to = 16, steps = 1}\n', "vary.bearing_pair.preload_N.steps = 1: input should be greater than or equal to 2"),
+        (DRAWN.replace("monte-carlo", "sweep") + '[vary]\n"bearing_pair.preload_N" = [12, 16, 12.0]\n', "vary: bearing_pair.preload_N: a value stands twice"),
         (DRAWN.replace("monte-carlo", "sweep") + '[vary]\n"bearing_pair.preload_N" = []\n', "vary.bearing_pair.preload_N = []: list should have at least 1 item"),
         (DRAWN.replace("monte-carlo", "sweep") + '[vary]\n"title.x" = [1]\n', "title.x names no single value"),
         (DRAWN.replace("monte-carlo", "sweep") + '[vary]\n"effects.bond_softenin.x" = [1]\n', "did you mean bond_softening"),

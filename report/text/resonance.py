@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
+from thermospindle.model.bearing.kinematics import Line
 from thermospindle.model.errors import listed
 from thermospindle.model.types import Array
 from thermospindle.model.units import RPM
@@ -168,10 +169,14 @@ def told(found: ResonanceMap) -> list[str]:
 
 
 def _line(c: Coincidence, bearings: Sequence[str] = ()) -> str:
-    order = f" of order {c.line.order}" if c.line.order else ""
-    names = [*dict.fromkeys(bearings)] or [c.line.bearing]
+    return _named(c.line, bearings)
+
+
+def _named(line: Line, bearings: Sequence[str] = ()) -> str:
+    order = f" of order {line.order}" if line.order else ""
+    names = [*dict.fromkeys(bearings)] or [line.bearing]
     where = f" of the {listed(names)} bearing{'s' * (len(names) > 1)}" if names[0] else ""
-    return f"{c.line.name} ({c.line.cause}{order}{where})"
+    return f"{line.name} ({line.cause}{order}{where})"
 
 
 def _mode(c: Coincidence) -> str:
@@ -183,18 +188,15 @@ def show_map(console: Console, found: ResonanceMap) -> None:
     for said in [*told(found), mapped(found)]:
         console.print(said, highlight=False)
     if not found.coincidences:
+        names = [*dict.fromkeys(_named(t.line) for t in found.lines)]
+        console.print(f"Lines on the map: {listed(names) or 'none'}; of {_whose(found)}.", highlight=False)
         return
     console.print()
     title = f"Coincidences from {found.temperatures[0]:g} to {found.temperatures[-1]:g} C, {found.speeds[0] / RPM:g} to {found.speeds[-1] / RPM:g} rpm, strongest first"
     columns = ("line", "wave", "bearing", "mode", "T\nC", "speed\nrpm", "f\nHz", "strong\nnm", "NRRO\nnm rms", "margin\n%")
     show_grid(console, title, columns, [_cells(c) for c in strongest(found.coincidences)[:SHOWN]], columns[:4], keys=4)
-    whose = (
-        "the scene's imperfections"
-        if found.drawn_from is None
-        else f"plausible imperfections (seed {found.drawn_from}; the scene names none)"
-    )
     console.print(
-        f"{len(found.coincidences)} in all. Strength: amplitude of the mode at the {looked_at(found.spindle)} under {whose}. "
+        f"{len(found.coincidences)} in all. Strength: amplitude of the mode at the {looked_at(found.spindle)} under {_whose(found)}. "
         f"NRRO: of all lines there, - where the line repeats every revolution and NRRO leaves it out. "
         f"Margin: of the line from the mode at {found.nominal.temperature:g} C, {found.nominal.speed / RPM:g} rpm.",
         highlight=False,
@@ -206,6 +208,10 @@ def show_map(console: Console, found: ResonanceMap) -> None:
             f"interpolated too: frequencies are off by {100 * i.frequency_error:.2g} % at most, strengths by {100 * i.largest_strength_error:.2g} %.",
             highlight=False,
         )
+
+
+def _whose(found: ResonanceMap) -> str:
+    return "the scene's imperfections" if found.drawn_from is None else f"plausible imperfections (seed {found.drawn_from}; the scene names none)"
 
 
 def _cells(c: Coincidence) -> list[str]:

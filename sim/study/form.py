@@ -83,6 +83,9 @@ class StudyForm(Table):
             values = getattr(self, key) or []
             if len(set(values)) < len(values):
                 raise ValueError(f"{key}: a value stands twice")
+        for key, values in self.vary.items():
+            if isinstance(values, list) and any(v in values[:i] for i, v in enumerate(values)):
+                raise ValueError(f"vary: {key}: a value stands twice")
         return self
 
 

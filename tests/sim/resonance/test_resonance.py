@@ -161,6 +161,11 @@ def test_a_sentence_tells_what_was_mapped(spindle, found):
     show_map(console, one)
     assert mapped(one) in console.export_text()
     assert "at 2 speeds, 3000 and 7200" in map_section(one)[1]
+    none, console = replace(one, coincidences=()), Console(record=True, width=3000, file=io.StringIO())
+    show_map(console, none)
+    assert "Lines on the map: " in (text := console.export_text())
+    assert one.lines[0].line.name in text
+    assert "of the scene's imperfections" in text if one.drawn_from is None else f"(seed {one.drawn_from}; the scene names none)" in text
 
 
 def test_help_says_which_speeds_are_mapped(capsys):
