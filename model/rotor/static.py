@@ -102,7 +102,7 @@ def rated(spindle: Spindle) -> bool:
 
 def rated_chain(spindle: Spindle, chain: RotorBase) -> RotorBase:
     """The chain with every bearing a spring of its rated radial stiffness from what turns to rigid ground, as catalogues and design
-    calculations have it: without tilt stiffness, coupling or housing. Bearings given by numbers keep theirs, to ground."""
+    calculations have it: without tilt stiffness, coupling or housing. Bearings given by numbers keep theirs, to ground; those between two turning parts stay between them."""
     ratings = {b.name: b for b in spindle.bearings}
     given = {b.name for b in spindle.linear_bearings} | {r.name for r in spindle.roller_bearings}
     turning = {b.name for b in chain.bodies if b.turns}
@@ -111,13 +111,13 @@ def rated_chain(spindle: Spindle, chain: RotorBase) -> RotorBase:
         if e.name not in ratings and e.name not in given:
             elements.append(e)
             continue
-        own = e.b if e.b in turning else e.a
+        own, other = (e.b, "ground") if e.a not in turning else (e.a, e.b if e.b in turning else "ground")
         stiffness = e.stiffness
         if e.name in ratings:
             radial = ratings[e.name].rated_stiffness or 0.0
             stiffness = np.diag([radial, radial, e.stiffness[2, 2], 0.0, 0.0])
         damping = e.damping * (stiffness[0, 0] / e.stiffness[0, 0] if e.stiffness[0, 0] else 1.0)
-        elements.append(replace(e, a=own, b="ground", stiffness=stiffness, damping=damping, slides=""))
+        elements.append(replace(e, a=own, b=other, stiffness=stiffness, damping=damping, slides=""))
     moved = {e.slides for e in chain.elements if e.slides}
     bodies = tuple(b for b in chain.bodies if b.name not in moved)
     return replace(chain, bodies=bodies, elements=tuple(e for e in elements if e.b not in moved))

@@ -117,15 +117,15 @@ def static(
 ) -> Answer:
     """Stiffness, bearing reactions and shares of the compliance for a unit force at every measuring point, along its direction, along the axis and the other way across it.
 
-    `bearings` rated: springs of the stiffness that the scene's bearings are rated at, to rigid ground, the default where all have one;
-    computed: what the program computes, in the spindle's own housing.
+    `bearings` rated: springs of the stiffness that the scene's bearings are rated at, to rigid ground, the default where all have one and any is a ball row;
+    computed: what the program computes, in the spindle's own housing, the default of others.
     """
     asked = dict(locals())
     spindle = _with_beam(with_effects(scene, effect_files)[0], beam)
     if bearings == RATED and not statics.rated(spindle):
         without = [b.name for b in spindle.bearings if b.rated_stiffness is None]
         raise BadInput(f"{spindle.file}: bearings.{without[0] if without else ''}: has no rated_radial_stiffness_N_per_um, which --bearings rated asks for")
-    chosen = bearings or (RATED if statics.rated(spindle) else COMPUTED)
+    chosen = bearings or (RATED if spindle.bearings and statics.rated(spindle) else COMPUTED)
     point = operating_point(spindle, Condition(temperature_or_reference(temperature, spindle), speed_rpm * RPM))
     chain = statics.rated_chain(spindle, point.chain) if chosen == RATED else point.chain
     answers = [statics.around(spindle, chain, p) for p in spindle.points]

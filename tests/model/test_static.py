@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import ROOT
+from tests.sim.running.test_two_rotors import TEXT as TWO_ROTORS
 from thermospindle.cli import main
 from thermospindle.model.bearing.pair import solve
 from thermospindle.model.bearing.row import reference_motion
@@ -76,6 +77,22 @@ def test_a_shaft_shares_an_axial_force_as_its_bearings_and_pieces_are_stiff(tmp_
     assert main(["static", str(file.parent), "--bearings", "computed"]) == 0
     rows = [line.split()[:2] for line in capsys.readouterr().out.split("Share")[0].splitlines() if re.match(r"(disc|middle|end)", line)]
     assert rows == [["disc", "+X"], ["disc", "axis"], ["disc_y", "+Y"], ["middle", "+X"], ["middle", "+Y"], ["middle", "axis"], ["end", "+X"], ["end", "+Y"], ["end", "axis"]]
+
+
+def test_bearings_given_by_numbers_lie_between_what_they_connect(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """An intershaft bearing of 5 N/um to a drum on 10 N/um: at the drum the two rotors' springs share the force, however bearings are taken; the drum is no ground."""
+    (tmp_path / "spindle.toml").write_text(TWO_ROTORS.replace('table = "rear.csv"', "radial_stiffness_N_per_um = 30.0"), encoding="utf-8")
+    answers = {}
+    for words in ([], ["--bearings", "computed"], ["--bearings", "rated"]):
+        assert main(["static", str(tmp_path), "--json", *words]) == 0
+        answers[" ".join(words)] = json.loads(capsys.readouterr().out)
+    assert answers[""]["bearings"] == "computed"
+    for point in ("tip", "drum"):
+        own = answers[""]["points"][point]
+        assert abs(own["reactions_N"]["between"]) > 1e-3
+        assert own["stiffness_N_per_m"] == answers["--bearings computed"]["points"][point]["stiffness_N_per_m"]
+    # of standing bearings given by numbers, to ground as they are here, nothing else is rated
+    assert answers["--bearings rated"]["points"]["tip"]["stiffness_N_per_m"] == pytest.approx(answers[""]["points"]["tip"]["stiffness_N_per_m"], rel=1e-9)
 
 
 def test_across_a_radial_load_a_little_more_load_moves_the_nose_by_the_compliance_told() -> None:
