@@ -1,8 +1,12 @@
 """How fast cage and balls turn, and at which frequencies a running spindle is excited.
 
-Rolling without slip at both races (Harris, *Rolling Bearing Analysis*, 3rd ed., ch. 8): with gamma = d cos(angle) / D
+Rolling without slip at both races, and no spin at the outer one (Harris, *Rolling Bearing Analysis*, 3rd ed., ch. 8), as the balls of
+`heavy_ball` orbit: with gamma = d / D, and a_i, a_o the contact angles, which ball inertia parts at speed,
 
-    cage = inner (1 - gamma) / 2 + outer (1 + gamma) / 2,      spin = |outer - inner| D (1 - gamma^2) / (2 d).
+    cage = outer - (outer - inner) (1 - gamma cos a_i) / (1 + cos(a_i - a_o)),      spin = |outer - cage| (1 + gamma cos a_o) / gamma,
+
+the spin being that of rolling on the outer race. With a_i = a_o = a this is cage = inner (1 - gamma cos a) / 2 + outer (1 + gamma cos a) / 2
+and spin = |outer - inner| (1 - gamma^2 cos^2 a) / (2 gamma).
 
 A ball row sums what happens at its Z contacts, with e^(i azimuth) across the axis and with 1 along it, so that a race wave of order n
 is felt across the axis only where n + 1 or n - 1 is a multiple of Z, and along it only where n is; all other orders cancel exactly.
@@ -98,19 +102,15 @@ CAUSES = ("unbalance", "inner waviness", "outer waviness", "ball waviness", "bal
 def kinematics(
     bearing: BearingState, balls: int, ball_diameter: float, pitch_diameter: float, inner_speed: float, outer_speed: float
 ) -> Kinematics:
-    """Cage and ball speeds of a row at its operating contact angle (diameters in m, speeds in rad/s).
-
-    Where ball inertia makes the inner and outer contact angles differ, their mean is taken.
-    """
-    angle = (bearing.contact_angle + bearing.outer_contact_angle) / 2
-    return rolling(angle, balls, ball_diameter / pitch_diameter, inner_speed, outer_speed)
+    """Cage and ball speeds of a row at its operating contact angles (diameters in m, speeds in rad/s)."""
+    return rolling((bearing.contact_angle, bearing.outer_contact_angle), balls, ball_diameter / pitch_diameter, inner_speed, outer_speed)
 
 
-def rolling(angle: float, balls: int, ratio: float, inner_speed: float, outer_speed: float, angled: bool = True) -> Kinematics:
-    """Speeds of rolling elements without slip at a contact `angle` (rad), `ratio` their diameter over the pitch diameter."""
-    gamma = ratio * np.cos(angle)
-    cage = (inner_speed * (1 - gamma) + outer_speed * (1 + gamma)) / 2
-    spin = abs(outer_speed - inner_speed) * (1 - gamma**2) / (2 * ratio)
+def rolling(angles: tuple[float, float], balls: int, ratio: float, inner_speed: float, outer_speed: float, angled: bool = True) -> Kinematics:
+    """Speeds of rolling elements without slip at contact `angles` (rad) with the inner and the outer race, `ratio` their diameter over the pitch diameter."""
+    a_i, a_o = angles
+    cage = outer_speed - (outer_speed - inner_speed) * (1 - ratio * np.cos(a_i)) / (1 + np.cos(a_i - a_o))
+    spin = abs(outer_speed - cage) * (1 + ratio * np.cos(a_o)) / ratio
     return Kinematics(inner_speed, outer_speed, float(cage), float(spin), balls, angled)
 
 
@@ -120,7 +120,7 @@ def row_kinematics(spindle: Spindle, state: PairState) -> dict[str, Kinematics]:
     def of(b: Bearing | RollerBearing) -> Kinematics:
         inner, outer = ring_speeds(spindle, b, state.condition.speed)
         if isinstance(b, RollerBearing):
-            return rolling(0.0, b.rollers, b.roller_diameter / b.pitch_diameter, inner, outer, angled=False)
+            return rolling((0.0, 0.0), b.rollers, b.roller_diameter / b.pitch_diameter, inner, outer, angled=False)
         return kinematics(state.bearing(b.name), b.balls, b.ball_diameter, b.pitch_diameter, inner, outer)
 
     return {b.name: of(b) for b in spindle.rolling}

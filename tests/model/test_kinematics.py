@@ -15,7 +15,8 @@ from thermospindle.model.bearing.kinematics import (
     race_line,
     row_kinematics,
 )
-from thermospindle.model.bearing.row import ring_speeds
+from thermospindle.model.bearing.pair import solve
+from thermospindle.model.bearing.row import reference_motion, ring_speeds
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
 
@@ -50,6 +51,20 @@ def test_balls_roll_without_slip(cold, inner, outer):
     assert (inner - kin.cage) * (pitch / 2 - reach) == pytest.approx(-spin, rel=1e-12)
     assert (outer - kin.cage) * (pitch / 2 + reach) == pytest.approx(spin, rel=1e-12)
     assert kin.over_inner + kin.over_outer == pytest.approx(10 * abs(outer - inner), rel=1e-12)
+
+
+def test_the_cage_of_heavy_balls_is_that_of_their_equilibrium(spindle):
+    """At 60000 rpm the contact angles are 21 degrees apart; the cage turns as that orbit does whose centrifugal force parts them, and slower than at their mean."""
+    heavy, condition = replace(spindle, ball_inertia=1.0), Condition(20.0, 60000 * RPM)
+    state = solve(heavy, condition, {b.name: reference_motion(20.0) for b in heavy.bearings})
+    b, kin = state.bearing("upper"), row_kinematics(heavy, state)["upper"]
+    assert abs(b.outer_contact_angle - b.contact_angle) > np.radians(1)
+    outer, inner = ((float(np.cos(a)), float(np.sin(a))) for a in (b.outer_contact_angle, b.contact_angle))
+    assert kin.cage == pytest.approx(b.row.inertia.orbit(outer, inner).speed, rel=1e-12)
+    gamma = 1.588 / 9.1
+    assert kin.spin * gamma == pytest.approx(abs(kin.outer - kin.cage) * (1 + gamma * outer[0]), rel=1e-12)  # the outer race's surface is the ball's
+    middle = (1 + gamma * np.cos((b.contact_angle + b.outer_contact_angle) / 2)) / 2 * kin.outer
+    assert abs(kin.cage / middle - 1) > 1e-3
 
 
 def test_ring_that_turns(spindle):
