@@ -14,6 +14,7 @@ import numpy as np
 import scipy
 
 from thermospindle.model.bearing import ball_row, roller
+from thermospindle.model.bearing.definitions import BearingSet
 from thermospindle.model.bearing.pair import BearingState, PairState, damping_time
 from thermospindle.model.bearing.roller import RollerState
 from thermospindle.model.errors import NoEquilibrium
@@ -25,6 +26,8 @@ from thermospindle.model.types import Array
 SMALL = 1e-9
 """Of the load, what may be left of the balance."""
 MOST_STEPS = 60
+SLACK = 1.0
+"""Rate (N/m) of a spring that keeps its force: a tenth of a millimetre changes that by 1e-4 N."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +45,8 @@ class _Row:
 def loaded(spindle: Spindle, state: PairState) -> PairState:
     """The state with its rows where the scene's radial load displaces them; the state itself where there is none.
 
-    Stiffness is the tangent there, forces those of the most loaded ball or roller. Rings on a spring with a rate slide, without friction, as far as
-    their rows push them. Raises `NoEquilibrium` where nothing bears the load.
+    Stiffness is the tangent there, forces those of the most loaded ball or roller. Rings on a spring slide, without friction, as far as their rows
+    push them. Raises `NoEquilibrium` where nothing bears the load.
     """
     if not any(spindle.radial_load):
         return state
@@ -65,11 +68,13 @@ def motion(spindle: Spindle, state: PairState) -> tuple[RotorBase, Array]:
 
 
 def _rings_apart(spindle: Spindle) -> Spindle:
-    """With every ring on a spring with a rate as a body of its own, of some mass, which no balance asks for."""
+    """With every ring on a spring as a body of its own, of some mass, which no balance asks for; one without a rate keeps its force, and has next to none."""
     mass = float(np.median([b.mass for b in spindle.structure.bodies]))
-    springs = [s.spring for s in spindle.sets]
-    sets = [s if spring is None or spring.rate is None or spring.mass > 0 else replace(s, spring=replace(spring, mass=mass)) for s, spring in zip(spindle.sets, springs, strict=True)]
-    return replace(spindle, sets=tuple(sets))
+
+    def free(s: BearingSet) -> BearingSet:
+        return s if s.spring is None else replace(s, spring=replace(s.spring, rate=s.spring.rate or SLACK, mass=s.spring.mass or mass))
+
+    return replace(spindle, sets=tuple(free(s) for s in spindle.sets))
 
 
 def _ball(chain: RotorBase, b: BearingState) -> _Row:

@@ -154,14 +154,18 @@ def on_spring(rate: float | None, mass: float = 0.0) -> Spindle:
 
 
 def test_a_ring_on_a_spring_slides_under_the_load() -> None:
-    """A soft spring keeps its force: each row has the 16 N it was set to. One without end stiff is a fixed ring, which the rows' own axial push under a radial load
-    makes 16.5 N. Between them the spring's force goes with how far the ring slid."""
-    [_, fixed], [_, soft], [_, stiff] = (under(on_spring(rate), (20.0, 5.0), 0.01) for rate in (None, 1.0, 1e12))
-    for a, b, c in zip(fixed.bearings, stiff.bearings, soft.bearings, strict=True):
-        assert b.preload == pytest.approx(a.preload, rel=1e-5)
-        assert b.stiffness == pytest.approx(a.stiffness, rel=1e-4, abs=1e-6 * np.abs(a.stiffness).max())
-        assert a.preload > 16.4
-        assert c.preload == pytest.approx(16.0, rel=1e-6)
+    """A spring without a rate keeps its force: each row has the 16 N it was set to, as with a soft one. One without end stiff is a fixed ring, which the rows' own axial push under a radial
+    load makes 16.5 N. Between them the spring's force goes with how far the ring slid."""
+    free, soft, stiff, stiffer = (under(on_spring(rate), (20.0, 5.0), 0.01)[1].bearings for rate in (None, 1.0, 1e12, 1e13))
+    fixed = under(replace(on_spring(None), sets=tuple(replace(s, spring=None) for s in on_spring(None).sets)), (20.0, 5.0), 0.01)[1].bearings
+    for a, b, c, d, e in zip(free, soft, stiff, stiffer, fixed, strict=True):
+        assert a.preload == pytest.approx(16.0, rel=1e-6)
+        assert b.preload == pytest.approx(16.0, rel=1e-6)
+        assert a.stiffness == pytest.approx(b.stiffness, rel=1e-6, abs=1e-6 * np.abs(b.stiffness).max())
+        assert c.preload == pytest.approx(d.preload, rel=1e-5)
+        assert c.preload == pytest.approx(e.preload, rel=1e-5)
+        assert c.stiffness == pytest.approx(e.stiffness, rel=1e-4, abs=1e-6 * np.abs(e.stiffness).max())
+        assert e.preload > 16.4
     rate = 2e6
     pushed, state = under(on_spring(rate), (20.0, 5.0), 0.01)
     lower, upper = state.bearings
