@@ -227,6 +227,13 @@ def check_structure(file: Path, spindle: Spindle) -> None:
                 raise BadInput(
                     f"{file}: structure.joints.{joint.name}.between: {name!r} is no body; allowed are ground, {', '.join(spindle.structure.parts)}"
                 )
+        turning = [name != "ground" and spindle.structure.body(name).turns for name in joint.bodies]
+        for key, across in (("lateral_stiffness_N_per_m", joint.stiffness[:2]), ("tilt_stiffness_N_m_per_rad", joint.stiffness[3:])):
+            if all(turning) and across[0] != across[1]:
+                raise BadInput(
+                    f"{file}: structure.joints.{joint.name}.{key} = {list(across)}: a joint of two turning parts that is stiffer one way than the other turns with them, and here stiffness "
+                    "stands still; allowed are two values alike"
+                )
     nodes = [p.node for p in spindle.points]
     for point in spindle.points:
         if nodes.count(point.node) > 1:
