@@ -17,7 +17,7 @@ import numpy as np
 from thermospindle.model.bearing.definitions import Bearing, BearingSet, LinearBearing, RollerBearing
 from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.errors import BadInput
-from thermospindle.model.material import Law, Material
+from thermospindle.model.material import Material, Viscosity
 from thermospindle.model.structure import Body, Structure
 
 PARTS = ("stationary", "rotating")
@@ -111,7 +111,7 @@ class Friction:
 
     f0: float
     f1: float
-    viscosity: Law  # kinematic, m2/s
+    viscosity: Viscosity  # kinematic, m2/s
     conductance: float  # W/K through one bearing
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from dataclasses import dataclass
+from math import log10
 
 import numpy as np
 
@@ -14,20 +15,11 @@ BEYOND = 0.01  # K, to which a law goes on straight beyond its ends: computed te
 
 
 @dataclass(frozen=True)
-class Law:
-    """A material property over temperature: piecewise linear between `temperature` (C), constant when there is one entry."""
+class Entries:
+    """Values of a property at rising temperatures (C)."""
 
     temperature: tuple[float, ...]
     value: tuple[float, ...]
-
-    def __call__(self, temperature: float) -> float:
-        if len(self.value) == 1:
-            return self.value[0]
-        if not self.temperature[0] - BEYOND <= temperature <= self.temperature[-1] + BEYOND:
-            self.check(temperature)
-        k = min(max(bisect_right(self.temperature, temperature), 1), len(self.value) - 1)
-        (start, end), (first, last) = self.temperature[k - 1 : k + 1], self.value[k - 1 : k + 1]
-        return first + (temperature - start) / (end - start) * (last - first)
 
     def check(self, temperature: float | Array) -> None:
         """OutsideRange where one of some temperatures (C) lies further than `BEYOND` from a law of several entries."""
@@ -35,6 +27,24 @@ class Law:
         if not (low - BEYOND <= least and most <= high + BEYOND):
             asked = f"at {least:.6g} C" if least == most else f"from {least:.6g} to {most:.6g} C"
             raise OutsideRange(f"a material law given from {low:g} to {high:g} C was asked {asked}")
+
+    def _after(self, temperature: float) -> int:
+        """The entry up to which a temperature reaches from the one before."""
+        return min(max(bisect_right(self.temperature, temperature), 1), len(self.value) - 1)
+
+
+@dataclass(frozen=True)
+class Law(Entries):
+    """A material property over temperature: piecewise linear between its entries, constant when there is one."""
+
+    def __call__(self, temperature: float) -> float:
+        if len(self.value) == 1:
+            return self.value[0]
+        if not self.temperature[0] - BEYOND <= temperature <= self.temperature[-1] + BEYOND:
+            self.check(temperature)
+        k = self._after(temperature)
+        (start, end), (first, last) = self.temperature[k - 1 : k + 1], self.value[k - 1 : k + 1]
+        return first + (temperature - start) / (end - start) * (last - first)
 
     def integral(self, start: float, stop: float) -> float:
         """Integral of the property from `start` to `stop` (C), exact for the piecewise linear law."""
@@ -44,6 +54,23 @@ class Law:
         knots = [low, *[t for t in self.temperature if low < t < high], high]
         area = float(np.trapezoid([self(t) for t in knots], knots))
         return area if stop >= start else -area
+
+
+LEAST_VISCOSITY = 0.35e-6  # m2/s; log10 log10 (nu + 0.7 mm2/s) ends at 0.3 mm2/s
+
+
+@dataclass(frozen=True)
+class Viscosity(Entries):
+    """Kinematic viscosity (m2/s) of an oil, at least `LEAST_VISCOSITY`: between its entries log10 log10 (nu + 0.7) is linear in log10 T, nu in mm2/s and T in K (ASTM D341)."""
+
+    def __call__(self, temperature: float) -> float:
+        if len(self.value) == 1:
+            return self.value[0]
+        self.check(temperature)
+        k = self._after(temperature)
+        start, end, asked = (log10(t + 273.15) for t in (*self.temperature[k - 1 : k + 1], temperature))
+        first, last = (log10(log10(1e6 * v + 0.7)) for v in self.value[k - 1 : k + 1])
+        return 1e-6 * (float(10 ** 10 ** (first + (asked - start) / (end - start) * (last - first))) - 0.7)
 
 
 @dataclass(frozen=True)

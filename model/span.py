@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from thermospindle.model.machine import Law, Spindle
+from thermospindle.model.machine import Spindle
+from thermospindle.model.material import Entries
 
 ABSOLUTE_ZERO = -273.15  # C
 
@@ -14,7 +15,7 @@ def temperature_range(spindle: Spindle, lubricant: bool = True) -> tuple[float, 
     viscosity, which friction and films ask for; `lubricant` False leaves that out. A finite difference must stay inside: one-sided at
     either end. Empty (low > high) where two laws have no temperature in common.
     """
-    laws = [law for name in spindle.used_materials for law in (spindle.materials[name].youngs_modulus, spindle.materials[name].thermal_expansion)]
+    laws: list[Entries] = [law for name in spindle.used_materials for law in (spindle.materials[name].youngs_modulus, spindle.materials[name].thermal_expansion)]
     laws += [spindle.thermal.friction.viscosity] if lubricant else []
     spans = [_span(law) for law in laws]
     return max(low for low, _ in spans), min(high for _, high in spans)
@@ -30,5 +31,5 @@ def inside(temperature: float, reach: float, spindle: Spindle) -> tuple[float, f
     return max(start, low), min(start + reach, high)
 
 
-def _span(law: Law) -> tuple[float, float]:
+def _span(law: Entries) -> tuple[float, float]:
     return (ABSOLUTE_ZERO, float("inf")) if len(law.value) == 1 else (law.temperature[0], law.temperature[-1])

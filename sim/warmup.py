@@ -26,7 +26,7 @@ from thermospindle.sim.effects import of_scene
 from thermospindle.sim.effects.effect import Effect, Values
 from thermospindle.sim.identification.pairing import follow
 from thermospindle.sim.operating import OperatingPoint, drawing, operating_point
-from thermospindle.thermal import conduction, heat
+from thermospindle.thermal import conduction, friction, heat
 from thermospindle.thermal.influence import influence
 from thermospindle.thermal.readout import Reading, reading
 
@@ -112,7 +112,7 @@ def warm_up(
     machine = _Machine(spindle, speed, effects, reading(model))
 
     def drive(_: float, nodal: Array) -> heat.Running:
-        return heat.Running(air, speed, machine.point(nodal).state.loads)
+        return heat.Running(air, speed, friction.loads(spindle, machine.point(nodal).state))
 
     try:
         field = heat.settled(model, lambda nodal: drive(0.0, nodal), start)
@@ -159,11 +159,11 @@ class _Machine:
     def moment(self, nodal: Array) -> Moment:
         model, point = self.read.model, self.point(nodal)
         names = [b.name for b in model.spindle.ringed]
-        friction = heat.friction_heat(model, nodal, heat.Running(0.0, self.speed, point.state.loads))
+        made = heat.friction_heat(model, nodal, heat.Running(0.0, self.speed, friction.loads(self.spindle, point.state)))
         return Moment(
             self.read.region_means(nodal),
             dict(zip(names, (model.bearing @ nodal).tolist(), strict=True)),
-            dict(zip(names, friction.tolist(), strict=True)),
+            dict(zip(names, made.tolist(), strict=True)),
             point,
         )
 

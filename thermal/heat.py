@@ -15,7 +15,7 @@ import numpy as np
 from scipy.sparse import csc_array, csr_array
 from scipy.sparse.linalg import SuperLU, eigsh, splu
 
-from thermospindle.model.bearing.roller import reference_loads
+from thermospindle.model.bearing.row import relative_speed
 from thermospindle.model.errors import NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Spindle
 from thermospindle.thermal import friction
@@ -46,7 +46,7 @@ class NotSettled(NoEquilibrium):
 
 @dataclass(frozen=True)
 class Running:
-    """What drives the temperature: chamber air (C), speed (rad/s), axial load of every bearing (N, by name)."""
+    """What drives the temperature: chamber air (C), speed (rad/s), the load of every bearing (N, by name) that `friction.loads` tells."""
 
     air: float
     speed: float
@@ -97,7 +97,7 @@ class History:
 
 def running(spindle: Spindle, air: float, speed: float, loads: Mapping[str, float] | None = None) -> Running:
     """Running conditions; bearings carry the loads of the reference state unless `loads` says else."""
-    return Running(air, speed, reference_loads(spindle) if loads is None else dict(loads))
+    return Running(air, speed, friction.loads(spindle) if loads is None else dict(loads))
 
 
 def steady(model: HeatModel, drive: Running) -> TemperatureField:
@@ -285,8 +285,13 @@ def friction_heat(model: HeatModel, nodal: np.ndarray, drive: Running) -> np.nda
     """Friction heat (W) of every bearing at nodal temperatures."""
     if not drive.speed:
         return np.zeros(len(model.spindle.ringed))
-    law, bearings = model.spindle.thermal.friction, zip(model.spindle.ringed, model.bearing @ nodal, strict=True)
-    return np.array([friction.heat(law, b, drive.speed, float(t), drive.loads[b.name]) for b, t in bearings])
+    bearings = zip(model.spindle.ringed, _relative(model, drive), model.bearing @ nodal, strict=True)
+    return np.array([friction.heat(model.spindle.thermal.friction, b, speed, float(t), drive.loads[b.name]) for b, speed, t in bearings])
+
+
+def _relative(model: HeatModel, drive: Running) -> list[float]:
+    """Speeds (rad/s) of the rings of every bearing against each other."""
+    return [relative_speed(model.spindle, b, drive.speed) for b in model.spindle.ringed]
 
 
 def _outer_load(model: HeatModel, drive: Running) -> np.ndarray:
@@ -307,4 +312,4 @@ def _factors(model: HeatModel, h: float) -> tuple[SuperLU, np.ndarray]:
 
 def _bearing_heat(model: HeatModel, cold: np.ndarray, gain: np.ndarray, drive: Running) -> np.ndarray:
     """Friction heat H (bearings,) with t = cold + gain H(t), t the bearing temperatures."""
-    return friction.balanced(model.spindle.thermal.friction, model.spindle.ringed, drive.speed, drive.loads, cold, gain)
+    return friction.balanced(model.spindle.thermal.friction, model.spindle.ringed, _relative(model, drive), drive.loads, cold, gain)

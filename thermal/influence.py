@@ -14,7 +14,8 @@ from functools import lru_cache, partial
 
 import numpy as np
 
-from thermospindle.model.machine import Bearing, Law, Region, RollerBearing, Spindle
+from thermospindle.model.machine import Bearing, Region, RollerBearing, Spindle
+from thermospindle.model.material import Law
 from thermospindle.thermal import store
 from thermospindle.thermal.elastic import Elasticity, Race, Response, Solid
 from thermospindle.thermal.mesh import PartMesh, tiled

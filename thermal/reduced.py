@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 from skfem import Basis
 
-from thermospindle.model.machine import Law
+from thermospindle.model.material import Law
 from thermospindle.thermal.elastic import Elasticity, Race, Response, Solid, dilatation
 from thermospindle.thermal.mesh import PartMesh
 from thermospindle.thermal.refine import largest_motion

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from skfem import Basis, LinearForm
 
-from thermospindle.model.machine import Law, Material, Spindle
+from thermospindle.model.machine import Material, Spindle
+from thermospindle.model.material import Law
 from thermospindle.thermal.mesh import PartMesh, element
 
 

@@ -90,11 +90,6 @@ class PairState:
         return next(b for b in self.all_bearings if b.name == name)
 
     @property
-    def loads(self) -> dict[str, float]:
-        """Load (N) on which friction depends, by bearing: preload of ball rows, sum of the contact loads of rollers."""
-        return {b.name: b.preload for b in self.bearings} | {name: b.load for name, b in self.rollers.items()}
-
-    @property
     def rollers(self) -> dict[str, RollerState]:
         """The roller bearings by name."""
         return {b.name: b for b in self.linear if isinstance(b, RollerState)}

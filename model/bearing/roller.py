@@ -135,9 +135,3 @@ def state_at(spindle: Spindle, b: RollerBearing, row: RollerRow, displacement: A
     damping = 2 * b.damping_ratio / (2 * np.pi * spindle.structure.damping_frequency) * answer.tangent
     loads = answer.roller_force
     return RollerState(b.name, b.z, answer.tangent, damping, row.clearance, float(loads.sum()), float(loads.max()), row)
-
-
-def reference_loads(spindle: Spindle) -> dict[str, float]:
-    """Load (N) on which friction depends, by bearing, at the reference temperature: preload, and the rollers' contact loads."""
-    rollers = {b.name: roller_state(spindle, b, None, spindle.reference_temperature).load for b in spindle.roller_bearings}
-    return {b.name: b.preload for b in spindle.bearings} | rollers

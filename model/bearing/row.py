@@ -105,3 +105,9 @@ def ring_speeds(spindle: Spindle, b: Bearing | RollerBearing, speed: float) -> t
         return body.speed_ratio * speed if body.turns else 0.0
 
     return of(b.inner_body), of(b.outer_body)
+
+
+def relative_speed(spindle: Spindle, b: Bearing | RollerBearing, speed: float) -> float:
+    """Speed (rad/s, not negative) of the rings of a bearing against each other: what its rolling elements and its lubricant know of the spindle's `speed`."""
+    inner, outer = ring_speeds(spindle, b, speed)
+    return abs(inner - outer)

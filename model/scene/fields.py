@@ -13,9 +13,9 @@ from unicodedata import category
 import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, Strict, ValidationError, model_validator
 
-from thermospindle.model import machine as m
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.formats import CURRENT, migrated
+from thermospindle.model.material import Law
 
 LARGEST, SMALLEST = 1e15, 1e-15  # of any number of a file: products of a few stay within what can be computed with
 
@@ -107,8 +107,8 @@ class LawTable(BaseModel):
             raise ValueError("temperature_C must rise and have as many entries as value")
         return self
 
-    def law(self, unit: float) -> m.Law:
-        return m.Law(tuple(self.temperature_C), tuple(unit * v for v in self.value))
+    def law(self, unit: float) -> Law:
+        return Law(tuple(self.temperature_C), tuple(unit * v for v in self.value))
 
 
 def _constant(value: Any) -> Any:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from thermospindle.model import machine as m
+from thermospindle.model.material import LEAST_VISCOSITY, Viscosity
 from thermospindle.model.scene.fields import LawTable, LawValue, Name, NotNegative, Positive, Table, Temperature, TwoNames
 from thermospindle.model.units import RPM
 
@@ -43,6 +44,16 @@ class Friction(Table):
     kinematic_viscosity_mm2_per_s: LawValue = BASE_OIL
     conductance_W_per_K: NotNegative = 0.05
 
+    @model_validator(mode="after")
+    def _an_oil(self) -> Friction:
+        if (least := min(self.kinematic_viscosity_mm2_per_s.value)) < 1e6 * LEAST_VISCOSITY:
+            raise ValueError(f"kinematic_viscosity_mm2_per_s: {least:g} mm2/s; the law between its temperatures (ASTM D341) allows {1e6 * LEAST_VISCOSITY:g} and more")
+        return self
+
+    def viscosity(self) -> Viscosity:
+        law = self.kinematic_viscosity_mm2_per_s.law(1e-6)
+        return Viscosity(law.temperature, law.value)
+
 
 STILL_AIR, MOVED_AIR = 10.0, 40.0  # W/(m2 K): free convection from standing faces, and that of a face that turns
 
@@ -72,6 +83,6 @@ class Thermal(Table):
             ),
             gaps=tuple(m.AirGap(regions=g.regions, coefficient=g.coefficient_W_per_m2_K) for g in self.gaps),
             friction=m.Friction(
-                f0=f.f0, f1=f.f1, viscosity=f.kinematic_viscosity_mm2_per_s.law(1e-6), conductance=f.conductance_W_per_K
+                f0=f.f0, f1=f.f1, viscosity=f.viscosity(), conductance=f.conductance_W_per_K
             ),
         )

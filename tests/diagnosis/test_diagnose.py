@@ -13,7 +13,8 @@ from tests.virtual_campaign import drawn, mode_campaign, model_of, virtual_campa
 from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.parameters.mechanism import variants
 from thermospindle.diagnosis.verdict import diagnose, unable
-from thermospindle.model.machine import Condition, Law
+from thermospindle.model.machine import Condition
+from thermospindle.model.material import Law
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
 from thermospindle.report.text.diagnosis.answer import diagnosis_json

@@ -10,8 +10,7 @@ from thermospindle.diagnosis.decision.conditions import conditions_of
 from thermospindle.diagnosis.forward.rates import STEP, rates_of
 from thermospindle.diagnosis.parameters.nuisance import GAIN, TEMPERATURE
 from thermospindle.diagnosis.verdict import campaign_data
-from thermospindle.model.machine import Law
-from thermospindle.model.material import BEYOND
+from thermospindle.model.material import BEYOND, Law
 
 
 def with_law(spindle, low, high):

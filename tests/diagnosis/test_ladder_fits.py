@@ -15,7 +15,8 @@ from thermospindle.diagnosis.ladder.left_out import LeftOut, missed, unseen
 from thermospindle.diagnosis.ladder.step import as_drawn
 from thermospindle.diagnosis.verdict import campaign_data
 from thermospindle.model.errors import BadInput
-from thermospindle.model.machine import Addition, Law
+from thermospindle.model.machine import Addition
+from thermospindle.model.material import Law
 from thermospindle.sim.effects import by_name
 
 

@@ -12,7 +12,8 @@ from scipy.optimize import brentq
 
 from tests.conftest import ROOT
 from thermospindle.model.errors import BadInput
-from thermospindle.model.machine import Law, Material
+from thermospindle.model.machine import Material
+from thermospindle.model.material import Law
 from thermospindle.model.rotor.beam import elements, nodes, shear_factor, with_shafts, with_theory
 from thermospindle.model.rotor.chain import RotorBase, joint_element, matrices, motion_rows
 from thermospindle.model.rotor.static import displacement

@@ -12,7 +12,8 @@ from thermospindle.model.bearing.pair import bearing_state, solve
 from thermospindle.model.bearing.row import reference_deformation, reference_motion, row_at
 from thermospindle.model.built.tolerance import scaled_preload
 from thermospindle.model.errors import NoEquilibrium
-from thermospindle.model.machine import Condition, Law, RingMotion
+from thermospindle.model.machine import Condition, RingMotion
+from thermospindle.model.material import Law
 from thermospindle.model.sense import of_states
 
 

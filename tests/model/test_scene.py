@@ -1,6 +1,7 @@
 """Scene files: what is read, and what is refused in one sentence that names file, key, value and what is allowed."""
 
 import copy
+import re
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -8,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.conftest import ROOT
 from thermospindle.model.errors import BadInput, OutsideRange
-from thermospindle.model.machine import Law
+from thermospindle.model.material import Law
 from thermospindle.model.rotor.section import cells, mass_properties
 from thermospindle.model.scene.checks import implied_clearance
 from thermospindle.model.scene.reading import build, content_hash, load
@@ -116,6 +118,7 @@ REFUSED = [
     ("turning-ring", lambda r: r["bearing_pair"].update(turning_ring="inner"), "turning_ring = 'inner'", "rotating part"),
     ("tandem", lambda r: r["bearing_pair"].update(arrangement="tandem"), "bearing_pair", "preload_kind must be spring"),
     ("joint-end", lambda r: named(r["structure"]["joints"], "mount").update(between=["ground", "bas"]), "'bas' is no body", "allowed are"),
+    ("oil-thin", lambda r: r["thermal"]["friction"].update(kinematic_viscosity_mm2_per_s=0.2), "kinematic_viscosity_mm2_per_s: 0.2 mm2/s", "allows 0.35 and more"),
     ("joint-twice", lambda r: named(r["structure"]["joints"], "mount").update(between=["base", "base"]), "structure.joints.mount.between: 'base' stands twice", "two bodies"),
     ("body-twice", lambda r: named(r["structure"]["bodies"], "seat").update(name="base"), "'base' is taken", "must differ"),
     (
@@ -137,6 +140,17 @@ REFUSED = [
     ("heat", lambda r: r["thermal"]["gaps"][0].update(regions=["shaft", "hub"]), "thermal.gaps: 'hub'", "did you mean hub body?"),
     ("unknown-table", lambda r: r.update(extra={}), "extra: unknown key", "materials"),
 ]
+
+
+@pytest.mark.parametrize(("key", "alike", "unlike"), [("lateral_stiffness_N_per_m", "[5.0e8, 5.0e8]", "[5.0e8, 1.0e7]"), ("tilt_stiffness_N_m_per_rad", "[2.0e5, 2.0e5]", "[2.0e5, 2.0e4]")])
+def test_a_joint_that_turns_is_alike_in_all_directions(tmp_path, key, alike, unlike):
+    """A disc on its shaft; whose seat may be what it likes where neither turns."""
+    text = (ROOT / "scenes" / "templates" / "rotor.toml").read_text(encoding="utf-8")
+    file = tmp_path / "spindle.toml"
+    assert re.search(rf"{key} = {re.escape(alike)}", text)
+    file.write_text(text.replace(f"{key} = {alike}", f"{key} = {unlike}"), encoding="utf-8")
+    with pytest.raises(BadInput, match=rf"structure.joints.disc seat.{key} = .*: a joint of two turning parts .*; allowed are two values alike"):
+        load(file)
 
 
 @pytest.mark.parametrize(("spoil", "key", "allowed"), [r[1:] for r in REFUSED], ids=[r[0] for r in REFUSED])

@@ -12,7 +12,8 @@ from tests.conftest import coarse_warmups
 from thermospindle.cli import main
 from thermospindle.model.bearing.pair import solve
 from thermospindle.model.errors import BadInput
-from thermospindle.model.machine import Addition, Condition, Friction, Law
+from thermospindle.model.machine import Addition, Condition, Friction
+from thermospindle.model.material import Law
 from thermospindle.model.units import RPM
 from thermospindle.report.figures.warmup import figure
 from thermospindle.report.text import warmup as text
@@ -20,7 +21,7 @@ from thermospindle.report.text.warmup import rows, warmup_json, warmup_section
 from thermospindle.sim import warmup as module
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.warmup import energy, warm_up
-from thermospindle.thermal import conduction, heat
+from thermospindle.thermal import conduction, friction, heat
 from thermospindle.thermal.expansion import expand, influence
 from thermospindle.thermal.readout import reading
 
@@ -140,7 +141,7 @@ def test_end_is_the_fixed_point_of_the_steady_problem(spindle, warm, model):
     for name, t in steady.temperatures.items():
         assert last.temperatures[name] == pytest.approx(t, abs=2e-3 * (t - 20.0) + 1e-3)
     assert warm.frequencies[-1] == pytest.approx(warm.steady_frequencies, abs=0.1)
-    field = heat.steady(model, heat.running(spindle, 20.0, SPEED, steady.preload))
+    field = heat.steady(model, heat.running(spindle, 20.0, SPEED, friction.loads(spindle, steady.point.state)))
     assert field.region_means() == pytest.approx(dict(steady.temperatures), abs=1e-6)
     state = solve(spindle, Condition(20.0, SPEED), expand(spindle, field))
     assert [b.preload for b in state.bearings] == pytest.approx(list(steady.preload.values()), rel=1e-6)
@@ -165,13 +166,13 @@ def test_halving_the_steps_quarters_the_change(spindle, warm, model):
 
 
 def test_preload_drives_friction(spindle, coarse):
-    """With friction from load alone, each moment's heat is f1 P d_m omega of its own preload, and the preload moves by a tenth."""
+    """With friction from load alone, each moment's heat is f1 P1 d_m omega with P1 = 0.9 cot(alpha) times its own preload, and the preload moves by a tenth."""
     loaded = replace(spindle.thermal.friction, f0=0.0, f1=0.01)
     own = replace(spindle, thermal=replace(spindle.thermal, friction=loaded))
     warm = warm_up(own, SPEED, 20.0, duration=300.0, tolerance=0.2)
     for moment in warm.moments:
         for name, made in moment.friction.items():
-            assert made == pytest.approx(0.01 * moment.preload[name] * 9.1e-3 * SPEED, rel=1e-7)
+            assert made == pytest.approx(0.01 * 0.9 / np.tan(np.radians(24.51)) * moment.preload[name] * 9.1e-3 * SPEED, rel=1e-7)
     assert min(m.preload["lower"] for m in warm.moments) < 0.9 * max(m.preload["lower"] for m in warm.moments)
 
 
@@ -249,7 +250,7 @@ def test_answer_as_json_and_rows(warm):
     title, html = warmup_section(warm)
     assert title == "Warm-up"
     assert html.count("<svg") == 1
-    assert "161 s" in html
+    assert "163 s" in html
 
 
 def test_what_moves_most_is_told_of_any_time(warm):

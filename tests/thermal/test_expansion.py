@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from thermospindle.model.errors import NotConverged, OutsideRange
-from thermospindle.model.machine import Law
+from thermospindle.model.material import Law
 from thermospindle.thermal import influence as influence_module
 from thermospindle.thermal.elastic import Solid
 from thermospindle.thermal.expansion import expand, field, influence

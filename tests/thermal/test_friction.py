@@ -5,10 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from thermospindle.model.bearing.row import reference_motion, relative_speed
 from thermospindle.model.errors import OutsideRange
-from thermospindle.model.machine import Friction, Law
+from thermospindle.model.machine import Condition, Friction
+from thermospindle.model.material import Law, Viscosity
 from thermospindle.model.units import RPM
-from thermospindle.thermal.friction import heat, torque, viscous_torque
+from thermospindle.sim.effects.bearing import lubricant_film, ring_growth
+from thermospindle.sim.effects.temperature import thermal_gradient
+from thermospindle.sim.operating import operating_point
+from thermospindle.thermal import conduction
+from thermospindle.thermal import heat as warmed
+from thermospindle.thermal.friction import heat, load, loads, torque, viscous_torque
+from thermospindle.thermal.influence import influence
 
 
 def friction(viscosity=100e-6, f0=2.0, f1=0.0013):
@@ -39,6 +47,63 @@ def test_heat_is_torque_times_speed_and_zero_at_rest(spindle):
     assert heat(law, b, -300.0, 30.0, 16.0) == pytest.approx(300 * torque(law, b, 300.0, 30.0, 16.0))
     assert heat(law, b, 0.0, 30.0, 16.0) == 0.0
     assert torque(replace(law, f0=0.0), b, 300.0, 30.0, -16.0) == pytest.approx(0.0013 * 16 * 9.1e-3)
+
+
+def test_load_of_a_row(spindle):
+    """P1 = max(0.9 F_a cot(alpha) - 0.1 F_r, F_r): near the catalogues' 3.3 F_a - 0.1 F_r at 15 degrees and F_a - 0.1 F_r at 40; a radial load alone counts whole."""
+    b = spindle.bearings[0]
+    assert load(b, -16.0) == pytest.approx(0.9 * 16 / np.tan(np.radians(24.51)))
+    assert load(replace(b, contact_angle=np.radians(15)), 100.0, 50.0) == pytest.approx(3.3 * 100 - 5, rel=0.03)
+    assert load(replace(b, contact_angle=np.radians(40)), 100.0, 50.0) == pytest.approx(100 - 5, rel=0.1)
+    assert load(b, 0.0, 50.0) == 50.0
+    rest = loads(spindle)
+    assert rest == pytest.approx({name: load(b, 16.0) for name in ("lower", "upper")})
+    state = operating_point(replace(spindle, radial_load=(30.0, 40.0), radial_load_z=0.0), Condition(20.0)).state
+    borne = loads(spindle, state)
+    for row in state.bearings:
+        assert borne[row.name] == pytest.approx(load(b, row.preload, np.hypot(*row.radial_force)))
+        assert borne[row.name] > rest[row.name]
+
+
+def test_rings_know_their_own_speed_alone(spindle):
+    """Half the ratio at twice the speed turns the rings alike: what they make, and what films and rings grow by, is alike."""
+    bodies = tuple(replace(b, speed_ratio=0.5) if b.turns else b for b in spindle.structure.bodies)
+    geared = replace(spindle, structure=replace(spindle.structure, bodies=bodies))
+    model = conduction.model(spindle, influence(spindle).sections)
+    warm = np.full(model.film.size, 30.0)
+    own, other = ((s, Condition(30.0, w)) for s, w in ((spindle, 700.0), (geared, 1400.0)))
+    made = [warmed.friction_heat(replace(model, spindle=s), warm, warmed.running(s, 30.0, c.speed)) for s, c in (own, other)]
+    assert made[0] == pytest.approx(made[1], rel=1e-12)
+    assert made[0].min() > 0
+    unit = thermal_gradient.unit_rise(spindle)
+    assert thermal_gradient.heat(*own, unit) == pytest.approx(thermal_gradient.heat(*other, unit), rel=1e-12)
+    still = {b.name: reference_motion(20.0) for b in spindle.bearings}
+    for effect, values in ((lubricant_film, {"scale": 1.0, "wedge": 1.0}), (ring_growth, {"scale": 1.0})):
+        grown = [effect.motions(*of, values, still) for of in (own, other)]
+        assert grown[0] == grown[1]
+        assert grown[0] != still
+
+
+def test_between_counter_rotating_rings_both_grow(spindle):
+    bodies = tuple(replace(b, turns=True, speed_ratio=1.0 if b.turns else -0.5) for b in spindle.structure.bodies)
+    both, still = replace(spindle, structure=replace(spindle.structure, bodies=bodies)), {b.name: reference_motion(20.0) for b in spindle.bearings}
+    grown = ring_growth.motions(both, Condition(20.0, 1000.0), {"scale": 1.0}, still)["upper"]
+    b = spindle.bearing("upper")
+    assert grown.outer_r == pytest.approx(1e6 * ring_growth.unit_growth(both, b, b.outer_ring))
+    assert grown.inner_r == pytest.approx(0.25e6 * ring_growth.unit_growth(both, b, b.inner_ring))
+    assert relative_speed(both, b, 1000.0) == 1500.0
+
+
+def test_viscosity_between_its_entries(spindle):
+    """Of an oil of 26 mm2/s at 40 C and 5.1 at 100 C told at both alone, every entry of the table that the standard gives; of a straight line they would be a third off."""
+    table = spindle.thermal.friction.viscosity
+    oil = Viscosity((40.0, 100.0), (26e-6, 5.1e-6))
+    for t, v in zip(table.temperature, table.value, strict=True):
+        if 40 <= t <= 100:
+            assert oil(t) == pytest.approx(v, rel=5e-3)
+    assert Law(oil.temperature, oil.value)(70.0) > 1.3 * oil(70.0)
+    with pytest.raises(OutsideRange):
+        oil(101.0)
 
 
 def test_viscosity_outside_its_table_is_refused(spindle):

@@ -9,7 +9,8 @@ from scipy.special import j0, j1
 from skfem import Basis
 
 from thermospindle.model.errors import OutsideRange
-from thermospindle.model.machine import AirGap, Convection, Friction, HeatSource, Law, Material, Region, Spindle, Thermal
+from thermospindle.model.machine import AirGap, Convection, Friction, HeatSource, Material, Region, Spindle, Thermal
+from thermospindle.model.material import Law
 from thermospindle.model.units import RPM
 from thermospindle.thermal import conduction, heat
 from thermospindle.thermal.expansion import influence

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from thermospindle.model.files import kept
-from thermospindle.model.machine import Law
+from thermospindle.model.material import Law
 from thermospindle.thermal import influence as module
 from thermospindle.thermal.elastic import Solid
 from thermospindle.thermal.expansion import expand

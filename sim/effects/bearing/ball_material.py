@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from thermospindle.model.machine import Condition, Law, Material, Spindle
+from thermospindle.model.machine import Condition, Material, Spindle
+from thermospindle.model.material import Law
 from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values
 from thermospindle.sim.effects.temperature.loose_inserts import blend
 

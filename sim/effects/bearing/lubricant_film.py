@@ -8,6 +8,7 @@ import numpy as np
 
 from thermospindle.model.bearing.hertz import race_contact
 from thermospindle.model.bearing.pair import PairState
+from thermospindle.model.bearing.row import relative_speed
 from thermospindle.model.machine import Bearing, Condition, RingMotion, Spindle
 from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values, scale_parameter
 
@@ -23,7 +24,7 @@ def motions(spindle: Spindle, condition: Condition, values: Values, by_bearing: 
     thicker = {}
     for b in spindle.bearings:
         motion = by_bearing[b.name]
-        film = sum(films(spindle, b, condition.speed, motion.temperature))
+        film = sum(films(spindle, b, relative_speed(spindle, b, condition.speed), motion.temperature))
         thicker[b.name] = replace(motion, ball_strain=motion.ball_strain + wedging * film / b.ball_diameter)
     return by_bearing | thicker
 
@@ -42,7 +43,7 @@ def pair(spindle: Spindle, condition: Condition, values: Values, state: PairStat
         if not b.in_contact:
             bearings.append(b)
             continue
-        film = scale * sum(films(spindle, drawn, condition.speed, condition.temperature))
+        film = scale * sum(films(spindle, drawn, relative_speed(spindle, drawn, condition.speed), condition.temperature))
         p = 1.5 * LOAD_POWER * film / b.deformation
         damping = b.damping / (1 + p) ** 2 + values["loss_factor"] / omega * p / (1 + p) ** 2 * b.stiffness
         bearings.append(replace(b, stiffness=b.stiffness / (1 + p), damping=damping))
@@ -52,7 +53,7 @@ def pair(spindle: Spindle, condition: Condition, values: Values, state: PairStat
 def films(
     spindle: Spindle, b: Bearing, speed: float, temperature: float, pressure_viscosity: float = PRESSURE_VISCOSITY
 ) -> tuple[float, float]:
-    """Central film (m) at the inner and the outer race, of a fully flooded contact under the reference preload."""
+    """Central film (m) at the inner and the outer race, of a fully flooded contact under the reference preload; `speed` (rad/s) of the rings against each other."""
     ball, ring = (
         (spindle.materials[name].youngs_modulus(temperature), spindle.materials[name].poisson_ratio)
         for name in (b.ball_material, b.ring_material)

@@ -14,6 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from thermospindle.model.bearing.row import ring_speeds
 from thermospindle.model.machine import Bearing, Condition, Material, Region, RingMotion, Spindle
 from thermospindle.model.rotor.section import cells
 from thermospindle.sim.effects.effect import ROWS, SECTION, Effect, Values, scale_parameter
@@ -36,19 +37,19 @@ def motions(spindle: Spindle, condition: Condition, values: Values, by_bearing: 
         return by_bearing
     grown = {}
     for b in spindle.bearings:
-        motion, growth = by_bearing[b.name], scale * condition.speed**2 * unit_growth(spindle, b)
-        if b.turning_ring == "outer":
-            grown[b.name] = replace(motion, outer_r=motion.outer_r + growth)
-        else:
-            grown[b.name] = replace(motion, inner_r=motion.inner_r + growth)
+        motion, (inner, outer) = by_bearing[b.name], ring_speeds(spindle, b, condition.speed)
+        if outer:
+            motion = replace(motion, outer_r=motion.outer_r + scale * outer**2 * unit_growth(spindle, b, b.outer_ring))
+        if inner:
+            motion = replace(motion, inner_r=motion.inner_r + scale * inner**2 * unit_growth(spindle, b, b.inner_ring))
+        grown[b.name] = motion
     return by_bearing | grown
 
 
-def unit_growth(spindle: Spindle, b: Bearing) -> float:
-    """Radial growth of the turning raceway for 1 rad/s (m s2)."""
-    name = b.outer_ring if b.turning_ring == "outer" else b.inner_ring
+def unit_growth(spindle: Spindle, b: Bearing, name: str) -> float:
+    """Radial growth of the raceway of the ring `name` of a bearing that turns at 1 rad/s (m s2)."""
     ring = replace(spindle.region(name), z=spindle.raceway(name, b))  # of a tube that bearings share, what is about this one
-    race = ring.r[0] if b.turning_ring == "outer" else ring.r[1]
+    race = ring.r[0] if name == b.outer_ring else ring.r[1]
     regions = tuple(g for g in spindle.regions if g.part == ring.part)
     constants = tuple(
         (m.youngs_modulus(spindle.reference_temperature), m.poisson_ratio, m.density) for m in (_material(spindle, g) for g in regions)

@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thermospindle.model.machine import Condition, Law, Material, RingMotion, Spindle
+from thermospindle.model.machine import Condition, Material, RingMotion, Spindle
+from thermospindle.model.material import Law
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import Effect, Parameter, Values, scale_parameter
 from thermospindle.sim.effects.roles import with_stiffness

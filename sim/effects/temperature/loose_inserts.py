@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from thermospindle.model.machine import Condition, Law, Spindle
+from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.material import Law
 from thermospindle.sim.effects.effect import SECTION, Effect, Parameter, Values
 from thermospindle.sim.effects.roles import lacking, materials
 

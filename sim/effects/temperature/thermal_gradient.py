@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 import scipy
 
-from thermospindle.model.bearing.roller import reference_loads
+from thermospindle.model.bearing.row import relative_speed
 from thermospindle.model.errors import OutsideRange
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array
@@ -62,13 +62,14 @@ def levelled(spindle: Spindle, regions: tuple[str, ...], rise: Array) -> Array:
 
 def heat(spindle: Spindle, condition: Condition, unit: UnitRise) -> Array:
     """Friction heat (bearings,) in W where every lubricant has the temperature that all of it makes. OutsideRange where that is beyond its viscosity's law."""
-    law, loads, cold = spindle.thermal.friction, reference_loads(spindle), np.full(len(spindle.ringed), condition.temperature)
+    law, loads, cold = spindle.thermal.friction, friction.loads(spindle), np.full(len(spindle.ringed), condition.temperature)
+    speeds = [relative_speed(spindle, b, condition.speed) for b in spindle.ringed]
     low, high = law.viscosity.temperature[0], law.viscosity.temperature[-1]
     try:
-        return friction.balanced(law, spindle.ringed, condition.speed, loads, cold, unit.bearing)
+        return friction.balanced(law, spindle.ringed, speeds, loads, cold, unit.bearing)
     except OutsideRange:
         end = high if condition.temperature >= low else low
-        at_end = [friction.heat(law, b, condition.speed, end, loads[b.name]) for b in spindle.ringed]
+        at_end = [friction.heat(law, b, speed, end, loads[b.name]) for b, speed in zip(spindle.ringed, speeds, strict=True)]
         warm = (cold + np.array(at_end) @ unit.bearing).max()
         raise OutsideRange(f"bearing friction brings the lubricant to {warm:.0f} C, and its viscosity is given from {low:g} to {high:g} C") from None
 

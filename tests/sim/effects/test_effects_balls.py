@@ -9,7 +9,8 @@ from tests.effect_points import COLD_FAST, REST, RUNNING, at
 from thermospindle.model.bearing.ball_row import respond
 from thermospindle.model.bearing.pair import solve
 from thermospindle.model.bearing.row import reference_motion
-from thermospindle.model.machine import Condition, Law
+from thermospindle.model.machine import Condition
+from thermospindle.model.material import Law
 from thermospindle.sim.effects.bearing import ball_inertia, ball_material, grease_damping, lubricant_film
 from thermospindle.sim.effects.temperature import loose_inserts
 from thermospindle.sim.operating import operating_point

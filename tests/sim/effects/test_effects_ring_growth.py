@@ -58,7 +58,7 @@ def test_growth_of_the_reference_rings_against_finite_elements(spindle, bearing)
     half = (ALUMINIUM[0] / 2, ALUMINIUM[1], ALUMINIUM[2] / 2)
     outside = [(6.5e-3, 7.5e-3, ALUMINIUM), (7.5e-3, 16e-3, half)] if bearing == 0 else [(6.5e-3, 12.5e-3, ALUMINIUM)]
     layers = stack((5.349e-3, 6.5e-3, STEEL), *outside)
-    found = ring_growth.unit_growth(spindle, spindle.bearings[bearing])
+    found = ring_growth.unit_growth(spindle, (b := spindle.bearings[bearing]), b.outer_ring)
     assert found == pytest.approx(spinning_discs(layers, 5.349e-3), rel=1e-4)
 
 
@@ -68,7 +68,8 @@ def test_growth_reaches_the_turning_race(spindle):
     turning = turning_inside(spindle)
     for made, field, other in ((spindle, "outer_r", "inner_r"), (turning, "inner_r", "outer_r")):
         slow, fast = (ring_growth.EFFECT.motions(made, Condition(20.0, w), {"scale": 0.8}, nothing)["upper"] for w in (500.0, 1000.0))
-        growth = ring_growth.unit_growth(made, next(b for b in made.bearings if b.name == "upper"))
+        upper = next(b for b in made.bearings if b.name == "upper")
+        growth = ring_growth.unit_growth(made, upper, upper.outer_ring if field == "outer_r" else upper.inner_ring)
         assert getattr(slow, field) == pytest.approx(0.8 * 500.0**2 * growth, rel=1e-12)
         assert getattr(fast, field) == pytest.approx(4 * getattr(slow, field), rel=1e-12)
         assert getattr(slow, field) > 0

@@ -8,7 +8,8 @@ from scipy.special import jn_zeros
 
 from tests.effect_points import REST, at
 from thermospindle.model.bearing.row import contact_constants
-from thermospindle.model.machine import Condition, Law
+from thermospindle.model.machine import Condition
+from thermospindle.model.material import Law
 from thermospindle.model.rotor.chain import Element, RotorBase, matrices
 from thermospindle.model.rotor.modes import modes, poles
 from thermospindle.model.structure import Body

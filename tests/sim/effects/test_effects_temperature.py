@@ -7,7 +7,8 @@ import pytest
 
 from tests.effect_points import REST, RUNNING
 from thermospindle.model.errors import OutsideRange
-from thermospindle.model.machine import Condition, Friction, Law, Region
+from thermospindle.model.machine import Condition, Friction, Region
+from thermospindle.model.material import Law
 from thermospindle.model.rotor.modes import modes
 from thermospindle.model.units import RPM
 from thermospindle.sim.effects.bearing import preload_loss

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from thermospindle.model.errors import BadInput
-from thermospindle.model.machine import Law
+from thermospindle.model.material import Law
 from thermospindle.sim.identification import shift
 
 
