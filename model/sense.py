@@ -9,6 +9,9 @@ import numpy as np
 from thermospindle.model.bearing.pair import BearingState
 from thermospindle.model.errors import listed
 from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.rotor.chain import RotorBase, element_rows, matrices
+from thermospindle.model.rotor.loss import damping_of_loss
+from thermospindle.model.rotor.modes import Mode
 from thermospindle.model.units import MM, RPM
 
 COLDEST, HOTTEST = -40.0, 120.0
@@ -18,6 +21,10 @@ FASTEST = 2.5e6
 STRONGEST = 1e9
 """Pa: rho v^2, the hoop stress of a thin ring by its own rotation (Timoshenko, *Strength of Materials*, part 2, 1956), that quenched steel does not bear for long."""
 AGAINST = 0.01  # of its preload, or of 1 N, by which a row is loaded against its sense
+OTHERWISE = 0.3
+"""Of a damping ratio, by which it may be off before that is said: measured ones scatter by as much."""
+TURNED = {"x": (-1.0, "y"), "y": (1.0, "x"), "tilt_x": (-1.0, "tilt_y"), "tilt_y": (1.0, "tilt_x")}
+"""What a motion becomes as it is turned by a right angle about z."""
 DEEPEST = 0.01
 """Deformation of both contacts over the ball's diameter. The static capacity of ISO 76, 4.2 GPa, is reached at about a third of it."""
 
@@ -80,6 +87,57 @@ def of_loads(spindle: Spindle, least: Mapping[str, float]) -> list[str]:
         for name, load in least.items()
         if load < -AGAINST * max(spindle.bearing(name).preload, 1.0)
     ]
+
+
+def of_damping(chain: RotorBase, modes: Sequence[Mode]) -> list[str]:
+    """Modes of a turning chain that would be damped otherwise if the dampers of what turns turned with it, and not stood in space as those of a chain do."""
+    other = [(m, m.damping_ratio, turned_damping(chain, m)) for m in modes]
+    undamped = [(m, turned) for m, own, turned in other if turned <= 0 < own]
+    if undamped:
+        m, turned = undamped[0]
+        more = f", and {len(undamped) - 1} more" if len(undamped) > 1 else ""
+        return [
+            f"the damping of shafts and joints that turn is taken to stand in space; turning with them, it would feed the {m.kind} {m.whirl} mode at {m.frequency:.1f} Hz{more}: "
+            f"{100 * turned:.2g} % of critical where {100 * m.damping_ratio:.2g} % is computed, which is unstable"
+        ]
+    off = [(abs(turned / own - 1), k) for k, (_, own, turned) in enumerate(other) if own > 0]
+    worst, k = max(off, default=(0.0, 0))
+    if worst < OTHERWISE:
+        return []
+    m, own, turned = other[k]
+    return [
+        f"the damping of shafts and joints that turn is taken to stand in space; turning with them, it would damp the {m.kind} {m.whirl} mode at {m.frequency:.1f} Hz "
+        f"by {100 * turned:.2g} % of critical where {100 * own:.2g} % is computed, the most that any is off"
+    ]
+
+
+def turned_damping(chain: RotorBase, mode: Mode) -> float:
+    """Damping ratio of a mode of a chain if the dampers between bodies of one rotor turned with it.
+
+    Turning with w, such a damper feels q' - w S q, S q the motion (-y, x) across and of the tilts (Genta, *Dynamics of Rotating Systems*, 2005, ch. 6): beside C it makes the
+    circulatory stiffness -w C S. To first order that moves a lightly damped mode's pole p by w phi^H C S phi / phi^H (2 p M + C + G) phi; forward modes lose w / |p| of what turns.
+    """
+    ratio = {b.name: b.speed_ratio for b in chain.bodies if b.turns}
+    own = [e for e in chain.elements if e.a in ratio and ratio.get(e.b) == ratio[e.a]]
+    linear, shape = matrices(chain), mode.shape
+    turn = np.zeros((5, 5))
+    turn[[0, 3], [1, 4]], turn[[1, 4], [0, 3]] = -1.0, 1.0
+    fed = 0j  # phi^H C S phi, in units of the spindle speed
+    for e in own:
+        q = element_rows(chain, e) @ shape
+        fed += ratio[e.a] * complex(q.conj() @ e.damping @ turn @ q)
+    for rotor in {ratio[e.a] for e in own if e.loss_factor}:
+        lossy = [(e.loss_factor, e.stiffness, element_rows(chain, e)) for e in own if e.loss_factor and ratio[e.a] == rotor]
+        across = np.zeros(len(shape), complex)
+        at = {dof: k for k, dof in enumerate(linear.dofs)}
+        for (body, move), k in at.items():
+            if ratio.get(body) == rotor and move in TURNED:
+                sign, other = TURNED[move]
+                across[k] = sign * shape[at[body, other]]
+        fed += rotor * complex(shape.conj() @ damping_of_loss(np.diag(linear.mass), linear.stiffness, lossy) @ across)
+    moved = chain.speed * fed / (shape.conj() @ (2 * mode.pole * linear.mass + linear.damping) @ shape)
+    pole = mode.pole + moved
+    return float(-pole.real / abs(pole))
 
 
 def _extremes(conditions: Sequence[Condition]) -> list[Condition]:

@@ -163,6 +163,13 @@ def doubts(spindle: Spindle, points: Sequence[OperatingPoint]) -> list[str]:
     return sense.of_conditions(spindle, [p.condition for p in points]) + sense.of_states(spindle, [p.state.bearings for p in points])
 
 
+def doubts_of_modes(spindle: Spindle, points: Sequence[OperatingPoint]) -> list[str]:
+    """What is odd, and what the modes within the hammer's band would be with dampers that turn, at the fastest of the points."""
+    fastest = max(points, key=lambda p: abs(p.condition.speed))
+    turning = sense.of_damping(fastest.chain, fastest.modes_below(spindle.hammer.band[1])) if fastest.condition.speed else []
+    return doubts(spindle, points) + turning
+
+
 def _region_temperatures(spindle: Spindle, condition: Condition, effects: Sequence[tuple[Effect, Values]]) -> float | dict[str, float]:
     """The condition's temperature (C), or one for every region where an effect has a say in it."""
     if not any(effect.temperatures for effect, _ in effects):

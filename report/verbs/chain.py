@@ -29,7 +29,7 @@ from thermospindle.sim.campaign.campaign import write_campaign
 from thermospindle.sim.campaign.simulated import runout_campaign
 from thermospindle.sim.effects import of_scene
 from thermospindle.sim.hammer.test import stages
-from thermospindle.sim.operating import doubts, operating_point
+from thermospindle.sim.operating import doubts_of_modes, operating_point
 from thermospindle.sim.run import Run
 from thermospindle.sim.run import run as whole_chain
 
@@ -183,7 +183,7 @@ def _write_impact(result: Run, folder: Path) -> None:
 
 def _doubts(result: Run, asked: str | None) -> list[str]:
     """What is odd at the operating points; and that the reduced model was taken, where nobody asked for an element."""
-    found = doubts(result.spindle, [s.point for s in result.steps])
+    found = doubts_of_modes(result.spindle, [s.point for s in result.steps])
     if asked is None and any(s.test.element == REDUCED for s in result.steps):
         step = 1e6 * result.spindle.hammer.step
         found.append(f"the stiffest mode asks for steps of {step:.3g} us, too many for a record: it is that of the reduced model, as with --element {REDUCED}, without MuJoCo")

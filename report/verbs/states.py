@@ -26,7 +26,7 @@ from thermospindle.report.verbs.answer import (
     with_effects,
     write_json,
 )
-from thermospindle.sim.operating import doubts, operating_point, stiffness_table
+from thermospindle.sim.operating import doubts, doubts_of_modes, operating_point, stiffness_table
 
 
 def table(
@@ -98,7 +98,7 @@ def modes(
         out,
         {"verb": "modes"} | asked,
         lambda folder, _: text.write_modes(point, folder),
-        doubts(spindle, [point]),
+        doubts_of_modes(spindle, [point]),
     )
 
 
