@@ -30,6 +30,7 @@ import pyuff
 
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Point
+from thermospindle.model.scene.fields import SMALLEST
 from thermospindle.model.types import Integers
 from thermospindle.sim.campaign.uff_frame import check_frame
 from thermospindle.sim.identification.frf import Frf, even, gap
@@ -56,7 +57,7 @@ KINDS = {
     12: Kind(
         "acceleration",
         (1, 0, 0),
-        {"m/s^2": 1.0, "m/s2": 1.0, "m/s²": 1.0, "mm/s^2": 1e-3, "mm/s2": 1e-3, "mm/s²": 1e-3, "g": _STANDARD_GRAVITY},
+        {"m/s^2": 1.0, "m/s2": 1.0, "m/s²": 1.0, "mm/s^2": 1e-3, "mm/s2": 1e-3, "mm/s²": 1e-3, "in/s^2": _INCH, "g": _STANDARD_GRAVITY},
     ),
     FORCE: Kind("excitation force", (0, 1, 0), {"N": 1.0, "mN": 1e-3, "kN": 1e3, "lbf": _POUND_FORCE}),
 }
@@ -257,10 +258,18 @@ def _scale(where: str, record: Mapping[str, Any], side: str, wanted: int, system
     if any(exponents) and exponents != kind.exponents:
         raise BadInput(f"{where}: {part}: unit exponents {exponents} are not those of {kind.name}, {kind.exponents}")
     if label in ("", "NONE") and number == wanted and system is not None:
-        return 1.0 / float(system["force" if wanted == FORCE else "length"])  # "to convert to SI divide by the factor"
+        return 1.0 / factor(where, system, "force" if wanted == FORCE else "length")  # "to convert to SI divide by the factor"
     if label not in kind.units:
         raise BadInput(f"{where}: {part} unit {label!r}; allowed for {kind.name} are {', '.join(kind.units)}")
     return kind.units[label]
+
+
+def factor(where: object, system: Mapping[str, Any], of: str) -> float:
+    """What values in the file's unit of `of` ("length", "force") are divided by for SI, of its dataset 164. `BadInput` for what is no factor."""
+    value = float(system[of])
+    if not SMALLEST <= value <= LARGEST:
+        raise BadInput(f"{where}: data set 164: the factor of {of} = {value:g}: must lie between {SMALLEST:g} and {LARGEST:g}")
+    return value
 
 
 def write_frf(path: Path, frf: Frf, points: Sequence[Point], title: str, test: str) -> None:

@@ -57,18 +57,14 @@ def scaled(curve: Curve, settings: FileForm) -> tuple[str, float] | str:
     if not curve.quantity or curve.quantity == told[0]:
         return told
     if settings.unit and settings.quantity:
-        return f"quantity: quantity = {settings.quantity!r} or unit = {settings.unit!r}, which is that of {_a(told[0])}"
+        return f"quantity: quantity = {settings.quantity!r} or unit = {settings.unit!r}, which is that of {units.with_article(told[0])}"
     if settings.quantity and units.length_factor(curve.unit) is None:
-        return f"unit: the unit of its FRFs: quantity = {curve.quantity!r} is told, and {curve.unit!r} is that of an {told[0]}"
+        return f"unit: the unit of its FRFs: quantity = {curve.quantity!r} is told, and {curve.unit!r} is that of {units.with_article(told[0])}"
     if settings.quantity and (factor := units.length_factor(curve.unit)) is not None:
         return curve.quantity, factor  # settled: the label's unit of time is wrong, its length and force are taken
     if settings.unit:
         return told
-    return f"quantity: which quantity its FRFs are: called {curve.quantity}, with the unit {curve.unit!r} of {_a(told[0])}"
-
-
-def _a(quantity: str) -> str:
-    return f"an {quantity}" if quantity == "accelerance" else f"a {quantity}"
+    return f"quantity: which quantity its FRFs are: called {curve.quantity}, with the unit {curve.unit!r} of {units.with_article(told[0])}"
 
 
 def open_conditions(found: Read, form: MappingForm, scene: Spindle | None, mapping: Path | None) -> list[Question]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 from thermospindle.sim.campaign.uff import FORCE, KINDS, QUANTITIES
@@ -14,6 +15,14 @@ WORDS = {
     "mobility": "mobility", "velocity": "mobility", "accelerance": "accelerance", "inertance": "accelerance", "acceleration": "accelerance",
 }  # fmt: skip
 """What an FRF or its numerator may be called."""
+HERTZ = {
+    "hz": 1.0, "hertz": 1.0, "1/s": 1.0, "khz": 1e3, "rad/s": 1 / (2 * math.pi), "rad/sec": 1 / (2 * math.pi), "rpm": 1 / 60, "1/min": 1 / 60,
+}  # fmt: skip
+SECONDS = {"s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0, "ms": 1e-3, "msec": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6}
+"""Factors of an axis to Hz and s, by its unit in small letters."""
+FREQUENCIES, TIMES = "Hz, kHz, rad/s, rpm", "s, ms, us"
+"""What messages say is allowed of them."""
+GRAVITY = ("g", "G", "gn")
 
 
 def tidy(text: str) -> str:
@@ -23,7 +32,7 @@ def tidy(text: str) -> str:
     text = text.replace(")(", ")/(")  # (m/s^2)(N), as one analyser writes
     text = re.sub(r"^1/\(?(\w+)\)?\*\(?([^()]+)\)?$", r"(\2)/\1", text)  # (1/N)*(m/s^2)
     text = re.sub(r"^\(1/(\w+)\)\*\(?([^()]+)\)?$", r"(\2)/\1", text)
-    return re.sub(r"^\((?P<all>[^()]*)\)$", r"\g<all>", text).replace("sec", "s")
+    return re.sub(r"^\((?P<all>[^()]*)\)$", r"\g<all>", text).replace("sec", "s").replace("/s/s", "/s^2")
 
 
 def of_frf(text: str) -> tuple[str, float] | None:
@@ -41,6 +50,7 @@ def of_frf(text: str) -> tuple[str, float] | None:
 def of_response(text: str) -> tuple[str, float] | None:
     """(quantity, factor to SI) of a response channel's unit: an acceleration makes an accelerance."""
     clean = tidy(text)
+    clean = GRAVITY[0] if clean in GRAVITY else clean
     for number, quantity in OF_TYPE.items():
         for label, factor in KINDS[number].units.items():
             if clean == tidy(label) and label:
@@ -56,9 +66,27 @@ def length_factor(text: str) -> float | None:
     """The factor of a unit's length alone: 1e-3 of mm/s/N, whatever the power of time says; None for g and what is not known."""
     clean = tidy(text)
     found = of_frf(clean)
-    return None if found is None or re.match(r"\(?g\b", clean) else found[1]
+    return None if found is None or re.match(rf"\(?({'|'.join(GRAVITY)})\b", clean) else found[1]
+
+
+def of_frequency(text: str) -> float | None:
+    """Factor to Hz of an axis of frequencies; None where its unit is none that is known."""
+    return HERTZ.get(_bare(text))
+
+
+def of_time(text: str) -> float | None:
+    """Factor to s of an axis of time; None where its unit is none that is known."""
+    return SECONDS.get(_bare(text))
+
+
+def _bare(text: str) -> str:
+    return text.strip().strip("()[]").replace(" ", "").lower()
 
 
 def named(text: str) -> str:
     """The quantity that a label like "Receptance" or "Acceleration/Force" speaks of; "" where it speaks of none."""
     return next((quantity for word, quantity in WORDS.items() if word in text.lower()), "")
+
+
+def with_article(quantity: str) -> str:
+    return f"an {quantity}" if quantity == "accelerance" else f"a {quantity}"

@@ -63,3 +63,24 @@ def columns(form: str, unit: str, value=FRF.value):
             heads.append(f"H({r},{q}) {name}" + ("" if "[" in name else f" [{unit}]"))
             found.append(v)
     return heads, found
+
+
+DIRECTIONS = {1: 3, 3: -1, 6: 3}
+"""Of the points, in UFF's count."""
+
+
+def set_58(x: np.ndarray, y: np.ndarray, response: tuple[int, int], reference: tuple[int, int], function: int = 4, kinds=(18, 11, 13), labels=("Hz", "m/s", "N"), names=("NONE", "NONE"), word="NONE") -> str:
+    """An ASCII set 58 in even steps and double precision; ends as (node, direction), `kinds` and `labels` of abscissa, numerator and denominator."""
+    head = "title\nNONE\n17-Oct-17 13:50:13\nNONE\nNONE\n" + f"{function:5d}{0:10d}{0:5d}{0:10d}"
+    head += "".join(f" {name:10}{node:10d}{direction:4d}" for name, (node, direction) in zip(names, (response, reference), strict=True)) + "\n"
+    head += f"{6 if np.iscomplexobj(y) else 4:10d}{len(x):10d}{1:10d}{x[0]:13.5E}{x[1] - x[0]:13.5E}{0:13.5E}\n"
+    head += "".join(f"{k:10d}{0:5d}{0:5d}{0:5d} {w:20} {u:20}\n" for k, u, w in zip((*kinds, 0), (*labels, "NONE"), ("NONE", word, "NONE", "NONE"), strict=True))
+    cells = np.column_stack([y.real, y.imag]).ravel() if np.iscomplexobj(y) else y
+    body = "".join("".join(f"{v:20.12E}" for v in cells[k : k + 4]) + "\n" for k in range(0, len(cells), 4))
+    return f"    -1\n    58\n{head}{body}    -1\n"
+
+
+def set_164(length: float, force: float) -> str:
+    """Units of a file: what is divided by for SI."""
+    numbers = "".join(f"{v:25.17E}" for v in (length, force, 1.0)) + f"\n{273.15:25.17E}"
+    return f"    -1\n   164\n{9:10d}{'own':<20}{2:10d}\n{numbers.replace('E', 'D')}\n    -1\n"
