@@ -25,7 +25,12 @@ class End:
     @property
     def label(self) -> str:
         """What a mapping calls it: its name, or node and direction like "5:+Z"; "" where nothing is told."""
-        return self.name or ":".join([str(self.node)] * (self.node > 0) + [self.direction] * bool(self.direction))
+        return self.name or self.full
+
+    @property
+    def full(self) -> str:
+        """The same with the direction beside a name, too: "hub:+X"."""
+        return ":".join(filter(None, (self.name or str(self.node or ""), self.direction)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -92,16 +92,13 @@ def place(end: End, form: MappingForm, points: dict[int, Point]) -> tuple[int, i
     """
     for made in form.points:
         called = {str(c) for c in made.called}
-        if called & {end.label, end.name, str(end.node) if end.node else ""} - {""} and made.node in points:
+        if called & {end.full, end.label, str(end.node or "")} - {""} and made.node in points:
             return made.node, _sign(end, points[made.node])
-    for point in points.values():
-        if end.name and end.name == point.name:
-            return point.node, 1
-    if end.node in points:
-        point = points[end.node]
-        if not end.direction or end.direction[1] == point.axis[1]:
-            return point.node, _sign(end, point)
-    return None
+    named = next((p for p in points.values() if end.name and end.name == p.name), None)
+    point = named or points.get(end.node)
+    if point is None or (end.direction and end.direction[1] != point.axis[1]):
+        return None
+    return point.node, _sign(end, point)
 
 
 def _sign(end: End, point: Point) -> int:
@@ -114,7 +111,7 @@ def unplaced(ends: Sequence[tuple[str, End]], points: dict[int, Point], scene: S
     labels: dict[str, list[str]] = {}
     for file, of in ends:
         if of.label:
-            labels.setdefault(of.label, []).append(file)
+            labels.setdefault(of.full, []).append(file)
     if not labels:
         return []
     there = f"; points there are {listed(f'{p.node} {p.name} {p.axis}' for p in points.values())}" if points else ""

@@ -120,7 +120,7 @@ def _points(found: Read, scene: Spindle | None) -> Iterable[list[str]]:
     ends: dict[str, End] = {}
     for _, end in found.ends:
         if end.label:
-            ends.setdefault(end.label, end)
+            ends.setdefault(end.full, end)
     places = {n: p for c in found.contents for n, p in c.places.items()}
     unscaled = {n: p for c in found.contents for n, p in c.unscaled.items()}
     taken = set(found.points)
