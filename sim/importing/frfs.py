@@ -18,7 +18,7 @@ ADVICE = {
     "conjugated": "conjugate = true in its [[files]] turns it round",
     "negative real part": "where the sensor looks the other way, say so where it is named, as in 3:-Z; the hammer's direction counts too",
     "another point than the hammer's": "tell in its [[files]] the point that the sensor was at",
-    "an axis": "a column of frequencies is told as such in its [files.columns], and one in rad/s left out, its lines told by step_Hz",
+    "an axis": "a column of frequencies is told as such in its [files.columns], with its unit",
     "coherence =": 'leave_out = ["H(response,reference)"] in its [[files]] does without it',
     "dead channel": 'leave_out = ["H(response,reference)"] in its [[files]] does without it',
     "zero on": "band_Hz leaves lines without values out",

@@ -50,6 +50,7 @@ class FileForm(Table):
     start_Hz: NotNegative | None = None
     step_Hz: Positive | None = None
     sample_rate_Hz: Positive | None = None
+    damping_unit: Literal["ratio", "percent"] | None = None
     conjugate: bool = False
     leave_out: list[str] = Field(default_factory=list)
 

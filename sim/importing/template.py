@@ -25,7 +25,7 @@ MORE = """\
 # quantity = "accelerance"      of the campaign: receptance, mobility or accelerance; FRFs are converted to it (the most frequent by default)
 # band_Hz = [50.0, 3000.0]      lines outside are left out
 # In [[files]]: quantity, unit = "g/N", response = 3, reference = "hub_top0", columns = { "Ch 2" = "response 3 [m/s^2]" }, phase_unit = "deg",
-#   start_Hz, step_Hz, sample_rate_Hz, conjugate = true, leave_out = ["set 5", "H(3,1)"], test = "T20" (files of one test share it)
+#   start_Hz, step_Hz, sample_rate_Hz, damping_unit, conjugate = true, leave_out = ["set 5", "H(3,1)"], test = "T20" (files of one test share it)
 # In [[tests]]: hammer_level_N, soak_time_min, window_decay_1_per_s, pretrigger_s, averages, repeat, conditions = { humidity = 0.4 }
 # [records]                     time records: estimator = "H1" | "H2" | "Hv", hit_length_s, exponential_end, double_hit_share, apart_s, band_Hz (else the scene's),
 #   overload = { force = 200.0, hub_top0 = 500.0 }   limits in the file's units, from which a hit is left out

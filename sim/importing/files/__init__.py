@@ -7,6 +7,8 @@ labels       what a column is, read off its heading or told by the mapping
 mode_tables  tables of modes that somebody picked by hand
 reading      which reader a file needs
 text         tables of numbers in text files
+uff_axes     axes and units of UFF functions: lines in Hz, steps in s, and sides of an ordinate, by label or set 164
+uff_modes    modes of UFF files, with dampings as ratios
 uff_sets     UFF/UNV files: FRFs, time records, geometry, modes, units
 ===========  ===========================================================================================================
 """

@@ -12,6 +12,7 @@ import numpy as np
 from thermospindle.model.errors import BadInput
 from thermospindle.model.types import Array
 from thermospindle.sim.identification.frf import even
+from thermospindle.sim.importing import units
 from thermospindle.sim.importing.files.labels import ROLES, Role, end, role_of, told_of_end
 from thermospindle.sim.importing.files.text import TextTable
 from thermospindle.sim.importing.mapping import REST, FileForm
@@ -155,7 +156,7 @@ def _curves(file: Path, columns: Sequence[Column], settings: FileForm) -> tuple[
     axis = next((c for c in columns if c.role and c.role.kind == "frequency"), None)
     n = len(own[0].values)
     if axis is not None:
-        frequency: Array = np.asarray(axis.values.real, float) * (1e3 if axis.role and axis.role.unit == "kHz" else 1.0)
+        frequency: Array = np.asarray(axis.values.real, float) * _to_si(file, axis)
     elif settings.step_Hz is not None:
         frequency = (settings.start_Hz or 0.0) + settings.step_Hz * np.arange(float(n))
     else:
@@ -189,6 +190,17 @@ def _curves(file: Path, columns: Sequence[Column], settings: FileForm) -> tuple[
         where = listed(c.name for c in parts.values())
         curves.append(Curve(file, where, response, reference, frequency, value, settings.quantity or "", unit, coherence, sd))
     return curves, questions
+
+
+def _to_si(file: Path, axis: Column) -> float:
+    """Factor of an axis to Hz or s. `BadInput` for a unit that is not known."""
+    assert axis.role is not None
+    time = axis.role.kind == "time"
+    factor = (units.of_time if time else units.of_frequency)(axis.role.unit or ("s" if time else "Hz"))
+    if factor is None:
+        allowed = units.TIMES if time else units.FREQUENCIES
+        raise BadInput(f'{file}: {axis.name}: its unit {axis.role.unit!r} is none of {axis.role.kind} that is known; allowed are {allowed}; columns tells it, as in "{axis.role.kind} [{allowed.split(",")[0]}]"')
+    return factor
 
 
 def _value(file: Path, parts: Mapping[str, Column], settings: FileForm) -> tuple[np.ndarray | None, list[Question]]:
@@ -232,7 +244,7 @@ def _motions(file: Path, columns: Sequence[Column], moving: Sequence[Column], se
     axis = next((c for c in columns if c.role and c.role.kind == "time"), None)
     step, questions = 0.0, []
     if axis is not None:
-        scale = 1e-3 if axis.role and axis.role.unit == "ms" else 1.0
+        scale = _to_si(file, axis)
         time = np.asarray(axis.values.real, float)
         step = even(time[0] if time.ndim > 1 else time) * scale
         if step == 0:

@@ -129,5 +129,5 @@ def _without_unit(text: str) -> tuple[str, str]:
     if match is None or (re.search(r"[,;|]", match[1]) is not None):
         return text, ""
     inside = match[1].strip()
-    known = inside in ("Hz", "kHz", "s", "ms", "deg", "°", "rad", "-", "1", "V") or DECIBEL.fullmatch(inside) or units.of_frf(inside) or units.of_response(inside) or units.of_force(inside)
+    known = inside in ("deg", "°", "rad", "-", "1", "V") or units.of_frequency(inside) or units.of_time(inside) or DECIBEL.fullmatch(inside) or units.of_frf(inside) or units.of_response(inside) or units.of_force(inside)
     return (text[: match.start()], inside) if known or match[0].strip().startswith("[") else (text, "")

@@ -8,7 +8,7 @@ import pyuff
 from pyuff.datasets.dataset_55 import prepare_55
 
 from tests.conftest import SCENE
-from thermospindle.model.errors import BadInput
+from thermospindle.model.errors import BadInput, Unanswered
 from thermospindle.model.scene.reading import load
 from thermospindle.report.verbs.importing import bring
 from thermospindle.sim.campaign.campaign import read_campaign
@@ -101,3 +101,40 @@ def test_a_shape_that_is_no_number_is_refused_by_its_mode(tmp_path, value):
     told.write_text(answers.format(""))
     bring([tmp_path / "lab.uff"], scene=SCENE, mapping=told, out=tmp_path / "c")
     assert [m.frequency for m in read_campaign(tmp_path / "c").tests[0].modes] == [1002.0]
+
+
+def modal_set(folder, dampings: list[tuple[float, float]], name="lab.uff"):
+    """Normal modes of 1000, 1100, ... Hz in sets 55, each with its (viscous, hysteretic) damping."""
+    for k, (viscous, hysteretic) in enumerate(dampings):
+        common = {f"id{i}": "NONE" for i in range(1, 6)} | {"model_type": 1, "analysis_type": 2, "data_ch": 2, "spec_data_type": 8, "data_type": 2, "n_data_per_node": 3}
+        mode = {"load_case": 1, "mode_n": k + 1, "freq": 1000.0 + 100 * k, "modal_m": 1.0, "modal_damp_vis": viscous, "modal_damp_his": hysteretic}
+        pyuff.UFF(str(folder / name)).write_sets(prepare_55(**common, **mode, node_nums=np.array([1]), **{r: np.ones(1) for r in ("r1", "r2", "r3")}), "add" if k else "overwrite")
+    return folder / name
+
+
+def dampings(folder, file, told=""):
+    (folder / "told.toml").write_text(f'frequency_sd_Hz = 0.5\n[[files]]\nfile = "lab.uff"\n{told}\n[[tests]]\nid = "lab"\ntemperature_C = 20\nspeed_rpm = 0\n')
+    notes = bring([file], scene=SCENE, mapping=folder / "told.toml", out=folder / "c").values["notes"]
+    return [m.damping_ratio for m in read_campaign(folder / "c").tests[0].modes], notes
+
+
+def test_hysteretic_damping_is_twice_the_ratio(tmp_path):
+    """Set 55, record 8, field 4; it was dropped. Beside a viscous one of its own that one is taken, and the other told to be left out."""
+    found, notes = dampings(tmp_path, modal_set(tmp_path, [(0.0, 0.02), (0.006, 0.012), (0.006, 0.03), (-0.001, 0.0), (0.0, 0.0)]))
+    assert found == [pytest.approx(0.01), pytest.approx(0.006), pytest.approx(0.006), None, None]
+    assert "lab.uff: hysteretic damping beside another viscous one left out, of the modes of 1200 Hz" in notes
+    assert "lab.uff: dampings that are not positive left out, of the modes of 1300 Hz" in notes
+
+
+def test_dampings_that_may_be_in_per_cent_are_asked_about_once_and_read_alike(tmp_path):
+    """Those below 1 were taken as ratios, and the others vanished."""
+    file = modal_set(tmp_path, [(0.54, 0.0), (1.28, 0.0), (0.0, 4.0)])
+    with pytest.raises(Unanswered, match=r'lab.uff: damping_unit: whether its dampings are "ratio" or "percent": 2, as that of 1200 Hz \(set 3\) is, would be 200 % or 2 %') as said:
+        dampings(tmp_path, file)
+    assert len(said.value.items) == 1
+    with pytest.raises(BadInput, match=r"lab.uff: set 2: damping of the mode of 1100 Hz = 1.28: with damping_unit = 'ratio' it must be below 1"):
+        dampings(tmp_path, file, 'damping_unit = "ratio"')
+    found, _ = dampings(tmp_path, file, 'damping_unit = "percent"')
+    assert found == [pytest.approx(0.0054), pytest.approx(0.0128), pytest.approx(0.02)]
+    bring([file], scene=SCENE, mapping=tmp_path / "form.toml")
+    assert 'damping_unit = "?"    # whether its dampings are' in (tmp_path / "form.toml").read_text()

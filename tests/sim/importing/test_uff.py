@@ -25,6 +25,65 @@ def written(folder, text, name="T20.uff"):
     return folder / name
 
 
+@pytest.mark.parametrize(("label", "kind", "factor"), [("rad/s", 18, 2 * np.pi), ("rad/sec", 18, 2 * np.pi), ("kHz", 18, 1e-3), ("KHZ", 0, 1e-3), ("rpm", 18, 60.0), ("Hz", 1, 1.0), ("NONE", 18, 1.0)])
+def test_lines_in_any_unit_that_is_known(tmp_path, label, kind, factor):
+    """All were read as Hz: modes 6.28 and 1000 times off without a word."""
+    frf = imported(tmp_path, "", written(tmp_path, frfs(x=FREQUENCY * factor, kinds=(kind, 11, 13), labels=(label, "m/s", "N"))))
+    np.testing.assert_allclose(frf.frequency, FREQUENCY, rtol=1e-5)
+    np.testing.assert_allclose(frf.value, FRF.value, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("label", "kind"), [("orders", 20), ("orders", 18), ("s", 17), ("bar", 0)])
+def test_lines_that_are_no_frequency_are_refused_unless_the_mapping_tells_them(tmp_path, label, kind):
+    file = written(tmp_path, frfs(kinds=(kind, 11, 13), labels=(label, "m/s", "N")))
+    with pytest.raises(BadInput, match=rf"T20.uff: set 1: abscissa of type {kind} in '{label}'; allowed is frequency \(18\) in Hz, kHz, rad/s, rpm; start_Hz and step_Hz in its \[\[files\]\]"):
+        imported(tmp_path, "", file)
+    frf = imported(tmp_path, '[[files]]\nfile = "T20.uff"\nstart_Hz = 400.0\nstep_Hz = 1.0\n', file)
+    np.testing.assert_allclose(frf.frequency, FREQUENCY)
+
+
+def test_an_axis_that_says_nothing_is_said_to_be_taken_in_SI(tmp_path):
+    file = written(tmp_path, frfs(kinds=(0, 11, 13), labels=("NONE", "m/s", "N")))
+    (tmp_path / "m.toml").write_text(SPINDLE + HEAD)
+    notes = bring([file], mapping=tmp_path / "m.toml", out=tmp_path / "c").values["notes"]
+    assert f"T20.uff: {len(PAIRS)} functions do not say what their abscissa is: taken as Hz, of time records as s" in notes
+
+
+@pytest.mark.parametrize("heading", ["Frequency [rad/s]", "Frequency (rad/s)"])
+def test_lines_of_a_text_table_in_another_unit(tmp_path, heading):
+    heads, found = columns("real", "(m/s)/N")
+    frf = imported(tmp_path, "", table(tmp_path / "T20.csv", [heading, *heads], [2 * np.pi * FREQUENCY, *found]))
+    np.testing.assert_allclose(frf.frequency, FREQUENCY, rtol=1e-9)
+
+
+def test_an_axis_of_a_text_table_in_a_unit_that_is_not_known(tmp_path):
+    heads, found = columns("real", "(m/s)/N")
+    file = table(tmp_path / "T20.csv", ["Frequency [bar]", *heads], [FREQUENCY, *found])
+    with pytest.raises(BadInput, match=r'Frequency \[bar\]: its unit \'bar\' is none of frequency that is known; allowed are Hz, kHz, rad/s, rpm; columns tells it, as in "frequency \[Hz\]"'):
+        imported(tmp_path, "", file)
+    frf = imported(tmp_path, '[[files]]\nfile = "T20.csv"\ncolumns = { "Frequency [bar]" = "frequency [kHz]" }\n', file)
+    np.testing.assert_allclose(frf.frequency, 1e3 * FREQUENCY, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("above", "below", "factor"),
+    [("NONE", "NONE", 1e3 / 10), ("NONE", "lbf", 1e3 * 4.4482216152605), ("m/s", "NONE", 1 / 10), ("NONE", "N", 1e3), ("mm/s", "N", 1e3)],
+)
+def test_each_side_of_an_frf_has_the_unit_of_its_label_or_of_set_164(tmp_path, above, below, factor):
+    """Set 164 is 1000 to a metre and 10 to a newton; a force's label beside it was dropped, and a label of the numerator alone was no unit."""
+    frf = imported(tmp_path, "", written(tmp_path, set_164(1e3, 10.0) + frfs(labels=("Hz", above, below), factor=factor)))
+    np.testing.assert_allclose(frf.value, FRF.value, rtol=1e-8)
+
+
+@pytest.mark.parametrize("factors", [(0.0, 0.0), (1e3, 0.0), (0.0, 1.0)])
+def test_factors_of_nothing_are_refused_with_geometry_and_without(tmp_path, factors):
+    geometry = f"    -1\n    15\n{1:10d}{0:10d}{0:10d}{0:10d}{12.0:13.5E}{0.0:13.5E}{20.0:13.5E}\n    -1\n" if factors[0] == 0 else ""
+    file = written(tmp_path, set_164(*factors) + geometry + frfs(labels=("Hz", "NONE", "NONE")))
+    for reading in (lambda: imported(tmp_path, "", file), lambda: read_frf(file, "mobility", POINTS)):
+        with pytest.raises(BadInput, match=rf"T20.uff.*: data set 164: the factor of {'force' if factors[0] else 'length'} = 0: must lie between"):
+            reading()
+
+
 def by_name(turned: int, direction: int, sign: float = 1.0) -> str:
     """Ends by name alone, node 0; that of `turned` looks in another direction."""
     names = {1: "hub_top0", 3: "hub_side0", 6: "seat90"}
@@ -58,3 +117,8 @@ def test_a_named_end_across_its_point_is_asked_about_and_may_be_told(tmp_path):
 def test_ways_of_writing_an_acceleration(text, quantity, factor):
     assert units.of_frf(text) == (quantity, pytest.approx(factor))
     assert (units.length_factor(text) is None) == ("g" in text.lower())
+
+
+def test_quantities_that_contradict_each_other_are_told_with_their_articles(tmp_path):
+    with pytest.raises(Unanswered, match="its label 'Acceleration' is that of an accelerance, its unit '\\(m/s\\)/N' that of a mobility"):
+        imported(tmp_path, "", written(tmp_path, frfs(word="Acceleration")))
