@@ -7,6 +7,7 @@ everything that is open at once; `template.template` writes the mapping as a for
 asked      what files and a mapping leave open, each asked once, as a sentence
 assemble   from files and a mapping to a campaign, or to everything that is still open, at once
 checks     what files hold that cannot be used, and what a mapping tells of them that they do not hold
+coherence  coherence beside the FRF that it is of, and what of it has no FRF
 files/     what is in a file of each kind
 frfs       from placed curves to the FRFs of one test: SI, one quantity, common lines, checks
 likeness   imported FRFs beside the scene's: units and channels that seem mistaken

@@ -6,14 +6,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Point, Spindle
 from thermospindle.model.units import MINUTE, RPM
 from thermospindle.sim.campaign.campaign import Campaign, Test
 from thermospindle.sim.importing.asked import open_conditions, open_ends, open_parts, open_units, scaled, spoken, together, unanswered
 from thermospindle.sim.importing.checks import check_columns, check_content, check_ends, check_files, check_left_out, check_tests, names_of
+from thermospindle.sim.importing.coherence import with_coherence
 from thermospindle.sim.importing.files.reading import content
 from thermospindle.sim.importing.frfs import Placed, frf_of
 from thermospindle.sim.importing.mapping import FileForm, MappingForm, TestForm, settings_of, told_of
@@ -45,16 +44,20 @@ def read(
     modes: dict[str, list[ModeLine]] = {}
     window: dict[str, float] = {}
     pretrigger: dict[str, float] = {}
-    coherence: dict[str, dict[tuple[End, End], np.ndarray]] = {}
+    coherence: dict[str, list[Curve]] = {}
     for c in contents:
         own = settings[c.file].test or plain(c.file.stem)
         check_content(c)
         if c.curves or c.questions or c.motions:
             curves.setdefault(own, []).extend(_turned(x, settings[c.file]) for x in c.curves)
-        coherence.setdefault(own, {}).update(c.coherence)
+        coherence.setdefault(own, []).extend(c.coherence)
         for m in c.modes:
             modes.setdefault(m.test or own, []).append(m)
-    curves = {test: [_with(x, coherence.get(test, {})) for x in every] for test, every in curves.items()}
+    for test, found_of in coherence.items():
+        with_, said = with_coherence(curves.get(test, []), found_of)
+        if with_:
+            curves[test] = with_
+        notes += said
     groups, open_records = grouped(contents, settings)
     questions += open_records
     measured = scene.hammer.band if scene is not None and form.band_Hz is None and form.records.band_Hz is None else None
@@ -89,12 +92,6 @@ def _ends(curves: Sequence[tuple[str, Curve]], contents: Sequence[Content]) -> l
 
 def _turned(curve: Curve, settings: FileForm) -> Curve:
     return replace(curve, value=curve.value.conj()) if settings.conjugate else curve
-
-
-def _with(curve: Curve, coherence: dict[tuple[End, End], np.ndarray]) -> Curve:
-    """The curve with the coherence of its ends, from whichever file of its test."""
-    own = coherence.get((curve.response, curve.reference))
-    return curve if own is None or own.shape != curve.value.shape else replace(curve, coherence=own)
 
 
 def campaign_of(found: Read, form: MappingForm, scene: Spindle | None, files: Sequence[Path], mapping: Path | None) -> tuple[Campaign, list[str]]:

@@ -26,6 +26,7 @@ ADVICE = {
     "reciprocity": "one of the two has another unit, sign or node than it says, or the spindle changed between the hits",
 }
 """What to do about what `check_frf` refuses, by a word of its sentence."""
+BESIDE = {"coherence": "coherence", "sd": "standard errors"}
 ONE = 1e-6
 """Coherence within which a file's single precision writes 1."""
 
@@ -63,6 +64,7 @@ def frf_of(
     responses, references = (tuple(dict.fromkeys(getattr(p, key) for p in placed)) for key in ("response", "reference"))
     order = {(p.response, p.reference): k for k, p in enumerate(placed)}
     index = np.array([[order[r, q] for q in references] for r in responses])
+    notes += [f"test {test}: {n}" for n in map(lambda key: _not_all(placed, key), BESIDE) if n]
     frf = Frf(
         frequency, np.asarray(value[index], complex), responses, references, quantity,
         _beside(placed, columns, index, "coherence", frequency, quantity), _beside(placed, columns, index, "sd", frequency, quantity),
@@ -157,6 +159,12 @@ def _spoken(lines: Array) -> str:
 
 def _value(p: Placed, lines: np.ndarray, frequency: Array, quantity: str) -> ComplexArray:
     return np.asarray(p.curve.value[lines] * p.factor * (2j * np.pi * frequency) ** (POWER[quantity] - POWER[p.quantity]), complex)
+
+
+def _not_all(placed: Sequence[Placed], key: str) -> str:
+    """What is left out in words where some FRFs have a coherence or standard errors beside them and others none."""
+    without = [p.name for p in placed if getattr(p.curve, key) is None]
+    return f"its {BESIDE[key]} left out: {listed(without)} {'has' if len(without) == 1 else 'have'} none" if 0 < len(without) < len(placed) else ""
 
 
 def _beside(placed: Sequence[Placed], columns: list[np.ndarray], index: np.ndarray, key: str, frequency: Array, quantity: str) -> Array | None:

@@ -99,7 +99,7 @@ class Content:
     modes: tuple[ModeLine, ...] = ()
     places: dict[int, tuple[float, float, float]] = field(default_factory=dict)  # m, by node
     unscaled: dict[int, tuple[float, float, float]] = field(default_factory=dict)  # by node, of a file that names no unit of length
-    coherence: dict[tuple[End, End], Array] = field(default_factory=dict)  # of FRFs that may be in another file of the test
+    coherence: tuple[Curve, ...] = ()  # of FRFs that may be in another file of the test
     notes: tuple[str, ...] = ()
     questions: tuple[Question, ...] = ()
     names: tuple[str, ...] = ()  # of the columns or arrays that a mapping's `columns` may tell

@@ -41,7 +41,7 @@ def _from_uff(file: Path, settings: FileForm) -> Content:
     motions: list[Motion] = []
     modes: list[Found] = []
     questions: list[Question] = []
-    coherence: dict[tuple[End, End], np.ndarray] = {}
+    coherence: list[Curve] = []
     errors: dict[tuple[End, End], np.ndarray] = {}
     axis: np.ndarray | None = None
     places: dict[int, tuple[float, float, float]] = {}
@@ -64,7 +64,7 @@ def _from_uff(file: Path, settings: FileForm) -> Content:
                 curves.append(curve)
                 questions += asked
             elif function == COHERENCE:
-                coherence[ends] = np.asarray(np.real(record["data"]), float)
+                coherence.append(Curve(file, where, *ends, frequencies(file, where, record, settings), np.asarray(np.real(record["data"]), float)))
             elif function == RECORD:
                 motions.append(_motion(file, where, record, system, settings))
             elif record["id2"].strip() == STANDARD_ERROR:  # of our own files, in the unit of the FRF
@@ -84,12 +84,13 @@ def _from_uff(file: Path, settings: FileForm) -> Content:
         elif kind not in (151, 164, 18, 82, 2412):
             left[f"dataset {kind}"] = left.get(f"dataset {kind}", 0) + 1
     lines, asked, said = modes_of(file, modes, settings)
+    coherence = [c if axis is None else replace(c, frequency=axis) for c in coherence]
     curves = [replace(c, sd=errors.get((c.response, c.reference)), frequency=c.frequency if axis is None else axis) for c in curves]
     notes = [f"{file.name}: {count} x {name} left out: not used by a campaign" for name, count in left.items()]
     notes += said
     if taken_as_SI:
         notes.append(f"{file.name}: {taken_as_SI} functions do not say what their abscissa is: taken as Hz, of time records as s")
-    return Content(file, tuple(curves), _joined(motions), lines, places, unscaled, coherence, tuple(notes), (*questions, *asked))
+    return Content(file, tuple(curves), _joined(motions), lines, places, unscaled, tuple(coherence), tuple(notes), (*questions, *asked))
 
 
 def _end(record: Mapping[str, Any], side: str, told: str | int | None) -> End:

@@ -109,6 +109,61 @@ def test_a_named_end_across_its_point_is_asked_about_and_may_be_told(tmp_path):
     assert read_campaign(tmp_path / "c").tests[0].frf.response_nodes == (1, 3, 6)
 
 
+def with_coherence(directions=DIRECTIONS, lines=slice(None), pairs=PAIRS, extra="") -> str:
+    return frfs() + extra + "".join(
+        set_58(FREQUENCY[lines], FRF.coherence[FRF.response_nodes.index(r), FRF.reference_nodes.index(q)][lines], (r, directions[r]), (q, directions[q]), 6, (18, 0, 0), ("Hz", "NONE", "NONE"))
+        for r, q in pairs
+    )
+
+
+def brought(tmp_path, text):
+    (tmp_path / "m.toml").write_text(SPINDLE + HEAD)
+    notes = bring([written(tmp_path, text)], mapping=tmp_path / "m.toml", out=tmp_path / "c").values["notes"]
+    return read_campaign(tmp_path / "c").tests[0].frf, [n for n in notes if "coherence" in n]
+
+
+NOWHERE = dict.fromkeys(DIRECTIONS, 0)
+
+
+@pytest.mark.parametrize("directions", [DIRECTIONS, NOWHERE, {n: -d for n, d in DIRECTIONS.items()}], ids=["same", "none", "opposite"])
+def test_coherence_belongs_to_the_one_frf_between_its_points(tmp_path, directions):
+    """Without directions it was dropped, and nothing said so."""
+    frf, notes = brought(tmp_path, with_coherence(directions))
+    np.testing.assert_allclose(frf.coherence, FRF.coherence, rtol=1e-9)
+    assert notes == []
+
+
+@pytest.mark.parametrize(("lines", "first"), [(slice(1, None), "400"), (slice(None, -1), "700")])
+def test_a_coherence_with_a_line_less_cuts_its_frf_to_the_lines_of_both(tmp_path, lines, first):
+    frf, notes = brought(tmp_path, with_coherence(lines=lines))
+    np.testing.assert_allclose(frf.frequency, FREQUENCY[lines])
+    np.testing.assert_allclose(frf.value, FRF.value[..., lines], rtol=1e-9)
+    np.testing.assert_allclose(frf.coherence, FRF.coherence[..., lines], rtol=1e-9)
+    assert notes == [f"T20.uff: the line at {first} Hz of set 1, set 2, set 3, set 4 and 2 more left out: coherence has no such line"]
+
+
+def test_coherence_that_fits_no_frf_is_left_out_by_name(tmp_path):
+    _, notes = brought(tmp_path, with_coherence(lines=slice(0, 150)))
+    assert "coherence of 1:+Z over 1:+Z (set 7), 1:+Z over 6:+Z (set 8)," in notes[0]
+    assert "and 2 more left out: 150 lines from 400 to 549 Hz are not the 301 from 400 to 700 Hz of the FRF" in notes[0]
+
+
+def test_coherence_of_one_pair_alone_is_left_out_with_what_lacks_it(tmp_path):
+    frf, notes = brought(tmp_path, with_coherence(pairs=PAIRS[:5]))
+    assert frf.coherence is None
+    assert notes == ["test T20: its coherence left out: H(6,6) has none"]
+
+
+def test_coherence_that_may_be_of_two_frfs_or_of_none_is_left_out_by_name(tmp_path):
+    """A second FRF of node 3, across, makes a coherence of node 3 without direction one of two; node 9 has no FRF at all."""
+    across = set_58(FREQUENCY, FRF.value[0, 0], (3, 2), (1, 3)) + set_58(FREQUENCY, FRF.coherence[0, 0], (9, 0), (1, 0), 6, (18, 0, 0), ("Hz", "NONE", "NONE"))
+    head = HEAD + '[[points]]\nnode = 4\nname = "across"\nbody = "hub"\nposition_mm = [12.5, 0.0, 15.0]\ndirection = "+Y"\ncalled = ["3:+Y"]\n'
+    (tmp_path / "m.toml").write_text(SPINDLE + head)
+    notes = bring([written(tmp_path, with_coherence(NOWHERE, extra=across))], mapping=tmp_path / "m.toml", out=tmp_path / "c").values["notes"]
+    assert "T20.uff: coherence of 3 over 1 (set 11) left out: 2 FRFs of its test are between these points" in notes
+    assert "T20.uff: coherence of 9 over 1 (set 8) left out: its test has no FRF between these points" in notes
+
+
 @pytest.mark.parametrize(
     ("text", "quantity", "factor"),
     [("in/s^2/lbf", "accelerance", 0.0254 / 4.4482216152605), ("(in/s2)/N", "accelerance", 0.0254), ("m/s/s/N", "accelerance", 1.0), ("(m/s/s)/N", "accelerance", 1.0)]
