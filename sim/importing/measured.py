@@ -33,6 +33,9 @@ class End:
         return ":".join(filter(None, (self.name or str(self.node or ""), self.direction)))
 
 
+NOWHERE = End()
+
+
 @dataclass(frozen=True, eq=False)
 class Curve:
     """One FRF as a file has it: `value` (n,) complex, or real where it is a magnitude alone; `unit` and `quantity` "" where not told."""
@@ -64,6 +67,7 @@ class Motion:
     step: float  # s
     value: Array
     unit: str = ""
+    reference: End = NOWHERE  # of a response: the point whose force it answers, where the file tells
 
 
 @dataclass(frozen=True)

@@ -263,13 +263,6 @@ def _motions(file: Path, columns: Sequence[Column], moving: Sequence[Column], se
         value = np.atleast_2d(np.asarray(c.values.real, float))
         value = value if value.shape[-1] >= value.shape[0] else value.T
         found.append(Motion(file, c.name, place if place.label else End(name="" if force else c.name), force, step or 1.0, value, c.role.unit))
-    hammer = next((m for m in found if m.force), None)
-    for m in found:
-        if hammer is not None and m.value.shape != hammer.value.shape:
-            raise BadInput(
-                f"{file}: {m.where}: has {m.value.shape[0]} hits of {m.value.shape[1]} samples, its force {hammer.where} {hammer.value.shape[0]} of "
-                f"{hammer.value.shape[1]}; they must be the same: time records are (hits, samples), or (hits, responses, samples)"
-            )
     if not any(m.force for m in found):
         questions.append(Question(file.name, "columns", f"which column is the hammer's force; {FORCE_NEEDED}"))
     elif all(m.force for m in found):

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass, replace
 
 from thermospindle.sim.importing import units
-from thermospindle.sim.importing.measured import End
+from thermospindle.sim.importing.measured import NOWHERE, End
 
 PARTS = {
     "real": "real", "re": "real", "imaginary": "imaginary", "imag": "imaginary", "im": "imaginary", "img": "imaginary",
@@ -21,9 +21,6 @@ RESPONSES = ("response", "acceleration", "accelerometer", "accel", "acc", "veloc
 KINDS_OF_CHANNEL = {*FORCES, *RESPONSES}
 ROLES = 'frequency, time, "H(3,1)" with real, imaginary, magnitude, decibel or phase behind it, coherence(3,1), sd(3,1), force, response 3, ignore'
 """What may stand in `columns` of a mapping."""
-
-
-NOWHERE = End()
 
 
 @dataclass(frozen=True)

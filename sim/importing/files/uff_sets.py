@@ -16,7 +16,7 @@ from thermospindle.sim.importing.files.labels import end, told_of_end
 from thermospindle.sim.importing.files.uff_axes import frequencies, in_unit, label, nameless, time_step
 from thermospindle.sim.importing.files.uff_modes import Found, mode, modes_of
 from thermospindle.sim.importing.mapping import FileForm
-from thermospindle.sim.importing.measured import Content, Curve, End, Motion, Question
+from thermospindle.sim.importing.measured import NOWHERE, Content, Curve, End, Motion, Question
 
 FRF, COHERENCE, RECORD = 4, 6, 1
 AXES = {0: "", 1: "+X", 2: "+Y", 3: "+Z", -1: "-X", -2: "-Y", -3: "-Z"}
@@ -129,15 +129,16 @@ def _motion(file: Path, where: str, record: Mapping[str, Any], system: Mapping[s
     unit, scale = in_unit(file, record, "ordinate", kind if kind in units.OF_TYPE or kind == FORCE else 0, system)
     force = kind == FORCE or units.of_force(unit) is not None or "force" in record["ordinate_axis_lab"].lower()
     value = np.asarray(np.real(record["data"]), float)[None] * scale
+    hit = _end(record, "ref", settings.reference)
     at = _end(record, "rsp", settings.reference if force else settings.response)
-    return Motion(file, where, at, force, time_step(file, where, record, settings), value, unit)
+    return Motion(file, where, at, force, time_step(file, where, record, settings), value, unit, NOWHERE if force else hit)
 
 
 def _joined(motions: list[Motion]) -> tuple[Motion, ...]:
-    """Records of one channel that follow each other in a file are its hits."""
-    found: dict[tuple[End, bool], Motion] = {}
+    """Records of one channel that follow each other in a file are its hits; those of one response to several hammer points are apart."""
+    found: dict[tuple[End, bool, End], Motion] = {}
     for m in motions:
-        key = (m.end, m.force)
+        key = (m.end, m.force, m.reference)
         first = found.setdefault(key, m)
         if first is m:
             continue
