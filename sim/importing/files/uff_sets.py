@@ -89,7 +89,7 @@ def _from_uff(file: Path, settings: FileForm) -> Content:
     notes = [f"{file.name}: {count} x {name} left out: not used by a campaign" for name, count in left.items()]
     notes += said
     if taken_as_SI:
-        notes.append(f"{file.name}: {taken_as_SI} functions do not say what their abscissa is: taken as Hz, of time records as s")
+        notes.append(f"{file.name}: functions that do not say what their abscissa is ({taken_as_SI}) are taken in Hz, time records in s")
     return Content(file, tuple(curves), _joined(motions), lines, places, unscaled, tuple(coherence), tuple(notes), (*questions, *asked))
 
 

@@ -46,7 +46,7 @@ def test_an_axis_that_says_nothing_is_said_to_be_taken_in_SI(tmp_path):
     file = written(tmp_path, frfs(kinds=(0, 11, 13), labels=("NONE", "m/s", "N")))
     (tmp_path / "m.toml").write_text(SPINDLE + HEAD)
     notes = bring([file], mapping=tmp_path / "m.toml", out=tmp_path / "c").values["notes"]
-    assert f"T20.uff: {len(PAIRS)} functions do not say what their abscissa is: taken as Hz, of time records as s" in notes
+    assert f"T20.uff: functions that do not say what their abscissa is ({len(PAIRS)}) are taken in Hz, time records in s" in notes
 
 
 @pytest.mark.parametrize("heading", ["Frequency [rad/s]", "Frequency (rad/s)"])
