@@ -12,6 +12,7 @@ from thermospindle.model.errors import BadInput, Unanswered
 from thermospindle.model.scene.reading import load
 from thermospindle.report.verbs.importing import bring
 from thermospindle.sim.campaign.campaign import read_campaign
+from thermospindle.sim.importing.files.uff_modes import mode
 
 
 def test_frequencies_alone_are_modes(tmp_path):
@@ -124,6 +125,12 @@ def test_hysteretic_damping_is_twice_the_ratio(tmp_path):
     assert found == [pytest.approx(0.01), pytest.approx(0.006), pytest.approx(0.006), None, None]
     assert "lab.uff: hysteretic damping beside another viscous one left out, of the modes of 1200 Hz" in notes
     assert "lab.uff: dampings that are not positive left out, of the modes of 1300 Hz" in notes
+
+
+def test_hysteretic_damping_of_data_set_2414():
+    """Record 12: frequency, viscous and hysteretic damping in fields 2, 5 and 6."""
+    found = mode("set 1", {"type": 2414, "analysis_type": 2, "record12_field2": 1000.0, "record12_field5": 0.0, "record12_field6": 0.02})
+    assert (found.line.frequency, found.told) == (1000.0, 0.01)
 
 
 def test_dampings_that_may_be_in_per_cent_are_asked_about_once_and_read_alike(tmp_path):
