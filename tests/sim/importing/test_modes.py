@@ -12,7 +12,7 @@ from thermospindle.model.errors import BadInput, Unanswered
 from thermospindle.model.scene.reading import load
 from thermospindle.report.verbs.importing import bring
 from thermospindle.sim.campaign.campaign import read_campaign
-from thermospindle.sim.importing.files.uff_modes import mode
+from thermospindle.sim.importing.files import uff_modes
 
 
 def test_frequencies_alone_are_modes(tmp_path):
@@ -129,7 +129,7 @@ def test_hysteretic_damping_is_twice_the_ratio(tmp_path):
 
 def test_hysteretic_damping_of_data_set_2414():
     """Record 12: frequency, viscous and hysteretic damping in fields 2, 5 and 6."""
-    found = mode("set 1", {"type": 2414, "analysis_type": 2, "record12_field2": 1000.0, "record12_field5": 0.0, "record12_field6": 0.02})
+    found = uff_modes.mode("set 1", {"type": 2414, "analysis_type": 2, "record12_field2": 1000.0, "record12_field5": 0.0, "record12_field6": 0.02})
     assert (found.line.frequency, found.told) == (1000.0, 0.01)
 
 
