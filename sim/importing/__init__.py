@@ -7,15 +7,12 @@ everything that is open at once; `template.template` writes the mapping as a for
 asked      what files and a mapping leave open, each asked once, as a sentence
 assemble   from files and a mapping to a campaign, or to everything that is still open, at once
 checks     what files hold that cannot be used, and what a mapping tells of them that they do not hold
-coherence  coherence beside the FRF that it is of, and what of it has no FRF
 files/     what is in a file of each kind
-frfs       from placed curves to the FRFs of one test: SI, one quantity, common lines, checks
-likeness   imported FRFs beside the scene's: units and channels that seem mistaken
+frfs/      from curves to the FRFs of a test, with coherence, checks, peaks of magnitudes, and a look at the scene's
 mapping    the form of a mapping file
 measured   what files hold before anything is decided about it: curves, time records, modes, places, questions
 modes      the modes of one test as rows of a campaign, with errors and shapes
 names      what names of files seem to tell: temperature, speed, hammer, and which files are one test
-peaks      modes of FRFs that are magnitudes alone
 places     which point of the campaign each end of a curve is
 records/   time records: hits found and judged, windows, FRFs with coherence and standard errors
 template   the mapping as a form to fill in

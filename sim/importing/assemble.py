@@ -12,14 +12,14 @@ from thermospindle.model.units import MINUTE, RPM
 from thermospindle.sim.campaign.campaign import Campaign, Test
 from thermospindle.sim.importing.asked import open_conditions, open_ends, open_parts, open_units, scaled, spoken, together, unanswered
 from thermospindle.sim.importing.checks import check_columns, check_content, check_ends, check_files, check_left_out, check_tests, names_of
-from thermospindle.sim.importing.coherence import with_coherence
 from thermospindle.sim.importing.files.reading import content
-from thermospindle.sim.importing.frfs import Placed, frf_of
+from thermospindle.sim.importing.frfs.coherence import with_coherence
+from thermospindle.sim.importing.frfs.one_test import Placed, frf_of
+from thermospindle.sim.importing.frfs.peaks import from_peaks
 from thermospindle.sim.importing.mapping import FileForm, MappingForm, TestForm, settings_of, told_of
 from thermospindle.sim.importing.measured import Content, Curve, End, ModeLine, Question, Read, listed
 from thermospindle.sim.importing.modes import rows_of
 from thermospindle.sim.importing.names import plain
-from thermospindle.sim.importing.peaks import from_peaks
 from thermospindle.sim.importing.places import place, points_of, unplaced
 from thermospindle.sim.importing.records.grouped import grouped
 from thermospindle.sim.importing.records.spectra import frfs_of, open_channels

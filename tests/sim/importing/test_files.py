@@ -284,8 +284,8 @@ def test_low_frequencies_of_an_accelerometer_are_noise_and_no_wrong_sign(tmp_pat
 
 def test_noise_of_a_magnitude_makes_no_modes(tmp_path):
     """Two modes, noise of 2 % of the largest: peaks of the noise are no modes."""
+    from thermospindle.sim.importing.frfs.peaks import from_peaks
     from thermospindle.sim.importing.measured import Curve, End
-    from thermospindle.sim.importing.peaks import from_peaks
 
     lines = np.arange(50.0, 2000.0)
     size = np.abs(rotor_frf(lines, noise=0.02).value[:, 0])

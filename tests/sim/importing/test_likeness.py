@@ -13,7 +13,7 @@ from tests.sim.importing.exported import table
 from thermospindle.model.scene.reading import load
 from thermospindle.report.verbs.importing import bring
 from thermospindle.sim.campaign.campaign import Campaign, read_campaign
-from thermospindle.sim.importing.likeness import likenesses
+from thermospindle.sim.importing.frfs.likeness import likenesses
 from thermospindle.sim.importing.units import of_frf
 
 

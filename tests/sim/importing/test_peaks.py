@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import thermospindle as ts
+from thermospindle.sim.importing.frfs.peaks import from_peaks
 from thermospindle.sim.importing.measured import Curve, End
-from thermospindle.sim.importing.peaks import from_peaks
 from thermospindle.sim.operating import OperatingPoint
 
 CLEAR = (1002.0, 1545.0, 1821.0, 2010.0)  # Hz, of hdd_2003 at 20 C; 1795 Hz stands within the half-power width of 1821 Hz
