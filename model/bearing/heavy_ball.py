@@ -156,14 +156,17 @@ def settled(ball: HeavyBall, line: Vector, tolerance: float, least: float, start
     """The balance of a ball at rest, its resultant below `tolerance` (N), for the outer groove's centre at `line` (m).
 
     The energy of the two contacts less the work of the centrifugal force is convex, so a Newton step that is halved until the
-    resultant falls finds its minimum; the gyroscopic friction is a small addition. `least` (N/m) is added to the stiffness of the
-    step, for a ball that touches nothing. `start` is where its centre may be, as it was for a `line` near this one. Raises `NoEquilibrium`.
+    resultant falls finds its minimum where the gyroscopic friction is a small addition. Where it is not, as between rings that turn
+    against each other, the ball is let drift there. `least` (N/m) is added to the stiffness of the step, for a ball that touches
+    nothing. `start` is where its centre may be, as it was for a `line` near this one. Raises `NoEquilibrium`.
     """
     here = None if start is None else _approached(ball, line, tolerance, least, start, FEW)
     if here is None or here.off >= tolerance:
         here = _approached(ball, line, tolerance, least, _start(ball, line), STEPS)
     if here.off >= tolerance:
-        raise NoEquilibrium(f"ball centres did not settle; the largest residual is {here.off:.2g} N")
+        stuck, here = here, _drifted(ball, line, tolerance, least)
+        if here.off >= tolerance:
+            raise NoEquilibrium(f"ball centres did not settle; the largest residual is {stuck.off:.2g} N")
     return here
 
 
@@ -191,6 +194,30 @@ def _approached(ball: HeavyBall, line: Vector, tolerance: float, least: float, s
     return here
 
 
+def _drifted(ball: HeavyBall, line: Vector, tolerance: float, least: float) -> Balance:
+    """Where a ball comes to that the resultant on it pushes through something viscous: pseudo-transient continuation (Kelley and Keyes 1998).
+
+    Rings that turn against each other leave a ball little centrifugal force and much moment. Where the friction 2 M / D across the outer race is more than
+    the centrifugal force has across it, it carries a loose ball from the crossing of `_start` over to the other one, where the drift begins, and a lightly pressed
+    ball as far. On the way S + G is not positive, and halved steps end where it is singular and the resultant least, but not nothing. A drift may pass through a
+    larger one. Each step is implicit, against a drag that lets the resultant carry the ball `LONGEST` at most and is twice what S + G falls short of nothing;
+    it is Newton's at the end.
+    """
+    longest = LONGEST * hypot(*line)
+    here = balance(ball, _other_side(_start(ball, line), line), line)
+    for _ in range(STEPS):
+        if here.off < tolerance:
+            break
+        (s_rr, s_rz, s_zr, s_zz), (g_rr, g_rz, g_zr, g_zz) = here.by_inner, here.by_line
+        rr, rz, zr, zz = s_rr + g_rr, s_rz + g_rz, s_zr + g_zr, s_zz + g_zz
+        softest = (rr + zz) / 2 - sqrt(max((rr - zz) ** 2 / 4 + rz * zr, 0.0))
+        drag = least + here.off / longest + 2 * max(-softest, 0.0)
+        step_r, step_z = _times(_inverse((rr + drag, rz, zr, zz + drag)), here.resultant)
+        factor = min(1.0, longest / max(hypot(step_r, step_z), 1e-30))
+        here = balance(ball, (here.centre[0] + factor * step_r, here.centre[1] + factor * step_z), line)
+    return here
+
+
 def _start(ball: HeavyBall, line: Vector) -> Vector:
     """Where the centre of a ball may be: between two races that press it; flung outward between two that do not.
 
@@ -214,6 +241,12 @@ def _start(ball: HeavyBall, line: Vector) -> Vector:
     er, ez = line[0] / length, line[1] / length
     out = 1.0 if ez >= 0 else -1.0  # of the two crossings the one farther from the axis
     return along * er + across * abs(ez), along * ez - out * across * er
+
+
+def _other_side(centre: Vector, line: Vector) -> Vector:
+    """The mirror image of a centre at the line between the groove centres: the other crossing of two circles about these."""
+    twice = 2 * (centre[0] * line[0] + centre[1] * line[1]) / (line[0] ** 2 + line[1] ** 2)
+    return twice * line[0] - centre[0], twice * line[1] - centre[1]
 
 
 def balance(ball: HeavyBall, centre: Vector, line: Vector) -> Balance:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from thermospindle.model.bearing import heavy_ball
-from thermospindle.model.bearing.ball_row import BallInertia, BallRow, centred_axial_force, respond
+from thermospindle.model.bearing.ball_row import BallInertia, BallRow, centre_line, centred_axial_force, respond
 from thermospindle.model.bearing.heavy_ball import HeavyBall, balance, settled
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.machine import Condition
@@ -153,3 +153,57 @@ def test_a_ball_settles_where_it_does_from_wherever_it_is_asked():
     r, z = cold.centre
     for start in ((r, z), (r + 1e-6, z - 1e-6), (0.5 * r, 2.0 * z), (1e-9, 1e-9)):
         assert settled(BALL, LINE, 1e-10, 1.0, start).centre == pytest.approx((r, z), rel=1e-9)
+
+
+AGAINST = BallRow(16, 311.127251846117e-6, 141.92751425103216e-6, 93e-6, 248e-6, 25.21121041899814e9, 18.9557814348371e9, 18e-3, BallInertia(6.2e-3, 36e-3, 7850.0, 2094.4, -2094.4))
+"""A row of steel balls, 25 degrees, 180 N, whose rings turn against each other with 20,000 rpm: a ball's centrifugal force is 1.9 N, the friction of its moment 1.9 N too."""
+ASIDE = np.array([3e-6, -2e-6, 1e-6, 1e-4, 2e-4])
+
+
+@pytest.mark.parametrize("share", [0.2, 0.6, 1.0])
+def test_balls_between_rings_that_turn_against_each_other(share):
+    """Halved steps ended between the races, 0.7 to 1.9 N left. Here the balance of every ball is written out (Jones 1960) with the answer's forces and angles, at the speed of the cage
+    that rolling asks for on the mean; and the contacts are where their deformations put them."""
+    answer = respond(AGAINST, share * ASIDE)
+    assert (answer.ball_force > 3.0).all()
+    inertia, (outer, inner) = AGAINST.inertia, (answer.outer_angle, answer.inner_angle)
+    gamma, polar = inertia.diameter / inertia.pitch_diameter, inertia.mass * inertia.diameter**2 / 10
+    rolls = [np.sqrt(written_out(inertia, o, i)[0] / (inertia.mass * inertia.pitch_diameter / 2)) for o, i in zip(outer, inner, strict=True)]
+    cage = -np.mean(rolls)  # with the outer ring: that surface is the faster one
+    flung, moment = inertia.mass * inertia.pitch_diameter / 2 * cage**2, polar * cage * (inertia.outer_speed - cage) * np.sin(outer) / gamma
+    friction = 2 * moment / inertia.diameter
+    along_r = answer.ball_force * np.cos(inner) - answer.outer_ball_force * np.cos(outer) - friction * np.sin(outer) + flung
+    along_z = answer.ball_force * np.sin(inner) - answer.outer_ball_force * np.sin(outer) + friction * np.cos(outer)
+    assert np.abs([along_r, along_z]).max() < 1e-8
+    reach = [length + (force / constant) ** (2 / 3) for length, force, constant in (
+        (AGAINST.inner_length, answer.ball_force, AGAINST.inner_constant), (AGAINST.outer_length, answer.outer_ball_force, AGAINST.outer_constant),
+    )]  # fmt: skip
+    lines = sum(length[:, None] * np.stack([-np.cos(a), np.sin(a)], -1) for length, a in zip(reach, (inner, outer), strict=True))
+    assert lines == pytest.approx(centre_line(AGAINST, share * ASIDE), abs=1e-14)
+
+
+def test_a_solver_of_another_kind_finds_the_same_forces():
+    """scipy's hybrid method on Harris's equations from many starts, written for a review."""
+    assert respond(AGAINST, 0.2 * ASIDE).force == pytest.approx([49.967, -30.353, 73.392, 0.25258, 0.41646], rel=1e-4)
+
+
+def test_stiffness_of_a_row_between_rings_that_turn_against_each_other():
+    scale, h = np.array([1, 1, 1, AGAINST.arm, AGAINST.arm]), 1e-9
+    steps = h * np.diag(1 / scale)
+    slopes = np.array([(respond(AGAINST, 0.2 * ASIDE + d).force - respond(AGAINST, 0.2 * ASIDE - d).force) / (2 * h) for d in steps]).T
+    tangent = respond(AGAINST, 0.2 * ASIDE).tangent / scale
+    assert slopes / scale[:, None] == pytest.approx(tangent / scale[:, None], abs=1e-5 * np.abs(tangent / scale[:, None]).max())
+
+
+@pytest.mark.parametrize("cage", [None, -330.0], ids=["as-it-rolls", "with-a-cage"])
+@pytest.mark.parametrize("rpm", [3000, 20_000, 60_000])
+def test_a_ball_settles_however_loose_it_is_between_rings_that_turn_against_each_other(rpm, cage):
+    """From 30 um of play to 10 um pressed, held by both races: where the moment outdoes the centrifugal force, the circles about the groove centres cross nearer the axis."""
+    inertia = replace(AGAINST.inertia, inner_speed=rpm * RPM, outer_speed=-rpm * RPM, cage=None if cage is None else cage * rpm / 20_000)
+    ball = HeavyBall(AGAINST.inner_length, AGAINST.outer_length, AGAINST.inner_constant, AGAINST.outer_constant, inertia)
+    for stretch in np.linspace(-30e-6, 10e-6, 81):
+        length = AGAINST.unloaded_distance + stretch
+        line = -length * np.cos(0.43), length * np.sin(0.43)
+        here = settled(ball, line, 1e-9 * (rpm / 20_000) ** 2, 1e-2)
+        assert here.inner > 0
+        assert np.linalg.eigvals(np.reshape(np.add(here.by_inner, here.by_line), (2, 2))).real.min() > 0  # pushed aside, it comes back

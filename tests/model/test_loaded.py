@@ -264,3 +264,15 @@ def test_balls_by_themselves_are_for_centred_rings(pair: Spindle) -> None:
 def test_a_load_is_told_whole(change: dict, why: str) -> None:
     with pytest.raises(BadInput, match=why):
         build(raw_of(FILE) | change, FILE)
+
+
+@pytest.mark.parametrize("load", [400.0, 800.0])
+def test_rings_that_turn_against_each_other_bear_a_load(load: float) -> None:
+    """A housing that turns as fast as the shaft the other way: balls that the load lets go had no equilibrium."""
+    file = ROOT / "scenes" / "templates" / "grinding.toml"
+    raw = raw_of(file) | {"ball_inertia": 1.0}
+    raw["structure"]["bodies"][0] |= {"turns": True, "speed_ratio": -1.0, "polar_inertia_kg_m2": 0.02}
+    _, state = under(build(raw, file), (load, 0.0), 8e-3, 2094.4)
+    assert abs(shares(state).sum(axis=0)) == pytest.approx([load, 0.0], rel=1e-6, abs=1e-6 * load)
+    least = [respond(b.row, np.array(b.displacement)).ball_force.min() for b in state.bearings]
+    assert 0 < min(least) < 3.0
