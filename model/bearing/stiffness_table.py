@@ -45,9 +45,22 @@ BY_DIRECTION = {
     "coupling_stiffness_y_N_per_rad": lambda b: b.coupling_stiffness_y,
 }
 """Columns of a table with a bearing that is not as stiff in every direction across the axis; those above are along x and about x then."""
+BETWEEN = {
+    "axial_stiffness_xz_N_per_m": (0, 2),
+    "axial_stiffness_yz_N_per_m": (1, 2),
+    "coupling_stiffness_x_tilt_x_N_per_rad": (0, 3),
+    "coupling_stiffness_y_tilt_y_N_per_rad": (1, 4),
+    "coupling_stiffness_z_tilt_x_N_per_rad": (2, 3),
+    "coupling_stiffness_z_tilt_y_N_per_rad": (2, 4),
+    "tilt_stiffness_xy_N_m_per_rad": (3, 4),
+}
+"""Entries of the stiffness (5, 5) that centred rings do not have, each a column of a table with a bearing that has it: force or moment along the first direction of its name for a motion along
+the second. With those above the whole matrix is told."""
+NOTHING = 1e-12
+"""Of sqrt(k_ii k_jj), where an entry k_ij is what rounding leaves of nothing."""
 PRESSURE = "contact_pressure_MPa"
 """Column of a table that has ball or roller bearings."""
-FURTHER = (*OF_BALLS, *OF_ROLLERS, *BY_DIRECTION, PRESSURE)
+FURTHER = (*OF_BALLS, *OF_ROLLERS, *BY_DIRECTION, PRESSURE, *BETWEEN)
 GAPS = "{}: the table has gaps; every bearing needs a row for each temperature and speed, and one only"
 MISSING = -1e308  # in a grid that is being read; NaN is what a bearing given by numbers does not have
 
@@ -89,7 +102,8 @@ def tabulate(
     """Table of pair states on a grid: `states[i][j]` at temperature i and speed j, and as many `pressures` (Pa, by bearing), or none."""
     bearings = states[0][0].all_bearings
     further = [of for kind, of in ((BearingState, OF_BALLS), (RollerState, OF_ROLLERS)) if any(isinstance(b, kind) for b in bearings)]
-    if not all(b.alike for row in states for state in row for b in state.all_bearings):
+    every = [b for row in states for state in row for b in state.all_bearings]
+    if not all(_alike(b.stiffness) for b in every):
         further.append(BY_DIRECTION)
     columns = reduce(or_, further, COLUMNS)
 
@@ -100,6 +114,10 @@ def tabulate(
     if any(own for row in pressures for own in row):
         for b in bearings:
             values[b.name][PRESSURE] = np.array([[1e-6 * own.get(b.name, np.nan) for own in row] for row in pressures])
+    for key, at in BETWEEN.items():
+        if any(_size(b.stiffness, at) > NOTHING for b in every):
+            for b in bearings:
+                values[b.name][key] = column(b.name, lambda own, at=at: own.stiffness[at])
     return StiffnessTable(
         np.array([row[0].condition.temperature for row in states]),
         np.array([state.condition.speed for state in states[0]]),
@@ -107,6 +125,22 @@ def tabulate(
         dict(unloads),
         dict(provenance),
     )
+
+
+def _alike(k: Array) -> bool:
+    """Whether a stiffness (5, 5) has the same entries along x and about x as along y and about y."""
+    same = ((0, 0), (1, 1), 1.0), ((3, 3), (4, 4), 1.0), ((0, 4), (1, 3), -1.0)
+    return _size(k, (0, 1)) <= NOTHING and all(abs(k[along_x] - sign * k[along_y]) <= NOTHING * _scale(k, along_x) for along_x, along_y, sign in same)
+
+
+def _size(k: Array, at: tuple[int, int]) -> float:
+    """An entry of a stiffness (5, 5) over its scale; nothing of a bearing that has no stiffness there."""
+    return float(abs(k[at]) / (_scale(k, at) or 1.0))
+
+
+def _scale(k: Array, at: tuple[int, int]) -> float:
+    i, j = at
+    return float(np.sqrt(abs(k[i, i] * k[j, j])))
 
 
 def _property(bearing: BearingState | LinearState, read: Callable[[Any], float]) -> float:

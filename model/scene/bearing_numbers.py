@@ -21,15 +21,17 @@ COLUMNS = ("radial_stiffness_N_per_m", "axial_stiffness_N_per_m", "tilt_stiffnes
 """Of a table; those that are missing are zero, but one of the first two must be there."""
 BY_DIRECTION = tuple(stiffness_table.BY_DIRECTION)
 """Of a table whose bearing is not as stiff along y as along x; those that are missing are as along x, the second zero."""
+BETWEEN = stiffness_table.BETWEEN
+"""Of a table whose bearing couples directions further, with their places in the matrix; those that are missing are zero."""
 DIRECTIONS = ("x", "y", "z", "tilt_x", "tilt_y")
 WHERE = ("temperature_C", "speed_rpm")
-BESIDE = ("bearing", *(c for c in (*stiffness_table.COLUMNS, *stiffness_table.FURTHER) if c not in (*COLUMNS, *BY_DIRECTION)))
+BESIDE = ("bearing", *(c for c in (*stiffness_table.COLUMNS, *stiffness_table.FURTHER) if c not in (*COLUMNS, *BY_DIRECTION, *BETWEEN)))
 """Columns of the verb `table` that are no stiffness."""
 
 
 class Numbers(Table):
     """`radial`, `axial` and `tilt` stiffness alike in both planes; or `matrix_SI`, order x, y, z, tilt_x, tilt_y in N, m and rad; or the CSV
-    file `table` with columns temperature_C, speed_rpm and those of `COLUMNS` and `BY_DIRECTION`, which is also what the verb `table` writes."""
+    file `table` with columns temperature_C, speed_rpm and those of `COLUMNS`, `BY_DIRECTION` and `BETWEEN`, which is also what the verb `table` writes."""
 
     radial_stiffness_N_per_um: Positive | None = None
     axial_stiffness_N_per_um: NotNegative = 0.0
@@ -94,6 +96,7 @@ def _read(file: Path, bearing: str | None) -> tuple[tuple[float, ...], tuple[flo
             at = float(plain_number(row["temperature_C"])), float(plain_number(row["speed_rpm"])) * RPM
             radial, axial, tilt, coupling = (float(plain_number(row[c])) if c in known else 0.0 for c in COLUMNS)
             along_y, mixed, tilt_y, coupling_y = (float(plain_number(row[c])) if c in row else same for c, same in zip(BY_DIRECTION, (radial, 0.0, tilt, coupling), strict=True))
+            between = {place: float(plain_number(row[c])) for c, place in BETWEEN.items() if c in row}
         except (TypeError, AttributeError, ValueError):  # a row that ends before its time has None
             raise BadInput(f"{file}: row {number}: every column must hold a number in digits 0 to 9") from None
         if None in row:  # what is left of a row that has more cells than the header
@@ -102,6 +105,8 @@ def _read(file: Path, bearing: str | None) -> tuple[tuple[float, ...], tuple[flo
         k[0, 1] = k[1, 0] = mixed
         k[0, 4] = k[4, 0] = coupling
         k[1, 3] = k[3, 1] = -coupling_y
+        for (i, j), value in between.items():
+            k[i, j] = k[j, i] = value
         if at in values:
             raise BadInput(f"{file}: row {number}: {at[0]:g} C and {at[1] / RPM:g} rpm stand twice{'' if bearing else '; which bearing? say bearing = ...'}")
         if not np.isfinite(at).all():
@@ -119,7 +124,7 @@ def _read(file: Path, bearing: str | None) -> tuple[tuple[float, ...], tuple[flo
 
 def _check_columns(file: Path, rows: Sequence[Mapping[str, str | None]]) -> None:
     """`BadInput` for a column that is neither stiffness nor what the verb `table` writes: a misspelt one would be a stiffness of zero."""
-    allowed = (*WHERE, *COLUMNS, *BY_DIRECTION, *BESIDE)
+    allowed = (*WHERE, *COLUMNS, *BY_DIRECTION, *BETWEEN, *BESIDE)
     for column in rows[0]:
         if column is None or column in allowed or (not column and not any(row[column] for row in rows)):
             continue

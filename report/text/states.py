@@ -10,7 +10,8 @@ import numpy as np
 from rich.console import Console
 
 from thermospindle.model.bearing.pair import IN_CONTACT
-from thermospindle.model.bearing.stiffness_table import FURTHER, PRESSURE, StiffnessTable
+from thermospindle.model.bearing.state import ALIKE
+from thermospindle.model.bearing.stiffness_table import BETWEEN, FURTHER, PRESSURE, StiffnessTable
 from thermospindle.model.pressure import OF_BALLS, OF_ROLLERS
 from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.modes import Mode, group_energy
@@ -97,13 +98,13 @@ def show_table(console: Console, table: StiffnessTable, radial_load: bool = Fals
     contact = "inner" if table.speed.any() else "contact"
     angle = "inner\nangle\ndeg" if table.speed.any() else "angle\ndeg"
     force = "\n".join([*(["largest"] if radial_load else []), contact, "force", "N"])
-    told_apart = any("radial_stiffness_y_N_per_m" in values for values in table.values.values())
+    told_apart = any(_apart(values) for values in table.values.values())
     shown = [
         ("contact_angle_deg", angle, 1, 2), ("deformation_um", "deform.\num", 1, 3), ("clearance_um", "clear-\nance\num", 1, 2),
         ("contact_force_N", force, 1, 3), ("ball_stiffness_N_per_m", "ball k\nN/um", 1e-6, 3), ("preload_N", "preload\nN", 1, 2),
         ("radial_stiffness_N_per_m", "k_xx\nN/um" if told_apart else "k_RR\nN/um", 1e-6, 2), ("radial_stiffness_y_N_per_m", "k_yy\nN/um", 1e-6, 2), ("axial_stiffness_N_per_m", "k_AA\nN/um", 1e-6, 3),
     ]  # fmt: skip
-    shown = [row for row in shown if all(row[0] in values for values in table.values.values())]
+    shown = [row for row in shown if all(row[0] in values for values in table.values.values()) and (told_apart or row[0] != "radial_stiffness_y_N_per_m")]
     columns, rows = ["T\nC", "speed\nrpm", "bearing", *(head for _, head, _, _ in shown)], []
     for i, temperature in enumerate(table.temperature):
         for j, speed in enumerate(table.speed):
@@ -116,11 +117,21 @@ def show_table(console: Console, table: StiffnessTable, radial_load: bool = Fals
         console.print("Inner angle and force: of the contact with the inner ring; those of the outer one are in table.csv of --out.")
     if radial_load and rows_of_balls:
         console.print("Under the radial load deformation, force and ball k are those of the most loaded ball; the angle is the mean of all, weighted with their force.")
+    if any(column in values for values in table.values.values() for column in BETWEEN):
+        console.print("Stiffness between these directions, as k_xz, is in table.csv of --out.")
     if pressed := _pressed(table):
         console.print(pressed, highlight=False)
     for name, where in table.unloads.items():
         if where is not None:
             console.print(f"{name} bearing loses contact at {where:.2f} C")
+
+
+def _apart(values: Mapping[str, Array]) -> bool:
+    """Whether a bearing's stiffness along y is another than along x, by more than nobody sees."""
+    if "radial_stiffness_y_N_per_m" not in values:
+        return False
+    x, y, xy = (values[f"radial_stiffness{way}_N_per_m"] for way in ("", "_y", "_xy"))
+    return bool((np.maximum(abs(x - y), abs(xy)) > ALIKE * np.maximum(x, y)).any())
 
 
 def _pressed(table: StiffnessTable) -> str:
@@ -149,11 +160,11 @@ def show_told_table(console: Console, table: StiffnessTable, radial_load: bool =
 def _range_of(values: Mapping[str, Array]) -> str:
     """From the first condition to the last, of what the bearing has; empty where its table tells neither."""
     told = []
-    along = " along x" if "radial_stiffness_y_N_per_m" in values else ""
+    apart = _apart(values)
     for column, words, unit, scale in (
         ("preload_N", "preload", "N", 1.0),
-        ("radial_stiffness_N_per_m", f"radial stiffness{along}", "N/um", 1e-6),
-        ("radial_stiffness_y_N_per_m", "along y", "N/um", 1e-6),
+        ("radial_stiffness_N_per_m", f"radial stiffness{' along x' if apart else ''}", "N/um", 1e-6),
+        *([("radial_stiffness_y_N_per_m", "along y", "N/um", 1e-6)] if apart else []),
     ):
         if column in values and np.all(np.isfinite(ends := values[column][[0, -1], [0, -1]] * scale)):
             first, last = (f"{x:.2f}" for x in ends)

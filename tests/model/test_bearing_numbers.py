@@ -21,6 +21,17 @@ def test_a_table(tmp_path):
     assert stiffness[0] == 2e7
 
 
+def test_columns_between_directions_are_optional(tmp_path):
+    """One alone, on both sides of the diagonal; one that would push the shaft away is refused."""
+    header = HEADER + ",axial_stiffness_xz_N_per_m"
+    *_, stiffness = grid(tmp_path, header, "20,0,2e7,1e7,-3e6")
+    k = np.reshape(stiffness, (5, 5))
+    assert k[0, 2] == k[2, 0] == -3e6
+    assert np.count_nonzero(k) == 5
+    with pytest.raises(BadInput, match="push nothing away"):
+        grid(tmp_path, header, "20,0,2e7,1e7,2e7")
+
+
 @pytest.mark.parametrize(
     ("header", "row", "told"),
     [
