@@ -67,12 +67,13 @@ def answer_of(raw: Any, where: str) -> Answer:
         candidates = tuple(_offered(c) for c in raw["candidates"])
         drafted = frozenset(_text(p["element"]) for p in raw.get("where", ()))
         tolerances = {name: _finite(row["value"]) for name, row in raw.get("tolerances", {}).items()}
+        built = {name: _finite(row.get("in_scene", row["value"])) for name, row in raw.get("tolerances", {}).items()}
         kinds = {name: row.get("kind", _kind(name)) for name, row in raw.get("tolerances", {}).items()}
         best = candidates[0].effects if candidates and raw.get("effects") else tuple(map(_text, raw.get("tolerances_beside", ())))
         scene_hash = raw.get("scene_hash")
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError):
         raise BadInput(f"{where}: {NO_ANSWER}") from None
-    build = {name: float(f"{v:.8g}") for name, v in tolerances.items() if kinds[name] == BUILD}
+    build = {name: float(f"{v:.8g}") for name, v in built.items() if kinds[name] == BUILD}
     tests = tuple(str(raw["tolerances"][name].get("test", name.removeprefix(OF_TEST))) for name in tolerances if kinds[name] == TEMPERATURE)
     return Answer(candidates, best, build, tests, scene_hash, drafted)
 

@@ -19,7 +19,7 @@ from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit
 from thermospindle.diagnosis.inference.prior import Learned, as_stated, precision_and_variances
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
-from thermospindle.diagnosis.parameters.mechanism import Mechanism, variants
+from thermospindle.diagnosis.parameters.mechanism import Mechanism, one_size, variants
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import Effect, Values
@@ -93,10 +93,7 @@ class Settled:
         at = len(self.nuisance)
         for m, root, own, shape in zip(self.mechanisms, self.fit.roots, sizes, shapes, strict=True):
             part = slice(at, at + len(root))
-            covariance = root @ spread[part, part] @ root.T
-            weight = 1 / np.maximum(np.diag(covariance), 1e-300)
-            weight /= weight.sum()
-            row = {m.size.name: (float(np.clip(weight @ own, *m.size.limits)), float(np.sqrt(weight @ covariance @ weight)))}
+            row = {m.size.name: one_size(m, root, own, root @ spread[part, part] @ root.T)}
             row |= {name: (v, 0.0) for name, v in m.choices.items()}
             at += len(root)
             errors = np.sqrt(np.maximum(np.diag(spread)[at : at + len(m.shape)], 0.0))

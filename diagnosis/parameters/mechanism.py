@@ -245,3 +245,15 @@ def size_covariance(conditions: Sequence[Condition], width: float, departure: fl
         alike, away = 1.0 + alike - to - to.T, grown(conditions, reference)
         straight = away.T @ away
     return width**2 * (offset**2 + straight + departure**2 * (0.98 * alike + 0.02 * np.eye(n)) + 1e-9 * np.eye(n))
+
+
+def one_size(m: Mechanism, root: Array, sizes: Array, covariance: Array) -> tuple[float, float]:
+    """One size for all tests, with its standard error, within its limits: of `sizes` (tests,) with their `covariance`, weighted by what the data tell beyond the prior whose `root` (tests, tests) that is.
+
+    A test at the reference, where what grows from it is nothing by its definition, tells nothing.
+    """
+    precision = 1 / np.maximum(np.diag(covariance), 1e-300)
+    told = np.maximum(precision - 1 / np.einsum("tk,tk->t", root, root), 0.0)
+    weight = told if told.any() else precision
+    weight = weight / weight.sum()
+    return float(np.clip(weight @ sizes, *m.size.limits)), float(np.sqrt(weight @ covariance @ weight))

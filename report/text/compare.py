@@ -130,7 +130,7 @@ def constant_words(c: Comparison) -> str:
         return ""
     number = max(found.frequency, key=lambda n: abs(found.frequency[n]))
     what = (
-        "build tolerances are fitted in this scene, so what is still missing are constant errors of modes, which diagnose leaves free and compare does not"
+        "build tolerances are fitted in this scene; diagnose leaves free, too, what no scene holds: constant errors of modes, and bearings, balls and joints that are not quite as drawn"
         if c.built
         else "build tolerances and constant errors of modes do that, which diagnose leaves free and compare does not"
     )

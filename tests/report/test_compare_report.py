@@ -98,7 +98,7 @@ def test_what_is_the_same_at_all_conditions_is_said_with_its_figures(found, fold
     assert constant.without < 0.1 * found.rms_residual
     said = constant_words(found)
     assert f"{constant.without:.3g} standard errors would be left: build tolerances and constant errors of modes do that" in said
-    assert "build tolerances are fitted in this scene, so what is still missing are constant errors of modes" in constant_words(replace(found, built=True))
+    assert "build tolerances are fitted in this scene; diagnose leaves free, too, what no scene holds: constant errors of modes" in constant_words(replace(found, built=True))
     show_comparison(Console(width=2000), found)
     assert said in capsys.readouterr().out
     assert "of the squared errors are the same at all conditions" in (folder / "report.html").read_text()

@@ -21,7 +21,9 @@ from thermospindle.diagnosis.decision.explanations import Candidate
 from thermospindle.diagnosis.inference.evidence import evidence, left_out
 from thermospindle.diagnosis.inference.fit import fit
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
+from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.diagnosis.parameters.mechanism import variants
+from thermospindle.diagnosis.parameters.nuisance import Nuisance
 from thermospindle.diagnosis.prediction.next_test import ModePrediction, NextTest
 from thermospindle.diagnosis.runout.verdict import diagnose_runout
 from thermospindle.diagnosis.verdict import Drift
@@ -32,7 +34,7 @@ from thermospindle.model.units import RPM
 from thermospindle.report.figures.diagnosis import errors, evidence_bars, explanations, law
 from thermospindle.report.page.diagnosis import sections, write_diagnosis
 from thermospindle.report.page.report import write_page
-from thermospindle.report.text.diagnosis.answer import diagnosis_json
+from thermospindle.report.text.diagnosis.answer import diagnosis_json, in_scene
 from thermospindle.report.text.diagnosis.doubts import doubt_words
 from thermospindle.report.text.diagnosis.granted import granted_words
 from thermospindle.report.text.diagnosis.words import _drift_words, law_words, show_diagnosis, value_words, would_change
@@ -331,9 +333,21 @@ def test_add_takes_what_it_fitted(told, spindle, tmp_path, capsys):
     fitted = answer["candidates"][0]["parameters"]["soak_lag.hub_share"]["value"]
     assert {e.name: v["hub_share"] for e, v in of_scene(built)} == {"soak_lag": pytest.approx(fitted, rel=1e-7)}
     names = {p.name for p in toleranced(spindle)}
-    assert built.build.deviations == pytest.approx({n: answer["tolerances"][n]["value"] for n in names}, rel=1e-7)
+    assert built.build.deviations == pytest.approx({n: answer["tolerances"][n]["in_scene"] for n in names}, rel=1e-7)
     assert set(built.build.deviations) == names
     assert built.build.tests == tuple(t.id for t in told[0].campaign.tests)
+
+
+def test_a_scene_gets_the_tolerances_that_go_without_what_it_cannot_hold():
+    """Of two that were fitted one against the other, the conditional mean where the one that no scene holds is nothing; a constant error of a mode, and a channel's gain, stay as they were fitted."""
+    kinds = (kinds_of.BUILD, kinds_of.BALLS, kinds_of.STIFFNESS, kinds_of.GAIN)
+    parameters = [Nuisance(kind, kind, 0.01) for kind in kinds]
+    covariance = np.eye(5)
+    covariance[0, 1] = covariance[1, 0] = -0.9
+    covariance[0, 2] = covariance[2, 0] = 0.3
+    evidence = SimpleNamespace(mean=np.array([1.0, -1.0, 2.0, 0.5, 3.0]), covariance=covariance)
+    assert in_scene(parameters, evidence) == pytest.approx([0.1, 0.0, 2.0, 0.5])
+    assert in_scene(parameters, SimpleNamespace(mean=evidence.mean, covariance=np.diag([1.0, 0.0, 1.0, 1.0, 1.0]))) == pytest.approx([1.0, -1.0, 2.0, 0.5])
 
 
 def test_runout_stands_on_the_same_page(told, spindle, tmp_path):
@@ -373,3 +387,10 @@ def test_a_draft_is_of_what_the_verdict_says_drifts(names, drafted):
     verdict = SimpleNamespace(word="unexplained", free=[SimpleNamespace(names=names)])
     said = would_change(SimpleNamespace(verdict=verdict, drifts=[SimpleNamespace(element="preload")], tests=()))
     assert ("`spindle draft` writes one from the drift of preload" in said) == drafted
+
+
+@pytest.mark.parametrize(("odds", "beyond", "words"), [(2.56, True, "odds of 2.56 to 1, beyond the temperatures that the scene states and the campaign had."), (5e3, False, "odds of 5000 to 1."), (1e6, False, "odds of more than a million to 1.")])
+def test_a_test_that_hardly_decides_is_not_said_to_tell(odds, beyond, words):
+    test = SimpleNamespace(condition=Condition(80.0), separates=("fixture_lag", "loose_inserts"), odds=odds, beyond=beyond)
+    said = would_change(SimpleNamespace(verdict=SimpleNamespace(word="unexplained", free=()), drifts=(), tests=(test,)))
+    assert f"would tell fixture_lag from loose_inserts with {words}" in said

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,8 @@ from thermospindle.diagnosis.inference.evidence import Evidence, left_out
 from thermospindle.diagnosis.inference.hypothesis import Hypothesis
 from thermospindle.diagnosis.inference.resonance import shown
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
-from thermospindle.diagnosis.parameters.mechanism import Mechanism
+from thermospindle.diagnosis.parameters.mechanism import one_size
+from thermospindle.diagnosis.parameters.nuisance import Nuisance
 from thermospindle.diagnosis.verdict import Diagnosis, Drift
 from thermospindle.model.machine import Spindle
 from thermospindle.model.types import Array
@@ -71,8 +73,9 @@ def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
         "misfit": _misfit(d),
         "tolerances": {
             p.name: {"value": p.at(m), "sd": float(s * p.sd), "prior_sd": p.sd, "kind": p.kind}
+            | ({"in_scene": p.at(own)} if p.kind == kinds_of.BUILD else {})
             | ({"test": d.search.model.tests[p.test].test.id} if p.kind == kinds_of.TEMPERATURE and p.test is not None else {})
-            for p, m, s in zip(d.search.model.parameters, v.told.evidence.mean, _sd(v.told.evidence), strict=False)
+            for p, m, s, own in zip(d.search.model.parameters, v.told.evidence.mean, _sd(v.told.evidence), in_scene(d.search.model.parameters, v.told.evidence), strict=False)
             if p.kind in (kinds_of.BUILD, kinds_of.TEMPERATURE, kinds_of.GAIN)
         },
         "tolerances_beside": list(v.told.names),
@@ -80,6 +83,16 @@ def diagnosis_json(d: Diagnosis) -> dict[str, Any]:
         "light_resonances": [{"frequency_Hz": r.frequency, "damping_ratio": r.damping} for r in shown(d.search.model, d.search.hypotheses[0])],
         "noise": {data.test.id: getattr(data, "noise_from", "the table of modes") for data in d.search.model.tests},
     }
+
+
+def in_scene(parameters: Sequence[Nuisance], evidence: Evidence) -> Array:
+    """Mean (P,) of the nuisances, in their reference widths, where `kinds_of.UNWRITTEN` are nothing: those no scene holds, and a tolerance that was fitted beside them would leave half of the two
+    behind. The conditional mean of the Gaussian, m - C_bu C_uu^-1 m_u.
+    """
+    mean, covariance = evidence.mean[: len(parameters)], evidence.covariance
+    wide = np.diag(covariance)[: len(parameters)] > 0
+    other = np.flatnonzero([w and p.kind in kinds_of.UNWRITTEN for p, w in zip(parameters, wide, strict=True)])
+    return np.asarray(mean - covariance[: len(parameters), other] @ np.linalg.pinv(covariance[np.ix_(other, other)], hermitian=True) @ mean[other])
 
 
 def _sd(evidence: Evidence) -> Array:
@@ -158,7 +171,7 @@ def told_values(c: Candidate, k: int, spindle: Spindle) -> dict[str, dict[str, A
 def parameters_of(h: Hypothesis, k: int) -> dict[str, dict[str, Any]]:
     """Values with errors of mechanism `k` of an explanation: one size for all tests, its choices and its shape parameters."""
     m, own = h.mechanisms[k], h.evidence
-    size, sd = one_size(m, own.sizes[k], own.size_covariance[k])
+    size, sd = one_size(m, h.fit.roots[k], own.sizes[k], own.size_covariance[k])
     rows: dict[str, dict[str, Any]] = {m.size.name: {"value": size, "sd": sd, "unit": m.size.unit}}
     units = {p.name: p.unit for p in m.effect.parameters}
     rows |= {name: {"value": value, "sd": 0.0, "unit": units[name]} for name, value in m.choices.items()}
@@ -168,13 +181,6 @@ def parameters_of(h: Hypothesis, k: int) -> dict[str, dict[str, Any]]:
     for p, value, error in zip(m.shape, h.fit.shapes[k], errors, strict=True):
         rows[p.name] = {"value": value, "sd": float(error * p.prior_sd), "unit": p.unit}
     return rows
-
-
-def one_size(m: Mechanism, sizes: Array, covariance: Array) -> tuple[float, float]:
-    """The size in the tests that tell it, weighted by what they tell; within its limits."""
-    variance = np.maximum(np.diag(covariance), 1e-300)
-    weight = 1 / variance / np.sum(1 / variance)
-    return float(np.clip(weight @ sizes, *m.size.limits)), float(np.sqrt(weight @ covariance @ weight))
 
 
 def _law(c: Candidate, k: int, d: Diagnosis) -> list[dict[str, Any]]:

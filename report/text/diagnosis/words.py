@@ -11,6 +11,7 @@ from thermospindle.diagnosis.decision.explanations import beyond_limits
 from thermospindle.diagnosis.decision.loss import in_all
 from thermospindle.diagnosis.inference.gaussian import apart_by
 from thermospindle.diagnosis.inference.hypothesis import DEPARTS
+from thermospindle.diagnosis.prediction.next_test import NextTest
 from thermospindle.diagnosis.verdict import Diagnosis, Drift
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
@@ -108,7 +109,7 @@ def _where(c: Condition) -> str:
 def would_change(d: Diagnosis) -> str:
     """What would make this verdict another one, in a sentence or two."""
     v = d.verdict
-    test = f" A test {plan_words(condition(d.tests[0].condition))} tells {d.tests[0].separates[0]} from {d.tests[0].separates[1]}." if d.tests else ""
+    test = f" {_told_apart(d.tests[0])}" if d.tests else ""
     if v.word == "none":
         return "An effect larger than these data could have hidden would change that; how large that is, is listed for each."
     if v.word == "unexplained":
@@ -122,6 +123,15 @@ def would_change(d: Diagnosis) -> str:
         test = f" No other temperature or speed tells {' + '.join(v.candidates[0].names)} from {' + '.join(rivals[0].names)}."
     rival = f"{' + '.join(rivals[0].names)}, {behind(v.candidates[0].delta_evidence - rivals[0].delta_evidence)}" if rivals else "none"
     return f"Data that the next best explanation ({rival}) predicts better would change that.{test}"
+
+
+def _told_apart(test: NextTest) -> str:
+    beyond = ", beyond the temperatures that the scene states and the campaign had" if test.beyond else ""
+    return f"A test {plan_words(condition(test.condition))} would tell {test.separates[0]} from {test.separates[1]} with odds of {odds_words(test.odds)} to 1{beyond}."
+
+
+def odds_words(odds: float) -> str:
+    return "more than a million" if odds >= 1e6 * (1 - 1e-9) else plain(odds)
 
 
 def behind(gap: float) -> str:
@@ -252,8 +262,7 @@ def _range(rows: list[dict[str, Any]]) -> str:
 def next_words(test: dict[str, Any], which: str) -> str:
     """The test to make, in a sentence."""
     first, second = test["separates"]
-    odds = "more than a million" if test["odds"] >= 1e6 * (1 - 1e-9) else plain(test["odds"])
-    return f"A test {which} would tell {first} from {second} with odds of {odds} to 1, most by {test['tells']}.{beyond_words(test)}"
+    return f"A test {which} would tell {first} from {second} with odds of {odds_words(test['odds'])} to 1, most by {test['tells']}.{beyond_words(test)}"
 
 
 def beyond_words(test: dict[str, Any]) -> str:

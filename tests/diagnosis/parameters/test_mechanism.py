@@ -12,7 +12,7 @@ from tests.virtual_campaign import mode_campaign, model_of, virtual_campaign
 from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.inference.freeform import alike, as_told_by, free_forms
 from thermospindle.diagnosis.inference.problem import Problem
-from thermospindle.diagnosis.parameters.mechanism import Mechanism, likeness, size_covariance, strongest, variants, with_own_laws
+from thermospindle.diagnosis.parameters.mechanism import Mechanism, likeness, one_size, size_covariance, strongest, variants, with_own_laws
 from thermospindle.diagnosis.parameters.nuisance import RECORD
 from thermospindle.model.machine import Addition, Condition
 from thermospindle.model.rotor.chain import motion_rows
@@ -53,6 +53,22 @@ def test_what_grows_from_a_reference_is_nothing_there(departure):
     assert found == pytest.approx(4.0 * expected, abs=1e-7)
     assert np.linalg.eigvalsh(found).min() > 0
     assert size_covariance(conditions, 2.0, departure, 1.0, reference) - found == pytest.approx(4.0 * np.ones((6, 6)))
+
+
+def test_one_size_is_of_the_tests_that_tell_it():
+    """A test at the reference, where a law of the data's own is nothing by its definition, has the error of its prior and told nearly all; tests that tell count by their precision, and where the
+    data tell of none all are alike. The root is that of what the sizes are counted in."""
+    conditions = [Condition(20.0), Condition(45.0), Condition(60.0)]
+    loss = next(m for m in variants(by_name("preload_loss")))
+    prior = size_covariance(conditions, loss.size.prior_sd, 1.0, 0.0, conditions[0])
+    root = np.linalg.cholesky(prior)
+    told = np.diag([prior[0, 0], 0.02**2, 0.01**2])
+    value, sd = one_size(loss, root, np.array([0.0, 0.10, 0.15]), told)
+    precision = 1 / np.diag(told)[1:] - 1 / np.diag(prior)[1:]
+    assert value == pytest.approx(precision @ [0.10, 0.15] / precision.sum(), rel=1e-6)
+    assert sd == pytest.approx(np.sqrt(precision**2 @ np.diag(told)[1:]) / precision.sum(), rel=1e-6)
+    assert one_size(loss, root, np.array([0.1, 0.1, 0.1]), prior)[0] == pytest.approx(0.1)
+    assert one_size(loss, root, np.array([0.0, 9.0, 9.0]), told)[0] == loss.size.limits[1]
 
 
 def test_departures_are_alike_where_conditions_are():
