@@ -186,6 +186,7 @@ class Spindle:
     axial_load: float = 0.0  # N, external axial force on what carries the outer rings, positive along z
     radial_load: tuple[float, float] = (0.0, 0.0)  # N, external force along x and y on what turns
     radial_load_z: float = 0.0  # m, where it acts
+    radial_load_body: str = ""  # turning body or shaft that it acts on; empty where the height tells it (`model.carrier`)
     linear_bearings: tuple[LinearBearing, ...] = ()  # those given by numbers
     roller_bearings: tuple[RollerBearing, ...] = ()  # cylindrical ones, lowest first
     effects: tuple[Addition, ...] = ()

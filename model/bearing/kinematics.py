@@ -38,6 +38,7 @@ import numpy as np
 
 from thermospindle.model.bearing.pair import BearingState, PairState
 from thermospindle.model.bearing.row import ring_speeds
+from thermospindle.model.carrier import unbalance_carrier
 from thermospindle.model.machine import Bearing, RollerBearing, Spindle
 
 SMALLEST = 1e-9
@@ -205,6 +206,6 @@ def lines(spindle: Spindle, kinematics_by_bearing: Mapping[str, Kinematics], hig
     if kinematics_by_bearing and not speed:
         speed = next(iter(kinematics_by_bearing.values())).turning
     own = spindle.imperfections
-    carrier = spindle.turning_at(own.unbalance_z) if own.unbalance or own.couple_unbalance else spindle.turning
+    carrier = unbalance_carrier(spindle, own) if own.unbalance or own.couple_unbalance else spindle.turning
     found.append(unbalance_line(speed * carrier.speed_ratio))
     return sorted((line for line in found if line.frequency > SMALLEST), key=lambda line: line.frequency)

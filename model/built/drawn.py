@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
+from thermospindle.model.carrier import named
 from thermospindle.model.machine import Spindle
 from thermospindle.model.types import Array
 
@@ -64,7 +65,7 @@ def drawn(spindle: Spindle, seed: int, grade: Grade = GRADES["high precision"]) 
     static, couple = random.uniform(0, 1, 2) * permissible
     phases = random.uniform(0, 2 * np.pi, 2)
     rows = {b.name: _drawn_row(b.balls, b.elements, grade, random) for b in spindle.rolling}
-    return Imperfections(float(static), body.z, float(phases[0]), float(couple * span / 2), float(phases[1]), rows)
+    return Imperfections(float(static), body.z, float(phases[0]), float(couple * span / 2), float(phases[1]), rows, named(spindle, body))
 
 
 def _drawn_row(balls: int, elements: int, grade: Grade, random: np.random.Generator) -> RowImperfections:

@@ -15,7 +15,6 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from thermospindle.model.bearing.pair import BearingState, LinearState, PairState
-from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Point, Spindle
 from thermospindle.model.rotor.loss import damping_of_loss
 from thermospindle.model.structure import MOVES, Body, Structure
@@ -110,14 +109,6 @@ def sprung(chain: RotorBase, names: Sequence[str], rate: float, mass: float) -> 
     stiffness = pass_on @ own[0].stiffness
     condensed = replace(own[0], stiffness=(stiffness + stiffness.T) / 2, damping=pass_on @ own[0].damping @ pass_on.T)
     return replace(chain, elements=tuple(condensed if e is own[0] else e for e in chain.elements))
-
-
-def turning_at(chain: RotorBase, z: float) -> Body:
-    """The turning body nearest a height (m)."""
-    turning = [b for b in chain.bodies if b.turns]
-    if not turning:
-        raise BadInput("structure: nothing turns, so there is nothing to spin; a body or shaft needs turns = true")
-    return min(turning, key=lambda b: abs(b.z - z))
 
 
 def joint_element(structure: Structure, index: int) -> Element:

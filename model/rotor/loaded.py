@@ -17,9 +17,10 @@ from thermospindle.model.bearing import ball_row, roller
 from thermospindle.model.bearing.definitions import BearingSet
 from thermospindle.model.bearing.pair import BearingState, PairState, damping_time
 from thermospindle.model.bearing.roller import RollerState
+from thermospindle.model.carrier import load_carrier
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.machine import Spindle
-from thermospindle.model.rotor.chain import RotorBase, element_rows, matrices, motion_rows, rotor_base, turning_at
+from thermospindle.model.rotor.chain import RotorBase, element_rows, matrices, motion_rows, rotor_base
 from thermospindle.model.rotor.static import displacement
 from thermospindle.model.types import Array
 
@@ -62,7 +63,7 @@ def motion(spindle: Spindle, state: PairState) -> tuple[RotorBase, Array]:
     rows = [_ball(chain, b) for b in state.bearings] + [_roller(chain, b) for b in state.linear if isinstance(b, RollerState)]
     own = {row.name for row in rows}
     linear = matrices(replace(chain, elements=tuple(e for e in chain.elements if e.name not in own)))
-    carrier = turning_at(chain, spindle.radial_load_z)
+    carrier = load_carrier(spindle)
     load = motion_rows(chain, carrier.name, (0.0, 0.0, spindle.radial_load_z))[:2].T @ np.array(spindle.radial_load)
     return chain, _motion(linear.stiffness, np.diag(linear.mass), rows, load, float(np.hypot(*spindle.radial_load)))
 

@@ -109,6 +109,7 @@ class Scene(Table):
     axial_load_N: Finite = 0.0
     radial_load_N: Pair = (0.0, 0.0)
     radial_load_z_mm: Place | None = None
+    radial_load_body: str | None = None
     structure: Structure
     shafts: list[ShaftForm] = Field(default_factory=list)
     thermal: Thermal = Thermal()
@@ -259,6 +260,7 @@ class Scene(Table):
             axial_load=self.axial_load_N,
             radial_load=self.radial_load_N,
             radial_load_z=(self.radial_load_z_mm or 0.0) * MM,
+            radial_load_body=self.radial_load_body or "",
             linear_bearings=tuple(sorted(linear, key=lambda b: b.z)),
             roller_bearings=tuple(sorted(rollers, key=lambda b: b.z)),
             effects=tuple(m.Addition(effect=e.name, values=dict(e.values)) for e in self.effects),

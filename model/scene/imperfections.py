@@ -93,6 +93,7 @@ class Imperfections(Table):
     grade: Literal["high precision", "precision", "ordinary"] | None = None
     unbalance_g_mm: NotNegative = 0.0
     unbalance_z_mm: Finite = 0.0
+    unbalance_body: str | None = None
     unbalance_phase_deg: Finite = 0.0
     couple_unbalance_g_mm2: NotNegative = 0.0
     couple_phase_deg: Finite = 0.0
@@ -113,4 +114,5 @@ class Imperfections(Table):
             couple_unbalance=self.couple_unbalance_g_mm2 * 1e-9,
             couple_phase=self.couple_phase_deg * DEGREE,
             bearings={name: row.row(balls[name]) for name, row in self.bearings.items()},
+            unbalance_body=self.unbalance_body or "",
         )

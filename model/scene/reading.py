@@ -24,6 +24,7 @@ from thermospindle.model.bearing.pair import solve
 from thermospindle.model.bearing.row import reference_motion
 from thermospindle.model.built.drawn import GRADES, drawn
 from thermospindle.model.built.tolerance import deviated
+from thermospindle.model.carrier import check_carriers
 from thermospindle.model.errors import BadInput, NoEquilibrium
 from thermospindle.model.files.formats import KEY, SCENE, migrated
 from thermospindle.model.machine import Bearing, Condition, Provenance, Spindle
@@ -91,6 +92,7 @@ def build(raw: dict[str, Any], file: Path) -> Spindle:
     check_rollers(file, spindle)
     check_raceways(file, spindle)
     check_structure(file, spindle)
+    check_carriers(spindle)
     spindle = _as_built(file, _with_section_inertia(spindle))
     if form.hammer_test.step_us is None:
         try:
@@ -143,6 +145,9 @@ def content_hash(spindle: Spindle) -> str:
     if not any(content["radial_load"]):  # what came later counts where there is any
         content.pop("radial_load")
         content.pop("radial_load_z")
+    for table, key in ((content, "radial_load_body"), (content["imperfections"], "unbalance_body")):
+        if not table[key]:
+            table.pop(key)
     for row in content["bearings"]:
         row.pop("told")
     if not content["roller_bearings"]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from thermospindle.model.bearing.pair import BearingState
 from thermospindle.model.bearing.roller import RollerState
+from thermospindle.model.carrier import load_carrier, unbalance_carrier
 from thermospindle.model.machine import Bearing, LinearBearing, RollerBearing, Spindle
 from thermospindle.model.shaft import THEORIES, Shaft
 from thermospindle.model.structure import Body
@@ -25,7 +26,7 @@ NUMBERS = {1: "one", 2: "two", 3: "three", 4: "four", 5: "five"}
 def understood(point: OperatingPoint, catalogue: Sequence[Effect]) -> dict[str, Any]:
     """The keys of `spindle check --json` but `odd` and `warnings`; `point` is the spindle at its reference temperature, at rest."""
     spindle = point.spindle
-    structure = spindle.structure
+    structure, own = spindle.structure, spindle.imperfections
     plain = structure.rigid_bodies
     refused = {e.name: why for e in catalogue if (why := refusal(e, spindle))}
     return {
@@ -37,6 +38,8 @@ def understood(point: OperatingPoint, catalogue: Sequence[Effect]) -> dict[str, 
         "axial_load_N": spindle.axial_load,
         "radial_load_N": list(spindle.radial_load),
         "radial_load_z_mm": _mm(spindle.radial_load_z) if any(spindle.radial_load) else None,
+        "radial_load_body": structure.carrier(load_carrier(spindle).name) if any(spindle.radial_load) else None,
+        "unbalance_body": structure.carrier(unbalance_carrier(spindle, own).name) if own.unbalance or own.couple_unbalance else None,
         "ball_inertia": spindle.ball_inertia,
         "parts": {
             "turning": [*(s.name for s in structure.shafts if s.turns), *(b.name for b in plain if b.turns)],

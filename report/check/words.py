@@ -43,7 +43,10 @@ def sentences(values: Mapping[str, Any]) -> list[str]:
     if any(values["radial_load_N"]):
         shares = [f"{name} {f[0]:+.3g}, {f[1]:+.3g}" for name, b in values["bearings"].items() if (f := b.get("radial_force_N"))]
         fx, fy = values["radial_load_N"]
-        found.append(f"External radial load {fx:g}, {fy:g} N along x, y at z = {values['radial_load_z_mm']:g} mm, borne by {'; '.join(shares)} N.")
+        on = f" on {values['radial_load_body']}" if len(turning) > 1 else ""
+        found.append(f"External radial load {fx:g}, {fy:g} N along x, y at z = {values['radial_load_z_mm']:g} mm{on}, borne by {'; '.join(shares)} N.")
+    if values["unbalance_body"] and len(turning) > 1:
+        found.append(f"The unbalance is on {values['unbalance_body']}.")
     h, modes = values["hammer"], values["modes_Hz"]
     points = [name for name, p in values["points"].items() if p["hammer"]]
     found.append(

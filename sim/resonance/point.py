@@ -10,6 +10,7 @@ import numpy as np
 
 from thermospindle.model.bearing.kinematics import Line
 from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
+from thermospindle.model.carrier import named
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import matrices
 from thermospindle.model.rotor.modes import Mode, Poles, poles
@@ -111,7 +112,7 @@ def unit_imperfections(spindle: Spindle, multiples: int) -> Imperfections:
         sizes = (UNIT_WAVE, *[0.0] * (b.elements - 1))
         rows[b.name] = RowImperfections(radial, waves(axial), radial, waves(axial), sizes, balls, UNIT_UNBALANCE)
     body = spindle.turning
-    return Imperfections(unbalance=UNIT_UNBALANCE, unbalance_z=body.z, bearings=rows)
+    return Imperfections(unbalance=UNIT_UNBALANCE, unbalance_z=body.z, bearings=rows, unbalance_body=named(spindle, body))
 
 
 def line_amplitudes(found: Exact) -> dict[Key, float]:

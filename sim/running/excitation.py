@@ -41,7 +41,8 @@ from thermospindle.model.bearing.kinematics import (
 )
 from thermospindle.model.bearing.pair import BearingState, check_centred
 from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
-from thermospindle.model.rotor.chain import RotorBase, element_rows, matrices, motion_rows, turning_at
+from thermospindle.model.carrier import unbalance_carrier
+from thermospindle.model.rotor.chain import RotorBase, element_rows, matrices, motion_rows
 from thermospindle.model.rotor.modes import LARGE, Poles, poles
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.operating import OperatingPoint
@@ -153,7 +154,9 @@ def excitation(point: OperatingPoint, imperfections: Imperfections | None = None
 
 
 def _unbalance(point: OperatingPoint, own: Imperfections) -> Iterator[tuple[Line, ComplexArray]]:
-    carrier = turning_at(point.chain, own.unbalance_z)
+    if not (own.unbalance or own.couple_unbalance):
+        return
+    carrier = unbalance_carrier(point.spindle, own)
     speed = point.condition.speed * carrier.speed_ratio
     rows = motion_rows(point.chain, carrier.name, (0.0, 0.0, own.unbalance_z))
     if own.unbalance:

@@ -22,7 +22,8 @@ from scipy.linalg import expm
 from thermospindle.model.bearing.ball_row import BallRow, respond
 from thermospindle.model.bearing.kinematics import Kinematics, row_kinematics
 from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
-from thermospindle.model.rotor.chain import element_rows, matrices, motion_rows, turning_at
+from thermospindle.model.carrier import unbalance_carrier
+from thermospindle.model.rotor.chain import element_rows, matrices, motion_rows
 from thermospindle.model.types import Array
 from thermospindle.sim.operating import OperatingPoint
 from thermospindle.sim.running.excitation import at_speed, excitation, response
@@ -162,8 +163,9 @@ def _steady_start(point: OperatingPoint, own: Imperfections) -> Array:
 
 def _unbalance_forces(point: OperatingPoint, own: Imperfections, kin: Mapping[str, Kinematics], time: Array) -> Array:
     """Generalised forces (n_times, n) of all unbalances: that of the turning body, and of the cages on the outer body."""
-    chain, speed = point.chain, point.condition.speed
-    rows = motion_rows(chain, turning_at(chain, own.unbalance_z).name, (0.0, 0.0, own.unbalance_z))
+    chain, carrier = point.chain, unbalance_carrier(point.spindle, own)
+    speed = point.condition.speed * carrier.speed_ratio
+    rows = motion_rows(chain, carrier.name, (0.0, 0.0, own.unbalance_z))
     static, couple = speed * time + own.unbalance_phase, speed * time + own.couple_phase
     found = own.unbalance * speed**2 * (np.stack([np.cos(static), np.sin(static)], axis=1) @ rows[:2])
     found += own.couple_unbalance * speed**2 * (np.stack([-np.sin(couple), np.cos(couple)], axis=1) @ rows[3:])

@@ -23,8 +23,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from thermospindle.model.carrier import unbalance_carrier
 from thermospindle.model.errors import BadInput
-from thermospindle.model.rotor.chain import turning_at
 from thermospindle.model.rotor.mjcf import joint_names, spin_dofs, spin_speeds
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.hammer.test import check_step
@@ -160,7 +160,9 @@ def running_model(point: OperatingPoint, element: str = "linear", step: float | 
     own, turning = point.imperfections, [b for b in point.chain.bodies if b.turns]
     for body in turning:
         spec.joint(f"{body.name}.spin").armature = FLYWHEEL * body.inertia[2]
-    carrier = turning_at(point.chain, own.unbalance_z)
+    if not (own.unbalance or own.couple_unbalance):
+        return spec.compile()
+    carrier = unbalance_carrier(point.spindle, own)
     body = spec.body(carrier.name)
     static = own.unbalance * np.exp(1j * own.unbalance_phase)
     product = static * (own.unbalance_z - carrier.z) + own.couple_unbalance * np.exp(1j * own.couple_phase)

@@ -13,10 +13,11 @@ from thermospindle.model.bearing.ball_row import respond
 from thermospindle.model.bearing.pair import solve
 from thermospindle.model.bearing.roller import EXPONENT, RollerState, line_constant
 from thermospindle.model.bearing.row import reference_motion
+from thermospindle.model.carrier import load_carrier
 from thermospindle.model.errors import BadInput, NoEquilibrium
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor import mjcf
-from thermospindle.model.rotor.chain import matrices, motion_rows, point_row, rotor_base, turning_at
+from thermospindle.model.rotor.chain import matrices, motion_rows, point_row, rotor_base
 from thermospindle.model.rotor.loaded import loaded, motion
 from thermospindle.model.rotor.static import static
 from thermospindle.model.scene.reading import build
@@ -188,7 +189,7 @@ def test_stiffness_behind_a_spring_is_the_derivative_of_the_motion(mass: float) 
         moved.append(float(point_row(chain, point) @ u))
     pushed, state = under(spindle, (20.0, 0.0), point.position[2])
     chain, z = rotor_base(pushed, state), point.position[2]
-    load = motion_rows(chain, turning_at(chain, z).name, (0.0, 0.0, z))[0]
+    load = motion_rows(chain, load_carrier(pushed).name, (0.0, 0.0, z))[0]
     compliance = float(point_row(chain, point) @ np.linalg.solve(matrices(chain).stiffness, load))
     assert (moved[1] - moved[0]) / (2 * step) == pytest.approx(compliance, rel=2e-3)
 

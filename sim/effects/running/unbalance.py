@@ -8,6 +8,7 @@ from dataclasses import replace
 from math import radians
 
 from thermospindle.model.built.imperfections import Imperfections
+from thermospindle.model.carrier import named, unbalance_carrier
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.units import RPM
 from thermospindle.sim.effects.effect import TURNING, Effect, Parameter, Values, mass_ratio, phase_parameter
@@ -19,6 +20,9 @@ def imperfections(spindle: Spindle, condition: Condition, values: Values, imperf
     if values["amount"] == 0.0 and values["couple"] == 0.0:
         return imperfections
     body = spindle.turning
+    if imperfections.unbalance or imperfections.couple_unbalance:  # as vectors add up only those that turn alike
+        carrier = unbalance_carrier(spindle, imperfections)
+        body = body if body.speed_ratio == carrier.speed_ratio else carrier
     turn = cmath.rect(1.0, radians(values["phase"]))
     own = cmath.rect(imperfections.unbalance, imperfections.unbalance_phase)
     more = values["amount"] * G_MM * turn
@@ -33,6 +37,7 @@ def imperfections(spindle: Spindle, condition: Condition, values: Values, imperf
         unbalance_phase=cmath.phase(static),
         couple_unbalance=abs(couple),
         couple_phase=cmath.phase(couple),
+        unbalance_body=named(spindle, body),
     )
 
 
@@ -45,7 +50,7 @@ def sized(spindle: Spindle) -> Mapping[str, float]:
 EFFECT = Effect(
     name="unbalance",
     title="Unbalance of the turning part",
-    equation="F = U omega^2 at the mass centre of the turning part, M = W omega^2, both turning with it; added to the scene's as vectors",
+    equation="F = U omega^2 at the mass centre of the turning part (of several, of what turns as the scene's unbalance does), M = W omega^2, both turning with it; added to the scene's as vectors",
     parameters=(
         Parameter(
             "amount",
