@@ -140,7 +140,7 @@ def spectrum_figure(runout: Runout) -> Figure:
             _labels(axes, _named(own, NAMED[direction], 0.01 * highest), highest, top)
         panels[1].set_xlabel("frequency, Hz")
         orders = panels[0].secondary_xaxis("top", functions=(lambda f: f / rate, lambda o: o * rate))
-        orders.set_xlabel(f"orders of the turning frequency, {rate:.5g} Hz")
+        orders.set_xlabel(f"orders of the turning frequency{'' if abs(runout.ratios[0]) == 1 else ' of the spindle'}, {rate:.5g} Hz")
         handles, labels = panels[0].get_legend_handles_labels()
         more = dict(zip(*panels[1].get_legend_handles_labels()[::-1], strict=True))
         shown = dict(zip(labels, handles, strict=True)) | more

@@ -1,6 +1,6 @@
 """What `spindle runout` says and writes: the JSON object, the terminal table, CSV files, figures, and a section for the report.
 
-The repeatable part (RRO) is made of the lines at whole multiples of the turning frequency, the nonrepeatable one (NRRO) is the rest of the
+The repeatable part (RRO) is made of the lines at whole multiples of the turning frequency of the part that is seen, the nonrepeatable one (NRRO) is the rest of the
 record; `averaged` holds the same values with the RRO from averaging over the record's revolutions, which lets some of the other lines through.
 """
 
@@ -26,7 +26,7 @@ from thermospindle.sim.running.runout import AXIAL, Runout, X, Y, looked_at
 from thermospindle.sim.running.waterfall import run_up, waterfall
 
 STATISTICS = {
-    "rro_um": "peak to valley of the repeatable part (lines at whole orders)",
+    "rro_um": "peak to valley of the repeatable part (lines that repeat every revolution of the part seen)",
     "nrro_um": "peak to valley of the nonrepeatable part over the whole record",
     "total_um": "peak to valley of the record",
     "rro_rms_um": "root mean square of the repeatable part about its mean",
@@ -53,7 +53,7 @@ def _quoted(m: ErrorMotion) -> dict[str, float]:
 def runout_json(runout: Runout, path: str, element: str, seed: int | None) -> dict[str, Any]:
     """The answer: values by direction, the lines strongest first, every probe, and how they were made."""
     quoted = {name: _quoted(m) for name, m in runout.values().items()}
-    averaged = {name: _quoted(m) for name, m in runout.values(runout.averaged).items()}
+    averaged = {name: _quoted(m) for name, m in runout.values(averaged=True).items()}
     leaked = dict(zip(quoted, (TO_UM * runout.leaked).tolist(), strict=True))
     condition = runout.point.condition
     time = runout.averaged.time
@@ -61,9 +61,10 @@ def runout_json(runout: Runout, path: str, element: str, seed: int | None) -> di
         "temperature_C": condition.temperature,
         "speed_rpm": condition.speed / RPM,
         "status": runout.point.state.status,
-        "seconds": runout.averaged.count / abs(runout.turning),
+        "seconds": runout.averaged.count / abs(runout.revolving),
         "revolutions": runout.averaged.count,
         "samples_per_revolution": len(time) // runout.averaged.count,
+        "seen_speed_rpm": condition.speed * runout.ratios[0] / RPM,
         "path": path,
         "element": element,
         "imperfections": "of the scene" if seed is None else f"drawn from seed {seed}",
@@ -77,8 +78,8 @@ def runout_json(runout: Runout, path: str, element: str, seed: int | None) -> di
         "statistics": STATISTICS | {"leakage_um": "most by which other lines can have changed the averaged RRO, zero to peak"},
         "lines": [line_json(line) for line in runout.lines],
         "probes": {
-            p.name: {"body": p.body, "position_mm": [1e3 * x for x in p.position], "direction": list(p.direction), **quoted[p.name]}
-            for p in runout.signals.probes
+            p.name: {"body": p.body, "position_mm": [1e3 * x for x in p.position], "direction": list(p.direction), "seen_speed_rpm": condition.speed * ratio / RPM, **quoted[p.name]}
+            for p, ratio in zip(runout.signals.probes, runout.ratios, strict=True)
         },
         "provenance": provenance(runout.point.spindle),
     }
@@ -114,7 +115,7 @@ def line_json(line: FoundLine) -> dict[str, Any]:
 def show_runout(console: Console, answer: dict[str, Any], where: str) -> None:
     """`where` names what the probes look at."""
     nominal = f" ({answer['speed_from']})" if answer["speed_from"] != "--speed" else ""
-    title = f"Runout at {answer['temperature_C']:g} C, {answer['speed_rpm']:g} rpm{nominal}, {answer['revolutions']} revolutions, um"
+    title = f"Runout at {answer['temperature_C']:g} C, {answer['speed_rpm']:g} rpm{nominal}, {answer['revolutions']} revolutions{_of_part(answer, where)}, um"
     title += f" ({of_bearings(answer['status'])})"
     quoted = grid(title, ("", f"radial\n({where} x)", f"radial\n({where} y)", "axial"), words=("",))
     for key, meaning in STATISTICS.items():
@@ -123,13 +124,19 @@ def show_runout(console: Console, answer: dict[str, Any], where: str) -> None:
     console.print()
     if not answer["lines"]:
         return
-    columns = ("Hz", "orders", "direction", "um", "whirl", "line", "cause", "bearing")
+    columns = ("Hz", "orders of\nthe spindle" if _of_part(answer, where) else "orders", "direction", "um", "whirl", "line", "cause", "bearing")
     rows = []
     for row in answer["lines"][:SHOWN]:
         numbers = (f"{row['frequency_Hz']:.2f}", f"{row['order']:.3f}", row["direction"], f"{row['amplitude_um']:.4f}", row["whirl"])
         bearings = list(dict.fromkeys(c["bearing"] for c in row["causes"] if c["bearing"]))
         rows.append([*numbers, row["name"], row["cause"], ", ".join(bearings)])
     show_grid(console, f"Strongest lines of {len(answer['lines'])}", columns, rows, (*columns[4:], "direction"), keys=2)
+
+
+def _of_part(answer: dict[str, Any], where: str) -> str:
+    """Whose revolutions are counted, where that is not the spindle's."""
+    seen, speed = answer["seen_speed_rpm"], answer["speed_rpm"]
+    return "" if abs(seen) == abs(speed) else f" of the {where} (it turns at {seen:g} rpm)"
 
 
 # ---------------------------------------------------------------- files
@@ -165,9 +172,10 @@ def _write_record(runout: Runout, path: Path) -> None:
 
 
 def _write_repeatable(runout: Runout, path: Path) -> None:
-    """RRO of every probe over one revolution: by lines, and averaged."""
+    """RRO of every probe over one revolution of what it sees: by lines, and averaged."""
     probes = runout.signals.probes
-    columns = [runout.by_lines.angle, *TO_UM * runout.by_lines.repeatable, *TO_UM * runout.averaged.repeatable]
+    both = (TO_UM * runout.cut_of(i, averaged).repeatable[i] for averaged in (False, True) for i in range(len(probes)))
+    columns = [runout.by_lines.angle, *both]
     names = [f"{p.name}_{how}_um" for how in ("rro", "averaged") for p in probes]
     _table(path, ["angle_rad", *names], columns)
 
@@ -199,9 +207,10 @@ def runout_section(runout: Runout, answer: dict[str, Any]) -> tuple[str, str]:
         ]
         for g in answer["lines"][:SHOWN]
     ]  # fmt: skip
+    frequency = "its turning frequency; orders are those of the spindle" if _of_part(answer, where) else "the turning frequency"
     text = (
-        f"<p>{answer['revolutions']} revolutions at {answer['temperature_C']:g} °C and {answer['speed_rpm']:.6g} rpm, {of_bearings(answer['status'])}, "
-        f"imperfections {answer['imperfections']}. The repeatable part is made of the lines at whole multiples of the turning frequency.</p>"
+        f"<p>{answer['revolutions']} revolutions{escape(_of_part(answer, where))} at {answer['temperature_C']:g} °C and {answer['speed_rpm']:.6g} rpm, {of_bearings(answer['status'])}, "
+        f"imperfections {answer['imperfections']}. The repeatable part is made of the lines at whole multiples of {frequency}.</p>"
         f"{table(('nm', f'radial ({escape(where)} x)', f'radial ({escape(where)} y)', 'axial'), quoted)}"
         f"{''.join(drawn.values())}"
         f"{table(('Hz', 'orders', 'direction', 'nm', 'line', 'cause'), lines, (2, 4, 5))}"

@@ -13,6 +13,7 @@ import numpy as np
 
 from thermospindle.model.types import Array
 from thermospindle.sim.resonance.point import Exact, Key, key, rms_of_lines
+from thermospindle.sim.running.runout import speed_ratio
 
 POINTS = 4
 
@@ -77,4 +78,4 @@ def runout(ends: tuple[Exact, Exact], share: float, number: int, which: Key, fre
     value[np.argmin(np.abs(value - value[own].conjugate()))], value[own] = moved.conjugate(), moved
     answers = (near.modal_forces / (2j * np.pi * at[:, None] - value)) @ (near.probes @ p.right).T
     speed = near.point.condition.speed + forward * (far.point.condition.speed - near.point.condition.speed)
-    return rms_of_lines(lines, at, abs(speed) / (2 * np.pi), answers)
+    return rms_of_lines(lines, at, abs(speed * speed_ratio(near.point.spindle)) / (2 * np.pi), answers)

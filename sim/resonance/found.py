@@ -53,11 +53,12 @@ class Coincidence:
     nrro: float
     at_nominal_speed: bool
     interpolated: bool = False
+    ratio: float = 1.0  # speed of what the hub's probes see over the spindle's
 
     @property
     def repeats(self) -> bool:
-        """Whether the line is a whole multiple of the speed, which NRRO leaves out."""
-        order = 2 * np.pi * self.line.frequency / self.condition.speed if self.condition.speed else 0.0
+        """Whether the line is a whole multiple of the speed of what the hub's probes see, which NRRO leaves out."""
+        order = 2 * np.pi * self.line.frequency / (self.condition.speed * self.ratio) if self.condition.speed else 0.0
         return abs(order - round(order)) < 1e-6
 
 

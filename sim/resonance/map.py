@@ -37,6 +37,7 @@ from thermospindle.sim.resonance.between import Between, between, strengths
 from thermospindle.sim.resonance.between import runout as between_runout
 from thermospindle.sim.resonance.found import Coincidence, Curve, Interpolated, LineTrack, ResonanceMap, Track, strongest
 from thermospindle.sim.resonance.point import Exact, key, line_amplitudes, nrro_rms, with_imperfections
+from thermospindle.sim.running.runout import speed_ratio
 
 SENSE = 0.01
 MULTIPLES = 3  # of the number of balls, and even ball orders, whose lines are drawn
@@ -163,6 +164,7 @@ class _Grid:
         self.spindle, self.nominal, self.multiples = spindle, nominal, multiples
         first = operating_point(spindle, nominal)
         check_centred(first.state, "a resonance map")
+        self.ratio = speed_ratio(spindle)
         self.given, self.drawn_from = imperfections, None
         if imperfections is None and first.imperfections == Imperfections():
             self.given, self.drawn_from = drawn(spindle, SEED), SEED
@@ -284,7 +286,7 @@ class _Grid:
         line = next(e.lines[which] for e in (ends if share < 0.5 else ends[::-1]) if which in e.lines)
         nrro = between_runout(ends, share, number, which, frequency)[1 if c.line.line.direction == "axial" else 0]
         return Coincidence(
-            replace(line, frequency=frequency), c.track, condition, frequency, frequency, *found, c.margin, nrro, c.at_nominal_speed, interpolated=True
+            replace(line, frequency=frequency), c.track, condition, frequency, frequency, *found, c.margin, nrro, c.at_nominal_speed, interpolated=True, ratio=self.ratio
         )
 
     def crossing(self, c: Candidate) -> Coincidence | None:
@@ -320,7 +322,7 @@ class _Grid:
         if sense < SENSE:
             return None
         nrro = float(nrro_rms(excited)[1 if own.line.direction == "axial" else 0])
-        return Coincidence(line, track, condition, line.frequency, mode.frequency, sense, strength, unit, c.margin, nrro, c.at_nominal_speed)
+        return Coincidence(line, track, condition, line.frequency, mode.frequency, sense, strength, unit, c.margin, nrro, c.at_nominal_speed, ratio=self.ratio)
 
     def nrro(self, condition: Condition, near: tuple[int, int]) -> tuple[float, float]:
         """Radial and axial NRRO (m rms) at a condition, given the place of its neighbour on the grid; nothing at rest."""

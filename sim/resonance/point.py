@@ -17,7 +17,7 @@ from thermospindle.model.rotor.modes import Mode, Poles, poles
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.operating import OperatingPoint
 from thermospindle.sim.running.excitation import Harmonics, harmonics, response
-from thermospindle.sim.running.runout import hub_probes
+from thermospindle.sim.running.runout import hub_probes, speed_ratio
 
 UNIT_WAVE, UNIT_UNBALANCE = 1e-6, 1e-6  # m, kg m (1 g mm)
 
@@ -125,11 +125,11 @@ def line_amplitudes(found: Exact) -> dict[Key, float]:
 
 
 def nrro_rms(found: Exact) -> tuple[float, float]:
-    """Radial (mean square of x and y) and axial rms (m) of all lines that are no whole multiple of the speed, from the linear response.
+    """Radial (mean square of x and y) and axial rms (m) of all lines that are no whole multiple of the speed of what the probes see, from the linear response.
 
     Lines of one bearing at equal frequency add up as phasors, others as squares: the cages of two bearings drift against each other.
     """
-    forces, turning = found.forces, abs(found.point.condition.speed) / (2 * np.pi)
+    forces, turning = found.forces, abs(found.point.condition.speed * speed_ratio(found.point.spindle)) / (2 * np.pi)
     if not forces.line or turning == 0.0:
         return 0.0, 0.0
     at_probes = response(found.point, forces, lambda: found.poles) @ found.probes.T
@@ -137,7 +137,7 @@ def nrro_rms(found: Exact) -> tuple[float, float]:
 
 
 def rms_of_lines(lines: Sequence[Line], frequency: Array, turning: float, at_probes: ComplexArray) -> tuple[float, float]:
-    """As `nrro_rms`, of phasors (lines, 3) m at the probes of lines at `frequency` (lines,) Hz of a rotor `turning` at so many Hz."""
+    """As `nrro_rms`, of phasors (lines, 3) m at the probes of lines at `frequency` (lines,) Hz of what they see, `turning` at so many Hz."""
     sums: dict[tuple[str, float], ComplexArray] = {}
     for line, order, one in zip(lines, frequency / turning, at_probes, strict=True):
         if abs(order - round(order)) > 1e-6:

@@ -25,6 +25,7 @@ LEAST = 0.01  # of the strongest line, and
 ABOVE_FLOOR = 6.0  # times the median of the residual's spectrum: smallest peak that is called an unexplained line
 ROUNDING = 1e-6  # of the strongest line of all: below it a line is rounding
 MOST = 20  # unexplained lines looked for
+MOST_WHOLE = 300  # multiples looked for where what is seen turns more slowly than the spindle, beyond those of the spindle and of theory
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +42,8 @@ class Fit:
 @dataclass(frozen=True)
 class FoundLine:
     """A line of a record. `amplitude` (m, zero to peak) along the axis or the largest semi-axis of the ellipse across it, `forward` and
-    `backward` the radii of its circles (0 along the axis); `order`: frequency in turning frequencies; `causes` strongest first by linear theory,
+    `backward` the radii of its circles (0 along the axis); `order`: frequency in turning frequencies of the spindle, also where the part that is seen has
+    another, whose revolutions alone `repeatable` goes by; `causes` strongest first by linear theory,
     with the `shares` (m) it gives them; none for an unexplained line; `predicted` (m): amplitude in linear theory."""
 
     frequency: float  # Hz
@@ -119,21 +121,24 @@ def amplitude_of(phasor: ComplexArray, sense: float) -> tuple[float, float, floa
 
 
 def find_lines(
-    time: Array, value: Array, turning: float, known: Sequence[Line], predicted: ComplexArray
+    time: Array, value: Array, turning: float, known: Sequence[Line], predicted: ComplexArray, seen: Array | None = None
 ) -> tuple[tuple[FoundLine, ...], Fit]:
     """The lines of a record (probes, n) m at time (n,) s, whose first three probes look along x, y and the axis; strongest first, with the fit.
 
-    `turning` is the turning frequency (Hz, signed), whose multiples are always looked for; `known` the lines of theory, `predicted` their
+    `turning` is the turning frequency of the spindle (Hz, signed), `seen` those (Hz) of what probes see, that of the three first, left out the spindle's: its multiples are
+    always looked for, and lines at multiples of the others have exactly that frequency. `known` are the lines of theory, `predicted` their
     phasors (known, 3) m by linear theory. Lines below a thousandth of the strongest in their direction are left out.
     """
     length, rate = float(time[-1] - time[0]) * len(time) / (len(time) - 1), abs(turning)
+    seen = np.array([rate]) if seen is None else np.abs(seen)
     below = HIGHEST * len(time) / length
     far = [line for line in known if line.frequency > below]
     if far:
         raise ValueError(f"the record is sampled too slowly for the line {far[-1].name} at {far[-1].frequency:.0f} Hz")
     highest = max((line.frequency for line in known), default=rate)
-    whole = rate * np.arange(1, int(min(highest + rate, below) / rate) + 1)
-    others = [f for f in (line.frequency for line in known) if np.abs(whole - f).min() > SNAP / length]
+    whole = float(seen[0]) * np.arange(1, _multiples(float(seen[0]), rate, highest, below) + 1)
+    of_known = (_on_multiple(line.frequency, seen, SNAP / length) for line in known)
+    others = [f for f in of_known if np.abs(whole - f).min(initial=np.inf) > SNAP / length]
     candidates = distinct(np.concatenate([whole, others]), length)
     best = fit(time, value, candidates)
     extra = _unexplained(time, best, length, below)
@@ -151,7 +156,7 @@ def find_lines(
         near = [i for i, line in enumerate(known) if ends[0] <= line.frequency <= ends[1]]
         for direction in ("radial", "axial"):
             own = [a[:2] if direction == "radial" else a[2:] for a in (at_middle[0][:, members], at_middle[1][:, near])]
-            found.append(_told(direction, candidates[members], own[0], [known[i] for i in near], own[1], rate, sense))
+            found.append(_told(direction, candidates[members], own[0], [known[i] for i in near], own[1], (rate, float(seen[0])), sense))
     strongest = {d: max((g.amplitude for g in found if g.direction == d), default=0.0) for d in ("radial", "axial")}
     floor = ROUNDING * max(strongest.values())
     least = {d: (max(1e-3 * s, floor), max(LEAST * s, floor)) for d, s in strongest.items()}
@@ -159,17 +164,32 @@ def find_lines(
     return tuple(sorted(kept, key=lambda g: -g.amplitude)), best
 
 
+def _multiples(seen: float, rate: float, highest: float, below: float) -> int:
+    """How many multiples of a turning frequency `seen` (Hz) to look for, up to one above the `highest` line and `below` (Hz)."""
+    every, of_spindle = (int(min(highest + f, below) / f) for f in (seen, rate))
+    return every if seen >= rate else min(every, max(of_spindle, MOST_WHOLE))
+
+
+def _on_multiple(frequency: float, seen: Array, near: float) -> float:
+    """A frequency (Hz), or the multiple of one `seen` that is `near` it (Hz): the same line, but for rounding of the speed."""
+    multiples = seen * np.maximum(np.round(frequency / seen), 1)
+    closest = int(np.abs(multiples - frequency).argmin())
+    return float(multiples[closest]) if abs(multiples[closest] - frequency) <= near else frequency
+
+
 def _frequencies(known: Sequence[Line]) -> Array:
     return np.array([line.frequency for line in known])
 
 
 def _told(
-    direction: str, frequency: Array, phasor: ComplexArray, near: list[Line], expected: ComplexArray, rate: float, sense: float
+    direction: str, frequency: Array, phasor: ComplexArray, near: list[Line], expected: ComplexArray, rates: tuple[float, float], sense: float
 ) -> FoundLine:
-    """One line out of fitted `frequency` (k,) with `phasor` (1 or 2, k), and lines of theory `near` with `expected` (1 or 2, near)."""
+    """One line out of fitted `frequency` (k,) with `phasor` (1 or 2, k), and lines of theory `near` with `expected` (1 or 2, near); `rates` (Hz) of the
+    spindle, which orders are told in, and of the part that is seen, in whose revolutions a line repeats or not."""
     size, forward, backward = amplitude_of(phasor.sum(axis=1), sense)
     main = float(frequency[int(np.abs(phasor).sum(axis=0).argmax())])
-    repeatable = abs(main / rate - round(main / rate)) < 1e-9
+    rate, seen = rates
+    repeatable = abs(main / seen - round(main / seen)) < 1e-9
     shares = [amplitude_of(expected[:, i], sense)[0] if line.direction == direction else 0.0 for i, line in enumerate(near)]
     largest = max(shares, default=0.0)
     order = [i for i in np.argsort(shares)[::-1] if near[i].direction == direction and shares[i] >= 1e-9 * largest]

@@ -5,6 +5,9 @@ of it, besides the scene's own measuring points. The looked-at surface is round 
 else. Signals come from a running simulation (`measured`) or, for the steady state of the same condition, from the exact harmonic answer of the
 linear model (`linear`). Both paths show the same; the first also shows what a ball-by-ball bearing adds.
 
+What repeats does so every revolution of the part that a probe sees, which need not turn as the spindle does (`speed_ratio`): its revolutions are counted, and the RRO holds the lines
+at whole multiples of its turning frequency. A probe at what stands goes by the hub. Orders are told in turning frequencies of the spindle always.
+
 Quoted as RRO and NRRO are peak to valley values of the record: the more revolutions, the larger the NRRO's, since its lines
 come into step sooner or later, so a value goes with its number of revolutions.
 """
@@ -67,7 +70,7 @@ class Probe:
 
 @dataclass(frozen=True, eq=False)
 class Signals:
-    """What the probes see: `value` (probes, n) m at `time` (n,) s, when the turning part stands at `angle` (n,) rad, and the whole motion
+    """What the probes see: `value` (probes, n) m at `time` (n,) s, when the spindle stands at `angle` (n,) rad, of which parts turn by their ratio, and the whole motion
     (n, dofs) of the chain from which they see it."""
 
     probes: tuple[Probe, ...]
@@ -83,37 +86,72 @@ class Signals:
 
 @dataclass(frozen=True, eq=False)
 class Runout:
-    """One record of whole revolutions analysed. `lines`: of the hub's three probes, strongest first; `fit`: of all."""
+    """One record of whole revolutions analysed. `lines`: of the hub's three probes, strongest first; `fit`: of all.
+
+    `averaged` and `by_lines` cut the record of every probe into revolutions of what the hub's probes see; `cut_of` into those of what a probe sees itself.
+    """
 
     point: OperatingPoint
     signals: Signals
-    turning: float  # Hz, signed
+    turning: float  # Hz, signed, of the spindle
     averaged: Revolutions  # RRO by averaging over the revolutions
     lines: tuple[FoundLine, ...]
     fit: Fit
 
-    def values(self, cut: Revolutions | None = None) -> dict[str, ErrorMotion]:
-        """What is quoted of every probe, by name; of the RRO by lines, or of another."""
-        cut = self.by_lines if cut is None else cut
-        return {p.name: error_motion(cut, i, p.radial) for i, p in enumerate(self.signals.probes)}
+    @cached_property
+    def ratios(self) -> tuple[float, ...]:
+        """Speed of what every probe sees over the spindle's; of what stands that of the hub."""
+        return tuple(speed_ratio(self.point.spindle, p) for p in self.signals.probes)
+
+    @property
+    def revolving(self) -> float:
+        """Turning frequency (Hz, signed) of what the hub's probes see, whose revolutions are counted."""
+        return self.turning * self.ratios[0]
+
+    def values(self, averaged: bool = False) -> dict[str, ErrorMotion]:
+        """What is quoted of every probe, by name; of the RRO by lines, or by averaging over the revolutions."""
+        return {p.name: error_motion(self.cut_of(i, averaged), i, p.radial) for i, p in enumerate(self.signals.probes)}
+
+    def cut_of(self, probe: int, averaged: bool = False) -> Revolutions:
+        """The record in revolutions of what a probe, by its number, sees, with the RRO by lines or by averaging."""
+        ratio = abs(self.ratios[probe])
+        if ratio == abs(self.ratios[0]):
+            return self.averaged if averaged else self.by_lines
+        return self._others[ratio][not averaged]
 
     @cached_property
     def by_lines(self) -> Revolutions:
-        """The same revolutions with the RRO made of the lines at whole orders alone, which the other lines do not leak into."""
-        rate = abs(self.turning)
+        """The same revolutions with the RRO made of the lines at whole orders of what is seen alone, which the other lines do not leak into."""
+        return self._from_lines(self.averaged, self.ratios[0])
+
+    @cached_property
+    def _others(self) -> dict[float, tuple[Revolutions, Revolutions]]:
+        """Averaged and by lines, by the size of the ratio, for what probes see beside the hub that turns at another speed; samples as many as in the hub's."""
+        found = {}
+        for ratio in {abs(r) for r in self.ratios} - {abs(self.ratios[0])}:
+            cut = revolutions(self.signals.time, ratio * self.signals.angle, self.signals.value, len(self.averaged.angle))
+            found[ratio] = cut, self._from_lines(cut, ratio)
+        return found
+
+    def _from_lines(self, cut: Revolutions, ratio: float) -> Revolutions:
+        turning = self.turning * ratio
+        rate = abs(turning)
         orders = np.round(self.fit.frequency / rate).astype(int)
         whole = np.abs(self.fit.frequency - orders * rate) < 1e-9 * rate
-        start = np.sign(self.turning) * (self.signals.angle[0] - 2 * np.pi * self.turning * self.signals.time[0])
+        start = np.sign(turning) * (ratio * self.signals.angle[0] - 2 * np.pi * turning * self.signals.time[0])
         at_zero = self.fit.phasor[:, whole] * np.exp(-1j * orders[whole] * start)
-        mean = self.fit.mean[:, None] + from_orders(self.averaged.angle, at_zero, orders[whole].tolist())
-        return replace(self.averaged, repeatable=mean)
+        mean = self.fit.mean[:, None] + from_orders(cut.angle, at_zero, orders[whole].tolist())
+        return replace(cut, repeatable=mean)
 
     @cached_property
     def leaked(self) -> Array:
         """Largest (probes,) m by which lines between the whole orders can have changed the averaged RRO: the sum of what each leaves in it."""
-        orders = self.fit.frequency / abs(self.turning)
-        gain = np.where(np.abs(orders - np.round(orders)) < 1e-9, 0.0, np.abs(leakage(orders, self.averaged.count)))
-        return np.asarray(np.abs(self.fit.phasor) @ gain)
+        found = []
+        for i, ratio in enumerate(self.ratios):
+            orders = self.fit.frequency / abs(self.turning * ratio)
+            gain = np.where(np.abs(orders - np.round(orders)) < 1e-9, 0.0, np.abs(leakage(orders, self.cut_of(i, True).count)))
+            found.append(float((np.abs(self.fit.phasor) @ gain)[i]))
+        return np.array(found)
 
 
 # ---------------------------------------------------------------- probes
@@ -140,6 +178,13 @@ def hub_probes(spindle: Spindle) -> tuple[Probe, Probe, Probe]:
         Probe(Y, body, (0.0, radius, height), (0.0, 1.0, 0.0)),
         Probe(AXIAL, body, (0.0, 0.0, end), (0.0, 0.0, 1.0)),
     )
+
+
+def speed_ratio(spindle: Spindle, probe: Probe | None = None) -> float:
+    """Speed of what a probe, by default the hub's, sees over the spindle's: what repeats every revolution goes by it, at what stands by the hub's."""
+    body = spindle.structure.body(hub_probes(spindle)[0].body)
+    own = body if probe is None else spindle.structure.body(probe.body)
+    return (own.speed_ratio if own.turns else body.speed_ratio) or 1.0
 
 
 def looked_at(spindle: Spindle) -> str:
@@ -223,8 +268,8 @@ def linear(point: OperatingPoint, probes: Sequence[Probe], time: Array, excited:
 
 
 def whole_turns(point: OperatingPoint) -> int:
-    """Default number of revolutions of a record: between once and twice the shortest record, where the lines leak least into their mean."""
-    rate = abs(point.condition.speed) / (2 * np.pi)
+    """Default number of revolutions, of what the hub's probes see, of a record: between once and twice the shortest record, where the lines leak least into their mean."""
+    rate = abs(point.condition.speed * speed_ratio(point.spindle)) / (2 * np.pi)
     fewest = int(np.ceil(max(SHORTEST * rate, REVOLUTIONS) - 1e-9))
     known, phasor = _known(point)
     size = np.abs(phasor @ probe_rows(point, hub_probes(point.spindle)).T).max(axis=1)
@@ -261,11 +306,12 @@ def analyse(point: OperatingPoint, signals: Signals) -> Runout:
     ValueError if the speed is not constant or the record is shorter than a revolution or too coarse for the lines looked for.
     """
     turning = turning_frequency(signals.time, signals.angle)
-    cut = revolutions(signals.time, signals.angle, signals.value)
+    ratios = [speed_ratio(point.spindle, p) for p in signals.probes]
+    cut = revolutions(signals.time, ratios[0] * signals.angle, signals.value)
     known, phasor = _known(point)
     predicted = phasor @ probe_rows(point, signals.probes[:3]).T
-    whole = slice(int(np.searchsorted(signals.time, signals.time[0] + cut.count / abs(turning) * (1 - 1e-12))))
-    found, fitted = find_lines(signals.time[whole], signals.value[:, whole], turning, known, predicted)
+    whole = slice(int(np.searchsorted(signals.time, signals.time[0] + cut.count / abs(turning * ratios[0]) * (1 - 1e-12))))
+    found, fitted = find_lines(signals.time[whole], signals.value[:, whole], turning, known, predicted, turning * np.array(list(dict.fromkeys(map(abs, ratios)))))
     return Runout(point, signals, turning, cut, found, fitted)
 
 
@@ -286,9 +332,11 @@ def runout(point: OperatingPoint, seconds: float | None = None, element: str = "
     speed = point.condition.speed
     if speed == 0:
         raise BadInput("--speed 0: a spindle at rest has no runout; give a speed in rpm")
-    turn = 2 * np.pi / abs(speed)
+    ratio = speed_ratio(point.spindle)
+    turn = 2 * np.pi / abs(speed * ratio)
     if seconds is not None and seconds < 2 * turn:
-        raise BadInput(f"--seconds {seconds:g}: at {60 / turn:g} rpm the record needs at least two revolutions, {2 * turn:.3g} s")
+        of_what = "" if abs(ratio) == 1 else f" of the {looked_at(point.spindle)}"
+        raise BadInput(f"--seconds {seconds:g}: at {60 / turn:g} rpm the record needs at least two revolutions{of_what}, {2 * turn:.3g} s")
     count = whole_turns(point) if seconds is None else int(seconds / turn + 1e-9)
     rate, probes = sampling_rate(point, path != "linear"), all_probes(point.spindle)
     samples = int(np.ceil(count * turn * rate)) + 2  # the last revolution ends between two samples

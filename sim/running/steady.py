@@ -1,6 +1,6 @@
 """Runout of a spindle in its steady state from the lines alone, exactly and without a record: what a study of many spindles asks of each.
 
-At constant speed every probe sees a sum of lines. Those at whole multiples of the speed repeat in every revolution and are the RRO; all others are
+At constant speed every probe sees a sum of lines. Those at whole multiples of the speed of what it sees repeat in every revolution and are the RRO; all others are
 the NRRO, whose root mean square follows from their amplitudes (Parseval). Six times that is how drives are specified; a peak to valley value of the NRRO
 would be one of a record, and go with its length.
 """
@@ -16,7 +16,7 @@ from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.operating import OperatingPoint
 from thermospindle.sim.running.excitation import harmonics, response
 from thermospindle.sim.running.revolutions import from_orders
-from thermospindle.sim.running.runout import hub_probes, probe_rows
+from thermospindle.sim.running.runout import hub_probes, probe_rows, speed_ratio
 
 SAME = 1e-9  # relative difference of frequencies that are one line
 LEAST = 1e-15  # m: less is rounding
@@ -33,7 +33,7 @@ class SteadyRunout:
 
 def steady_runout(point: OperatingPoint) -> dict[str, SteadyRunout]:
     """What the hub's probes see, by name. BadInput at rest."""
-    rate = abs(point.condition.speed) / (2 * np.pi)
+    rate = abs(point.condition.speed * speed_ratio(point.spindle)) / (2 * np.pi)
     if rate == 0:
         raise BadInput("a spindle at rest has no runout")
     probes = hub_probes(point.spindle)

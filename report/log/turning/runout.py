@@ -26,7 +26,7 @@ from thermospindle.report.log.turning.blueprint import POLAR, WATERFALL, bluepri
 from thermospindle.report.log.views import at
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.posing import body_meshes, cage_turns, frame_indices, turning_poses
-from thermospindle.sim.running.runout import AXIAL, Runout, X, Y
+from thermospindle.sim.running.runout import AXIAL, Runout, X, Y, looked_at
 from thermospindle.sim.running.waterfall import LineSpectrum
 
 COLOURS = ((255, 120, 90), (90, 200, 255), (190, 220, 90))  # x, y, axial
@@ -159,8 +159,9 @@ def log_waterfall(recording: rr.RecordingStream, spectra: Sequence[LineSpectrum]
 def summary(runout: Runout) -> str:
     """Markdown: what is quoted, and the strongest lines."""
     condition, values = runout.point.condition, runout.values()
+    of_what = "" if abs(runout.ratios[0]) == 1 else f" of the {looked_at(runout.point.spindle)}"
     lines = [
-        f"**{condition.temperature:g} °C, {condition.speed / RPM:.6g} rpm, {runout.averaged.count} revolutions**",
+        f"**{condition.temperature:g} °C, {condition.speed / RPM:.6g} rpm, {runout.averaged.count} revolutions{of_what}**",
         "",
         "| nm | RRO | NRRO | 6σ NRRO | synchr. | asynchr. |",
         "|---|---|---|---|---|---|",

@@ -113,12 +113,12 @@ def test_both_ways_to_part_the_record_agree_within_the_leakage(found):
     away = found.averaged.repeatable - found.by_lines.repeatable
     assert np.all(np.abs(away).max(axis=1) <= found.leaked * (1 + 1e-6) + 1e-15)
     assert found.leaked[0] < 0.1 * np.ptp(found.by_lines.nonrepeatable[0])
-    rms = [v.nonrepeatable_rms for v in (found.values()[X], found.values(found.averaged)[X])]
+    rms = [v.nonrepeatable_rms for v in (found.values()[X], found.values(averaged=True)[X])]
     assert rms[0] == pytest.approx(rms[1], rel=0.01)
 
 
 def test_variance_of_the_record_is_the_sum_of_both_parts(found):
-    for name, m in found.values(found.averaged).items():
+    for name, m in found.values(averaged=True).items():
         assert m.repeatable_rms**2 + m.nonrepeatable_rms**2 == pytest.approx(m.total_rms**2, rel=1e-12), name
     m = found.values()[X]  # lines between whole orders are not quite orthogonal to the whole ones in a finite record
     assert m.repeatable_rms**2 + m.nonrepeatable_rms**2 == pytest.approx(m.total_rms**2, rel=1e-3)
