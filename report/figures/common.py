@@ -70,6 +70,9 @@ DRAWN: dict[Any, Any] = STYLE | {"figure.constrained_layout.use": False}
 
 SVG = "{http://www.w3.org/2000/svg}"
 REFERENCE = re.compile(r"#([a-zA-Z][\w.-]*)(?=\)|$)")  # of url(#id) and #id; also a colour, which is no element's id
+DRAWN_BY = ("d", "points", "transform", "style", "x", "y", "x1", "y1", "x2", "y2", "width", "height", "viewBox")
+"""Attributes that say where and how an element is drawn, in points: two decimals of them are enough."""
+LONG = re.compile(r"-?\d+\.\d{3,}(?:e[-+]?\d+)?")
 ElementTree.register_namespace("", SVG[1:-1])
 ElementTree.register_namespace("xlink", "http://www.w3.org/1999/xlink")
 
@@ -108,7 +111,7 @@ def svg(figure: Figure, key: str, description: str) -> str:
     """The figure as an SVG element for the inside of a page; `key` keeps its ids apart from those of other figures.
 
     Ids that nothing refers to go, the others are numbered: matplotlib's own are hashes of places to their last bit, which the layout's
-    solver leaves to chance.
+    solver leaves to chance. Places are rounded to a hundredth of a point; what is written stays as it is.
     """
     buffer = io.BytesIO()
     laid_out(figure).savefig(buffer, format="svg", dpi=170, bbox_inches="tight", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
@@ -123,12 +126,18 @@ def svg(figure: Figure, key: str, description: str) -> str:
             element.set("id", number.setdefault(name, f"{key}-{len(number)}"))
     for element in root.iter():
         for attribute, value in element.items():
-            element.set(attribute, REFERENCE.sub(lambda m: "#" + number.get(m[1], m[1]), value))
+            value = REFERENCE.sub(lambda m: "#" + number.get(m[1], m[1]), value)
+            element.set(attribute, LONG.sub(_rounded, value) if attribute in DRAWN_BY else value)
     width = float(root.attrib["viewBox"].split()[2])
     root.attrib = {"viewBox": root.attrib["viewBox"], "style": f"max-width: {width / 11:.2f}rem", "role": "img", "aria-label": description}
     text = ElementTree.tostring(root, encoding="unicode", short_empty_elements=True)
     text = re.sub(r' xmlns(:xlink)?="[^"]+"', "", text)  # HTML knows both
-    return re.sub(r"\n\s*", "\n", re.sub(r"(\d\.\d\d)\d+", r"\1", text))
+    return re.sub(r"\n\s*", "\n", text)
+
+
+def _rounded(number: re.Match[str]) -> str:
+    """Of a number its two decimals, without zeros at the end."""
+    return f"{float(number[0]):z.2f}".rstrip("0").rstrip(".")
 
 
 def pictures(figures: Mapping[str, Figure], captions: Mapping[str, str], key: str = "") -> dict[str, str]:

@@ -96,6 +96,25 @@ def test_svg_for_a_page():
     assert "<metadata" not in drawn[0]
 
 
+def test_what_is_written_in_a_figure_is_not_shortened():
+    """Places are rounded to a hundredth of a point; ticks, names and the description keep every digit."""
+    with rc_context(common.STYLE):
+        figure = Figure(figsize=(3, 2))
+        axes = figure.subplots()
+        axes.plot([20, 35, 50], [0.00123456, 0.0034, 0.0048])
+        axes.set_xlabel("beside 1001.9978 Hz")
+        drawn = common.svg(figure, "a", "a loss of 0.0079")
+    texts = re.findall(r"<text[^>]*>(.*?)</text>", drawn)
+    assert {"0.002", "0.003", "0.004", "beside 1001.9978 Hz"} <= set(texts)
+    assert 'aria-label="a loss of 0.0079"' in drawn
+    assert not re.search(r"\d\.\d{3}", re.sub(r"<text[^>]*>.*?</text>|aria-label=\"[^\"]*\"", "", drawn))
+
+
+@pytest.mark.parametrize(("long", "short"), [("1.236", "1.24"), ("-0.0004", "0"), ("12.999", "13"), ("1.5e-07", "1.5e-07"), ("9.9990e1", "99.99"), ("7.10", "7.10")])
+def test_places_are_rounded_not_cut(long, short):
+    assert common.LONG.sub(common._rounded, f"M {long} 2") == f"M {short} 2"
+
+
 def test_a_level_curve_has_no_offset_axis():
     """A contact angle that stays 25 degrees but for its last digits: ticks are plain numbers around 25, not 0.00 and an offset."""
     text = plots.trend("k", [20.0, 60.0], {"": {"lower": [25.0, 25.00004], "upper": [25.0, 25.0]}}, "contact angle, degrees", False)
