@@ -23,6 +23,8 @@ from thermospindle.sim.running.waterfall import LineSpectrum, on_grid
 REPEATS, BAND = "#c9371c", "#2166ac"
 NAMED = {"radial": 9, "axial": 7}  # lines with labels, at most
 NOTHING = 1e-6  # of the strongest line: a direction with no stronger one does not move
+LEAST = 1e-3  # nm that a plot reaches at least: what moves by less stands still
+LINE = 12  # revolutions that are drawn one after the other beside the band of all
 DECADES = 3.0  # of the spectrum below its strongest line
 ROOM = 250.0  # for labels, times the strongest line
 RANGE = 50.0  # dB below the strongest line that the waterfall shows
@@ -55,7 +57,7 @@ def _orbit(axes: Axes, cut: Revolutions, x: int, y: int, where: str) -> None:
     axes.plot(*every, color=BAND, lw=0.35, alpha=0.45, rasterized=True)
     mean = TO_NM * cut.repeatable[[x, y]]
     axes.plot(*np.concatenate([mean, mean[:, :1]], axis=1), color=REPEATS, lw=2.0)
-    reach = 1.08 * float(np.abs(every - every.mean(axis=1, keepdims=True)).max() or 1.0)
+    reach = 1.08 * max(float(np.abs(every - every.mean(axis=1, keepdims=True)).max()), LEAST)
     for axis, middle in zip(("x", "y"), every.mean(axis=1), strict=True):
         axes.set(**{f"{axis}lim": (middle - reach, middle + reach), f"{axis}label": f"{where} {axis}, nm"})
     axes.set_aspect("equal")
@@ -63,7 +65,10 @@ def _orbit(axes: Axes, cut: Revolutions, x: int, y: int, where: str) -> None:
 
 
 def _polar(axes: PolarAxes, cut: Revolutions, probe: int, quoted: ErrorMotion, title: str, radial: bool) -> None:
-    """Displacement over angle on a base circle; a radial plot about its least-squares circle, which is drawn."""
+    """Displacement over angle on a base circle; a radial plot about its least-squares circle, which is drawn.
+
+    Revolutions are one line that goes on from each to the next: a motion that does not repeat does not end where it began.
+    """
     mean, value = cut.repeatable[probe], cut.value[probe]
     base = mean.mean()
     if radial:
@@ -71,10 +76,10 @@ def _polar(axes: PolarAxes, cut: Revolutions, probe: int, quoted: ErrorMotion, t
     mean, value = TO_NM * (mean - base), TO_NM * (value - base)
     angle = np.append(cut.angle, cut.angle[0] + 2 * np.pi)
     low, high = _closed(value.min(axis=0)), _closed(value.max(axis=0))
-    reach = float(max(abs(low.min()), abs(high.max())) or 1.0)
+    reach = max(float(abs(low.min())), float(abs(high.max())), LEAST)
     axes.fill_between(angle, low, high, color=BAND, alpha=0.2, lw=0, label="band of all revolutions (NRRO)")
-    for turn in value[:: max(1, len(value) // 12)]:
-        axes.plot(angle, _closed(turn), color=BAND, lw=0.3, alpha=0.5)
+    turns = value[:LINE]
+    axes.plot((cut.angle + 2 * np.pi * np.arange(len(turns))[:, None]).ravel(), turns.ravel(), color=BAND, lw=0.3, alpha=0.5, label=f"the first {len(turns)} of them")
     axes.plot(angle, _closed(mean), color=REPEATS, lw=2.0, label="repeatable part (RRO)")
     axes.plot(np.linspace(0, 2 * np.pi, 181), np.zeros(181), color=INK, lw=0.9, ls="--", zorder=5, label="least-squares circle (axial: mean)")
     axes.set_rlim(-2.6 * reach, 1.15 * reach)
@@ -126,9 +131,14 @@ def spectrum_figure(runout: Runout) -> Figure:
     with rc_context(STYLE | {"figure.constrained_layout.w_pad": 0.15}):  # the last number of an axis is wider than its end
         figure = Figure(figsize=(11.0, 7.6))
         panels = figure.subplots(2, 1, sharex=True)
+        most = TO_NM * max([*(float(a.max()) for a in amplitudes), *(g.amplitude for g in runout.lines)])
         for axes, direction, amplitude in zip(panels, ("radial", "axial"), amplitudes, strict=True):
             own = [g for g in runout.lines if g.direction == direction and g.frequency < highest]
-            top = TO_NM * max([float(amplitude.max()), *(g.amplitude for g in own)]) or 1.0
+            largest = TO_NM * max([float(amplitude.max()), *(g.amplitude for g in own)])
+            top = max(largest, NOTHING * most) or 1.0
+            if largest <= NOTHING * most:  # its rounding is no spectrum
+                axes.text(0.5, 0.5, "nothing moves this way", transform=axes.transAxes, ha="center", va="center", color=PALE)
+                own, amplitude = [], np.zeros_like(amplitude)
             shown_part = frequency < highest
             axes.semilogy(frequency[shown_part], np.maximum(TO_NM * amplitude[shown_part], 1e-3 * top * 10**-DECADES), color=PALE, lw=0.7)
             _marks(axes, own)

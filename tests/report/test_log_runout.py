@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rerun as rr
+from matplotlib.figure import Figure
+from matplotlib.projections.polar import PolarAxes
 from rerun.chunk import RrdReader
 from scipy.spatial.transform import Rotation
 
@@ -20,13 +22,13 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM, TO_MM
-from thermospindle.report.figures.runout import RANGE, motion_figure, polar_figure, spectrum_figure, waterfall_figure
+from thermospindle.report.figures.runout import LEAST, LINE, RANGE, _polar, motion_figure, polar_figure, spectrum_figure, waterfall_figure
 from thermospindle.report.log.read import read_log
 from thermospindle.report.log.told import describe
 from thermospindle.report.log.turning.runout import log_signals, orbit_pieces, rolling_elements, write_runout_log
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.posing import cage_turns, frame_indices, turning_poses
-from thermospindle.sim.running.runout import X, Y, runout, with_imperfections
+from thermospindle.sim.running.runout import AXIAL, X, Y, runout, with_imperfections
 from thermospindle.sim.running.waterfall import LineSpectrum, on_grid, run_up, waterfall
 
 SPEED = 7200 * np.pi / 30
@@ -206,6 +208,35 @@ def test_the_least_squares_circle_lies_above_the_repeatable_part(record):
     polar = motion_figure(record).axes[1]
     named = {line.get_label(): line.get_zorder() for line in polar.lines}
     assert named["least-squares circle (axial: mean)"] > named["repeatable part (RRO)"]
+
+
+def test_revolutions_go_on_from_each_to_the_next(record):
+    """Each was closed on itself: of a motion that does not repeat that drew spokes at 0 degrees."""
+    cut = record.by_lines
+    [line] = [line for line in motion_figure(record).axes[1].lines if str(line.get_label()).startswith("the first")]
+    angle, value = np.asarray(line.get_xdata(), float), np.asarray(line.get_ydata(), float)
+    assert len(angle) == LINE * len(cut.angle)
+    assert np.diff(angle) == pytest.approx(np.full(len(angle) - 1, 2 * np.pi / len(cut.angle)), rel=1e-6)
+    jumps = np.abs(np.diff(value))
+    assert jumps[len(cut.angle) - 1 :: len(cut.angle)].max() < 2 * np.delete(jumps, np.s_[len(cut.angle) - 1 :: len(cut.angle)]).max()
+
+
+def test_what_does_not_move_has_no_motion_and_no_spectrum(record):
+    """The rounding of an axial probe, 1e-15 nm, was drawn over the whole plot."""
+    names = [p.name for p in record.signals.probes]
+    k, noise = names.index(AXIAL), 1e-24 * np.random.default_rng(0).normal(size=record.signals.value.shape[-1])
+    value, axial = np.array(record.signals.value), tuple(g for g in record.lines if g.direction == "radial")
+    value[k] = noise
+    drawn = spectrum_figure(replace(record, signals=replace(record.signals, value=value), lines=axial)).axes[1]
+    assert [t.get_text() for t in drawn.texts] == ["nothing moves this way"]
+    assert not np.ptp(drawn.lines[0].get_ydata())
+    cut = record.by_lines
+    still = np.array(cut.value)
+    still[k] = np.resize(noise, still[k].shape)
+    polar = Figure().add_subplot(projection="polar")
+    assert isinstance(polar, PolarAxes)
+    _polar(polar, replace(cut, value=still, repeatable=np.zeros_like(cut.repeatable)), k, record.values()[AXIAL], "", False)
+    assert polar.get_ylim()[1] >= LEAST
 
 
 def test_inspect_tells_what_is_in_it(file, capsys):
