@@ -154,6 +154,21 @@ def label(test: Test, line: str = "\n") -> str:
     return line.join(words)
 
 
+SAME = 1e-4
+"""Of a value: what changes by less is drawn nearly level."""
+
+
+def least_span(axes: Axes, values: Array, least: float | None = None) -> None:
+    """The upright axis shows `least` (by default `SAME` of the largest) on either side of what is drawn, where all `values` are nearer to each other than that: else its rounding would fill the panel."""
+    known = values[np.isfinite(values)]
+    if not known.size:
+        return
+    least = SAME * float(np.abs(known).max()) if least is None else least
+    middle = (known.min() + known.max()) / 2
+    if np.ptp(known) < least:
+        axes.set_ylim(middle - least, middle + least)
+
+
 def spread(wanted: Array, apart: float, low: float = 0.0, high: float = 1.0) -> Array:
     """Places (n,) nearest to the `wanted` ones (any order), in least squares, that keep their order, are `apart` and lie between `low` and `high`; closer
     together where so many do not fit."""

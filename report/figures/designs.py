@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from thermospindle.report.figures.common import STYLE, colour
+from thermospindle.report.figures.common import STYLE, colour, least_span
 
 COLUMNS, WIDTH = 4, 10.0  # panels beside each other; inches
 SHOWN = 5  # conditions
@@ -28,14 +28,17 @@ def compared(told: Mapping[str, Any]) -> dict[str, Figure]:
         for axes in grid[len(figures) :]:
             axes.set_axis_off()
         for axes, figure in zip(grid, figures, strict=False):
+            drawn = []
             for k, c in enumerate(conditions):
                 if figure not in c["figures"]:
                     continue
                 place = np.arange(len(names)) + 0.12 * (k - (len(conditions) - 1) / 2)
                 own = list(c["figures"][figure]["designs"].values())
                 middle, low, high = np.array([_ends(d) for d in own], float).T
+                drawn += [middle, low, high]
                 label = f"{c['temperature_C']:g} °C" + (f", {c['speed_rpm']:g} rpm" if c["speed_rpm"] else "")
                 axes.errorbar(place, middle, yerr=np.abs([middle - low, high - middle]), fmt="s" if c["speed_rpm"] else "o", ms=3, lw=0.9, color=colour(c["temperature_C"], every), label=label)
+            least_span(axes, np.array(drawn))
             axes.set_title(figure, fontsize=7.5)
             axes.set_xticks(range(len(names)), names, rotation=20, ha="right", fontsize=7)
         seen = {label: handle for axes in grid for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}

@@ -15,7 +15,7 @@ from matplotlib.patches import Circle, Patch, Rectangle
 
 from thermospindle.model.machine import PARTS, RollerBearing, Spindle
 from thermospindle.model.types import Array
-from thermospindle.report.figures.common import BEARINGS, INK, PALE, STYLE, colour, svg
+from thermospindle.report.figures.common import BEARINGS, INK, PALE, STYLE, colour, least_span, svg
 from thermospindle.sim.operating import OperatingPoint
 from thermospindle.sim.posing import round_down
 from thermospindle.thermal.expansion import DeformedSection, field
@@ -72,8 +72,7 @@ def trend(key: str, temperature: Sequence[float], curves: Mapping[str, Mapping[s
     axes.margins(x=0.06, y=0.12)
     axes.ticklabel_format(useOffset=False)
     every = np.array([series for values in curves.values() for series in values.values()])
-    if np.ptp(every) < LEVEL * abs(every.mean()):  # else the axis would be divided into digits that say nothing
-        axes.set_ylim(*sorted((every.mean() * (1 - LEVEL), every.mean() * (1 + LEVEL))))
+    least_span(axes, every, LEVEL * float(abs(every.mean())))
     if from_zero:
         axes.set_ylim(1.15 * min(every.min(), 0.0), 1.15 * max(every.max(), 0.0) or 1.0)
     handles = axes.get_lines()[: len(next(iter(curves.values())))]

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from thermospindle.model.types import Array
-from thermospindle.report.figures.common import INK, STYLE
+from thermospindle.report.figures.common import INK, STYLE, least_span
 
 Colour = str | tuple[float, float, float]
 Curves = Sequence[tuple[Array, Array, Colour]]
@@ -28,6 +28,8 @@ def panels(titled: Mapping[str, Curves], columns: int, size: tuple[float, float]
         for k, (axes, (title, curves)) in enumerate(zip(every.flat, titled.items(), strict=False)):
             for x, y, colour in curves:
                 axes.plot(x, y, color=colour, lw=1.2, marker="o" if len(x) == 1 else "")
+            if curves:
+                least_span(axes, np.concatenate([np.ravel(y) for _, y, _ in curves]))
             axes.set_title(title)
             axes.xaxis.set_major_locator(MaxNLocator(2))
             axes.yaxis.set_major_locator(MaxNLocator(3))

@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from thermospindle.model.types import Array
-from thermospindle.report.figures.common import BEARINGS, INK, PALE, STYLE, colour
+from thermospindle.report.figures.common import BEARINGS, INK, PALE, SAME, STYLE, colour, least_span
 from thermospindle.sim.study.rows import OF_RUNOUT, Cases
 from thermospindle.sim.study.sensitivity import APART
 from thermospindle.sim.study.summary import at_conditions, first_set, frequencies, numbers
@@ -58,6 +58,7 @@ def sweep(of: Cases, table: pa.Table) -> dict[str, Figure]:
             for told, rows in lines.items():
                 rows = sorted(rows, key=lambda i: x[i])
                 axes.plot(x[rows], y[rows], **looks[told])
+            least_span(axes, y)
             axes.set_title(title)
         for axes in grid[max(0, len(panels) - COLUMNS) : len(panels)]:
             axes.set_xlabel(varied[along])
@@ -141,7 +142,9 @@ def _spreads(of: Cases, table: pa.Table) -> Figure:
             known = values[np.isfinite(values)] if values is not None else np.array([])
             if len(known) > 1:
                 label = f"{here['temperature_C']:g} °C" + (f", {here['speed_rpm']:g} rpm" if here["speed_rpm"] else "")
-                axes.hist(known, bins="auto" if np.ptp(known) > 0 else 1, density=True, histtype="step", color=colour(here["temperature_C"], every), ls="--" if here["speed_rpm"] else "-", label=label)  # fmt: skip
+                least, middle = SAME * float(np.abs(known).max()), float(known.mean())
+                bins: Look = {"bins": "auto"} if np.ptp(known) > least else {"bins": 1, "range": (middle - least, middle + least)}
+                axes.hist(known, **bins, density=True, histtype="step", color=colour(here["temperature_C"], every), ls="--" if here["speed_rpm"] else "-", label=label)  # fmt: skip
         axes.set_title(title)
         axes.set_yticks([])
         axes.set_xlabel("Hz" if k < len(modes) else "µm" if "RRO" in title else "N")

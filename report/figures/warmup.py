@@ -11,12 +11,13 @@ from matplotlib.figure import Figure
 
 from thermospindle.model.types import Array
 from thermospindle.model.units import MINUTE
-from thermospindle.report.figures.common import BEARINGS, PALE, STYLE, spread
+from thermospindle.report.figures.common import BEARINGS, PALE, SAME, STYLE, least_span, spread
 from thermospindle.report.typeset import power
 from thermospindle.sim.warmup import Warmup, most_friction, roller_names, rollers
 
 PARTS = {"stationary": "#3b6ea5", "rotating": "#c2622d"}
 LETTERS = 7.5  # points, of names beside lines
+WARMER = 0.1  # K that the panel of temperatures shows at least: their time steps are right within a tenth of it
 MODES = ("#1f8a70", "#7a3d8f", "#a0741a", "#3b6ea5", "#c9371c", "#555f6b", "#d18a0f", "#b0457b")
 
 
@@ -37,6 +38,7 @@ def figure(warmup: Warmup) -> Figure:
     groups = _alike(temperature, [parts[g] for g in regions])
     names = [_group_name([regions[k] for k in group], parts) for group in groups]
     ends = np.array([temperature[-1, group].mean() for group in groups])
+    least_span(axes, temperature, WARMER)
     name_ends(axes, ends, names, [PARTS[parts[regions[group[0]]]] for group in groups])
     axes.set(title="Region temperatures", ylabel="temperature, °C")
     for part, paint in PARTS.items():
@@ -63,6 +65,7 @@ def figure(warmup: Warmup) -> Figure:
     paints = [MODES[k % len(MODES)] for k in range(len(names))]
     for series, paint in zip(shift.T, paints, strict=True):
         axes.plot(minutes, series, color=paint)
+    least_span(axes, shift, SAME * float(np.nanmax(warmup.frequencies[0], initial=0.0)))
     name_ends(axes, shift[-1], names, paints)
     axes.axhline(0.0, color=PALE, lw=0.6)
     axes.set(title="Natural frequencies (names: Hz at the start)", ylabel="change since the start, Hz")
@@ -82,6 +85,7 @@ def _of_bearings(axes: Axes, minutes: Array, values: Array, bearings: Sequence[s
     for k, series in enumerate(values.T[:1] if same else values.T):
         paint, _, dashes = BEARINGS[k % len(BEARINGS)]
         axes.plot(minutes, series, color=paint, ls=dashes, lw=1.5)
+    least_span(axes, values)
     names = ["both bearings" if len(bearings) == 2 else f"all {len(bearings)} bearings"] if same else list(bearings)
     name_ends(axes, values[-1, : len(names)], names, [BEARINGS[k % len(BEARINGS)][0] for k in range(len(names))])
     axes.set(title=title, ylabel=label)

@@ -12,9 +12,10 @@ from matplotlib.figure import Figure
 
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
-from thermospindle.report.figures import common
+from thermospindle.report.figures import common, designs, warmup
 from thermospindle.report.figures import report as plots
 from thermospindle.report.figures.common import colour
+from thermospindle.report.figures.run import panels
 from thermospindle.report.figures.study import looks_of
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.run import Run
@@ -121,6 +122,41 @@ def test_a_level_curve_has_no_offset_axis():
     ticks = [float(t.replace("−", "-")) for t in re.findall(r">([−+\d.e]+)</text>", text)]
     assert "e" not in "".join(re.findall(r">([−+\d.e]+)</text>", text))
     assert len([t for t in ticks if 24 < t < 26]) >= 3
+
+
+@pytest.mark.parametrize(
+    ("values", "least", "ends"),
+    [
+        ([180.0 - 1e-10, 180.0, 180.0 + 1e-10], None, (179.982, 180.018)),
+        ([180.0, np.nan, 180.0], None, (179.982, 180.018)),
+        ([-5.0, -5.0 - 1e-9], 0.1, (-5.1, -4.9)),
+        ([180.0, 180.1], None, None),  # what changes fills the panel
+        ([0.0, 0.0], None, None),
+        ([np.nan], None, None),
+    ],
+)
+def test_rounding_does_not_fill_a_panel(values, least, ends):
+    figure = Figure()
+    axes = figure.subplots()
+    axes.plot(values)
+    before = axes.get_ylim()
+    common.least_span(axes, np.array(values), least)
+    assert axes.get_ylim() == (before if ends is None else pytest.approx(ends, rel=1e-9))
+
+
+NOISE = 180.0 + 1e-10 * np.array([0.0, 1.0, -1.0, 0.5])
+"""The preload of a spring, as it is computed."""
+
+
+def test_a_preload_that_stays_is_level_in_every_figure():
+    """In that of a warm-up it went from 179.99999999985 to 180.00000000015 N."""
+    figure = Figure()
+    axes = figure.subplots()
+    warmup._of_bearings(axes, np.arange(4.0), np.array([NOISE, NOISE]).T, ["front", "rear"], "Preload", "preload, N")
+    own = {f"d{k}": {"nominal": v} for k, v in enumerate(NOISE)}
+    told = {"designs": [{"design": d} for d in own], "conditions": [{"temperature_C": 20.0, "speed_rpm": 0.0, "figures": {"preload": {"designs": own}}}]}
+    for each in (axes, designs.compared(told)["comparison"].axes[0], panels({"preload": [(np.arange(4.0), NOISE, "black")]}, 1, (3.0, 2.0), "s").axes[0]):
+        assert np.ptp(each.get_ylim()) > 0.01
 
 
 def test_residuals_have_one_scale():
