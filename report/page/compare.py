@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
+from thermospindle.diagnosis.compare.before_after import BeforeAfter
 from thermospindle.diagnosis.compare.compare import Comparison
 from thermospindle.diagnosis.runout.compare import RunoutBeside
 from thermospindle.model.machine import Spindle
@@ -17,6 +18,7 @@ from thermospindle.report.log.compare import FrfsBeside, write_comparison_log
 from thermospindle.report.page import runout_compare as runout
 from thermospindle.report.page.report import Section, write_page
 from thermospindle.report.text.compare import AGREES, TOGETHER, constant_words, unlike
+from thermospindle.report.text.runout_compare import before_after
 from thermospindle.report.typeset import figure, minus, prose, signed, table, with_error
 
 WORDS = {
@@ -45,12 +47,12 @@ WORDS = {
 }
 
 
-def sections(c: Comparison) -> list[Section]:
-    """What the comparison adds to a report: the map of residuals and errors in a table, then what its FRFs say, where it has any."""
+def sections(c: Comparison, both: BeforeAfter | None = None) -> list[Section]:
+    """What the comparison adds to a report: the map of residuals and errors in a table, of `both` scenes those before and after, then what its FRFs say, where it has any."""
     found: list[Section] = []
     drawn = {name: svg(one, f"compare-{name}", WORDS[name][0]) for name, one in figures(c).items()}
     modal = "".join(figure(drawn[name], WORDS[name][1]) for name in ("pulls", "shapes") if name in drawn)
-    found.append(("Measured beside computed", _summary(c) + modal + _table(c)))
+    found.append(("Measured beside computed", _summary(c) + (_before_after(both) if both else "") + modal + _table(c)))
     spectral = [name for name in ("frfs", "bands", "channels", "fdac") if name in drawn]
     if spectral:
         found.append(("FRFs, measured and computed", "".join(f"<h3>{WORDS[n][0]}</h3>{figure(drawn[n], WORDS[n][1])}" for n in spectral)))
@@ -66,14 +68,15 @@ def write_comparison(
     campaign: str = "",
     *,
     name: str = "",
+    both: BeforeAfter | None = None,
     progress: Callable[[str], None] = lambda done: None,
 ) -> None:
     """`report.html`, a PNG and an SVG of every picture, and, where there are FRFs, `compare.rrd`, in a folder that exists.
 
-    `c` are tests of modes, `turning` tests of runout with the `errors` of two scenes; either may be missing. `campaign` is its title, where there is no `c`, and `name` what its folder is called.
+    `c` are tests of modes, `turning` tests of runout with the `errors` of two scenes; either may be missing. `both` is `c` beside the scene before it. `campaign` is its title, where there is no `c`, and `name` what its folder is called.
     """
     drawn = comparison_figures(turning)
-    every = [*(sections(c) if c else []), *(runout.sections(turning, drawn, errors) if turning else [])]
+    every = [*(sections(c, both) if c else []), *(runout.sections(turning, drawn, errors) if turning else [])]
     ids = {t.test.id for t in (c.tests if c else ())} | {t.test.id for t in turning}
     write_page(folder, spindle, len(ids), c.campaign if c else campaign, every, "Comparison", name)
     progress("page written")
@@ -110,6 +113,19 @@ def _summary(c: Comparison) -> str:
             if values]  # fmt: skip
     remarks += list(c.crossings)
     return "".join(words) + ("<ul>" + "".join(f"<li>{minus(str(Markup.escape(x)))}</li>" for x in remarks) + "</ul>" if remarks else "")
+
+
+def _before_after(both: BeforeAfter) -> str:
+    """The errors of the scene before and of that after, of fitted and held-out tests apart where there are both."""
+    found = [*before_after(both.errors())]
+    if not found:
+        return ""
+    if len(found) < 3:  # all, fitted, held out: without one of these the other is all
+        found = found[:1]
+    rows = [[f"{tests} tests", f"{one:.3g}", f"{other:.3g}"] for tests, one, other in found]
+    unseen = f" Held out: {escape(', '.join(both.held_out))}." if both.held_out else ""
+    head = ("", f"before,\n{both.before.spindle}", f"after,\n{both.after.spindle}")
+    return table(head, rows, (0,), f"Error, rms in standard errors, before and after.{unseen}", "before-after")
 
 
 def _table(c: Comparison) -> str:

@@ -62,7 +62,7 @@ def compare(
         if turning:
             turning[1](console)
 
-    write = write_json("comparison.json", lambda folder: _write(comparison, spindle, folder, *(turning[2:] if turning else ()), name=whole.name))
+    write = write_json("comparison.json", lambda folder: _write(comparison, spindle, folder, *(turning[2:] if turning else ()), name=whole.name, both=both if earlier else None))
     return answered(values, show, out, asked, write, [*doubtful(spindle, whole), *left_out(tests), *_beyond(comparison), *_louder(comparison)])
 
 
@@ -85,10 +85,10 @@ def _louder(c: Comparison) -> list[str]:
     return [f"measured FRFs are {size}, all alike: a unit, a sensor's or the hammer's sensitivity, or the mass of the drawing is off by a factor of about {10 ** (abs(by) / 20):.2g}"]
 
 
-def _write(*what: Any, name: str) -> None:
+def _write(*what: Any, name: str, both: BeforeAfter | None = None) -> None:
     from thermospindle.report.page.compare import write_comparison  # matplotlib and rerun take their time to load
 
-    write_comparison(*what, name=name)
+    write_comparison(*what, name=name, both=both)
 
 
 def _of_runout(

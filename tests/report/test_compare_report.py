@@ -12,6 +12,9 @@ import pytest
 from matplotlib import rc_context
 from rich.console import Console
 
+from tests.conftest import SCENE
+from thermospindle.cli import main
+from thermospindle.diagnosis.compare.before_after import BeforeAfter
 from thermospindle.diagnosis.compare.compare import compare
 from thermospindle.diagnosis.compare.constant import constant_errors
 from thermospindle.diagnosis.data.observe import observe
@@ -189,6 +192,24 @@ def test_sections_have_the_form_of_the_report(found):
     told = sections(found)
     assert [title for title, _ in told] == ["Measured beside computed", "FRFs, measured and computed"]
     assert all("<svg" in body for _, body in told)
+
+
+def test_the_page_tells_the_error_before_and_after(found, tmp_path):
+    """It was in the terminal and in the JSON alone."""
+    cold, hot = found.tests
+    worse = replace(found, spindle="<old>", tests=(replace(cold, residuals=10 * cold.residuals), hot))
+    text = sections(found, BeforeAfter(worse, found, ("T60",)))[0][1]
+    rows = dict(re.findall(r"<tr[^>]*><td class=left>([^<]* tests)</td>(.*?)</tr>", text))
+    errors = BeforeAfter(worse, found, ("T60",)).errors()
+    for name, which in (("all tests", ""), ("fitted tests", "fitted_"), ("held out tests", "held_out_")):
+        assert rows[name] == "".join(f"<td>{errors[which + when]:.3g}</td>" for when in ("before", "after"))
+    assert "Held out: T60." in text
+    assert "&lt;old&gt;" in text
+    assert "before-after" not in sections(found)[0][1]
+    assert len(re.findall(" tests</td>", sections(found, BeforeAfter(worse, found, ()))[0][1])) == 1  # none is held out: all are fitted
+    out = tmp_path / "out"
+    assert main(["compare", str(SCENE), str(SCENE / "measured" / "jang_2003"), "--before", str(SCENE), "--out", str(out), "--json"]) == 0
+    assert "rms in standard errors, before and after" in (out / "report.html").read_text()
 
 
 def test_the_pull_map_shows_the_pulls(found):
