@@ -36,7 +36,9 @@ CURVES = 14  # drawn in the map
 
 @rc_context(STYLE)
 def figures(found: ResonanceMap) -> dict[str, Figure]:
-    return {"campbell": campbell(found), "temperature": over_temperature(found), "coincidences": both(found), "nrro": runout(found)}
+    """By the names of their files; `nrro` only where something does not repeat."""
+    drawn = {"campbell": campbell(found), "temperature": over_temperature(found), "coincidences": both(found)}
+    return drawn | ({} if found.repeats else {"nrro": runout(found)})
 
 
 def drawn_lines(found: ResonanceMap) -> list[LineTrack]:

@@ -162,10 +162,15 @@ def _nonrepeatable(found: ResonanceMap, c: Coincidence) -> str:
 
 def told(found: ResonanceMap) -> list[str]:
     """What a reader is told of `sentences`: the first `SAID`, and how many more there are."""
-    every = sentences(found)
+    every, alone = sentences(found), [_all_repeats(found)] if found.repeats else []
     left = len(every) - SAID
     many = f"So do {left} weaker lines between {found.temperatures[0]:g} and {found.temperatures[-1]:g} C; all are in coincidences.csv of --out, and in --json."
-    return every if left <= 1 else [*every[:SAID], many]
+    return [*(every if left <= 1 else [*every[:SAID], many]), *alone]
+
+
+def _all_repeats(found: ResonanceMap) -> str:
+    why = "" if found.spindle.bearings or found.spindle.roller_bearings else " (bearings given by numbers roll no balls)"
+    return f"All runout of this map repeats every revolution{why}, so there is no figure of nonrepeatable runout (NRRO)."
 
 
 def _line(c: Coincidence, bearings: Sequence[str] = ()) -> str:
@@ -261,4 +266,4 @@ def map_section(found: ResonanceMap) -> tuple[str, str]:
         "coincidences": "Where lines meet modes, over both.",
         "nrro": "Nonrepeatable runout along temperature and speed, linear response.",
     }
-    return "Resonance map", said + grid + "".join(figure(svg(drawn[k], f"map-{k}", k), caption) for k, caption in captions.items())
+    return "Resonance map", said + grid + "".join(figure(svg(drawn[k], f"map-{k}", k), caption) for k, caption in captions.items() if k in drawn)

@@ -12,6 +12,9 @@ from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array
 
 
+STILL = 1e-12  # m of runout that is nothing
+
+
 @dataclass(frozen=True, eq=False)
 class Track:
     """A mode over the grid: its number, kind and whirl at the nominal condition, `frequency` (T, S) in Hz, NaN where it was lost."""
@@ -111,6 +114,11 @@ class ResonanceMap:
         return int(np.argmin(np.abs(self.temperatures - self.nominal.temperature))), int(
             np.argmin(np.abs(self.speeds - self.nominal.speed))
         )
+
+    @property
+    def repeats(self) -> bool:
+        """Whether all runout that was computed repeats every revolution."""
+        return all(float(along[:, 1:].max(initial=0.0)) < STILL for along in (self.nrro_speed, self.nrro_temperature))
 
 
 def strongest(coincidences: Sequence[Coincidence]) -> list[Coincidence]:

@@ -18,6 +18,7 @@ from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.modes import modes
 from thermospindle.model.units import RPM
 from thermospindle.report.log.read import read_log
+from thermospindle.report.figures.resonance import figures
 from thermospindle.report.log.told import describe, log_json
 from thermospindle.report.log.turning.map import write_map_log
 from thermospindle.report.text.resonance import SAID, map_json, map_section, mapped, sentences, show_map, told
@@ -149,6 +150,20 @@ def test_answer_as_json(met):
     title, html = map_section(met)
     assert title == "Resonance map"
     assert html.count("<svg") == 4
+
+
+def test_where_all_runout_repeats_a_sentence_stands_for_its_figure(met):
+    """Bearings by numbers have unbalance alone: two empty panels with a curve of zeros over another."""
+    along = {name: getattr(met, name) * [1.0, 0.0, 0.0] for name in ("nrro_speed", "nrro_temperature")}
+    still = replace(met, **along)
+    assert (met.repeats, still.repeats) == (False, True)
+    assert set(figures(met)) - set(figures(still)) == {"nrro"}
+    for known, numbers in ((still, ""), (replace(still, spindle=replace(met.spindle, bearings=())), " (bearings given by numbers roll no balls)")):
+        assert told(known)[-1] == f"All runout of this map repeats every revolution{numbers}, so there is no figure of nonrepeatable runout (NRRO)."
+    html = map_section(still)[1]
+    assert html.count("<svg") == 3
+    assert "All runout of this map repeats" in html
+    assert "All runout" not in map_section(met)[1]
 
 
 def test_a_sentence_tells_what_was_mapped(spindle, found):
