@@ -11,7 +11,6 @@ from thermospindle.model.bearing.kinematics import Line
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array
 
-
 STILL = 1e-12  # m of runout that is nothing
 
 

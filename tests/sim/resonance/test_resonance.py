@@ -17,8 +17,8 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.modes import modes
 from thermospindle.model.units import RPM
-from thermospindle.report.log.read import read_log
 from thermospindle.report.figures.resonance import figures
+from thermospindle.report.log.read import read_log
 from thermospindle.report.log.told import describe, log_json
 from thermospindle.report.log.turning.map import write_map_log
 from thermospindle.report.text.resonance import SAID, map_json, map_section, mapped, sentences, show_map, told
