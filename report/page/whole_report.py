@@ -22,7 +22,7 @@ from thermospindle.report.text.warmup import warmup_section
 from thermospindle.sim.campaign.campaign import Campaign
 from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.operating import operating_point
-from thermospindle.sim.resonance.map import SEED, resonance_map, stages
+from thermospindle.sim.resonance.map import SEED, fastest, resonance_map, stages
 from thermospindle.sim.run import Run
 from thermospindle.sim.running.runout import runout, with_imperfections
 from thermospindle.sim.warmup import STAGES, warm_up
@@ -39,7 +39,8 @@ def climbed(run: Run) -> list[Campaign]:
 
 def steps(run: Run) -> int:
     """About how often the functions here report progress."""
-    return STEPS + STAGES + stages(run.spindle, OVER_TEMPERATURE) + sum(LADDER_STEPS + 3 * len(c.tests) for c in climbed(run))
+    of_turning = STEPS + STAGES + stages(run.spindle, OVER_TEMPERATURE) if turns(run.spindle) else 0
+    return of_turning + sum(LADDER_STEPS + 3 * len(c.tests) for c in climbed(run))
 
 
 def more_sections(run: Run, speed: float, catalogue: tuple[Effect, ...], progress: Callable[[str], None]) -> Iterator[Section]:
@@ -50,24 +51,45 @@ def more_sections(run: Run, speed: float, catalogue: tuple[Effect, ...], progres
         yield ladder_report.section(ladder(run.spindle, campaign, catalogue=catalogue, progress=progress))
 
 
+def turns(spindle: Spindle) -> bool:
+    return any(b.turns for b in spindle.structure.bodies)
+
+
 def turning(spindle: Spindle, temperatures: Sequence[float], speed: float, progress: Callable[[str], None]) -> Iterator[Section]:
-    """Runout and resonance map from the coldest of the temperatures, warm-up from the spindle's reference temperature."""
-    condition = Condition(temperatures[0], speed)
-    point = operating_point(spindle, condition)
-    seed = None
-    if point.imperfections == Imperfections():
-        seed, spindle = SEED, with_imperfections(spindle, drawn(spindle, SEED))
-        point = operating_point(spindle, condition)
-    progress("simulating the turning spindle")
-    found = runout(point)
-    yield runout_section(found, runout_json(found, "simulated", "linear", seed))
-    progress("warming up")
-    try:
-        yield warmup_section(warm_up(spindle, speed, spindle.reference_temperature, progress=progress))
-    except (BadInput, OutsideRange, NoEquilibrium) as error:  # a scene need not say how it is cooled
-        yield "Warm-up", f"<p>Not computed: {escape(str(error))}.</p>"
+    """Runout and resonance map from the coldest of the temperatures, warm-up from the spindle's reference temperature; of what is left out a sentence that says why."""
+    if not turns(spindle):
+        yield "Runout, warm-up and resonance map", "<p>Left out, all three: nothing of this machine turns (no body or shaft has <code>turns = true</code>).</p>"
+        return
     low, high = temperatures[0], temperatures[-1]
-    if high > low:
-        progress("mapping resonances")
-        grid = np.linspace(low, high, OVER_TEMPERATURE).tolist(), np.linspace(0, 2 * speed, OVER_SPEED).tolist()
-        yield map_section(resonance_map(spindle, *grid, condition, progress=progress))
+    condition = Condition(low, speed)
+
+    def of_runout() -> Section:
+        point, seed = operating_point(spindle, condition), None
+        if point.imperfections == Imperfections():
+            point, seed = operating_point(with_imperfections(spindle, drawn(spindle, SEED)), condition), SEED
+        found = runout(point)
+        return runout_section(found, runout_json(found, "simulated", "linear", seed))
+
+    progress("simulating the turning spindle")
+    yield _computed("Runout", of_runout)
+    progress("warming up")
+    if not spindle.regions:
+        yield "Warm-up", "<p>Left out: the scene has no section that heat could flow through.</p>"
+    elif not spindle.ringed:
+        yield "Warm-up", "<p>Left out: no ball or roller row runs between rings of the section, so no bearing makes heat.</p>"
+    else:
+        yield _computed("Warm-up", lambda: warmup_section(warm_up(spindle, speed, spindle.reference_temperature, progress=progress)))
+    if high == low:
+        yield "Resonance map", f"<p>Left out: a map goes over temperatures, and this report has {low:g} °C alone.</p>"
+        return
+    progress("mapping resonances")
+    grid = np.linspace(low, high, OVER_TEMPERATURE).tolist(), np.linspace(0, fastest(spindle, speed), OVER_SPEED).tolist()
+    yield _computed("Resonance map", lambda: map_section(resonance_map(spindle, *grid, condition, progress=progress)))
+
+
+def _computed(title: str, section: Callable[[], Section]) -> Section:
+    """The section, or in its place why there is none: a scene need not say how it is cooled, nor bear every speed."""
+    try:
+        return section()
+    except (BadInput, OutsideRange, NoEquilibrium) as error:
+        return title, f"<p>Not computed: {escape(str(error))}.</p>"

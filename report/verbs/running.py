@@ -26,7 +26,7 @@ from thermospindle.report.verbs.answer import (
 )
 from thermospindle.sim.operating import doubts, operating_point
 from thermospindle.sim.resonance.found import ResonanceMap
-from thermospindle.sim.resonance.map import resonance_map, stages
+from thermospindle.sim.resonance.map import fastest, resonance_map, stages
 from thermospindle.sim.running.runout import looked_at, with_imperfections
 from thermospindle.sim.running.runout import runout as simulated_runout
 from thermospindle.sim.warmup import SHORTEST, STAGES, Warmup, warm_up
@@ -120,8 +120,7 @@ def resonances(
     speed = spindle.nominal_speed if speed_rpm is None else speed_rpm * RPM
     nominal = Condition(temperature_or_reference(temperature, spindle), speed)
     grid = temperatures_or_range(temperatures, spindle, STEPS_OF_TEMPERATURE)
-    fastest = min([2 * speed, *(b.speed[-1] for b in spindle.linear_bearings if len(b.speed) > 1)])  # as far as their tables go
-    speeds = [s * RPM for s in speeds_rpm] if speeds_rpm else np.linspace(0, fastest, STEPS_OF_SPEED).tolist()
+    speeds = [s * RPM for s in speeds_rpm] if speeds_rpm else np.linspace(0, fastest(spindle, speed), STEPS_OF_SPEED).tolist()
     with progress_bar(stages(spindle, len(grid))) as progress:
         found = resonance_map(spindle, grid, speeds, nominal, multiples, progress=progress)
     conditions = [nominal, *(Condition(t, s) for t in grid for s in speeds)]

@@ -115,6 +115,11 @@ def _with(nominal: float, values: Sequence[float]) -> Array:
     return np.unique([nominal, *every[~np.isclose(every, nominal, rtol=1e-9, atol=1e-9)]])
 
 
+def fastest(spindle: Spindle, nominal: float) -> float:
+    """Speed (rad/s) up to which a map about a `nominal` one goes: twice that, or as far as the tables of bearings given by numbers."""
+    return min([2 * nominal, *(b.speed[-1] for b in spindle.linear_bearings if len(b.speed) > 1)])
+
+
 def stages(spindle: Spindle, temperatures: int) -> int:
     """How often `resonance_map` tells of its progress, about."""
     return temperatures + PARTS * (2 if spindle.structure.shafts else 1) + 3
