@@ -169,7 +169,7 @@ def hub_probes(spindle: Spindle) -> tuple[Probe, Probe, Probe]:
         turning = next((b for b in spindle.structure.bodies if b.turns), None)
         if turning is None or not turning.regions:
             raise BadInput(
-                f"{spindle.file or spindle.name}: structure.bodies: runout needs a turning body made of section regions, or a turning shaft, to look at"
+                f"{spindle.file or spindle.name}: structure.bodies: nothing turns that runout could be looked at: that takes a turning body made of section regions, or a turning shaft"
             )
         top = max((spindle.region(name) for name in turning.regions), key=lambda g: (g.z[1], g.r[1]))
         body, radius, height, end = turning.name, top.r[1], top.z[1] - BELOW_TOP * (top.z[1] - top.z[0]), top.z[1]

@@ -276,4 +276,4 @@ def test_rings_that_turn_against_each_other_bear_a_load(load: float) -> None:
     _, state = under(build(raw, file), (load, 0.0), 8e-3, 2094.4)
     assert abs(shares(state).sum(axis=0)) == pytest.approx([load, 0.0], rel=1e-6, abs=1e-6 * load)
     least = [respond(b.row, np.array(b.displacement)).ball_force.min() for b in state.bearings]
-    assert 0 < min(least) < 3.0
+    assert 0 <= min(least) < 3.0
