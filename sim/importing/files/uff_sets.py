@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 from thermospindle.model.errors import BadInput
 from thermospindle.sim.campaign.uff import AXIS, FORCE, KINDS, STANDARD_ERROR, factor, read_uff
 from thermospindle.sim.importing import units
-from thermospindle.sim.importing.files.labels import end, told_of_end
+from thermospindle.sim.importing.files.labels import Role, end, role_of, told_of_end
 from thermospindle.sim.importing.files.uff_axes import frequencies, in_unit, label, nameless, time_step
 from thermospindle.sim.importing.files.uff_modes import Found, mode, modes_of
 from thermospindle.sim.importing.mapping import FileForm
@@ -48,6 +48,8 @@ def _from_uff(file: Path, settings: FileForm) -> Content:
     unscaled: dict[int, tuple[float, float, float]] = {}
     left: dict[str, int] = {}
     taken_as_SI = 0
+    names: list[str] = []
+    told = _told(file, sets, settings)
     for number, record in enumerate(sets, 1):
         where = f"set {number}"
         if where in settings.leave_out:
@@ -66,7 +68,10 @@ def _from_uff(file: Path, settings: FileForm) -> Content:
             elif function == COHERENCE:
                 coherence.append(Curve(file, where, *ends, frequencies(file, where, record, settings), np.asarray(np.real(record["data"]), float)))
             elif function == RECORD:
-                motions.append(_motion(file, where, record, system, settings))
+                names.append(where)
+                own = told.get(_channel(record))
+                if own is None or own.kind != "ignore":
+                    motions.append(_motion(file, where, record, system, settings, own))
             elif record["id2"].strip() == STANDARD_ERROR:  # of our own files, in the unit of the FRF
                 errors[ends] = np.asarray(np.real(record["data"]), float)
             elif record["id2"].strip() == AXIS:
@@ -77,8 +82,8 @@ def _from_uff(file: Path, settings: FileForm) -> Content:
         elif kind in (15, 2411):
             scale = 1 / factor(file, system, "length") if system else 1.0
             nodes, xyz = _nodes(record)
-            told = {int(n): (float(x) * scale, float(y) * scale, float(z) * scale) for n, (x, y, z) in zip(nodes, xyz, strict=True)}
-            (places if system else unscaled).update(told)
+            xyz_of = {int(n): (float(x) * scale, float(y) * scale, float(z) * scale) for n, (x, y, z) in zip(nodes, xyz, strict=True)}
+            (places if system else unscaled).update(xyz_of)
         elif kind in (55, 2414) and (found := mode(where, record)) is not None:
             modes.append(found)
         elif kind not in (151, 164, 18, 82, 2412):
@@ -90,7 +95,7 @@ def _from_uff(file: Path, settings: FileForm) -> Content:
     notes += said
     if taken_as_SI:
         notes.append(f"{file.name}: functions that do not say what their abscissa is ({taken_as_SI}) are taken in Hz, time records in s")
-    return Content(file, tuple(curves), _joined(motions), lines, places, unscaled, tuple(coherence), tuple(notes), (*questions, *asked))
+    return Content(file, tuple(curves), _joined(motions), lines, places, unscaled, tuple(coherence), tuple(notes), (*questions, *asked), tuple(names))
 
 
 def _end(record: Mapping[str, Any], side: str, told: str | int | None) -> End:
@@ -124,14 +129,44 @@ def _curve(
     return Curve(file, where, *ends, frequencies(file, where, record, settings), value, quantity, unit), questions
 
 
-def _motion(file: Path, where: str, record: Mapping[str, Any], system: Mapping[str, Any] | None, settings: FileForm) -> Motion:
+def _motion(
+    file: Path, where: str, record: Mapping[str, Any], system: Mapping[str, Any] | None, settings: FileForm, told: Role | None
+) -> Motion:
+    """One record, as the file says or as it is `told`: what it is of, its unit, its point."""
     kind = record["ordinate_spec_data_type"]
     unit, scale = in_unit(file, record, "ordinate", kind if kind in units.OF_TYPE or kind == FORCE else 0, system)
+    if told is not None and told.unit:
+        unit, scale = told.unit, 1.0
     force = kind == FORCE or units.of_force(unit) is not None or "force" in record["ordinate_axis_lab"].lower()
+    if told is not None:
+        force = told.kind == "force"
     value = np.asarray(np.real(record["data"]), float)[None] * scale
     hit = _end(record, "ref", settings.reference)
     at = _end(record, "rsp", settings.reference if force else settings.response)
+    if told is not None and (own := told.reference if force else told.response).label:
+        at = own
     return Motion(file, where, at, force, time_step(file, where, record, settings), value, unit, NOWHERE if force else hit)
+
+
+CHANNEL = ("rsp_node", "rsp_dir", "rsp_ent_name", "ref_node", "ref_dir", "ref_ent_name", "ordinate_spec_data_type")
+"""What the records of one channel to one hammer point have alike."""
+
+
+def _told(file: Path, sets: Sequence[Mapping[str, Any]], settings: FileForm) -> dict[tuple[Any, ...], Role]:
+    """The roles that the mapping's `columns` tell of channels, each by one of its sets. `BadInput` for one that no record can have."""
+    found = {}
+    for number, record in enumerate(sets, 1):
+        said = settings.columns.get(f"set {number}")
+        if said is not None and record["type"] == 58 and record["func_type"] == RECORD:
+            role = role_of(said)
+            if role is None or role.kind not in ("force", "response", "ignore"):
+                raise BadInput(f'{file}: set {number}: columns = {{ "set {number}" = {said!r} }}; allowed for a record are force, response 3, ignore, with the unit in brackets behind it')
+            found[_channel(record)] = role
+    return found
+
+
+def _channel(record: Mapping[str, Any]) -> tuple[Any, ...]:
+    return tuple(record[key] for key in CHANNEL)
 
 
 def _joined(motions: list[Motion]) -> tuple[Motion, ...]:

@@ -83,6 +83,26 @@ def test_time_in_milliseconds_and_in_what_is_not_known(tmp_path):
     assert of_uff(tmp_path / "own", text, f"sample_rate_Hz = {RATE}").frf.reference_nodes == (1,)
 
 
+def test_what_a_record_is_can_be_told(tmp_path):
+    """Of a unit that is none, and of force and response in each other's place, it was asked for `columns`, which a UFF file had none of. One set tells for all hits of its channel."""
+    random = np.random.default_rng(4)
+    text = records(random, 1, (1, 3)).replace("mm/s", "V   ")
+    with pytest.raises(Unanswered, match=r"columns: the unit of its response 'set 2', as in \"response 3 \[m/s\^2\]\"; found is 'V'"):
+        of_uff(tmp_path, text)
+    test = of_uff(tmp_path, text, 'columns = { "set 2" = "response 1 [mm/s]", "set 3" = "response [mm/s]" }')
+    model = exact(test.frf.frequency, test.window_decay)[:, :1]
+    assert test.frf.response_nodes == (1, 2)
+    assert np.abs(test.frf.value - model).max() < 1e-3 * np.abs(model).max()
+    (tmp_path / "alone").mkdir()
+    alone = of_uff(tmp_path / "alone", text, 'columns = { "set 2" = "ignore", "set 3" = "response 2:-Z [mm/s]" }')
+    assert np.abs(alone.frf.value + model[1:]).max() < 1e-3 * np.abs(model).max()
+    (tmp_path / "wrong").mkdir()
+    with pytest.raises(BadInput, match=r'set 2: columns = { "set 2" = \'H\(1,1\) real\' }; allowed for a record are force, response 3, ignore'):
+        of_uff(tmp_path / "wrong", text, 'columns = { "set 2" = "H(1,1) real" }')
+    with pytest.raises(BadInput, match=r"columns: 'set 9' is no column of hammer.uff; there are set 1, set 2, set 3, set 4, set 5, set 6"):
+        of_uff(tmp_path / "wrong", text, 'columns = { "set 9" = "ignore" }')
+
+
 def test_records_without_labels_are_in_the_units_of_set_164(tmp_path):
     random = np.random.default_rng(4)
     text = set_164(1e3, 1.0) + records(random, 1, (1, 3)).replace("mm/s", "NONE").replace(f"NONE                 {'N':20}", f"NONE                 {'NONE':20}")
