@@ -16,7 +16,7 @@ from thermospindle.report.figures.common import INK, PALE, STYLE, spread
 from thermospindle.report.figures.warmup import LETTERS, MODES, name_ends
 from thermospindle.sim.resonance.found import Coincidence, LineTrack, ResonanceMap, Track, strongest
 from thermospindle.sim.resonance.point import key
-from thermospindle.sim.running.runout import looked_at
+from thermospindle.sim.running.probes import looked_at
 
 WHIRL = {"forward": "#c9371c", "backward": "#2166ac", "mixed": "#7b3f99", "none": "#1f8a70"}
 WHIRLS = {"forward": "whirls forward", "backward": "whirls backward", "mixed": "mixed whirl", "none": "axial or standing"}

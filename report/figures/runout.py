@@ -16,8 +16,9 @@ from thermospindle.model.units import RPM, TO_NM
 from thermospindle.report.figures.common import INK, PALE, STYLE, colour, spread
 from thermospindle.sim.posing import round_down
 from thermospindle.sim.running.lines import FoundLine
+from thermospindle.sim.running.probes import AXIAL, X, Y, looked_at
 from thermospindle.sim.running.revolutions import ErrorMotion, Revolutions, once_per_revolution
-from thermospindle.sim.running.runout import AXIAL, Runout, X, Y, looked_at
+from thermospindle.sim.running.runout import Runout
 from thermospindle.sim.running.waterfall import LineSpectrum, on_grid
 
 REPEATS, BAND = "#c9371c", "#2166ac"

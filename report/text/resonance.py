@@ -18,7 +18,7 @@ from thermospindle.report.typeset import figure, known, prose, table, write_csv
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.resonance.found import Coincidence, ResonanceMap, strongest
 from thermospindle.sim.resonance.point import key
-from thermospindle.sim.running.runout import looked_at
+from thermospindle.sim.running.probes import looked_at
 
 SAID = 4  # crossings at the nominal speed told in words, of more than one more
 FEW = 4  # temperatures or speeds that are told one by one

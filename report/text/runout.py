@@ -21,8 +21,9 @@ from thermospindle.report.text.states import of_bearings
 from thermospindle.report.typeset import table, write_csv
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.running.lines import FoundLine
+from thermospindle.sim.running.probes import AXIAL, X, Y, looked_at
 from thermospindle.sim.running.revolutions import ErrorMotion
-from thermospindle.sim.running.runout import AXIAL, Runout, X, Y, looked_at
+from thermospindle.sim.running.runout import Runout
 from thermospindle.sim.running.waterfall import run_up, waterfall
 
 STATISTICS = {

@@ -27,8 +27,9 @@ from thermospindle.report.verbs.answer import (
 from thermospindle.sim.operating import doubts, operating_point
 from thermospindle.sim.resonance.found import ResonanceMap
 from thermospindle.sim.resonance.map import fastest, resonance_map, stages
-from thermospindle.sim.running.runout import looked_at, with_imperfections
+from thermospindle.sim.running.probes import looked_at
 from thermospindle.sim.running.runout import runout as simulated_runout
+from thermospindle.sim.running.runout import with_imperfections
 from thermospindle.sim.warmup import SHORTEST, STAGES, Warmup, warm_up
 
 STEPS_OF_TEMPERATURE, STEPS_OF_SPEED = 21, 41  # of a resonance map

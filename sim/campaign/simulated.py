@@ -19,8 +19,9 @@ from thermospindle.model.units import RPM
 from thermospindle.sim.campaign.campaign import Campaign, Test
 from thermospindle.sim.campaign.runout_record import RunoutRecord
 from thermospindle.sim.operating import OperatingPoint, operating_point
+from thermospindle.sim.running.probes import hub_probes, second_plane
 from thermospindle.sim.running.run import run_spindle
-from thermospindle.sim.running.runout import hub_probes, linear, sampling_rate, second_plane
+from thermospindle.sim.running.runout import linear, sampling_rate
 
 NOISE = 1e-9  # m rms in the band of the record: a capacitive probe
 SECONDS = 0.6

@@ -13,7 +13,7 @@ import numpy as np
 
 from thermospindle.model.types import Array
 from thermospindle.sim.resonance.point import Exact, Key, key, rms_of_lines
-from thermospindle.sim.running.runout import speed_ratio
+from thermospindle.sim.running.probes import speed_ratio
 
 POINTS = 4
 

@@ -11,7 +11,7 @@ grid's points (`sim.resonance.between`), with an error that is measured on those
   a pair that anisotropy has split (Genta, *Dynamics of Rotating Systems*, 2005, sec. 2.4).
 
 How strong a crossing is: amplitude of the mode's own part of the response, phi (psi f) / (i omega - pole), at the hub's probe
-(`sim.running.runout.hub_probes`), under the imperfections of the scene, and per unit of the imperfection that makes the line.
+(`sim.running.probes.hub_probes`), under the imperfections of the scene, and per unit of the imperfection that makes the line.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from thermospindle.sim.resonance.between import Between, between, strengths
 from thermospindle.sim.resonance.between import runout as between_runout
 from thermospindle.sim.resonance.found import Coincidence, Curve, Interpolated, LineTrack, ResonanceMap, Track, strongest
 from thermospindle.sim.resonance.point import Exact, key, line_amplitudes, nrro_rms, with_imperfections
-from thermospindle.sim.running.runout import speed_ratio
+from thermospindle.sim.running.probes import speed_ratio
 
 SENSE = 0.01
 MULTIPLES = 3  # of the number of balls, and even ball orders, whose lines are drawn

@@ -17,7 +17,7 @@ from thermospindle.model.rotor.modes import Mode, Poles, poles
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.operating import OperatingPoint
 from thermospindle.sim.running.excitation import Harmonics, harmonics, response
-from thermospindle.sim.running.runout import hub_probes, speed_ratio
+from thermospindle.sim.running.probes import hub_probes, speed_ratio
 
 UNIT_WAVE, UNIT_UNBALANCE = 1e-6, 1e-6  # m, kg m (1 g mm)
 

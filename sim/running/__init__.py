@@ -6,6 +6,7 @@ excitation    what excites a running spindle: unbalance, waviness, ball sizes an
 lines         lines of known frequency in a record: their phasors by least squares, which causes they have, and what no
               cause explains
 moving_balls  ball by ball, with the balls moving: the second way to the running spindle, without small amplitudes
+probes        probes fixed in space: what they look at, and how fast that turns
 revolutions   A running record cut into whole revolutions: what repeats in every one of them, and what does not
 run           the running spindle in time: MuJoCo under the forces of its imperfections, at constant speed, in run-up
               and in coast-down

@@ -15,8 +15,8 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.operating import OperatingPoint
 from thermospindle.sim.running.excitation import harmonics, response
+from thermospindle.sim.running.probes import hub_probes, probe_rows, speed_ratio
 from thermospindle.sim.running.revolutions import from_orders
-from thermospindle.sim.running.runout import hub_probes, probe_rows, speed_ratio
 
 SAME = 1e-9  # relative difference of frequencies that are one line
 LEAST = 1e-15  # m: less is rounding

@@ -17,7 +17,7 @@ from thermospindle.model.units import RPM
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.running.excitation import harmonics, response
 from thermospindle.sim.running.lines import amplitude_of
-from thermospindle.sim.running.runout import hub_probes, probe_rows
+from thermospindle.sim.running.probes import hub_probes, probe_rows
 
 STEPS = 25
 """Speeds of a waterfall, up to 1.25 times the speed of a record, so that the record's is one of them."""

@@ -23,7 +23,7 @@ from thermospindle.model.scene.fields import read_file
 from thermospindle.model.scene.reading import scene_path
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import Effect
-from thermospindle.sim.running.runout import AXIAL, X, Y
+from thermospindle.sim.running.probes import AXIAL, X, Y
 from thermospindle.sim.study.form import MONTE_CARLO, MOST, SWEEP, Study
 from thermospindle.sim.study.rows import OF_RUNOUT, STIFFNESS, Cases, Row, cases
 from thermospindle.sim.study.sensitivity import spread

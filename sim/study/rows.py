@@ -21,7 +21,7 @@ from thermospindle.model.units import RPM, TO_UM
 from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.identification.pairing import follow
 from thermospindle.sim.operating import OperatingPoint, operating_point, unloads
-from thermospindle.sim.running.runout import AXIAL, X, Y, hub_probes, probe_rows
+from thermospindle.sim.running.probes import AXIAL, X, Y, hub_probes, probe_rows
 from thermospindle.sim.running.steady import steady_runout
 from thermospindle.sim.study.draws import count, draw, imperfection_columns, known_of
 from thermospindle.sim.study.form import MONTE_CARLO, MOST, Study

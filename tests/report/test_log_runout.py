@@ -28,7 +28,8 @@ from thermospindle.report.log.told import describe
 from thermospindle.report.log.turning.runout import log_signals, orbit_pieces, rolling_elements, write_runout_log
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.posing import cage_turns, frame_indices, turning_poses
-from thermospindle.sim.running.runout import AXIAL, X, Y, runout, with_imperfections
+from thermospindle.sim.running.probes import AXIAL, X, Y
+from thermospindle.sim.running.runout import runout, with_imperfections
 from thermospindle.sim.running.waterfall import LineSpectrum, on_grid, run_up, waterfall
 
 SPEED = 7200 * np.pi / 30

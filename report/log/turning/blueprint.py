@@ -9,7 +9,8 @@ import rerun.blueprint as rrb
 from thermospindle.report.log.blueprint import framed
 from thermospindle.report.log.pictures import view
 from thermospindle.report.log.views import DARK, scene, summary_view, window
-from thermospindle.sim.running.runout import Runout, looked_at
+from thermospindle.sim.running.probes import looked_at
+from thermospindle.sim.running.runout import Runout
 
 WATERFALL, POLAR = (6.6, 4.8), (4.2, 3.3)  # inches
 WORDS = {"RRO": "repeatable", "NRRO": "nonrepeatable"}

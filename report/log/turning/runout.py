@@ -26,7 +26,8 @@ from thermospindle.report.log.turning.blueprint import POLAR, WATERFALL, bluepri
 from thermospindle.report.log.views import at
 from thermospindle.sim.operating import provenance
 from thermospindle.sim.posing import body_meshes, cage_turns, frame_indices, turning_poses
-from thermospindle.sim.running.runout import AXIAL, Runout, X, Y, looked_at
+from thermospindle.sim.running.probes import AXIAL, X, Y, looked_at
+from thermospindle.sim.running.runout import Runout
 from thermospindle.sim.running.waterfall import LineSpectrum
 
 COLOURS = ((255, 120, 90), (90, 200, 255), (190, 220, 90))  # x, y, axial

@@ -27,7 +27,8 @@ from thermospindle.sim.resonance.found import strongest
 from thermospindle.sim.resonance.map import resonance_map
 from thermospindle.sim.resonance.point import Exact, key, nrro_rms
 from thermospindle.sim.running.excitation import harmonics, response
-from thermospindle.sim.running.runout import hub_probes, runout
+from thermospindle.sim.running.probes import hub_probes
+from thermospindle.sim.running.runout import runout
 
 SCENE = Path(__file__).parents[3] / "scenes" / "hdd_2003"
 

@@ -29,21 +29,9 @@ from thermospindle.report.verbs.starting import new
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.running import runout as running
 from thermospindle.sim.running.lines import fit
+from thermospindle.sim.running.probes import AXIAL, X, Y, all_probes, hub_probes, looked_at, second_plane
 from thermospindle.sim.running.run import run_spindle
-from thermospindle.sim.running.runout import (
-    AXIAL,
-    X,
-    Y,
-    all_probes,
-    hub_probes,
-    linear,
-    looked_at,
-    measured,
-    runout,
-    second_plane,
-    whole_turns,
-    with_imperfections,
-)
+from thermospindle.sim.running.runout import linear, measured, runout, whole_turns, with_imperfections
 
 RATE = 20000.0
 SCENE = Path(__file__).parents[3] / "scenes" / "hdd_2003"

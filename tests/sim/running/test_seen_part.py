@@ -20,7 +20,8 @@ from thermospindle.sim.operating import operating_point
 from thermospindle.sim.resonance.map import resonance_map
 from thermospindle.sim.resonance.point import Exact, nrro_rms
 from thermospindle.sim.running.lines import MOST_WHOLE, find_lines
-from thermospindle.sim.running.runout import X, analyse, runout, whole_turns
+from thermospindle.sim.running.probes import X
+from thermospindle.sim.running.runout import analyse, runout, whole_turns
 from thermospindle.sim.running.steady import steady_runout
 
 SPEED = 7200 * RPM

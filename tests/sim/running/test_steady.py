@@ -9,7 +9,8 @@ from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.sim.operating import operating_point
-from thermospindle.sim.running.runout import hub_probes, linear, runout
+from thermospindle.sim.running.probes import hub_probes
+from thermospindle.sim.running.runout import linear, runout
 from thermospindle.sim.running.steady import steady_runout
 
 
