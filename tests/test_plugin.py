@@ -101,6 +101,7 @@ def test_lost_contact_and_a_temperature_in_kelvin_are_told():
         (lambda: assert_frequency(SCENE, mode="axial 2", at_C="20", frequency_Hz=1, within=1), "temperature_C = '20': must be a finite number"),
         (lambda: assert_damping(SCENE, mode="axial 2", at_C=20, percent="1", within=1), "percent = '1': must be a finite number"),
         (lambda: assert_margin(SCENE, mode="axial 2", speed_rpm=0, at_least_percent=1), "speed_rpm = 0: nothing turns"),
+        (lambda: assert_margin(SCENE, mode="axial 2", speed_rpm=7200, at_least_percent=1, multiples=0), "multiples = 0: of the number of balls, up to which waviness counts; must be a whole number of 1 or more"),
         (lambda: assert_margin(SCENE, mode="axial 2", speed_rpm=7200, at_least_percent=-1), "at_least_percent = -1: must be a finite number above 0"),
         (lambda: assert_split(SCENE, modes=("lateral 1",), at_C=20, split_Hz=1, within=1), "modes = ('lateral 1',): must be two modes"),
         (lambda: assert_agreement(SCENE, DATA / "foreign_bond", rms=float("inf")), "rms = inf: must be a finite number above 0"),

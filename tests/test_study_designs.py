@@ -53,7 +53,7 @@ def test_drawn_designs_are_drawn_apart_and_gone_on_with(tmp_path, capsys):
     own = told["conditions"][0]["figures"]["lowest_Hz"]
     of = {name: [r["lowest_Hz"] for r in rows if r["design"] == name] for name in ("hdd_2003", "mk7702")}
     assert [len(v) for v in of.values()] == [10, 10]
-    assert own["pairs"] == [{"design": "hdd_2003", "than": "mk7702", "probability": 1.0, "sd": 0.0}]
+    assert own["pairs"] == [{"design": "hdd_2003", "than": "mk7702", "probability": 1.0, "sd": pytest.approx(np.sqrt(21 / 1200))}]  # as of two alike
     relative = [np.array(v) / np.mean(v) - 1 for v in of.values()]
     assert abs(np.corrcoef(relative)[0, 1]) < 0.8
     before = files(out)
@@ -77,3 +77,17 @@ def test_probability_of_being_better_is_that_of_normal_ones_and_its_error_comes_
     assert better(one, other, higher=False).probability == pytest.approx(1 - 1 / 6)  # of six pairs two are equal
     assert better(one, other, higher=True).probability == pytest.approx(1 / 6)
     assert better(one, np.array([1.0]), higher=True) is None
+
+
+@pytest.mark.parametrize("draws", [2, 3, 5, 8, 15, 40])
+def test_of_two_alike_none_is_better_by_three_errors(draws):
+    """Of few draws that happen to lie apart the error by DeLong is nothing: one of two alike was named better in a third of all comparisons of two draws."""
+    rng = np.random.default_rng(draws)
+    named = 0
+    for _ in range(4000):
+        found = better(rng.standard_normal(draws), rng.standard_normal(draws), higher=True)
+        named += abs(found.probability - 0.5) > 3 * found.sd
+    assert named < 4000 * 0.0027 + 3 * np.sqrt(4000 * 0.0027)
+    apart = better(np.arange(draws) + 100.0, np.arange(draws) * 1.0, higher=True)
+    assert apart.probability == 1.0
+    assert (3 * apart.sd < 0.5) == (draws > 6)

@@ -85,23 +85,28 @@ def odd(point: OperatingPoint) -> list[str]:
 @overload
 def modes(source: OperatingPoint, *, highest_Hz: float = ...) -> list[Mode]: ...
 @overload
-def modes(source: ImpactTest | Frf, *, highest_Hz: float = ...) -> Modes: ...
-def modes(source: OperatingPoint | ImpactTest | Frf, *, highest_Hz: float = np.inf) -> list[Mode] | Modes:
+def modes(source: ImpactTest | Frf, *, highest_Hz: float = ..., window_decay: float = ...) -> Modes: ...
+def modes(source: OperatingPoint | ImpactTest | Frf, *, highest_Hz: float = np.inf, window_decay: float = 0.0) -> list[Mode] | Modes:
     """Natural modes up to `highest_Hz`.
 
     Of an operating point the model's own, a list in order of frequency: `.frequency` Hz, `.damping_ratio`, `.kind`, `.whirl`, `.energy` (share of the
     strain energy by element), `.shape` (n,). Of an impact test or measured FRFs those identified by maximum likelihood: `Modes` with `.frequency` (m,)
-    Hz, `.damping` (m,), `.shape` (m, responses), and `.frequency_sd` (m,) and so on, their standard errors.
+    Hz, `.damping` (m,), `.shape` (m, responses), and `.frequency_sd` (m,) and so on, their standard errors. FRFs of records under an exponential window
+    exp(-d t) have its damping in them, d / (2 pi f) more of every mode: `window_decay` (1/s) takes it out; of an impact test it is known.
     """
     _kind("source", source, (OperatingPoint, ImpactTest, Frf), "an operating point (ts.point), a virtual test (ts.impact) or FRFs (ts.frf)")
     if highest_Hz != np.inf:
         number("highest_Hz", highest_Hz, 0.0, np.inf)
+    if window_decay != 0.0:
+        number("window_decay", window_decay, 0.0, np.inf)
+        if not isinstance(source, Frf):
+            raise BadInput("window_decay: is of measured FRFs; an operating point has none, and of an impact test it is known")
     if isinstance(source, OperatingPoint):
         return source.modes_below(highest_Hz)
     if isinstance(source, Frf):
         use = source.frequency <= highest_Hz
         sd = None if source.sd is None else source.sd[..., use]
-        return extract(source.frequency[use], source.value[..., use], sd, kind=source.quantity)
+        return extract(source.frequency[use], source.value[..., use], sd, kind=source.quantity, window_decay=window_decay)
     return identify(source)
 
 
@@ -109,7 +114,7 @@ def frf(source: OperatingPoint | ImpactTest, frequency_Hz: ArrayLike | None = No
     """FRFs between the scene's measuring points: `frf["hub_top0", "hub_top90"]` is one of them, (n,) complex, SI.
 
     Of an operating point exact at `frequency_Hz` (n,), by default 2000 lines over the scene's band; of an impact test the H1 estimate with coherence
-    and standard errors at its own lines. `quantity`: receptance m/N, mobility (m/s)/N, accelerance (m/s2)/N; responses are all points, references the
+    and standard errors at its own lines, with the damping of its exponential window in it (`test.estimate.window_decay`, 1/s, which `modes` takes out). `quantity`: receptance m/N, mobility (m/s)/N, accelerance (m/s2)/N; responses are all points, references the
     hammer's.
     """
     _kind("source", source, (OperatingPoint, ImpactTest), "an operating point (ts.point) or a virtual test (ts.impact)")

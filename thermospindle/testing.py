@@ -15,6 +15,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from functools import lru_cache
+from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -153,8 +154,10 @@ def assert_margin(
     _asked(["at_least_percent"], at_least_percent=at_least_percent)
     if speed_rpm == 0:
         raise BadInput("speed_rpm = 0: nothing turns, and no bearing has a line; must be a speed")
+    if not isinstance(multiples, Integral) or multiples < 1:
+        raise BadInput(f"multiples = {multiples!r}: of the number of balls, up to which waviness counts; must be a whole number of 1 or more")
     spindle = _loaded(scene)
-    points = [_point(spindle, t, speed_rpm) for t in (temperatures_C or spindle.temperatures)]
+    points = [_point(spindle, t, speed_rpm) for t in (temperatures_C if len(temperatures_C) else spindle.temperatures)]
     index = _index(points[0], mode)
     near: list[tuple[float, str]] = []
     for point in points:
@@ -247,9 +250,9 @@ def _index(point: OperatingPoint, mode: str | int) -> int:
     from thermospindle.model.errors import BadInput
 
     found = point.modes
-    kind, _, text = ("", "", str(mode)) if isinstance(mode, int) else mode.strip().rpartition(" ")
+    kind, _, text = ("", "", str(mode)) if isinstance(mode, Integral) else str(mode).strip().rpartition(" ")
     own = [i for i, m in enumerate(found) if kind in ("", m.kind)]
-    if not text.isdigit() or not 1 <= int(text) <= len(own) or (isinstance(mode, str) and not kind):
+    if not text.isdigit() or not 1 <= int(text) <= len(own) or (not isinstance(mode, Integral) and not kind):
         counts = {k: sum(m.kind == k for m in found) for k in dict.fromkeys(m.kind for m in found)}
         there = ", ".join(f"{k} 1 to {n}" for k, n in counts.items())
         near = "" if kind in ("", *counts) or not text.isdigit() else "".join(f"did you mean {k} {text}? " for k in get_close_matches(kind, counts, n=1))

@@ -66,7 +66,7 @@ EFFECT = Effect(
     resembles=("soak_lag", "expansion_mismatch", "thermal_gradient"),
     valid=(
         "slow movements: the ring slides in its seat as temperature changes but sticks against vibration, so both bearings keep "
-        "their dynamic stiffness; not for tandem pairs"
+        "their dynamic stiffness; not for tandem pairs; where several sets locate the shaft, its expansion between them goes on shifting load from the rows in fixed positions of one to those of another"
     ),
     motions=motions,
     idle=idle,

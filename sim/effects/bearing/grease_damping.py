@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from thermospindle.model.bearing.pair import PairState
+from thermospindle.model.bearing.roller import RollerState
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values
 
@@ -16,7 +17,8 @@ def pair(spindle: Spindle, condition: Condition, values: Values, state: PairStat
     viscosity = spindle.thermal.friction.viscosity
     ratio = viscosity(condition.temperature) / viscosity(spindle.reference_temperature)
     factor = 1 + share * (ratio - 1)
-    return replace(state, bearings=tuple(replace(b, damping=factor * b.damping) for b in state.bearings))
+    rolling = tuple(replace(b, damping=factor * b.damping) if isinstance(b, RollerState) else b for b in state.linear)
+    return replace(state, bearings=tuple(replace(b, damping=factor * b.damping) for b in state.bearings), linear=rolling)
 
 
 EFFECT = Effect(

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from thermospindle.model.bearing.row import ring_speeds
-from thermospindle.model.machine import Bearing, Condition, Material, Region, RingMotion, Spindle
+from thermospindle.model.machine import Bearing, Condition, Material, Region, RingMotion, RollerBearing, Spindle
 from thermospindle.model.rotor.section import cells
 from thermospindle.sim.effects.effect import ROWS, SECTION, Effect, Values, scale_parameter
 
@@ -36,7 +36,7 @@ def motions(spindle: Spindle, condition: Condition, values: Values, by_bearing: 
     if scale == 0.0 or condition.speed == 0.0:
         return by_bearing
     grown = {}
-    for b in spindle.bearings:
+    for b in spindle.ringed:
         motion, (inner, outer) = by_bearing[b.name], ring_speeds(spindle, b, condition.speed)
         if outer:
             motion = replace(motion, outer_r=motion.outer_r + scale * outer**2 * unit_growth(spindle, b, b.outer_ring))
@@ -46,7 +46,7 @@ def motions(spindle: Spindle, condition: Condition, values: Values, by_bearing: 
     return by_bearing | grown
 
 
-def unit_growth(spindle: Spindle, b: Bearing, name: str) -> float:
+def unit_growth(spindle: Spindle, b: Bearing | RollerBearing, name: str) -> float:
     """Radial growth of the raceway of the ring `name` of a bearing that turns at 1 rad/s (m s2)."""
     ring = replace(spindle.region(name), z=spindle.raceway(name, b))  # of a tube that bearings share, what is about this one
     race = ring.r[0] if name == b.outer_ring else ring.r[1]

@@ -40,12 +40,16 @@ def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
     if scale == 0.0:
         return spindle
     materials = dict(spindle.materials)
-    for name in {n for b in spindle.bearings for n in (b.ball_material, b.ring_material)}:
+    own = {n for b in spindle.bearings for n in (b.ball_material, b.ring_material)} | {n for b in spindle.roller_bearings for n in (b.roller_material, b.ring_material)}
+    for name in own:
         copy = softened(spindle.materials[name], spindle.reference_temperature, scale)
         materials[copy.name] = copy
     bearings = tuple(
         replace(b, ball_material=_copy(spindle.materials[b.ball_material]), ring_material=_copy(spindle.materials[b.ring_material]))
         for b in spindle.bearings
+    )
+    rollers = tuple(
+        replace(b, roller_material=_copy(spindle.materials[b.roller_material]), ring_material=_copy(spindle.materials[b.ring_material])) for b in spindle.roller_bearings
     )
     share = scale * values["joint_share"]
     factor = {
@@ -54,7 +58,7 @@ def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
         if j.material
     }
     structure = with_stiffness(spindle, factor).structure
-    return replace(spindle, materials=materials, bearings=bearings, structure=structure)
+    return replace(spindle, materials=materials, bearings=bearings, roller_bearings=rollers, structure=structure)
 
 
 def motions(spindle: Spindle, condition: Condition, values: Values, by_bearing: dict[str, RingMotion]) -> dict[str, RingMotion]:
@@ -71,17 +75,17 @@ def motions(spindle: Spindle, condition: Condition, values: Values, by_bearing: 
         softer = found.gain @ np.array([strain[name] for name in found.strained])
         moved = scale * SLOPE * np.array([strain[name] for name in found.materials]) @ softer
         change |= dict(zip(found.races, moved.reshape(-1, 2), strict=True))
-    result = {}
-    for b in spindle.bearings:
+    changed = {}
+    for b in spindle.ringed:
         motion, (inner, outer) = by_bearing[b.name], (change[race] for race in raceways(spindle, b))
-        result[b.name] = replace(
+        changed[b.name] = replace(
             motion,
             inner_r=motion.inner_r + float(inner[0]),
             inner_z=motion.inner_z + float(inner[1]),
             outer_r=motion.outer_r + float(outer[0]),
             outer_z=motion.outer_z + float(outer[1]),
         )
-    return result
+    return by_bearing | changed
 
 
 @dataclass(frozen=True, eq=False)

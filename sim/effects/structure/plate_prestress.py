@@ -40,8 +40,8 @@ EFFECT = Effect(
             limits=(-0.3, 0.3),
             meaning="relative change of the plate's axial stiffness 40 K above the reference: tension positive, compression negative",
             source=(
-                "3 mm of aluminium, 30 mm in radius, fully held over 40 K: N / N_cr = 0.10 by the formulas; a third of it where "
-                "the frame expands too"
+                "3 mm of aluminium, 30 mm in radius, fully held over 40 K: N / N_cr = -0.10 by the formulas, compression; a third of it where "
+                "the frame expands too, and tension where it expands more than the plate: of either sign, the typical value as of the latter"
             ),
         ),
         Parameter(

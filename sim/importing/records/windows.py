@@ -9,16 +9,20 @@ from thermospindle.sim.identification.frf import Frf
 from thermospindle.sim.importing.records.hits import TOUCHING
 
 DECAYED = 1e-3  # of its peak, to which a response has fallen at the end of a record that needs no exponential window
+RINGS = 20.0  # times the mean of a spectrum, by which a line stands above it that is no noise's: of that the largest of 1000 is 7 in the mean
 ENDS_AT = 0.01  # value of the exponential window at the end of a record that needs one
 REACH = 0.1  # of the largest force spectrum, down to which the hammer excites
 HEARD = 0.7  # coherence, from which a response is that of the hammer
 
 
 def end_needed(response: Array) -> float:
-    """End value of the exponential window: one where every response has died away within its record."""
-    tail = np.abs(response[..., -response.shape[-1] // 20 :]).max(axis=(-1, 1))
-    floor = np.abs(response).max(axis=(-1, 1))
-    return 1.0 if bool(np.all(tail <= DECAYED * floor)) else ENDS_AT
+    """End value of the exponential window for responses (references, hits, channels, n): one where every one has died away within its record, to `DECAYED` of its peak or to noise, which is spread
+    over all lines of its last twentieth while what still rings stands on a few."""
+    tail = response[..., -response.shape[-1] // 20 :]
+    loud = np.abs(tail).max(axis=(-1, 1)) > DECAYED * np.abs(response).max(axis=(-1, 1))
+    lines = (np.abs(np.fft.rfft(tail - tail.mean(axis=-1, keepdims=True), axis=-1)[..., 1:]) ** 2).sum(axis=1)
+    rings = (lines.max(axis=-1) > RINGS * lines.mean(axis=-1)) | (lines.shape[-1] < 2 * RINGS)
+    return ENDS_AT if bool(np.any(loud & rings)) else 1.0
 
 
 def excited(force: Array, step: float) -> tuple[float, float]:

@@ -10,6 +10,7 @@ from thermospindle.model.errors import BadInput, Unanswered
 from thermospindle.report.verbs.importing import bring
 from thermospindle.sim.campaign.campaign import read_campaign
 from thermospindle.sim.hammer.pulse import PRE_TRIGGER
+from thermospindle.sim.importing.records.windows import end_needed
 
 RATE, LENGTH = 8192.0, 1.0
 POLES = 2 * np.pi * np.array([210.0, 640.0]), np.array([0.01, 0.008])
@@ -329,3 +330,17 @@ def test_all_channels_in_one_array(tmp_path, order):
     np.savez(tmp_path / "hammer1.npz", fs=RATE, force=np.array(force)[:3], velocity=motion, resp_nodes=np.array([1, 2]))
     with pytest.raises(BadInput, match="its force force 3 of"):
         bring([tmp_path / "hammer1.npz"], mapping=tmp_path / "m.toml", out=tmp_path / "d")
+
+
+def test_a_window_is_for_what_rings_and_not_for_noise():
+    """A response that has died away to the noise of its sensor, 0.05 % of its peak, needs none; one that still rings does, as loud as that noise or three times softer, and so does a dead one with a short tail
+    of which nobody can tell."""
+    random, n = np.random.default_rng(6), 16384
+    t = np.arange(n) / 8192
+    noise = 5e-4 * random.standard_normal((1, 4, 3, n))
+    died = np.exp(-10 * t) * np.sin(2 * np.pi * 900 * t)
+    assert end_needed(died + noise) == 1.0
+    assert end_needed(died + 0 * noise) == 1.0
+    for left in (5e-3, 1e-3, 2e-4):
+        assert end_needed(np.exp(np.log(left) / t[-1] * t) * np.sin(2 * np.pi * 900 * t) + noise) == 0.01
+    assert end_needed((died + noise)[..., :400]) == 0.01
