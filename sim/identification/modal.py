@@ -8,7 +8,7 @@ standard deviation of a complex number: sd^2 = E|e|^2 (half of it in each of the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -130,8 +130,17 @@ def extract(
         raise ValueError("the FRF must be finite and its noise finite and positive at every line")
     unit = 2 * np.pi * np.sqrt(frequency[0] * frequency[-1])
     told = _telling(frf, sd, -(-len(frequency) // MOST_LINES))
-    lines = Lines((window_decay + 2j * np.pi * frequency[told]) / unit, frf[..., told], np.sqrt(2) / sd[..., told], KINDS[kind])
-    return _modes(*_accepted(lines, search(lines)), unit, given, frf.shape[:2], len(frequency))
+    alike = _alike(window_decay / np.median(np.diff(frequency)))
+    lines = Lines((window_decay + 2j * np.pi * frequency[told]) / unit, frf[..., told], np.sqrt(2) / sd[..., told], KINDS[kind], alike)
+    return _modes(*_accepted(lines, search(lines)), unit, given, frf.shape[:2], len(frequency), window_decay)
+
+
+def _alike(lost: float) -> float:
+    """How many times the noise at the start of a record is, in variance, that of its mean, where an exponential window has fallen to exp(-`lost`) at its end: 2 d T / (1 - exp(-2 d T)).
+
+    An answer that dies away at once meets the noise at the start alone, which the mean over all lines takes for so many times less than it is.
+    """
+    return float(2 * lost / -np.expm1(-2 * lost)) if lost > 0 else 1.0
 
 
 def _telling(frf: ComplexArray, sd: Array, every: int) -> NDArray[np.intp]:
@@ -180,14 +189,14 @@ def impose_rank_one(lines: Lines, free: Fit) -> tuple[Lines, Fit, float]:
             constraints, rise = trial.unknowns - fit.unknowns, (fit.chi2 - trial.chi2) / trial.scale()
             if same_mode(lines, fit.poles[: len(fit.shape)], fit.shape, 0.95).any():
                 continue
-            if rise < constraints + 5 * np.sqrt(2 * constraints):
+            if rise < lines.alike * (constraints + 5 * np.sqrt(2 * constraints)):
                 return lines, fit, 1.0
             if not better(lines, trial, fit):
-                strained.append((rise / constraints, fit))
+                strained.append((max(rise / constraints / lines.alike, 1.0), fit))
     if strained:
         strain, fit = min(strained, key=lambda found: found[0])
         return lines, fit, strain
-    flat = Lines(lines.s, lines.frf.reshape(-1, 1, n), lines.weight.reshape(-1, 1, n), lines.power)
+    flat = replace(lines, frf=lines.frf.reshape(-1, 1, n), weight=lines.weight.reshape(-1, 1, n))
     free = refine(lines, free, 1e-3)
     poles = np.append(free.poles[first], free.poles[~first])
     return flat, project(flat, poles, free.residues[first], np.ones((first.sum(), 1), complex)), float(min(responses, references) == 1)
@@ -240,8 +249,13 @@ def _modes(
     given: bool,
     functions: tuple[int, int],
     measured: int,
+    window_decay: float,
 ) -> Modes:
-    """Physical units, standard errors, and the choice of what is reported."""
+    """Physical units, standard errors, and the choice of what is reported.
+
+    Under an exponential window w the noise at a time goes with w, and the fit weighs it alike: of a mode that decays with a by itself and with b = a + d in the windowed record, an amplitude has
+    `alike` b / (a + 2 d) times the variance that this fit tells, and a pole `alike` (b / (a + 2 d))^3 times, by least squares of exp(-b t), and of t exp(-b t) beside it, in noise that falls as exp(-d t).
+    """
     responses, references = functions
     m, a, width = len(fit.poles), *fit.shape.shape
     # inverse of the information matrix by its eigenvectors, scaled to a unit diagonal first: parameters differ by many powers of ten
@@ -260,7 +274,9 @@ def _modes(
     jacobian = np.vstack([to_frequency, to_damping])
     both = np.r_[0:a, half : half + a]
     frequency, damping = radius * unit / (2 * np.pi), -angle.real
-    spread = jacobian @ covariance[both[:, None], both] @ jacobian.T
+    slower = (window_decay - poles.real * unit) / np.maximum(2 * window_decay - poles.real * unit, np.finfo(float).tiny)
+    louder = np.sqrt(np.maximum(lines.alike * slower**3, 1.0))
+    spread = jacobian @ covariance[both[:, None], both] @ jacobian.T * np.outer(np.tile(louder, 2), np.tile(louder, 2))
 
     residues = np.einsum("ri,rk->rik", fit.shape, fit.participation).reshape(a, responses, references)
     shape, shape_sd, weight = np.zeros((a, responses), complex), np.zeros((a, responses)), np.zeros(a)
@@ -278,12 +294,12 @@ def _modes(
         real, imag = np.ix_(x, x), np.ix_(half + x, half + x)
         cross = covariance[np.ix_(half + x, x)]
         hermitian = covariance[real] + covariance[imag] + 1j * (cross - cross.T)
-        shape_sd[r] = np.sqrt(np.einsum("ij,jk,ik->i", relative, hermitian, relative.conj()).real.clip(0))
+        shape_sd[r] = np.sqrt(np.einsum("ij,jk,ik->i", relative, hermitian, relative.conj()).real.clip(0) * max(lines.alike * slower[r], 1.0))
         x, known = np.append(x, half + x), np.append(fit.shape[r].real, fit.shape[r].imag)
         weight[r] = known @ matrix[np.ix_(x, x)] @ known / fit.scale()
 
     sd = np.sqrt(np.diag(spread))
-    cost = 2 * (fit.shape.shape[1] + fit.participation.shape[1]) * np.log(lines.count)
+    cost = 2 * (fit.shape.shape[1] + fit.participation.shape[1]) * np.log(lines.count) * lines.alike
     sure = believed(lines, poles) & (sd[:a] < damping * frequency) & (sd[a:] < damping / 2) & (weight > FAINT * cost)  # the last refinement may have led a pole out of the band
     moved = 0
     for pole, offset in twice:

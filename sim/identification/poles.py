@@ -6,7 +6,7 @@ Anal. 10 (1973) 413; Inverse Problems 19 (2003) R1, in Kaufman's form, BIT 15 (1
     H(s) = s^k ( sum_r [ R_r / (s - l_r) + conj(R_r) / (s - conj(l_r)) ]  +  u_-2 / s^2 + u_-1 / s + u_0 + ... + u_4 s^4 ),   s = i w,
 
 k = 0, 1, 2 for receptance, mobility, accelerance; u are real and stand for what lies far outside the band. ComplexArray noise e of every line
-is independent with E|e|^2 = sd^2. Within the matrix, R_r = shape_r participation_r^T where this is imposed (any mode of a linear system
+is independent with E|e|^2 = sd^2; under an exponential window neighbouring lines share theirs, so that what noise alone takes off chi-square is up to `alike` times as much. Within the matrix, R_r = shape_r participation_r^T where this is imposed (any mode of a linear system
 that is not a multiple root, gyroscopic or not: Peeters et al., Shock and Vibration 11 (2004) 395), otherwise free.
 
 Poles are added and dropped by the Bayesian information criterion (Schwarz, Ann. Stat. 6 (1978) 461). Candidates come from the residual
@@ -47,12 +47,13 @@ APART = 5
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """A measured matrix: s (n,) = i w (plus an exponential window's decay), `frf` (n_resp, n_ref, n), `weight` sqrt(2)/sd, `power` k."""
+    """A measured matrix: s (n,) = i w (plus an exponential window's decay), `frf` (n_resp, n_ref, n), `weight` sqrt(2)/sd, `power` k; `alike` as many lines as share the noise of one."""
 
     s: ComplexArray
     frf: ComplexArray
     weight: Array
     power: int
+    alike: float = 1.0
 
     @property
     def count(self) -> int:
@@ -261,7 +262,7 @@ def removal(fit: Fit) -> Array:
 
 def price(lines: Lines) -> float:
     """What a pole with free residues must bring in chi-square."""
-    return 2 * (1 + lines.frf[..., 0].size) * np.log(lines.count)
+    return 2 * (1 + lines.frf[..., 0].size) * np.log(lines.count) * lines.alike
 
 
 def realise(poles: ComplexArray, residues: ComplexArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
@@ -301,7 +302,7 @@ def split(lines: Lines, free: Fit) -> Fit:
 def better(lines: Lines, trial: Fit, fit: Fit) -> bool:
     """Whether the information criterion prefers `trial`, the noise taken from the smaller of the two residuals."""
     scale = min(trial.scale(), fit.scale())
-    return (fit.chi2 - trial.chi2) / scale > (trial.unknowns - fit.unknowns) * np.log(lines.count)
+    return (fit.chi2 - trial.chi2) / scale > (trial.unknowns - fit.unknowns) * np.log(lines.count) * lines.alike
 
 
 def _moved(lines: Lines, fit: Fit, step: Array) -> Fit:
