@@ -6,21 +6,22 @@ By discrete orthogonality (Gautschi, *Orthogonal Polynomials*, 2004, Theorem 1.3
 variance sd^2 / weight, the weights adding up to k: nothing is lost, and the model is evaluated at p frequencies instead of k. A block is
 divided until what its polynomial leaves is noise; where poles are sharp, single lines remain. What blocks leave also tells the noise.
 Polynomials are in the lines' numbers: a sweep whose steps grow evenly (a logarithmic one) is as smooth in these as one of even steps.
-Under an exponential window the noise of neighbouring lines is correlated, which `window` takes into account where the lines show it.
+Under an exponential window the noise of neighbouring lines is correlated, which `window` takes into account where the lines show it, and so is that of values.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import nnls
+from scipy.sparse import block_diag, csr_array
 
-from thermospindle.diagnosis.data.window import left_by, neighbours, windowed
+from thermospindle.diagnosis.data.window import NONE, Alike, Window, left_by, neighbours, windowed
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.campaign.campaign import Noise, Test
@@ -51,7 +52,7 @@ CONFIRMED, PARTS = 1.1, 4  # of a known noise, up to which the scatter of neighb
 class LineData:
     """One test: `value` (n_resp, n_ref, L) at `frequency` (L,) Hz in `quantity`; `sd` alike, the standard deviation sqrt(E |error|^2).
 
-    `noise_from` says in words where the noise was taken from, `raw` how many lines the test had.
+    `noise_from` says in words where the noise was taken from, `raw` how many lines the test had; errors that go together are `alike`.
     """
 
     test: Test
@@ -62,11 +63,38 @@ class LineData:
     quantity: str
     noise_from: str
     raw: int
+    alike: Alike | None = None
 
     @cached_property
     def duration(self) -> float:
         """Length (s) of the record that lines so far apart are the transform of."""
         return np.inf if self.test.frf is None else record_length(self.test.frf)
+
+    @cached_property
+    def whitening(self) -> ComplexArray | None:
+        """W (n_resp, n_ref, L, L) by which values, each in its standard errors, become independent; None where they are."""
+        return None if self.alike is None else self.alike.hit(self.test.pretrigger or self.alike.window.pretrigger).whitening()
+
+    def in_errors(self, value: ComplexArray) -> ComplexArray:
+        """Differences (n_resp, n_ref, L) of FRFs as independent numbers, whose real and imaginary parts have unit variance."""
+        return self.independent(value / self.sd * np.sqrt(2))
+
+    def independent(self, scaled: ComplexArray) -> ComplexArray:
+        """Values (..., n_resp, n_ref, L) in their standard errors as independent ones."""
+        return scaled if self.whitening is None else _each(scaled, self.whitening)
+
+    @property
+    def smooth(self) -> float:
+        """Variance of what is smooth over lines, over that of lines that are independent."""
+        return 1.0 if self.alike is None else self.alike.window.smooth
+
+    def alone(self, rows: Array) -> Array:
+        """Rows (k, N) of independent numbers as numbers of every line by itself, taken for independent, with errors as large as those of what is smooth."""
+        if self.whitening is None:
+            return rows
+        parts = rows.reshape(len(rows), 2, *self.value.shape)
+        found = _each(parts[:, 0] + 1j * parts[:, 1], np.asarray(np.linalg.inv(self.whitening), complex)) / np.sqrt(self.smooth)
+        return np.stack([found.real, found.imag], axis=1).reshape(rows.shape)
 
     @property
     def sensors(self) -> tuple[int, ...]:
@@ -84,6 +112,11 @@ class LineData:
         return 2 * self.value.size
 
 
+def _each(value: ComplexArray, by: ComplexArray) -> ComplexArray:
+    """Values (..., n_resp, n_ref, L) of every FRF times its own matrix (n_resp, n_ref, L, L)."""
+    return np.asarray((value[..., None, :] @ by)[..., 0, :] if value.ndim == 3 else np.moveaxis(np.moveaxis(value, 0, -2) @ by, -2, 0), complex)
+
+
 def line_data(test: Test, condition: Condition, stated: Noise | None, expected: Noise) -> LineData:
     """The lines of a test's FRFs above 0 Hz, without those of the running speed. Noise is that of the file (repeats, coherence), or `stated` by the campaign, or found in the
     scatter of neighbouring lines, starting from what the scene's measuring chain is `expected` to have."""
@@ -94,56 +127,56 @@ def line_data(test: Test, condition: Condition, stated: Noise | None, expected: 
     steps = np.diff(frequency)
     change = np.abs(np.log(steps[1:] / steps[:-1])) > np.log(CHANGED)  # lines left out, and where another part of a sweep begins
     gaps = sorted({*(np.flatnonzero(np.diff(np.flatnonzero(use)) > 1) + 1).tolist(), *((np.flatnonzero(change) + 1).tolist() if not even(frf.frequency) else ())})
-    damped = test.window_decay * record_length(frf) if np.isfinite(record_length(frf)) else 0.0
-    damped = damped if windowed(value, damped) else 0.0
-    sd, noise_from = _noise(frf, value, use, stated, expected, damped)
+    length = record_length(frf)
+    window = windowed(value, Window(test.window_decay, length, test.pretrigger)) if np.isfinite(length) else NONE
+    sd, noise_from = _noise(frf, value, use, stated, expected, window)
     least = SILENT * float(np.abs(value).max())  # where symmetry forbids an answer there is rounding alone, or nothing
     sd = np.maximum(sd, least)
-    falling = _falls(value, sd, damped, frequency)
+    falling = _falls(value, sd, window, frequency)
     if falling is not None:
-        sd = np.maximum(sd, _smooth_sd(value, _scatter(value, damped), frequency, falling))
-    known, blocks = sd if noise_from in KNOWN else None, _blocks(value, sd, damped, gaps)
-    seen = _within_blocks(value, blocks, damped, frequency, falling)
+        sd = np.maximum(sd, _smooth_sd(value, _scatter(value, window), frequency, falling))
+    known, blocks = sd if noise_from in KNOWN else None, _blocks(value, sd, window, gaps)
+    seen = _within_blocks(value, blocks, window, frequency, falling)
     if seen is None and len(frequency) > LINES_THAT_SCATTER:  # noise stated too small divides every block to single lines
-        blocks = _blocks(value, np.maximum(sd, _smooth_sd(value, _scatter(value, damped), frequency, falling)), damped, gaps)
-        seen = _within_blocks(value, blocks, damped, frequency, falling)
+        blocks = _blocks(value, np.maximum(sd, _smooth_sd(value, _scatter(value, window), frequency, falling)), window, gaps)
+        seen = _within_blocks(value, blocks, window, frequency, falling)
     for _ in range(2):
         if seen is None:
             break
         sd_seen = np.maximum(np.sqrt(seen), least)
         if known is not None and _confirmed(known, sd_seen):
-            sd, blocks = known, _blocks(value, known, damped, gaps)
+            sd, blocks = known, _blocks(value, known, window, gaps)
             break
         sd = sd_seen if known is None else np.maximum(known, sd_seen)
         noise_from = SCATTER if known is None else noise_from
-        blocks = _blocks(value, sd, damped, gaps)
-        seen = _within_blocks(value, blocks, damped, frequency, falling)
-    at, kept, error = _compressed(frequency, value, sd, blocks, damped)
-    return LineData(test, condition, at, kept, error, frf.quantity, noise_from, len(frequency))
+        blocks = _blocks(value, sd, window, gaps)
+        seen = _within_blocks(value, blocks, window, frequency, falling)
+    at, kept, error, alike = _compressed(frequency, value, sd, blocks, window, falling)
+    return LineData(test, condition, at, kept, error, frf.quantity, noise_from, len(frequency), alike)
 
 
-def _noise(frf: Frf, value: ComplexArray, use, stated: Noise | None, expected: Noise, damped: float) -> tuple[Array, str]:
+def _noise(frf: Frf, value: ComplexArray, use, stated: Noise | None, expected: Noise, window: Window) -> tuple[Array, str]:
     if frf.sd is not None and np.all(np.isfinite(frf.sd)):
         return _smooth_sd(value, frf.sd[:, :, use], frf.frequency[use]), REPEATS
     if stated is not None:
         return noise_model(value, stated.of_value, stated.of_largest), CAMPAIGN
     if value.shape[-1] <= LINES_THAT_SCATTER:
         return noise_model(value, expected.of_value, expected.of_largest), "the scene's measuring accuracy"
-    return _smooth_sd(value, _scatter(value, damped), frf.frequency[use]), SCATTER
+    return _smooth_sd(value, _scatter(value, window), frf.frequency[use]), SCATTER
 
 
-def _scatter(value: ComplexArray, damped: float) -> Array:
+def _scatter(value: ComplexArray, window: Window) -> Array:
     """Standard errors (n_resp, n_ref, n) of single lines by their neighbours', whose noise a window makes alike."""
-    return np.asarray(scatter(value) / np.sqrt(neighbours(damped)))
+    return np.asarray(scatter(value) / np.sqrt(neighbours(window)))
 
 
-def _falls(value: ComplexArray, sd: Array, damped: float, frequency: Array) -> Array | None:
+def _falls(value: ComplexArray, sd: Array, window: Window, frequency: Array) -> Array | None:
     """Shapes (shapes, n) over frequency of a noise that falls with it, where lines at the lowest `LOW`, measured by `sd`, scatter more than twice as much as the others: that
     of an accelerometer does, whose motion was integrated to a velocity or a displacement; None where it does not."""
     low = frequency <= (1 - LOW[0]) * frequency[0] + LOW[0] * frequency[-1]
     if low.sum() < LOW[1]:
         return None
-    seen = _scatter(value, damped) / sd
+    seen = _scatter(value, window) / sd
     steep = np.median(seen[..., low]) > 2 * np.median(seen[..., ~low])
     return np.array([(frequency[0] / frequency) ** power for power in FALLS]) if steep else None
 
@@ -151,14 +184,20 @@ def _falls(value: ComplexArray, sd: Array, damped: float, frequency: Array) -> A
 def _smooth_sd(value: ComplexArray, sd: Array, frequency: Array, falling: Array | None = None) -> Array:
     """The noise of value and of largest, rising with frequency and, where given, of the shapes `falling`, that the standard errors `sd` of single lines
     follow, FRF by FRF; few hits scatter them."""
+    return np.asarray(np.sqrt(np.sum(_parts(value, sd, frequency, falling), axis=0)))
+
+
+def _parts(value: ComplexArray, sd: Array, frequency: Array, falling: Array | None) -> Array:
+    """Variances (2, n_resp, n_ref, n) of the noise of value, and of largest."""
     size, shapes = np.abs(value), _shapes(frequency, falling)
     largest = size.max(axis=(0, 2))
-    smooth = np.empty_like(sd)
+    parts = np.empty((2, *sd.shape))
     for i, j in np.ndindex(*sd.shape[:2]):
         columns = np.stack([size[i, j] ** 2, *(max(largest[j], 1e-300) ** 2 * shapes)], axis=1)
         share = _gamma_fit(columns, sd[i, j] ** 2, np.ones(sd.shape[2]), WIDE if falling is not None else USUAL)
-        smooth[i, j] = np.maximum(columns @ share, 1e-14 * largest[j] ** 2)
-    return np.sqrt(smooth)
+        parts[0, i, j] = share[0] * columns[:, 0]
+        parts[1, i, j] = np.maximum(columns[:, 1:] @ share[1:], 1e-14 * largest[j] ** 2 - parts[0, i, j])
+    return parts
 
 
 def _confirmed(known: Array, seen: Array) -> bool:
@@ -183,7 +222,7 @@ def _basis(k: int, p: int = NODES) -> tuple[Array, Array, Array]:
     return _at_nodes(x, k, p), nodes + (k - 1) / 2, weights
 
 
-def _blocks(value: ComplexArray, sd: Array, damped: float, gaps: Sequence[int] = ()) -> list[tuple[int, int]]:
+def _blocks(value: ComplexArray, sd: Array, window: Window, gaps: Sequence[int] = ()) -> list[tuple[int, int]]:
     """Ranges of lines [first, after) whose polynomial leaves nothing but noise, from the whole band down by halves; none reaches over `gaps`, the
     lines before which some were left out."""
     n, found = value.shape[-1], []
@@ -199,8 +238,8 @@ def _blocks(value: ComplexArray, sd: Array, damped: float, gaps: Sequence[int] =
         v, variance = value[:, :, first:after], sd[:, :, first:after] ** 2
         left = v - (v @ q[:, :NODES]) @ q[:, :NODES].T
         beyond = np.abs(v @ q[:, NODES:]) ** 2 / (variance @ q[:, NODES:] ** 2)
-        _, rest, spread = left_by(q[:, :NODES], damped)
-        following, _, _ = left_by(q[:, NODES:], damped)
+        _, rest, spread = left_by(q[:, :NODES], window)
+        following, _, _ = left_by(q[:, NODES:], window)
         frfs = left.shape[0] * left.shape[1]
         whole = _lacking(np.abs(left) ** 2 / variance, frfs * rest, frfs * spread)
         if whole or _lacking(beyond, frfs * following.sum(), frfs * (following**2).sum()):
@@ -215,7 +254,7 @@ def _lacking(squares: Array, mean: float, variance: float) -> bool:
     return float(squares.sum()) > mean + LACK_OF_FIT * np.sqrt(variance)
 
 
-def _within_blocks(value: ComplexArray, blocks: list[tuple[int, int]], damped: float, frequency: Array, falling: Array | None = None) -> Array | None:
+def _within_blocks(value: ComplexArray, blocks: list[tuple[int, int]], window: Window, frequency: Array, falling: Array | None = None) -> Array | None:
     """Noise variances (n_resp, n_ref, n) from what the polynomials of all blocks leave, as shares of |H|^2 and of the largest |H|^2 to that
     hammer, reference by reference; none of an FRF that is silent. None where too few degrees of freedom are left."""
     size = np.abs(value) ** 2
@@ -233,7 +272,7 @@ def _within_blocks(value: ComplexArray, blocks: list[tuple[int, int]], damped: f
             q, _, _ = _basis(k, p)
             v = of[:, first:after]
             left = v - (v @ q) @ q.T
-            seen.append(np.sum(np.abs(left) ** 2, axis=1) / left_by(q, damped)[1])
+            seen.append(np.sum(np.abs(left) ** 2, axis=1) / left_by(q, window)[1])
             floor = [np.full(len(v), largest * r[first:after].mean()) for r in shapes]
             rows.append(np.stack([strength[:, first:after].mean(axis=1), *floor], axis=1))
             freedom.append(np.full(len(v), float(k - p)))
@@ -274,25 +313,33 @@ def _gamma_fit(columns: Array, seen: Array, freedom: Array, least: tuple[float, 
 
 
 def _compressed(
-    frequency: Array, value: ComplexArray, sd: Array, blocks: list[tuple[int, int]], damped: float
-) -> tuple[Array, ComplexArray, Array]:
-    at, kept, error = [], [], []
+    frequency: Array, value: ComplexArray, sd: Array, blocks: list[tuple[int, int]], window: Window, falling: Array | None
+) -> tuple[Array, ComplexArray, Array, Alike | None]:
+    """Frequencies (L,), values and standard errors (n_resp, n_ref, L), and how these go together."""
+    parts = _parts(value, sd, frequency, falling) if window.damped else sd[None] ** 2
+    at, kept, mixing, variance = [], [], [], []
     for first, after in blocks:
-        k = after - first
-        own = slice(first, after)
+        k, own = after - first, slice(first, after)
         if k <= NODES + 1:
             at.append(frequency[own])
             kept.append(value[:, :, own])
-            error.append(sd[:, :, own])
+            mixing.append(np.eye(k))
+            variance.append(parts[..., own])
             continue
         q, nodes, weights = _basis(k)
         polynomials = _at_nodes(nodes - (k - 1) / 2, k)  # (p nodes, p polynomials)
         at.append(_between(nodes, frequency[own]))
         kept.append((value[:, :, own] @ q) @ polynomials.T)
-        shares, _, _ = left_by(q, damped)
-        variance = (sd[:, :, own] ** 2 @ q**2 * shares) @ (polynomials**2).T  # equal white noise gives sd^2 / weight
-        error.append(np.sqrt(np.maximum(variance, shares.min() * (sd[:, :, own] ** 2).min(axis=-1, keepdims=True) / weights)))
-    return np.concatenate(at), np.concatenate(kept, axis=-1), np.concatenate(error, axis=-1)
+        mixing.append(polynomials @ q.T)
+        of_nodes = (parts[..., own] @ q**2) @ (polynomials**2).T  # equal white noise gives sd^2 / weight
+        variance.append(np.maximum(of_nodes, parts[..., own].min(axis=-1, keepdims=True) / weights))
+    whole, alike = np.concatenate(variance, axis=-1), None
+    if window.damped:
+        number = np.rint(frequency * window.length).astype(int)
+        alike = Alike(csr_array(block_diag(mixing)), number, window, np.zeros(0))
+        whole[1] *= alike.times
+        alike = replace(alike, share=whole[1] / whole.sum(axis=0))
+    return np.concatenate(at), np.concatenate(kept, axis=-1), np.sqrt(whole.sum(axis=0)), alike
 
 
 def _between(nodes: Array, frequency: Array) -> Array:

@@ -67,6 +67,9 @@ def nuisance_jacobian(model: CampaignModel, t: int, x: Array, effects: Applied, 
         at = fill(at, response.cut_off[None])
     for light, of_light in lights:
         at = fill(at, response.by_light(light) * np.array([model.parameters[i].sd for i in of_light])[:, None, None, None])
+    if data.whitening is not None:
+        white = data.independent(jacobian[:at, 0] + 1j * jacobian[:at, 1])
+        jacobian[:at, 0], jacobian[:at, 1] = white.real, white.imag
     return model.whitened(t, response.value, data.value), jacobian.reshape(len(jacobian), -1), numbers
 
 
@@ -93,11 +96,11 @@ def column(model: CampaignModel, t: int, x: Array, first: Applied, second: Appli
 
 
 def by_products_of_shares(model: CampaignModel, t: int, x: Array, effects: Applied, modes: int) -> tuple[ComplexArray, ComplexArray]:
-    """Derivatives (k, channels, L) of the FRFs of test `t`, in standard errors, by the products of two shares each, in the first reference `modes`, of a light resonance
+    """Derivatives (k, channels, L) of the FRFs of test `t`, in standard errors each `alone` (`LineData`), by the products of two shares each, in the first reference `modes`, of a light resonance
     that is not there yet and felt as a mass of -1 / s^2; and s (L,)."""
     linear, data = model.linear(t, x, effects), model.tests[t]
     answer = model.standing(t, x, effects, linear)
     assert isinstance(answer, Response)
     assert isinstance(data, LineData)
-    moved = answer.by_products_of_shares(model.reference.over(linear.matrices.dofs)[:, :modes], *np.triu_indices(modes)) * (np.sqrt(2) / data.sd)
+    moved = answer.by_products_of_shares(model.reference.over(linear.matrices.dofs)[:, :modes], *np.triu_indices(modes)) * (np.sqrt(2 / data.smooth) / data.sd)
     return moved.reshape(len(moved), -1, moved.shape[-1]), answer.s

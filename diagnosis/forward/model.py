@@ -319,7 +319,7 @@ class CampaignModel:
     def whitened(self, t: int, value: ComplexArray, measured: ComplexArray | float) -> Array:
         data = self.tests[t]
         assert isinstance(data, LineData)
-        left = ((value - measured) / data.sd * np.sqrt(2)).ravel()
+        left = data.in_errors(value - measured).ravel()
         return np.concatenate([left.real, left.imag])
 
     @cached_property
@@ -355,4 +355,5 @@ def _thin(data: LineData) -> LineData:
     lines = data.value.shape[-1]
     own = slice(THIN // 2, None, THIN) if lines >= ENOUGH_LINES * THIN else slice(None)
     share = np.sqrt(lines / max(data.value[:, :, own].shape[-1], 1)) or 1.0
-    return replace(data, frequency=data.frequency[own], value=data.value[:, :, own], sd=data.sd[:, :, own] / share)
+    alike = None if data.alike is None else data.alike.only(own)
+    return replace(data, frequency=data.frequency[own], value=data.value[:, :, own], sd=data.sd[:, :, own] / share, alike=alike)

@@ -13,15 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
+from thermospindle.diagnosis.data.mode_table import TestData
 from thermospindle.diagnosis.forward.derivatives import by_products_of_shares
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.forward.response import Light
 from thermospindle.diagnosis.inference.fit import Fit
 from thermospindle.diagnosis.inference.prior import Learned
-from thermospindle.diagnosis.inference.problem import Problem
+from thermospindle.diagnosis.inference.problem import Linearisation, Problem
 from thermospindle.diagnosis.inference.screening import linearised
 from thermospindle.diagnosis.parameters.nuisance import SHARE_SD, Resonance
-from thermospindle.model.types import Array, ComplexArray
+from thermospindle.model.types import Array, ComplexArray, Integers
 
 LAGS = 12  # lines over which residuals are compared
 SMALL, BY_CHANCE = 0.05, 3.0  # a correlation that says nothing, and its standard deviations by chance (of n numbers 1 / sqrt(n) each) up to which it says nothing either
@@ -95,6 +96,8 @@ def light_resonance(model: CampaignModel, about: Fit, learned: Learned, drifts: 
         return None
     problem = Problem(model, about.mechanisms, learned, about.moved)
     at = linearised(model, about)
+    if any(d.smooth != 1.0 for d in model.tests if isinstance(d, LineData)):
+        at = Linearisation(problem.length, [_alone(d, *row) for d, row in zip(model.tests, at.rows, strict=True)])
     x, effects = problem.parts(about.point)[0], problem.effects_of(about.point)
     gradient = problem.precision @ about.point + at.gradient
     inverse = np.asarray(np.linalg.inv(problem.precision + at.information), float)
@@ -130,6 +133,14 @@ def light_resonance(model: CampaignModel, about: Fit, learned: Learned, drifts: 
     shares = np.zeros(len(model.reference.omega))
     shares[:seen] = np.sqrt(max(size[-1], 0.0)) * vector[:, -1]
     return Resonance(frequency, DAMPING, tuple(shares.tolist()), (drift, 0.0)), gain - float(np.log(len(rows)))
+
+
+def _alone(data: TestData, residual: Array, derivatives: Array, numbers: Integers) -> tuple[Array, Array, Integers]:
+    """Rows of a linearisation with every line by itself (`LineData.alone`)."""
+    if not isinstance(data, LineData):
+        return residual, derivatives, numbers
+    rows = data.alone(np.concatenate([residual[None], derivatives]))
+    return rows[0], rows[1:], numbers
 
 
 def by_frequency(moved: ComplexArray, felt: ComplexArray, residual: Array, derivatives: Array) -> tuple[Array, Array, Array]:

@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.linalg import eigh
+from scipy.sparse import eye_array
 
 from tests.conftest import ROOT
 from tests.virtual_campaign import drawn, effect, mode_campaign, model_of, truth, virtual_campaign
+from thermospindle.diagnosis.data.window import Alike, Window
 from thermospindle.diagnosis.forward.derivatives import column, nuisance_jacobian
 from thermospindle.diagnosis.forward.linear import products, together
 from thermospindle.diagnosis.forward.model import CampaignModel
@@ -98,6 +100,25 @@ def test_derivatives_of_lines(scene, quantity, decay):
         assert worst[kind] < 1e-4, kind
     for kind in (BUILD, EXPANSION, COEFFICIENT, *APART, BALLS, CHANGE, TEMPERATURE):
         assert worst[kind] < 5e-3, kind
+
+
+def windowed(data):
+    """A test of lines whose noise a window makes alike."""
+    number = np.rint(data.frequency * 0.1).astype(int)
+    share = np.linspace(0.6, 1.0, data.value.size).reshape(data.value.shape)
+    return replace(data, alike=Alike(eye_array(len(number), format="csr"), number, Window(20.0, 0.1, 0.002), share))
+
+
+def test_derivatives_of_lines_whose_errors_go_together(scene):
+    model, x = made(scene)
+    model = replace(model, tests=tuple(windowed(d) for d in model.tests))
+    for t, data in enumerate(model.tests):
+        r, jacobian, numbers = nuisance_jacobian(model, t, x, [], rates_of(model, x, [[], []]))
+        assert r == pytest.approx(model.residual(t, x, []))
+        plain = replace(model, tests=tuple(replace(d, alike=None) for d in model.tests))
+        assert data.alone(jacobian) * np.sqrt(data.smooth) == pytest.approx(nuisance_jacobian(plain, t, x, [], rates_of(plain, x, [[], []]))[1], rel=1e-6, abs=1e-6)
+        expected = differences(model, t, x, numbers).T
+        assert np.linalg.norm(jacobian - expected, axis=1) == pytest.approx(np.zeros(len(numbers)), abs=5e-3 * np.linalg.norm(expected, axis=1).max())
 
 
 def test_what_a_bearing_may_change_by_otherwise():
