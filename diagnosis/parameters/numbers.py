@@ -27,6 +27,19 @@ class Numbers:
     reference: ReferenceModes
 
     @cached_property
+    def of_kind(self) -> dict[str, Integers]:
+        """Numbers of the parameters of every kind there is."""
+        kinds = [p.kind for p in self.parameters]
+        return {kind: np.flatnonzero(np.array(kinds) == kind) for kind in dict.fromkeys(kinds)}
+
+    @cached_property
+    def places(self) -> tuple[Integers, Integers, Integers]:
+        """Test, index and first mode (P,) of every parameter, -1 where it has none."""
+        rows = [(-1 if p.test is None else p.test, p.index, p.modes[0]) for p in self.parameters]
+        test, index, mode = np.array(rows, int).reshape(-1, 3).T
+        return test, index, mode
+
+    @cached_property
     def expansion(self) -> list[int]:
         """Numbers of the parameters of ring expansion."""
         return [i for i, p in enumerate(self.parameters) if p.kind == kinds_of.EXPANSION]
