@@ -253,7 +253,7 @@ class CampaignModel:
 
     def residual(self, t: int, x: Array, effects: Applied) -> Array:
         """Residuals (N,) of test `t`, computed less measured, in standard errors."""
-        return self.in_errors(t, self.standing(t, x, effects, self.linear(t, x, effects)))
+        return self.in_errors(t, self.standing(t, x, effects)[1])
 
     def in_errors(self, t: int, answer: Response | Table) -> Array:
         """Residuals (N,) of an answer, in standard errors."""
@@ -299,16 +299,17 @@ class CampaignModel:
         """With one light resonance more, whose parameters follow all others."""
         return replace(self, parameters=(*self.parameters, *resonance.nuisances), resonances=(*self.resonances, resonance))
 
-    def standing(self, t: int, x: Array, effects: Applied, linear: Linear) -> Response | Table:
-        """The answer of test `t`; the last one is kept for those who ask more of the same place."""
+    def standing(self, t: int, x: Array, effects: Applied) -> tuple[Linear, Response | Table]:
+        """The linear model of test `t` and its answer; the last ones are kept for those who ask more of the same place."""
         key = (x.tobytes(), tuple((id(e), *v.values()) for e, v in effects))
         late = self._responses.get(t)
         if late is None or late[0] != key:
-            late = self._responses[t] = key, self.answer(t, x, linear), effects
+            linear = self.linear(t, x, effects)
+            late = self._responses[t] = key, (linear, self.answer(t, x, linear)), effects
         return late[1]
 
     @cached_property
-    def _responses(self) -> dict[int, tuple[tuple, Response | Table, Applied]]:
+    def _responses(self) -> dict[int, tuple[tuple, tuple[Linear, Response | Table], Applied]]:
         return {}
 
     def _gain(self, x: Array, number: Integers, index: Integers, of: Integers) -> Array:

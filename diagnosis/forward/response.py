@@ -198,22 +198,20 @@ class Response:
             found += _over(right[:, power == p] @ left[:, power == p].T, self._forced(int(p)))
         return found
 
-    def moved_together(self, columns: Array, power: int, of: Pairs, size: Array) -> Iterator[ComplexArray]:
-        """Derivatives (k, n_resp, n_ref, L) by factors of `size` (k,) s^`power` times the sum over pairs i, j `of` each of u_i u_j^T + u_j u_i^T in the dynamic stiffness, u the `columns` (r, m):
+    def moved_together(self, columns: Array, power: int, of: Pairs) -> Iterator[ComplexArray]:
+        """Derivatives (k, n_resp, n_ref, L) by factors of s^`power` times the sum over pairs i, j `of` each of u_i u_j^T + u_j u_i^T in the dynamic stiffness, u the `columns` (r, m):
         a few at a time, for they fill memory rather than a cache."""
         read, driven = self.read(columns), self.driven(columns, np.full(columns.shape[1], power))
         both = [pair for i, j in of for pair in ((i, j), (j, i))]
-        for at in range(0, len(size), TOGETHER):
+        for at in range(0, len(of[0][0]), TOGETHER):
             few = slice(at, at + TOGETHER)
-            times = size[few]
-            first, *others = ((times[:, None, None] * read[a[few]])[:, :, None] * driven[b[few]][:, None] for a, b in both)
+            first, *others = (read[a[few]][:, :, None] * driven[b[few]][:, None] for a, b in both)
             found = first
             for other in others:
                 found += other
             if (end := self._late) is not None:
-                powers = np.full(len(times), power)
-                kicked = np.sum([end.kicked(columns[:, a[few]] * times, columns[:, b[few]], powers) for a, b in both], axis=0)
-                found += self._cut * end.moved(kicked)
+                powers = np.full(len(found), power)
+                found += self._cut * end.moved(np.sum([end.kicked(columns[:, a[few]], columns[:, b[few]], powers) for a, b in both], axis=0))
             yield found
 
     def read(self, columns: Array) -> ComplexArray:

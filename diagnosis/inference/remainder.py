@@ -108,10 +108,11 @@ def light_resonance(model: CampaignModel, about: Fit, learned: Learned, drifts: 
     k = seen * (seen + 1) // 2
     own = []
     for t, _ in with_lines:
-        residual, derivatives, numbers = at.rows[t]
+        residual, by = at.rows[t]
         moved, s = by_products_of_shares(model, t, x, effects[t], seen)
         felt = np.array([-SHARE_SD**2 * light.felt(s)[0] for light in lights])
-        own.append((numbers, *by_frequency(moved, felt, residual, derivatives)))
+        cross, square, slope = by_frequency(moved, felt, residual, by.rows)
+        own.append((by.numbers, by.times[:, None] * cross[:, by.of], square, slope))
     rows = []
     for drift, shift in zip(drifts, shifts, strict=True):
         cross, square, slope = np.zeros((count, len(inverse), k)), np.zeros((count, k, k)), np.zeros((count, k))
