@@ -70,12 +70,10 @@ def nuisance_jacobian(model: CampaignModel, t: int, x: Array, effects: Applied, 
     numbers, of, times = _after_each_other(shared)
     n_resp, n_ref, lines = response.value.shape
     weight = np.sqrt(2) / data.sd
-    jacobian = np.zeros((int(of.max(initial=-1)) + 1 + more, 2, n_resp, n_ref, lines))
+    jacobian, of_parts = np.zeros((int(of.max(initial=-1)) + 1 + more, n_resp, n_ref, 2 * lines)), np.repeat(weight, 2, axis=-1)
 
     def fill(first: int, moved: ComplexArray) -> int:
-        rows = jacobian[first : first + len(moved)]
-        np.multiply(moved.real, weight, out=rows[:, 0])
-        np.multiply(moved.imag, weight, out=rows[:, 1])
+        np.multiply(np.ascontiguousarray(moved).view(float), of_parts, out=jacobian[first : first + len(moved)])
         return first + len(moved)
 
     at = fill(0, response.moved(rates.products[t]))
@@ -90,7 +88,7 @@ def nuisance_jacobian(model: CampaignModel, t: int, x: Array, effects: Applied, 
     for ref, gain in enumerate(model.hammer_gain(t, x)):
         missed = gain * response.struck(missing[:, ref]) * weight[:, ref][:, None]
         for n in np.flatnonzero(way // 2 == struck_by[ref]):
-            jacobian[at + n, 0, :, ref], jacobian[at + n, 1, :, ref] = missed[:, way[n] % 2].real, missed[:, way[n] % 2].imag
+            jacobian[at + n, :, ref] = missed[:, way[n] % 2].view(float)
     at += len(way)
     if record:
         at = fill(at, response.cut_off[None])

@@ -304,10 +304,10 @@ class CampaignModel:
         return np.asarray(np.exp((of[:, None] == index) @ ln))
 
     def whitened(self, t: int, value: ComplexArray, measured: ComplexArray | float) -> Array:
+        """What differs (n_resp, n_ref, L) in standard errors, (N,): the real and the imaginary part of one number after the other."""
         data = self.tests[t]
         assert isinstance(data, LineData)
-        left = ((value - measured) / data.sd * np.sqrt(2)).ravel()
-        return np.concatenate([left.real, left.imag])
+        return ((value - measured) * (np.sqrt(2) / data.sd)).ravel().view(float)
 
     @cached_property
     def structural(self) -> list[bool]:

@@ -49,9 +49,10 @@ def overlap(model: CampaignModel, fit: Fit) -> Overlap:
     """Of the residuals that an explanation leaves in FRF lines."""
     problem = Problem(model, fit.mechanisms)
     left = [
-        (d.frequency, problem.residual(t, fit.point).reshape(-1, len(d.frequency)))
+        (d.frequency, np.concatenate([left.real, left.imag]))
         for t, d in enumerate(model.tests)
         if isinstance(d, LineData) and d.count
+        for left in [problem.residual(t, fit.point).view(complex).reshape(-1, len(d.frequency))]
     ]
     total, square, count = np.zeros(LAGS), sum(float(np.mean(r * r)) for _, r in left), sum(r.size for _, r in left)
     if square <= 0.0:
@@ -134,12 +135,12 @@ def light_resonance(model: CampaignModel, about: Fit, learned: Learned, drifts: 
 
 
 def by_frequency(moved: ComplexArray, felt: ComplexArray, residual: Array, derivatives: Array) -> tuple[Array, Array, Array]:
-    """Of columns that are the real and imaginary parts of `moved` (k, channels, L) times each of `felt` (F, L): their products with `derivatives` (n, N), (F, n, k), among
+    """Of columns that are the real and imaginary parts, one after the other, of `moved` (k, channels, L) times each of `felt` (F, L): their products with `derivatives` (n, N), (F, n, k), among
     themselves (F, k, k), and with the `residual` (N,), (F, k). What is felt is the same for all channels of a line, so that these are summed up once."""
     k, channels, lines = moved.shape
-    every = np.concatenate([derivatives, residual[None]]).reshape(-1, 2, channels, lines)
+    every = np.concatenate([derivatives, residual[None]]).view(complex).reshape(-1, channels, lines)
     by_line = np.moveaxis(moved, -1, 0)  # (L, k, channels)
-    turned = np.moveaxis(every[:, 0] - 1j * every[:, 1], -1, 0)  # (L, n + 1, channels)
+    turned = np.moveaxis(every.conj(), -1, 0)  # (L, n + 1, channels)
     with_each = (turned @ by_line.swapaxes(1, 2)).reshape(lines, -1)
     among = (by_line @ by_line.conj().swapaxes(1, 2)).real.reshape(lines, -1)
     found = (felt @ with_each).real.reshape(len(felt), -1, k)
