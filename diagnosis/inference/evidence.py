@@ -189,34 +189,36 @@ def _odds(sizes: Mapping[str, float]) -> float:
 
 def _likeliest(each: Callable[[float, Mapping[str, float]], Array], grids: Mapping[str, Sequence[float]], scales: Sequence[float]) -> tuple[Array, float, dict[str, float]]:
     """The ln evidence that `each` gives, the errors of `scales` and the sizes of discrepancies of `grids`, and between their places, that have most of it: one after the other, until that moves nothing."""
-    known: dict[tuple[float, ...], Array] = {}
+    known: dict[tuple[float, ...], tuple[float, Array]] = {}
 
-    def at(s: float, sizes: Mapping[str, float]) -> Array:
+    def at(s: float, sizes: Mapping[str, float]) -> tuple[float, Array]:
+        """All of it together, and each."""
         key = s, *(sizes[kind] for kind in grids)
         if key not in known:
-            known[key] = each(s, sizes)
+            values = each(s, sizes)
+            known[key] = float(logsumexp(values)), values
         return known[key]
 
     s, sizes = scales[len(scales) // 2], {kind: grid[0] for kind, grid in grids.items()}
-    values = at(s, sizes)
+    best = at(s, sizes)
     for _ in range(SWEEPS):
-        before = logsumexp(values)
+        before = best[0]
         for move in _moves(grids):
-            if (to := {**sizes, **move}) != sizes and logsumexp(there := at(s, to)) > logsumexp(values):
-                values, sizes = there, to
+            if (to := {**sizes, **move}) != sizes and (there := at(s, to))[0] > best[0]:
+                best, sizes = there, to
         for scale in scales:
-            if scale != s and logsumexp(there := at(scale, sizes)) > logsumexp(values):
-                values, s = there, scale
-        if logsumexp(values) - before < 0.01:
+            if scale != s and (there := at(scale, sizes))[0] > best[0]:
+                best, s = there, scale
+        if best[0] - before < 0.01:
             break
     for _ in range(SWEEPS):
-        before = logsumexp(values)
+        before = best[0]
         for kind, by in product([kind for kind in FINER if kind in sizes], (1, -1)):
-            while (size := _beside(FINER[kind], sizes[kind], by)) is not None and logsumexp(there := at(s, {**sizes, kind: size})) > logsumexp(values):
-                values, sizes = there, {**sizes, kind: size}
-        if logsumexp(values) - before < 0.1:
+            while (size := _beside(FINER[kind], sizes[kind], by)) is not None and (there := at(s, {**sizes, kind: size}))[0] > best[0]:
+                best, sizes = there, {**sizes, kind: size}
+        if best[0] - before < 0.1:
             break
-    return values, s, sizes
+    return best[1], s, sizes
 
 
 def _stacked(covariances: Sequence[Array], tests: int) -> Array:

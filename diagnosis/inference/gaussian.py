@@ -109,7 +109,8 @@ class Nuisances:
 
 def under(root: csr_array, information: Array) -> Nuisances:
     """Nuisances of an information (p, p) under a prior of theirs alone, of which R (p, r) is the `root`."""
-    inner = np.asarray(root.T @ (root.T @ information).T)
+    turn = root.T
+    inner = np.asarray(turn @ (turn @ information).T)
     np.fill_diagonal(inner, inner.diagonal() + 1.0)
     return Nuisances(root, np.asarray(cholesky(inner.T, lower=True, overwrite_a=True, check_finite=False)))
 

@@ -80,6 +80,9 @@ def worst_by_kind(model, t, x):
     rates = rates_of(model, x, [[] for _ in model.tests])
     r, by = nuisance_jacobian(model, t, x, [], rates)
     jacobian, numbers = by.whole, by.numbers
+    assert len(by.rows) <= len(numbers)  # a gain and its drift do the same
+    assert by.information == pytest.approx(jacobian @ jacobian.T, rel=1e-9, abs=1e-9 * np.abs(by.information).max())
+    assert by.products(r) == pytest.approx(jacobian @ r, abs=1e-9 * np.abs(jacobian @ r).max())
     assert np.array_equal(r, model.residual(t, x, []))
     assert len(set(numbers)) == len(numbers)
     wanted = differences(model, t, x, numbers)
