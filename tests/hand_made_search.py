@@ -16,6 +16,7 @@ from thermospindle.diagnosis.inference.prior import Learned
 from thermospindle.diagnosis.inference.screening import Screened
 from thermospindle.diagnosis.inference.search import Search
 from thermospindle.diagnosis.parameters.mechanism import Mechanism
+from thermospindle.diagnosis.parameters.numbers import Numbers
 from thermospindle.model.machine import Condition
 from thermospindle.sim.effects.effect import Effect, Parameter
 
@@ -45,7 +46,7 @@ def made(gains: dict[str | tuple[str, ...], float], catalogue: int = 30, forms: 
     """A search that found `gains` in ln evidence over the model without effects, as much as it is worth (`TOO_SURE`); so many mechanisms were screened."""
     spindle = SimpleNamespace(tolerances=SimpleNamespace(temperature=0.2))
     tests = tuple(SimpleNamespace(condition=c, count=50) for c in CONDITIONS)
-    model = SimpleNamespace(parameters=(), tests=tests, spindle=spindle, resonances=())
+    model = SimpleNamespace(parameters=(), tests=tests, numbers=Numbers((), tests, None), spindle=spindle, resonances=())
     none = hypothesis((), 0.0)
     others = [hypothesis((k,) if isinstance(k, str) else k, TOO_SURE * v) for k, v in gains.items()]
     screened = [Screened(mechanism(f"effect_{i}"), 0.0, np.zeros(2), 1.0) for i in range(catalogue)]

@@ -34,11 +34,11 @@ def expand(spindle: Spindle, temperature: Temperature, tolerance: float = TOLERA
         for response in influence(spindle, tolerance, means).responses.values():
             strains = _strain_field(spindle, Solid(response.section, elasticity(spindle, means)), temperature)
             moves |= _by_race(response.races, np.einsum("ieq,eq->i", response.density, strains))
-    elif not _region_strains(spindle, list(means), means).any():
+    elif not any((free := dict(zip(means, _region_strains(spindle, list(means), means), strict=True))).values()):
         moves = {race: (0.0, 0.0) for b in spindle.ringed for race in raceways(spindle, b)}
     else:
         for gain in gains(spindle, tolerance, means):
-            moves |= _by_race(gain.races, gain.value @ _region_strains(spindle, gain.regions, means))
+            moves |= _by_race(gain.races, gain.value @ np.array([free[region] for region in gain.regions]))
     return ring_motions(spindle, means, moves)
 
 

@@ -77,7 +77,7 @@ class LineData:
 
     def in_errors(self, value: ComplexArray) -> ComplexArray:
         """Differences (n_resp, n_ref, L) of FRFs as independent numbers, whose real and imaginary parts have unit variance."""
-        return self.independent(value / self.sd * np.sqrt(2))
+        return self.independent(value * (np.sqrt(2) / self.sd))
 
     def independent(self, scaled: ComplexArray) -> ComplexArray:
         """Values (..., n_resp, n_ref, L) in their standard errors as independent ones."""
@@ -89,12 +89,12 @@ class LineData:
         return 1.0 if self.alike is None else self.alike.window.smooth
 
     def alone(self, rows: Array) -> Array:
-        """Rows (k, N) of independent numbers as numbers of every line by itself, taken for independent, with errors as large as those of what is smooth."""
+        """Rows (k, N) of independent numbers, the real and the imaginary part of one after the other, as numbers of every line by itself, taken for independent, with errors as large as those of what is smooth."""
         if self.whitening is None:
             return rows
-        parts = rows.reshape(len(rows), 2, *self.value.shape)
-        found = _each(parts[:, 0] + 1j * parts[:, 1], np.asarray(np.linalg.inv(self.whitening), complex)) / np.sqrt(self.smooth)
-        return np.stack([found.real, found.imag], axis=1).reshape(rows.shape)
+        values = np.ascontiguousarray(rows).view(complex).reshape(len(rows), *self.value.shape)
+        found = _each(values, np.asarray(np.linalg.inv(self.whitening), complex)) / np.sqrt(self.smooth)
+        return np.ascontiguousarray(found).reshape(len(rows), -1).view(float)
 
     @property
     def sensors(self) -> tuple[int, ...]:
@@ -114,7 +114,7 @@ class LineData:
 
 def _each(value: ComplexArray, by: ComplexArray) -> ComplexArray:
     """Values (..., n_resp, n_ref, L) of every FRF times its own matrix (n_resp, n_ref, L, L)."""
-    return np.asarray((value[..., None, :] @ by)[..., 0, :] if value.ndim == 3 else np.moveaxis(np.moveaxis(value, 0, -2) @ by, -2, 0), complex)
+    return np.ascontiguousarray((value[..., None, :] @ by)[..., 0, :] if value.ndim == 3 else np.moveaxis(np.moveaxis(value, 0, -2) @ by, -2, 0), complex)
 
 
 def line_data(test: Test, condition: Condition, stated: Noise | None, expected: Noise) -> LineData:

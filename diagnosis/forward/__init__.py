@@ -8,6 +8,7 @@ table        poles and shapes, and their derivatives, for a table of modes
 shapes       a measured shape beside the nearest that a model has
 rates        how the matrices change with tolerances, temperature and ring expansion
 points       operating points that differ in the measuring chain alone, or in how far the rings expand
+latest       what of all these was worked out last
 model        residuals of every test in standard errors
 hit          where in records that end early a test was hit, where nobody tells
 derivatives  of these, by nuisance parameters, by what lists of effects differ in, by light resonances

@@ -6,6 +6,9 @@ line serves all parameters; what also moves rows, gains or delays is differenced
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
@@ -17,69 +20,117 @@ from thermospindle.diagnosis.forward.table import Table
 from thermospindle.model.types import Array, ComplexArray, Integers
 
 
-def nuisance_jacobian(model: CampaignModel, t: int, x: Array, effects: Applied, rates: Rates, more: int = 0) -> tuple[Array, Array, Integers]:
-    """Residuals (N,) of test `t`, their derivatives (k + more, N) by k nuisance parameters, and the numbers (k,) of these; rows `more` are
-    left zero for whoever has further parameters."""
-    data, linear = model.tests[t], model.linear(t, x, effects)
-    response = model.standing(t, x, effects, linear)
+@dataclass(frozen=True, eq=False)
+class Derivatives:
+    """Derivatives of residuals (N,) of one test by the parameters `numbers` (k,): by each `times` (k,) that of the `rows` (m, N) which has the number `of` (k,). A gain and its drift, a constant
+    discrepancy and the one that drifts, the sizes that a mechanism has in several tests do the same to one of them."""
+
+    rows: Array
+    numbers: Integers
+    of: Integers
+    times: Array
+
+    @property
+    def whole(self) -> Array:
+        """(k, N)."""
+        return self.times[:, None] * self.rows[self.of]
+
+    @property
+    def information(self) -> Array:
+        """Products (k, k) with each other."""
+        own = self.rows @ self.rows.T
+        return self.times[:, None] * own[np.ix_(self.of, self.of)] * self.times
+
+    def products(self, residual: Array) -> Array:
+        """With residuals (N,), (k,)."""
+        return self.times * (self.rows @ residual)[self.of]
+
+    def by(self, kept: np.ndarray) -> Derivatives:
+        """By some of the parameters alone."""
+        return replace(self, numbers=self.numbers[kept], of=self.of[kept], times=self.times[kept])
+
+    def further(self, numbers: Integers, of: Integers, times: Array) -> Derivatives:
+        """By more parameters, whose rows are there."""
+        return replace(self, numbers=np.concatenate([self.numbers, numbers]), of=np.concatenate([self.of, of]), times=np.concatenate([self.times, times]))
+
+
+def nuisance_jacobian(model: CampaignModel, t: int, x: Array, effects: Applied, rates: Rates, more: int = 0) -> tuple[Array, Derivatives]:
+    """Residuals (N,) of test `t` and their derivatives by nuisance parameters; the last `more` rows are left zero for whoever has further parameters."""
+    data, (linear, response) = model.tests[t], model.standing(t, x, effects)
+    discrepancies = _by_discrepancies(model, t, linear, x)
+    shared = [_each(rates.numbers[t]), *(of for *_, of in discrepancies)]
     if isinstance(response, Table):
-        r, found = response.residual, response.moved(together([rates.products[t], *(pairs(*of) for of in _by_discrepancies(model, t, linear, x))]))
-        numbers = np.concatenate([rates.numbers[t], *[row[0] for row in model.numbers.discrepancies[t]]])
-        return r, np.concatenate([found, np.zeros((more, len(r)))]), numbers
+        r, found = response.residual, response.moved(together([rates.products[t], *(pairs(vectors, power, of) for vectors, power, of, _ in discrepancies)]))
+        return r, Derivatives(np.concatenate([found, np.zeros((more, len(r)))]), *_after_each_other(shared))
     assert isinstance(data, LineData)
-    (own, channel), (struck, hammer) = model.numbers.gains[t], model.numbers.hammers[t]
-    missed, way = model.numbers.misses[t]
     record = [] if model.numbers.record is None else [model.numbers.record]
     lights = model.lights(t, linear.matrices.dofs, x)
-    numbers = np.concatenate([rates.numbers[t], *[row[0] for row in model.numbers.discrepancies[t]], own, struck, missed, np.array(record, int), *[n for _, n in lights]])
+    channels, hammers, ways = (_alike(model, *which[t]) for which in (model.numbers.gains, model.numbers.hammers, model.numbers.misses))
+    shared += [channels, hammers, ways, _each(np.array(record, int)), *(_alike(model, n, n) for _, n in lights)]
+    numbers, of, times = _after_each_other(shared)
     n_resp, n_ref, lines = response.value.shape
     weight = np.sqrt(2) / data.sd
-    jacobian = np.zeros((len(numbers) + more, 2, n_resp, n_ref, lines))
+    jacobian, of_parts = np.zeros((int(of.max(initial=-1)) + 1 + more, n_resp, n_ref, 2 * lines)), np.repeat(weight, 2, axis=-1)
 
     def fill(first: int, moved: ComplexArray) -> int:
-        rows = jacobian[first : first + len(moved)]
-        np.multiply(moved.real, weight, out=rows[:, 0])
-        np.multiply(moved.imag, weight, out=rows[:, 1])
+        np.multiply(np.ascontiguousarray(moved).view(float), of_parts, out=jacobian[first : first + len(moved)])
         return first + len(moved)
 
     at = fill(0, response.moved(rates.products[t]))
-    for columns, power, paired, size in _by_discrepancies(model, t, linear, x):
-        for moved in response.moved_together(response.over(columns), power, paired, size):
+    for columns, power, paired, _ in discrepancies:
+        for moved in response.moved_together(response.over(columns), power, paired):
             at = fill(at, moved)
-    for k, c in enumerate(channel):
-        for row in np.flatnonzero(model.numbers.channel_of[t][:n_resp] == c):
-            gain = response.value[row] * weight[row] * model.parameters[own[k]].sd
-            jacobian[at + k, 0, row], jacobian[at + k, 1, row] = gain.real, gain.imag
-    at += len(own)
-    for k, h in enumerate(hammer):
-        for of in np.flatnonzero(model.numbers.hammer_of[t] == h):
-            gain = response.value[:, of] * weight[:, of] * model.parameters[struck[k]].sd
-            jacobian[at + k, 0, :, of], jacobian[at + k, 1, :, of] = gain.real, gain.imag
-    at += len(struck)
-    missing, struck_by = aside(model.operating(t, x, effects)), model.numbers.hammer_of[t]
+    for c in np.unique(model.numbers.gains[t][1]):
+        at = fill(at, np.where((model.numbers.channel_of[t][:n_resp] == c)[:, None, None], response.value, 0.0)[None])
+    for h in np.unique(model.numbers.hammers[t][1]):
+        at = fill(at, np.where((model.numbers.hammer_of[t] == h)[:, None], response.value, 0.0)[None])
+    missing, struck_by, way = aside(model.operating(t, x, effects)), model.numbers.hammer_of[t], np.unique(model.numbers.misses[t][1])
     for ref, gain in enumerate(model.hammer_gain(t, x)):
-        moved = gain * response.struck(missing[:, ref]) * weight[:, ref][:, None]
+        missed = gain * response.struck(missing[:, ref]) * weight[:, ref][:, None]
         for n in np.flatnonzero(way // 2 == struck_by[ref]):
-            miss = moved[:, way[n] % 2] * model.sd[missed[n]]
-            jacobian[at + n, 0, :, ref], jacobian[at + n, 1, :, ref] = miss.real, miss.imag
-    at += len(missed)
+            jacobian[at + n, :, ref] = missed[:, way[n] % 2].view(float)
+    at += len(way)
     if record:
         at = fill(at, response.cut_off[None])
-    for light, of_light in lights:
-        at = fill(at, response.by_light(light) * np.array([model.parameters[i].sd for i in of_light])[:, None, None, None])
+    for light, _ in lights:
+        at = fill(at, response.by_light(light))
     if data.whitening is not None:
-        white = data.independent(jacobian[:at, 0] + 1j * jacobian[:at, 1])
-        jacobian[:at, 0], jacobian[:at, 1] = white.real, white.imag
-    return model.whitened(t, response.value, data.value), jacobian.reshape(len(jacobian), -1), numbers
+        jacobian[:at] = data.independent(jacobian[:at].view(complex)).view(float)
+    return model.whitened(t, response.value, data.value), Derivatives(jacobian.reshape(len(jacobian), -1), numbers, of, times)
 
 
-def _by_discrepancies(model: CampaignModel, t: int, linear: Linear, x: Array) -> list[tuple[Array, int, Pairs, Array]]:
-    """What discrepancies of stiffness change in test `t`, and those of damping: vectors (n, m), a power of s, pairs of vectors, and the size of each."""
-    w, ((_, i, j, stiffness), (_, a, b, damping)) = model.reference.over(linear.matrices.dofs), model.numbers.discrepancies[t]
-    modes, k = w.shape[1], len(i)
+Shared = tuple[Integers, Integers, Array]
+"""Parameters (k,), by number, that have rows of derivatives in common: which of these is each one's (k,), and how many times (k,) it is."""
+
+
+def _each(numbers: Integers) -> Shared:
+    """Of parameters that have a row each."""
+    return numbers, np.arange(len(numbers)), np.ones(len(numbers))
+
+
+def _alike(model: CampaignModel, numbers: Integers, of: Integers) -> Shared:
+    """Of parameters that move what they are `of`, in proportion to their standard deviations; rows are in its order."""
+    return numbers, np.unique(of, return_inverse=True)[1], model.sd[numbers]
+
+
+def _after_each_other(every: Sequence[Shared]) -> Shared:
+    """Of several, the rows of one after those of another."""
+    numbers, of, times = zip(*every, strict=True)
+    first = np.cumsum([0, *(int(rows.max(initial=-1)) + 1 for rows in of)])
+    return np.concatenate(numbers), np.concatenate([rows + n for rows, n in zip(of, first, strict=False)]), np.concatenate(times)
+
+
+def _by_discrepancies(model: CampaignModel, t: int, linear: Linear, x: Array) -> list[tuple[Array, int, Pairs, Shared]]:
+    """What discrepancies of stiffness change in test `t`, and those of damping: vectors (n, m), a power of s, pairs of vectors, and the parameters that they are of."""
+    w, ((number, i, j, stiffness), (lossy, a, b, damping)) = model.reference.over(linear.matrices.dofs), model.numbers.discrepancies[t]
+    modes = w.shape[1]
+    _, first, of = np.unique(i * modes + j, return_index=True, return_inverse=True)
+    i, j, k = i[first], j[first], len(first)
     beside = w @ model.turned(t, x).by_pairs(i, j)
     turned = [(i, modes + np.arange(k)), (j, modes + k + np.arange(k))]
-    return [(np.hstack([w, beside]), 0, turned, stiffness), (w, 1, [(a, b)], damping * np.where(a == b, 0.5, 1.0))]
+    halved = damping * np.where(a == b, 0.5, 1.0)
+    _, first, of_damping = np.unique(a * modes + b, return_index=True, return_inverse=True)
+    return [(np.hstack([w, beside]), 0, turned, (number, of, stiffness)), (w, 1, [(a[first], b[first])], (lossy, of_damping, halved))]
 
 
 def column(model: CampaignModel, t: int, x: Array, first: Applied, second: Applied, apart: float) -> Array:
@@ -87,8 +138,7 @@ def column(model: CampaignModel, t: int, x: Array, first: Applied, second: Appli
 
     Where matrices alone differ the exact derivative of the FRF is taken, which has no error of the second order in the FRF.
     """
-    at, moved = model.linear(t, x, first), model.linear(t, x, second)
-    answer = model.standing(t, x, first, at)
+    (at, answer), moved = model.standing(t, x, first), model.linear(t, x, second)
     if at.layout == moved.layout and at.matrices.dofs == moved.matrices.dofs and same_chain(at.chain, moved.chain):
         by = products(*((getattr(moved.matrices, k) - getattr(at.matrices, k)) / apart for k in ("mass", "damping", "stiffness")))
         return answer.moved(by)[0] if isinstance(answer, Table) else model.whitened(t, answer.moved(by)[0], 0.0)
@@ -98,8 +148,7 @@ def column(model: CampaignModel, t: int, x: Array, first: Applied, second: Appli
 def by_products_of_shares(model: CampaignModel, t: int, x: Array, effects: Applied, modes: int) -> tuple[ComplexArray, ComplexArray]:
     """Derivatives (k, channels, L) of the FRFs of test `t`, in standard errors each `alone` (`LineData`), by the products of two shares each, in the first reference `modes`, of a light resonance
     that is not there yet and felt as a mass of -1 / s^2; and s (L,)."""
-    linear, data = model.linear(t, x, effects), model.tests[t]
-    answer = model.standing(t, x, effects, linear)
+    data, (linear, answer) = model.tests[t], model.standing(t, x, effects)
     assert isinstance(answer, Response)
     assert isinstance(data, LineData)
     moved = answer.by_products_of_shares(model.reference.over(linear.matrices.dofs)[:, :modes], *np.triu_indices(modes)) * (np.sqrt(2 / data.smooth) / data.sd)

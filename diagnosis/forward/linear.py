@@ -111,13 +111,13 @@ def products(mass: Array, damping: Array, stiffness: Array) -> Products:
     return Products(1, moves, moves, np.array(power, int), np.concatenate(left, axis=1), np.concatenate(right, axis=1))
 
 
-def pairs(vectors: Array, power: int, of: Pairs, size: Array) -> Products:
-    """Products of k parameters, of each `size` s^`power` times the sum over pairs i, j `of` its own of u_i u_j^T + u_j u_i^T, u the columns of `vectors` (n, m)."""
-    k, rows = len(size), 2 * len(of)
+def pairs(vectors: Array, power: int, of: Pairs) -> Products:
+    """Products of k parameters, of each s^`power` times the sum over pairs i, j `of` its own of u_i u_j^T + u_j u_i^T, u the columns of `vectors` (n, m)."""
+    k, rows = len(of[0][0]), 2 * len(of)
     first = np.stack([n for i, j in of for n in (i, j)], axis=1).ravel()
     second = np.stack([n for i, j in of for n in (j, i)], axis=1).ravel()
     every = np.arange(k)
-    return Products(k, every, rows * every, np.full(rows * k, power), vectors[:, first] * np.repeat(size, rows), vectors[:, second])
+    return Products(k, every, rows * every, np.full(rows * k, power), vectors[:, first], vectors[:, second])
 
 
 def together(every: Sequence[Products]) -> Products:

@@ -13,8 +13,9 @@ import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.mode_table import ModeData, TestData
+from thermospindle.diagnosis.forward.latest import Latest
 from thermospindle.diagnosis.forward.linear import Dofs, Linear, mass_between, mass_changes
-from thermospindle.diagnosis.forward.points import Applied, apart, aside, otherwise, replace_measuring, stretched, uneven
+from thermospindle.diagnosis.forward.points import Applied, aside, replace_measuring, undrawn
 from thermospindle.diagnosis.forward.response import Light, Response
 from thermospindle.diagnosis.forward.table import Table
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
@@ -33,6 +34,7 @@ from thermospindle.sim.operating import SETTLING, OperatingPoint, acted_on, equi
 
 SIZE_STEP = 0.02  # of a size's or shape parameter's prior standard deviation, for differences
 THIN, ENOUGH_LINES = 4, 30  # lines left out of a thinned model, and how many of a test it keeps at least
+KEPT, ANSWERS = 12, 2  # spindles, states and points a test, and answers, of those asked for last
 ACTING = tuple(hook for hook in HOOKS if hook != "measurement")
 FAILED = (NoEquilibrium, OutsideRange, ValueError, RuntimeError, ZeroDivisionError, FloatingPointError, np.linalg.LinAlgError)
 """What a model says at parameter values where no spindle can be built; a fit then steps less far."""
@@ -57,7 +59,7 @@ class CampaignModel:
 
     def __getstate__(self) -> dict:
         """Without what was worked out: it is on its way to another process."""
-        return {k: v for k, v in self.__dict__.items() if k not in ("_equilibria", "_heavier", "_points", "_responses", "_spindles", "kept", "thinned")}
+        return {k: v for k, v in self.__dict__.items() if not isinstance(v, Latest) and k not in ("_heavier", "kept", "thinned")}
 
     @cached_property
     def thinned(self) -> CampaignModel:
@@ -67,26 +69,24 @@ class CampaignModel:
     # ------------------------------------------------------------ the spindle at nuisance values
 
     def _built(self, t: int, x: Array) -> Spindle:
-        values, coefficients = x[: len(self.build)], self.numbers.coefficients
-        t = self._like[t]
-        key = (t, values.tobytes(), x[coefficients].tobytes())
-        if key not in self._spindles:
-            if len(self._spindles) > 4 * len(self.tests):
-                self._spindles.clear()
+        t, coefficients = self._like[t], self.numbers.coefficients
+
+        def built() -> Spindle:
             spindle = self.scenes[t]
-            for parameter, nuisance, value in zip(self.build, self.parameters[: len(values)], values, strict=True):
+            for parameter, nuisance, value in zip(self.build, self.parameters, x, strict=False):
                 if value:
                     spindle = parameter.apply(spindle, nuisance.at(value))
             for i in coefficients:
                 if x[i]:
                     material = spindle.materials[spindle.used_materials[self.parameters[i].index]]
                     spindle = with_material(spindle, expanding(material, float(x[i]) * self.sd[i]))
-            self._spindles[key] = spindle
-        return self._spindles[key]
+            return spindle
+
+        return self._spindles.of((t, x[: len(self.build)].tobytes(), x[coefficients].tobytes()), built)
 
     @cached_property
-    def _spindles(self) -> dict:
-        return {}
+    def _spindles(self) -> Latest[Spindle]:
+        return Latest(KEPT * len(self.tests))
 
     @cached_property
     def _like(self) -> list[int]:
@@ -113,48 +113,45 @@ class CampaignModel:
         effects, own = within_limits(effects), self.numbers
         little = tuple(x[of].tobytes() for of in (own.apart, own.balls[t], own.uneven))
         at = (t, x[: len(self.build)].tobytes(), float(x[own.temperature[t]]), *(x[of].tobytes() for of in (own.expansion, own.coefficients, own.flung)))
-        key = (at, little, _asking(effects, ACTING))
-        late = self._points.get(key)
-        if late is not None:
-            return replace_measuring(late, [*self.present, *effects])
-        if len(self._points) > 6 * len(self.tests):
-            self._points.clear()
-        every = [*self._otherwise_than_drawn(t, x), *self.present, *effects]
-        late = self._points[key] = acted_on(self._with_settled_rings(t, x, every, (at, _asking(effects, SETTLING))), every)
-        late.chain  # noqa: B018 - worked out here, so that errors come here
-        return late
+
+        def worked_out() -> OperatingPoint:
+            every = [*self._otherwise_than_drawn(t, x), *self.present, *effects]
+            found = acted_on(self._with_settled_rings(t, x, every, (at, _asking(effects, SETTLING))), every)
+            found.chain  # noqa: B018 - worked out here, so that errors come here
+            return found
+
+        return replace_measuring(self._points.of((at, little, _asking(effects, ACTING)), worked_out), [*self.present, *effects])
+
+    @cached_property
+    def _points(self) -> Latest[OperatingPoint]:
+        return Latest(KEPT * len(self.tests))
 
     def _with_settled_rings(self, t: int, x: Array, every: Applied, key: tuple) -> OperatingPoint:
         """The rings of test `t` in equilibrium under all that acts."""
-        if key not in self._equilibria:
-            if len(self._equilibria) > 6 * len(self.tests):
-                self._equilibria.clear()
+
+        def settled() -> tuple[OperatingPoint, Applied]:
             own = self.numbers
             condition, warmer = self.tests[t].condition, float(x[own.temperature[t]]) * self.parameters[own.temperature[t]].sd
             built = self._built(t, x)
             for i in own.flung:
                 built = replace(built, ball_inertia=max(built.ball_inertia * (1 + float(x[i]) * self.parameters[i].sd), 0.0))
-            self._equilibria[key] = equilibrium(built, replace(condition, temperature=condition.temperature + warmer), every), every
-        return self._equilibria[key][0]
+            return equilibrium(built, replace(condition, temperature=condition.temperature + warmer), every), every
+
+        return self._equilibria.of(key, settled)[0]
 
     @cached_property
-    def _equilibria(self) -> dict[tuple, tuple[OperatingPoint, Applied]]:
+    def _equilibria(self) -> Latest[tuple[OperatingPoint, Applied]]:
         """With the effects, which their keys tell apart by where they are in memory: as long as they are kept no other comes there."""
-        return {}
+        return Latest(KEPT * len(self.tests))
 
     def _otherwise_than_drawn(self, t: int, x: Array) -> list[tuple[Effect, Values]]:
-        """What bearings, balls, joints and rings are in test `t` that no drawing has, as effects that act before all others."""
-        own, found = self.numbers, []
-        if x[own.expansion].any():
-            found.append(stretched(*(1 + float(x[i]) * self.parameters[i].sd for i in own.expansion)))
-        if x[own.uneven].any():
-            found.append(uneven([(self.unevennesses[p.index], float(x[i]) * p.sd) for i in own.uneven for p in [self.parameters[i]]]))
-        if x[own.balls[t]].any():
-            found.append(self._otherwise(t, x))
-        if x[own.apart].any():
-            names, rows = [b.name for b in self.spindle.all_bearings], [(self.parameters[i], float(x[i])) for i in own.apart]
-            found.append(apart(*({names[p.index]: v * p.sd for p, v in rows if p.kind == kind} for kind in kinds_of.APART)))
-        return found
+        own = self.numbers
+        key = t, *(x[of].tobytes() for of in (own.expansion, own.uneven, own.balls[t], own.apart))
+        return self._undrawn.of(key, lambda: undrawn(own, t, x, [b.name for b in self.spindle.all_bearings], self.unevennesses))
+
+    @cached_property
+    def _undrawn(self) -> Latest[list[tuple[Effect, Values]]]:
+        return Latest(KEPT * len(self.tests))
 
     @cached_property
     def by_condition(self) -> Array:
@@ -168,18 +165,6 @@ class CampaignModel:
             except FAILED:
                 continue
         return found
-
-    def _otherwise(self, t: int, x: Array) -> tuple[Effect, Values]:
-        """How stiff the balls are in test `t`, otherwise than drawn."""
-        rows = [(p, float(x[i]) * p.sd) for i in self.numbers.balls[t] for p in [self.parameters[i]]]
-        shares = {p.index: value for p, value in rows if p.kind == kinds_of.BALLS}
-        warmer = sum(value for p, value in rows if p.kind == kinds_of.CHANGE and p.test is None)
-        own = {p.index: value for p, value in rows if p.kind == kinds_of.CHANGE and p.test == t}
-        return otherwise(shares, warmer, (own.get(0, 0.0), own.get(1, 0.0)))
-
-    @cached_property
-    def _points(self) -> dict:
-        return {}
 
     @cached_property
     def kept(self) -> dict:
@@ -227,9 +212,8 @@ class CampaignModel:
 
     def _otherwise_heavy(self, x: Array, dofs: Dofs) -> tuple[Array, Array]:
         """What bodies that have their mass otherwise than drawn add to M and, per rad/s, to G (n, n)."""
-        own = x[self.numbers.masses]
-        mass, gyroscopic = self.heavier(dofs)
-        return np.tensordot(own, mass, 1), np.tensordot(own, gyroscopic, 1)
+        mass, gyroscopic = ((x[self.numbers.masses] @ each.reshape(len(each), -1)).reshape(each.shape[1:]) for each in self.heavier(dofs))
+        return mass, gyroscopic
 
     def heavier(self, dofs: Dofs) -> tuple[Array, Array]:
         """What a standard deviation of each way in which bodies may have their mass otherwise adds to M and, per rad/s, to G (k, n, n)."""
@@ -253,7 +237,7 @@ class CampaignModel:
 
     def residual(self, t: int, x: Array, effects: Applied) -> Array:
         """Residuals (N,) of test `t`, computed less measured, in standard errors."""
-        return self.in_errors(t, self.standing(t, x, effects, self.linear(t, x, effects)))
+        return self.in_errors(t, self.standing(t, x, effects)[1])
 
     def in_errors(self, t: int, answer: Response | Table) -> Array:
         """Residuals (N,) of an answer, in standard errors."""
@@ -299,17 +283,20 @@ class CampaignModel:
         """With one light resonance more, whose parameters follow all others."""
         return replace(self, parameters=(*self.parameters, *resonance.nuisances), resonances=(*self.resonances, resonance))
 
-    def standing(self, t: int, x: Array, effects: Applied, linear: Linear) -> Response | Table:
-        """The answer of test `t`; the last one is kept for those who ask more of the same place."""
-        key = (x.tobytes(), tuple((id(e), *v.values()) for e, v in effects))
-        late = self._responses.get(t)
-        if late is None or late[0] != key:
-            late = self._responses[t] = key, self.answer(t, x, linear), effects
-        return late[1]
+    def standing(self, t: int, x: Array, effects: Applied) -> tuple[Linear, Response | Table]:
+        """The linear model of test `t` and its answer; the last ones are kept for those who ask more of the same place."""
+
+        def worked_out() -> tuple[Linear, Response | Table, Applied]:
+            linear = self.linear(t, x, effects)
+            return linear, self.answer(t, x, linear), effects
+
+        linear, answer, _ = self._responses.of((t, x.tobytes(), tuple((id(e), *v.values()) for e, v in effects)), worked_out)
+        return linear, answer
 
     @cached_property
-    def _responses(self) -> dict[int, tuple[tuple, Response | Table, Applied]]:
-        return {}
+    def _responses(self) -> Latest[tuple[Linear, Response | Table, Applied]]:
+        """With the effects, as long as which are kept no other comes where they are in memory."""
+        return Latest(ANSWERS * len(self.tests))
 
     def _gain(self, x: Array, number: Integers, index: Integers, of: Integers) -> Array:
         """Gains of rows (or columns) that are `of` these channels (or hammers), which the parameters by `number` are the ln of, one or more for each `index`."""
@@ -317,10 +304,10 @@ class CampaignModel:
         return np.asarray(np.exp((of[:, None] == index) @ ln))
 
     def whitened(self, t: int, value: ComplexArray, measured: ComplexArray | float) -> Array:
+        """What differs (n_resp, n_ref, L) in standard errors, (N,): the real and the imaginary part of one number after the other."""
         data = self.tests[t]
         assert isinstance(data, LineData)
-        left = data.in_errors(value - measured).ravel()
-        return np.concatenate([left.real, left.imag])
+        return data.in_errors(value - measured).ravel().view(float)
 
     @cached_property
     def structural(self) -> list[bool]:
@@ -332,8 +319,7 @@ class CampaignModel:
 def _modal(discrepancies: Discrepancies, x: Array, modes: int) -> Array:
     """Discrepancies over the modal matrix (modes, modes), each as it is stated."""
     number, i, j, size = discrepancies
-    found = np.zeros((modes, modes))
-    np.add.at(found, (i, j), size * x[number])
+    found = np.bincount(i * modes + j, size * x[number], modes**2).reshape(modes, modes)
     return np.where(found == 0, found.T, found)
 
 

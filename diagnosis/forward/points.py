@@ -8,11 +8,13 @@ from functools import lru_cache
 
 import numpy as np
 
-from thermospindle.diagnosis.parameters.nuisance import DIRECTIONS, RANGE_K, Unevenness
+from thermospindle.diagnosis.parameters import nuisance as kinds_of
+from thermospindle.diagnosis.parameters.nuisance import DIRECTIONS, RANGE_K, Nuisance, Unevenness
+from thermospindle.diagnosis.parameters.numbers import Numbers
 from thermospindle.model.bearing.pair import PairState
 from thermospindle.model.machine import Condition, Point, RingMotion, Spindle
 from thermospindle.model.rotor.chain import Layout, RotorBase, row_of
-from thermospindle.model.types import Array
+from thermospindle.model.types import Array, Integers
 from thermospindle.sim.effects.effect import Effect, Values
 from thermospindle.sim.effects.measuring.hammer_position import off
 from thermospindle.sim.operating import OperatingPoint
@@ -41,6 +43,29 @@ def aside(point: OperatingPoint) -> Array:
 def _aside(layout: Layout, aimed: tuple[Point, ...]) -> Array:
     found = np.array([[row_of(layout, off(p, STEP, way)) - row_of(layout, p) for p in aimed] for way in (0.0, np.pi / 2)]) / STEP
     found.flags.writeable = False
+    return found
+
+
+def undrawn(numbers: Numbers, t: int, x: Array, bearings: Sequence[str], joints: Sequence[Unevenness]) -> list[tuple[Effect, Values]]:
+    """What `bearings`, balls, `joints` and rings are in test `t`, at nuisance values x (P,), that no drawing has, as effects that act before all others."""
+    found = []
+
+    def told(of: Integers) -> list[tuple[Nuisance, float]]:
+        """By how much, in their own units."""
+        return [(p, float(x[i]) * p.sd) for i in of for p in [numbers.parameters[i]]]
+
+    if x[numbers.expansion].any():
+        found.append(stretched(*(1 + value for _, value in told(numbers.expansion))))
+    if x[numbers.uneven].any():
+        found.append(uneven([(joints[p.index], value) for p, value in told(numbers.uneven)]))
+    if x[numbers.balls[t]].any():
+        balls = told(numbers.balls[t])
+        shares = {p.index: value for p, value in balls if p.kind == kinds_of.BALLS}
+        warmer = sum(value for p, value in balls if p.kind == kinds_of.CHANGE and p.test is None)
+        own = {p.index: value for p, value in balls if p.kind == kinds_of.CHANGE and p.test == t}
+        found.append(otherwise(shares, warmer, (own.get(0, 0.0), own.get(1, 0.0))))
+    if x[numbers.apart].any():
+        found.append(apart(*({bearings[p.index]: value for p, value in told(numbers.apart) if p.kind == kind} for kind in kinds_of.APART)))
     return found
 
 

@@ -20,6 +20,7 @@ from thermospindle.sim.identification.frf import POWER
 
 SILENT = 1e-6  # of a mode's answer, left at the end of a record
 TOGETHER = 8  # derivatives at a time
+FEW = 2  # times as many products as a parameter may have, for each to be followed by itself, as there are degrees of freedom at least
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,16 +84,16 @@ class Response:
             self.value = self.value + cut * self.cut_off
 
     def _dynamic(self) -> ComplexArray:
-        """Dynamic stiffness (L, r, r)."""
-        mass, damping, stiffness = self._matrices
-        s = self.s[:, None, None]
-        whole = np.asarray(s**2 * mass + s * damping + stiffness, complex)
+        """Dynamic stiffness (L, r, r): one product of what depends on the line with what does not."""
+        s = self.s
+        terms = [*zip((s**2, s, np.ones_like(s)), self._matrices, strict=True)]
         if self._quartic is not None:
-            whole -= s**4 * self._quartic
+            terms.append((-(s**4), self._quartic))
         for light in self._lights:
             b = self.over(light.columns) @ light.shares
-            whole += light.felt(self.s)[0][:, None, None] * np.outer(b, b)
-        return whole
+            terms.append((light.felt(s)[0], np.outer(b, b)))
+        by_line, matrices = (np.array(of, complex) for of in zip(*terms, strict=True))
+        return np.tensordot(by_line, matrices, (0, 0))
 
     @cached_property
     def _read(self) -> ComplexArray:
@@ -178,18 +179,27 @@ class Response:
         if len(by.of):
             left, right = self.over(by.left), self.over(by.right)
             own = [slice(a, b) for a, b in pairwise([*by.first, len(by.power)])]
-            few = np.concatenate([np.full(rows.stop - rows.start, rows.stop - rows.start <= len(left)) for rows in own])
+            few = np.concatenate([np.full(rows.stop - rows.start, FEW * (rows.stop - rows.start) <= len(left)) for rows in own])
             at = np.cumsum(few) - 1
             read, driven = self.read(left[:, few]), self.driven(right[:, few], by.power[few])
             for k, rows in zip(by.of, own, strict=True):
                 if few[rows.start]:
                     of_it = slice(at[rows.start], at[rows.start] + rows.stop - rows.start)
-                    np.einsum("kil,kjl->ijl", read[of_it], driven[of_it], out=found[k])
-                else:  # more products than degrees of freedom: their sum acts on these
-                    np.einsum("kil,kjl->ijl", self._read, self._felt(left[:, rows], right[:, rows], by.power[rows]), out=found[k])
+                    np.sum(read[of_it][:, :, None] * driven[of_it][:, None], axis=0, out=found[k])
+                else:  # so many products that their sum, acting on all degrees of freedom, is less work
+                    found[k] = self._answering(self._felt(left[:, rows], right[:, rows], by.power[rows]))
             if (end := self._late) is not None:
                 found[by.of] += self._cut * end.moved(np.add.reduceat(end.kicked(left, right, by.power), by.first, axis=0))
         return found
+
+    def _answering(self, force: ComplexArray) -> ComplexArray:
+        """What responses read (n_resp, n_ref, L) of forces (r, n_ref, L) on all degrees of freedom."""
+        return np.asarray((self._read_by_line @ force.transpose(2, 0, 1)).transpose(1, 2, 0))
+
+    @cached_property
+    def _read_by_line(self) -> ComplexArray:
+        """(L, n_resp, r)."""
+        return np.ascontiguousarray(self._read.transpose(2, 1, 0))
 
     def _felt(self, left: Array, right: Array, power: Integers) -> ComplexArray:
         """The force (r, n_ref, L) on each degree of freedom that products (r, m) in the dynamic stiffness make together."""
@@ -198,22 +208,20 @@ class Response:
             found += _over(right[:, power == p] @ left[:, power == p].T, self._forced(int(p)))
         return found
 
-    def moved_together(self, columns: Array, power: int, of: Pairs, size: Array) -> Iterator[ComplexArray]:
-        """Derivatives (k, n_resp, n_ref, L) by factors of `size` (k,) s^`power` times the sum over pairs i, j `of` each of u_i u_j^T + u_j u_i^T in the dynamic stiffness, u the `columns` (r, m):
+    def moved_together(self, columns: Array, power: int, of: Pairs) -> Iterator[ComplexArray]:
+        """Derivatives (k, n_resp, n_ref, L) by factors of s^`power` times the sum over pairs i, j `of` each of u_i u_j^T + u_j u_i^T in the dynamic stiffness, u the `columns` (r, m):
         a few at a time, for they fill memory rather than a cache."""
         read, driven = self.read(columns), self.driven(columns, np.full(columns.shape[1], power))
-        both = [pair for i, j in of for pair in ((i, j), (j, i))]
-        for at in range(0, len(size), TOGETHER):
+        first, second = (np.stack(numbers, axis=1) for numbers in zip(*(pair for i, j in of for pair in ((i, j), (j, i))), strict=True))
+        for at in range(0, len(first), TOGETHER):
             few = slice(at, at + TOGETHER)
-            times = size[few]
-            first, *others = ((times[:, None, None] * read[a[few]])[:, :, None] * driven[b[few]][:, None] for a, b in both)
-            found = first
-            for other in others:
-                found += other
+            found = np.empty((len(first[few]), *self.value.shape), complex)
+            for of_it, i, j in zip(found, first[few], second[few], strict=True):
+                np.sum(read[i][:, :, None] * driven[j][:, None], axis=0, out=of_it)
             if (end := self._late) is not None:
-                powers = np.full(len(times), power)
-                kicked = np.sum([end.kicked(columns[:, a[few]] * times, columns[:, b[few]], powers) for a, b in both], axis=0)
-                found += self._cut * end.moved(kicked)
+                i, j = first[few].ravel(), second[few].ravel()
+                kicked = end.kicked(columns[:, i], columns[:, j], np.full(len(i), power))
+                found += self._cut * end.moved(np.add.reduceat(kicked, np.arange(0, len(i), first.shape[1]), axis=0))
             yield found
 
     def read(self, columns: Array) -> ComplexArray:

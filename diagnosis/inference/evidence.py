@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache, reduce
+from functools import cache, lru_cache, reduce
 from itertools import pairwise, product, zip_longest
 
 import numpy as np
@@ -136,10 +136,14 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
     roots = [_roots(conditions, m.reference, counted_in(m), tuple(grid), len(m.shape)) for m, grid in zip(fit.mechanisms, own_grids, strict=True)]
     odds = np.asarray(reduce(np.add.outer, [np.array(list(grid.values())) for grid in own_grids], np.array(0.0))).ravel()
 
+    @cache
+    def scaled(s: float) -> Quadratic:
+        return Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
+
     def each(s: float, sizes: Mapping[str, float], nuisances: Nuisances | None = None) -> Array:
         """ln evidence of every combination of widths, departures and offsets of the mechanisms, by its prior odds."""
-        scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
-        return marginal(scaled, nuisances or integrated(model, fit, s, sizes)).integrated(roots) + odds - fit.count * np.log(s) + _odds(sizes)
+        nuisances = nuisances or under(nuisance_root(model, sizes, fit.moved), scaled(s).a[:p, :p])
+        return marginal(scaled(s), nuisances).integrated(roots) + odds - fit.count * np.log(s) + _odds(sizes)
 
     nuisances = None
     if near:
@@ -150,10 +154,9 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
         values, s, sizes = _likeliest(each, grids, scales)
     best = np.unravel_index(int(np.argmax(values)), [len(grid) for grid in own_grids]) if own_grids else ()
     own = [tuple(grid)[k] for grid, k in zip(own_grids, best, strict=True)]
-    scaled = Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
     learned = Learned(sizes, s, *(tuple(of) for of in zip(*own, strict=True)))
     nuisances = nuisances or integrated(model, fit, s, sizes)
-    mean, spread, left = posterior(scaled, nuisances, mechanism_root(model, fit.mechanisms, learned))
+    mean, spread, left = posterior(scaled(s), nuisances, mechanism_root(model, fit.mechanisms, learned))
     chi2 = whole.at(mean)
     held = [h.number for h in fit.held]
     own_mean = np.where(np.isin(np.arange(p, len(mean)), held), fit.point[p:], mean[p:])
@@ -186,26 +189,36 @@ def _odds(sizes: Mapping[str, float]) -> float:
 
 def _likeliest(each: Callable[[float, Mapping[str, float]], Array], grids: Mapping[str, Sequence[float]], scales: Sequence[float]) -> tuple[Array, float, dict[str, float]]:
     """The ln evidence that `each` gives, the errors of `scales` and the sizes of discrepancies of `grids`, and between their places, that have most of it: one after the other, until that moves nothing."""
+    known: dict[tuple[float, ...], tuple[float, Array]] = {}
+
+    def at(s: float, sizes: Mapping[str, float]) -> tuple[float, Array]:
+        """All of it together, and each."""
+        key = s, *(sizes[kind] for kind in grids)
+        if key not in known:
+            values = each(s, sizes)
+            known[key] = float(logsumexp(values)), values
+        return known[key]
+
     s, sizes = scales[len(scales) // 2], {kind: grid[0] for kind, grid in grids.items()}
-    values = each(s, sizes)
+    best = at(s, sizes)
     for _ in range(SWEEPS):
-        before = logsumexp(values)
+        before = best[0]
         for move in _moves(grids):
-            if (to := {**sizes, **move}) != sizes and logsumexp(there := each(s, to)) > logsumexp(values):
-                values, sizes = there, to
+            if (to := {**sizes, **move}) != sizes and (there := at(s, to))[0] > best[0]:
+                best, sizes = there, to
         for scale in scales:
-            if scale != s and logsumexp(there := each(scale, sizes)) > logsumexp(values):
-                values, s = there, scale
-        if logsumexp(values) - before < 0.01:
+            if scale != s and (there := at(scale, sizes))[0] > best[0]:
+                best, s = there, scale
+        if best[0] - before < 0.01:
             break
     for _ in range(SWEEPS):
-        before = logsumexp(values)
+        before = best[0]
         for kind, by in product([kind for kind in FINER if kind in sizes], (1, -1)):
-            while (size := _beside(FINER[kind], sizes[kind], by)) is not None and logsumexp(there := each(s, {**sizes, kind: size})) > logsumexp(values):
-                values, sizes = there, {**sizes, kind: size}
-        if logsumexp(values) - before < 0.1:
+            while (size := _beside(FINER[kind], sizes[kind], by)) is not None and (there := at(s, {**sizes, kind: size}))[0] > best[0]:
+                best, sizes = there, {**sizes, kind: size}
+        if best[0] - before < 0.1:
             break
-    return values, s, sizes
+    return best[1], s, sizes
 
 
 def _stacked(covariances: Sequence[Array], tests: int) -> Array:

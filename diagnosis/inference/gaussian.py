@@ -10,11 +10,11 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import lsq_linear
+from scipy.sparse import csr_array
 from scipy.special import binom, chdtrc, log_ndtr, ndtr
 
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.inference.fit import Fit
-from thermospindle.diagnosis.inference.prior import Root
 from thermospindle.diagnosis.parameters.mechanism import Mechanism, grown, size_covariance
 from thermospindle.model.types import Array
 
@@ -82,19 +82,19 @@ def _factor(information: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Nuisances:
-    """The first parameters (p,) of a quadratic under their prior R R^T: what all mechanisms that stand beside them have in common. `factor` (r, r) is the lower
+    """The first parameters (p,) of a quadratic under their prior R R^T, of which R (p, r) is the `root`: what all mechanisms that stand beside them have in common. `factor` (r, r) is the lower
     Cholesky factor of 1 + R^T A R."""
 
-    prior: Root
+    root: csr_array
     factor: Array
 
     def halved(self, matrix: Array) -> Array:
         """H (r, c) of a matrix B (p, c), whose H^T H is B^T (A + (R R^T)^-1)^-1 B."""
-        return np.asarray(solve_triangular(self.factor, self.prior.turned(matrix), lower=True))
+        return np.asarray(solve_triangular(self.factor, self.root.T @ matrix, lower=True, check_finite=False))
 
     def back(self, half: Array) -> Array:
         """(A + (R R^T)^-1)^-1 B of H (r, c); of ones a root of the covariance."""
-        return self.prior.times(solve_triangular(self.factor, half, lower=True, trans="T"))
+        return np.asarray(self.root @ solve_triangular(self.factor, half, lower=True, trans="T"))
 
     @cached_property
     def half_ln_determinant(self) -> float:
@@ -107,10 +107,12 @@ class Nuisances:
         return root @ root.T
 
 
-def under(prior: Root, information: Array) -> Nuisances:
-    """Nuisances of an information (p, p) under a prior of theirs alone."""
-    inner = prior.within(information)
-    return Nuisances(prior, np.asarray(cholesky(inner + np.eye(len(inner)), lower=True)))
+def under(root: csr_array, information: Array) -> Nuisances:
+    """Nuisances of an information (p, p) under a prior of theirs alone, of which R (p, r) is the `root`."""
+    turn = root.T
+    inner = np.asarray(turn @ (turn @ information).T)
+    np.fill_diagonal(inner, inner.diagonal() + 1.0)
+    return Nuisances(root, np.asarray(cholesky(inner.T, lower=True, overwrite_a=True, check_finite=False)))
 
 
 def marginal(q: Quadratic, nuisances: Nuisances) -> Marginal:
@@ -120,7 +122,7 @@ def marginal(q: Quadratic, nuisances: Nuisances) -> Marginal:
 
 def _apart(q: Quadratic, nuisances: Nuisances) -> tuple[Marginal, Array, Array]:
     """`marginal`, and `Nuisances.halved` of b (r,) and of what couples nuisances to mechanisms (r, m)."""
-    p = len(nuisances.prior.scale)
+    p = nuisances.root.shape[0]
     halves = nuisances.halved(np.concatenate([q.b[:p, None], q.a[:p, p:]], axis=1))
     b, a = halves[:, 0], halves[:, 1:]
     constant = -0.5 * q.constant + 0.5 * float(b @ b) - nuisances.half_ln_determinant

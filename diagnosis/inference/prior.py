@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import solve_triangular
+from scipy.sparse import csr_array
 
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.diagnosis.parameters.mechanism import REFERENCE_DEPARTURE, REFERENCE_WIDTH, Mechanism, size_covariance
 from thermospindle.model.machine import Condition
-from thermospindle.model.types import Array, Integers
+from thermospindle.model.types import Array
 
 REFERENCE = {
     kinds_of.BUILD: 1.0,
@@ -93,9 +94,17 @@ def roots_of(model: CampaignModel, mechanisms: Sequence[Mechanism]) -> tuple[Arr
     return tuple(np.asarray(np.linalg.cholesky(size_covariance(conditions, w * m.size.prior_sd, d, o, m.reference)), float) for m, w, d, o in own)
 
 
+def _width(kind: str, sizes: Mapping[str, float]) -> float:
+    """Of the nuisances of one kind, in units of its reference width."""
+    return sizes[kind] / REFERENCE[kind] if kind in sizes else 1.0
+
+
 def nuisance_variances(model: CampaignModel, sizes: Mapping[str, float]) -> Array:
     """Prior variances (P,) of the nuisance parameters in units of their reference widths."""
-    return np.array([(sizes[p.kind] / REFERENCE[p.kind]) ** 2 if p.kind in sizes else 1.0 for p in model.parameters])
+    found = np.ones(len(model.parameters))
+    for kind, own in model.numbers.of_kind.items():
+        found[own] = _width(kind, sizes) ** 2
+    return found
 
 
 def misjudged(model: CampaignModel, sizes: Mapping[str, float], moved: Array) -> Array:
@@ -110,22 +119,25 @@ def misjudged(model: CampaignModel, sizes: Mapping[str, float], moved: Array) ->
     if not (shares.any() and moved.any()):
         return np.zeros((len(model.parameters), 0))
     found = np.zeros((len(model.parameters), len(moved), *moved.shape[2:]))
-    for i, q in enumerate(model.parameters):
-        if q.kind in DRIFTING:
-            which, mode = DRIFTING.index(q.kind), q.modes[0]
-            found[i, :, which, mode] = shares * moved[:, q.test, which, mode] / REFERENCE[q.kind]
+    test, _, mode = model.numbers.places
+    for which, kind in enumerate(DRIFTING):
+        if (own := model.numbers.of_kind.get(kind)) is not None:
+            found[own, :, which, mode[own]] = (shares[:, None] * moved[:, test[own], which, mode[own]]).T / REFERENCE[kind]
     columns = found.reshape(len(found), int(np.prod(found.shape[1:])))
     return columns[:, columns.any(axis=0)]
 
 
 def ageing(model: CampaignModel, sizes: Mapping[str, float]) -> Array:
     """Root (P, k) of the prior covariance of gains that go straight with the order in which the campaign lists its tests, in proportion to their drift from test to test."""
-    order, scatter = np.linspace(-1.0, 1.0, len(model.tests)), np.sqrt(nuisance_variances(model, sizes))
-    found: dict[tuple[str, int], Array] = {}
-    for i, q in enumerate(model.parameters):
-        if q.kind in AGES and scatter[i]:
-            found.setdefault((q.kind, q.index), np.zeros(len(model.parameters)))[i] = AGEING * scatter[i] * order[q.test]
-    return np.array(list(found.values())).reshape(len(found), len(model.parameters)).T
+    order, found = np.linspace(-1.0, 1.0, len(model.tests)), [np.zeros((len(model.parameters), 0))]
+    test, index, _ = model.numbers.places
+    for kind in AGES:
+        own = model.numbers.of_kind.get(kind)
+        if own is not None and (scatter := _width(kind, sizes)):
+            gains, of = np.unique(index[own], return_inverse=True)
+            found.append(np.zeros((len(model.parameters), len(gains))))
+            found[-1][own, of] = AGEING * scatter * order[test[own]]
+    return np.hstack(found)
 
 
 def correlated(model: CampaignModel, sizes: Mapping[str, float], moved: Array) -> Array:
@@ -153,37 +165,17 @@ def whitened_covariance(conditions: tuple[Condition, ...], reference: Condition 
     return np.asarray(solve_triangular(root, half.T, lower=True))
 
 
-@dataclass(frozen=True, eq=False)
-class Root:
-    """R (P, r) of the nuisances' prior covariance R R^T: diag(`scale`) (P,) and `beside` (P, k)."""
-
-    scale: Array
-    beside: Array
-
-    @cached_property
-    def wide(self) -> Integers:
-        """The nuisances that have a width of their own; r counts these alone."""
-        return np.flatnonzero(self.scale)
-
-    def turned(self, matrix: Array) -> Array:
-        """R^T `matrix`, (P, c) to (r, c)."""
-        return np.concatenate([self.scale[self.wide, None] * matrix[self.wide], self.beside.T @ matrix])
-
-    def times(self, matrix: Array) -> Array:
-        """R `matrix`, (r, c) to (P, c)."""
-        w = len(self.wide)
-        found = self.beside @ matrix[w:]
-        found[self.wide] += self.scale[self.wide, None] * matrix[:w]
-        return np.asarray(found)
-
-    def within(self, matrix: Array) -> Array:
-        """R^T `matrix` R of a symmetric one, (P, P) to (r, r)."""
-        return self.turned(self.turned(matrix).T)
+def together(scale: Array, beside: Array) -> csr_array:
+    """R (P, r) of the covariance R R^T of parameters that have each a width of their own, `scale` (P,), and `beside` (P, k) what is not each by itself; those without either have no columns."""
+    wide = np.flatnonzero(scale)
+    rows, columns = beside.nonzero()
+    terms, places = np.concatenate([scale[wide], beside[rows, columns]]), (np.concatenate([wide, rows]), np.concatenate([np.arange(len(wide)), len(wide) + columns]))
+    return csr_array((terms, places), shape=(len(scale), len(wide) + beside.shape[1]))
 
 
-def nuisance_root(model: CampaignModel, sizes: Mapping[str, float], moved: Array) -> Root:
-    """Of the nuisances, the mechanisms having `moved` the modes; singular where a size is zero."""
-    return Root(np.sqrt(nuisance_variances(model, sizes)), correlated(model, sizes, moved))
+def nuisance_root(model: CampaignModel, sizes: Mapping[str, float], moved: Array) -> csr_array:
+    """R (P, r) of the nuisances' prior covariance R R^T, the mechanisms having `moved` the modes; singular where a size is zero."""
+    return together(np.sqrt(nuisance_variances(model, sizes)), correlated(model, sizes, moved))
 
 
 def mechanism_root(model: CampaignModel, mechanisms: Sequence[Mechanism], learned: Learned) -> Array:

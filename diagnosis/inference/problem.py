@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from thermospindle.diagnosis.forward.derivatives import column, nuisance_jacobian
+from thermospindle.diagnosis.forward.derivatives import Derivatives, column, nuisance_jacobian
 from thermospindle.diagnosis.forward.linear import Rates
 from thermospindle.diagnosis.forward.model import FAILED, SIZE_STEP, Applied, CampaignModel
 from thermospindle.diagnosis.forward.rates import rates_of
@@ -142,24 +142,23 @@ class Problem:
                     continue
         return np.zeros(self.model.tests[t].count)
 
-    def linearised(self, t: int, p: Array, rates: Rates) -> tuple[Array, Array, Integers]:
-        """Residual (N,), derivatives (k, N) and the numbers (k,) of the parameters of p they belong to."""
+    def linearised(self, t: int, p: Array, rates: Rates) -> tuple[Array, Derivatives]:
+        """Residual (N,) of test `t` and its derivatives by the parameters of p that move it."""
         x, sizes, shapes = self.parts(p)
         effects = self.applied(t, sizes, shapes)
-        more = sum(t + 1 + len(m.shape) for m in self.mechanisms)
-        r, jacobian, numbers = nuisance_jacobian(self.model, t, x, self.acting(effects), rates, more)
-        own: list[int] = []
-        row, at = len(numbers), self.nuisances
+        more = sum(1 + len(m.shape) for m in self.mechanisms)
+        r, found = nuisance_jacobian(self.model, t, x, self.acting(effects), rates, more)
+        numbers, of, times = [], [], []
+        row, at = len(found.rows) - more, self.nuisances
         for k, (m, root) in enumerate(zip(self.mechanisms, self.roots, strict=True)):
-            by_size = self.by_size(t, x, effects, k)
-            np.multiply(root[t, : t + 1, None], by_size, out=jacobian[row : row + t + 1])
-            own += range(at, at + t + 1)
-            row, at = row + t + 1, at + self.tests
-            for q in m.shape:
-                jacobian[row] = q.prior_sd * self._by_value(t, x, effects, k, q)
-                own.append(at)
-                row, at = row + 1, at + 1
-        return r, jacobian, np.concatenate([numbers, np.array(own, int)])
+            found.rows[row] = self.by_size(t, x, effects, k)
+            numbers += [*range(at, at + t + 1), *range(at + self.tests, at + self.tests + len(m.shape))]
+            of += [*[row] * (t + 1), *range(row + 1, row + 1 + len(m.shape))]
+            times += [*root[t, : t + 1], *(q.prior_sd for q in m.shape)]
+            for n, q in enumerate(m.shape, row + 1):
+                found.rows[n] = self._by_value(t, x, effects, k, q)
+            row, at = row + 1 + len(m.shape), at + self.tests + len(m.shape)
+        return r, found.further(np.array(numbers, int), np.array(of, int), np.array(times, float))
 
     def effects_of(self, p: Array) -> list[list]:
         _, sizes, shapes = self.parts(p)
@@ -169,7 +168,7 @@ class Problem:
         """Of all tests, without the parameters that are `held` where they are; with rates of its own where a mechanism that has gone, or come, took degrees of
         freedom with it."""
         x, effects_of = self.parts(p)[0], self.effects_of(p)
-        if any(self.model.linear(t, x, own).matrices.dofs != dofs for t, (own, dofs) in enumerate(zip(effects_of, rates.dofs, strict=True))):
+        if any(self.model.standing(t, x, own)[0].matrices.dofs != dofs for t, (own, dofs) in enumerate(zip(effects_of, rates.dofs, strict=True))):
             rates = rates_of(self.model, x, effects_of, rates)
         return Linearisation(self.length, [self.linearised(t, p, rates) for t in range(self.tests)]).without(held)
 
@@ -200,28 +199,27 @@ def built(residual: Callable[[int], Array], tests: int) -> list[Array] | None:
 class Linearisation:
     """Derivatives of all tests at one point: information J^T J, and gradients J^T r of residuals there or near."""
 
-    def __init__(self, length: int, rows: Sequence[tuple[Array, Array, Integers]]) -> None:
+    def __init__(self, length: int, rows: Sequence[tuple[Array, Derivatives]]) -> None:
         self.length, self.rows = length, rows
-        self.residuals = [r for r, _, _ in rows]
+        self.residuals = [r for r, _ in rows]
         self.information: Array = np.zeros((length, length))
-        self._own = [jacobian @ jacobian.T for _, jacobian, _ in rows]
-        for own, (_, _, numbers) in zip(self._own, rows, strict=True):
-            self.information[np.ix_(numbers, numbers)] += own
+        self._own = [found.information for _, found in rows]
+        for own, (_, found) in zip(self._own, rows, strict=True):
+            self.information[np.ix_(found.numbers, found.numbers)] += own
 
     @property
     def by_test(self) -> list[Array]:
         """The information (n, n) of each test."""
-        found = [np.zeros_like(self.information) for _ in self.rows]
-        for information, own, (_, _, numbers) in zip(found, self._own, self.rows, strict=True):
-            information[np.ix_(numbers, numbers)] = own
-        return found
+        every = [np.zeros_like(self.information) for _ in self.rows]
+        for information, own, (_, found) in zip(every, self._own, self.rows, strict=True):
+            information[np.ix_(found.numbers, found.numbers)] = own
+        return every
 
     def without(self, held: Integers) -> Linearisation:
         """The same with some parameters held where they are."""
         if not len(held):
             return self
-        kept = [~np.isin(numbers, held) for _, _, numbers in self.rows]
-        return Linearisation(self.length, [(r, j[own], n[own]) for (r, j, n), own in zip(self.rows, kept, strict=True)])
+        return Linearisation(self.length, [(r, found.by(~np.isin(found.numbers, held))) for r, found in self.rows])
 
     @cached_property
     def chi2(self) -> float:
@@ -238,9 +236,7 @@ class Linearisation:
         return np.asarray(temper**2 * np.sum(self.gradients(at.residuals), axis=0) + problem.precision @ at.p)
 
     def gradients(self, residuals: Sequence[Array]) -> list[Array]:
-        found = []
-        for r, (_, jacobian, numbers) in zip(residuals, self.rows, strict=True):
-            gradient = np.zeros(self.length)
-            gradient[numbers] = jacobian @ r
-            found.append(gradient)
-        return found
+        gradients = [np.zeros(self.length) for _ in self.rows]
+        for gradient, r, (_, found) in zip(gradients, residuals, self.rows, strict=True):
+            gradient[found.numbers] = found.products(r)
+        return gradients

@@ -8,13 +8,13 @@ oscillator on the machine that would make that is looked for, and becomes part o
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from thermospindle.diagnosis.data.lines import LineData
 from thermospindle.diagnosis.data.mode_table import TestData
-from thermospindle.diagnosis.forward.derivatives import by_products_of_shares
+from thermospindle.diagnosis.forward.derivatives import Derivatives, by_products_of_shares
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.forward.response import Light
 from thermospindle.diagnosis.inference.fit import Fit
@@ -22,7 +22,7 @@ from thermospindle.diagnosis.inference.prior import Learned
 from thermospindle.diagnosis.inference.problem import Linearisation, Problem
 from thermospindle.diagnosis.inference.screening import linearised
 from thermospindle.diagnosis.parameters.nuisance import SHARE_SD, Resonance
-from thermospindle.model.types import Array, ComplexArray, Integers
+from thermospindle.model.types import Array, ComplexArray
 
 LAGS = 12  # lines over which residuals are compared
 SMALL, BY_CHANCE = 0.05, 3.0  # a correlation that says nothing, and its standard deviations by chance (of n numbers 1 / sqrt(n) each) up to which it says nothing either
@@ -50,9 +50,10 @@ def overlap(model: CampaignModel, fit: Fit) -> Overlap:
     """Of the residuals that an explanation leaves in FRF lines."""
     problem = Problem(model, fit.mechanisms)
     left = [
-        (d.frequency, problem.residual(t, fit.point).reshape(-1, len(d.frequency)))
+        (d.frequency, np.concatenate([left.real, left.imag]))
         for t, d in enumerate(model.tests)
         if isinstance(d, LineData) and d.count
+        for left in [problem.residual(t, fit.point).view(complex).reshape(-1, len(d.frequency))]
     ]
     total, square, count = np.zeros(LAGS), sum(float(np.mean(r * r)) for _, r in left), sum(r.size for _, r in left)
     if square <= 0.0:
@@ -111,10 +112,11 @@ def light_resonance(model: CampaignModel, about: Fit, learned: Learned, drifts: 
     k = seen * (seen + 1) // 2
     own = []
     for t, _ in with_lines:
-        residual, derivatives, numbers = at.rows[t]
+        residual, by = at.rows[t]
         moved, s = by_products_of_shares(model, t, x, effects[t], seen)
         felt = np.array([-SHARE_SD**2 * light.felt(s)[0] for light in lights])
-        own.append((numbers, *by_frequency(moved, felt, residual, derivatives)))
+        cross, square, slope = by_frequency(moved, felt, residual, by.rows)
+        own.append((by.numbers, by.times[:, None] * cross[:, by.of], square, slope))
     rows = []
     for drift, shift in zip(drifts, shifts, strict=True):
         cross, square, slope = np.zeros((count, len(inverse), k)), np.zeros((count, k, k)), np.zeros((count, k))
@@ -135,21 +137,18 @@ def light_resonance(model: CampaignModel, about: Fit, learned: Learned, drifts: 
     return Resonance(frequency, DAMPING, tuple(shares.tolist()), (drift, 0.0)), gain - float(np.log(len(rows)))
 
 
-def _alone(data: TestData, residual: Array, derivatives: Array, numbers: Integers) -> tuple[Array, Array, Integers]:
-    """Rows of a linearisation with every line by itself (`LineData.alone`)."""
-    if not isinstance(data, LineData):
-        return residual, derivatives, numbers
-    rows = data.alone(np.concatenate([residual[None], derivatives]))
-    return rows[0], rows[1:], numbers
+def _alone(data: TestData, residual: Array, by: Derivatives) -> tuple[Array, Derivatives]:
+    """Residuals and derivatives of a test with every line by itself (`LineData.alone`)."""
+    return (data.alone(residual[None])[0], replace(by, rows=data.alone(by.rows))) if isinstance(data, LineData) else (residual, by)
 
 
 def by_frequency(moved: ComplexArray, felt: ComplexArray, residual: Array, derivatives: Array) -> tuple[Array, Array, Array]:
-    """Of columns that are the real and imaginary parts of `moved` (k, channels, L) times each of `felt` (F, L): their products with `derivatives` (n, N), (F, n, k), among
+    """Of columns that are the real and imaginary parts, one after the other, of `moved` (k, channels, L) times each of `felt` (F, L): their products with `derivatives` (n, N), (F, n, k), among
     themselves (F, k, k), and with the `residual` (N,), (F, k). What is felt is the same for all channels of a line, so that these are summed up once."""
     k, channels, lines = moved.shape
-    every = np.concatenate([derivatives, residual[None]]).reshape(-1, 2, channels, lines)
+    every = np.concatenate([derivatives, residual[None]]).view(complex).reshape(-1, channels, lines)
     by_line = np.moveaxis(moved, -1, 0)  # (L, k, channels)
-    turned = np.moveaxis(every[:, 0] - 1j * every[:, 1], -1, 0)  # (L, n + 1, channels)
+    turned = np.moveaxis(every.conj(), -1, 0)  # (L, n + 1, channels)
     with_each = (turned @ by_line.swapaxes(1, 2)).reshape(lines, -1)
     among = (by_line @ by_line.conj().swapaxes(1, 2)).real.reshape(lines, -1)
     found = (felt @ with_each).real.reshape(len(felt), -1, k)

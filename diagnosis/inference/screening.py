@@ -116,12 +116,12 @@ def _by_size(problem: Problem, about: Fit, shape: Array) -> tuple[Array, list[tu
     p[problem.length - len(shape) :] = shape
     x, own_sizes, shapes = problem.parts(p)
     rows = []
-    for t, (residual, derivatives, numbers) in enumerate(at.rows):
+    for t, (residual, derivatives) in enumerate(at.rows):
         try:
             column = problem.by_size(t, x, problem.applied(t, own_sizes, shapes), k)
         except FAILED:
             column = np.zeros(len(residual))
-        rows.append((derivatives @ column, numbers, float(column @ column), float(column @ residual)))
+        rows.append((derivatives.products(column), derivatives.numbers, float(column @ column), float(column @ residual)))
     return p, rows
 
 

@@ -93,14 +93,14 @@ def missed(found: Settled, tests: Sequence[TestData], group: LeftOut) -> Missed:
     information, gradient, total, count = np.zeros((problem.length,) * 2), np.zeros(problem.length), 0.0, 0
     relative: list[Array] = []
     for t in group.tests:
-        r, jacobian, numbers = problem.linearised(t, point, rates)
+        r, by = problem.linearised(t, point, rates)
         own = _rows(tests[t], group.modes.get(t), len(r))
         if isinstance(data := tests[t], ModeData):
             of_frequency = own[: len(data.frequency)]
             relative.append(np.expm1(r[: len(of_frequency)] * data.frequency_sd)[of_frequency])
-        r, jacobian = r[own], jacobian[:, own]
-        information[np.ix_(numbers, numbers)] += jacobian @ jacobian.T
-        gradient[numbers] += jacobian @ r
+        r, by = r[own], replace(by, rows=by.rows[:, own])
+        information[np.ix_(by.numbers, by.numbers)] += by.information
+        gradient[by.numbers] += by.products(r)
         total += float(r @ r)
         count += len(r)
     size, directions = np.linalg.eigh(covariance)

@@ -27,40 +27,56 @@ class Numbers:
     reference: ReferenceModes
 
     @cached_property
-    def expansion(self) -> list[int]:
+    def of_kind(self) -> dict[str, Integers]:
+        """Numbers of the parameters of every kind there is."""
+        kinds = [p.kind for p in self.parameters]
+        return {kind: np.flatnonzero(np.array(kinds) == kind) for kind in dict.fromkeys(kinds)}
+
+    def _of(self, *kinds: str) -> Integers:
+        return np.sort(np.concatenate([self.of_kind.get(kind, np.zeros(0, int)) for kind in kinds]))
+
+    @cached_property
+    def places(self) -> tuple[Integers, Integers, Integers]:
+        """Test, index and first mode (P,) of every parameter, -1 where it has none."""
+        rows = [(-1 if p.test is None else p.test, p.index, p.modes[0]) for p in self.parameters]
+        test, index, mode = np.array(rows, int).reshape(-1, 3).T
+        return test, index, mode
+
+    @cached_property
+    def expansion(self) -> Integers:
         """Numbers of the parameters of ring expansion."""
-        return [i for i, p in enumerate(self.parameters) if p.kind == kinds_of.EXPANSION]
+        return self._of(kinds_of.EXPANSION)
 
     @cached_property
-    def coefficients(self) -> list[int]:
+    def coefficients(self) -> Integers:
         """Numbers of the parameters of coefficients of expansion."""
-        return [i for i, p in enumerate(self.parameters) if p.kind == kinds_of.COEFFICIENT]
+        return self._of(kinds_of.COEFFICIENT)
 
     @cached_property
-    def apart(self) -> list[int]:
+    def apart(self) -> Integers:
         """Numbers of the parameters by which bearings differ among themselves."""
-        return [i for i, p in enumerate(self.parameters) if p.kind in kinds_of.APART]
+        return self._of(*kinds_of.APART)
 
     @cached_property
-    def balls(self) -> list[list[int]]:
+    def balls(self) -> list[Integers]:
         """For every test the numbers of the parameters by which balls are stiffer: in one direction, with temperature, and in this test."""
-        kinds = (kinds_of.BALLS, kinds_of.CHANGE)
-        return [[i for i, p in enumerate(self.parameters) if p.kind in kinds and p.test in (None, t)] for t in range(len(self.tests))]
+        own = self._of(kinds_of.BALLS, kinds_of.CHANGE)
+        return [own[np.isin(self.places[0][own], (-1, t))] for t in range(len(self.tests))]
 
     @cached_property
-    def flung(self) -> list[int]:
+    def flung(self) -> Integers:
         """The number of the parameter by which the balls' inertia loads are off, where the scene has these."""
-        return [i for i, p in enumerate(self.parameters) if p.kind == kinds_of.FLUNG]
+        return self._of(kinds_of.FLUNG)
 
     @cached_property
-    def uneven(self) -> list[int]:
+    def uneven(self) -> Integers:
         """Numbers of the parameters by which joints are uneven about the axis."""
-        return [i for i, p in enumerate(self.parameters) if p.kind == kinds_of.UNEVEN]
+        return self._of(kinds_of.UNEVEN)
 
     @cached_property
-    def masses(self) -> list[int]:
+    def masses(self) -> Integers:
         """Numbers of the parameters of how bodies have their mass."""
-        return [i for i, p in enumerate(self.parameters) if p.kind == kinds_of.MASSES]
+        return self._of(kinds_of.MASSES)
 
     @cached_property
     def temperature(self) -> list[int]:

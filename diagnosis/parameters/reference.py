@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import eigh
@@ -37,9 +38,17 @@ class ReferenceModes:
         return Turned(stated, np.where(apart, 1 / np.where(apart, difference, 1.0), 0.0), self.seen)
 
     def over(self, dofs: Sequence[tuple[str, str]]) -> Array:
-        """M f over other dofs: zero for those that the reference has not."""
-        place = {dof: i for i, dof in enumerate(self.dofs)}
-        return np.array([self.weighted[place[dof]] if dof in place else np.zeros(len(self.omega)) for dof in dofs])
+        """M f over other dofs: zero for those that the reference has not; read only."""
+        if (known := tuple(dofs)) not in self._over:
+            place = {dof: i for i, dof in enumerate(self.dofs)}
+            found = np.array([self.weighted[place[dof]] if dof in place else np.zeros(len(self.omega)) for dof in dofs])
+            found.flags.writeable = False
+            self._over[known] = found
+        return self._over[known]
+
+    @cached_property
+    def _over(self) -> dict[tuple[tuple[str, str], ...], Array]:
+        return {}
 
     def moved(self, plain: Matrices, acting: Matrices) -> Array:
         """Relative changes (2, seen) of the frequency and the damping of the modes seen from one state to another of the same dofs, to first order."""

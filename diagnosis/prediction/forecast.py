@@ -117,11 +117,11 @@ def by_all(model: CampaignModel, s: Standing, plan: Condition) -> Array:
     k = len(pole)
     table = ModeData(model.tests[0].test, plan, np.abs(pole) / (2 * np.pi), np.ones(k), np.ones(k), np.full(k, np.inf), kinds(linear.matrices, shape))
     there = replace(there, tests=(table,))
-    _, derivatives, numbers = nuisance_jacobian(there, 0, x, effects, rates_of(there, x, [effects], s.hypothesis.fit.rates))
+    _, by = nuisance_jacobian(there, 0, x, effects, rates_of(there, x, [effects], s.hypothesis.fit.rates))
     rates = np.zeros((k, len(x) + 1))
-    lasting = [there.parameters[i].test is None for i in numbers]
-    rates[:, numbers[lasting]] = derivatives[lasting].T
-    rates[:, -1] = derivatives[numbers == there.numbers.temperature[0]][0]
+    lasting = np.array([there.parameters[i].test is None for i in by.numbers])
+    rates[:, by.numbers[lasting]] = by.whole[lasting].T
+    rates[:, -1] = by.whole[by.numbers == there.numbers.temperature[0]][0]
     return rates
 
 

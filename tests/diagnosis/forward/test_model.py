@@ -80,7 +80,11 @@ def differences(model, t, x, numbers, step=2e-3):
 def worst_by_kind(model, t, x):
     """Largest error of a derivative over the length of that derivative, for every kind of nuisance parameter."""
     rates = rates_of(model, x, [[] for _ in model.tests])
-    r, jacobian, numbers = nuisance_jacobian(model, t, x, [], rates)
+    r, by = nuisance_jacobian(model, t, x, [], rates)
+    jacobian, numbers = by.whole, by.numbers
+    assert len(by.rows) <= len(numbers)  # a gain and its drift do the same
+    assert by.information == pytest.approx(jacobian @ jacobian.T, rel=1e-9, abs=1e-9 * np.abs(by.information).max())
+    assert by.products(r) == pytest.approx(jacobian @ r, abs=1e-9 * np.abs(jacobian @ r).max())
     assert np.array_equal(r, model.residual(t, x, []))
     assert len(set(numbers)) == len(numbers)
     wanted = differences(model, t, x, numbers)
@@ -113,12 +117,12 @@ def test_derivatives_of_lines_whose_errors_go_together(scene):
     model, x = made(scene)
     model = replace(model, tests=tuple(windowed(d) for d in model.tests))
     for t, data in enumerate(model.tests):
-        r, jacobian, numbers = nuisance_jacobian(model, t, x, [], rates_of(model, x, [[], []]))
+        r, by = nuisance_jacobian(model, t, x, [], rates_of(model, x, [[], []]))
         assert r == pytest.approx(model.residual(t, x, []))
         plain = replace(model, tests=tuple(replace(d, alike=None) for d in model.tests))
-        assert data.alone(jacobian) * np.sqrt(data.smooth) == pytest.approx(nuisance_jacobian(plain, t, x, [], rates_of(plain, x, [[], []]))[1], rel=1e-6, abs=1e-6)
-        expected = differences(model, t, x, numbers).T
-        assert np.linalg.norm(jacobian - expected, axis=1) == pytest.approx(np.zeros(len(numbers)), abs=5e-3 * np.linalg.norm(expected, axis=1).max())
+        assert data.alone(by.rows) * np.sqrt(data.smooth) == pytest.approx(nuisance_jacobian(plain, t, x, [], rates_of(plain, x, [[], []]))[1].rows, rel=1e-6, abs=1e-6)
+        expected = differences(model, t, x, by.numbers).T
+        assert np.linalg.norm(by.whole - expected, axis=1) == pytest.approx(np.zeros(len(by.numbers)), abs=5e-3 * np.linalg.norm(expected, axis=1).max())
 
 
 def test_what_a_bearing_may_change_by_otherwise():
@@ -146,9 +150,9 @@ def test_a_test_of_a_flexible_shaft_that_is_left_out_has_none_either():
 
 
 def has_none(model, x):
-    r, jacobian, numbers = nuisance_jacobian(model, 1, x, [], rates_of(model, x, [[], []]))
+    r, by = nuisance_jacobian(model, 1, x, [], rates_of(model, x, [[], []]))
     assert r.shape == (0,)
-    assert jacobian.shape == (len(numbers), 0)
+    assert by.whole.shape == (len(by.numbers), 0)
 
 
 @pytest.mark.slow
@@ -207,7 +211,7 @@ def test_derivatives_of_records_that_end_early(scene):
         by_pair = [np.outer(vectors[:, a], vectors[:, b]) + np.outer(vectors[:, b], vectors[:, a]) for a, b in zip(i, j, strict=True)]
         zero = np.zeros((n, n))
         power = {"mass": 2, "damping": 1, "stiffness": 0}[which]
-        at_once = np.concatenate(list(at(1.0, 0.0).moved_together(vectors, power, [(i, j)], np.ones(2))))
+        at_once = np.concatenate(list(at(1.0, 0.0).moved_together(vectors, power, [(i, j)])))
         by_each = [products(*[pair if k == which else zero for k in ("mass", "damping", "stiffness")]) for pair in by_pair]
         apart = at(1.0, 0.0).moved(together(by_each))
         assert np.abs(at_once - apart).max() < 1e-9 * np.abs(apart).max()
@@ -236,7 +240,7 @@ def test_parameters_of_other_tests_do_not_move_a_test(scene):
     model, x = made(scene)
     rates = rates_of(model, x, [[], []])
     for t in (0, 1):
-        _, _, numbers = nuisance_jacobian(model, t, x, [], rates)
+        numbers = nuisance_jacobian(model, t, x, [], rates)[1].numbers
         others = [i for i in range(len(x)) if i not in set(numbers)]
         assert others
         assert {model.parameters[i].test for i in others} == {1 - t}
@@ -302,7 +306,8 @@ def test_derivatives_of_shapes(name, real):
     assert data.count == 2 * len(data.frequency) + len(data.frequency) * (len(scene.points) - 1) * (1 if real else 2)
     x = 0.1 * np.random.default_rng(2).standard_normal(len(model.parameters))
     for t in (0, 1):
-        r, jacobian, numbers = nuisance_jacobian(model, t, x, [], rates_of(model, x, [[] for _ in model.tests]))
+        r, by = nuisance_jacobian(model, t, x, [], rates_of(model, x, [[] for _ in model.tests]))
+        jacobian, numbers = by.whole, by.numbers
         assert len(r) == model.tests[t].count
         shapes = slice(2 * len(data.frequency), None)  # the others are a hundred times as sure
         wanted = differences(model, t, x, numbers)[shapes]

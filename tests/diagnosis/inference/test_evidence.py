@@ -18,12 +18,13 @@ from thermospindle.diagnosis.inference.prior import (
     ACTION,
     AGEING,
     UNMOVED,
-    Root,
+    correlated,
     mechanism_root,
     misjudged,
     nuisance_root,
     nuisance_variances,
     precision_and_variances,
+    together,
 )
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.diagnosis.parameters.nuisance import (
@@ -39,6 +40,7 @@ from thermospindle.diagnosis.parameters.nuisance import (
     STIFFNESS_DRIFT_SD,
     Nuisance,
 )
+from thermospindle.diagnosis.parameters.numbers import Numbers
 from thermospindle.model.machine import Condition
 
 
@@ -126,7 +128,7 @@ def test_a_model_that_is_wrong_may_be_wrong_in_what_conditions_and_an_effect_do(
         Nuisance(kind, kind, sd, test=t, modes=(i, i))
         for kind, sd in ((STIFFNESS_DRIFT, STIFFNESS_DRIFT_SD), (DAMPING_DRIFT, DAMPING_DRIFT_SD)) for t in (0, 1) for i in (0, 1)
     ]  # fmt: skip
-    model = SimpleNamespace(parameters=parameters)
+    model = SimpleNamespace(parameters=parameters, numbers=Numbers(parameters, (), None))
     moved = np.zeros((2, 2, 2, 2))
     moved[1, 0, 0, 1], moved[1, 1, 0, 1], moved[1, 1, 1, 0] = (
         0.01,
@@ -153,9 +155,9 @@ def test_a_model_that_is_wrong_may_be_wrong_in_what_conditions_and_an_effect_do(
 def test_gains_age_with_the_order_of_the_tests():
     """Beside what they scatter by, each sensor's and each hammer's by itself."""
     parameters = [Nuisance(kind, "gain", 1e-3, test=t, index=i) for kind in (DRIFT, kinds_of.HAMMER_DRIFT) for i in range(2) for t in range(3)]
-    model = SimpleNamespace(parameters=parameters, tests=[None] * 3)
+    model = SimpleNamespace(parameters=parameters, tests=[None] * 3, numbers=Numbers(parameters, (), None))
     own = nuisance_root(model, {DRIFT: 2 * kinds_of.DRIFT_SD, kinds_of.HAMMER_DRIFT: 0.0}, np.zeros((0, 3, 2, 0)))
-    covariance = np.diag(own.scale**2) + own.beside @ own.beside.T
+    covariance = (own @ own.T).toarray()
     one = 4 * (np.eye(3) + AGEING**2 * np.outer([-1, 0, 1], [-1, 0, 1]))
     assert covariance == pytest.approx(block_diag(one, one, np.zeros((6, 6))))
 
@@ -166,7 +168,7 @@ def test_what_is_wrong_in_an_effect_is_alike_in_all_tests():
     jacobian, y = random.standard_normal((60, 5)), random.standard_normal(60)
     beside, diagonal = random.standard_normal((5, 2)), np.array([1.0, 0.0, 0.3, 0.0, 2.0])
     q = Quadratic(float(y @ y), jacobian.T @ y, jacobian.T @ jacobian)
-    left = marginal(q, under(Root(np.sqrt(diagonal), beside), q.a))
+    left = marginal(q, under(together(np.sqrt(diagonal), beside), q.a))
     prior = np.diag(diagonal) + beside @ beside.T
     whole = multivariate_normal(np.zeros(60), np.eye(60) + jacobian @ prior @ jacobian.T)
     assert left.constant == pytest.approx(whole.logpdf(y) + 30 * np.log(2 * np.pi), rel=1e-9)
@@ -183,17 +185,16 @@ def test_a_fit_and_the_evidence_have_one_prior():
         Nuisance(kind, "drift", sd, test=t, modes=(i, i))
         for kind, sd in ((STIFFNESS_DRIFT, STIFFNESS_DRIFT_SD), (DAMPING_DRIFT, DAMPING_DRIFT_SD)) for t in tests for i in (0, 1)
     )  # fmt: skip
-    model = SimpleNamespace(parameters=parameters, tests=made.model.tests)
+    model = SimpleNamespace(parameters=parameters, tests=made.model.tests, numbers=Numbers(parameters, (), None))
     moved = np.random.default_rng(8).normal(0, 0.2, (1, len(tests), 2, 2))
     found, own = nuisance_root(model, learned.sizes, moved), mechanism_root(model, made.fit.mechanisms, learned)
-    p = len(found.scale)
-    assert (found.beside.shape[1], len(own)) == (4, len(tests) + len(made.fit.mechanisms[0].shape))
+    beside = correlated(model, learned.sizes, moved)
+    assert (beside.shape[1], len(own)) == (4, len(tests) + len(made.fit.mechanisms[0].shape))
     inverse, variances = precision_and_variances(model, made.fit.mechanisms, learned, moved)
-    covariance = block_diag(found.times(found.turned(np.eye(p))), own @ own.T)
+    covariance = block_diag((found @ found.T).toarray(), own @ own.T)
     assert variances == pytest.approx(np.diag(covariance), abs=1e-7)
-    assert np.abs(found.beside).max() > 0.1
+    assert np.abs(beside).max() > 0.1
     assert inverse @ covariance == pytest.approx(np.eye(len(covariance)), abs=1e-5)
-    assert found.within(np.eye(p)) == pytest.approx(found.turned(found.times(np.eye(len(found.within(np.eye(p)))))))
 
 
 def test_the_posterior_beside_nuisances_that_are_kept_is_that_of_all_together():
@@ -204,7 +205,7 @@ def test_the_posterior_beside_nuisances_that_are_kept_is_that_of_all_together():
     for m in (3, 0):
         n = 4 + m
         q = Quadratic(float(y @ y), jacobian[:, :n].T @ y, jacobian[:, :n].T @ jacobian[:, :n])
-        kept = under(Root(scale, beside), q.a[:4, :4])
+        kept = under(together(scale, beside), q.a[:4, :4])
         prior = block_diag(np.diag(scale**2) + beside @ beside.T, own @ own.T)[:n, :n]
         gain = prior @ jacobian[:, :n].T @ np.linalg.inv(np.eye(40) + jacobian[:, :n] @ prior @ jacobian[:, :n].T)
         mean, covariance, _ = posterior(q, kept, own[:m, :m])
@@ -221,7 +222,7 @@ def test_rounding_does_not_end_an_evidence():
     information = jacobian @ jacobian.T
     information[1:, 1:] -= 1e3 * np.eye(2)  # as rounding may have it
     q = Quadratic(0.0, np.zeros(3), information)
-    kept = under(Root(np.ones(1), np.zeros((1, 0))), q.a[:1, :1])
+    kept = under(together(np.ones(1), np.zeros((1, 0))), q.a[:1, :1])
     left = marginal(q, kept)
     root = np.array([np.eye(2), 3 * np.eye(2)])
     assert np.isfinite(left.integrated([root])).all()
@@ -337,7 +338,7 @@ def test_what_is_off_by_the_same_in_all_tests_is_no_drift():
         by_test.append((float(y @ y), -columns.T @ y, columns.T @ columns))
     chi2, gradient, information = (np.sum([b[k] for b in by_test], axis=0) for k in range(3))
     fit = Fit((), np.zeros(n), np.zeros((0, tests)), (), (), float(chi2), gradient, information, tuple(by_test), tests * rows, None, 1.0)
-    model = SimpleNamespace(parameters=tuple(parameters), tests=tuple(SimpleNamespace(condition=c, count=rows) for c in [Condition(20.0)] * tests))
+    model = SimpleNamespace(parameters=tuple(parameters), tests=tuple(SimpleNamespace(condition=c, count=rows) for c in [Condition(20.0)] * tests), numbers=Numbers(parameters, (), None))
     learned = evidence(model, fit).learned.sizes
     assert learned[DAMPING] > 0.0
     assert learned[DAMPING_DRIFT] == 0.0

@@ -10,6 +10,7 @@ import pytest
 from scipy import optimize
 
 from tests.virtual_campaign import drawn, effect, fitted, mode_campaign, model_of, virtual_campaign
+from thermospindle.diagnosis.forward.derivatives import Derivatives
 from thermospindle.diagnosis.inference.evidence import evidence
 from thermospindle.diagnosis.inference.fit import AFAR, TEMPERS, _from_afar, _settled, fit
 from thermospindle.diagnosis.inference.freeform import free_forms
@@ -76,7 +77,7 @@ class Ring(Problem):
 
     def linearisation(self, p, rates):
         across = np.array([p[0], p[1] + 1]) / np.hypot(p[0], p[1] + 1)
-        return Linearisation(2, [(self.residuals(p)[0], np.column_stack([100 * across, 3 * np.eye(2)]), np.arange(2))])
+        return Linearisation(2, [(self.residuals(p)[0], Derivatives(np.column_stack([100 * across, 3 * np.eye(2)]), np.arange(2), np.arange(2), np.ones(2)))])
 
 
 def test_a_bent_valley_is_followed_to_its_end(monkeypatch):

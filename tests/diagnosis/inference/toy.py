@@ -22,6 +22,7 @@ from thermospindle.diagnosis.parameters.nuisance import (
     TEMPERATURE,
     Nuisance,
 )
+from thermospindle.diagnosis.parameters.numbers import Numbers
 from thermospindle.model.machine import Condition
 from thermospindle.sim.effects.effect import Effect, Parameter
 
@@ -107,4 +108,4 @@ def toy(
         mechanisms, point, np.zeros((len(mechanisms), 3)), ((),) * len(mechanisms), roots, sum(b[0] for b in by_test),
         np.sum([b[1] for b in by_test], axis=0), np.sum([b[2] for b in by_test], axis=0), by_test, 3 * rows, None, 1.0,
     )  # fmt: skip
-    return Toy(SimpleNamespace(parameters=tuple(parameters), tests=tests), fit, jacobians, y, mechanisms)
+    return Toy(SimpleNamespace(parameters=tuple(parameters), tests=tests, numbers=Numbers(parameters, tests, None)), fit, jacobians, y, mechanisms)

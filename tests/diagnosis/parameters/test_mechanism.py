@@ -301,11 +301,11 @@ def test_derivatives_by_sizes(spindle, model, table):
     p[problem.nuisances :] = np.abs(p[problem.nuisances :])  # within limits: at one of them derivatives are those from inside
     rates = rates_of(used, problem.parts(p)[0], problem.effects_of(p))
     for t in (0, 1):
-        _, jacobian, numbers = problem.linearised(t, p, rates)
-        for i in numbers[numbers >= problem.nuisances]:
+        by = problem.linearised(t, p, rates)[1]
+        for i in by.numbers[by.numbers >= problem.nuisances]:
             up, down = p.copy(), p.copy()
             up[i] += 1e-3
             down[i] -= 1e-3
             wanted = (problem.residual(t, up) - problem.residual(t, down)) / 2e-3
-            found = jacobian[list(numbers).index(i)]
+            found = by.whole[list(by.numbers).index(i)]
             assert np.linalg.norm(found - wanted) <= 2e-2 * np.linalg.norm(wanted) + 1e-9
