@@ -24,7 +24,7 @@ from thermospindle.diagnosis.runout.next_test import CERTAIN, NextRunout, next_r
 from thermospindle.diagnosis.runout.sources import Sources, sources
 from thermospindle.model.machine import Spindle
 from thermospindle.sim.campaign.campaign import Campaign
-from thermospindle.sim.effects import CATALOGUE, of_scene
+from thermospindle.sim.effects import CATALOGUE, of_scene, usable
 from thermospindle.sim.effects.effect import Effect
 
 CLEAR = 12.0  # ln evidence by which an explanation must lead the model without it
@@ -81,7 +81,7 @@ def diagnose_runout(
     base = [fit_family(f) for f in parts]
     progress("lines fitted without any effect")
     present = {effect.name for effect, _ in of_scene(spindle)}
-    effects = [e for e in catalogue if e.imperfections is not None and e.name not in present]
+    effects = [e for e in usable(spindle, catalogue) if e.imperfections is not None and e.name not in present]
     tried = [v for e in effects for v in variants(e, found, parts)]
     fits = [_fitted((v,), parts, base, worth=True) for v in tried]
     best = _best_of_each(fits)
