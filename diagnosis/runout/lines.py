@@ -170,12 +170,15 @@ def _clusters(known: list[Line], near: float) -> list[list[Line]]:
 
 
 def _form(clusters: list[list[Line]], frequency: Array, size: Array, length: float, uncertain: Array) -> Array:
-    """Errors (probes, k) of lines of `size` (probes, k) that are not of noise: frequencies `uncertain` (k,) Hz, lines that beat, neighbours that leak."""
+    """Errors (probes, k) of lines of `size` (probes, k) that are not of noise: frequencies `uncertain` (k,) Hz, lines that beat, neighbours that leak.
+
+    Lines fitted as one at their mean are off it by up to half their spread, as one whose frequency is uncertain is, and leak as much.
+    """
     spread = np.array([c[-1].frequency - c[0].frequency for c in clusters]) * length
     off = uncertain * length
     apart = np.abs(frequency[:, None] - frequency) * length
     np.fill_diagonal(apart, np.inf)
-    leaked = size**2 @ ((LEAKS + off)[:, None] / np.maximum(apart, 0.5)) ** 2
+    leaked = size**2 @ ((LEAKS + off + spread / 2)[:, None] / np.maximum(apart, 0.5)) ** 2
     return np.asarray(np.sqrt((size * (FORM + 1 - np.sinc(spread / 2) * np.sinc(off))) ** 2 + leaked))
 
 

@@ -103,3 +103,19 @@ def test_every_bearing_of_a_scene_is_looked_at():
     made = runout_campaign(spindle, [Condition(20.0, 8000 * RPM)], 0.3, path="linear")
     tried = {v.values["bearing"] for e in diagnose_runout(spindle, made).explanations for v in e.variants if "bearing" in v.values}
     assert max(tried) > 1.0
+
+
+def test_what_leaks_from_lines_that_are_fitted_as_one_is_no_line_of_another():
+    """Lines of several bearings stand half a bin apart: what their sum leaves at a line along the axis, seen across it, is within its error."""
+    spindle = load(SCENES / "five_bearing")
+    made = runout_campaign(spindle, [Condition(20.0, s * RPM) for s in (4000, 8000)], 0.6, path="linear")
+    along = np.array([abs(p.direction[2]) > 0.5 for p in made.points])
+    apart = []
+    for test in made.tests:
+        for line in look(spindle, test).seen:
+            if len(directions := {g.direction for g in line.lines}) == 1:
+                nothing = along != (directions == {"axial"})
+                apart += list(np.abs(line.phasor[nothing]) / line.sd[nothing])
+    assert len(apart) > 300
+    assert max(apart) < 3.5  # exp(-3.5^2) of noise alone: 5e-6 a line
+    assert np.sqrt(np.mean(np.square(apart))) > 0.6
