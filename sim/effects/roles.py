@@ -11,7 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from thermospindle.model.machine import Region, Spindle
+from thermospindle.model.bearing.row import ring_speeds
+from thermospindle.model.machine import Bearing, Region, RollerBearing, Spindle
 from thermospindle.model.rotor.chain import Element
 from thermospindle.model.structure import Body, Joint
 from thermospindle.model.types import Array
@@ -31,6 +32,12 @@ def held(spindle: Spindle) -> set[str]:
     """The bearings one of whose rings is in a housing: in a body with that role, or in the ground, which then stands for a rigid one."""
     housings = {b.name for b in spindle.structure.bodies if b.role == "housing"} | {"ground"}
     return {b.name for b in spindle.all_bearings if b.inner_body in housings or b.outer_body in housings}
+
+
+def turning_ring(spindle: Spindle, b: Bearing | RollerBearing) -> str:
+    """Which ring of a bearing turns, inner or outer; inner where both do."""
+    inner, outer = ring_speeds(spindle, b, 1.0)
+    return "outer" if outer and not inner else "inner"
 
 
 def regions(spindle: Spindle, role: str) -> list[Region]:
