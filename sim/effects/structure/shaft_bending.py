@@ -72,7 +72,7 @@ def moved(element: Element, z: float) -> Element:
     """The same element told by the relative motion at another height: r(z_e) = B r(z), K -> B^T K B."""
     back = np.eye(5)
     back[0, 4], back[1, 3] = element.z - z, z - element.z
-    return replace(element, z=z, stiffness=back.T @ element.stiffness @ back, damping=back.T @ element.damping @ back)
+    return replace(element.told_by(back), z=z)
 
 
 def flexibility(beam: Sequence[Piece], start: float, stop: float) -> Array:
