@@ -8,16 +8,20 @@ import pytest
 from tests.conftest import SCENE
 from tests.sim.running.test_seen_part import geared
 from thermospindle.diagnosis.runout.compare import compare_runout
+from thermospindle.diagnosis.runout.explanation import variants
+from thermospindle.diagnosis.runout.fit import families, fit_family, merged
 from thermospindle.diagnosis.runout.lines import look
-from thermospindle.diagnosis.runout.verdict import diagnose_runout
+from thermospindle.diagnosis.runout.sources import sources
+from thermospindle.diagnosis.runout.verdict import _fitted, diagnose_runout
 from thermospindle.model.bearing.kinematics import lines, row_kinematics
 from thermospindle.model.built.drawn import drawn
 from thermospindle.model.built.imperfections import Imperfections
 from thermospindle.model.errors import BadInput
-from thermospindle.model.machine import Condition
+from thermospindle.model.machine import Addition, Condition
 from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
 from thermospindle.sim.campaign.simulated import runout_campaign
+from thermospindle.sim.effects import by_name, usable
 from thermospindle.sim.operating import operating_point
 
 SCENES = SCENE.parent
@@ -119,3 +123,33 @@ def test_what_leaks_from_lines_that_are_fitted_as_one_is_no_line_of_another():
     assert len(apart) > 300
     assert max(apart) < 3.5  # exp(-3.5^2) of noise alone: 5e-6 a line
     assert np.sqrt(np.mean(np.square(apart))) > 0.6
+
+
+def test_an_effect_that_does_nothing_gains_nothing_by_moving_several_families():
+    """Lines of one effect are fitted together and share the build's tolerances, which they do without it too: 9 in ln evidence were counted for it."""
+    spindle = load(SCENES / "five_bearing")
+    made = runout_campaign(spindle, [Condition(20.0, s * RPM) for s in (4000, 6000, 8000)], 0.6, path="linear")
+    seen = [look(spindle, t) for t in made.tests]
+    known = sources(spindle, seen, made.points)
+    parts = families(seen, known)
+    waviness = next(e for e in usable(spindle) if e.name == "ball_waviness")
+    variant = next(v for v in variants(waviness, known, parts) if v.values["half_order"] == 1 and v.values["bearing"] == 2)
+    assert len(variant.parts) > 1
+    own = [parts[i] for i in variant.parts]
+    nothing = replace(variant, amplitudes={s: 1e-12 * a for s, a in variant.amplitudes.items()}, parts=tuple(range(len(own))))
+    base = [fit_family(f) for f in own]
+    assert fit_family(merged(own)).evidence > sum(f.evidence for f in base) + 1.0
+    assert _fitted((nothing,), own, base, {}).delta_evidence < 0.5
+
+
+@pytest.mark.slow
+def test_no_second_effect_is_named_beside_a_wave_of_five_bearings():
+    """Ball waviness as the scene has it was taken for a second effect, needed beside an inner race of 400 nm."""
+    spindle = load(SCENES / "five_bearing")
+    values = by_name("race_waviness").typical() | {"amplitude": 400.0, "multiple": 1.0, "offset": 1.0, "ring": 0.0, "bearing": 4.0}
+    made = runout_campaign(replace(spindle, effects=(Addition("race_waviness", values),)), [Condition(20.0, s * RPM) for s in (4000, 6000, 8000)], 0.6)
+    d = diagnose_runout(spindle, made)
+    assert (d.verdict, d.effects) == ("identified", ("race_waviness",)), d.reason
+    best = d.explanations[0]
+    assert best.variants[0].values["bearing"] == 4.0
+    assert best.size[0] == pytest.approx(400.0, abs=4 * best.size_sd[0])
