@@ -24,6 +24,12 @@ def unbalance_carrier(spindle: Spindle, own: Imperfections) -> Body:
     return carrier(spindle, own.unbalance_z, own.unbalance_body, UNBALANCE)
 
 
+def unbalanced(spindle: Spindle) -> Body:
+    """The body that the scene's unbalance is on; without one, what turns, where one would be."""
+    own = spindle.imperfections
+    return unbalance_carrier(spindle, own) if own.unbalance or own.couple_unbalance else spindle.turning
+
+
 def load_carrier(spindle: Spindle) -> Body:
     """The same of the scene's radial load."""
     return carrier(spindle, spindle.radial_load_z, spindle.radial_load_body, RADIAL_LOAD)

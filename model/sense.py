@@ -127,7 +127,7 @@ def turned_damping(chain: RotorBase, mode: Mode) -> float:
         q = element_rows(chain, e) @ shape
         fed += ratio[e.a] * complex(q.conj() @ e.damping @ turn @ q)
     for rotor in {ratio[e.a] for e in own if e.loss_factor}:
-        lossy = [(e.loss_factor, e.stiffness, element_rows(chain, e)) for e in own if e.loss_factor and ratio[e.a] == rotor]
+        lossy = [(e.lossy, element_rows(chain, e)) for e in own if e.loss_factor and ratio[e.a] == rotor]
         across = np.zeros(len(shape), complex)
         at = {dof: k for k, dof in enumerate(linear.dofs)}
         for (body, move), k in at.items():

@@ -50,6 +50,7 @@ QUICK: dict[str, tuple[list[object], list[str]]] = {
     "effects": (["effects"], ["effects"]),
     "effects of a scene": (["effects", "--scene", SCENE], ["effects", "effects, and with --scene"]),
     "an effect": (["effects", "unbalance"], ["effects, of one effect"]),
+    "an effect in a scene": (["effects", "unbalance", "--scene", SCENE], ["effects, of one effect", "effects, of one effect with --scene"]),
     "impact": (["impact", "MADE/short", "--hits", 1], ["impact"]),
     "simulate": (["simulate", "MADE/short", "--temperatures", 20, "--hits", 1, "--element", "reduced", "--out", "OUT"], ["simulate"]),
     "runout": (["runout", SCENE, "--path", "linear", "--seconds", 0.2], ["runout"]),

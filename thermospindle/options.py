@@ -115,7 +115,7 @@ def _setting(text: str) -> tuple[str, float]:
     try:
         return name, _number(value)
     except argparse.ArgumentTypeError as error:
-        named = "; a bearing, a set or a channel goes by its number, as spindle effects EFFECT tells it" if value.strip().isidentifier() else ""
+        named = "; a bearing, a set or a channel goes by its number, as spindle effects EFFECT --scene SCENE tells it" if value.strip().isidentifier() else ""
         raise argparse.ArgumentTypeError(f"{name}: {error}{named}") from None
 
 

@@ -162,7 +162,7 @@ def assert_margin(
     near: list[tuple[float, str]] = []
     for point in points:
         own = _partner(points[0], point, index, _partners(points[0], point))
-        for line in lines(point.spindle, row_kinematics(point.spindle, point.state), multiples):
+        for line in lines(point.spindle, row_kinematics(point.spindle, point.state), point.condition.speed, multiples):
             if (line.direction == "axial") == (own.kind == "axial"):
                 percent = 100 * (line.frequency - own.frequency) / own.frequency
                 bearing = f" of bearing {line.bearing}" if line.bearing else ""

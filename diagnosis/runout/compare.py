@@ -9,19 +9,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thermospindle.diagnosis.runout.lines import Seen, UnexplainedLine, key_of, look, runout_tests
 from thermospindle.diagnosis.runout.sources import phasors, scatter
 from thermospindle.model.bearing.kinematics import Line
+from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Point, Spindle
-from thermospindle.model.types import Array
+from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.campaign.beside import on_nodes
 from thermospindle.sim.campaign.campaign import Campaign, Test
+from thermospindle.sim.campaign.runout_record import FEWEST
 from thermospindle.sim.campaign.simulated import set_down
 from thermospindle.sim.operating import operating_point
+from thermospindle.sim.running.probes import speed_ratio
 from thermospindle.sim.running.revolutions import revolutions
 
 STARTS = 24  # random starts of the balls
@@ -110,11 +113,26 @@ def _beside(spindle: Spindle, seen: Seen, points: tuple[Point, ...]) -> RunoutBe
             found.append(
                 LineBeside(one.frequency, one.frequency / turning, node, causes, measured, sd, computed, float(np.hypot(chance, build)))
             )
-    rro, nrro = _parts(seen, waves, turning)
+    ratios = np.array([abs(speed_ratio(spindle, by_node[n])) for n in seen.nodes])
+    _check_length(seen, turning * ratios)
+    rro, nrro = _parts(seen, waves, turning, ratios)
     return RunoutBeside(seen.test, tuple(sorted(found, key=lambda g: -max(g.measured, g.computed))), rro, nrro, seen.unexplained)
 
 
-def _parts(seen: Seen, waves: list[tuple[float, Any]], turning: float) -> tuple[tuple[PartBeside, ...], tuple[PartBeside, ...]]:
+def _check_length(seen: Seen, turning: Array) -> None:
+    """BadInput where a record holds too few revolutions of what a probe sees, which turns at `turning` (probes,) Hz."""
+    record = seen.test.runout
+    assert record is not None
+    slowest = int(turning.argmin())
+    if record.length * turning[slowest] < FEWEST:
+        told = f"{record.length * turning[slowest]:.3g} revolutions of what node {seen.nodes[slowest]} sees, at {60 * turning[slowest]:.6g} rpm"
+        raise BadInput(f"tests.{seen.test.id}: runout: {told}; at least {FEWEST:g} whole ones are needed")
+
+
+def _parts(
+    seen: Seen, waves: list[tuple[float, ComplexArray]], turning: float, ratios: Array
+) -> tuple[tuple[PartBeside, ...], tuple[PartBeside, ...]]:
+    """The repeatable and the nonrepeatable part of every probe, in revolutions of what it sees: that turns `ratios` (probes,) times as fast as the spindle, at `turning` Hz."""
     record = seen.test.runout
     assert record is not None
     n = len(seen.nodes)
@@ -123,20 +141,19 @@ def _parts(seen: Seen, waves: list[tuple[float, Any]], turning: float) -> tuple[
         for f, phasor in waves:
             turn = 2 * np.pi * f * record.axis
             made += np.outer(phasor.real, np.cos(turn)) - np.outer(phasor.imag, np.sin(turn))
-        angle = seen.condition.speed * record.axis
-        both = [revolutions(record.axis, angle, value - value.mean(axis=1, keepdims=True)) for value in (record.value, made)]
-
-        def compared(what: str) -> tuple[PartBeside, ...]:
-            m, c = (getattr(cut, what).reshape(n, -1) for cut in both)
-            rms, valley = (np.array([m.std(axis=1), c.std(axis=1)]).T, np.array([np.ptp(m, axis=1), np.ptp(c, axis=1)]).T)
-            return tuple(PartBeside(node, *map(float, r), *map(float, v)) for node, r, v in zip(seen.nodes, rms, valley, strict=True))
-
-        return compared("repeatable"), compared("nonrepeatable")
+        parts: Array = np.zeros((2, n, 2, 2))  # repeatable or not; probe; rms or peak to valley; measured or computed
+        for ratio in np.unique(ratios):
+            own = np.flatnonzero(ratios == ratio)
+            for k, value in enumerate((record.value[own], made[own])):
+                cut = revolutions(record.axis, 2 * np.pi * turning * ratio * record.axis, value - value.mean(axis=1, keepdims=True))
+                for what, part in enumerate((cut.repeatable, cut.nonrepeatable.reshape(len(own), -1))):
+                    parts[what, own, 0, k], parts[what, own, 1, k] = part.std(axis=1), np.ptp(part, axis=1)
+        repeatable, nonrepeatable = (tuple(PartBeside(node, *map(float, p[0]), *map(float, p[1])) for node, p in zip(seen.nodes, part, strict=True)) for part in parts)
+        return repeatable, nonrepeatable
     power = np.zeros((2, 2, n))
-    for s in seen.seen:
-        power[int(_whole(s.frequency, turning)), 0] += np.abs(s.phasor) ** 2 / 2
-    for f, phasor in waves:
-        power[int(_whole(f, turning)), 1] += np.abs(phasor) ** 2 / 2
+    for k, lines in enumerate(([(s.frequency, s.phasor) for s in seen.seen], waves)):
+        for f, phasor in lines:
+            power[_whole(f, turning * ratios).astype(int), k, np.arange(n)] += np.abs(phasor) ** 2 / 2
     rms: Array = np.sqrt(power)
     nonrepeatable, repeatable = (
         tuple(PartBeside(node, float(m), float(c), None, None) for node, m, c in zip(seen.nodes, *own, strict=True)) for own in rms
@@ -144,5 +161,6 @@ def _parts(seen: Seen, waves: list[tuple[float, Any]], turning: float) -> tuple[
     return repeatable, nonrepeatable
 
 
-def _whole(frequency: float, turning: float) -> bool:
-    return abs(frequency / turning - round(frequency / turning)) < 1e-6
+def _whole(frequency: float, turning: Array) -> NDArray[np.bool_]:
+    """Whether a frequency is a whole multiple of each of some turning frequencies (Hz)."""
+    return np.asarray(np.abs(frequency / turning - np.round(frequency / turning)) < 1e-6)

@@ -115,6 +115,7 @@ def _family(seen: Sequence[Seen], found: Sources, keys: set[Key]) -> Family | No
     steady: set[tuple[int, str, str]] = set()
     for t, s in enumerate(seen):
         turning = abs(s.condition.speed) / (2 * np.pi)
+        of_parts = {f"{ratio:g}": ratio * turning for ratio in found.ratios}
         for line in s.seen:
             own = {key_of(g): g for g in line.lines}
             if not own.keys() & keys:
@@ -124,8 +125,8 @@ def _family(seen: Sequence[Seen], found: Sources, keys: set[Key]) -> Family | No
                 g = own.get(source[0])
                 if g is None or only not in (None, t):
                     continue
-                locked = abs(g.frequency - turning) < 1e-6 * turning
-                group = (TURNING, "") if locked else (g.bearing, _kind_of(source[0]))
+                locked = next((name for name, f in of_parts.items() if abs(g.frequency - f) < 1e-6 * f), None)
+                group = (TURNING, locked) if locked else (g.bearing, _kind_of(source[0]))
                 number[q] = phases.setdefault((t, *group), len(phases) + 1)
                 if source[0][1] != "ball waviness":
                     steady.add((t, *group))

@@ -93,16 +93,15 @@ def look(spindle: Spindle, test: Test) -> Seen:
     assert record is not None
     point = operating_point(spindle, condition)
     kin = row_kinematics(point.spindle, point.state)
-    known = lines(point.spindle, kin, MULTIPLE)
-    first = max(line.frequency for line in lines(point.spindle, kin, 1))
+    first = highest_of_first(point.spindle, kin, condition.speed)
     if record.highest < 1.1 * first:
         raise BadInput(
-            f"tests.{test.id}: runout holds nothing above {record.highest:.4g} Hz; the first lines of the balls reach {first:.4g} Hz, and a tenth more is needed"
+            f"tests.{test.id}: runout holds nothing above {record.highest:.4g} Hz; the first lines of {'the balls' if kin else 'what turns'} reach {first:.4g} Hz, and a tenth more is needed"
         )
     limit = record.highest / (1.1 if record.kind == "time" else 1.02)
     power = _power(record)
-    slip = _slip(point.spindle, kin, record, power, limit)
-    known = [line for line in lines(point.spindle, slipped(kin, slip), MULTIPLE) if line.frequency < limit]
+    slip = _slip(point.spindle, kin, condition.speed, record, power, limit)
+    known = [line for line in lines(point.spindle, slipped(kin, slip), condition.speed, MULTIPLE) if line.frequency < limit]
     together = TOGETHER if record.kind == "time" else 2.0 * REACH[record.window] + 1
     clusters = _clusters(known, together / record.length)
     frequency = np.array([float(np.mean(sorted({g.frequency for g in cluster}))) for cluster in clusters])
@@ -114,7 +113,7 @@ def look(spindle: Spindle, test: Test) -> Seen:
         phasor, sd = _summed(record, frequency)
         sd = np.hypot(sd, OF_BINS * np.abs(phasor))
         unexplained = ()
-    further = lines(point.spindle, slipped(kin, slip + APART), MULTIPLE)
+    further = lines(point.spindle, slipped(kin, slip + APART), condition.speed, MULTIPLE)
     moved = {key_of(g): g.frequency for g in further}
     uncertain = [max(abs(moved.get(key_of(g), g.frequency) - g.frequency) for g in cluster) for cluster in clusters]
     sd = np.sqrt(sd**2 + _form(clusters, frequency, np.abs(phasor), record.length, np.array(uncertain)) ** 2)
@@ -128,8 +127,8 @@ def expected(spindle: Spindle, condition: Condition, nodes: tuple[int, ...], sec
     assert record is not None
     point = operating_point(spindle, condition)
     kin = row_kinematics(point.spindle, point.state)
-    reach = max(record.highest / 1.1, max(line.frequency for line in lines(point.spindle, kin, 1)))
-    known = [line for line in lines(point.spindle, slipped(kin, like.slip), MULTIPLE) if line.frequency < reach]
+    reach = max(record.highest / 1.1, highest_of_first(point.spindle, kin, condition.speed))
+    known = [line for line in lines(point.spindle, slipped(kin, like.slip), condition.speed, MULTIPLE) if line.frequency < reach]
     together = TOGETHER if record.kind == "time" else 2.0 * REACH[record.window] + 1
     noise = np.median([line.sd for line in like.seen], axis=0) * np.sqrt(record.length / seconds)
     sd = np.array([noise[like.nodes.index(n)] if n in like.nodes else np.median(noise) for n in nodes])
@@ -138,6 +137,11 @@ def expected(spindle: Spindle, condition: Condition, nodes: tuple[int, ...], sec
         frequency = float(np.mean(sorted({g.frequency for g in cluster})))
         found.append(SeenLine(frequency, tuple(cluster), np.zeros(len(nodes), complex), sd))
     return Seen(Test("planned", condition.temperature, condition.speed), condition, nodes, tuple(found), (), like.slip, like.phased)
+
+
+def highest_of_first(spindle: Spindle, kin: Mapping[str, Kinematics], speed: float) -> float:
+    """Frequency (Hz) of the highest line of theory up to the number of balls, and at least of what is unbalanced, of a spindle that turns."""
+    return max(line.frequency for line in lines(spindle, kin, speed, 1))
 
 
 def slipped(kin: Mapping[str, Kinematics], slip: float) -> dict[str, Kinematics]:
@@ -166,12 +170,15 @@ def _clusters(known: list[Line], near: float) -> list[list[Line]]:
 
 
 def _form(clusters: list[list[Line]], frequency: Array, size: Array, length: float, uncertain: Array) -> Array:
-    """Errors (probes, k) of lines of `size` (probes, k) that are not of noise: frequencies `uncertain` (k,) Hz, lines that beat, neighbours that leak."""
+    """Errors (probes, k) of lines of `size` (probes, k) that are not of noise: frequencies `uncertain` (k,) Hz, lines that beat, neighbours that leak.
+
+    Lines fitted as one at their mean are off it by up to half their spread, as one whose frequency is uncertain is, and leak as much.
+    """
     spread = np.array([c[-1].frequency - c[0].frequency for c in clusters]) * length
     off = uncertain * length
     apart = np.abs(frequency[:, None] - frequency) * length
     np.fill_diagonal(apart, np.inf)
-    leaked = size**2 @ ((LEAKS + off)[:, None] / np.maximum(apart, 0.5)) ** 2
+    leaked = size**2 @ ((LEAKS + off + spread / 2)[:, None] / np.maximum(apart, 0.5)) ** 2
     return np.asarray(np.sqrt((size * (FORM + 1 - np.sinc(spread / 2) * np.sinc(off))) ** 2 + leaked))
 
 
@@ -191,13 +198,13 @@ def _power(record: RunoutRecord) -> tuple[Array, Array]:
     return frequency, np.asarray((value / floor).sum(axis=0))
 
 
-def _slip(spindle: Spindle, kin: Mapping[str, Kinematics], record: RunoutRecord, power: tuple[Array, Array], limit: float) -> float:
+def _slip(spindle: Spindle, kin: Mapping[str, Kinematics], speed: float, record: RunoutRecord, power: tuple[Array, Array], limit: float) -> float:
     """The slip at which the lines of the balls are strongest, with its prior; 0 for a spectrum, whose bins are no finer than their lines."""
     if record.kind == "spectrum":
         return 0.0
 
     def score(slip: float) -> float:
-        at = {g.frequency for g in lines(spindle, slipped(kin, slip), MULTIPLE) if g.frequency < limit and g.bearing}
+        at = {g.frequency for g in lines(spindle, slipped(kin, slip), speed, MULTIPLE) if g.frequency < limit and g.bearing}
         return float(np.log1p(np.interp(sorted(at), *power)).sum()) - 0.5 * (slip / SLIP_SD) ** 2
 
     scores = np.array([score(s) for s in SLIPS])

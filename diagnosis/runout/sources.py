@@ -14,9 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from thermospindle.diagnosis.runout.lines import MULTIPLE, Key, Seen, key_of
-from thermospindle.model.built.drawn import GRADES
+from thermospindle.model.built.drawn import GRADES, held_over
 from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.built.tolerance import toleranced
+from thermospindle.model.carrier import named, unbalanced
 from thermospindle.model.machine import Point, Spindle
 from thermospindle.model.rotor.chain import motion_rows
 from thermospindle.model.types import Array, ComplexArray
@@ -37,7 +38,7 @@ SourceKey = tuple[Key, str]
 @dataclass(frozen=True, eq=False)
 class Sources:
     """`shown[source]` (tests, probes) m per unit amplitude, `by_tolerance[source]` (parameters, tests, probes) its derivative by the relative
-    build parameters `names` with standard deviations `sd`; `likely[source]` the rms amplitude (m, kg m, kg m2); `points` of the tests."""
+    build parameters `names` with standard deviations `sd`; `likely[source]` the rms amplitude (m, kg m, kg m2); `points` of the tests; `ratios` of the parts that turn, each speed over the spindle's once."""
 
     shown: Mapping[SourceKey, ComplexArray]
     by_tolerance: Mapping[SourceKey, ComplexArray]
@@ -46,6 +47,7 @@ class Sources:
     sd: Array
     points: tuple[OperatingPoint, ...]
     probes: tuple[tuple[Point, ...], ...]
+    ratios: tuple[float, ...]
 
 
 def sources(spindle: Spindle, seen: Sequence[Seen], points: Sequence[Point]) -> Sources:
@@ -64,8 +66,9 @@ def sources(spindle: Spindle, seen: Sequence[Seen], points: Sequence[Point]) -> 
         for key, value in moved.items():
             by_tolerance[key][k] = (value - shown[key]) / step
     likely = {key: _likely(spindle, nominal[0].imperfections, key) for key in shown}
+    ratios = tuple(sorted({abs(b.speed_ratio) for b in spindle.structure.bodies if b.turns and b.speed_ratio}))
     return Sources(
-        shown, by_tolerance, likely, tuple(p.name for p in build), np.array([p.sd for p in build]), tuple(nominal), tuple(probes)
+        shown, by_tolerance, likely, tuple(p.name for p in build), np.array([p.sd for p in build]), tuple(nominal), tuple(probes), ratios
     )
 
 
@@ -98,7 +101,7 @@ def scatter(spindle: Spindle, point: OperatingPoint, probes: Sequence[Point]) ->
 
 def units(spindle: Spindle) -> dict[str, Imperfections]:
     """Imperfections in which every source has the amplitude 1."""
-    body = spindle.turning
+    body = unbalanced(spindle)
     first, second = {}, {}
     for b in spindle.rolling:
         orders = [1, *(k * b.balls + by for k in range(1, MULTIPLE + 1) for by in (-1, 0, 1))]
@@ -106,7 +109,11 @@ def units(spindle: Spindle) -> dict[str, Imperfections]:
         balls = (tuple(Wave(n, 1.0, 0.0) for n in range(2, 2 * MULTIPLE + 1, 2)), *[()] * (b.elements - 1))
         first[b.name] = RowImperfections(waves, (), waves, (), (1.0, *[0.0] * (b.elements - 1)), balls, 1.0)
         second[b.name] = RowImperfections((), waves, (), waves)
-    return {FIRST: Imperfections(1.0, body.z, bearings=first), SECOND: Imperfections(couple_unbalance=1.0, bearings=second)}
+    part = named(spindle, body)
+    return {
+        FIRST: Imperfections(1.0, body.z, bearings=first, unbalance_body=part),
+        SECOND: Imperfections(unbalance_z=body.z, couple_unbalance=1.0, bearings=second, unbalance_body=part),
+    }
 
 
 def of_effect(found: Sources, effect: Effect, values: Values) -> dict[SourceKey, complex]:
@@ -144,9 +151,8 @@ def _likely(spindle: Spindle, made: Imperfections, source: SourceKey) -> float:
     (bearing, cause, order, _, _), which = source
     scene = spindle.imperfections
     if cause == "unbalance":
-        body = spindle.turning
+        body, span = unbalanced(spindle), held_over(spindle)
         static = 0.5 * spindle.turning_mass * GRADE.balance / spindle.nominal_speed
-        span = max(b.z for b in spindle.rolling) - min(b.z for b in spindle.rolling)
         sizes = [scene.unbalance or static, made.unbalance]
         if which == SECOND:
             sizes = [scene.couple_unbalance or 0.5 * span * static, made.couple_unbalance + made.unbalance * abs(made.unbalance_z - body.z)]

@@ -24,7 +24,7 @@ from thermospindle.diagnosis.runout.next_test import CERTAIN, NextRunout, next_r
 from thermospindle.diagnosis.runout.sources import Sources, sources
 from thermospindle.model.machine import Spindle
 from thermospindle.sim.campaign.campaign import Campaign
-from thermospindle.sim.effects import CATALOGUE, of_scene
+from thermospindle.sim.effects import CATALOGUE, of_scene, usable
 from thermospindle.sim.effects.effect import Effect
 
 CLEAR = 12.0  # ln evidence by which an explanation must lead the model without it
@@ -81,25 +81,46 @@ def diagnose_runout(
     base = [fit_family(f) for f in parts]
     progress("lines fitted without any effect")
     present = {effect.name for effect, _ in of_scene(spindle)}
-    effects = [e for e in catalogue if e.imperfections is not None and e.name not in present]
+    effects = [e for e in usable(spindle, catalogue) if e.imperfections is not None and e.name not in present]
     tried = [v for e in effects for v in variants(e, found, parts)]
-    fits = [_fitted((v,), parts, base, worth=True) for v in tried]
+    alone: Alone = {}
+    fits = [_fitted((v,), parts, base, alone, worth=True) for v in tried]
     best = _best_of_each(fits)
     progress(f"{len(fits)} variants of {len(effects)} effects tried")
-    pairs = _pairs(best, tried, parts, base)
-    d = _verdict(seen, found, parts, base, effects, fits, best, pairs)
+    pairs = _pairs(best, tried, parts, base, alone)
+    d = _verdict(seen, found, parts, base, alone, effects, fits, best, pairs)
     if len(d.rivals) < 2:
         return replace(d, no_next="Nothing is left to be told apart." if d.verdict != "unexplained" else "No two explanations are left that a test could part.")
     tests, words = next_runout(spindle, seen, campaign.points, d.rivals, progress)
     return replace(d, next=tests, no_next=words)
 
 
-def _fitted(chosen: Sequence[Variant], parts: Sequence[Family], base: Sequence[FamilyFit], worth: bool = False) -> Explanation:
-    """The fit of variants to the families they move; the others stay. With `worth` one that cannot gain anything stays at size zero."""
+Alone = dict[tuple[tuple[int, ...], bool], float]
+"""Evidence of several families as one without an effect, by their numbers and whether another is in it: what was asked is kept."""
+
+
+def _evidence_without(own: Sequence[int], parts: Sequence[Family], base: Sequence[FamilyFit], alone: Alone, beside: Explanation | None) -> float:
+    """The most evidence found of families without the effect that moves them all, or with the one `beside` it alone: each by itself, or as one.
+
+    By itself each has build tolerances of its own; as one they share them, which is worth something without any effect.
+    """
+    apart = sum(base[i].evidence for i in own) + (beside.delta_evidence if beside else 0.0)
+    if len(own) == 1:
+        return apart
+    key = (tuple(own), beside is not None)
+    if key not in alone:
+        family, chosen = merged([parts[i] for i in own]), beside.variants if beside else ()
+        alone[key] = fit_family(family, [family.of_effect(v.amplitudes) for v in chosen], [v.prior for v in chosen]).evidence
+    return max(apart, alone[key])
+
+
+def _fitted(chosen: Sequence[Variant], parts: Sequence[Family], base: Sequence[FamilyFit], alone: Alone, worth: bool = False, beside: Explanation | None = None) -> Explanation:
+    """The fit of variants to the families they move; the others stay. With `worth` one that cannot gain anything stays at size zero. Of two, the first is the one `beside`
+    which the other is weighed."""
     own = sorted({i for v in chosen for i in v.parts})
     family = merged([parts[i] for i in own])
     b = [family.of_effect(v.amplitudes) for v in chosen]
-    before_evidence, before_chi2 = sum(base[i].evidence for i in own), sum(base[i].chi2 for i in own)
+    before_chi2 = sum(base[i].chi2 for i in own)
     total = sum(f.chi2 for f in base)
     amplitude = np.concatenate([base[i].amplitude for i in own])
     if worth and 2 * float(np.sum(np.abs(amplitude[b[0] != 0]) ** 2)) < WORTH and before_chi2 < chdtri(family.count, 0.01):
@@ -108,16 +129,17 @@ def _fitted(chosen: Sequence[Variant], parts: Sequence[Family], base: Sequence[F
             tuple(chosen), np.zeros(1), np.full(1, chosen[0].prior / np.hypot(1, size)), -float(np.log(np.hypot(1, size))), total
         )
     fit = fit_family(family, b, [v.prior for v in chosen])
+    gained = fit.evidence - _evidence_without(own, parts, base, alone, beside) + (beside.delta_evidence if beside else 0.0)
     # turned by half a turn an effect is the same: nothing predicts its phase
-    return Explanation(tuple(chosen), np.abs(fit.size), fit.size_sd, fit.evidence - before_evidence, total - before_chi2 + fit.chi2)
+    return Explanation(tuple(chosen), np.abs(fit.size), fit.size_sd, gained, total - before_chi2 + fit.chi2)
 
 
-def _of_any_size(found: Explanation, parts: Sequence[Family], base: Sequence[FamilyFit]) -> Explanation:
+def _of_any_size(found: Explanation, parts: Sequence[Family], base: Sequence[FamilyFit], alone: Alone) -> Explanation:
     """The same variant where every size within its limits is believed: what the lines alone say of it."""
     v = found.variants[0]
     family = merged([parts[i] for i in v.parts])
     fit = fit_family(family, [family.of_effect(v.amplitudes)], [v.effect.parameters[0].limits[1]])
-    gained = fit.evidence - sum(base[i].evidence for i in v.parts)
+    gained = fit.evidence - _evidence_without(v.parts, parts, base, alone, None)
     return replace(found, size=np.abs(fit.size), size_sd=fit.size_sd, delta_evidence=gained)
 
 
@@ -130,7 +152,7 @@ def _best_of_each(fits: Sequence[Explanation]) -> list[Explanation]:
     return sorted(best.values(), key=lambda f: -f.delta_evidence)
 
 
-def _pairs(best: Sequence[Explanation], tried: Sequence[Variant], parts: Sequence[Family], base: Sequence[FamilyFit]) -> list[Explanation]:
+def _pairs(best: Sequence[Explanation], tried: Sequence[Variant], parts: Sequence[Family], base: Sequence[FamilyFit], alone: Alone) -> list[Explanation]:
     """The best single with each other effect: its best variant alone, and those that share lines with the single."""
     if not best or best[0].delta_evidence < CLEAR:
         return []
@@ -139,9 +161,9 @@ def _pairs(best: Sequence[Explanation], tried: Sequence[Variant], parts: Sequenc
     for other in tried:
         if other.effect.name == first.effect.name:
             continue
-        alone = next(f for f in best if f.effects[0] == other.effect.name)
-        if other is alone.variants[0] or set(other.parts) & set(first.parts):
-            pair = _fitted((first, other), parts, base)
+        single = next(f for f in best if f.effects[0] == other.effect.name)
+        if other is single.variants[0] or set(other.parts) & set(first.parts):
+            pair = _fitted((first, other), parts, base, alone, beside=best[0])
             if other.effect.name not in found or pair.delta_evidence > found[other.effect.name].delta_evidence:
                 found[other.effect.name] = pair
     return sorted(found.values(), key=lambda f: -f.delta_evidence)
@@ -187,6 +209,7 @@ def _verdict(
     found: Sources,
     parts: Sequence[Family],
     base: Sequence[FamilyFit],
+    alone: Alone,
     effects: Sequence[Effect],
     fits: Sequence[Explanation],
     best: Sequence[Explanation],
@@ -241,7 +264,7 @@ def _verdict(
         return answer("two effects", chosen.effects, f"{chosen.effects[0]} and {chosen.effects[1]} are both needed: without the second "
                       f"{chosen.delta_evidence - first.delta_evidence:.1f} in ln evidence are lost{fall}.", near)  # fmt: skip
     rivals = [c for c in best if first.delta_evidence - c.delta_evidence < AHEAD]
-    unusual = [c for c in (_of_any_size(e, parts, base) for e in best if e not in rivals and set(e.variants[0].parts) & set(first.variants[0].parts))
+    unusual = [c for c in (_of_any_size(e, parts, base, alone) for e in best if e not in rivals and set(e.variants[0].parts) & set(first.variants[0].parts))
                if c.believable and first.delta_evidence - c.delta_evidence < AHEAD]  # fmt: skip
     if unusual and first.believable:
         names = sorted({n for c in [*rivals, *unusual] for n in c.effects})

@@ -38,7 +38,7 @@ import numpy as np
 
 from thermospindle.model.bearing.pair import BearingState, PairState
 from thermospindle.model.bearing.row import ring_speeds
-from thermospindle.model.carrier import unbalance_carrier
+from thermospindle.model.carrier import unbalanced
 from thermospindle.model.machine import Bearing, RollerBearing, Spindle
 
 SMALLEST = 1e-9
@@ -186,10 +186,10 @@ def _radial(bearing: str, cause: str, order: int, name: str, speed: float, kin: 
     return Line(bearing, cause, order, name, "radial", whirl, abs(speed) / (2 * np.pi))
 
 
-def lines(spindle: Spindle, kinematics_by_bearing: Mapping[str, Kinematics], highest_multiple: int = 3, speed: float = 0.0) -> list[Line]:
+def lines(spindle: Spindle, kinematics_by_bearing: Mapping[str, Kinematics], speed: float, highest_multiple: int = 3) -> list[Line]:
     """All lines of linear theory for k up to `highest_multiple`, multiples of Z and even ball orders alike, in order of frequency.
 
-    `speed` (rad/s) is the spindle's; left out, that of the first bearing's turning ring. Orders that stand still (order 1 of a ring at rest, anything at speed zero) excite nothing and are left out.
+    `speed` (rad/s) is the spindle's, of which what is unbalanced has its own ratio. Orders that stand still (order 1 of a ring at rest, anything at speed zero) excite nothing and are left out.
     """
     found: list[Line] = []
     for name in (b.name for b in spindle.rolling):
@@ -203,9 +203,5 @@ def lines(spindle: Spindle, kinematics_by_bearing: Mapping[str, Kinematics], hig
         for order in range(2, 2 * highest_multiple + 1, 2):
             found += [ball_line(name, kin, order, "radial", by) for by in (-1, 1)]
             found += [ball_line(name, kin, order, "axial")] if kin.angled else []
-    if kinematics_by_bearing and not speed:
-        speed = next(iter(kinematics_by_bearing.values())).turning
-    own = spindle.imperfections
-    carrier = unbalance_carrier(spindle, own) if own.unbalance or own.couple_unbalance else spindle.turning
-    found.append(unbalance_line(speed * carrier.speed_ratio))
+    found.append(unbalance_line(speed * unbalanced(spindle).speed_ratio))
     return sorted((line for line in found if line.frequency > SMALLEST), key=lambda line: line.frequency)

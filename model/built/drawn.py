@@ -59,13 +59,17 @@ def drawn(spindle: Spindle, seed: int, grade: Grade = GRADES["high precision"]) 
     """A plausible set of imperfections of a spindle; the same seed gives the same set."""
     random = np.random.default_rng(seed)
     body = spindle.turning
-    heights = [b.z for b in spindle.all_bearings] or [p.position[2] for p in spindle.points]
-    span = max(heights) - min(heights)
     permissible = spindle.turning_mass * grade.balance / spindle.nominal_speed
     static, couple = random.uniform(0, 1, 2) * permissible
     phases = random.uniform(0, 2 * np.pi, 2)
     rows = {b.name: _drawn_row(b.balls, b.elements, grade, random) for b in spindle.rolling}
-    return Imperfections(float(static), body.z, float(phases[0]), float(couple * span / 2), float(phases[1]), rows, named(spindle, body))
+    return Imperfections(float(static), body.z, float(phases[0]), float(couple * held_over(spindle) / 2), float(phases[1]), rows, named(spindle, body))
+
+
+def held_over(spindle: Spindle) -> float:
+    """Distance (m) between the outermost bearings, of a machine without any between its measuring points."""
+    heights = [b.z for b in spindle.all_bearings] or [p.position[2] for p in spindle.points]
+    return max(heights) - min(heights)
 
 
 def _drawn_row(balls: int, elements: int, grade: Grade, random: np.random.Generator) -> RowImperfections:

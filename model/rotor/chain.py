@@ -37,7 +37,21 @@ class Element:
     stiffness: Array
     damping: Array
     slides: str = ""
-    loss_factor: float = 0.0  # of its stiffness, beside `damping` (`loss`)
+    loss_factor: float = 0.0  # beside `damping`, of its stiffness but for what is `lossless` (`model.rotor.loss`)
+    lossless: Array | None = None  # (5, 5), a flexibility in series that `stiffness` has in it and that loses nothing
+
+    @property
+    def lossy(self) -> Array:
+        """Imaginary part (5, 5) of the complex stiffness by the loss factor: of K in series with a lossless F, together K_s, to first order
+        eta (1 + K F)^-1 K (1 + F K)^-1 = eta (K_s - K_s F K_s)."""
+        own = self.stiffness if self.lossless is None else self.stiffness - self.stiffness @ self.lossless @ self.stiffness
+        return self.loss_factor * own
+
+    def told_by(self, motion: Array) -> Element:
+        """The same element told by another relative motion r', r = `motion` r', a regular matrix (5, 5)."""
+        back = np.linalg.inv(motion)
+        lossless = None if self.lossless is None else back @ self.lossless @ back.T
+        return replace(self, stiffness=motion.T @ self.stiffness @ motion, damping=motion.T @ self.damping @ motion, lossless=lossless)
 
 
 Layout = tuple[tuple[str, float, tuple[str, ...]], ...]
@@ -193,7 +207,7 @@ def matrices(chain: RotorBase) -> Matrices:
 
 def lost(chain: RotorBase, mass: Array, stiffness: Array) -> Array:
     """Damping (n, n) of the loss factors of a chain's elements, in its masses (n,) and stiffness (n, n)."""
-    return damping_of_loss(mass, stiffness, [(e.loss_factor, e.stiffness, element_rows(chain, e)) for e in chain.elements if e.loss_factor])
+    return damping_of_loss(mass, stiffness, [(e.lossy, element_rows(chain, e)) for e in chain.elements if e.loss_factor])
 
 
 @lru_cache(maxsize=64)

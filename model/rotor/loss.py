@@ -29,8 +29,8 @@ RIGID = 1e-13
 """Of the largest square of a frequency: below is a free body's rounding error."""
 
 
-def damping_of_loss(mass: Array, stiffness: Array, lossy: Sequence[tuple[float, Array, Array]]) -> Array:
-    """Damping matrix (n, n), N s/m and so on, of elements `lossy` (loss factor, stiffness (5, 5), rows (5, n)) in a chain with masses (n,) and stiffness (n, n).
+def damping_of_loss(mass: Array, stiffness: Array, lossy: Sequence[tuple[Array, Array]]) -> Array:
+    """Damping matrix (n, n), N s/m and so on, of elements `lossy` (loss factor times stiffness (5, 5), rows (5, n)) in a chain with masses (n,) and stiffness (n, n).
 
     Degrees of freedom that nothing couples are worked out by themselves, so that equal modes of two planes stay in their planes.
     """
@@ -38,7 +38,7 @@ def damping_of_loss(mass: Array, stiffness: Array, lossy: Sequence[tuple[float, 
     k, size = (stiffness + stiffness.T) / 2, np.sqrt(np.abs(np.diag(stiffness)))
     coupled = scipy.sparse.csr_array((np.abs(k) > 1e-12 * np.outer(size, size)).astype(float))
     count, label = scipy.sparse.csgraph.connected_components(coupled, directed=False)
-    felt = np.concatenate([_root(factor * own) @ rows for factor, own, rows in lossy])
+    felt = np.concatenate([_root(own) @ rows for own, rows in lossy])
     for block in range(count):
         own = np.flatnonzero(label == block)
         root = np.sqrt(mass[own])

@@ -32,7 +32,9 @@ def show_effects(console: Console, catalogue: Sequence[Effect], refused: Mapping
     console.print("spindle effects NAME explains one; spindle add SCENE NAME --out NEW_SCENE adds it.", highlight=False)
 
 
-def show_effect(console: Console, effect: Effect, refused: str = "") -> None:
+def show_effect(console: Console, effect: Effect, refused: str = "", called: Mapping[str, Mapping[str, str]] = {}) -> None:
+    """One effect in all its words; `refused` says why it cannot be in a scene, `called` what there the numbers of its parameters mean."""
+
     def line(what: str, text: str) -> None:
         console.print(f"\n{what}:", style="bold")
         console.print(text, markup=False, highlight=False)
@@ -47,7 +49,8 @@ def show_effect(console: Console, effect: Effect, refused: str = "") -> None:
         grid.add_row(p.name, p.unit, f"{p.neutral:g}", f"{p.typical:g}", f"{p.prior_sd:g}", f"{p.limits[0]:g} to {p.limits[1]:g}")
     console.print(grid)
     for p in effect.parameters:
-        console.print(f"{p.name}: {p.meaning}. Source: {p.source}.", markup=False, highlight=False)
+        here = ", ".join(f"{number} {name}" for number, name in called.get(p.name, {}).items())
+        console.print(f"{p.name}: {p.meaning}. Source: {p.source}." + (f" In this scene: {here}." if here else ""), markup=False, highlight=False)
     line("What one sees", effect.sees)
     line("What it resembles", ", ".join(effect.resembles))
     line("Where it is valid", effect.valid)

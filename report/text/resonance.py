@@ -164,7 +164,7 @@ def told(found: ResonanceMap) -> list[str]:
     """What a reader is told of `sentences`: the first `SAID`, and how many more there are."""
     every, alone = sentences(found), [_all_repeats(found)] if found.repeats else []
     left = len(every) - SAID
-    many = f"So do {left} weaker lines between {found.temperatures[0]:g} and {found.temperatures[-1]:g} C; all are in coincidences.csv of --out, and in --json."
+    many = f"So do {left} weaker lines between {found.temperatures[0]:g} and {found.temperatures[-1]:g} C; all are in coincidences.csv of spindle map --out, and in its --json."
     return [*(every if left <= 1 else [*every[:SAID], many]), *alone]
 
 

@@ -129,9 +129,13 @@ def show_runout(console: Console, answer: dict[str, Any], where: str) -> None:
     rows = []
     for row in answer["lines"][:SHOWN]:
         numbers = (f"{row['frequency_Hz']:.2f}", f"{row['order']:.3f}", row["direction"], f"{row['amplitude_um']:.4f}", row["whirl"])
-        bearings = list(dict.fromkeys(c["bearing"] for c in row["causes"] if c["bearing"]))
-        rows.append([*numbers, row["name"], row["cause"], ", ".join(bearings)])
+        rows.append([*numbers, row["name"], row["cause"], _bearings(row)])
     show_grid(console, f"Strongest lines of {len(answer['lines'])}", columns, rows, (*columns[4:], "direction"), keys=2)
+
+
+def _bearings(row: dict[str, Any]) -> str:
+    """All bearings that have a part in a line, strongest first."""
+    return ", ".join(dict.fromkeys(c["bearing"] for c in row["causes"] if c["bearing"]))
 
 
 def _of_part(answer: dict[str, Any], where: str) -> str:
@@ -204,7 +208,7 @@ def runout_section(runout: Runout, answer: dict[str, Any]) -> tuple[str, str]:
     lines = [
         [
             f"{g['frequency_Hz']:.2f}", f"{g['order']:.3f}", g["direction"], f"{1e3 * g['amplitude_um']:.2f}", escape(g["name"]),
-            escape(" ".join(w for w in (g["bearing"], g["cause"]) if w)),
+            escape(" ".join(w for w in (_bearings(g), g["cause"]) if w)),
         ]
         for g in answer["lines"][:SHOWN]
     ]  # fmt: skip

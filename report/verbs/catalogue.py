@@ -14,7 +14,7 @@ from thermospindle.report.folder import mark, whole_folder
 from thermospindle.report.text.effects import show_effect, show_effects, summary
 from thermospindle.report.verbs.answer import Answer, answered, with_effects, write_json
 from thermospindle.sim.effects import by_name
-from thermospindle.sim.effects.effect import refusal
+from thermospindle.sim.effects.effect import called, refusal
 from thermospindle.sim.effects.known import catalogue
 
 
@@ -35,9 +35,11 @@ def effects(
     effect = by_name(name, known)
     values = {k: getattr(effect, k) for k in ("name", "title", "equation", "sees", "valid")}
     values |= {"resembles": list(effect.resembles), "parameters": [asdict(p) for p in effect.parameters]}
-    values |= {} if scene is None else {"refused": refused.get(effect.name)}
-    why_not = refused.get(effect.name, "")
-    return answered(values, lambda console: show_effect(console, effect, why_not), out, asked, write_json("effect.json"))
+    why_not, here = refused.get(effect.name, ""), dict[str, dict[str, str]]()
+    if scene is not None:
+        here = {} if why_not else {p.name: {f"{c:g}": called(p, c, spindle) or "" for c in p.choices} for p in effect.parameters if p.counts}
+        values |= {"refused": why_not or None, "called": here}
+    return answered(values, lambda console: show_effect(console, effect, why_not, here), out, asked, write_json("effect.json"))
 
 
 def add(

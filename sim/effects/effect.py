@@ -62,9 +62,12 @@ def mass_ratio(spindle: Spindle) -> float:
     return (spindle.turning_mass or sum(b.mass for b in spindle.structure.bodies)) / REFERENCE_HUB
 
 
-ROWS, SECTION, TURNING, SHAFT = "ball row", "section", "turning body", "flexible shaft"
+ROWS, ROLLING, RINGS = "ball row", "ball or roller row", "ball or roller row between rings of the section"
+SECTION, TURNING, SHAFT = "section", "turning body", "flexible shaft"
 PARTS: Mapping[str, Callable[[Spindle], bool]] = {
     ROWS: lambda spindle: bool(spindle.bearings),
+    ROLLING: lambda spindle: bool(spindle.rolling),
+    RINGS: lambda spindle: bool(spindle.ringed),
     SECTION: lambda spindle: bool(spindle.regions),
     TURNING: lambda spindle: any(b.turns for b in spindle.structure.bodies),
     SHAFT: lambda spindle: bool(spindle.structure.shafts),

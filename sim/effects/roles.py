@@ -11,7 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from thermospindle.model.machine import Region, Spindle
+from thermospindle.model.bearing.row import ring_speeds
+from thermospindle.model.machine import Bearing, Region, RollerBearing, Spindle
 from thermospindle.model.rotor.chain import Element
 from thermospindle.model.structure import Body, Joint
 from thermospindle.model.types import Array
@@ -31,6 +32,12 @@ def held(spindle: Spindle) -> set[str]:
     """The bearings one of whose rings is in a housing: in a body with that role, or in the ground, which then stands for a rigid one."""
     housings = {b.name for b in spindle.structure.bodies if b.role == "housing"} | {"ground"}
     return {b.name for b in spindle.all_bearings if b.inner_body in housings or b.outer_body in housings}
+
+
+def turning_ring(spindle: Spindle, b: Bearing | RollerBearing) -> str:
+    """Which ring of a bearing turns, inner or outer; inner where both do."""
+    inner, outer = ring_speeds(spindle, b, 1.0)
+    return "outer" if outer and not inner else "inner"
 
 
 def regions(spindle: Spindle, role: str) -> list[Region]:
@@ -82,8 +89,9 @@ def beyond(value: float, play: float) -> float:
 def in_series(element: Element, flexibility: Array) -> Element:
     """The element with a lossless flexibility (5, 5) at its end.
 
-    K_s = (1 + K F)^-1 K; its damping to first order of complex stiffness K + i omega D: (1 + K F)^-1 D (1 + F K)^-1.
+    K_s = (1 + K F)^-1 K; its damping to first order of complex stiffness K + i omega D: (1 + K F)^-1 D (1 + F K)^-1. A loss factor is of K alone (`Element.lossy`).
     """
     pass_on = np.linalg.inv(np.eye(5) + element.stiffness @ flexibility)
     stiffness, damping = pass_on @ element.stiffness, pass_on @ element.damping @ pass_on.T
-    return replace(element, stiffness=(stiffness + stiffness.T) / 2, damping=(damping + damping.T) / 2)
+    lossless = flexibility if element.lossless is None else element.lossless + flexibility
+    return replace(element, stiffness=(stiffness + stiffness.T) / 2, damping=(damping + damping.T) / 2, lossless=lossless)

@@ -190,7 +190,7 @@ class _Grid:
             partners = follow(linear.mass, list(near.values()), found)
             own = {k: found[p] for k, p in zip(near, partners, strict=True) if p >= 0}
             kin = row_kinematics(point.spindle, point.state)
-            here = {key(line): line for line in lines(point.spindle, kin, self.multiples, condition.speed)}
+            here = {key(line): line for line in lines(point.spindle, kin, condition.speed, self.multiples)}
             self.kept[place] = Exact(point, own, here, self.multiples)
         return self.kept[place]
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from thermospindle.model.bearing.kinematics import Line
 from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
-from thermospindle.model.carrier import named
+from thermospindle.model.carrier import named, unbalanced
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import matrices
 from thermospindle.model.rotor.modes import Mode, Poles, poles
@@ -111,7 +111,7 @@ def unit_imperfections(spindle: Spindle, multiples: int) -> Imperfections:
         balls = (waves(range(2, 2 * multiples + 1, 2)), *[()] * (b.elements - 1))
         sizes = (UNIT_WAVE, *[0.0] * (b.elements - 1))
         rows[b.name] = RowImperfections(radial, waves(axial), radial, waves(axial), sizes, balls, UNIT_UNBALANCE)
-    body = spindle.turning
+    body = unbalanced(spindle)
     return Imperfections(unbalance=UNIT_UNBALANCE, unbalance_z=body.z, bearings=rows, unbalance_body=named(spindle, body))
 
 

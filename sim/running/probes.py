@@ -62,11 +62,13 @@ def hub_probes(spindle: Spindle) -> tuple[Probe, Probe, Probe]:
     )
 
 
-def speed_ratio(spindle: Spindle, probe: Probe | None = None) -> float:
+def speed_ratio(spindle: Spindle, probe: Probe | Point | None = None) -> float:
     """Speed of what a probe, by default the hub's, sees over the spindle's: what repeats every revolution goes by it, at what stands by the hub's."""
-    body = spindle.structure.body(hub_probes(spindle)[0].body)
-    own = body if probe is None else spindle.structure.body(probe.body)
-    return (own.speed_ratio if own.turns else body.speed_ratio) or 1.0
+    own = None if probe is None else spindle.structure.body(probe.body)
+    if own is None or not own.turns:
+        shaft = next((s for s in spindle.structure.shafts if s.turns), None)
+        own = spindle.structure.body(_first_place(spindle, shaft)[0]) if shaft else next((b for b in spindle.structure.bodies if b.turns), spindle.turning)
+    return own.speed_ratio or 1.0
 
 
 def looked_at(spindle: Spindle) -> str:

@@ -69,7 +69,8 @@ def test_a_hidden_imperfection_is_named_with_its_size_and_place(spindle, name) -
     assert chosen == {k: values[k] for k in chosen}
     told = runout_diagnosis_json(d, CATALOGUE, spindle)["candidates"][0]["parameters"]
     rings = {k.split(".")[1]: v["called"] for k, v in told.items() if "called" in v}
-    assert rings == {k: spindle.bearings[int(v)].name for k, v in values.items() if k == "bearing"}
+    names = {"bearing": [b.name for b in spindle.bearings], "ring": ["inner", "outer"]}
+    assert rings == {k: names[k][int(v)] for k, v in values.items() if k in names}
     assert best.size[0] > d.smallest[name]
 
 

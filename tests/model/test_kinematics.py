@@ -96,7 +96,7 @@ TABLE = [
 @pytest.mark.parametrize(("name", "direction", "whirl", "frequency"), TABLE, ids=[row[0] for row in TABLE])
 def test_lines_of_the_paper(spindle, running, name, direction, whirl, frequency):
     """Line tables of Wardle and of Jang and Jeong, with the kinematic numbers above."""
-    found = [x for x in lines(spindle, row_kinematics(spindle, running)) if x.name == name and x.direction == direction]
+    found = [x for x in lines(spindle, row_kinematics(spindle, running), running.condition.speed) if x.name == name and x.direction == direction]
     assert found
     for line in found:
         assert (line.whirl, line.frequency) == (whirl, pytest.approx(frequency, abs=6e-3))
@@ -104,17 +104,17 @@ def test_lines_of_the_paper(spindle, running, name, direction, whirl, frequency)
 
 def test_both_senses_at_the_balls_over_the_inner_race(spindle, running):
     """Orders 9 and 11 of a ring at rest both excite at 10 fc, one forward and one backward."""
-    found = {x.order: x.whirl for x in lines(spindle, row_kinematics(spindle, running)) if x.name == "10 fc" and x.bearing == "upper"}
+    found = {x.order: x.whirl for x in lines(spindle, row_kinematics(spindle, running), running.condition.speed) if x.name == "10 fc" and x.bearing == "upper"}
     assert found == {9: 1, 10: 0, 11: -1}
 
 
 def test_nothing_at_rest(spindle, cold):
-    assert lines(spindle, row_kinematics(spindle, cold)) == []
+    assert lines(spindle, row_kinematics(spindle, cold), cold.condition.speed) == []
 
 
 def test_turning_the_other_way_changes_nothing_but_the_sense_of_plus_z(spindle, running):
     back = replace(running, condition=Condition(20.0, -7200 * RPM))
-    assert lines(spindle, row_kinematics(spindle, back)) == lines(spindle, row_kinematics(spindle, running))
+    assert lines(spindle, row_kinematics(spindle, back), back.condition.speed) == lines(spindle, row_kinematics(spindle, running), running.condition.speed)
 
 
 # Frequencies that fall on whole lines of a 1 s record; the cage's is chosen so that no two lines meet.

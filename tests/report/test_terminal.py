@@ -119,3 +119,13 @@ def test_static_says_nothing_of_beams_where_there_are_none(capsys: pytest.Captur
 def test_where_no_mode_lies_the_lowest_is_told_instead_of_an_empty_table(capsys: pytest.CaptureFixture[str]):
     assert main(["modes", "hdd_2003", "--highest", "100"]) == 0
     assert capsys.readouterr().out.strip() == "No mode lies below 100 Hz at 20 C, 0 rpm; the lowest is at 1002.00 Hz."
+
+
+def test_an_effect_of_a_scene_says_what_its_numbers_mean(capsys):
+    """As the message promises that refuses a bearing's name."""
+    assert main(["effects", "seat_clearance", "--scene", "mk7702"]) == 0
+    assert "In this scene: 0 front1, 1 front2, 2 front3, 3 rear1." in " ".join(capsys.readouterr().out.split())
+    assert main(["effects", "preload_loss", "--scene", "five_bearing"]) == 0
+    assert "In this scene: -1 all, 0 front, 1 rear." in " ".join(capsys.readouterr().out.split())
+    assert main(["effects", "seat_clearance"]) == 0
+    assert "In this scene" not in capsys.readouterr().out

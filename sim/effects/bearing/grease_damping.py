@@ -7,7 +7,7 @@ from dataclasses import replace
 from thermospindle.model.bearing.pair import PairState
 from thermospindle.model.bearing.roller import RollerState
 from thermospindle.model.machine import Condition, Spindle
-from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values
+from thermospindle.sim.effects.effect import ROLLING, Effect, Parameter, Values
 
 
 def pair(spindle: Spindle, condition: Condition, values: Values, state: PairState) -> PairState:
@@ -44,5 +44,5 @@ EFFECT = Effect(
     resembles=("bond_softening",),
     valid="within the viscosity table; at chamber temperature, so without the bearings' own heat",
     pair=pair,
-    acts_on=(ROWS,),
+    acts_on=(ROLLING,),
 )

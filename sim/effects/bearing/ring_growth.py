@@ -17,7 +17,7 @@ import numpy as np
 from thermospindle.model.bearing.row import ring_speeds
 from thermospindle.model.machine import Bearing, Condition, Material, Region, RingMotion, RollerBearing, Spindle
 from thermospindle.model.rotor.section import cells
-from thermospindle.sim.effects.effect import ROWS, SECTION, Effect, Values, scale_parameter
+from thermospindle.sim.effects.effect import RINGS, Effect, Values, scale_parameter
 
 
 @dataclass(frozen=True)
@@ -147,5 +147,5 @@ EFFECT = Effect(
     resembles=("ball_inertia", "thermal_gradient", "lubricant_film"),
     valid="plane stress, bonded layers, no support from or load on neighbouring heights; grooves keep their radii",
     motions=motions,
-    acts_on=(ROWS, SECTION),
+    acts_on=(RINGS,),
 )

@@ -17,9 +17,8 @@ def chain(spindle: Spindle, condition: Condition, values: Values, chain: RotorBa
         return chain
     name = spindle.all_bearings[min(int(values["bearing"]), len(spindle.all_bearings) - 1)].name
     keep = np.sqrt(1 - values["share"])
-    scale = np.outer([keep, keep, 1.0, 1.0, 1.0], [keep, keep, 1.0, 1.0, 1.0])
-    changed = (replace(e, stiffness=scale * e.stiffness, damping=scale * e.damping) if e.name == name else e for e in chain.elements)
-    return replace(chain, elements=tuple(changed))
+    loose = np.diag([keep, keep, 1.0, 1.0, 1.0])
+    return replace(chain, elements=tuple(e.told_by(loose) if e.name == name else e for e in chain.elements))
 
 
 def idle(spindle: Spindle) -> str | None:

@@ -38,10 +38,10 @@ def chain(spindle: Spindle, condition: Condition, values: Values, chain: RotorBa
         return chain
     if idle(spindle) is not None or outside(spindle) is not None:
         return chain
-    inner = spindle.bearings[0].inner_body
-    bearings, joints = {b.name for b in spindle.bearings}, {j.name for j in spindle.structure.joints if inner in j.bodies}
+    inner = spindle.all_bearings[0].inner_body
+    bearings, joints = {b.name for b in spindle.all_bearings}, {j.name for j in spindle.structure.joints if inner in j.bodies}
     root = next((e.z for e in chain.elements if e.name in joints), chain.body(inner).z)
-    node, *others = sorted((b.z for b in spindle.bearings), key=lambda z: abs(z - root))
+    node, *others = sorted((b.z for b in spindle.all_bearings), key=lambda z: abs(z - root))
     beam = pieces(spindle, condition.temperature)
     changed = []
     for e in chain.elements:
@@ -56,12 +56,12 @@ def chain(spindle: Spindle, condition: Condition, values: Values, chain: RotorBa
 def idle(spindle: Spindle) -> str | None:
     if not regions(spindle, "shaft"):
         return lacking("region", "shaft")
-    return None if len({b.z for b in spindle.bearings}) > 1 else "its bearings stand at one height"
+    return None if len({b.z for b in spindle.all_bearings}) > 1 else "its bearings stand at one height"
 
 
 def outside(spindle: Spindle) -> str | None:
     """A shaft that only its bearings hold is no cantilever."""
-    inner = {b.inner_body for b in spindle.bearings}
+    inner = {b.inner_body for b in spindle.all_bearings}
     if len(inner) > 1:
         return "its inner rings sit on several bodies, of which none is the rigid shaft whose bending this puts in series"
     held = any(inner & set(j.bodies) for j in spindle.structure.joints)
@@ -72,7 +72,7 @@ def moved(element: Element, z: float) -> Element:
     """The same element told by the relative motion at another height: r(z_e) = B r(z), K -> B^T K B."""
     back = np.eye(5)
     back[0, 4], back[1, 3] = element.z - z, z - element.z
-    return replace(element, z=z, stiffness=back.T @ element.stiffness @ back, damping=back.T @ element.damping @ back)
+    return replace(element.told_by(back), z=z)
 
 
 def flexibility(beam: Sequence[Piece], start: float, stop: float) -> Array:

@@ -20,13 +20,7 @@ def chain(spindle: Spindle, condition: Condition, values: Values, chain: RotorBa
     direction = np.radians(values["direction"])
     by_role = {"flange": split, "plate": values["plate_share"] * split}
     uneven = {name: unevenness(own, direction) for role, own in by_role.items() for name in joints(spindle, role)}
-    elements = tuple(
-        replace(e, stiffness=uneven[e.name] @ e.stiffness @ uneven[e.name], damping=uneven[e.name] @ e.damping @ uneven[e.name])
-        if e.name in uneven
-        else e
-        for e in chain.elements
-    )
-    return replace(chain, elements=elements)
+    return replace(chain, elements=tuple(e.told_by(uneven[e.name]) if e.name in uneven else e for e in chain.elements))
 
 
 def unevenness(split: float, direction: float) -> Array:

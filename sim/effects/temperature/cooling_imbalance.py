@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from thermospindle.model.machine import Condition, Spindle
-from thermospindle.sim.effects.effect import ROWS, SECTION, Effect, Parameter, Values
+from thermospindle.sim.effects.effect import RINGS, Effect, Parameter, Values
+from thermospindle.sim.effects.roles import turning_ring
 
 
 def temperatures(spindle: Spindle, condition: Condition, values: Values, by_region: dict[str, float]) -> dict[str, float]:
@@ -16,7 +17,7 @@ def temperatures(spindle: Spindle, condition: Condition, values: Values, by_regi
 
 
 def idle(spindle: Spindle) -> str | None:
-    inner = all(b.turning_ring == "inner" for b in spindle.bearings)
+    inner = all(turning_ring(spindle, b) == "inner" for b in spindle.ringed)
     return None if inner else "its outer rings turn, and no housing round them is cooled"
 
 
@@ -42,6 +43,6 @@ EFFECT = Effect(
     resembles=("thermal_gradient", "soak_lag", "tandem_sharing"),
     valid="inner rings turning; each part at one temperature; steady state",
     temperatures=temperatures,
-    acts_on=(ROWS, SECTION),
+    acts_on=(RINGS,),
     idle=idle,
 )  # fmt: skip

@@ -12,7 +12,7 @@ from thermospindle.sim.effects.roles import lacking, materials
 
 def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
     hub = values["hub_expansion"]
-    rings = dict.fromkeys(b.ring_material for b in spindle.bearings)
+    rings = dict.fromkeys(b.ring_material for b in spindle.rolling)
     errors = [(name, hub) for name in carrying(spindle)] + [(name, values["ring_share"] * hub) for name in rings]
     for name, error in errors:
         if error != 0.0:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from thermospindle.model.machine import Condition, Spindle
-from thermospindle.sim.effects.effect import ROWS, SECTION, Effect, Parameter, Values
+from thermospindle.sim.effects.effect import RINGS, Effect, Parameter, Values
 from thermospindle.sim.effects.lag import EQUATION, held_back, left_after, nominal_soak
 
 
@@ -35,5 +35,5 @@ EFFECT = Effect(
     resembles=("soak_lag", "expansion_mismatch", "thermometer_error", "clearance_opening"),
     valid="each part at one temperature, balls at the mean of their rings'; the turning part has the chamber's temperature",
     temperatures=temperatures,
-    acts_on=(ROWS, SECTION),
+    acts_on=(RINGS,),
 )

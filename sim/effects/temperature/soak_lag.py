@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from thermospindle.model.machine import Condition, RingMotion, Spindle
-from thermospindle.sim.effects.effect import ROWS, SECTION, Effect, Parameter, Values
+from thermospindle.model.machine import Condition, RingMotion, RollerBearing, Spindle
+from thermospindle.sim.effects.effect import RINGS, Effect, Parameter, Values
 from thermospindle.sim.effects.lag import EQUATION, held_back, left_after, nominal_soak
+from thermospindle.sim.effects.roles import turning_ring
 
 
 def temperatures(spindle: Spindle, condition: Condition, values: Values, by_region: dict[str, float]) -> dict[str, float]:
@@ -14,17 +15,18 @@ def temperatures(spindle: Spindle, condition: Condition, values: Values, by_regi
 
 
 def motions(spindle: Spindle, condition: Condition, values: Values, by_bearing: dict[str, RingMotion]) -> dict[str, RingMotion]:
-    """Balls taken from the mean of their rings' temperatures to their own, the turning groove from its ring's to half way to the balls'."""
+    """Balls and rollers taken from the mean of their rings' temperatures to their own, the turning groove from its ring's to half way to the balls'."""
     missing = share(condition, values)
     if missing == 0.0:
         return by_bearing
     lag = missing * (condition.temperature - spindle.reference_temperature)  # K, of the turning rings behind the standing
     ball, groove = (0.5 - values["ball_share"]) * lag, (1 - values["ball_share"]) / 2 * lag
     moved = {}
-    for b in spindle.bearings:
-        strain = f"{b.turning_ring}_strain"
+    for b in spindle.ringed:
+        strain = f"{turning_ring(spindle, b)}_strain"
         motion, ring = by_bearing[b.name], by_bearing[b.name].temperature - lag / 2
-        grown = spindle.materials[b.ball_material].thermal_strain(motion.temperature + ball, motion.temperature)
+        element = b.roller_material if isinstance(b, RollerBearing) else b.ball_material
+        grown = spindle.materials[element].thermal_strain(motion.temperature + ball, motion.temperature)
         widened = spindle.materials[b.ring_material].thermal_strain(ring + groove, ring)
         moved[b.name] = replace(
             motion,
@@ -74,12 +76,12 @@ EFFECT = Effect(
         ),
     ),
     sees=(
-        "bearing modes fall less from cold to hot than computed, at rest as well as turning, and the upper bearing's modes as "
-        "much as the lower's; nothing at the reference temperature"
+        "bearing modes change less from cold to hot than computed where outer rings turn, and rise less or fall where inner ones do, at rest as "
+        "well as turning, the upper bearing's modes as much as the lower's; nothing at the reference temperature"
     ),
     resembles=("fixture_lag", "expansion_mismatch", "loose_inserts", "constant_force_preload", "preload_loss", "clearance_opening"),
     valid="the rotating part is isothermal (Biot number far below 1) and the stationary part has the chamber's temperature",
     temperatures=temperatures,
     motions=motions,
-    acts_on=(ROWS, SECTION),
+    acts_on=(RINGS,),
 )

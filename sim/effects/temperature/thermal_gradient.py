@@ -16,7 +16,7 @@ from thermospindle.model.bearing.row import relative_speed
 from thermospindle.model.errors import OutsideRange
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array
-from thermospindle.sim.effects.effect import ROWS, SECTION, Effect, Parameter, Values, scale_parameter
+from thermospindle.sim.effects.effect import RINGS, Effect, Parameter, Values, scale_parameter
 from thermospindle.thermal import friction
 
 
@@ -43,7 +43,7 @@ def temperatures(spindle: Spindle, condition: Condition, values: Values, by_regi
         return by_region
     unit = unit_rise(spindle)
     rise = heat(spindle, condition, unit) @ unit.region
-    outer = [unit.regions.index(b.outer_ring) for b in spindle.bearings]
+    outer = [unit.regions.index(b.outer_ring) for b in spindle.ringed]
     rise = rise - (1 - values["common_share"]) * rise[outer].mean()
     if values["level_share"]:
         rise = rise + values["level_share"] * (levelled(spindle, unit.regions, rise) - rise)
@@ -53,7 +53,7 @@ def temperatures(spindle: Spindle, condition: Condition, values: Values, by_regi
 def levelled(spindle: Spindle, regions: tuple[str, ...], rise: Array) -> Array:
     """The `rise` (regions,) if each part were at one temperature, the mean of the bearing rings in it; a part without rings as it is."""
     part = np.array([spindle.region(name).part for name in regions])
-    rings = [regions.index(name) for b in spindle.bearings for name in (b.inner_ring, b.outer_ring)]
+    rings = [regions.index(name) for b in spindle.ringed for name in (b.inner_ring, b.outer_ring)]
     level = rise.copy()
     for p in set(part[rings]):
         level[part == p] = rise[[r for r in rings if part[r] == p]].mean()
@@ -157,5 +157,5 @@ EFFECT = Effect(
         "no motor heat; below the temperature at which the viscosity table ends"
     ),
     temperatures=temperatures,
-    acts_on=(ROWS, SECTION),
+    acts_on=(RINGS,),
 )

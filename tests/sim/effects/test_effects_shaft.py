@@ -199,3 +199,21 @@ def test_support_anisotropy_scales_a_whole_bending_plane():
     found = uneven @ np.linalg.inv(square) @ uneven
     for plane, exact in (([0, 4], strong), ([1, 3], weak)):
         assert found[np.ix_(plane, plane)] == pytest.approx(np.linalg.inv(exact)[np.ix_(plane, plane)], rel=1e-6)
+
+
+def test_a_shaft_in_series_with_a_flange_that_has_a_loss_factor_loses_nothing(spindle):
+    """K (1 + i eta) and F in series: 1 / (1 / K (1 + i eta) + F), to first order eta K_s^2 / K, less than eta K_s by the share of the strain that is the shaft's."""
+    eta, bent = 0.02, {"scale": 5.0}
+    joints = tuple(replace(j, damping_ratio=0.0, loss_factor=eta if j.role == "flange" else 0.0) for j in spindle.structure.joints)
+    lossy = replace(spindle, structure=replace(spindle.structure, joints=joints))
+    point = operating_point(lossy, Condition(20.0), [(shaft_bending.EFFECT, bent)])
+    [flange] = [e for e in point.chain.elements if e.loss_factor]
+    rigid = operating_point(lossy, Condition(20.0), []).chain
+    own = shaft_bending.moved(next(e for e in rigid.elements if e.name == flange.name), flange.z)
+    series = np.linalg.inv(np.linalg.inv(own.stiffness * (1 + 1e-6j * eta)) + flange.lossless)
+    assert flange.stiffness == pytest.approx(series.real, rel=1e-6, abs=1e-9 * np.abs(series).max())
+    assert flange.lossy == pytest.approx(1e6 * series.imag, rel=1e-5, abs=1e-9 * np.abs(series).max())
+    assert flange.lossy[3, 3] < 0.95 * eta * flange.stiffness[3, 3]
+    uneven = operating_point(lossy, Condition(20.0), [(shaft_bending.EFFECT, bent), (support_anisotropy.EFFECT, support_anisotropy.EFFECT.neutral() | {"split": 0.5})])
+    loss = next(e for e in uneven.chain.elements if e.loss_factor).lossy
+    assert np.linalg.eigvalsh(loss)[0] > 0

@@ -111,14 +111,14 @@ def test_lines_are_those_of_the_rules_and_no_other(spindle, race):
     own = both(**{race: tuple(Wave(n, 1e-8, 0.1 * n) for n in range(1, 42))})
     point = at(spindle, own, 40.0)
     side = race.split("_")[0]
-    expected = [x for x in lines(point.spindle, row_kinematics(point.spindle, point.state), 4) if x.cause == f"{side} waviness"]
+    expected = [x for x in lines(point.spindle, row_kinematics(point.spindle, point.state), point.condition.speed, 4) if x.cause == f"{side} waviness"]
     assert sorted(map(str, harmonics(point).line)) == sorted(map(str, expected))
 
 
 def test_ball_lines_are_those_of_the_rules_and_no_other(spindle):
     balls = tuple(tuple(Wave(n, 1e-8, 0.7 * j * n) for n in range(1, 7)) for j in range(10))
     point = at(spindle, both(ball_waves=balls, ball_diameter=(1e-8, *[0.0] * 9)), 40.0)
-    known = lines(point.spindle, row_kinematics(point.spindle, point.state), 3)
+    known = lines(point.spindle, row_kinematics(point.spindle, point.state), point.condition.speed, 3)
     expected = [x for x in known if x.cause in ("ball waviness", "ball size")]
     assert sorted(map(str, harmonics(point).line)) == sorted(map(str, expected))
 

@@ -184,3 +184,14 @@ def test_of_a_slow_part_some_multiples_are_looked_for_and_those_of_theory():
     assert [(round(g.frequency, 3), g.repeatable) for g in found] == [(1.0, True), (1500.0, True), (1500.5, False)]
     assert [g.order for g in found] == pytest.approx([1e-3, 1.5, 1.5005])
     assert len(best.frequency) == MOST_WHOLE + 2
+
+
+def test_a_report_names_every_bearing_of_a_line(plain):
+    """At 20 C both rows have the same cage frequency: one line of both."""
+    point = operating_point(plain, Condition(20.0, SPEED))
+    found = runout(point, path="linear")
+    answer = runout_json(found, "linear", "linear", None)
+    [cage] = [g for g in answer["lines"] if g["name"] == "fc"]
+    names = [c["bearing"] for c in cage["causes"]]
+    assert sorted(names) == ["lower", "upper"]
+    assert f"{', '.join(names)} ball size" in runout_section(found, answer)[1]

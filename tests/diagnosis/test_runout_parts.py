@@ -1,0 +1,155 @@
+"""Runout tests of machines whose parts turn at speeds of their own, and of one whose bearings are numbers: lines, what repeats, and what is named."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.conftest import SCENE
+from tests.sim.running.test_seen_part import geared
+from thermospindle.diagnosis.runout.compare import compare_runout
+from thermospindle.diagnosis.runout.explanation import variants
+from thermospindle.diagnosis.runout.fit import families, fit_family, merged
+from thermospindle.diagnosis.runout.lines import look
+from thermospindle.diagnosis.runout.sources import sources
+from thermospindle.diagnosis.runout.verdict import _fitted, diagnose_runout
+from thermospindle.model.bearing.kinematics import lines, row_kinematics
+from thermospindle.model.built.drawn import drawn
+from thermospindle.model.built.imperfections import Imperfections
+from thermospindle.model.errors import BadInput
+from thermospindle.model.machine import Addition, Condition
+from thermospindle.model.scene.reading import load
+from thermospindle.model.units import RPM
+from thermospindle.sim.campaign.simulated import runout_campaign
+from thermospindle.sim.effects import by_name, usable
+from thermospindle.sim.operating import operating_point
+
+SCENES = SCENE.parent
+SPEED = 7200 * RPM
+
+
+@pytest.fixture(scope="module")
+def plain():
+    spindle = load(SCENE)
+    return replace(spindle, imperfections=drawn(spindle, 3))
+
+
+@pytest.fixture(scope="module")
+def made(plain):
+    """What the hub shows at `SPEED`, whatever turns it."""
+    return runout_campaign(plain, [Condition(40.0, SPEED)], 0.5, path="linear")
+
+
+def at_ratio(campaign, ratio):
+    return replace(campaign, tests=tuple(replace(t, speed=t.speed / ratio) for t in campaign.tests))
+
+
+@pytest.mark.parametrize("ratio", [0.5, 2.0, -0.5])
+def test_a_geared_hub_has_the_lines_of_one_without_gears(plain, ratio):
+    """Bearings and unbalance both turn with the hub: the unbalance has the ratio once, not twice."""
+
+    def of(spindle, speed):
+        point = operating_point(spindle, Condition(40.0, speed))
+        return {(x.bearing, x.cause, x.order, x.name, x.direction): x.frequency for x in lines(spindle, row_kinematics(spindle, point.state), speed)}
+
+    direct, turned = of(plain, SPEED), of(geared(plain, ratio), SPEED / ratio)
+    assert turned == pytest.approx(direct)
+    assert direct["", "unbalance", 0, "1x", "radial"] == pytest.approx(120.0)
+
+
+@pytest.mark.parametrize("ratio", [0.5, 2.0])
+def test_a_geared_hub_compares_as_one_without_gears(plain, made, ratio):
+    [direct], [found] = compare_runout(plain, made), compare_runout(geared(plain, ratio), at_ratio(made, ratio))
+    assert [(g.frequency, g.node) for g in found.lines] == [(pytest.approx(g.frequency), g.node) for g in direct.lines]
+    assert [g.computed for g in found.lines] == pytest.approx([g.computed for g in direct.lines], rel=1e-6, abs=1e-15)
+    for part in ("rro", "nrro"):
+        rows, expected = (np.array([(p.measured_rms, p.computed_rms, p.measured, p.computed) for p in getattr(x, part)]) for x in (found, direct))
+        assert rows == pytest.approx(expected, rel=1e-6, abs=1e-14)
+
+
+def test_a_spectrum_parts_what_repeats_by_what_is_seen(plain, made):
+    """The once-per-revolution line of a hub at half the speed of the spindle is at half an order of it, and repeats."""
+    [test] = made.tests
+    record = test.runout
+    bins = replace(record, kind="spectrum", axis=np.fft.rfftfreq(record.value.shape[1], record.step), value=np.fft.rfft(record.value) * 2 / record.value.shape[1])
+    spectra = replace(made, tests=(replace(test, runout=bins),))
+    [direct], [found] = compare_runout(plain, spectra), compare_runout(geared(plain, 0.5), at_ratio(spectra, 0.5))
+    assert direct.rro[0].computed_rms > 1e-10
+    for part in ("rro", "nrro"):
+        rows, expected = (np.array([(p.measured_rms, p.computed_rms) for p in getattr(x, part)]) for x in (found, direct))
+        assert rows == pytest.approx(expected, rel=1e-6, abs=1e-14)
+
+
+def test_a_record_of_few_revolutions_of_what_is_seen_is_refused(plain, made):
+    with pytest.raises(BadInput, match=r"tests\.T40_n7200: runout: 3 revolutions of what node 8 sees, at 360 rpm; at least 4 whole ones are needed"):
+        compare_runout(geared(plain, 0.05), made)
+
+
+def test_only_the_unbalance_is_looked_for_where_bearings_are_numbers():
+    """MK7702 rolls no balls: its one line is the unbalance's, and an effect of a ball row has nothing to act on."""
+    spindle = load(SCENES / "mk7702")
+    true = replace(spindle, imperfections=Imperfections(unbalance=50e-6, unbalance_z=0.1))
+    made = runout_campaign(true, [Condition(20.0, 2000 * RPM)], 0.5, path="linear")
+    seen = look(spindle, made.tests[0])
+    assert [[g.name for g in line.lines] for line in seen.seen] == [["1x"]]
+    assert seen.seen[0].frequency == pytest.approx(2000 / 60)
+    [beside] = compare_runout(true, made)
+    assert max(abs(g.residual) for g in beside.lines) < 1
+    quiet = replace(spindle, imperfections=Imperfections(unbalance=5e-6, unbalance_z=0.1))
+    d = diagnose_runout(quiet, made)
+    assert (d.verdict, d.effects) == ("identified", ("unbalance",)), d.reason
+    assert d.explanations[0].size[0] == pytest.approx(50.0, abs=4 * d.explanations[0].size_sd[0] + 5.0)
+
+
+def test_every_bearing_of_a_scene_is_looked_at():
+    """Choices of an effect are those of the scene's five bearings, from Python as from the command line."""
+    spindle = load(SCENES / "five_bearing")
+    made = runout_campaign(spindle, [Condition(20.0, 8000 * RPM)], 0.3, path="linear")
+    tried = {v.values["bearing"] for e in diagnose_runout(spindle, made).explanations for v in e.variants if "bearing" in v.values}
+    assert max(tried) > 1.0
+
+
+def test_what_leaks_from_lines_that_are_fitted_as_one_is_no_line_of_another():
+    """Lines of several bearings stand half a bin apart: what their sum leaves at a line along the axis, seen across it, is within its error."""
+    spindle = load(SCENES / "five_bearing")
+    made = runout_campaign(spindle, [Condition(20.0, s * RPM) for s in (4000, 8000)], 0.6, path="linear")
+    along = np.array([abs(p.direction[2]) > 0.5 for p in made.points])
+    apart = []
+    for test in made.tests:
+        for line in look(spindle, test).seen:
+            if len(directions := {g.direction for g in line.lines}) == 1:
+                nothing = along != (directions == {"axial"})
+                apart += list(np.abs(line.phasor[nothing]) / line.sd[nothing])
+    assert len(apart) > 300
+    assert max(apart) < 3.5  # exp(-3.5^2) of noise alone: 5e-6 a line
+    assert np.sqrt(np.mean(np.square(apart))) > 0.6
+
+
+def test_an_effect_that_does_nothing_gains_nothing_by_moving_several_families():
+    """Lines of one effect are fitted together and share the build's tolerances, which they do without it too: 9 in ln evidence were counted for it."""
+    spindle = load(SCENES / "five_bearing")
+    made = runout_campaign(spindle, [Condition(20.0, s * RPM) for s in (4000, 6000, 8000)], 0.6, path="linear")
+    seen = [look(spindle, t) for t in made.tests]
+    known = sources(spindle, seen, made.points)
+    parts = families(seen, known)
+    waviness = next(e for e in usable(spindle) if e.name == "ball_waviness")
+    variant = next(v for v in variants(waviness, known, parts) if v.values["half_order"] == 1 and v.values["bearing"] == 2)
+    assert len(variant.parts) > 1
+    own = [parts[i] for i in variant.parts]
+    nothing = replace(variant, amplitudes={s: 1e-12 * a for s, a in variant.amplitudes.items()}, parts=tuple(range(len(own))))
+    base = [fit_family(f) for f in own]
+    assert fit_family(merged(own)).evidence > sum(f.evidence for f in base) + 1.0
+    assert _fitted((nothing,), own, base, {}).delta_evidence < 0.5
+
+
+@pytest.mark.slow
+def test_no_second_effect_is_named_beside_a_wave_of_five_bearings():
+    """Ball waviness as the scene has it was taken for a second effect, needed beside an inner race of 400 nm."""
+    spindle = load(SCENES / "five_bearing")
+    values = by_name("race_waviness").typical() | {"amplitude": 400.0, "multiple": 1.0, "offset": 1.0, "ring": 0.0, "bearing": 4.0}
+    made = runout_campaign(replace(spindle, effects=(Addition("race_waviness", values),)), [Condition(20.0, s * RPM) for s in (4000, 6000, 8000)], 0.6)
+    d = diagnose_runout(spindle, made)
+    assert (d.verdict, d.effects) == ("identified", ("race_waviness",)), d.reason
+    best = d.explanations[0]
+    assert best.variants[0].values["bearing"] == 4.0
+    assert best.size[0] == pytest.approx(400.0, abs=4 * best.size_sd[0])
