@@ -12,12 +12,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import matmul_toeplitz
 from scipy.optimize import least_squares
 
+from thermospindle.diagnosis.data.window import Window, apart
 from thermospindle.model.built.tolerance import Toleranced
 from thermospindle.model.machine import Condition, HammerTest, Spindle
 from thermospindle.model.types import Array, ComplexArray
-from thermospindle.sim.identification.frf import POWER, Frf
+from thermospindle.sim.identification.frf import POWER, Frf, record_length
 from thermospindle.sim.operating import operating_point
 
 STEP = 1e-5  # relative, for differences: far above what the bearing equilibrium is solved to
@@ -76,7 +78,18 @@ def fit_lines(spindle: Spindle, condition: Condition, frf: Frf, parameters: Sequ
     if not found.success:
         raise ValueError(f"the fit of {', '.join(names)} has not come to rest after {LONGEST} steps")
     covariance = np.asarray(np.linalg.inv(found.jac.T @ found.jac), float)
+    if window_decay and np.isfinite(length := record_length(frf)):
+        real, imaginary = found.jac.T.reshape(len(names), 2, -1, frequency.size).transpose(1, 2, 3, 0)
+        half = covariance @ felt(real + 1j * imaginary, Window(window_decay, length)) @ covariance
+        covariance = (half + half.T) / 2
     return LineFit(names, found.x, covariance, float(found.cost), measured.size, int(found.nfev))
+
+
+def felt(slopes: ComplexArray, window: Window) -> Array:
+    """Covariance (p, p) of what noise under a window, of unit variance a line, does along `slopes` (m, n, p) of m FRFs by p parameters."""
+    lines = slopes.shape[1]
+    alike = apart(np.arange(lines), window)
+    return np.asarray(sum((own.conj().T @ matmul_toeplitz((alike, alike.conj()), own)).real for own in slopes), float)
 
 
 def chain_noise(hammer: HammerTest, value: ComplexArray) -> Array:

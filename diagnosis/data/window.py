@@ -54,16 +54,20 @@ class Window:
 NONE = Window()
 
 
-def between(number: Integers, window: Window, early: float = 0.0) -> ComplexArray:
-    """Correlation (n, n) of the noise of lines by `number` (n,); the identity without a window. With the last share `early` of the record as loud as its start, which may be there: where records begin
+def apart(lines: Integers, window: Window, early: float = 0.0) -> ComplexArray:
+    """Correlation (n,) of the noise of two so many `lines` (n,) apart; with the last share `early` of the record as loud as its start, which may be there: where records begin
     before the time that is told, their noise is."""
     if window.damped == 0.0:
-        return np.eye(len(number)).astype(complex)
+        return (lines == 0).astype(complex)
+    falls, turns = 2 * window.damped + 2j * np.pi * lines, 2j * np.pi * np.where(lines, lines, 1)
+    found = -np.expm1(-falls * (1 - early)) / falls + np.where(lines, np.expm1(-turns * (1 - early)) / turns, early)
+    return np.asarray(found * window.smooth * np.exp(1j * window.turn * lines), complex)
+
+
+def between(number: Integers, window: Window, early: float = 0.0) -> ComplexArray:
+    """The same (n, n) of lines by `number` (n,)."""
     farthest = int(np.ptp(number))
-    apart = np.arange(-farthest, farthest + 1)
-    falls, turns = 2 * window.damped + 2j * np.pi * apart, 2j * np.pi * np.where(apart, apart, 1)
-    found = -np.expm1(-falls * (1 - early)) / falls + np.where(apart, np.expm1(-turns * (1 - early)) / turns, early)
-    return np.asarray((found * window.smooth * np.exp(1j * window.turn * apart))[np.subtract.outer(number, number) + farthest], complex)
+    return apart(np.arange(-farthest, farthest + 1), window, early)[np.subtract.outer(number, number) + farthest]
 
 
 @lru_cache(maxsize=512)
