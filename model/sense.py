@@ -12,6 +12,7 @@ from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import RotorBase, element_rows, matrices
 from thermospindle.model.rotor.loss import damping_of_loss
 from thermospindle.model.rotor.modes import Mode
+from thermospindle.model.types import Array
 from thermospindle.model.units import MM, RPM
 
 COLDEST, HOTTEST = -40.0, 120.0
@@ -91,7 +92,7 @@ def of_loads(spindle: Spindle, least: Mapping[str, float]) -> list[str]:
 
 def of_damping(chain: RotorBase, modes: Sequence[Mode]) -> list[str]:
     """Modes of a turning chain that would be damped otherwise if the dampers of what turns turned with it, and not stood in space as those of a chain do."""
-    other = [(m, m.damping_ratio, turned_damping(chain, m)) for m in modes]
+    other = [(m, m.damping_ratio, turned) for m, turned in zip(modes, turned_dampings(chain, modes), strict=True)]
     undamped = [(m, turned) for m, own, turned in other if turned <= 0 < own]
     if undamped:
         m, turned = undamped[0]
@@ -111,33 +112,35 @@ def of_damping(chain: RotorBase, modes: Sequence[Mode]) -> list[str]:
     ]
 
 
-def turned_damping(chain: RotorBase, mode: Mode) -> float:
-    """Damping ratio of a mode of a chain if the dampers between bodies of one rotor turned with it.
+def turned_dampings(chain: RotorBase, modes: Sequence[Mode]) -> list[float]:
+    """Damping ratios of modes of a chain if the dampers between bodies of one rotor turned with it.
 
     Turning with w, such a damper feels q' - w S q, S q the motion (-y, x) across and of the tilts (Genta, *Dynamics of Rotating Systems*, 2005, ch. 6): beside C it makes the
     circulatory stiffness -w C S. To first order that moves a lightly damped mode's pole p by w phi^H C S phi / phi^H (2 p M + C + G) phi; forward modes lose w / |p| of what turns.
     """
+    linear, circulatory = matrices(chain), _circulatory(chain)
+    poles = [m.pole + (m.shape.conj() @ circulatory @ m.shape) / (m.shape.conj() @ (2 * m.pole * linear.mass + linear.damping) @ m.shape) for m in modes]
+    return [float(-p.real / abs(p)) for p in poles]
+
+
+def _circulatory(chain: RotorBase) -> Array:
+    """w C S (n, n) of the dampers between bodies of one rotor, summed over the rotors."""
     ratio = {b.name: b.speed_ratio for b in chain.bodies if b.turns}
     own = [e for e in chain.elements if e.a in ratio and ratio.get(e.b) == ratio[e.a]]
-    linear, shape = matrices(chain), mode.shape
-    turn = np.zeros((5, 5))
-    turn[[0, 3], [1, 4]], turn[[1, 4], [0, 3]] = -1.0, 1.0
-    fed = 0j  # phi^H C S phi, in units of the spindle speed
-    for e in own:
-        q = element_rows(chain, e) @ shape
-        fed += ratio[e.a] * complex(q.conj() @ e.damping @ turn @ q)
-    for rotor in {ratio[e.a] for e in own if e.loss_factor}:
-        lossy = [(e.lossy, element_rows(chain, e)) for e in own if e.loss_factor and ratio[e.a] == rotor]
-        across = np.zeros(len(shape), complex)
-        at = {dof: k for k, dof in enumerate(linear.dofs)}
+    linear, at = matrices(chain), {dof: k for k, dof in enumerate(chain.dofs)}
+    found = np.zeros_like(linear.stiffness)
+    for rotor in {ratio[e.a] for e in own}:
+        turn = np.zeros_like(found)
         for (body, move), k in at.items():
             if ratio.get(body) == rotor and move in TURNED:
-                sign, other = TURNED[move]
-                across[k] = sign * shape[at[body, other]]
-        fed += rotor * complex(shape.conj() @ damping_of_loss(np.diag(linear.mass), linear.stiffness, lossy) @ across)
-    moved = chain.speed * fed / (shape.conj() @ (2 * mode.pole * linear.mass + linear.damping) @ shape)
-    pole = mode.pole + moved
-    return float(-pole.real / abs(pole))
+                turn[k, at[body, TURNED[move][1]]] = TURNED[move][0]
+        of_it = [(e, element_rows(chain, e)) for e in own if ratio[e.a] == rotor]
+        damping = np.sum([rows.T @ e.damping @ rows for e, rows in of_it], axis=0)
+        lossy = [(e.lossy, rows) for e, rows in of_it if e.loss_factor]
+        if lossy:
+            damping = damping + damping_of_loss(np.diag(linear.mass), linear.stiffness, lossy)
+        found += chain.speed * rotor * damping @ turn
+    return found
 
 
 def _extremes(conditions: Sequence[Condition]) -> list[Condition]:

@@ -50,6 +50,11 @@ class Structure:
     outer_body: str = ""
     shafts: tuple[Shaft, ...] = ()  # those whose nodes and elements are among `bodies` and `joints`
 
+    @property
+    def turns(self) -> bool:
+        """Whether anything does."""
+        return any(b.turns for b in self.bodies)
+
     def carrier(self, body: str) -> str:
         """What a body is axially rigid with: its shaft, or itself."""
         return self._shaft_of.get(body, body)

@@ -184,7 +184,7 @@ def region_bodies(spindle: Spindle) -> dict[str, str]:
     }:
         hosts |= found
     on_shafts = {g.name: node for g in spindle.regions if g.name not in made_of and (node := host(spindle, g))}
-    turning = spindle.turning.name if any(b.turns for b in structure.bodies) else ""
+    turning = spindle.turning.name if structure.turns else ""
     still = next((name for b in spindle.bearings for name in (b.inner_body, b.outer_body) if name != "ground" and not structure.body(name).turns), "")
     still = still or next((b.name for b in structure.bodies if not b.turns), turning)
     return {g.name: on_shafts.get(g.name) or hosts.get(g.name, turning if g.part == "rotating" else still) for g in spindle.regions}

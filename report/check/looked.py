@@ -30,5 +30,5 @@ def looked(spindle: Spindle, reference: OperatingPoint) -> Looked:
         except (NoEquilibrium, OutsideRange) as error:
             return f"at {temperature:g} C and {speed / RPM:.0f} rpm: {error}"
 
-    turns = any(b.turns for b in spindle.structure.bodies)
+    turns = spindle.structure.turns
     return Looked(spindle, reference, at(hottest, 0.0), at(spindle.reference_temperature, spindle.nominal_speed) if turns else "")

@@ -178,7 +178,7 @@ def _mesh(found: Looked) -> Iterator[str]:
 def _running(found: Looked) -> Iterator[str]:
     spindle = found.spindle
     own = spindle.imperfections
-    if any(b.turns for b in spindle.structure.bodies) and not (own.unbalance or own.couple_unbalance or own.bearings):
+    if spindle.structure.turns and not (own.unbalance or own.couple_unbalance or own.bearings):
         yield "no imperfections are told, so that the turning spindle has no runout; imperfections.seed and grade draw plausible ones"
     turning = {b.name for b in spindle.structure.bodies if b.turns}
     for joint in spindle.structure.joints:

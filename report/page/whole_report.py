@@ -39,7 +39,7 @@ def climbed(run: Run) -> list[Campaign]:
 
 def steps(run: Run) -> int:
     """About how often the functions here report progress."""
-    of_turning = STEPS + STAGES + stages(run.spindle, OVER_TEMPERATURE) if turns(run.spindle) else 0
+    of_turning = STEPS + STAGES + stages(run.spindle, OVER_TEMPERATURE) if run.spindle.structure.turns else 0
     return of_turning + sum(LADDER_STEPS + 3 * len(c.tests) for c in climbed(run))
 
 
@@ -51,13 +51,9 @@ def more_sections(run: Run, speed: float, catalogue: tuple[Effect, ...], progres
         yield ladder_report.section(ladder(run.spindle, campaign, catalogue=catalogue, progress=progress))
 
 
-def turns(spindle: Spindle) -> bool:
-    return any(b.turns for b in spindle.structure.bodies)
-
-
 def turning(spindle: Spindle, temperatures: Sequence[float], speed: float, progress: Callable[[str], None]) -> Iterator[Section]:
     """Runout and resonance map from the coldest of the temperatures, warm-up from the spindle's reference temperature; of what is left out a sentence that says why."""
-    if not turns(spindle):
+    if not spindle.structure.turns:
         yield "Runout, warm-up and resonance map", "<p>Left out, all three: nothing of this machine turns (no body or shaft has <code>turns = true</code>).</p>"
         return
     low, high = temperatures[0], temperatures[-1]

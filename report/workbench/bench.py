@@ -147,7 +147,7 @@ def _conditions(spindle: Spindle) -> list[Shown]:
     temperatures = np.linspace(*spindle.temperatures, TEMPERATURES)
     found = [Shown(f"{t:g} °C", Condition(float(t))) for t in temperatures]
     speed = spindle.nominal_speed
-    if speed and any(b.turns for b in spindle.structure.bodies):
+    if speed and spindle.structure.turns:
         found += [Shown(f"{t:g} °C, {speed / RPM:.0f} rpm", Condition(float(t), speed)) for t in temperatures[[0, -1]]]
     return found
 

@@ -69,7 +69,7 @@ PARTS: Mapping[str, Callable[[Spindle], bool]] = {
     ROLLING: lambda spindle: bool(spindle.rolling),
     RINGS: lambda spindle: bool(spindle.ringed),
     SECTION: lambda spindle: bool(spindle.regions),
-    TURNING: lambda spindle: any(b.turns for b in spindle.structure.bodies),
+    TURNING: lambda spindle: spindle.structure.turns,
     SHAFT: lambda spindle: bool(spindle.structure.shafts),
 }
 """What an effect may need of a spindle, as a message names it."""

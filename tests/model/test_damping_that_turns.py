@@ -10,7 +10,7 @@ from thermospindle.model.machine import Condition
 from thermospindle.model.rotor.chain import RotorBase, matrices
 from thermospindle.model.rotor.modes import modes
 from thermospindle.model.scene.reading import load
-from thermospindle.model.sense import of_damping, turned_damping
+from thermospindle.model.sense import of_damping, turned_dampings
 from thermospindle.model.units import RPM
 from thermospindle.sim.operating import operating_point
 
@@ -48,7 +48,7 @@ def exact(chain: RotorBase, near: complex) -> float:
 def test_damping_ratio_of_what_turns(tmp_path, rpm, loss):
     chain = rotor(tmp_path, rpm, loss)
     for mode in modes(chain, highest=650.0):
-        turned = turned_damping(chain, mode)
+        turned = turned_dampings(chain, [mode])[0]
         assert turned == pytest.approx(exact(chain, mode.pole), abs=2e-5 + 0.01 * mode.damping_ratio)
         if rpm == 0.0 or mode.kind == "axial":
             assert turned == pytest.approx(mode.damping_ratio, rel=1e-12)
@@ -64,7 +64,7 @@ def test_above_the_critical_speed_the_forward_mode_is_fed(tmp_path):
     for mode, sense in ((forward, 1), (backward, -1)):
         stays = next(m for m in modes(bearings, highest=650.0) if m.whirl == mode.whirl).damping_ratio
         expected = stays + (mode.damping_ratio - stays) * (1 - sense * chain.speed / abs(mode.pole))
-        assert turned_damping(chain, mode) == pytest.approx(expected, abs=5e-5)
+        assert turned_dampings(chain, [mode])[0] == pytest.approx(expected, abs=5e-5)
     [said] = of_damping(chain, found)
     assert f"feed the lateral forward mode at {forward.frequency:.1f} Hz: -0.055 % of critical where 0.85 % is computed, which is unstable" in said
 
