@@ -27,6 +27,7 @@ from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.campaign.campaign import Noise, Test
 from thermospindle.sim.identification.frf import Frf, even, out_of, record_length
 from thermospindle.sim.identification.modal import noise_model, scatter
+from thermospindle.sim.identification.padding import own_lines
 
 NODES = 5  # of a block: polynomials of degree 4
 LONGEST = 160  # lines in a block
@@ -118,10 +119,11 @@ def _each(value: ComplexArray, by: ComplexArray) -> ComplexArray:
 
 
 def line_data(test: Test, condition: Condition, stated: Noise | None, expected: Noise) -> LineData:
-    """The lines of a test's FRFs above 0 Hz, without those of the running speed. Noise is that of the file (repeats, coherence), or `stated` by the campaign, or found in the
+    """The lines of a test's FRFs above 0 Hz, without those of the running speed, and without those between the lines of a record that was filled up with zeros. Noise is that of the file (repeats, coherence), or `stated` by the campaign, or found in the
     scatter of neighbouring lines, starting from what the scene's measuring chain is `expected` to have."""
-    frf = test.frf
-    assert frf is not None
+    assert test.frf is not None
+    frf, closer = own_lines(test.frf)
+    test = replace(test, frf=frf)
     use = (frf.frequency > 0) & ~out_of(frf, test.speed).out
     frequency, value = frf.frequency[use], frf.value[:, :, use]
     steps = np.diff(frequency)
@@ -152,7 +154,8 @@ def line_data(test: Test, condition: Condition, stated: Noise | None, expected: 
         blocks = _blocks(value, sd, window, gaps)
         seen = _within_blocks(value, blocks, window, frequency, falling)
     at, kept, error, alike = _compressed(frequency, value, sd, blocks, window, falling)
-    return LineData(test, condition, at, kept, error, frf.quantity, noise_from, len(frequency), alike)
+    said = noise_from if closer == 1 else f"{noise_from}, of every {closer}{'nd' if closer == 2 else 'rd' if closer == 3 else 'th'} line: records are filled up with zeros"
+    return LineData(test, condition, at, kept, error, frf.quantity, said, len(frequency), alike)
 
 
 def _noise(frf: Frf, value: ComplexArray, use, stated: Noise | None, expected: Noise, window: Window) -> tuple[Array, str]:

@@ -16,6 +16,7 @@ from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.campaign.campaign import Campaign, Noise, Test, condition_of
 from thermospindle.sim.identification.frf import out_of, without
 from thermospindle.sim.identification.modal import noise_model
+from thermospindle.sim.identification.padding import own_lines
 from thermospindle.sim.identification.pairing import REPEATED, ModeSet, at_shared, pairs
 from thermospindle.sim.identification.remembered import extracted
 
@@ -111,7 +112,8 @@ def _only(o: Observation, kept: NDArray[np.bool_]) -> Observation:
 
 def _from_frf(test: Test, noise: Noise) -> Observation:
     assert test.frf is not None
-    frf = without(test.frf, out_of(test.frf, test.speed).out)
+    frf, _ = own_lines(test.frf)
+    frf = without(frf, out_of(frf, test.speed).out)
     sd = frf.sd
     if sd is None or not np.all(np.isfinite(sd)):  # a single hit has no scatter
         sd = noise_model(frf.value, noise.of_value, noise.of_largest)

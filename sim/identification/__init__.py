@@ -5,6 +5,7 @@ frf            FRFs of one modal test, and the physical checks that measured and
                is built on them
 modal          modes of a measured matrix of frequency response functions, with standard errors
 numbering      the modes of a run numbered at its first step and followed, measured and identified modes set beside them
+padding        records that were filled up with zeros, and the lines that are theirs
 pairing        which mode of one set is which of another: one cost, one assignment, and a policy for each use
 peak           a modal peak of a test, wherever it is from: what a log of a run keeps of it
 poles          poles of a matrix of frequency response functions by maximum likelihood, and where to start looking for
