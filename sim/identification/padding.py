@@ -13,10 +13,10 @@ import numpy as np
 from thermospindle.model.types import Array
 from thermospindle.sim.identification.frf import Frf, even
 
-PARTS = 64  # of the time that lines are apart for, in which what is there is compared
+PARTS = 128  # of the time that lines are apart for, in which what is there is compared
 NEARLY = 1.05  # as many times closer as that
-FEW = 256  # lines, from which it shows
-FALLS, STEADY = 300.0, 3.0  # power of two parts before a fall over that of two after it, at least; and of the one before that over it, at most
+FEW = 512  # lines, from which it shows
+FALLS, STEADY = 30.0, 3.0  # power of two parts before a fall over that of two after it, at least; and of the one before that over it, at most
 
 
 def own_lines(frf: Frf) -> tuple[Frf, int]:
@@ -33,12 +33,12 @@ def padding(frf: Frf) -> int:
     """How many times closer lines lie than those of their records, rounded down but for a twentieth."""
     if len(frf.frequency) < FEW or not even(frf.frequency):
         return 1
-    there = _power(frf.value)
+    there, falls = _power(frf.value), {}
     for part in range(4, PARTS - 4):
         before, earlier, after = there[part - 2 : part].mean(), there[part - 4 : part - 2].mean(), there[part + 1 : part + 3].mean()
         if before > FALLS * after and earlier < STEADY * before:
-            return max(int(NEARLY * PARTS / (part + 0.5)), 1)
-    return 1
+            falls[part] = before / max(after, 1e-300)
+    return max(int(NEARLY * PARTS / (max(falls, key=lambda part: falls[part]) + 0.5)), 1) if falls else 1
 
 
 def _power(value: np.ndarray) -> Array:
