@@ -247,6 +247,10 @@ class Spindle:
         first = self.bearings[0]
         return self.structure.body(first.inner_body if first.turning_ring == "outer" else first.outer_body)
 
+    def axial_on_turning(self, force: float) -> float:
+        """`axial_load` (N) of an axial force (N) on what turns: itself where outer rings turn, its opposite where inner rings do, since bearings feel the motion between both alone."""
+        return -force if any(b.turning_ring == "inner" for b in self.bearings) else force
+
     @property
     def turning_mass(self) -> float:
         """Mass (kg) of all that turns."""

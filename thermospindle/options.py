@@ -262,7 +262,7 @@ def parsers() -> tuple[_Parser, dict[str, argparse.ArgumentParser]]:
     element(runout)
     runout.add_argument(
         "--path", choices=("simulated", "linear"),
-        help="a run in MuJoCo, or the exact harmonic answer of the linear model",
+        help="a run in MuJoCo, or the exact harmonic answer of the linear model (simulated by default, linear where that takes too many steps)",
     )  # fmt: skip
     warmup = verb(
         "warmup", ("running", "warmup"), "from cold start (or into a chamber soak): temperatures, preload, friction and frequencies over time"

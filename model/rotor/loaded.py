@@ -110,7 +110,7 @@ def _rows(chain: RotorBase, name: str) -> Array:
 def _motion(stiffness: Array, mass: Array, rows: Sequence[_Row], load: Array, size: float) -> Array:
     """Motion (n,) under a load (n,) of `size` N: the least potential, then Newton's method on the balance."""
     firm = stiffness + sum((row.b.T @ (np.trace(stiffness) / len(mass) * row.b) for row in rows), start=np.zeros_like(stiffness))
-    if displacement(firm, mass, load) is None:
+    if displacement(firm, load) is None:
         raise NoEquilibrium("nothing bears the radial load: the spindle is free to move under it")
     none = np.zeros(5)
     resting = [row.light(none)[0] for row in rows]
@@ -138,7 +138,7 @@ def _motion(stiffness: Array, mass: Array, rows: Sequence[_Row], load: Array, si
     for _ in range(MOST_STEPS):
         left = load - stiffness @ u - sum((row.b.T @ (row.force(row.b @ u) - f) for row, f in zip(rows, before, strict=True)), start=np.zeros_like(u))
         tangent = stiffness + sum((row.b.T @ _even(row.tangent(row.b @ u)) @ row.b for row in rows), start=np.zeros_like(stiffness))
-        step = displacement(tangent, mass, left)
+        step = displacement(tangent, left)
         if step is None:
             break
         u = u + step

@@ -18,7 +18,7 @@ from thermospindle.model.rotor.chain import Element, RotorBase, element_rows, ma
 from thermospindle.model.types import Array
 
 FREE = 1e-12
-"""Of the largest eigenvalue of M^-1/2 K M^-1/2: what is below is a motion that nothing resists."""
+"""Of the largest eigenvalue of D^-1/2 K D^-1/2 with D the diagonal of K: what is below is a motion that nothing resists."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ def static(spindle: Spindle, chain: RotorBase, point: Point) -> Static:
     """Stiffness, reactions and shares at one point of a chain at its operating state."""
     linear = matrices(chain)
     row = point_row(chain, point)
-    moved = displacement(linear.stiffness, np.diag(linear.mass), row)
+    moved = displacement(linear.stiffness, row)
     names = {b.name: b for b in spindle.all_bearings}
     if moved is None:
         return Static(point, 0.0, dict.fromkeys(names, 0.0), {})
@@ -83,12 +83,19 @@ def around(spindle: Spindle, chain: RotorBase, point: Point) -> Around:
     return Around(static(spindle, chain, point), static(spindle, chain, axial), across)
 
 
-def displacement(stiffness: Array, mass: Array, force: Array) -> Array | None:
-    """Displacement (n,) under a force (n,) at masses (n,); None where the force drives a motion that nothing resists."""
-    root = np.sqrt(mass)
+def free_motions(stiffness: Array) -> Array:
+    """Motions (n, m) that nothing resists, orthonormal. Degrees of freedom are scaled by their own stiffness (Jacobi's scaling, van der Sluis 1969, *Numer. Math.* 14, 14: within a factor n of
+    the best condition that a diagonal gives), so that neither units nor masses count: a light part on a stiff seat frees nothing else."""
+    own = np.diag(stiffness)
+    root = np.sqrt(np.where(own > 0, own, 1.0))
     value, vector = np.linalg.eigh(stiffness / np.outer(root, root))
     free = vector[:, value < FREE * value[-1]] / root[:, None]
-    free = np.linalg.qr(free)[0] if free.size else free
+    return np.linalg.qr(free / np.linalg.norm(free, axis=0))[0] if free.size else free
+
+
+def displacement(stiffness: Array, force: Array) -> Array | None:
+    """Displacement (n,) under a force (n,); None where the force drives a motion that nothing resists."""
+    free = free_motions(stiffness)
     if free.size and np.linalg.norm(free.T @ force) > 1e-6 * np.linalg.norm(force):
         return None
     held = stiffness + np.trace(stiffness) / len(stiffness) * free @ free.T

@@ -48,6 +48,8 @@ class Numbers(Table):
             raise ValueError("a bearing given by numbers has one of radial_stiffness_N_per_um, matrix_SI and table")
         if self.matrix_SI is not None:
             k = np.array(self.matrix_SI)
+            if not k.any():
+                raise ValueError("matrix_SI: all entries are zero; a bearing holds something, x and y in N/m, tilts in N m/rad")
             if np.abs(k - k.T).max() > 1e-9 * np.abs(k).max():
                 i, j = np.unravel_index(int(np.abs(k - k.T).argmax()), k.shape)
                 raise ValueError(
@@ -77,49 +79,66 @@ def _read(file: Path, bearing: str | None) -> tuple[tuple[float, ...], tuple[flo
     if not file.is_file():  # a pipe would be waited for, a device has no end
         raise BadInput(f"{file}: no such file")
     try:
-        lines = [line for line in file.read_text(encoding="utf-8-sig").splitlines() if not line.startswith("#")]
-        rows = list(csv.DictReader(lines))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        lines = [(number, line) for number, line in enumerate(file.read_text(encoding="utf-8-sig").splitlines(), 1) if line.strip() and not line.startswith("#")]
+        rows = list(zip((number for number, _ in lines[1:]), csv.DictReader(line for _, line in lines), strict=True))
+    except (OSError, UnicodeDecodeError, csv.Error, ValueError) as error:
         raise BadInput(f"{file}: cannot be read as a table of bearing stiffness: {error}") from None
     if rows:
-        _check_columns(file, rows)
+        _check_columns(file, [row for _, row in rows])
     if rows and bearing is not None:
-        rows = [row for row in rows if row.get("bearing") == bearing]
+        rows = [(number, row) for number, row in rows if row.get("bearing") == bearing]
     if not rows:
         raise BadInput(f"{file}: has no rows{f' of bearing {bearing!r}' if bearing else ''}")
-    known = [c for c in COLUMNS if c in rows[0]]
-    if not set(known) & set(COLUMNS[:2]) or not set(WHERE) <= set(rows[0]):
+    known = [c for c in COLUMNS if c in rows[0][1]]
+    if not set(known) & set(COLUMNS[:2]) or not set(WHERE) <= set(rows[0][1]):
         raise BadInput(f"{file}: its columns must be temperature_C, speed_rpm and {', '.join(COLUMNS)}, the last two where there are any")
     values: dict[tuple[float, float], np.ndarray] = {}
-    for number, row in enumerate(rows, 2):
-        try:
-            at = float(plain_number(row["temperature_C"])), float(plain_number(row["speed_rpm"])) * RPM
-            radial, axial, tilt, coupling = (float(plain_number(row[c])) if c in known else 0.0 for c in COLUMNS)
-            along_y, mixed, tilt_y, coupling_y = (float(plain_number(row[c])) if c in row else same for c, same in zip(BY_DIRECTION, (radial, 0.0, tilt, coupling), strict=True))
-            between = {place: float(plain_number(row[c])) for c, place in BETWEEN.items() if c in row}
-        except (TypeError, AttributeError, ValueError):  # a row that ends before its time has None
-            raise BadInput(f"{file}: row {number}: every column must hold a number in digits 0 to 9") from None
+    for number, row in rows:
+        where = f"{file}: line {number}"
         if None in row:  # what is left of a row that has more cells than the header
-            raise BadInput(f"{file}: row {number}: has more cells than the header has columns; numbers have a point, not a comma")
-        k = np.diag([radial, along_y, axial, tilt, tilt_y])
-        k[0, 1] = k[1, 0] = mixed
-        k[0, 4] = k[4, 0] = coupling
-        k[1, 3] = k[3, 1] = -coupling_y
-        for (i, j), value in between.items():
-            k[i, j] = k[j, i] = value
+            raise BadInput(f"{where}: has more cells than the header has columns; numbers have a point, not a comma")
+        told = {c: _number(where, c, row[c]) for c in (*WHERE, *COLUMNS, *BY_DIRECTION, *BETWEEN) if c in row}
+        at = told["temperature_C"], told["speed_rpm"] * RPM
+        k = _matrix(told)
         if at in values:
-            raise BadInput(f"{file}: row {number}: {at[0]:g} C and {at[1] / RPM:g} rpm stand twice{'' if bearing else '; which bearing? say bearing = ...'}")
-        if not np.isfinite(at).all():
-            raise BadInput(f"{file}: row {number}: temperature_C and speed_rpm must be finite")
-        if not np.isfinite(k).all() or np.linalg.eigvalsh(k).min() < -1e-9 * np.abs(k).max():
-            raise BadInput(f"{file}: row {number}: is no stiffness of a bearing; it must be finite and push nothing away")
+            raise BadInput(f"{where}: {at[0]:g} C and {at[1] / RPM:g} rpm stand twice{'' if bearing else '; which bearing? say bearing = ...'}")
+        if (lowest := np.linalg.eigvalsh(k).min()) < -1e-9 * np.abs(k).max():
+            raise BadInput(f"{where}: its stiffness has the negative eigenvalue {lowest:.3g}, as of a bearing that pushes the shaft away; all must be 0 or more")
         values[at] = k
     if not any(k.any() for k in values.values()):
         raise BadInput(f"{file}: {', '.join(known)}: all are zero{f' of bearing {bearing!r}' if bearing else ''}; a table holds some stiffness, in the units of its header")
     temperatures, speeds = (tuple(sorted({at[i] for at in values})) for i in (0, 1))
-    if len(values) != len(temperatures) * len(speeds):
-        raise BadInput(f"{file}: the table has gaps; it needs a row for each of {len(temperatures)} temperatures and {len(speeds)} speeds")
+    missing = next(((t, s) for t in temperatures for s in speeds if (t, s) not in values), None)
+    if missing is not None:
+        raise BadInput(
+            f"{file}: has no row of {missing[0]:g} C and {missing[1] / RPM:g} rpm{f' of bearing {bearing!r}' if bearing else ''}; "
+            f"it needs one for each of its {len(temperatures)} temperatures at each of its {len(speeds)} speeds"
+        )
     return temperatures, speeds, tuple(float(v) for t in temperatures for s in speeds for v in values[t, s].ravel())
+
+
+def _number(where: str, column: str, text: str | None) -> float:
+    """The finite number of a cell; None is that of a row that ends before its time."""
+    try:
+        value = float(plain_number(text or ""))
+    except ValueError:
+        value = float("nan")
+    if not np.isfinite(value):
+        raise BadInput(f"{where}: {column} = {text or ''!r}: must be a finite number in digits 0 to 9")
+    return value
+
+
+def _matrix(told: Mapping[str, float]) -> np.ndarray:
+    """The stiffness (5, 5) of a row's columns."""
+    radial, axial, tilt, coupling = (told.get(c, 0.0) for c in COLUMNS)
+    along_y, mixed, tilt_y, coupling_y = (told.get(c, same) for c, same in zip(BY_DIRECTION, (radial, 0.0, tilt, coupling), strict=True))
+    k = np.diag([radial, along_y, axial, tilt, tilt_y])
+    k[0, 1] = k[1, 0] = mixed
+    k[0, 4] = k[4, 0] = coupling
+    k[1, 3] = k[3, 1] = -coupling_y
+    for column, (i, j) in BETWEEN.items():
+        k[i, j] = k[j, i] = told.get(column, 0.0)
+    return k
 
 
 def _check_columns(file: Path, rows: Sequence[Mapping[str, str | None]]) -> None:
@@ -128,4 +147,6 @@ def _check_columns(file: Path, rows: Sequence[Mapping[str, str | None]]) -> None
     for column in rows[0]:
         if column is None or column in allowed or (not column and not any(row[column] for row in rows)):
             continue
+        if apart := next((sign for sign in (";", "\t") if sign in column), None):
+            raise BadInput(f"{file}: its columns are separated by {apart!r}; allowed are commas, and a point in numbers")
         raise BadInput(f"{file}: column {column!r}: unknown; allowed are {', '.join(allowed)}{meant(column, allowed)}")

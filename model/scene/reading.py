@@ -84,6 +84,7 @@ def build(raw: dict[str, Any], file: Path) -> Spindle:
         form = scene_file.Scene.model_validate(raw)
     except ValidationError as error:
         raise BadInput(scene_file.first_error(file, raw, scene_file.Scene, error)) from None
+    _check_catalogues(form, file)
     spindle = form.spindle(name=file.parent.name, file=file, provenance=_provenance(file, raw))
     spindle = _with_shafts(file, spindle)
     check_section(file, spindle)
@@ -202,6 +203,16 @@ def _is_number(value: Any) -> bool:
 
 
 # ---------------------------------------------------------------- what follows from the file
+
+
+def _check_catalogues(form: scene_file.Scene, file: Path) -> None:
+    """`BadInput` with file and key for a catalogue that no ball bearing fits."""
+    for name, row in form.ball_rows.items():
+        if (told := row.catalogue_row()) is not None:
+            try:
+                derived(told)
+            except BadInput as error:
+                raise BadInput(f"{file}: ball_rows.{name}.{error}") from None
 
 
 def _with_loaded_angles(form: scene_file.Scene, spindle: Spindle) -> Spindle:

@@ -10,7 +10,7 @@ import numpy as np
 from thermospindle.diagnosis.forward.linear import mass_between
 from thermospindle.model.machine import Point, Spindle
 from thermospindle.model.rotor.modes import poles_below
-from thermospindle.model.rotor.static import FREE
+from thermospindle.model.rotor.static import free_motions
 from thermospindle.model.shaft import SAME_HEIGHT, Shaft
 from thermospindle.model.units import HERTZ, MM, RPM
 from thermospindle.report.check.looked import Looked
@@ -64,10 +64,7 @@ def _materials(found: Looked) -> Iterator[str]:
 
 
 def _free(found: Looked) -> Iterator[str]:
-    linear = found.reference.linear
-    root = np.sqrt(np.diag(linear.mass))
-    value = np.linalg.eigvalsh(linear.stiffness / np.outer(root, root))
-    count = int(np.sum(value < FREE * value[-1]))
+    count = free_motions(found.reference.linear.stiffness).shape[1]
     if count:
         what = "a motion" if count == 1 else f"{count} motions"
         yield f"nothing holds the spindle against {what}, as of a shaft that hangs free or floats along its axis"

@@ -39,12 +39,13 @@ def sentences(values: Mapping[str, Any]) -> list[str]:
         found.append("Rings do not grow by their own rotation; the effect ring_growth takes that in.")
     found += [_rollers(name, b) for name, b in values["bearings"].items() if b["kind"] == "roller row"]
     if values["axial_load_N"]:
-        found.append(f"External axial load {values['axial_load_N']:g} N along z.")
+        found.append(_axial_load(values))
     if any(values["radial_load_N"]):
         shares = [f"{name} {f[0]:+.3g}, {f[1]:+.3g}" for name, b in values["bearings"].items() if (f := b.get("radial_force_N"))]
         fx, fy = values["radial_load_N"]
         on = f" on {values['radial_load_body']}" if len(turning) > 1 else ""
-        found.append(f"External radial load {fx:g}, {fy:g} N along x, y at z = {values['radial_load_z_mm']:g} mm{on}, borne by {'; '.join(shares)} N.")
+        borne = f"borne by {'; '.join(shares)} N" if shares else "changes nothing: bearings given by numbers are as stiff under any load"
+        found.append(f"External radial load {fx:g}, {fy:g} N along x, y at z = {values['radial_load_z_mm']:g} mm{on}, {borne}.")
     if values["unbalance_body"] and len(turning) > 1:
         found.append(f"The unbalance is on {values['unbalance_body']}.")
     h, modes = values["hammer"], values["modes_Hz"]
@@ -101,6 +102,15 @@ def grids(values: Mapping[str, Any]) -> list[tuple[str, list[str], list[list[str
         ("Points", ["node", "point", "on", "x, y, z\nmm", "along", "hammer"], points),
     ]
     return [g for g in every if g[2]]
+
+
+def _axial_load(values: Mapping[str, Any]) -> str:
+    """The axial load on what carries the outer rings, and what that is as a force on what carries the inner ones."""
+    load, rows = values["axial_load_N"], [b for b in values["bearings"].values() if b["kind"] == "ball row"]
+    if not rows:
+        return f"External axial load {load:g} N along z changes nothing: no bearing here is a ball row, whose stiffness goes with load."
+    outer, inner = (listed(list(dict.fromkeys(b[key] for b in rows))) for key in ("outer_on", "inner_on"))
+    return f"External axial load {load:g} N along z on {outer}, which carries the outer rings: for the bearings the same as {-load:g} N on {inner}."
 
 
 def _rollers(name: str, b: Mapping[str, Any]) -> str:

@@ -24,7 +24,7 @@ from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.resonance.map import SEED, fastest, resonance_map, stages
 from thermospindle.sim.run import Run
-from thermospindle.sim.running.runout import runout, with_imperfections
+from thermospindle.sim.running.runout import planned, runout, with_imperfections
 from thermospindle.sim.warmup import STAGES, warm_up
 
 STEPS = 3  # of progress, beside those of the warm-up, of the map and of the ladders
@@ -63,8 +63,9 @@ def turning(spindle: Spindle, temperatures: Sequence[float], speed: float, progr
         point, seed = operating_point(spindle, condition), None
         if point.imperfections == Imperfections():
             point, seed = operating_point(with_imperfections(spindle, drawn(spindle, SEED)), condition), SEED
-        found = runout(point)
-        return runout_section(found, runout_json(found, "simulated", "linear", seed))
+        path = planned(point).path
+        found = runout(point, path=path)
+        return runout_section(found, runout_json(found, path, "linear", seed))
 
     progress("simulating the turning spindle")
     yield _computed("Runout", of_runout)

@@ -106,6 +106,9 @@ def verdict(c: Comparison) -> str:
         return f"{sentence}; but the shape measured at {_first(turned)} has nothing of the computed one (MAC below {UNLIKE:g})." if turned else f"{sentence}."
     alone = max((abs(m.residual) for _, m in every), default=0.0)
     if alone < c.rms_residual and not any(t.missing for t in c.tests):
+        t, m, off = max(((t, m, abs(m.damping_residual or 0.0)) for t, m in every), key=lambda row: row[2])
+        if off > max(alone, ALMOST):
+            return f"{sentence}; no frequency alone is off by more than {alone:.1f}, but dampings are, most that of {_mode(t, m)} by {off:.3g}."
         return f"{sentence}; {TOGETHER.format(alone)}."
     if lost := [f"{f:.5g} Hz of {t.test.id}" for t in c.tests for f in t.missing]:
         several = len(lost) > 1

@@ -28,8 +28,8 @@ from thermospindle.sim.operating import doubts, operating_point
 from thermospindle.sim.resonance.found import ResonanceMap
 from thermospindle.sim.resonance.map import fastest, resonance_map, stages
 from thermospindle.sim.running.probes import looked_at
+from thermospindle.sim.running.runout import planned, with_imperfections
 from thermospindle.sim.running.runout import runout as simulated_runout
-from thermospindle.sim.running.runout import with_imperfections
 from thermospindle.sim.warmup import SHORTEST, STAGES, Warmup, warm_up
 
 STEPS_OF_TEMPERATURE, STEPS_OF_SPEED = 21, 41  # of a resonance map
@@ -42,7 +42,7 @@ def runout(
     seconds: float | None = None,
     seed: int | None = None,
     element: str = "linear",
-    path: str = "simulated",
+    path: str | None = None,
     effect_files: Sequence[Path] = (),
     out: Path | None = None,
 ) -> Answer:
@@ -54,14 +54,17 @@ def runout(
     spindle, _ = with_effects(scene, effect_files)
     if seed is not None:
         spindle = with_imperfections(spindle, drawn(spindle, seed))
-    with progress_bar(5) as progress:
-        speed = spindle.nominal_speed if speed_rpm is None else speed_rpm * RPM
-        _ = spindle.turning  # refused where nothing turns
-        point = operating_point(spindle, Condition(temperature_or_reference(temperature, spindle), speed))
-        found = simulated_runout(point, seconds, element, path)
+    speed = spindle.nominal_speed if speed_rpm is None else speed_rpm * RPM
+    _ = spindle.turning  # refused where nothing turns
+    point = operating_point(spindle, Condition(temperature_or_reference(temperature, spindle), speed))
+    plan = planned(point, seconds, element, path)
+    with progress_bar(plan.pieces + 5) as progress:
+        found = simulated_runout(point, seconds, element, plan.path, progress)
         progress("record analysed")
-        values = runout_json(found, path, element, seed) | {"speed_from": "the scene's nominal speed" if speed_rpm is None else "--speed"}
+        values = runout_json(found, plan.path, element, seed) | {"speed_from": "the scene's nominal speed" if speed_rpm is None else "--speed"}
         odd = doubts(spindle, [point])
+        if path is None and plan.path == "linear":
+            odd.append("the stiffest mode of the model takes more steps than a record can have: the exact harmonic answer is taken, as --path linear does")
         if not found.lines:
             odd.append(
                 "the scene names no imperfections, so nothing moves; --seed 1 draws plausible ones, and the table [imperfections] of the "

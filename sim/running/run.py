@@ -34,6 +34,7 @@ from thermospindle.sim.side_by_side import SideBySide
 
 FILTER_REACH = 24  # samples on either side that the anti-alias filter sees
 PIECE = 0.05  # s, simulated at a time
+MOST_STEPS = 5_000_000  # of one record, as of a hammer test's: a quarter of an hour of a large model
 BLOCK = 256  # steps for which sines are tabulated
 FLYWHEEL = 1e3  # armature of the spin hinge over the body's own polar inertia
 POLAR_GIVEN = 0.01  # share of its polar moment that a tilted segment may give up to stay a body
@@ -103,9 +104,14 @@ def run_spindle(
     samples, settled = round(duration * sample_rate), int(np.ceil(settle * sample_rate))
     if samples < 1:
         raise BadInput(f"duration = {duration:g} s: allowed is one sample of {1 / sample_rate:g} s or more")
+    if (steps := record_steps(settled + samples, every)) > MOST_STEPS:
+        raise BadInput(
+            f"{points[0].spindle.file or points[0].spindle.name}: a record of {duration:g} s takes {steps:.2g} steps of {1e6 * step:.3g} us, for the stiffest mode of the model; allowed are "
+            f"{MOST_STEPS:.0e}: longer elements, softer joints or heavier parts take fewer, so does a shorter record, and --path linear needs none"
+        )
     runs = [_Run(point, element, step, -(FILTER_REACH + settled) * every * step, speed_profile) for point in points]
     taps = firwin(2 * FILTER_REACH * every + 1, 0.85 / every, window=("kaiser", 8.6))
-    per_piece = max(1, round(PIECE * sample_rate))
+    per_piece = _per_piece(sample_rate)
     needed = settled + samples + 2 * FILTER_REACH
     state = np.array([run.start for run in runs])
     nv = runs[0].model.nv
@@ -133,6 +139,20 @@ def run_spindle(
         for i, run in enumerate(runs)
         for k in [int(np.abs(run.ratios).argmax())]  # what turns tells how far the spindle has
     ]
+
+
+def record_steps(samples: int, every: int) -> int:
+    """Integration steps of a record of so many samples, `every` steps each, and of what its filter sees on either side."""
+    return (samples + 2 * FILTER_REACH) * every
+
+
+def pieces(samples: int, sample_rate: float) -> int:
+    """How often `run_spindle` tells of its progress in a record of so many samples, without what settles."""
+    return -(-(samples + 2 * FILTER_REACH) // _per_piece(sample_rate))
+
+
+def _per_piece(sample_rate: float) -> int:
+    return max(1, round(PIECE * sample_rate))
 
 
 def _every(points: Sequence[OperatingPoint], step: float, sample_rate: float) -> int:

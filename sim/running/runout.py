@@ -12,7 +12,7 @@ come into step sooner or later, so a value goes with its number of revolutions.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -37,7 +37,7 @@ from thermospindle.sim.running.revolutions import (
     revolutions,
     turning_frequency,
 )
-from thermospindle.sim.running.run import RunningRecord, run_spindle
+from thermospindle.sim.running.run import MOST_STEPS, RunningRecord, pieces, record_steps, run_spindle
 
 SHORTEST, REVOLUTIONS = 0.5, 12
 """A record lasts at least half a second and so many revolutions, unless asked for otherwise."""
@@ -206,8 +206,18 @@ def _known(point: OperatingPoint) -> tuple[tuple[Line, ...], ComplexArray]:
     return (*excited.line, *others), np.vstack([response(point, excited), nothing])
 
 
-def runout(point: OperatingPoint, seconds: float | None = None, element: str = "linear", path: str = "simulated") -> Runout:
-    """Runout at an operating point from a record of `seconds`; `path` is simulated (MuJoCo) or linear (harmonic answer).
+@dataclass(frozen=True)
+class Plan:
+    """How runout is found: `path` simulated (MuJoCo) or linear (harmonic answer), `samples` at `rate` (Hz), in so many `pieces` of which `runout` tells; none of the linear path."""
+
+    path: str
+    samples: int
+    rate: float
+    pieces: int
+
+
+def planned(point: OperatingPoint, seconds: float | None = None, element: str = "linear", path: str | None = None) -> Plan:
+    """The plan for a record of `seconds`; without a `path` it is simulated, but linear where linear bearings take more steps than a record can have.
 
     BadInput at rest, and for a record shorter than two revolutions.
     """
@@ -220,11 +230,22 @@ def runout(point: OperatingPoint, seconds: float | None = None, element: str = "
         of_what = "" if abs(ratio) == 1 else f" of the {looked_at(point.spindle)}"
         raise BadInput(f"--seconds {seconds:g}: at {60 / turn:g} rpm the record needs at least two revolutions{of_what}, {2 * turn:.3g} s")
     count = whole_turns(point) if seconds is None else int(seconds / turn + 1e-9)
-    rate, probes = sampling_rate(point, path != "linear"), all_probes(point.spindle)
+    rate = sampling_rate(point, path != "linear")
     samples = int(np.ceil(count * turn * rate)) + 2  # the last revolution ends between two samples
-    if path == "linear":
-        return analyse(point, linear(point, probes, np.arange(samples) / rate))
-    [record] = run_spindle([point], samples / rate, rate, element=element)
+    if path is None:
+        many = record_steps(samples, round(1 / (rate * point.spindle.hammer.step))) > MOST_STEPS
+        path = "linear" if many and element == "linear" else "simulated"
+    return Plan(path, samples, rate, pieces(samples, rate) if path == "simulated" else 0)
+
+
+def runout(
+    point: OperatingPoint, seconds: float | None = None, element: str = "linear", path: str | None = None, progress: Callable[[str], None] = lambda done: None
+) -> Runout:
+    """Runout at an operating point, as `planned`; `progress` is told of every piece of a simulated record."""
+    plan, probes = planned(point, seconds, element, path), all_probes(point.spindle)
+    if plan.path == "linear":
+        return analyse(point, linear(point, probes, np.arange(plan.samples) / plan.rate))
+    [record] = run_spindle([point], plan.samples / plan.rate, plan.rate, element=element, progress=progress)
     return analyse(point, measured(record, probes))
 
 

@@ -188,7 +188,7 @@ def _stiffness(point: OperatingPoint) -> Row:
     """Static stiffness (N/um) by probe of the hub, of a force where and along which it looks; None where nothing holds it or it cannot move."""
     probes, found = hub_probes(point.spindle), {}
     for probe, row in zip(probes, probe_rows(point, probes), strict=True):
-        moved = displacement(point.linear.stiffness, np.diag(point.linear.mass), row)
+        moved = displacement(point.linear.stiffness, row)
         compliance = 0.0 if moved is None else TO_UM * float(row @ moved)
         found[f"{STIFFNESS}.{_plain(probe.name)}"] = 1 / compliance if compliance > 0 else None
     return found

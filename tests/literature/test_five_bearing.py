@@ -5,6 +5,8 @@ catalogue "Super precision bearings", p. 176 (axial rigidity of sets over that o
 """
 
 import json
+import re
+import tomllib
 from dataclasses import replace
 
 import numpy as np
@@ -21,11 +23,12 @@ from thermospindle.model.rotor.beam import with_theory
 from thermospindle.model.rotor.chain import matrices, motion_rows
 from thermospindle.model.rotor.modes import frf, modes
 from thermospindle.model.rotor.static import rated_chain, static
-from thermospindle.model.scene.reading import load, loaded_angle
+from thermospindle.model.scene.reading import build, load, loaded_angle, with_shipped_rows
 from thermospindle.model.units import RPM
 from thermospindle.sim.operating import operating_point
 
 SCENE = ROOT / "scenes" / "five_bearing"
+FILE = SCENE / "spindle.toml"
 
 
 @pytest.fixture(scope="module")
@@ -101,6 +104,14 @@ def test_assumed_balls_carry_what_the_catalogue_says(five):
 def test_a_catalogue_entry_in_the_wrong_order_is_refused():
     with pytest.raises(BadInput, match="fit no ball bearing of 15 degrees"):
         derived(CatalogueRow(np.radians(15), (283.0, 931.0, 1923.0), (6964.0, 3138.0, 880.0), (76.8e6, 131.9e6, 191.7e6)))
+
+
+def test_a_catalogue_that_no_bearing_fits_is_told_with_file_and_key():
+    raw = with_shipped_rows(tomllib.loads(FILE.read_text(encoding="utf-8")))
+    name, row = next((name, row) for name, row in raw["ball_rows"].items() if "catalogue" in row)
+    raw["ball_rows"] = {**raw["ball_rows"], name: {**row, "catalogue": {**row["catalogue"], "preload_N": row["catalogue"]["preload_N"][::-1]}}}
+    with pytest.raises(BadInput, match=rf"{re.escape(str(FILE))}: ball_rows\.{name}\.catalogue: preload_N = .* fit no ball bearing"):
+        build(raw, FILE)
 
 
 # ---------------------------------------------------------------- sets

@@ -28,7 +28,7 @@ def test_columns_between_directions_are_optional(tmp_path):
     k = np.reshape(stiffness, (5, 5))
     assert k[0, 2] == k[2, 0] == -3e6
     assert np.count_nonzero(k) == 5
-    with pytest.raises(BadInput, match="push nothing away"):
+    with pytest.raises(BadInput, match="line 2: its stiffness has the negative eigenvalue"):
         grid(tmp_path, header, "20,0,2e7,1e7,2e7")
 
 
@@ -39,7 +39,12 @@ def test_columns_between_directions_are_optional(tmp_path):
         (HEADER.replace("N_per_m", "N_per_um", 1), "20,0,20,0", ["column 'radial_stiffness_N_per_um'", "did you mean radial_stiffness_N_per_m?"]),
         (HEADER + ",tilt_stifness_Nm_per_rad", "20,0,2e7,0,1e4", ["did you mean tilt_stiffness_N_m_per_rad?"]),
         (HEADER + ",", "20,0,2e7,0,1e4", ["column ''"]),
-        (HEADER, "20,0,2e7,0,5", ["row 2: has more cells than the header"]),
+        (HEADER, "20,0,2e7,0,5", ["line 2: has more cells than the header"]),
+        (HEADER, "# rig 2\n\n20,0,2e7,0\n60,0,2O7,0", ["line 5: radial_stiffness_N_per_m = '2O7': must be a finite number"]),
+        (HEADER, "20,0,2e7,0\n60,0,nan,0", ["line 3: radial_stiffness_N_per_m = 'nan'"]),
+        (HEADER, "20,0,2e7,0\n60,0,2e7", ["line 3: axial_stiffness_N_per_m = ''"]),
+        (HEADER, "20,0,2e7,0\n20,3000,2e7,0\n60,0,2e7,0", ["has no row of 60 C and 3000 rpm", "2 temperatures", "2 speeds"]),
+        (HEADER.replace(",", ";"), "20;0;2e7;0", ["separated by ';'; allowed are commas"]),
         (HEADER, "20,0,0,0", ["radial_stiffness_N_per_m, axial_stiffness_N_per_m: all are zero"]),
     ],
 )
@@ -55,3 +60,14 @@ def test_a_cross_coupled_bearing_is_refused_with_its_entries():
     matrix[0, 1], matrix[1, 0] = 3e6, -3e6
     with pytest.raises(ValidationError, match=r"row x, column y is 3e\+06, row y, column x -3e\+06; .* cross-coupled bearings \(journals, seals\) are out of scope"):
         Numbers(matrix_SI=matrix.tolist(), damping_ratio=0.05)
+
+
+def test_lines_of_a_table_of_several_bearings_are_the_file_s(tmp_path):
+    (tmp_path / "both.csv").write_text(f"# made by hand\nbearing,{HEADER}\nA,20,0,2e7,0\nB,20,0,2e7,0\nB,60,0,x,0\n", encoding="utf-8")
+    with pytest.raises(BadInput, match=r"both\.csv: line 5: radial_stiffness_N_per_m = 'x'"):
+        Numbers(table="both.csv", bearing="B", damping_ratio=0.05).grid(tmp_path)
+
+
+def test_a_matrix_of_zeros_is_refused_as_a_table_of_zeros_is():
+    with pytest.raises(ValidationError, match="matrix_SI: all entries are zero"):
+        Numbers(matrix_SI=np.zeros((5, 5)).tolist(), damping_ratio=0.05)

@@ -113,3 +113,22 @@ def test_across_a_radial_load_a_little_more_load_moves_the_nose_by_the_complianc
     assert level.across is not None
     ratio = (found.own.stiffness / found.across.stiffness) / (level.own.stiffness / level.across.stiffness)
     assert abs(ratio - 1) > 1e-3
+
+
+def test_a_static_answer_asks_for_no_mass(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of a shaft without mass, as in textbooks, on a stiff seat; by hand 1 / (a^2 b^2 / (3 E I L) + bearings, left b / L and right a / L of the force on 2e7 N/m each + seat)."""
+    text = (ROOT / "scenes" / "templates" / "rotor.toml").read_text(encoding="utf-8")
+    changes = ("density_kg_per_m3 = 7850.0", "density_kg_per_m3 = 1.0"), ("longest_element_mm", 'beam = "euler-bernoulli"\nlongest_element_mm')
+    stiff = (("lateral_stiffness_N_per_m = [5.0e8, 5.0e8]", "lateral_stiffness_N_per_m = [1e10, 1e10]"), ("[2.0e5, 2.0e5]", "[1e8, 1e8]"))
+    for old, new in (*changes, *stiff):
+        text = text.replace(old, new, 1)
+    (tmp_path / "spindle.toml").write_text(text, encoding="utf-8")
+    assert main(["static", str(tmp_path), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)["points"]["disc"]
+    a, b = 0.195, 0.345
+    bent = a**2 * b**2 / (3 * 208e9 * np.pi * 0.03**4 / 64 * (a + b))
+    compliance = bent + ((b / (a + b)) ** 2 + (a / (a + b)) ** 2) / 2e7 + 1e-10
+    assert answer["stiffness_N_per_m"] == pytest.approx(1 / compliance, rel=1e-6)
+    assert answer["reactions_N"] == pytest.approx({"left": -b / (a + b), "right": -a / (a + b)}, rel=1e-6)
+    assert main(["check", str(tmp_path), "--json"]) == 0
+    assert not any("nothing holds" in words for words in json.loads(capsys.readouterr().out)["odd"])

@@ -317,3 +317,24 @@ def test_parts_of_the_friction_may_be_left_out(tmp_path: Path, capsys: pytest.Ca
     assert told["thermal.friction.f1"] == "0.0003"
     assert "thermal.friction.f0" not in told
     assert load(tmp_path).thermal == load(SCENES["five_bearing"]).thermal
+
+
+@pytest.mark.parametrize(("scene", "outer", "inner"), [("grinding", "housing", "spindle"), ("hdd", "hub", "shaft")])
+def test_an_axial_load_is_told_with_its_sign_on_either_side(scene: str, outer: str, inner: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A force towards +z on what carries the outer rings takes load off rows of sense -z."""
+    (tmp_path / "spindle.toml").write_text("axial_load_N = 5.0\n" + SCENES[scene].read_text(encoding="utf-8"), encoding="utf-8")
+    assert main(["check", str(tmp_path)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert f"External axial load 5 N along z on {outer}, which carries the outer rings: for the bearings the same as -5 N on {inner}." in said
+    found = checked(tmp_path, capsys)
+    if scene == "grinding":  # its rear ring slides on the spring: the front one bears all
+        assert found["bearings"]["front"]["preload_N"] == pytest.approx(175.0, rel=1e-9)
+
+
+def test_loads_that_bearings_given_by_numbers_do_not_feel_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    loads = "axial_load_N = 5.0\nradial_load_N = [10.0, 0.0]\nradial_load_z_mm = 400.0\n"
+    (tmp_path / "spindle.toml").write_text(loads + SCENES["rotor"].read_text(encoding="utf-8"), encoding="utf-8")
+    assert main(["check", str(tmp_path)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "External axial load 5 N along z changes nothing" in said
+    assert "External radial load 10, 0 N along x, y at z = 400 mm on shaft, changes nothing: bearings given by numbers are as stiff under any load." in said

@@ -332,3 +332,12 @@ def test_labels_of_an_open_place_are_shown(found):
     numbers = {n for text in below[0].texts for n in text.get_text().split(",")}
     assert numbers == {str(m.number) for m in found.tests[-1].modes}
     assert all(axes.xaxis.get_tick_params()["labelbottom"] for axes in figures(replace(found, tests=found.tests[:1]))["frfs"].axes if axes.lines)
+
+
+def test_a_damping_that_is_far_off_is_named(found):
+    """No frequency is off by much and the dampings are: it was told as errors of the temperature that hang together."""
+    largest = max(abs(m.residual) for t in found.tests for m in t.modes)
+    far = [replace(t, missing=(), residuals=np.full_like(t.residuals, 100 * largest), modes=tuple(replace(m, damping_sd=1e-9) for m in t.modes)) for t in found.tests]
+    said = verdict(replace(found, tests=tuple(far)))
+    assert f"no frequency alone is off by more than {largest:.1f}, but dampings are, most that of " in said
+    assert "hang together" not in said

@@ -17,7 +17,7 @@ def spindle(spindle: Spindle, condition: Condition, values: Values) -> Spindle:
     pull = pull_at(spindle, condition, values)
     if pull == 0.0:
         return spindle
-    return replace(spindle, axial_load=spindle.axial_load - pull)
+    return replace(spindle, axial_load=spindle.axial_load + spindle.axial_on_turning(-pull))
 
 
 def pull_at(spindle: Spindle, condition: Condition, values: Values) -> float:
@@ -75,7 +75,7 @@ EFFECT = Effect(
     name="magnetic_pull",
     title="Magnetic pull of the motor on the hub",
     equation=(
-        "axial force on the hub F_z = -P, P = pull (1 + remanence_slope (T - T_ref))^2, in the pair's equilibrium (Jang et al. 2003, "
+        "axial force on what turns F_z = -P, P = pull (1 + remanence_slope (T - T_ref))^2, in the pair's equilibrium (Jang et al. 2003, "
         "Eq. 8); between stator and hub K = diag(-k, -k, axial_ratio k, 0, 0) at the magnet's height, k = radial_ratio |P|: "
         "the pull grows as the gap closes; axial_ratio 2 without iron (Earnshaw: div grad of the energy is 0)"
     ),
@@ -87,7 +87,7 @@ EFFECT = Effect(
             typical=3.0,
             prior_sd=2.0,
             limits=(-10.0, 10.0),
-            meaning="axial magnetic force on the hub, positive downward",
+            meaning="axial magnetic force on what turns, positive downward (towards -z)",
             source="assumed: disk-drive motors set their magnet off the stator's middle for some newtons of axial bias",
         ),
         Parameter(

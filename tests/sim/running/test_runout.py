@@ -31,7 +31,7 @@ from thermospindle.sim.running import runout as running
 from thermospindle.sim.running.lines import fit
 from thermospindle.sim.running.probes import AXIAL, X, Y, all_probes, hub_probes, looked_at, second_plane
 from thermospindle.sim.running.run import run_spindle
-from thermospindle.sim.running.runout import linear, measured, runout, whole_turns, with_imperfections
+from thermospindle.sim.running.runout import linear, measured, planned, runout, whole_turns, with_imperfections
 
 RATE = 20000.0
 SCENE = Path(__file__).parents[3] / "scenes" / "hdd_2003"
@@ -335,3 +335,21 @@ def test_signals_of_a_given_harmonic_answer(hot_point):
     probes = hub_probes(hot_point.spindle)
     parts = linear(hot_point, probes, time, one).value + linear(hot_point, probes, time, other).value
     assert parts == pytest.approx(linear(hot_point, probes, time).value, abs=1e-15)
+
+
+def test_a_record_of_too_many_steps_is_not_stepped(hot_point):
+    """It had filled the memory: a stiff seat of a light part asks for steps of picoseconds."""
+    stiff = replace(hot_point, spindle=replace(hot_point.spindle, hammer=replace(hot_point.spindle.hammer, step=1e-10)))
+    plan = planned(stiff)
+    assert (plan.path, plan.pieces) == ("linear", 0)
+    assert planned(hot_point).path == planned(stiff, element="ball-by-ball").path == "simulated"
+    by_itself, asked = (runout(point, 0.2, path=path) for point, path in ((stiff, None), (hot_point, "linear")))
+    assert [f"{line.frequency:.3f} {line.amplitude:.3e}" for line in by_itself.lines[:5]] == [f"{line.frequency:.3f} {line.amplitude:.3e}" for line in asked.lines[:5]]
+    with pytest.raises(BadInput, match=r"steps of 0\.0001 us, for the stiffest mode of the model; allowed are 5e\+06: .* --path linear needs none"):
+        runout(stiff, 0.2, path="simulated")
+
+
+def test_a_simulated_record_tells_of_each_piece(hot_point):
+    told: list[str] = []
+    runout(hot_point, 0.1, progress=told.append)
+    assert len(told) == planned(hot_point, 0.1).pieces > 1
