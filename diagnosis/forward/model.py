@@ -212,8 +212,8 @@ class CampaignModel:
 
     def _otherwise_heavy(self, x: Array, dofs: Dofs) -> tuple[Array, Array]:
         """What bodies that have their mass otherwise than drawn add to M and, per rad/s, to G (n, n)."""
-        mass, gyroscopic = ((x[self.numbers.masses] @ each.reshape(len(each), -1)).reshape(each.shape[1:]) for each in self.heavier(dofs))
-        return mass, gyroscopic
+        mass, gyroscopic = self.heavier(dofs)
+        return np.tensordot(x[self.numbers.masses], mass, 1), np.tensordot(x[self.numbers.masses], gyroscopic, 1)
 
     def heavier(self, dofs: Dofs) -> tuple[Array, Array]:
         """What a standard deviation of each way in which bodies may have their mass otherwise adds to M and, per rad/s, to G (k, n, n)."""

@@ -218,7 +218,7 @@ def test_check_tells_which_part_it_took(made, capsys):
     assert main(["check", str(spindle.file)]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "The unbalance is on disc." in said
-    assert "at z = 220 mm on sleeve, borne by" in said
+    assert "at z = 220 mm on sleeve, changes nothing" in said
 
 
 def test_without_a_scene_the_sentence_is_the_same(made):
