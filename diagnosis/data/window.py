@@ -78,6 +78,11 @@ def correlation(lines: int, window: Window) -> ComplexArray:
     return found
 
 
+def covariance(mixing: csr_array, number: Integers, window: Window, early: float = 0.0) -> ComplexArray:
+    """Covariance (L, L) of values that are each a `mixing` (L, n) of lines by `number` (n,), of unit variance each under the window."""
+    return np.asarray(mixing @ (mixing @ between(number, window, early)).conj().T, complex)
+
+
 @dataclass(frozen=True, eq=False)
 class Alike:
     """Values (L,) of FRFs (n_resp, n_ref) that are each a `mixing` (L, n) of lines by `number` (n,), of whose variance a window makes the `share` (n_resp, n_ref, L) alike; the
@@ -95,19 +100,11 @@ class Alike:
         """The same of records that were hit at another time."""
         return replace(self, window=replace(self.window, pretrigger=pretrigger))
 
-    def _covariance(self, early: float = 0.0) -> ComplexArray:
-        """Of values (L, L), under a window that leaves lines unit variance."""
-        return np.asarray(self.mixing @ (self.mixing @ between(self.number, self.window, early)).conj().T, complex)
-
-    @property
-    def times(self) -> Array:
-        """Variance (L,) of values, over that which they have of independent lines."""
-        return np.asarray(np.diag(self._covariance()).real / self.mixing.power(2).sum(axis=1))
-
     def whitening(self) -> ComplexArray:
         """W (n_resp, n_ref, L, L), by which rows of values, each in its own standard errors, become independent ones of unit variance: W^T R W^* = 1 with R their correlation."""
-        size, one = np.sqrt(np.diag(self._covariance()).real), np.eye(self.mixing.shape[0])
-        alike, found = self._covariance(EARLY if self.window.pretrigger else UNTOLD) / np.outer(size, size), np.empty((*self.share.shape, len(one)), complex)
+        of = self.mixing, self.number, self.window
+        size, one = np.sqrt(np.diag(covariance(*of)).real), np.eye(self.mixing.shape[0])
+        alike, found = covariance(*of, EARLY if self.window.pretrigger else UNTOLD) / np.outer(size, size), np.empty((*self.share.shape, len(one)), complex)
         for at in np.ndindex(*self.share.shape[:2]):
             own = np.minimum(self.share[at], 1 - FRESH)
             lower = np.linalg.cholesky(np.sqrt(np.outer(own, own)) * alike + np.diag(1 - own))

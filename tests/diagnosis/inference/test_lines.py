@@ -7,7 +7,9 @@ import pytest
 from scipy import stats
 
 from tests.virtual_campaign import NOISE, noisy
-from thermospindle.diagnosis.data.lines import CAMPAIGN, NODES, REPEATS, SCATTER, LineData, _at_nodes, _basis, line_data
+from thermospindle.diagnosis.data.blocks import NODES, at_nodes, basis
+from thermospindle.diagnosis.data.lines import LineData, line_data
+from thermospindle.diagnosis.data.noise import CAMPAIGN, REPEATS, SCATTER
 from thermospindle.model.machine import Condition
 from thermospindle.sim.campaign.campaign import Noise, Test
 from thermospindle.sim.identification.frf import Frf
@@ -41,7 +43,7 @@ def made(seed: int, damping: tuple[float, ...] = BROAD, noise: Noise = NOISE, st
 @pytest.mark.parametrize("k", [7, 11, 80, 160])
 def test_nodes_hold_the_polynomial(k):
     """Orthonormal polynomials; Gauss nodes inside the block with weights that add up to k; whatever has degree 4 is its own values there."""
-    q, nodes, weights = _basis(k)
+    q, nodes, weights = basis(k)
     assert np.allclose(q.T @ q, np.eye(NODES), atol=1e-12)
     assert weights.sum() == pytest.approx(k, rel=1e-12)
     assert np.all(weights > 0)
@@ -52,9 +54,9 @@ def test_nodes_hold_the_polynomial(k):
     def quartic(line):
         return np.polyval(coefficients, (line - k / 3) / k)
 
-    at_nodes = _at_nodes(nodes - (k - 1) / 2, k)
-    assert np.allclose(at_nodes @ (q.T @ quartic(np.arange(k))), quartic(nodes), atol=1e-12)
-    assert np.allclose(at_nodes @ at_nodes.T, np.diag(1 / weights), atol=1e-12)  # independent errors of variance sd^2 / weight
+    polynomials = at_nodes(nodes - (k - 1) / 2, k)
+    assert np.allclose(polynomials @ (q.T @ quartic(np.arange(k))), quartic(nodes), atol=1e-12)
+    assert np.allclose(polynomials @ polynomials.T, np.diag(1 / weights), atol=1e-12)  # independent errors of variance sd^2 / weight
     for degree in range(2 * NODES):  # a Gauss rule is exact to degree 2 p - 1
         x = (np.arange(k) - (k - 1) / 2) / k
         assert np.sum(weights * ((nodes - (k - 1) / 2) / k) ** degree) == pytest.approx(np.sum(x**degree), abs=1e-10 * k)
