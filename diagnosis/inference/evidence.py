@@ -11,10 +11,10 @@ width and its departure from its law (the mean over the grid). What is quoted is
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache, reduce
-from itertools import pairwise, product, zip_longest
+from itertools import zip_longest
 
 import numpy as np
 from scipy.sparse import csr_array, eye_array, lil_array
@@ -36,48 +36,11 @@ from thermospindle.diagnosis.inference.gaussian import (
 from thermospindle.diagnosis.inference.prior import Learned, Own, counted_in, mechanism_root, nuisance_root, whitened_covariance
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.diagnosis.parameters.mechanism import Mechanism
+from thermospindle.diagnosis.parameters.sizes import GRIDS, WIDER, likeliest, ln_odds
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import Effect
 
-GRIDS = {
-    kinds_of.STIFFNESS: (0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2),  # relative error of a frequency
-    kinds_of.DAMPING: (0.0, 0.01, 0.03, 0.1),
-    kinds_of.STIFFNESS_DRIFT: (0.0, 3e-5, 1e-4, 3e-4, 1e-3),
-    kinds_of.DAMPING_DRIFT: (0.0, 0.01, 0.03),
-    kinds_of.DRIFT: (0.0, 3e-4, 1e-3, 3e-3, 1e-2),
-    kinds_of.HAMMER: (1.0, 3.0),
-    kinds_of.HAMMER_DRIFT: (0.0, 1e-3, 3e-3, 1e-2),
-    kinds_of.MISS_DRIFT: (0.0, 3e-5, 1e-4, 3e-4),  # m
-    kinds_of.CHANGE: (0.0, 0.01, 0.03),
-    kinds_of.EXPANSION: (1.0, 3.0, 6.0),
-    kinds_of.ACTION: (0.0, 0.01, 0.03, 0.1),
-    kinds_of.OF_CONDITIONS: (0.0, 0.01, 0.03, 0.1),
-}
-WIDER = {1.0: 0.0, 2.0: -12.0, 4.0: -13.0, 8.0: -14.0}
-"""Prior odds (ln) that a drawing is off by so many times the build tolerances that the scene states, assumed, and less than those of any two effects: one
-tolerance that is strained tells of an effect, several of a drawing that is off."""
-FARTHER = {1.0: 0.0, 3.0: -2.0, 6.0: -4.0}
-"""Prior odds (ln) that thermal motions are off by so many times what two finite-element programs differ by, assumed: one spindle in eight by a per cent, one in sixty by two, where any
-one effect is in one of a hundred."""
-UNCALIBRATED = {1.0: 0.0, 3.0: -2.0}
-"""Prior odds (ln) that hammers' gains are off by three times what the scene's channels are, assumed: a hammer whose calibration is old, or that always hits askew by 10 to 15 degrees,
-is off by some per cent, which a sensor's gain would have to explain in part."""
-OTHERWISE = {0.0: 0.0, 0.01: 0.0, 0.03: -2.0, 0.1: -4.0}
-"""Prior odds (ln) that what temperature and speed do to a mode is off by such a share of it, assumed: one spindle in eight by 3 %, one in sixty by a tenth, which a missing effect may be as well."""
-ODDS = {kinds_of.BUILD: WIDER, kinds_of.EXPANSION: FARTHER, kinds_of.HAMMER: UNCALIBRATED, kinds_of.OF_CONDITIONS: OTHERWISE}
-"""By kind of nuisance, of sizes of which one is that of the scene or of the model itself."""
-BETWEEN = 2  # places between two of a grid that are not nothing
-
-
-def finer(grid: Sequence[float]) -> tuple[float, ...]:
-    """What is not nothing of a grid, with places `BETWEEN`. Dozens of numbers share the size of a drift: between places that are three times apart they lose some 0.2 in ln evidence each,
-    which one effect that takes one channel's part of it would win."""
-    sizes = [size for size in grid if size > 0]
-    return *(float(f"{f:.2g}") for low, high in pairwise(sizes) for f in np.geomspace(low, high, BETWEEN + 1, endpoint=False)), sizes[-1]
-
-
-FINER = {kind: finer(grid) for kind, grid in GRIDS.items() if kind not in ODDS}
 WIDTHS = (0.5, 1.0, 2.0, 4.0)  # of a size, in its own prior standard deviations
 DEPARTURES = (0.0, 0.1, 0.3, 1.0)  # from a law, of the size
 FREE_WIDTHS = (0.1, 0.3, 1.0, 3.0, 10.0)  # of what has no law: its width is to be learned
@@ -85,7 +48,6 @@ OFFSET = -12.0
 """Prior odds (ln) that what drifts is off by as much in all tests as well: that is a drawing that is off (`WIDER`), and not what temperature and speed do."""
 FARTHEST = 3.0  # times what a shape parameter does at the fitted size of a test, of what it does at the size that all share
 ROUNDED = 1.0  # of chi2, which is never negative: what rounding may take from a quadratic that stands for a fit
-SWEEPS = 3  # at most, through the sizes of nuisances one after the other
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,10 +102,13 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
     def scaled(s: float) -> Quadratic:
         return Quadratic(whole.constant / s**2, whole.b / s**2, whole.a / s**2)
 
+    def beside(s: float, sizes: Mapping[str, float]) -> Nuisances:
+        return under(nuisance_root(model, sizes, fit.moved), scaled(s).a[:p, :p])
+
     def each(s: float, sizes: Mapping[str, float], nuisances: Nuisances | None = None) -> Array:
         """ln evidence of every combination of widths, departures and offsets of the mechanisms, by its prior odds."""
-        nuisances = nuisances or under(nuisance_root(model, sizes, fit.moved), scaled(s).a[:p, :p])
-        return marginal(scaled(s), nuisances).integrated(roots) + odds - fit.count * np.log(s) + _odds(sizes)
+        nuisances = nuisances or beside(s, sizes)
+        return marginal(scaled(s), nuisances).integrated(roots) + odds - fit.count * np.log(s) + ln_odds(sizes)
 
     nuisances = None
     if near:
@@ -151,17 +116,17 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
         values, s, sizes, nuisances = max(every, key=lambda row: logsumexp(row[0]))
     else:
         scales = [1.0] if fit.temper < 1.0 else [float(s) for s in _error_scales(whole, fit.count)]
-        values, s, sizes = _likeliest(each, grids, scales)
+        values, s, sizes = likeliest(each, grids, scales)
     best = np.unravel_index(int(np.argmax(values)), [len(grid) for grid in own_grids]) if own_grids else ()
     own = [tuple(grid)[k] for grid, k in zip(own_grids, best, strict=True)]
     learned = Learned(sizes, s, *(tuple(of) for of in zip(*own, strict=True)))
-    nuisances = nuisances or integrated(model, fit, s, sizes)
+    nuisances = nuisances or beside(s, sizes)
     mean, spread, left = posterior(scaled(s), nuisances, mechanism_root(model, fit.mechanisms, learned))
     chi2 = whole.at(mean)
     held = [h.number for h in fit.held]
     own_mean = np.where(np.isin(np.arange(p, len(mean)), held), fit.point[p:], mean[p:])
     owed = fit.owed / (2 * s**2) if fit.temper == 1.0 else 0.0
-    as_fitted = left.at(own_mean) - fit.count * np.log(s) + _odds(sizes) - owed
+    as_fitted = left.at(own_mean) - fit.count * np.log(s) + ln_odds(sizes) - owed
     mean, spread = fit.point + turn @ (mean - fit.point), turn @ spread @ turn.T
     truncation = ln_within_limits(fit, mean, spread, s)
     mean[held] = fit.point[held]
@@ -182,66 +147,8 @@ def evidence(model: CampaignModel, fit: Fit, near: Sequence[Learned] = (), wide:
     return Evidence(float(logsumexp(values)) + truncation - owed, learned, mean, spread, *told, chi2, as_fitted, by_departing)
 
 
-def _odds(sizes: Mapping[str, float]) -> float:
-    """Prior odds (ln) of sizes that may be other than the scene's or the model's own."""
-    return sum(of[sizes[kind]] for kind, of in ODDS.items() if kind in sizes)
-
-
-def _likeliest(each: Callable[[float, Mapping[str, float]], Array], grids: Mapping[str, Sequence[float]], scales: Sequence[float]) -> tuple[Array, float, dict[str, float]]:
-    """The ln evidence that `each` gives, the errors of `scales` and the sizes of discrepancies of `grids`, and between their places, that have most of it: one after the other, until that moves nothing."""
-    known: dict[tuple[float, ...], tuple[float, Array]] = {}
-
-    def at(s: float, sizes: Mapping[str, float]) -> tuple[float, Array]:
-        """All of it together, and each."""
-        key = s, *(sizes[kind] for kind in grids)
-        if key not in known:
-            values = each(s, sizes)
-            known[key] = float(logsumexp(values)), values
-        return known[key]
-
-    s, sizes = scales[len(scales) // 2], {kind: grid[0] for kind, grid in grids.items()}
-    best = at(s, sizes)
-    for _ in range(SWEEPS):
-        before = best[0]
-        for move in _moves(grids):
-            if (to := {**sizes, **move}) != sizes and (there := at(s, to))[0] > best[0]:
-                best, sizes = there, to
-        for scale in scales:
-            if scale != s and (there := at(scale, sizes))[0] > best[0]:
-                best, s = there, scale
-        if best[0] - before < 0.01:
-            break
-    for _ in range(SWEEPS):
-        before = best[0]
-        for kind, by in product([kind for kind in FINER if kind in sizes], (1, -1)):
-            while (size := _beside(FINER[kind], sizes[kind], by)) is not None and (there := at(s, {**sizes, kind: size}))[0] > best[0]:
-                best, sizes = there, {**sizes, kind: size}
-        if best[0] - before < 0.1:
-            break
-    return best[1], s, sizes
-
-
 def _stacked(covariances: Sequence[Array], tests: int) -> Array:
     return np.array(covariances).reshape(len(covariances), tests, tests)
-
-
-def _moves(grids: Mapping[str, Sequence[float]]) -> list[dict[str, float]]:
-    """Steps of a sweep: one size after the other; and what drifts from test to test to nothing where a constant error is of some size, for what is off by the same in all tests
-    could be taken for drift, beside which a constant costs more than it gains."""
-    found = [{kind: size} for kind, grid in grids.items() for size in grid]
-    for constant, drift in ((kinds_of.STIFFNESS, kinds_of.STIFFNESS_DRIFT), (kinds_of.DAMPING, kinds_of.DAMPING_DRIFT)):
-        if constant in grids and drift in grids:
-            found += [{constant: size, drift: grids[drift][0]} for size in grids[constant]]
-    if kinds_of.BUILD in grids:
-        as_drawn = {kind: grids[kind][0] for kind in kinds_of.DISCREPANCIES if kind in grids}
-        found += [{**as_drawn, kinds_of.BUILD: times} for times in grids[kinds_of.BUILD]]
-    return found
-
-
-def _beside(grid: Sequence[float], size: float, by: int) -> float | None:
-    """The next place of a grid, up or down; none beyond its ends, or for a size of nothing."""
-    k = grid.index(size) + by if size in grid else -1
-    return grid[k] if 0 <= k < len(grid) else None
 
 
 def integrated(model: CampaignModel, fit: Fit, errors: float, sizes: Mapping[str, float]) -> Nuisances:

@@ -10,13 +10,14 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
-from thermospindle.diagnosis.inference.evidence import GRIDS, evidence, integrated
+from thermospindle.diagnosis.inference.evidence import evidence, integrated
 from thermospindle.diagnosis.inference.fit import Fit
 from thermospindle.diagnosis.inference.gaussian import Nuisances, impossible
 from thermospindle.diagnosis.inference.prior import Learned, as_stated
 from thermospindle.diagnosis.inference.problem import Linearisation, Problem
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.diagnosis.parameters.mechanism import Mechanism
+from thermospindle.diagnosis.parameters.sizes import GRIDS
 from thermospindle.model.parallel import in_parallel
 from thermospindle.model.types import Array, Integers
 from thermospindle.sim.effects.effect import HOOKS

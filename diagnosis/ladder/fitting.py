@@ -14,12 +14,13 @@ from itertools import product
 import numpy as np
 
 from thermospindle.diagnosis.forward.model import FAILED, CampaignModel
-from thermospindle.diagnosis.inference.evidence import GRIDS, ODDS, Evidence, evidence
+from thermospindle.diagnosis.inference.evidence import Evidence, evidence
 from thermospindle.diagnosis.inference.fit import TEMPERS, Fit, fit
 from thermospindle.diagnosis.inference.prior import Learned, as_stated, precision_and_variances
 from thermospindle.diagnosis.inference.problem import Problem
 from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.diagnosis.parameters.mechanism import Mechanism, one_size, variants
+from thermospindle.diagnosis.parameters.sizes import GRIDS, ODDS
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.types import Array
 from thermospindle.sim.effects.effect import Effect, Values

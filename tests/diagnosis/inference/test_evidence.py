@@ -11,7 +11,7 @@ from scipy.linalg import block_diag
 from scipy.stats import multivariate_normal
 
 from tests.diagnosis.inference.toy import toy
-from thermospindle.diagnosis.inference.evidence import FARTHER, OFFSET, WIDER, WIDTHS, Learned, evidence, finer, left_out, own_grid
+from thermospindle.diagnosis.inference.evidence import OFFSET, WIDTHS, Learned, evidence, left_out, own_grid
 from thermospindle.diagnosis.inference.fit import Fit
 from thermospindle.diagnosis.inference.gaussian import Quadratic, ln_integral, marginal, posterior, under
 from thermospindle.diagnosis.inference.prior import (
@@ -41,6 +41,7 @@ from thermospindle.diagnosis.parameters.nuisance import (
     Nuisance,
 )
 from thermospindle.diagnosis.parameters.numbers import Numbers
+from thermospindle.diagnosis.parameters.sizes import FARTHER, WIDER, finer
 from thermospindle.model.machine import Condition
 
 
