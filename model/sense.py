@@ -9,7 +9,7 @@ import numpy as np
 from thermospindle.model.bearing.pair import BearingState
 from thermospindle.model.errors import listed
 from thermospindle.model.machine import Condition, Spindle
-from thermospindle.model.rotor.chain import RotorBase, element_rows, matrices
+from thermospindle.model.rotor.chain import Matrices, RotorBase, element_rows, matrices
 from thermospindle.model.rotor.loss import damping_of_loss
 from thermospindle.model.rotor.modes import Mode
 from thermospindle.model.types import Array
@@ -118,16 +118,17 @@ def turned_dampings(chain: RotorBase, modes: Sequence[Mode]) -> list[float]:
     Turning with w, such a damper feels q' - w S q, S q the motion (-y, x) across and of the tilts (Genta, *Dynamics of Rotating Systems*, 2005, ch. 6): beside C it makes the
     circulatory stiffness -w C S. To first order that moves a lightly damped mode's pole p by w phi^H C S phi / phi^H (2 p M + C + G) phi; forward modes lose w / |p| of what turns.
     """
-    linear, circulatory = matrices(chain), _circulatory(chain)
+    linear = matrices(chain)
+    circulatory = _circulatory(chain, linear)
     poles = [m.pole + (m.shape.conj() @ circulatory @ m.shape) / (m.shape.conj() @ (2 * m.pole * linear.mass + linear.damping) @ m.shape) for m in modes]
     return [float(-p.real / abs(p)) for p in poles]
 
 
-def _circulatory(chain: RotorBase) -> Array:
+def _circulatory(chain: RotorBase, linear: Matrices) -> Array:
     """w C S (n, n) of the dampers between bodies of one rotor, summed over the rotors."""
     ratio = {b.name: b.speed_ratio for b in chain.bodies if b.turns}
     own = [e for e in chain.elements if e.a in ratio and ratio.get(e.b) == ratio[e.a]]
-    linear, at = matrices(chain), {dof: k for k, dof in enumerate(chain.dofs)}
+    at = {dof: k for k, dof in enumerate(linear.dofs)}
     found = np.zeros_like(linear.stiffness)
     for rotor in {ratio[e.a] for e in own}:
         turn = np.zeros_like(found)

@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 from thermospindle.diagnosis.runout.lines import Seen, UnexplainedLine, key_of, look, runout_tests
 from thermospindle.diagnosis.runout.sources import phasors, scatter
 from thermospindle.model.bearing.kinematics import Line
-from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Point, Spindle
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.campaign.beside import on_nodes
 from thermospindle.sim.campaign.campaign import Campaign, Test
-from thermospindle.sim.campaign.runout_record import FEWEST
+from thermospindle.sim.campaign.runout_record import check_revolutions
 from thermospindle.sim.campaign.simulated import set_down
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.running.probes import speed_ratio
@@ -90,8 +89,11 @@ def rms_residual(found: Sequence[RunoutBeside]) -> float | None:
 def _beside(spindle: Spindle, seen: Seen, points: tuple[Point, ...]) -> RunoutBeside:
     point = operating_point(spindle, seen.condition)
     by_node = {p.node: p for p in on_nodes(spindle, points)}
+    turning, ratios, record = abs(seen.condition.speed) / (2 * np.pi), np.array([abs(speed_ratio(spindle, by_node[n])) for n in seen.nodes]), seen.test.runout
+    assert record is not None
+    slowest = int(ratios.argmin())
+    check_revolutions(f"tests.{seen.test.id}: runout", record, turning * ratios[slowest], f" of what node {seen.nodes[slowest]} sees,")
     own = phasors(point, point.imperfections, [by_node[n] for n in seen.nodes])
-    turning = abs(seen.condition.speed) / (2 * np.pi)
     balls = {b.name: b.balls for b in point.spindle.rolling}
     random = np.random.default_rng(0)
     starts = [phasors(point, set_down(point.imperfections, balls, random), [by_node[n] for n in seen.nodes]) for _ in range(STARTS)]
@@ -113,20 +115,8 @@ def _beside(spindle: Spindle, seen: Seen, points: tuple[Point, ...]) -> RunoutBe
             found.append(
                 LineBeside(one.frequency, one.frequency / turning, node, causes, measured, sd, computed, float(np.hypot(chance, build)))
             )
-    ratios = np.array([abs(speed_ratio(spindle, by_node[n])) for n in seen.nodes])
-    _check_length(seen, turning * ratios)
     rro, nrro = _parts(seen, waves, turning, ratios)
     return RunoutBeside(seen.test, tuple(sorted(found, key=lambda g: -max(g.measured, g.computed))), rro, nrro, seen.unexplained)
-
-
-def _check_length(seen: Seen, turning: Array) -> None:
-    """BadInput where a record holds too few revolutions of what a probe sees, which turns at `turning` (probes,) Hz."""
-    record = seen.test.runout
-    assert record is not None
-    slowest = int(turning.argmin())
-    if record.length * turning[slowest] < FEWEST:
-        told = f"{record.length * turning[slowest]:.3g} revolutions of what node {seen.nodes[slowest]} sees, at {60 * turning[slowest]:.6g} rpm"
-        raise BadInput(f"tests.{seen.test.id}: runout: {told}; at least {FEWEST:g} whole ones are needed")
 
 
 def _parts(

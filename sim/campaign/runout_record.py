@@ -55,6 +55,12 @@ class RunoutRecord:
         return 0.5 / self.step if self.kind == "time" else float(self.axis[-1])
 
 
+def check_revolutions(where: str, record: RunoutRecord, rate: float, whose: str = "") -> None:
+    """`BadInput` for a record that holds too few revolutions of what turns at `rate` (Hz), told by `whose` it is."""
+    if record.length * rate < FEWEST:
+        raise BadInput(f"{where}: {record.length * rate:.3g} revolutions{whose} at {60 * rate:.6g} rpm; at least {FEWEST:g} whole ones are needed")
+
+
 def read_runout(file: Path, points: Sequence[Point], speed: float, window: str | None) -> RunoutRecord:
     """The record of a file, checked; `speed` (rad/s) of the test and `window` as its table states them.
 
@@ -89,8 +95,7 @@ def check_runout(file: str | Path, record: RunoutRecord, speed: float) -> None:
     if record.kind == "spectrum" and record.axis[0] < 0:
         raise BadInput(f"{file}: frequency_Hz = {record.axis[0]:g}: negative frequencies are not allowed")
     rate = abs(speed) / (2 * np.pi)
-    if record.length * rate < FEWEST:
-        raise BadInput(f"{file}: {record.length * rate:.3g} revolutions at {60 * rate:.6g} rpm; at least {FEWEST:g} whole ones are needed")
+    check_revolutions(str(file), record, rate)
     if record.highest < 2 * rate:
         raise BadInput(f"{file}: holds nothing above {record.highest:.4g} Hz; at {60 * rate:.6g} rpm at least {2 * rate:.4g} Hz are needed")
     for node, value in zip(record.nodes, record.value, strict=True):
