@@ -21,7 +21,7 @@ from thermospindle.diagnosis.data.noise import (
     told,
     within_blocks,
 )
-from thermospindle.diagnosis.data.window import NONE, Alike, Window, windowed
+from thermospindle.diagnosis.data.window import NONE, TOLD, Alike, Window, windowed
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.campaign.campaign import Noise, Test
@@ -56,7 +56,9 @@ class LineData:
     @cached_property
     def whitening(self) -> ComplexArray | None:
         """W (n_resp, n_ref, L, L) by which values, each in its standard errors, become independent; None where they are."""
-        return None if self.alike is None else self.alike.hit(self.test.pretrigger or self.alike.window.pretrigger).whitening()
+        if self.alike is None:
+            return None
+        return (self.alike if self.test.pretrigger is None else self.alike.hit(self.test.pretrigger)).whitening()
 
     def in_errors(self, value: ComplexArray) -> ComplexArray:
         """Differences (n_resp, n_ref, L) of FRFs as independent numbers, whose real and imaginary parts have unit variance."""
@@ -113,7 +115,8 @@ def line_data(test: Test, condition: Condition, stated: Noise | None, expected: 
     change = np.abs(np.log(steps[1:] / steps[:-1])) > np.log(CHANGED)  # lines left out, and where another part of a sweep begins
     gaps = sorted({*(np.flatnonzero(np.diff(np.flatnonzero(use)) > 1) + 1).tolist(), *((np.flatnonzero(change) + 1).tolist() if not even(frf.frequency) else ())})
     length = record_length(frf)
-    window = windowed(value, Window(test.window_decay, length, test.pretrigger)) if np.isfinite(length) else NONE
+    hit = Window(test.window_decay, length) if test.pretrigger is None else Window(test.window_decay, length, test.pretrigger, TOLD)
+    window = windowed(value, hit) if np.isfinite(length) else NONE
     sd, noise_from = told(frf, value, use, stated, expected, window)
     least = SILENT * float(np.abs(value).max())  # where symmetry forbids an answer there is rounding alone, or nothing
     sd = np.maximum(sd, least)

@@ -22,7 +22,7 @@ from thermospindle.model.types import Array, ComplexArray, Integers
 
 LEAST = 0.2  # d T, from which a window is worth a question
 FRESH = 0.003  # of the noise's variance, at least, that is new in every line: that of the force channel, which no window takes away late in a record, of a file's digits, and what polynomials leave
-EARLY, UNTOLD = 0.03, 0.12  # of a record, by which it may begin earlier than is told, or its lines say; and where neither does: so late a hit does not show in what polynomials leave
+TOLD, FOUND, UNTOLD = 0.01, 0.03, 0.12  # of a record, by which it may begin earlier than is told; than its lines say; and where neither does: so late a hit does not show in what polynomials leave
 REACH, FINE, TELLS = 0.25, 100, 0.03  # of a record, up to which the hit is sought, times in it, and by how much nearer a correlation must be to tell one: three standard errors of a median over some hundred pieces
 PIECE, DEGREES = 24, 9  # lines and polynomials of the pieces whose scatter tells whether noise is windowed
 
@@ -34,6 +34,7 @@ class Window:
     decay: float = 0.0
     length: float = 1.0
     pretrigger: float = 0.0
+    early: float = UNTOLD  # share of a record by which it may begin earlier
 
     @property
     def damped(self) -> float:
@@ -97,14 +98,14 @@ class Alike:
         return replace(self, mixing=self.mixing[which], share=self.share[..., which])
 
     def hit(self, pretrigger: float) -> Alike:
-        """The same of records that were hit at another time."""
-        return replace(self, window=replace(self.window, pretrigger=pretrigger))
+        """The same of records that were hit at a time that is told."""
+        return replace(self, window=replace(self.window, pretrigger=pretrigger, early=TOLD))
 
     def whitening(self) -> ComplexArray:
         """W (n_resp, n_ref, L, L), by which rows of values, each in its own standard errors, become independent ones of unit variance: W^T R W^* = 1 with R their correlation."""
         of = self.mixing, self.number, self.window
         size, one = np.sqrt(np.diag(covariance(*of)).real), np.eye(self.mixing.shape[0])
-        alike, found = covariance(*of, EARLY if self.window.pretrigger else UNTOLD) / np.outer(size, size), np.empty((*self.share.shape, len(one)), complex)
+        alike, found = covariance(*of, self.window.early) / np.outer(size, size), np.empty((*self.share.shape, len(one)), complex)
         for at in np.ndindex(*self.share.shape[:2]):
             own = np.minimum(self.share[at], 1 - FRESH)
             lower = np.linalg.cholesky(np.sqrt(np.outer(own, own)) * alike + np.diag(1 - own))
@@ -150,6 +151,6 @@ def windowed(value: ComplexArray, window: Window) -> Window:
         c = across @ correlation(PIECE, of) @ across
         return abs(middle - complex(np.trace(c, offset=-1) / np.trace(c)))
 
-    late = [] if window.pretrigger else [replace(window, pretrigger=share * window.length) for share in np.linspace(0.0, REACH, FINE + 1)[1:]]
+    late = [] if window.early < UNTOLD else [replace(window, pretrigger=share * window.length, early=FOUND) for share in np.linspace(0.0, REACH, FINE + 1)[1:]]
     best = min([NONE, window, *late], key=off)
     return best if best is NONE or off(best) < off(window) - TELLS else window

@@ -26,7 +26,7 @@ def hit_found(model: CampaignModel, fitted: Array, least: float) -> CampaignMode
     gains `least` by another at that. None where all tell, where records are long enough, or where chi2 does not fall by `least`; and by what the best of so many
     times gains by chance (ln of their number: chi2 of one number). Nor where it falls by far more than what is left out is in all, which then stands in for something else."""
     thin = model.thinned
-    untold = [(t, d) for t, d in enumerate(thin.tests) if isinstance(d, LineData) and np.isfinite(d.duration) and not d.test.pretrigger]
+    untold = [(t, d) for t, d in enumerate(thin.tests) if isinstance(d, LineData) and np.isfinite(d.duration) and d.test.pretrigger is None]
     if not untold or model.numbers.record is None:
         return None
     x, own_share = fitted.copy(), float(fitted[model.numbers.record])

@@ -114,7 +114,7 @@ class Response:
     @cached_property
     def _end(self) -> RecordEnd | None:
         """The end of records, where some mode still answers there."""
-        return self._ending(self._of[1].test.pretrigger)
+        return self._ending(self._of[1].test.pretrigger or 0.0)
 
     def cut_off_after(self, before: float) -> ComplexArray:
         """What records that were hit `before` seconds after their start would leave out, (n_resp, n_ref, L)."""

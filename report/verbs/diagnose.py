@@ -80,7 +80,7 @@ def _found(found: verdict.Diagnosis) -> list[str]:
     """Warnings: of effects that cannot be worked out; where records end early, and where in them they were hit was not told but found."""
     unable = [f"{name} is no explanation of test {why}" for name, why in found.unable.items()]
     for told, seen in zip(found.campaign.tests, found.search.model.tests, strict=True):
-        if seen.test.pretrigger != told.pretrigger:
+        if seen.test.pretrigger is not None and seen.test.pretrigger != told.pretrigger:
             return [
                 *unable,
                 f"records end before answers have died away; that they were hit {1e3 * seen.test.pretrigger:.3g} ms after their start, which no test tells (pretrigger_s), "

@@ -53,7 +53,7 @@ class Test:
     modes: tuple[ModeRow, ...] = ()
     window_decay: float = 0.0  # 1/s, damping that an exponential window exp(-decay t) has left in the FRFs
     runout: RunoutRecord | None = field(default=None, compare=False)
-    pretrigger: float = 0.0  # s from the start of a record to the middle of the hit
+    pretrigger: float | None = None  # s from the start of a record to the middle of the hit, where it is told
 
     @property
     def shape_nodes(self) -> tuple[int, ...]:
@@ -125,7 +125,7 @@ def read_campaign(folder: Path, limits: Limits = LIMITS) -> Campaign:
         if frf is not None:
             _check_size(folder / str(t.frf), frf)
             check_frf(folder / str(t.frf), frf, speed, limits)
-            if t.pretrigger_s >= (record := record_length(frf)):
+            if t.pretrigger_s is not None and t.pretrigger_s >= (record := record_length(frf)):
                 raise BadInput(f"{file}: tests.{t.id}.pretrigger_s = {t.pretrigger_s:g}: must be less than the record of lines {1 / record:g} Hz apart, {record:g} s")
         tests.append(
             Test(t.id, t.temperature_C, speed, t.hammer_level_N, soak, t.repeat, t.conditions, frf, modes, t.window_decay_1_per_s, runout, t.pretrigger_s)
@@ -228,7 +228,7 @@ def _toml_text(campaign: Campaign) -> str:
             "soak_time_min": None if t.soak_time is None else in_unit(t.soak_time, MINUTE),
             "repeat": t.repeat,
             "window_decay_1_per_s": t.window_decay or None,
-            "pretrigger_s": t.pretrigger or None,
+            "pretrigger_s": t.pretrigger,
             "conditions": t.conditions or None,
         }
         for t in campaign.tests

@@ -51,7 +51,7 @@ class TestTable(Table):
     hammer_level_N: Positive | None = None
     soak_time_min: NotNegative | None = None
     window_decay_1_per_s: NotNegative = 0.0
-    pretrigger_s: NotNegative = 0.0
+    pretrigger_s: NotNegative | None = None
     repeat: Annotated[int, Field(ge=1)] = 1
     conditions: dict[str, Any] = {}
 

@@ -149,7 +149,7 @@ def _test(id_: str, told: TestForm, found: Read, placed: list[Placed], quantity:
     notes += more
     soak = None if told.soak_time_min is None else told.soak_time_min * MINUTE
     decay = told.window_decay_1_per_s + found.window.get(id_, 0.0)
-    before = told.pretrigger_s or found.pretrigger.get(id_, 0.0)
+    before = found.pretrigger.get(id_) if told.pretrigger_s is None else told.pretrigger_s
     return Test(
         id_, told.temperature_C, speed, told.hammer_level_N, soak, told.repeat, told.conditions, frf, rows, decay, pretrigger=before
     )

@@ -71,7 +71,7 @@ class TestForm(Table):
     hammer_level_N: Positive | None = None
     soak_time_min: NotNegative | None = None
     window_decay_1_per_s: NotNegative = 0.0
-    pretrigger_s: NotNegative = 0.0
+    pretrigger_s: NotNegative | None = None
     repeat: Annotated[int, Field(ge=1)] = 1
     averages: Annotated[int, Field(ge=1, le=100000)] | None = None
     conditions: dict[str, Any] = Field(default_factory=dict)

@@ -81,12 +81,12 @@ def test_errors_of_compressed_lines_come_true(hidden):
 
 @pytest.mark.parametrize(
     ("hidden", "before", "told", "without"),
-    [(0.0, 0.0, 0.0, 0.9), (DAMPED, 0.0, 0.0, 1.5), (DAMPED, 0.02, 0.0, 1.5), (DAMPED, 0.04, 0.0, 1.0), (DAMPED, 0.04, 0.04, 1.0)],
-    ids=["new in every line", "hit at the start", "hit a little later, untold", "hit later, untold", "hit later"],
+    [(0.0, 0.0, None, 0.9), (DAMPED, 0.0, None, 1.5), (DAMPED, 0.0, 0.0, 1.5), (DAMPED, 0.02, None, 1.5), (DAMPED, 0.04, None, 1.0), (DAMPED, 0.04, 0.04, 1.0), (DAMPED, 0.0425, 0.04, 1.0)],
+    ids=["new in every line", "hit at the start, untold", "hit at the start", "hit a little later, untold", "hit later, untold", "hit later", "hit a little later than told"],
 )
 def test_errors_of_what_is_smooth_over_lines_come_true(hidden, before, told, without):
     """A gain, a delay and a mode's frequency fitted to windowed noise are off by their stated errors, within a fifth, where lines taken for independent would say half as much. Hit late in a record
-    the noise of an FRF turns from line to line; a little later than is told does no harm, and much later lines say by themselves."""
+    the noise of an FRF turns from line to line; a little later than is told does no harm, and much later lines say by themselves. Where the time is told, chi2 is right too."""
     frequency, off, alone, chi2 = LINES[USE], [], [], []
     smooth = modal_frf(frequency)
     for seed in range(10):
@@ -102,7 +102,7 @@ def test_errors_of_what_is_smooth_over_lines_come_true(hidden, before, told, wit
         chi2.append(np.mean(np.abs(data.in_errors(left)) ** 2) / 2)
     assert np.sqrt(np.mean(np.square(off))) == pytest.approx(1.0, abs=0.2)
     assert np.sqrt(np.mean(np.square(alone))) > without
-    assert 0.5 < np.mean(chi2) < 1.1
+    assert (0.5 if told is None and hidden else 0.81) < np.mean(chi2) < 1.1
 
 
 def test_lines_by_themselves():

@@ -33,7 +33,7 @@ def hit(spindle, *before, told=(), times=1.0):
         every = replace(data, frequency=FREQUENCY, value=test.frf.value)
         answer = Response(model.linear(t, x, []), every, np.exp(errors.gain))
         value = test.frf.value + (0.0 if before[t] is None else times * answer.cut_off_after(before[t]))
-        tests.append(replace(test, frf=replace(test.frf, value=noisy(value, random, NOISE)), pretrigger=before[t] if t in told else 0.0))
+        tests.append(replace(test, frf=replace(test.frf, value=noisy(value, random, NOISE)), pretrigger=before[t] if t in told else None))
     return model_of(spindle, replace(whole, tests=tuple(tests), noise=NOISE))
 
 
