@@ -66,7 +66,8 @@ class Viscosity(Entries):
     def __call__(self, temperature: float) -> float:
         if len(self.value) == 1:
             return self.value[0]
-        self.check(temperature)
+        if not self.temperature[0] - BEYOND <= temperature <= self.temperature[-1] + BEYOND:
+            self.check(temperature)
         k = self._after(temperature)
         start, end, asked = (log10(t + 273.15) for t in (*self.temperature[k - 1 : k + 1], temperature))
         first, last = (log10(log10(1e6 * v + 0.7)) for v in self.value[k - 1 : k + 1])

@@ -21,10 +21,12 @@ from thermospindle.diagnosis.inference.singles import (
     BEHIND,
     FAR,
     OCCAM,
+    STRAINED,
     Singles,
     better,
     by_own_laws,
     carried_over,
+    farthest_tolerance,
     fit_singles,
     of_each_name,
 )
@@ -137,7 +139,8 @@ def _ended(model: CampaignModel, least: float, found: Sequence[Hypothesis], work
 def _at_the_end(model: CampaignModel, least: float, h: Hypothesis) -> Hypothesis:
     if h.mechanisms:  # without any it is settled
         h = settled(model, h)
-        h = _from_the_drawing(model, h) if not h.free and any(m.shape for m in h.mechanisms) else h
+        if not h.free and any(m.shape for m in h.mechanisms) and farthest_tolerance(model, h.fit.point) > STRAINED:
+            h = _from_the_drawing(model, h)
     return widened(model, h, least)
 
 
@@ -145,7 +148,7 @@ def _from_the_drawing(model: CampaignModel, h: Hypothesis) -> Hypothesis:
     """Once more with no tolerance off its drawing: a shape that went where tolerances were strained may lie in a valley of its own, where these hold it. A disk of 3 g and 12.5 mm was found as one
     of 3.9 +- 0.02 g and 15 mm, 80 in chi2 behind."""
     try:
-        again = fit(model, h.mechanisms, as_drawn(model, h.fit.point), h.fit.rates, TEMPERS[-1:], h.evidence.learned, h.fit.moved)
+        again = fit(model, h.mechanisms, as_drawn(model, h.fit.point), h.fit.rates, TEMPERS[-1:], h.evidence.learned, h.fit.moved, beaten=h.fit.cost)
         found = Hypothesis(again, evidence(model, again))
     except FAILED:
         return h

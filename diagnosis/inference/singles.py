@@ -174,8 +174,7 @@ def lasting(
     or strained tolerances stand in for them, and beside those screening sees nothing. Followed to the end is what gains something while errors are
     still enlarged."""
     n = len(model.parameters)
-    off = max((abs(float(v)) for q, v in zip(model.parameters, lead.evidence.mean, strict=False) if q.kind == kinds_of.BUILD), default=0.0)
-    if lead.evidence.learned.sizes.get(kinds_of.STIFFNESS, 0.0) < HIDING and off < STRAINED:
+    if lead.evidence.learned.sizes.get(kinds_of.STIFFNESS, 0.0) < HIDING and farthest_tolerance(model, lead.evidence.mean) < STRAINED:
         return []
     own = as_drawn(model, lead.fit.point)
     drawn = {m.name: m for m in reversed(mechanisms) if m.lasting and m.kind == "law" and m.name not in lead.names}
@@ -189,6 +188,11 @@ def lasting(
     gaining = [h for h in fitted(model, tasks, TEMPERS[:-1], about, most, expected, workers) if h.evidence.ln > least]
     tasks = [Task(h.mechanisms, (h.fit.point,), -np.inf) for h in gaining]
     return fitted(model, tasks, TEMPERS[-1:], lead.fit, most, expected, workers, beaten=lead.fit.cost)
+
+
+def farthest_tolerance(model: CampaignModel, point: Array) -> float:
+    """How far, in its standard deviations, the build tolerance is that is farthest off in a parameter vector (n,); nothing where there are none."""
+    return max((abs(float(v)) for q, v in zip(model.parameters, point, strict=False) if q.kind == kinds_of.BUILD), default=0.0)
 
 
 def better(found: Sequence[Hypothesis]) -> list[Hypothesis]:

@@ -32,6 +32,7 @@ TRIES = 8  # sizes of an effect, until one shows and another does not
 FARTHEST = float(np.log(10.0))  # that one is from the next
 GROWS = 3.0  # times
 STEPS = 40  # at most, of everything else beside it
+KEPT = 0.75  # of what steps promised, from which derivatives of an earlier point are believed when they promise little more
 SHOWS, HIDES = 3.0, 2.0  # standard errors of a typical size, from which an effect alone shows, and up to which it hides beside another
 
 
@@ -155,19 +156,22 @@ def _beside(problem: Problem, about: Fit, base: Linearisation, moved: Sequence[A
     left = [-d for d in moved]
     nothing = Point(np.zeros(len(start)), left, problem.cost(np.zeros(len(start)), 1.0, left))
     here = min(nothing, at(start), key=lambda point: point.cost) if start.any() else nothing
-    lines, rates, current = base, about.rates, True
+    lines, rates, current, holds = base, about.rates, True, True
     for _ in range(STEPS):
         slope, normal = lines.slope(problem, here, 1.0), problem.precision + lines.information
         move = problem.step(here.p, slope, normal)
-        there = at(here.p + move)
+        there, hoped = at(here.p + move), promised(slope, normal, move)
         if there.cost < (1 - NEAR) * here.cost:
+            holds = holds and here.cost - there.cost > KEPT * hoped
             here, current = there, False
             continue
-        if current and (rates is not about.rates or promised(slope, normal, move) < NEAR * here.cost):
+        if (current or holds) and hoped < NEAR * here.cost:
             break
-        if current:  # it is not the lines that are old
-            rates = rates_of(model, about.nuisance + here.p, [[] for _ in model.tests], rates)
-        lines, current = problem.linearisation(about.nuisance + here.p, rates), True
+        if current:
+            if rates is not about.rates:
+                break
+            rates = rates_of(model, about.nuisance + here.p, [[] for _ in model.tests], rates)  # it is not the lines that are old
+        lines, current, holds = problem.linearisation(about.nuisance + here.p, rates), True, True
     return here
 
 
