@@ -331,10 +331,14 @@ def test_an_axial_load_is_told_with_its_sign_on_either_side(scene: str, outer: s
         assert found["bearings"]["front"]["preload_N"] == pytest.approx(175.0, rel=1e-9)
 
 
-def test_loads_that_bearings_given_by_numbers_do_not_feel_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bearings_given_by_numbers_bear_a_radial_load_by_the_lever_rule(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     loads = "axial_load_N = 5.0\nradial_load_N = [10.0, 0.0]\nradial_load_z_mm = 400.0\n"
     (tmp_path / "spindle.toml").write_text(loads + SCENES["rotor"].read_text(encoding="utf-8"), encoding="utf-8")
     assert main(["check", str(tmp_path)]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "External axial load 5 N along z changes nothing" in said
-    assert "External radial load 10, 0 N along x, y at z = 400 mm on shaft, changes nothing: bearings given by numbers are as stiff under any load." in said
+    assert "External radial load 10, 0 N along x, y at z = 400 mm on shaft, borne by left +3.15, +0; right +6.85, +0 N; left and right, given by numbers, are as stiff under any load." in said
+    found = {name: b["radial_force_N"] for name, b in checked(tmp_path, capsys)["bearings"].items()}
+    right = 10.0 * (400.0 - 30.0) / (570.0 - 30.0)
+    assert found["left"] == pytest.approx([10.0 - right, 0.0], abs=1e-5)
+    assert found["right"] == pytest.approx([right, 0.0], abs=1e-5)
