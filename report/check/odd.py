@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from thermospindle.diagnosis.forward.linear import mass_between
+from thermospindle.model.errors import listed
 from thermospindle.model.machine import Point, Spindle
 from thermospindle.model.rotor.modes import poles_below
 from thermospindle.model.rotor.static import free_motions
@@ -18,13 +19,16 @@ from thermospindle.report.check.odd_bearings import OF_BEARINGS
 from thermospindle.sim.effects import of_scene
 from thermospindle.sim.effects.effect import refusal
 from thermospindle.sim.hammer.pulse import pulse_duration
+from thermospindle.sim.resonance.critical import criticals
 
 WEAK = 0.1
 """Share of its force at low frequency below which a hammer hardly excites: 20 dB."""
 UNDAMPED = 1e-5
 """Damping ratio below which a record cannot show how a mode dies out: of metals, 1e-4 and more."""
 NEAR = 0.05
-"""Of the speed, within which a natural frequency is called critical."""
+"""Of its speed, within which a natural frequency that a part's unbalance drives is told."""
+ENDLESS = 0.1
+"""m, of a motion at resonance that damping does not bound in earnest."""
 LEAST_EXPANSION = 0.01
 """um/m K: glass ceramics such as Zerodur have 0.02, and whoever writes 1/K has 1e-5."""
 LEAST_DENSITY = 100.0
@@ -85,10 +89,13 @@ def _damping(found: Looked) -> Iterator[str]:
 def _critical(found: Looked) -> Iterator[str]:
     if isinstance(found.turning, str):
         return
-    speed = found.turning.condition.speed
-    for m in found.turning.modes:
-        if abs(m.frequency * 2 * np.pi / speed - 1) < NEAR:
-            yield f"a natural frequency of {m.frequency:.0f} Hz lies at the nominal speed of {speed / RPM:.0f} rpm: unbalance drives it"
+    for c in criticals(found.turning, NEAR):
+        of = "nominal speed" if np.isclose(c.speed, found.turning.condition.speed) else f"speed of {listed(c.parts)}"
+        way = "whirls with the rotor" if c.sense > 0.99 else "whirls mostly with the rotor" if c.sense > 0.75 else "hardly whirls" if c.sense > 0.25 else "whirls mostly against the rotor"
+        much = f"{1e6 * c.unbalance:.3g} g mm" + (" of the scene" if c.of_scene else "")
+        moved = f"{much} at z = {c.z / MM:g} mm would move that place by {1e6 * c.moved:.3g} um in resonance" if c.moved < ENDLESS else "nothing damps it"
+        share = "" if c.sense > 0.99 else f" by {100 * c.sense:.2g} % of the modal force"
+        yield f"a natural frequency of {c.mode.frequency:.0f} Hz lies at the {of} of {c.speed / RPM:.0f} rpm and {way}: unbalance drives it{share}; {moved}"
 
 
 # ---------------------------------------------------------------- measuring

@@ -35,11 +35,11 @@ from thermospindle.sim.identification.pairing import follow
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.resonance.between import Between, between, strengths
 from thermospindle.sim.resonance.between import runout as between_runout
+from thermospindle.sim.resonance.critical import SENSE
 from thermospindle.sim.resonance.found import Coincidence, Curve, Interpolated, LineTrack, ResonanceMap, Track, strongest
 from thermospindle.sim.resonance.point import Exact, key, line_amplitudes, nrro_rms, with_imperfections
 from thermospindle.sim.running.probes import speed_ratio
 
-SENSE = 0.01
 MULTIPLES = 3  # of the number of balls, and even ball orders, whose lines are drawn
 CLOSE = 1e-3  # Hz, of line and mode at a crossing
 DENSER = 6  # coincidences about which runout is computed at more places

@@ -19,6 +19,7 @@ from thermospindle.model.scene.reading import content_hash, load
 from thermospindle.model.units import RPM
 from thermospindle.sim.effects import by_name
 from thermospindle.sim.operating import operating_point
+from thermospindle.sim.resonance.critical import criticals
 from thermospindle.sim.running.excitation import harmonics, response
 from thermospindle.sim.running.moving_balls import _unbalance_forces
 
@@ -226,3 +227,19 @@ def test_without_a_scene_the_sentence_is_the_same(made):
     spindle = replace(made(0.0), imperfections=Imperfections(unbalance=1e-6, unbalance_z=0.22))
     with pytest.raises(BadInput, match="unbalance_body must name the one it acts on: allowed are shaft, sleeve"):
         harmonics(operating_point(spindle, Condition(20.0, SPEED)))
+
+
+def test_each_part_drives_the_modes_at_its_own_speed_that_whirl_with_it(made):
+    """The sleeve turns backwards at half the speed: of a pair of its modes it drives the one that goes backward with the spindle."""
+    spindle = made(50.0)
+    turning = operating_point(spindle, Condition(20.0, SPEED))
+    assert criticals(operating_point(spindle, Condition(20.0)), 0.5) == []
+    pair = [m for m in turning.modes if m.kind != "axial" and m.energy["low"] + m.energy["high"] > 0.9][:2]
+    assert {m.whirl for m in pair} == {"forward", "backward"}
+    backward = next(m for m in pair if m.whirl == "backward")
+    at = Condition(20.0, 4 * np.pi * backward.frequency)
+    point = operating_point(spindle, at)
+    found = [c for c in criticals(point, 0.1) if c.parts == ("sleeve",)]
+    assert found
+    assert {c.mode.whirl for c in found} == {"backward"}
+    assert all(c.sense > 0.99 and not c.of_scene and c.speed == pytest.approx(-at.speed / 2) for c in found)

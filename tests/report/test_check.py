@@ -14,13 +14,17 @@ from matplotlib.patches import Rectangle
 from tests.conftest import ROOT
 from thermospindle.cli import main
 from thermospindle.model.machine import Condition
+from thermospindle.model.rotor.chain import motion_rows
 from thermospindle.model.scene.reading import load
+from thermospindle.model.units import RPM
 from thermospindle.report.check.drawing import drawing
 from thermospindle.report.check.looked import looked
 from thermospindle.report.check.odd import odd
 from thermospindle.report.check.understood import arrangement
 from thermospindle.report.check.words import of_words
 from thermospindle.sim.operating import operating_point
+from thermospindle.sim.resonance.critical import criticals
+from thermospindle.sim.running.excitation import harmonics, response
 
 SCENES = {name: ROOT / "scenes" / name / "spindle.toml" for name in ("hdd_2003", "mk7702", "five_bearing", "free_shaft")}
 SCENES |= {kind: ROOT / "scenes" / "templates" / f"{kind}.toml" for kind in ("hdd", "machine-tool", "grinding", "rotor")}
@@ -342,3 +346,42 @@ def test_bearings_given_by_numbers_bear_a_radial_load_by_the_lever_rule(tmp_path
     right = 10.0 * (400.0 - 30.0) / (570.0 - 30.0)
     assert found["left"] == pytest.approx([10.0 - right, 0.0], abs=1e-5)
     assert found["right"] == pytest.approx([right, 0.0], abs=1e-5)
+
+
+def critical_words(text: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> list[str]:
+    (folder / "spindle.toml").write_text(text, encoding="utf-8")
+    return [words for words in checked(folder, capsys)["odd"] if words.startswith("a natural frequency of")]
+
+
+def test_unbalance_is_told_to_drive_what_whirls_with_the_rotor(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """In supports that are alike in all directions it does nothing to the backward mode at that speed; in others to both, each by its share."""
+    text = SCENES["rotor"].read_text(encoding="utf-8").replace("nominal_speed_rpm = 4000.0", "nominal_speed_rpm = 7200.0")
+    (tmp_path / "spindle.toml").write_text(text, encoding="utf-8")
+    point = operating_point(load(tmp_path), Condition(20.0, 7200 * RPM))
+    pair = [m for m in point.modes if abs(m.frequency / 120.0 - 1) < 0.05]
+    assert [m.whirl for m in pair] == ["backward", "forward"]
+    [told] = critical_words(text, tmp_path, capsys)
+    assert told.startswith(f"a natural frequency of {pair[1].frequency:.0f} Hz lies at the nominal speed of 7200 rpm and whirls with the rotor: unbalance drives it; 5 g mm of the scene at z = 225 mm")
+
+    apart = text.replace("radial_stiffness_N_per_um = 20.0   # in every direction across the axis\naxial_stiffness_N_per_um = 5.0 ", "matrix_SI = [[2e7, 0, 0, 0, 0], [0, 1.2e7, 0, 0, 0], [0, 0, 5e6, 0, 0], [0, 0, 0, 0, 0], [0, 0, 0, 0, 0]] ")
+    assert apart != text
+    both = critical_words(apart, tmp_path, capsys)
+    assert "whirls mostly against the rotor: unbalance drives it by 22 % of the modal force; 5 g mm of the scene" in both[0]
+    assert "whirls mostly with the rotor: unbalance drives it by 78 % of the modal force; 5 g mm of the scene" in both[1]
+    assert len(both) == 2
+
+
+def test_how_far_unbalance_moves_a_mode_is_what_the_running_rotor_does_there(tmp_path: Path) -> None:
+    """At the critical speed all other modes add little to the one."""
+    text = SCENES["rotor"].read_text(encoding="utf-8")
+    (tmp_path / "spindle.toml").write_text(text, encoding="utf-8")
+    spindle = load(tmp_path)
+    speed = 7200 * RPM
+    for _ in range(6):  # to where the forward mode stands at the speed
+        point = operating_point(spindle, Condition(20.0, speed))
+        [found] = criticals(point, 0.05)
+        speed = 2 * np.pi * found.mode.frequency
+    row = motion_rows(point.chain, "disc", (0.0, 0.0, 0.225))[0]
+    assert found.of_scene
+    assert found.sense == pytest.approx(1.0, abs=1e-6)
+    assert found.moved == pytest.approx(float(np.abs(response(point, harmonics(point)) @ row)[0]), rel=0.01)
