@@ -196,6 +196,8 @@ ODD = [
     ("rotor", "radial_stiffness_N_per_um = 20.0", "radial_stiffness_N_per_um = 20.0e-6", "bearing left: its radial stiffness is 20 N/m at most, on which the"),
     ("free_shaft", "damping_ratio = 1.0e-4", "damping_ratio = 1.0e-9", "4 modes up to 1100 Hz are undamped"),
     ("grinding", "outer_conformity = 0.53", "outer_conformity = 0.60", "the outer groove's radius is 0.6 ball diameters"),
+    ("machine-tool", "balls = 18\nball_diameter_mm = 10.32", "balls = 11\nball_diameter_mm = 10.32", "ball_rows.rear.catalogue, of rear1, rear2: preload, unloading force and axial rigidity ask for contacts 1.6 times as stiff as Hertz has them of 11 balls of 10.32 mm"),
+    ("machine-tool", "axial_rigidity_N_per_um = [64.5, 111.7, 162.8]", "axial_rigidity_N_per_um = [32.25, 55.85, 81.4]", "mm and grooves of a radius of 0.559 ball diameters, and bearings have 0.52 to 0.535"),
     ("free_shaft", "[tolerances]", "[[effects]]\nname = \"preload_loss\"\n[tolerances]", "effect preload_loss: nothing to act on here"),
     ("hdd_2003", 'between = ["seat", "shaft"]', 'between = ["hub", "shaft"]', "joint flange: 'hub' turns and 'shaft' does not"),
     ("hdd", "preload_N = 16.0", "preload_N = 900.0", "under preload and the loads told; balls leave dents from 4200 MPa, the static limit of ISO 76"),
@@ -385,3 +387,7 @@ def test_how_far_unbalance_moves_a_mode_is_what_the_running_rotor_does_there(tmp
     assert found.of_scene
     assert found.sense == pytest.approx(1.0, abs=1e-6)
     assert found.moved == pytest.approx(float(np.abs(response(point, harmonics(point)) @ row)[0]), rel=0.01)
+
+
+def test_no_catalogue_of_the_shipped_bearings_is_odd(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert not [words for words in checked(SCENES["five_bearing"], capsys)["odd"] if "catalogue" in words]
