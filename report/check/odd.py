@@ -10,7 +10,7 @@ import numpy as np
 from thermospindle.diagnosis.forward.linear import mass_between
 from thermospindle.model.errors import listed
 from thermospindle.model.machine import Point, Spindle
-from thermospindle.model.rotor.modes import poles_below
+from thermospindle.model.rotor.modes import lost_to_rounding, poles_below
 from thermospindle.model.rotor.static import free_motions
 from thermospindle.model.shaft import SAME_HEIGHT, Shaft
 from thermospindle.model.units import HERTZ, MM, RPM
@@ -27,6 +27,8 @@ UNDAMPED = 1e-5
 """Damping ratio below which a record cannot show how a mode dies out: of metals, 1e-4 and more."""
 NEAR = 0.05
 """Of its speed, within which a natural frequency that a part's unbalance drives is told."""
+LOWEST = 0.1
+"""Hz, of a motion that is slower than anything measured here."""
 ENDLESS = 0.1
 """m, of a motion at resonance that damping does not bound in earnest."""
 LEAST_EXPANSION = 0.01
@@ -72,6 +74,15 @@ def _free(found: Looked) -> Iterator[str]:
     if count:
         what = "a motion" if count == 1 else f"{count} motions"
         yield f"nothing holds the spindle against {what}, as of a shaft that hangs free or floats along its axis"
+
+
+def _lost(found: Looked) -> Iterator[str]:
+    lost = lost_to_rounding(found.reference.linear)
+    if lost.count and lost.below > LOWEST:
+        yield (
+            f"{_count(lost.count, 'natural frequency', 'natural frequencies')} below {lost.below:.3g} Hz cannot be told from rounding beside that of {lost.stiffest:.2g} Hz which parts nearly without mass have "
+            "between stiff ones, and no verb shows them; more mass there (beam = \"timoshenko\" gives elements their rotary inertia), or longer elements, make them appear"
+        )
 
 
 def _undamped(found: Looked) -> Iterator[str]:
@@ -165,7 +176,7 @@ def _hammer(found: Looked) -> Iterator[str]:
 def _mesh(found: Looked) -> Iterator[str]:
     """Modes of shafts that come out low for their masses are at nodes."""
     between, high = mass_between(found.reference, found.spindle), found.spindle.hammer.band[1]
-    if between is None:
+    if between is None or lost_to_rounding(found.reference.linear).count:
         return
     lumped = [m.frequency for m in found.reference.modes]
     spread = np.sort(np.abs(poles_below(found.reference.linear, high, between)[0])) / HERTZ
@@ -212,5 +223,5 @@ def _count(n: int, one: str, many: str = "") -> str:
 
 
 QUESTIONS: tuple[Callable[[Looked], Iterator[str]], ...] = (
-    *OF_BEARINGS, _seats, _materials, _free, _undamped, _damping, _critical, _sections, _points, _hammer, _mesh, _running, _effects,
+    *OF_BEARINGS, _seats, _materials, _free, _lost, _undamped, _damping, _critical, _sections, _points, _hammer, _mesh, _running, _effects,
 )  # fmt: skip
