@@ -11,7 +11,7 @@ import pytest
 from thermospindle.cli import main
 from thermospindle.model.built.drawn import drawn
 from thermospindle.model.built.imperfections import Imperfections
-from thermospindle.model.carrier import unbalance_carrier
+from thermospindle.model.carrier import permissible_unbalance, unbalance_carrier
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.loaded import motion
@@ -243,3 +243,21 @@ def test_each_part_drives_the_modes_at_its_own_speed_that_whirl_with_it(made):
     assert found
     assert {c.mode.whirl for c in found} == {"backward"}
     assert all(c.sense > 0.99 and not c.of_scene and c.speed == pytest.approx(-at.speed / 2) for c in found)
+
+
+def test_a_balance_grade_goes_by_a_parts_own_speed(made):
+    """Of a shaft and disc geared to twice the spindle's speed, beside a sleeve at half of it: e = G / (2 speed), m what turns with them."""
+    spindle = made(0.0)
+    structure = spindle.structure
+    fast = replace(structure, bodies=tuple(replace(b, speed_ratio=2.0) if b.speed_ratio == 1.0 else b for b in structure.bodies))
+    geared = replace(spindle, structure=fast)
+    body = geared.turning
+    assert body.speed_ratio == 2.0
+    mass = sum(b.mass for b in geared.structure.bodies if b.speed_ratio == 2.0)
+    assert mass < 0.9 * geared.turning_mass
+    assert permissible_unbalance(geared, body, 2.5e-3) == pytest.approx(mass * 2.5e-3 / (2 * SPEED), rel=1e-12)
+    sleeve = next(b for b in structure.bodies if b.speed_ratio == -0.5)
+    assert permissible_unbalance(geared, sleeve, 2.5e-3) == pytest.approx((geared.turning_mass - mass) * 2.5e-3 / (0.5 * SPEED), rel=1e-12)
+    assert drawn(geared, 3).unbalance == pytest.approx(drawn(spindle, 3).unbalance / 2, rel=1e-12)
+    sizes = [by_name("unbalance").sized(s)["amount"] for s in (spindle, geared)]
+    assert sizes[1] == pytest.approx(sizes[0] / 2, rel=1e-12)
