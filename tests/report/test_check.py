@@ -410,3 +410,20 @@ def test_a_light_shaft_keeps_its_modes_at_any_mesh(beam: str, density: float, el
     spindle = load(tmp_path)
     assert found["modes_Hz"] == pytest.approx([m.frequency for m in operating_point(spindle, Condition(20.0)).modes_below(1500.0)], rel=1e-3)
     assert found["modes_Hz"][0] == pytest.approx(151.0 if density == 1.0 else 120.6, rel=5e-3)
+
+
+def test_a_rotor_that_stiffens_nothing_is_in_the_legend_and_under_no_name(tmp_path: Path) -> None:
+    """Of a shaft of 30 mm with a rotor of 160 mm around it: its hatch ends above the names below the axis."""
+    text = SCENES["rotor"].read_text(encoding="utf-8")
+    (tmp_path / "spindle.toml").write_text(text.replace("# mass_outer_mm = [[30, 600]] ", "mass_outer_mm = [[30, 250], [160, 100], [30, 250]] "), encoding="utf-8")
+    figure = drawing(operating_point(load(tmp_path), Condition(20.0)))
+    [axes] = figure.axes
+    figure.canvas.draw()
+    [hatch] = [p for p in axes.patches if p.get_hatch() and p.get_window_extent().y1 <= axes.transData.transform((0, 0))[1] + 1]
+    assert hatch.get_path().vertices[:, 1].min() == pytest.approx(-80.0)
+    below = [t for t in axes.texts if t.get_position()[1] < 0]
+    assert {"shaft", "disc"} <= {t.get_text() for t in below}
+    assert all(t.get_window_extent().y1 < hatch.get_window_extent().y0 for t in below)
+    entry = "mass that stiffens nothing"
+    assert entry in {t.get_text() for t in figure.legends[0].get_texts()}
+    assert entry not in {t.get_text() for t in drawing(operating_point(load(SCENES["rotor"]), Condition(20.0))).legends[0].get_texts()}
