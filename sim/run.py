@@ -10,8 +10,7 @@ import numpy as np
 
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.units import RPM
-from thermospindle.sim.campaign.beside import on_parts
-from thermospindle.sim.campaign.campaign import Campaign, Test, read_campaign
+from thermospindle.sim.campaign.campaign import Campaign, Test, on_parts, read_campaign
 from thermospindle.sim.hammer.pulse import check_band, middle_of_hit
 from thermospindle.sim.hammer.test import ImpactTest, impact_tests
 from thermospindle.sim.identification.frf import Frf

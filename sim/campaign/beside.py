@@ -58,11 +58,6 @@ def on_nodes(spindle: Spindle, points: Sequence[Point]) -> tuple[Point, ...]:
     return tuple(p if shaft is None else replace(p, body=shaft.node_at(p.position[2])) for p, shaft in zip(points, shafts, strict=True))
 
 
-def on_parts(spindle: Spindle, points: Sequence[Point]) -> tuple[Point, ...]:
-    """The points as a campaign is written with them: on bodies and shafts by name, whatever nodes the mesh of a shaft has."""
-    return tuple(replace(p, body=spindle.structure.carrier(p.body)) for p in points)
-
-
 def _shaft_of(spindle: Spindle, point: Point) -> Shaft | None:
     """The shaft that a point is on, by its name or that of a node of some mesh of it."""
     if any(b.name == point.body for b in spindle.structure.rigid_bodies):

@@ -16,8 +16,7 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition, Point, Spindle
 from thermospindle.model.rotor.chain import motion_rows
 from thermospindle.model.units import RPM
-from thermospindle.sim.campaign.beside import on_parts
-from thermospindle.sim.campaign.campaign import Campaign, Test
+from thermospindle.sim.campaign.campaign import Campaign, Test, on_parts
 from thermospindle.sim.campaign.runout_record import RunoutRecord
 from thermospindle.sim.operating import OperatingPoint, operating_point
 from thermospindle.sim.running.probes import hub_probes, second_plane

@@ -9,8 +9,7 @@ from pathlib import Path
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Point, Spindle
 from thermospindle.model.units import MINUTE, RPM
-from thermospindle.sim.campaign.beside import on_parts
-from thermospindle.sim.campaign.campaign import Campaign, Test
+from thermospindle.sim.campaign.campaign import Campaign, Test, on_parts
 from thermospindle.sim.importing.asked import open_conditions, open_ends, open_parts, open_units, scaled, spoken, together, unanswered
 from thermospindle.sim.importing.checks import check_columns, check_content, check_ends, check_files, check_left_out, check_tests, names_of
 from thermospindle.sim.importing.files.reading import content

@@ -13,8 +13,8 @@ from thermospindle.diagnosis.verdict import diagnose
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
-from thermospindle.sim.campaign.beside import beside, check_points, doubtful, of_another, on_nodes, on_parts
-from thermospindle.sim.campaign.campaign import Campaign, Test, read_campaign, write_campaign
+from thermospindle.sim.campaign.beside import beside, check_points, doubtful, of_another, on_nodes
+from thermospindle.sim.campaign.campaign import Campaign, Test, on_parts, read_campaign, write_campaign
 from thermospindle.sim.campaign.simulated import hub_points, runout_campaign
 from thermospindle.sim.identification.frf import Frf
 from thermospindle.sim.run import Run, as_campaign
