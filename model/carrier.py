@@ -30,6 +30,13 @@ def unbalanced(spindle: Spindle) -> Body:
     return unbalance_carrier(spindle, own) if own.unbalance or own.couple_unbalance else spindle.turning
 
 
+def permissible_unbalance(spindle: Spindle, body: Body, grade: float) -> float:
+    """Unbalance (kg m) that a balance `grade` G (m/s) permits what turns together with a body: its mass times G over its own speed where the spindle turns at its nominal one (ISO
+    21940-11:2016, e = G / speed)."""
+    mass = sum(b.mass for b in spindle.structure.bodies if b.turns and b.speed_ratio == body.speed_ratio)
+    return mass * grade / (spindle.nominal_speed * abs(body.speed_ratio or 1.0))
+
+
 def load_carrier(spindle: Spindle) -> Body:
     """The same of the scene's radial load."""
     return carrier(spindle, spindle.radial_load_z, spindle.radial_load_body, RADIAL_LOAD)

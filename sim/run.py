@@ -10,7 +10,7 @@ import numpy as np
 
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.units import RPM
-from thermospindle.sim.campaign.campaign import Campaign, Test, read_campaign
+from thermospindle.sim.campaign.campaign import Campaign, Test, on_parts, read_campaign
 from thermospindle.sim.hammer.pulse import check_band, middle_of_hit
 from thermospindle.sim.hammer.test import ImpactTest, impact_tests
 from thermospindle.sim.identification.frf import Frf
@@ -84,7 +84,7 @@ def as_campaign(run: Run, title: str) -> Campaign:
         )
         for step in run.steps
     )
-    return Campaign(title, run.spindle.name, "mobility", run.spindle.points, tests, lumped_shafts=bool(run.spindle.structure.shafts))
+    return Campaign(title, run.spindle.name, "mobility", on_parts(run.spindle, run.spindle.points), tests, lumped_shafts=bool(run.spindle.structure.shafts))
 
 
 def _as_measured(frf: Frf) -> Frf:

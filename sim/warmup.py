@@ -11,7 +11,7 @@ condition's; those that prescribe region temperatures are left out whole, since 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +21,7 @@ from thermospindle.model.machine import Condition, RollerBearing, Spindle
 from thermospindle.model.rotor.chain import matrices
 from thermospindle.model.rotor.modes import Mode, modes
 from thermospindle.model.types import Array
-from thermospindle.model.units import RPM
+from thermospindle.model.units import MINUTE, RPM
 from thermospindle.sim.effects import of_scene
 from thermospindle.sim.effects.effect import Effect, Values
 from thermospindle.sim.identification.pairing import follow
@@ -36,6 +36,7 @@ PARTS = 20  # of the time, after each of which progress is told
 STAGES = PARTS + 3
 """How often a warm-up tells of its progress."""
 SHORTEST = 1e-3  # s that a warm-up lasts: in far less, temperatures move by their rounding
+REMEDY = "thermal.convection cools more, thermal.friction heats less, and a preload of springs, or less of it, gives way to hot rings"
 STEPS = 48  # at least, over a warm-up of that length
 
 
@@ -110,20 +111,13 @@ def warm_up(
     if not model.cooled.any():
         raise BadInput(f"{spindle.file or spindle.name}: thermal.convection: cools no face, so the spindle would heat up without end")
     machine = _Machine(spindle, speed, effects, reading(model))
+    reached: list[Reached] = []  # at first and last
 
-    def drive(_: float, nodal: Array) -> heat.Running:
-        return heat.Running(air, speed, friction.loads(spindle, machine.point(nodal).state))
+    def drive(time: float, nodal: Array) -> heat.Running:
+        loads = friction.loads(spindle, machine.point(nodal).state)
+        reached[1:] = [Reached(time, nodal, loads)]
+        return heat.Running(air, speed, loads)
 
-    try:
-        field = heat.settled(model, lambda nodal: drive(0.0, nodal), start)
-    except OutsideRange as error:
-        where = f"{spindle.file or spindle.name}: from {start:g} C in air of {air:g} C at {speed / RPM:g} rpm"
-        raise OutsideRange(f"{where} the grease or a material is asked for a temperature that its law does not reach: {error}; thermal.convection cools more, thermal.friction heats less") from None
-    final = model.nodal(field)
-    constant = heat.slowest(model, field, drive(0.0, final))
-    back = heat.feedback(model, field, lambda nodal: drive(0.0, nodal))
-    progress(f"steady state, time constant {constant:.0f} s")
-    whole = TIME_CONSTANTS * constant
     told = 0
 
     def passed(share: float) -> None:
@@ -132,7 +126,29 @@ def warm_up(
             told += 1
             progress(f"{100 * told // PARTS} % of the time")
 
-    history = heat.march(model, drive, start, duration or whole, tolerance, whole / STEPS, passed)
+    def marched(whole: float) -> heat.History:
+        reached.clear()
+        drive(0.0, model.nodal(start))
+        try:
+            return heat.march(model, drive, start, duration or whole, tolerance, whole / STEPS, passed)
+        except (OutsideRange, heat.NotSettled) as error:
+            raise type(error)(f"{where} {_ran_away(machine, reached, str(error))}; {REMEDY}") from None
+
+    where = f"{spindle.file or spindle.name}: from {start:g} C in air of {air:g} C at {speed / RPM:g} rpm"
+    try:
+        field = heat.settled(model, lambda nodal: drive(0.0, nodal), start)
+    except heat.NotSettled as error:
+        raise heat.NotSettled(f"{where} the bearings run away: {error}; {REMEDY}") from None
+    except OutsideRange as error:
+        if speed and not isinstance(error, heat.RanAway):  # too hot under the loads of the start, which says nothing of what becomes of them
+            marched(TIME_CONSTANTS * heat.slowest(model, model.field(model.nodal(start)), drive(0.0, model.nodal(start))))
+        raise type(error)(f"{where} the grease or a material is asked for a temperature that its law does not reach: {error}; {REMEDY}") from None
+    final = model.nodal(field)
+    constant = heat.slowest(model, field, drive(0.0, final))
+    back = heat.feedback(model, field, lambda nodal: drive(0.0, nodal))
+    progress(f"steady state, time constant {constant:.0f} s")
+    whole = TIME_CONSTANTS * constant
+    history = marched(whole)
     progress(f"temperatures in {len(history.times) - 1} steps")
     moments = tuple(machine.moment(nodal) for nodal in history.nodal)
     steady = machine.moment(final)
@@ -140,6 +156,32 @@ def warm_up(
     followed = _followed(first, [*moments, steady])
     progress("natural frequencies")
     return Warmup(spindle, start, air, speed, history, moments, first, followed[:-1], steady, followed[-1], constant, left_out, back)
+
+
+@dataclass(frozen=True, eq=False)
+class Reached:
+    """What a warm-up came to: a time (s), nodal temperatures (nodes,) C and the loads (N) of bearings there."""
+
+    time: float
+    nodal: Array
+    loads: Mapping[str, float]
+
+
+def _ran_away(machine: _Machine, reached: Sequence[Reached], error: str) -> str:
+    """How far a warm-up came that left a law: the bearing whose load has grown most since the start, or the hottest where none has."""
+    begin, last = reached[0].loads, reached[-1]
+    after, regions = f"after {last.time / MINUTE:.3g} min", machine.read.region_means(last.nodal)
+    temperatures = machine.read.model.bearing @ last.nodal
+    ringed = machine.read.model.spindle.ringed
+    grown = {b.name: abs(last.loads[b.name]) / max(abs(begin[b.name]), 1e-9) for b in ringed}
+    most = max(ringed, key=lambda b: grown[b.name])
+    if grown[most.name] <= heat.GROWN:
+        return f"the bearings leave the range of a law {after}, {ringed[int(np.argmax(temperatures))].name} at {temperatures.max():.0f} C: {error}"
+    inner, outer = regions[most.inner_ring], regions[most.outer_ring]
+    return (
+        f"the bearings run away {after}: {most.name} carries {last.loads[most.name]:.0f} N, {grown[most.name]:.2g} times its {begin[most.name]:.0f} N at the start, with its inner ring at {inner:.0f} C and "
+        f"its outer one at {outer:.0f} C, and the load heats it further ({error})"
+    )
 
 
 @dataclass(frozen=True, eq=False)

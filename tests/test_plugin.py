@@ -164,3 +164,16 @@ def test_a_scene_that_changed_is_read_again(tmp_path):
 def test_agreement_with_frfs_of_another_program():
     with pytest.raises(AssertionError, match="the worst are"):
         assert_agreement(SCENE, DATA / "foreign_bond", rms=1.0)
+
+
+def test_a_shaft_is_named_and_not_its_mesh():
+    """The energy of all its elements together."""
+    with pytest.raises(AssertionError) as failed:
+        assert_frequency("mk7702", mode="lateral 1", at_C=20, frequency_Hz=1.0, within=1)
+    said = str(failed.value)
+    point = Spindles().point("mk7702", 20.0)
+    mode = next(m for m in point.modes if m.kind == "lateral")
+    [shaft] = point.spindle.structure.shafts
+    share = sum(mode.energy[name] for name in shaft.elements)
+    assert f"strain energy of lateral at {mode.frequency:.1f} Hz: {shaft.name} {share:.0%}, " in said
+    assert not any(name in said for name in shaft.elements)

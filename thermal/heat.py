@@ -34,6 +34,7 @@ ERROR_WEIGHTS = WEIGHTS - np.array([(1 - WEIGHTS[0]) / 3, (3 * WEIGHTS[0] + 1) /
 
 RUNAWAY = 1000.0  # C, past any bearing's end; a search that gets there has none
 ROUNDS = 200  # of loads and temperature after each other
+GROWN = 1.5  # times a load, by its own heat, from which a search that leaves a law's range is told as one that runs away
 STEP = 1e-3  # of the loads, to see what comes back of it
 ALIKE = 1e-8  # relative change of the bearing loads at which they and the temperature agree
 Drive = Callable[[float, np.ndarray], "Running"]
@@ -42,6 +43,10 @@ Drive = Callable[[float, np.ndarray], "Running"]
 
 class NotSettled(NoEquilibrium):
     """Bearing loads and the temperature that follows from them find no common value."""
+
+
+class RanAway(OutsideRange):
+    """A law is left on the way of loads and temperature that drive each other up."""
 
 
 @dataclass(frozen=True)
@@ -209,17 +214,24 @@ def _agreed(
     cold = factors.solve(known + (h or 1.0) * _outer_load(model, last))  # without friction
     if not last.speed or not model.spindle.ringed:
         return cold, last
-    names, before, back = list(last.loads), np.zeros(len(last.loads)), 0.0
+    names, before, back, cool = list(last.loads), np.zeros(len(last.loads)), 0.0, last.loads
     for _ in range(ROUNDS):
         try:
             nodal = cold + _bearing_heat(model, model.bearing @ cold, response @ model.bearing.T, last) @ response
+            if np.abs(nodal).max() > RUNAWAY:
+                back = 1.0
+                break
+            now = drive(nodal)
         except OutsideRange as error:
-            near = f"it runs away, or nearly: of a load that is added {back:.0%} come back through its heat, and at 100% there is no steady state; on the way " if back > 0.5 else ""
-            raise OutsideRange(f"{near}{error}") from None
-        if np.abs(nodal).max() > RUNAWAY:
-            back = 1.0
-            break
-        now = drive(nodal)
+            grown = {b: last.loads[b] / load for b, load in cool.items() if load and last.loads[b] > GROWN * load}
+            if back > 0.5:
+                near = f"it runs away, or nearly: of a load that is added {back:.0%} come back through its heat, and at 100% there is no steady state; on the way "
+            elif grown:
+                most = max(grown, key=lambda b: grown[b])
+                near = f"it runs away, or nearly: its own heat makes the load of {most} {grown[most]:.2g} times as large; on the way "
+            else:
+                raise
+            raise RanAway(f"{near}{error}") from None
         asked, found = (np.array([d.loads[b] for b in names]) for d in (last, now))
         change = (found - asked) / (np.abs(asked) + 1e-3)
         if np.abs(change).max() <= ALIKE:

@@ -13,7 +13,7 @@ spindle (`thermospindle.load`). A scene and a condition are computed once a proc
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from numbers import Integral
 from pathlib import Path
@@ -303,8 +303,18 @@ def _table(first: OperatingPoint, then: OperatingPoint, partners: Sequence[int],
 
 def _energy(point: OperatingPoint, index: int) -> list[str]:
     mode = point.modes[index]
-    most = sorted(mode.energy.items(), key=lambda e: -e[1])[:MOST]
+    most = sorted(_by_part(point, mode.energy).items(), key=lambda e: -e[1])[:MOST]
     return [f"  strain energy of {mode.kind} at {mode.frequency:.1f} Hz: " + ", ".join(f"{name} {share:.0%}" for name, share in most)]
+
+
+def _by_part(point: OperatingPoint, of_elements: Mapping[str, float]) -> dict[str, float]:
+    """Sums over elements by name of bearing, joint or shaft: nobody knows the elements of a shaft's mesh by theirs."""
+    shaft_of = {element: s.name for s in point.spindle.structure.shafts for element in s.elements}
+    found: dict[str, float] = {}
+    for name, value in of_elements.items():
+        part = shaft_of.get(name, name)
+        found[part] = found.get(part, 0.0) + value
+    return found
 
 
 def _odd(*points: OperatingPoint) -> list[str]:
@@ -319,7 +329,7 @@ def _behind(first: OperatingPoint, then: OperatingPoint, index: int, after: Mode
     say, which is right to the second order; and what is left, of masses, speed and higher orders."""
     mode = first.modes[index]
     ends = [_moved(first, then, first, mode), _moved(first, then, then, after)]
-    change = {name: sum(end[name] for end in ends) / 2 for name in ends[0]}
+    change = _by_part(first, {name: sum(end[name] for end in ends) / 2 for name in ends[0]})
     moved = sorted(change.items(), key=lambda row: -abs(row[1]))[:MOST]
     told = [f"{name} {value:+.2f} Hz" for name, value in moved if abs(value) > 5e-3]
     whole = after.frequency - mode.frequency

@@ -9,7 +9,7 @@ import numpy as np
 from thermospindle.diagnosis.data.mode_table import ModeData
 from thermospindle.diagnosis.forward.linear import Linear, Products, shown
 from thermospindle.diagnosis.forward.shapes import ShapeBeside
-from thermospindle.model.rotor.modes import Poles, kinds, oscillating, poles_below, with_mass_between
+from thermospindle.model.rotor.modes import Poles, kinds, oscillating, poles_below, stiffest_of, with_mass_between
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.sim.identification import pairing
 from thermospindle.sim.identification.pairing import MIXING, ModeSet
@@ -100,7 +100,7 @@ class Table:
 
     @cached_property
     def _found(self) -> Integers:
-        return np.array(oscillating(self._poles, self._reach))
+        return np.array(oscillating(self._poles, self._reach, stiffest_of(self._linear.matrices)))
 
     @cached_property
     def _own(self) -> Integers:

@@ -11,7 +11,7 @@ from thermospindle.diagnosis.forward.linear import Linear, mass_between, shown
 from thermospindle.diagnosis.forward.model import Applied
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import matrices
-from thermospindle.model.rotor.modes import kinds, oscillating, with_mass_between
+from thermospindle.model.rotor.modes import kinds, oscillating, stiffest_of, with_mass_between
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.sim.identification.pairing import ModeSet
 from thermospindle.sim.operating import operating_point
@@ -59,7 +59,7 @@ def predict(spindle: Spindle, observation: Observation, effects: Applied, warmer
 def predicted(linear: Linear, highest: float) -> Predicted:
     """Modes of a linear model up to `highest` (Hz) as its measuring chain shows them."""
     own, chain = with_mass_between(linear.matrices, linear.between), linear.chain
-    found = oscillating(own, highest)
+    found = oscillating(own, highest, stiffest_of(linear.matrices))
     pole, right = own.value[found] - chain.decay, own.right[:, found]
     participation = own.left[found] @ chain.reference_rows.T * (1 + chain.decay / pole[:, None])
     return Predicted(pole, shown(chain, pole, right), participation, kinds(linear.matrices, right))

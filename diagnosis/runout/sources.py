@@ -17,7 +17,7 @@ from thermospindle.diagnosis.runout.lines import MULTIPLE, Key, Seen, key_of
 from thermospindle.model.built.drawn import GRADES, held_over
 from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
 from thermospindle.model.built.tolerance import toleranced
-from thermospindle.model.carrier import named, unbalanced
+from thermospindle.model.carrier import named, permissible_unbalance, unbalanced
 from thermospindle.model.machine import Point, Spindle
 from thermospindle.model.rotor.chain import motion_rows
 from thermospindle.model.types import Array, ComplexArray
@@ -152,7 +152,7 @@ def _likely(spindle: Spindle, made: Imperfections, source: SourceKey) -> float:
     scene = spindle.imperfections
     if cause == "unbalance":
         body, span = unbalanced(spindle), held_over(spindle)
-        static = 0.5 * spindle.turning_mass * GRADE.balance / spindle.nominal_speed
+        static = 0.5 * permissible_unbalance(spindle, body, GRADE.balance)
         sizes = [scene.unbalance or static, made.unbalance]
         if which == SECOND:
             sizes = [scene.couple_unbalance or 0.5 * span * static, made.couple_unbalance + made.unbalance * abs(made.unbalance_z - body.z)]

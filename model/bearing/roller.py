@@ -61,7 +61,6 @@ class RollerState(LinearState):
     load: float
     contact_force: float  # N, of the most loaded roller
     row: RollerRow
-    radial_force: tuple[float, float] = (0.0, 0.0)  # on its outer ring under a radial load, to hold it there
 
 
 def line_constant(length: float, modulus: float = STEEL) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -71,6 +71,7 @@ class LinearState(ByDirection):
     z: float
     stiffness: Array
     damping: Array
+    radial_force: tuple[float, float] = field(default=(0.0, 0.0), kw_only=True)  # N, on its outer ring under a radial load, to hold it there
 
 
 def linear_state(spindle: Spindle, b: LinearBearing, condition: Condition) -> LinearState:

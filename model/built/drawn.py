@@ -3,8 +3,8 @@
 `drawn` makes a plausible set from a seed:
 
 - unbalance: the permissible eccentricity e = G / speed of ISO 21940-11:2016 (formerly ISO 1940-1), Table 1: G 2.5 for computer drives,
-  G 0.4 for spindles of high-precision systems; half of it on average, since the grade is a limit; the couple takes the same unbalance
-  at half the bearing span;
+  G 0.4 for spindles of high-precision systems; at the own speed of the part, with the mass of what turns together with it; half of it on average, since the
+  grade is a limit; the couple takes the same unbalance at half the bearing span;
 - balls: ISO 3290-1:2014: variation of the lot diameter V_DwL over the set, deviation from spherical form over order 2 and up;
 - races: amplitude falling with a power of the order, as measured on 17 rings of 608 bearings (*J. Manuf. Mater. Process.* 9 (2025)
   220), Rayleigh distributed with uniform phases;
@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermospindle.model.built.imperfections import Imperfections, RowImperfections, Wave
-from thermospindle.model.carrier import named
+from thermospindle.model.carrier import named, permissible_unbalance
 from thermospindle.model.machine import Spindle
 from thermospindle.model.types import Array
 
@@ -30,7 +30,7 @@ from thermospindle.model.types import Array
 class Grade:
     """How well a spindle is made.
 
-    `balance`: G of ISO 21940-11 (m/s), at the spindle's own nominal speed; `ball_form`, `ball_lot`: deviation from spherical form and
+    `balance`: G of ISO 21940-11 (m/s), at the part's own speed where the spindle turns at its nominal one; `ball_form`, `ball_lot`: deviation from spherical form and
     variation of the lot diameter of ISO 3290-1 (m); `race`: rms amplitude (m) of order 2, falling as order ** -`decay`.
     """
 
@@ -59,7 +59,7 @@ def drawn(spindle: Spindle, seed: int, grade: Grade = GRADES["high precision"]) 
     """A plausible set of imperfections of a spindle; the same seed gives the same set."""
     random = np.random.default_rng(seed)
     body = spindle.turning
-    permissible = spindle.turning_mass * grade.balance / spindle.nominal_speed
+    permissible = permissible_unbalance(spindle, body, grade.balance)
     static, couple = random.uniform(0, 1, 2) * permissible
     phases = random.uniform(0, 2 * np.pi, 2)
     rows = {b.name: _drawn_row(b.balls, b.elements, grade, random) for b in spindle.rolling}

@@ -17,6 +17,7 @@ from thermospindle.model.bearing import ball_row, roller
 from thermospindle.model.bearing.definitions import BearingSet
 from thermospindle.model.bearing.pair import BearingState, PairState, damping_time
 from thermospindle.model.bearing.roller import RollerState
+from thermospindle.model.bearing.state import LinearState
 from thermospindle.model.carrier import load_carrier
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.machine import Spindle
@@ -46,14 +47,14 @@ class _Row:
 def loaded(spindle: Spindle, state: PairState) -> PairState:
     """The state with its rows where the scene's radial load displaces them; the state itself where there is none.
 
-    Stiffness is the tangent there, forces those of the most loaded ball or roller. Rings on a spring slide, without friction, as far as their rows
+    Stiffness is the tangent there, forces those of the most loaded ball or roller; bearings given by numbers bear their share and stay as stiff. Rings on a spring slide, without friction, as far as their rows
     push them. Raises `NoEquilibrium` where nothing bears the load.
     """
     if not any(spindle.radial_load):
         return state
     chain, moved = motion(spindle, state)
     balls = tuple(_displaced(spindle, b, _rows(chain, b.name) @ moved) for b in state.bearings)
-    others = tuple(_pressed(spindle, b, _rows(chain, b.name) @ moved) if isinstance(b, RollerState) else b for b in state.linear)
+    others = tuple(_pressed(spindle, b, _rows(chain, b.name) @ moved) for b in state.linear)
     return replace(state, bearings=balls, linear=others)
 
 
@@ -173,7 +174,11 @@ def _displaced(spindle: Spindle, b: BearingState, q: Array) -> BearingState:
     )
 
 
-def _pressed(spindle: Spindle, b: RollerState, q: Array) -> RollerState:
+def _pressed(spindle: Spindle, b: LinearState, q: Array) -> LinearState:
+    """A roller bearing with its rings displaced by q (5,), or one given by numbers, which is as stiff as before."""
+    if not isinstance(b, RollerState):
+        fx, fy = b.stiffness[:2] @ q
+        return replace(b, radial_force=(float(fx), float(fy)))
     own = next(r for r in spindle.roller_bearings if r.name == b.name)
     force = roller.respond(b.row, q).force
     return replace(roller.state_at(spindle, own, b.row, q), radial_force=(float(force[0]), float(force[1])))

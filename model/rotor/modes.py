@@ -17,6 +17,7 @@ import scipy
 from thermospindle.model.machine import Spindle
 from thermospindle.model.rotor.chain import Matrices, RotorBase, element_rows, matrices, motion_rows, point_row
 from thermospindle.model.rotor.reduced import FINE, reduced
+from thermospindle.model.rotor.static import free_motions
 from thermospindle.model.structure import MOVES
 from thermospindle.model.types import Array, ComplexArray, Integers
 from thermospindle.model.units import HERTZ
@@ -24,7 +25,9 @@ from thermospindle.model.units import HERTZ
 LINE, LESSER = 0.04, 0.05
 """Of the largest motion, below which a mode moves along a line, and of the largest orbit's area, above which one of the other sense counts."""
 FREE = 5e-8
-"""Of the largest pole: what oscillates slower is a free body's rounding error."""
+"""Of the highest undamped frequency: what oscillates slower is a free body's rounding error."""
+ROUNDING = 1e-14
+"""The same of the largest pole of all, a light damper's: what its own rounding leaves."""
 PARALLEL = 1e10
 """Condition of a block's vectors, from which a sum over its poles would have less than six digits."""
 LINES = 256
@@ -224,7 +227,7 @@ def poles_below(linear: Matrices, highest: float, between: Between | None = None
     n = len(linear.mass)
     if n <= LARGE or not np.isfinite(highest):
         p = with_mass_between(linear, between)
-        found = oscillating(p, highest)
+        found = oscillating(p, highest, stiffest_of(linear))
         return p.value[found], p.right[:, found]
     values, columns, stiffest = [], [], 0.0
     for own in _apart(linear):  # each by itself, so that equal modes of two planes stay in their planes
@@ -248,11 +251,36 @@ def oscillating(p: Poles, highest: float = np.inf, stiffest: float = 0.0) -> lis
     """Indices of the oscillating poles below `highest` (Hz), one of each conjugate pair, in order of frequency.
 
     A body that nothing holds, as a hub whose bearings have lost contact, moves without oscillating: its double pole at zero comes
-    out as a pair of the size sqrt(rounding) of the largest pole, or of `stiffest` (rad/s) where the model was reduced from a stiffer one.
+    out as a pair of the size sqrt(rounding) of `stiffest` (rad/s), the highest undamped frequency of the whole model, by default the largest of the poles, which a damper of
+    light parts makes larger than that.
     """
     size = np.abs(p.value)
+    least = max(FREE * (stiffest or size.max()), ROUNDING * size.max())
     order = np.argsort(size, kind="stable")
-    return [int(i) for i in order if p.value[i].imag > FREE * max(size.max(), stiffest) and size[i] < HERTZ * highest]
+    return [int(i) for i in order if p.value[i].imag > least and size[i] < HERTZ * highest]
+
+
+@dataclass(frozen=True)
+class Lost:
+    """How many natural frequencies rounding hides: undamped ones below `below` (Hz) beside the `stiffest` (Hz), and not of a motion that nothing holds."""
+
+    count: int
+    below: float
+    stiffest: float
+
+
+def lost_to_rounding(linear: Matrices) -> Lost:
+    """What `oscillating` cannot tell from a free motion; parts nearly without mass between stiff neighbours make it so."""
+    root, stiffest = np.sqrt(np.diag(linear.mass)), stiffest_of(linear)
+    squares = np.linalg.eigvalsh((linear.stiffness + linear.stiffness.T) / 2 / np.outer(root, root))
+    slow = int((squares <= (FREE * stiffest) ** 2).sum())
+    return Lost(max(slow - free_motions(linear.stiffness).shape[1], 0), FREE * stiffest / HERTZ, stiffest / HERTZ)
+
+
+def stiffest_of(linear: Matrices) -> float:
+    """Bound (rad/s) on the highest undamped frequency of a chain: the largest sum of a row of M^-1/2 K M^-1/2 (Gershgorin 1931), which is that or little more."""
+    root = np.sqrt(np.abs(np.diag(linear.mass)))
+    return float(np.sqrt(np.abs(linear.stiffness / np.outer(root, root)).sum(axis=1).max(initial=0.0)))
 
 
 def _quadratic(vectors: ComplexArray, matrix: Array) -> Array:

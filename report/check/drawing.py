@@ -99,7 +99,7 @@ def _frame(spindle: Spindle) -> Frame:
         radius, length = cylinder(b)
         ends += [b.z - length / 2, b.z + length / 2]
         radii.append(radius)
-    shafts = [r for s in spindle.structure.shafts for g in s.segments for r in g.outer]
+    shafts = [r for s in spindle.structure.shafts for g in s.segments for r in (*g.outer, *g.mass_outer)]
     low, high, top = min(ends) / MM, max(ends) / MM, max([*radii, 0.02 * (max(ends) - min(ends))]) / MM
     room = 0.03 * (high - low)
     lifted = max(1.35 * top, top + 0.5 * (high - low) / (WIDTH - 0.9)) if spindle.linear_bearings else top
@@ -241,7 +241,7 @@ def _labels(spindle: Spindle, frame: Frame) -> tuple[list[Label], list[Label]]:
     low = []
     for s in structure.shafts:
         middle = (s.nodes[0] + s.nodes[-1]) / 2
-        low.append((s.name, middle / MM, -min(max(g.outer) for g in s.segments if g.z[0] <= middle <= g.z[1]) / MM, INK))
+        low.append((s.name, middle / MM, -min(max(*g.outer, *g.mass_outer) for g in s.segments if g.z[0] <= middle <= g.z[1]) / MM, INK))
     low += [(b.name, b.z / MM, -0.5 * frame.bottom, INK) for b in structure.rigid_bodies]
     low += [(f"{j.name} ({' - '.join(structure.carrier(n) for n in j.bodies)})", j.z / MM, -0.82 * frame.bottom, JOINT) for j in structure.own_joints]
     return _staggered(top, frame), _staggered(low, frame)
@@ -294,6 +294,8 @@ def _legend(spindle: Spindle) -> list[Line2D | Patch]:
     handles: list[Line2D | Patch] = [Patch(fc=TURNING, ec=INK, lw=0.5, label="turns")]
     if any(g.part != "rotating" for g in spindle.regions) or any(not s.turns for s in structure.shafts):
         handles.append(Patch(fc=STANDING, ec=INK, lw=0.5, label="stands"))
+    if any(g.mass_outer != g.outer for s in structure.shafts for g in s.segments):
+        handles.append(Patch(fc="none", ec=PALE, lw=0.6, hatch="////", label="mass that stiffens nothing"))
     if _undrawn(spindle):
         handles.append(Patch(fc="none", ec=TURNED, lw=1.1, ls=(0, (4, 2)), label="cylinder of a body's mass and inertia"))
     if spindle.bearings or spindle.roller_bearings:

@@ -8,8 +8,9 @@ from itertools import pairwise
 import numpy as np
 
 from thermospindle.diagnosis.forward.linear import mass_between
+from thermospindle.model.errors import listed
 from thermospindle.model.machine import Point, Spindle
-from thermospindle.model.rotor.modes import poles_below
+from thermospindle.model.rotor.modes import lost_to_rounding, poles_below
 from thermospindle.model.rotor.static import free_motions
 from thermospindle.model.shaft import SAME_HEIGHT, Shaft
 from thermospindle.model.units import HERTZ, MM, RPM
@@ -18,13 +19,18 @@ from thermospindle.report.check.odd_bearings import OF_BEARINGS
 from thermospindle.sim.effects import of_scene
 from thermospindle.sim.effects.effect import refusal
 from thermospindle.sim.hammer.pulse import pulse_duration
+from thermospindle.sim.resonance.critical import criticals
 
 WEAK = 0.1
 """Share of its force at low frequency below which a hammer hardly excites: 20 dB."""
 UNDAMPED = 1e-5
 """Damping ratio below which a record cannot show how a mode dies out: of metals, 1e-4 and more."""
 NEAR = 0.05
-"""Of the speed, within which a natural frequency is called critical."""
+"""Of its speed, within which a natural frequency that a part's unbalance drives is told."""
+LOWEST = 0.1
+"""Hz, of a motion that is slower than anything measured here."""
+ENDLESS = 0.1
+"""m, of a motion at resonance that damping does not bound in earnest."""
 LEAST_EXPANSION = 0.01
 """um/m K: glass ceramics such as Zerodur have 0.02, and whoever writes 1/K has 1e-5."""
 LEAST_DENSITY = 100.0
@@ -70,6 +76,15 @@ def _free(found: Looked) -> Iterator[str]:
         yield f"nothing holds the spindle against {what}, as of a shaft that hangs free or floats along its axis"
 
 
+def _lost(found: Looked) -> Iterator[str]:
+    lost = lost_to_rounding(found.reference.linear)
+    if lost.count and lost.below > LOWEST:
+        yield (
+            f"{_count(lost.count, 'natural frequency', 'natural frequencies')} below {lost.below:.3g} Hz cannot be told from rounding beside that of {lost.stiffest:.2g} Hz which parts nearly without mass have "
+            "between stiff ones, and no verb shows them; more mass there (beam = \"timoshenko\" gives elements their rotary inertia), or longer elements, make them appear"
+        )
+
+
 def _undamped(found: Looked) -> Iterator[str]:
     modes = [m for m in found.reference.modes if m.frequency <= found.spindle.hammer.band[1] and m.damping_ratio < UNDAMPED]
     if modes:
@@ -85,10 +100,13 @@ def _damping(found: Looked) -> Iterator[str]:
 def _critical(found: Looked) -> Iterator[str]:
     if isinstance(found.turning, str):
         return
-    speed = found.turning.condition.speed
-    for m in found.turning.modes:
-        if abs(m.frequency * 2 * np.pi / speed - 1) < NEAR:
-            yield f"a natural frequency of {m.frequency:.0f} Hz lies at the nominal speed of {speed / RPM:.0f} rpm: unbalance drives it"
+    for c in criticals(found.turning, NEAR):
+        of = "nominal speed" if np.isclose(c.speed, found.turning.condition.speed) else f"speed of {listed(c.parts)}"
+        way = "whirls with the rotor" if c.sense > 0.99 else "whirls mostly with the rotor" if c.sense > 0.75 else "hardly whirls" if c.sense > 0.25 else "whirls mostly against the rotor"
+        much = f"{1e6 * c.unbalance:.3g} g mm" + (" of the scene" if c.of_scene else "")
+        moved = f"{much} at z = {c.z / MM:g} mm would move that place by {1e6 * c.moved:.3g} um in resonance" if c.moved < ENDLESS else "nothing damps it"
+        share = "" if c.sense > 0.99 else f" by {100 * c.sense:.2g} % of the modal force"
+        yield f"a natural frequency of {c.mode.frequency:.0f} Hz lies at the {of} of {c.speed / RPM:.0f} rpm and {way}: unbalance drives it{share}; {moved}"
 
 
 # ---------------------------------------------------------------- measuring
@@ -158,7 +176,7 @@ def _hammer(found: Looked) -> Iterator[str]:
 def _mesh(found: Looked) -> Iterator[str]:
     """Modes of shafts that come out low for their masses are at nodes."""
     between, high = mass_between(found.reference, found.spindle), found.spindle.hammer.band[1]
-    if between is None:
+    if between is None or lost_to_rounding(found.reference.linear).count:
         return
     lumped = [m.frequency for m in found.reference.modes]
     spread = np.sort(np.abs(poles_below(found.reference.linear, high, between)[0])) / HERTZ
@@ -205,5 +223,5 @@ def _count(n: int, one: str, many: str = "") -> str:
 
 
 QUESTIONS: tuple[Callable[[Looked], Iterator[str]], ...] = (
-    *OF_BEARINGS, _seats, _materials, _free, _undamped, _damping, _critical, _sections, _points, _hammer, _mesh, _running, _effects,
+    *OF_BEARINGS, _seats, _materials, _free, _lost, _undamped, _damping, _critical, _sections, _points, _hammer, _mesh, _running, _effects,
 )  # fmt: skip

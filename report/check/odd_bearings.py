@@ -12,7 +12,7 @@ from thermospindle.model.bearing.definitions import ToldAngle
 from thermospindle.model.bearing.pair import joined
 from thermospindle.model.bearing.roller import RollerState
 from thermospindle.model.errors import listed
-from thermospindle.model.machine import Condition, LinearBearing
+from thermospindle.model.machine import Bearing, Condition, LinearBearing
 from thermospindle.model.pressure import OF_BALLS, OF_ROLLERS, pressures
 from thermospindle.model.units import MM, RPM
 from thermospindle.report.check.looked import Looked
@@ -20,6 +20,10 @@ from thermospindle.report.check.understood import free_angle
 
 CONFORMITY = (0.505, 0.58)
 """Groove radius over ball diameter of bearings that are made: 0.515 to 0.53 mostly (Harris, Rolling Bearing Analysis, ch. 2)."""
+OF_CATALOGUE = (0.51, 0.55)
+"""The same where it follows from a catalogue; of spindle bearings with balls as they are made it is 0.52 to 0.535."""
+STIFFER = 1.3
+"""Times Hertz' load-deflection constant, by which a catalogue's may differ either way: its rounding and models leave a tenth."""
 CONTACT_ANGLE = (5.0, 60.0)
 """Degrees: deep-groove bearings have 8 to 15 of their clearance, angular contact ones 12 to 40, thrust ones 60."""
 SAG = 1.0 * MM
@@ -44,7 +48,7 @@ def _same_place(found: Looked) -> Iterator[str]:
 def _contacts(found: Looked) -> Iterator[str]:
     for b in found.spindle.bearings:
         for ring, value in (("inner", b.inner_conformity), ("outer", b.outer_conformity)):
-            if not CONFORMITY[0] <= value <= CONFORMITY[1]:
+            if b.constant_factor == 1.0 and not CONFORMITY[0] <= value <= CONFORMITY[1]:
                 yield f"bearing {b.name}: the {ring} groove's radius is {value:g} ball diameters; bearings have {CONFORMITY[0]:g} to {CONFORMITY[1]:g}"
         if free_angle(b, found.reference.state.bearing(b.name)) is None:
             yield f"bearing {b.name}: its contact angle under the preload means that the rings would press the balls without any; a larger angle, or more preload, is meant"
@@ -61,6 +65,25 @@ def _angles(found: Looked) -> Iterator[str]:
             f"ball_rows.{told.row}.{told.key} = {told.value:g}, of {', '.join(names)}: angular contact bearings have 12 to 40 degrees, thrust bearings 60, "
             "and deep-groove ones 8 to 15; the key takes degrees"
         )
+
+
+def _catalogues(found: Looked) -> Iterator[str]:
+    """Balls that a catalogue's preload, unloading force and axial rigidity do not fit; once a row of the scene's, whatever bearings have it."""
+    of: dict[str, list[Bearing]] = {}
+    for b in found.spindle.bearings:
+        if b.constant_factor != 1.0:
+            of.setdefault(b.told.row if b.told else b.name, []).append(b)
+    for row, own in of.items():
+        b, off = own[0], []
+        if not 1 / STIFFER < b.constant_factor < STIFFER:
+            off.append(f"contacts {b.constant_factor:.2g} times as stiff as Hertz has them of {b.balls} balls of {b.ball_diameter / MM:g} mm")
+        if not OF_CATALOGUE[0] < b.inner_conformity < OF_CATALOGUE[1]:
+            off.append(f"grooves of a radius of {b.inner_conformity:.3g} ball diameters, and bearings have 0.52 to 0.535")
+        if off:
+            yield (
+                f"ball_rows.{row}.catalogue, of {', '.join(b.name for b in own)}: preload, unloading force and axial rigidity ask for {listed(off)}: "
+                "number, diameter or material of the balls, or the catalogue's numbers, are of another bearing"
+            )
 
 
 def _soft(found: Looked) -> Iterator[str]:
@@ -161,4 +184,4 @@ def _constant(b: LinearBearing) -> bool:
     return len(b.temperature) * len(b.speed) == 1
 
 
-OF_BEARINGS: tuple[Callable[[Looked], Iterator[str]], ...] = (_loose, _same_place, _contacts, _angles, _soft, _preload, _half_sprung, _pressed, _pushed, _sense, _tables)
+OF_BEARINGS: tuple[Callable[[Looked], Iterator[str]], ...] = (_loose, _same_place, _contacts, _angles, _catalogues, _soft, _preload, _half_sprung, _pressed, _pushed, _sense, _tables)

@@ -134,6 +134,7 @@ def _bearing(point: OperatingPoint, b: Bearing | LinearBearing | RollerBearing) 
         "radial_stiffness_y_N_per_um": 1e-6 * state.radial_stiffness_y,
         "axial_stiffness_N_per_um": 1e-6 * state.axial_stiffness,
         "tilt_stiffness_N_m_per_rad": state.tilt_stiffness,
+        "radial_force_N": _borne(spindle, b, state.radial_force),
     }
     if isinstance(b, RollerBearing):
         assert isinstance(state, RollerState)
@@ -146,7 +147,6 @@ def _bearing(point: OperatingPoint, b: Bearing | LinearBearing | RollerBearing) 
             "pitch_diameter_mm": _mm(b.pitch_diameter),
             "clearance_um": 1e6 * state.clearance,
             "roller_force_N": state.contact_force,
-            "radial_force_N": _borne(spindle, b, state.radial_force),
         }
     if isinstance(b, LinearBearing):
         table = {"temperatures_C": list(b.temperature), "speeds_rpm": [s / RPM for s in b.speed]} if len(b.temperature) * len(b.speed) > 1 else None
@@ -165,13 +165,12 @@ def _bearing(point: OperatingPoint, b: Bearing | LinearBearing | RollerBearing) 
         "load_lines_meet_axis_at_mm": _mm(apex(b, own.contact_angle)),
         "preload_N": own.preload,
         "ball_force_N": own.contact_force,
-        "radial_force_N": _borne(spindle, b, own.radial_force),
         "raceway_mm": {"inner": [_mm(z) for z in spindle.raceway(b.inner_ring, b)], "outer": [_mm(z) for z in spindle.raceway(b.outer_ring, b)]},
     }
 
 
-def _borne(spindle: Spindle, b: Bearing | RollerBearing, on_outer: tuple[float, float]) -> list[float]:
-    """What a row bears of the radial load (N, along x and y), of the force that holds its outer ring: the sum over all is the load."""
+def _borne(spindle: Spindle, b: Bearing | LinearBearing | RollerBearing, on_outer: tuple[float, float]) -> list[float]:
+    """What a bearing bears of the radial load (N, along x and y), of the force that holds its outer ring: the sum over all is the load."""
     inner = next((own for own in spindle.structure.bodies if own.name == b.inner_body), None)
     sign = -1.0 if inner is not None and inner.turns else 1.0
     return [round(sign * f, 6) + 0.0 for f in on_outer]

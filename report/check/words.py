@@ -41,11 +41,13 @@ def sentences(values: Mapping[str, Any]) -> list[str]:
     if values["axial_load_N"]:
         found.append(_axial_load(values))
     if any(values["radial_load_N"]):
-        shares = [f"{name} {f[0]:+.3g}, {f[1]:+.3g}" for name, b in values["bearings"].items() if (f := b.get("radial_force_N"))]
+        shares = [f"{name} {f[0]:+.3g}, {f[1]:+.3g}" for name, b in values["bearings"].items() if (f := b["radial_force_N"])]
         fx, fy = values["radial_load_N"]
         on = f" on {values['radial_load_body']}" if len(turning) > 1 else ""
-        borne = f"borne by {'; '.join(shares)} N" if shares else "changes nothing: bearings given by numbers are as stiff under any load"
-        found.append(f"External radial load {fx:g}, {fy:g} N along x, y at z = {values['radial_load_z_mm']:g} mm{on}, {borne}.")
+        borne = f"{'; '.join(shares)} N" if shares else "joints alone"
+        numbers = [name for name, b in values["bearings"].items() if b["kind"] == "numbers"]
+        alike = f"; {listed(numbers)}, given by numbers, {'is' if len(numbers) == 1 else 'are'} as stiff under any load" if numbers else ""
+        found.append(f"External radial load {fx:g}, {fy:g} N along x, y at z = {values['radial_load_z_mm']:g} mm{on}, borne by {borne}{alike}.")
     if values["unbalance_body"] and len(turning) > 1:
         found.append(f"The unbalance is on {values['unbalance_body']}.")
     h, modes = values["hammer"], values["modes_Hz"]

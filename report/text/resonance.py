@@ -16,7 +16,7 @@ from thermospindle.model.units import RPM
 from thermospindle.report.text.grid import show_grid
 from thermospindle.report.typeset import figure, known, prose, table, write_csv
 from thermospindle.sim.operating import provenance
-from thermospindle.sim.resonance.found import Coincidence, ResonanceMap, strongest
+from thermospindle.sim.resonance.found import NEARBY, Coincidence, ResonanceMap, strongest
 from thermospindle.sim.resonance.point import key
 from thermospindle.sim.running.probes import looked_at
 
@@ -30,8 +30,9 @@ def map_json(found: ResonanceMap) -> dict[str, Any]:
     return {
         "nominal": {"temperature_C": found.nominal.temperature, "speed_rpm": found.nominal.speed / RPM},
         "mapped": mapped(found),
-        "sentences": sentences(found),
+        "sentences": [*sentences(found), *nearby(found)],
         "coincidences": [_coincidence_json(c) for c in found.coincidences],
+        "beyond": [_coincidence_json(c) for c in found.beyond],
         "modes": [{"mode": m.number, "kind": m.kind, "whirl": m.whirl, "frequency_Hz": known(m.frequency)} for m in found.modes],
         "lines": [
             {
@@ -165,7 +166,17 @@ def told(found: ResonanceMap) -> list[str]:
     every, alone = sentences(found), [_all_repeats(found)] if found.repeats else []
     left = len(every) - SAID
     many = f"So do {left} weaker lines between {found.temperatures[0]:g} and {found.temperatures[-1]:g} C; all are in coincidences.csv of spindle map --out, and in its --json."
-    return [*(every if left <= 1 else [*every[:SAID], many]), *alone]
+    return [*(every if left <= 1 else [*every[:SAID], many]), *nearby(found), *alone]
+
+
+def nearby(found: ResonanceMap) -> list[str]:
+    """One sentence of what is met just beyond the speeds of the map, of what its imperfections excite if they excite any; none where nothing is."""
+    every = strongest([c for c in found.beyond if c.strength > 0] or found.beyond)
+    if not every:
+        return []
+    told = [f"{_line(c)} meets {_mode(c)} at {c.condition.speed / RPM:.0f} rpm and {c.frequency:.1f} Hz" for c in every[:FEW]]
+    more = [f"so do {len(every) - FEW} weaker lines"] if len(every) > FEW else []
+    return [f"Just beyond the mapped speeds, less than {NEARBY:.0%} away, at {found.nominal.temperature:g} C: {'; '.join([*told, *more])}."]
 
 
 def _all_repeats(found: ResonanceMap) -> str:

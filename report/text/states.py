@@ -12,6 +12,7 @@ from rich.console import Console
 from thermospindle.model.bearing.pair import IN_CONTACT
 from thermospindle.model.bearing.state import ALIKE
 from thermospindle.model.bearing.stiffness_table import BETWEEN, FURTHER, PRESSURE, StiffnessTable
+from thermospindle.model.errors import listed
 from thermospindle.model.pressure import OF_BALLS, OF_ROLLERS
 from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.modes import Mode, group_energy
@@ -149,7 +150,7 @@ def _pressed(table: StiffnessTable) -> str:
 
 def show_told_table(console: Console, table: StiffnessTable, radial_load: bool = False) -> None:
     """In one sentence how far each bearing's preload and radial stiffness go, then the table."""
-    ends = [f"{name} {said}" for name, values in table.values.items() if (said := _range_of(values))]
+    ends = [f"{name} {said}" for name, values in table.values.items() if (said := _range_of(table, values))]
     if ends:
         span = f"From {table.temperature[0]:g} to {table.temperature[-1]:g} C" if len(table.temperature) > 1 else f"At {table.temperature[0]:g} C"
         rpm = f" at {table.speed[0] / RPM:g} rpm" if len(table.speed) == 1 else f" and {table.speed[0] / RPM:g} to {table.speed[-1] / RPM:g} rpm"
@@ -157,8 +158,8 @@ def show_told_table(console: Console, table: StiffnessTable, radial_load: bool =
     show_table(console, table, radial_load)
 
 
-def _range_of(values: Mapping[str, Array]) -> str:
-    """From the first condition to the last, of what the bearing has; empty where its table tells neither."""
+def _range_of(table: StiffnessTable, values: Mapping[str, Array]) -> str:
+    """From the first condition to the last, of what the bearing has, and the least and the most where they lie between; empty where its table tells neither."""
     told = []
     apart = _apart(values)
     for column, words, unit, scale in (
@@ -168,8 +169,20 @@ def _range_of(values: Mapping[str, Array]) -> str:
     ):
         if column in values and np.all(np.isfinite(ends := values[column][[0, -1], [0, -1]] * scale)):
             first, last = (f"{x:.2f}" for x in ends)
-            told.append(f"{words} {first} {unit}" if first == last else f"{words} {first} to {last} {unit}")
+            told.append((f"{words} {first} {unit}" if first == last else f"{words} {first} to {last} {unit}") + _between(table, values[column] * scale))
     return ", ".join(told)
+
+
+def _between(table: StiffnessTable, values: Array) -> str:
+    """The least and the most of values (T, S) that their first and last do not show, and where, in brackets."""
+    first, last = sorted(values[[0, -1], [0, -1]])
+    found = []
+    for word, at, beyond in (("least", np.nanargmin(values), lambda x: x < first), ("most", np.nanargmax(values), lambda x: x > last)):
+        i, j = np.unravel_index(at, values.shape)
+        if beyond(round(values[i, j], 2)) and f"{values[i, j]:.2f}" not in (f"{first:.2f}", f"{last:.2f}"):
+            where = [*([f"{table.temperature[i]:g} C"] if len(table.temperature) > 1 else []), *([f"{table.speed[j] / RPM:g} rpm"] if len(table.speed) > 1 else [])]
+            found.append(f"{word} {values[i, j]:.2f} at {listed(where)}")
+    return f" ({', '.join(found)})" if found else ""
 
 
 def of_bearings(status: str) -> str:

@@ -126,7 +126,7 @@ def resonances(
     grid = temperatures_or_range(temperatures, spindle, STEPS_OF_TEMPERATURE)
     speeds = [s * RPM for s in speeds_rpm] if speeds_rpm else np.linspace(0, fastest(spindle, speed), STEPS_OF_SPEED).tolist()
     with progress_bar(stages(spindle, len(grid))) as progress:
-        found = resonance_map(spindle, grid, speeds, nominal, multiples, progress=progress)
+        found = resonance_map(spindle, grid, speeds, nominal, multiples, progress=progress, nearby=bool(speeds_rpm))
     conditions = [nominal, *(Condition(t, s) for t in grid for s in speeds)]
     return answered(
         map_json(found),

@@ -6,8 +6,9 @@ the keys of the file and SI in the dataclasses; temperatures are C, angular spee
 
 from __future__ import annotations
 
+import dataclasses
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ import numpy as np
 from thermospindle.model.errors import BadInput, listed
 from thermospindle.model.files.formats import CAMPAIGN, CURRENT, KEY
 from thermospindle.model.files.whole import whole
-from thermospindle.model.machine import Condition, Point
+from thermospindle.model.machine import Condition, Point, Spindle
 from thermospindle.model.scene.fields import read_file
 from thermospindle.model.units import MINUTE, MM, RPM
 from thermospindle.sim.campaign.form import checked, in_unit, toml
@@ -142,6 +143,11 @@ def _check_size(file: Path, frf: Frf) -> None:
 
 
 # ---------------------------------------------------------------- writing
+
+
+def on_parts(spindle: Spindle, points: Sequence[Point]) -> tuple[Point, ...]:
+    """The points as a campaign is written with them: on bodies and shafts by name, whatever nodes the mesh of a shaft has (`beside.on_nodes` finds them again)."""
+    return tuple(dataclasses.replace(p, body=spindle.structure.carrier(p.body)) for p in points)
 
 
 def write_campaign(campaign: Campaign, folder: Path, replace: bool = False) -> None:

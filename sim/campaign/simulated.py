@@ -16,7 +16,7 @@ from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition, Point, Spindle
 from thermospindle.model.rotor.chain import motion_rows
 from thermospindle.model.units import RPM
-from thermospindle.sim.campaign.campaign import Campaign, Test
+from thermospindle.sim.campaign.campaign import Campaign, Test, on_parts
 from thermospindle.sim.campaign.runout_record import RunoutRecord
 from thermospindle.sim.operating import OperatingPoint, operating_point
 from thermospindle.sim.running.probes import hub_probes, second_plane
@@ -110,7 +110,7 @@ def runout_campaign(
         repeat = 1 + sum((t.temperature, t.speed) == (condition.temperature, condition.speed) for t in tests)
         name = f"T{condition.temperature:g}_n{condition.speed / RPM:.0f}" + (f"_{repeat}" if repeat > 1 else "")
         tests.append(Test(name, condition.temperature, condition.speed, repeat=repeat, runout=seen))
-    return Campaign(f"virtual runout of {spindle.title}"[:80], spindle.name, "displacement", points, tuple(tests))
+    return Campaign(f"virtual runout of {spindle.title}"[:80], spindle.name, "displacement", on_parts(spindle, points), tuple(tests))
 
 
 def _row(point: OperatingPoint, probe: Point) -> np.ndarray:

@@ -76,7 +76,7 @@ PARTS: Mapping[str, Callable[[Spindle], bool]] = {
 
 
 def fitted_to(effect: Effect, spindle: Spindle) -> Effect:
-    """The effect with its parameters as plausible for a spindle: sizes in its scale, to two digits, and a choice for each of its bearings.
+    """The effect with its parameters as plausible for a spindle: sizes in its scale, to two digits, a choice for each of its bearings, and what is meant by the scene's own names.
 
     Limits only widen. On the reference spindle it is the effect itself, and so is one that has been fitted already.
     """
@@ -84,7 +84,8 @@ def fitted_to(effect: Effect, spindle: Spindle) -> Effect:
         return effect
     factors = effect.sized(spindle) if effect.sized else {}
     counts = {kind: len(names) for kind, names in _counted(spindle).items()}
-    rows = tuple(_fitted(p, factors.get(p.name, 1.0), counts) for p in effect.parameters)
+    meant = effect.meant(spindle) if effect.meant else {}
+    rows = tuple(replace(_fitted(p, factors.get(p.name, 1.0), counts), meaning=meant.get(p.name, p.meaning)) for p in effect.parameters)
     return effect if rows == effect.parameters else replace(effect, parameters=rows, sized=None)
 
 
@@ -202,7 +203,8 @@ class Effect:
     `acts_on` names the parts of a spindle (`PARTS`) without any of which the effect has nothing to act on; `idle(spindle)` says why it
     has nothing to act on in a spindle that has them, `outside(spindle)` why that spindle is outside its validity; None
     where neither is so (`refusal` asks both). `sized(spindle)` gives what is plausible for a machine of that size: factors by parameter
-    name, of typical size, prior and limits, for sizes that are written for the reference spindle.
+    name, of typical size, prior and limits, for sizes that are written for the reference spindle; `meant(spindle)` the meaning of parameters, by name, with the
+    names that the scene has for its parts.
     """
 
     name: str
@@ -224,6 +226,7 @@ class Effect:
     idle: Question | None = None
     outside: Question | None = None
     sized: Sizes | None = None
+    meant: Callable[[Spindle], Mapping[str, str]] | None = None
     drifts: str = ""  # of one drafted from a diagnosis: the element, or effect, whose change it is
     lasting: bool = False  # its size is the same in every test, as a mass is: no law that data may depart from
     exact: bool = False  # mechanics or the material alone gives its law over speed and temperature: data may hardly depart from it, and have none of their own

@@ -9,7 +9,7 @@ from pathlib import Path
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Point, Spindle
 from thermospindle.model.units import MINUTE, RPM
-from thermospindle.sim.campaign.campaign import Campaign, Test
+from thermospindle.sim.campaign.campaign import Campaign, Test, on_parts
 from thermospindle.sim.importing.asked import open_conditions, open_ends, open_parts, open_units, scaled, spoken, together, unanswered
 from thermospindle.sim.importing.checks import check_columns, check_content, check_ends, check_files, check_left_out, check_tests, names_of
 from thermospindle.sim.importing.files.reading import content
@@ -111,7 +111,7 @@ def campaign_of(found: Read, form: MappingForm, scene: Spindle | None, files: Se
     title = form.title or f"imported from {listed((f.name for f in files), 3)}"
     note = "\n".join(x for x in (form.note, *notes) if x)
     spindle = form.spindle or (scene.name if scene else "")
-    return Campaign(title, spindle, quantity, points, tests, None, note), notes
+    return Campaign(title, spindle, quantity, on_parts(scene, points) if scene else points, tests, None, note), notes
 
 
 def _placed(curve: Curve, form: MappingForm, points: dict[int, Point], settings: FileForm) -> Placed | None:

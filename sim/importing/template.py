@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from thermospindle.model.files.formats import CURRENT, KEY, MAPPING
 from thermospindle.model.machine import Spindle
-from thermospindle.model.units import MM
+from thermospindle.model.units import MM, RPM
 from thermospindle.sim.campaign.form import in_unit, toml
 from thermospindle.sim.importing.files.labels import ROLES
 from thermospindle.sim.importing.mapping import REST
 from thermospindle.sim.importing.measured import End, Question, Read, listed
 from thermospindle.sim.importing.names import conditions_of, hit_at, plain, tests_of
 
-EXAMPLES = {"temperature_C": "20.0", "speed_rpm": "7200.0"}
+CONDITIONS = ("temperature_C", "speed_rpm")
 HEAD = """\
 # What the files do not tell. Put an answer in the place of each "?"; a key that is left out, or "?", is open.
 # Then run the same command again. Everything here may be edited; units are in the names of the keys.
@@ -53,11 +53,11 @@ def template(found: Read, files: Sequence[Path], scene: Spindle | None) -> str:
         lines += _asked(own[file], node if node in found.points else None)
     renamed = {plain(f.stem): test for f, test in tests.items()}
     names = list(dict.fromkeys(renamed.get(t, t) for t in found.tests))
-    shared = [key for key in EXAMPLES if len(names) > 2 and not any(key in conditions_of(t) for t in names)]
+    shared = [key for key in CONDITIONS if len(names) > 2 and not any(key in conditions_of(t) for t in names)]
     if shared:
         lines += ["", "[[tests]]", f'id = "*"    # all {len(names)} of them; the table of one test, below, may say otherwise', *(f'{key} = "?"' for key in shared)]
     for test in names:
-        lines += ["", "[[tests]]", f"id = {toml(test)}", *_condition(test, shared)]
+        lines += ["", "[[tests]]", f"id = {toml(test)}", *_condition(test, shared, _examples(scene))]
     lines += [line for block in _points(found, scene) for line in block]
     return "\n".join([*lines, "", MORE])
 
@@ -102,11 +102,18 @@ def _asked(questions: Sequence[Question], hit: int | None = None) -> list[str]:
     return lines
 
 
-def _condition(test: str, shared: Sequence[str]) -> list[str]:
+def _examples(scene: Spindle | None) -> dict[str, float]:
+    """Conditions as they may be, by key: those that a scene is meant for."""
+    if scene is None:
+        return dict(zip(CONDITIONS, (20.0, 7200.0), strict=True))
+    return dict(zip(CONDITIONS, (scene.reference_temperature, scene.nominal_speed / RPM if scene.structure.turns else 0.0), strict=True))
+
+
+def _condition(test: str, shared: Sequence[str], examples: Mapping[str, float]) -> list[str]:
     """Temperature and speed, read off the name where it seems to tell them; what is asked of all tests together as a comment."""
     told = conditions_of(test)
-    asked = [f"# {key} = {EXAMPLES[key]}    # where it is another" if key in shared else f'{key} = "?"' for key in EXAMPLES]
-    return [f"{key} = {told[key]:g}    # read off the name {test!r}; correct it where it is wrong" if key in told else line for key, line in zip(EXAMPLES, asked, strict=True)]
+    asked = [f"# {key} = {toml(float(f'{examples[key]:.6g}'))}    # where it is another" if key in shared else f'{key} = "?"' for key in CONDITIONS]
+    return [f"{key} = {told[key]:g}    # read off the name {test!r}; correct it where it is wrong" if key in told else line for key, line in zip(CONDITIONS, asked, strict=True)]
 
 
 def _told(place: tuple[float, ...] | None, unscaled: tuple[float, ...] | None) -> str:

@@ -12,6 +12,7 @@ from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.types import Array
 
 STILL = 1e-12  # m of runout that is nothing
+NEARBY = 0.1  # of a speed, how far beyond those that are asked for crossings are looked for
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +92,8 @@ class ResonanceMap:
     """Natural frequencies and lines on the grid `temperatures` (C) x `speeds` (rad/s), and where they meet.
 
     `nrro_speed`, `nrro_temperature` (n, 3): place (rad/s or C), radial and axial rms (m), along speed at the nominal temperature and along
-    temperature at the nominal speed, denser about the strongest coincidences. `drawn_from` is the seed of imperfections that the scene does not name, None if it does.
+    temperature at the nominal speed, denser about the strongest coincidences. `beyond`: what is met within `NEARBY` outside the
+    speeds at the nominal temperature, strongest first, where that was asked. `drawn_from` is the seed of imperfections that the scene does not name, None if it does.
     """
 
     spindle: Spindle
@@ -106,6 +108,7 @@ class ResonanceMap:
     nrro_temperature: Array
     drawn_from: int | None
     interpolated: Interpolated | None = None
+    beyond: tuple[Coincidence, ...] = ()
 
     @property
     def nominal_index(self) -> tuple[int, int]:

@@ -25,7 +25,7 @@ from thermospindle.model.bearing.kinematics import Line, lines, row_kinematics
 from thermospindle.model.bearing.pair import check_centred
 from thermospindle.model.built.drawn import drawn
 from thermospindle.model.built.imperfections import Imperfections
-from thermospindle.model.errors import BadInput
+from thermospindle.model.errors import BadInput, NoEquilibrium, OutsideRange
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.chain import matrices
 from thermospindle.model.rotor.modes import LARGE, Mode, modes
@@ -35,11 +35,11 @@ from thermospindle.sim.identification.pairing import follow
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.resonance.between import Between, between, strengths
 from thermospindle.sim.resonance.between import runout as between_runout
-from thermospindle.sim.resonance.found import Coincidence, Curve, Interpolated, LineTrack, ResonanceMap, Track, strongest
+from thermospindle.sim.resonance.critical import SENSE
+from thermospindle.sim.resonance.found import NEARBY, Coincidence, Curve, Interpolated, LineTrack, ResonanceMap, Track, strongest
 from thermospindle.sim.resonance.point import Exact, key, line_amplitudes, nrro_rms, with_imperfections
 from thermospindle.sim.running.probes import speed_ratio
 
-SENSE = 0.01
 MULTIPLES = 3  # of the number of balls, and even ball orders, whose lines are drawn
 CLOSE = 1e-3  # Hz, of line and mode at a crossing
 DENSER = 6  # coincidences about which runout is computed at more places
@@ -71,8 +71,9 @@ def resonance_map(
     highest: float | None = None,
     imperfections: Imperfections | None = None,
     progress: Callable[[str], None] = lambda done: None,
+    nearby: bool = False,
 ) -> ResonanceMap:
-    """The map over `temperatures` (C) and `speeds` (rad/s, not negative), to which the nominal condition is added.
+    """The map over `temperatures` (C) and `speeds` (rad/s, not negative), to which the nominal condition is added; with `nearby` also what is met just beyond these speeds.
 
     Modes up to `highest` (Hz, the scene's band by default) at the nominal condition are followed. `imperfections` default to the
     scene's (with those of its effects), or to a plausible set where it names none. BadInput for a grid without extent.
@@ -104,8 +105,9 @@ def resonance_map(
     along_s = np.array([(s, *grid.nrro(Condition(nominal.temperature, s), (t0, _nearest(over_s, s)))) for s in _dense(over_s, crossed)])
     along_t = np.array([(t, *grid.nrro(Condition(t, nominal.speed), (_nearest(over_t, t), s0))) for t in _dense(over_t, met)])
     progress("runout along both axes")
+    beyond = grid.beyond(tracks, of_lines, over_s, t0, s0) if nearby else ()
     return ResonanceMap(
-        spindle, nominal, over_t, over_s, tracks, of_lines, tuple(curves), tuple(found), along_s, along_t, grid.drawn_from, interpolated
+        spindle, nominal, over_t, over_s, tracks, of_lines, tuple(curves), tuple(found), along_s, along_t, grid.drawn_from, interpolated, beyond
     )
 
 
@@ -328,6 +330,38 @@ class _Grid:
             return None
         nrro = float(nrro_rms(excited)[1 if own.line.direction == "axial" else 0])
         return Coincidence(line, track, condition, line.frequency, mode.frequency, sense, strength, unit, c.margin, nrro, c.at_nominal_speed, ratio=self.ratio)
+
+    def beyond(self, tracks: Sequence[Track], of_lines: Sequence[LineTrack], over_s: Array, t0: int, s0: int) -> tuple[Coincidence, ...]:
+        """What is met within `NEARBY` outside the speeds at the nominal temperature, strongest first, of which the first few are found exactly; nothing where there is no
+        such state."""
+        candidates: list[Candidate] = []
+        for edge, step in ((len(over_s) - 1, 1), (0, -1)):
+            condition = Condition(self.nominal.temperature, float(over_s[edge]) * (1 + step * NEARBY))
+            if not condition.speed:
+                continue
+            try:
+                out = self.exact(condition, self.every[t0, edge].modes)
+            except (NoEquilibrium, OutsideRange):
+                continue
+            at = len(over_s) if step > 0 else 0
+            places = np.insert(over_s, at, condition.speed)
+            for own in of_lines:
+                line = out.lines.get(key(own.line))
+                for track in tracks if line else ():
+                    mode = out.modes.get(track.number)
+                    if line is None or mode is None or not _same_direction(own.line, track):
+                        continue
+                    of_mode = np.insert(track.frequency[t0], at, mode.frequency)
+                    gap = np.insert(own.frequency[t0], at, line.frequency) - of_mode
+                    first = min(edge, at)
+                    if gap[first] * gap[first + 1] < 0:
+                        low, high = (((condition.temperature, float(places[k])), float(gap[k])) for k in (first, first + 1))
+                        margin = float((own.frequency[t0, s0] - track.frequency[t0, s0]) / track.frequency[t0, s0])
+                        candidates.append(Candidate(own, track, (low, high), between(places, gap, of_mode, first), margin, False))
+        rough = [(c, near) for c in candidates if (near := self.interpolated(c)) is not None]
+        rough.sort(key=lambda pair: -pair[1].strength)
+        found = [self.crossing(c) if k < DENSER else near for k, (c, near) in enumerate(rough)]
+        return tuple(sorted((c for c in found if c is not None), key=lambda c: -c.strength))
 
     def nrro(self, condition: Condition, near: tuple[int, int]) -> tuple[float, float]:
         """Radial and axial NRRO (m rms) at a condition, given the place of its neighbour on the grid; nothing at rest."""

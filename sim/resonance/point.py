@@ -89,7 +89,12 @@ class Exact:
 def _size(phasors: ComplexArray, axial: bool) -> float:
     """Amplitude along the axis, or the long half axis of the orbit across it, from phasors of the probes x, y, z."""
     x, y, z = phasors
-    return float(abs(z)) if axial else float(np.sqrt((abs(x) ** 2 + abs(y) ** 2 + abs(x * x + y * y)) / 2))
+    return float(abs(z)) if axial else orbit(x, y)
+
+
+def orbit(x: complex, y: complex) -> float:
+    """Long half axis (m) of an orbit across the axis, from phasors (m)."""
+    return float(np.sqrt((abs(x) ** 2 + abs(y) ** 2 + abs(x * x + y * y)) / 2))
 
 
 def with_imperfections(point: OperatingPoint, imperfections: Imperfections) -> OperatingPoint:

@@ -87,7 +87,7 @@ LATERAL = [706.8, 1058.6, 1558.3, 3100.7]
 
 
 def test_four_modes_at_rest(mk7702):
-    """Without the assumed damping: 2.6e-4 low at most with masses at nodes, as MuJoCo has them, and equal to the digits given where they are spread. What `modes` prints is within
+    """Without the assumed damping: off by 2.6e-4 at most with masses at nodes, as MuJoCo has them, and equal to the digits given where they are spread. What `modes` prints is within
     3e-4 as well: bearings of a damping ratio of 0.015 at 1 kHz hold the shaft by their dampers too, by which |pole| rises as much as masses at nodes lower it."""
     at_nodes = operating_point(undamped(mk7702), Condition(20.0))
     lumped = [m.frequency for m in at_nodes.modes_below(4000.0) if m.kind != "axial"]
@@ -99,6 +99,27 @@ def test_four_modes_at_rest(mk7702):
     damped = [m.frequency for m in operating_point(mk7702, Condition(20.0)).modes_below(4000.0) if m.kind != "axial"]
     assert damped[::2] == pytest.approx(LATERAL, rel=3e-4)
     assert 2e-4 < damped[6] / lumped[6] - 1 < 5e-4
+
+
+def test_what_modes_prints_tends_to_the_printed_frequencies(mk7702, tmp_path):
+    """1058.87 Hz for 1058.6: masses at nodes 20 mm apart, of which halving leaves a quarter, and 0.03 Hz of the bearings' dampers. Spread along the elements they are right on any mesh."""
+    text = mk7702.file.read_text(encoding="utf-8")
+    at_nodes, spread = [], []
+    for element in (20.0, 10.0, 5.0):
+        (tmp_path / "spindle.toml").write_text(text.replace("longest_element_mm = 20.0", f"longest_element_mm = {element}"), encoding="utf-8")
+        bare = undamped(load(tmp_path))
+        point = operating_point(bare, Condition(20.0))
+        at_nodes.append([m.frequency for m in point.modes_below(1300.0) if m.kind != "axial"][2])
+        pole, _ = poles_below(point.linear, 1300.0, mass_between(point, bare))
+        spread.append(np.sort(np.abs(pole) / (2 * np.pi))[-1])
+    assert spread == pytest.approx([1058.59] * 3, abs=0.005)
+    errors = np.array(at_nodes) - spread
+    assert errors[0] == pytest.approx(0.257, abs=0.01)
+    assert errors[1] < errors[0] / 3.5
+    assert errors[2] < errors[1] / 3.5
+    damped = [m.frequency for m in operating_point(mk7702, Condition(20.0)).modes_below(1300.0) if m.kind != "axial"][2]
+    assert damped == pytest.approx(1058.87, abs=0.005)
+    assert damped - at_nodes[0] == pytest.approx(0.028, abs=0.005)
 
 
 @pytest.mark.parametrize("rpm", ROSS)

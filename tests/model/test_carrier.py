@@ -11,7 +11,7 @@ import pytest
 from thermospindle.cli import main
 from thermospindle.model.built.drawn import drawn
 from thermospindle.model.built.imperfections import Imperfections
-from thermospindle.model.carrier import unbalance_carrier
+from thermospindle.model.carrier import permissible_unbalance, unbalance_carrier
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.model.rotor.loaded import motion
@@ -19,6 +19,7 @@ from thermospindle.model.scene.reading import content_hash, load
 from thermospindle.model.units import RPM
 from thermospindle.sim.effects import by_name
 from thermospindle.sim.operating import operating_point
+from thermospindle.sim.resonance.critical import criticals
 from thermospindle.sim.running.excitation import harmonics, response
 from thermospindle.sim.running.moving_balls import _unbalance_forces
 
@@ -218,10 +219,45 @@ def test_check_tells_which_part_it_took(made, capsys):
     assert main(["check", str(spindle.file)]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "The unbalance is on disc." in said
-    assert "at z = 220 mm on sleeve, changes nothing" in said
+    # the sleeve's own bearings at 110 and 290 mm bear 300 N by the lever rule, those of the shaft nothing
+    assert "at z = 220 mm on sleeve, borne by front +0, +0; low +117, +0; high +183, +0; rear +0, +0 N; front, low, high and rear, given by numbers, are as stiff under any load." in said
 
 
 def test_without_a_scene_the_sentence_is_the_same(made):
     spindle = replace(made(0.0), imperfections=Imperfections(unbalance=1e-6, unbalance_z=0.22))
     with pytest.raises(BadInput, match="unbalance_body must name the one it acts on: allowed are shaft, sleeve"):
         harmonics(operating_point(spindle, Condition(20.0, SPEED)))
+
+
+def test_each_part_drives_the_modes_at_its_own_speed_that_whirl_with_it(made):
+    """The sleeve turns backwards at half the speed: of a pair of its modes it drives the one that goes backward with the spindle."""
+    spindle = made(50.0)
+    turning = operating_point(spindle, Condition(20.0, SPEED))
+    assert criticals(operating_point(spindle, Condition(20.0)), 0.5) == []
+    pair = [m for m in turning.modes if m.kind != "axial" and m.energy["low"] + m.energy["high"] > 0.9][:2]
+    assert {m.whirl for m in pair} == {"forward", "backward"}
+    backward = next(m for m in pair if m.whirl == "backward")
+    at = Condition(20.0, 4 * np.pi * backward.frequency)
+    point = operating_point(spindle, at)
+    found = [c for c in criticals(point, 0.1) if c.parts == ("sleeve",)]
+    assert found
+    assert {c.mode.whirl for c in found} == {"backward"}
+    assert all(c.sense > 0.99 and not c.of_scene and c.speed == pytest.approx(-at.speed / 2) for c in found)
+
+
+def test_a_balance_grade_goes_by_a_parts_own_speed(made):
+    """Of a shaft and disc geared to twice the spindle's speed, beside a sleeve at half of it: e = G / (2 speed), m what turns with them."""
+    spindle = made(0.0)
+    structure = spindle.structure
+    fast = replace(structure, bodies=tuple(replace(b, speed_ratio=2.0) if b.speed_ratio == 1.0 else b for b in structure.bodies))
+    geared = replace(spindle, structure=fast)
+    body = geared.turning
+    assert body.speed_ratio == 2.0
+    mass = sum(b.mass for b in geared.structure.bodies if b.speed_ratio == 2.0)
+    assert mass < 0.9 * geared.turning_mass
+    assert permissible_unbalance(geared, body, 2.5e-3) == pytest.approx(mass * 2.5e-3 / (2 * SPEED), rel=1e-12)
+    sleeve = next(b for b in structure.bodies if b.speed_ratio == -0.5)
+    assert permissible_unbalance(geared, sleeve, 2.5e-3) == pytest.approx((geared.turning_mass - mass) * 2.5e-3 / (0.5 * SPEED), rel=1e-12)
+    assert drawn(geared, 3).unbalance == pytest.approx(drawn(spindle, 3).unbalance / 2, rel=1e-12)
+    sizes = [by_name("unbalance").sized(s)["amount"] for s in (spindle, geared)]
+    assert sizes[1] == pytest.approx(sizes[0] / 2, rel=1e-12)

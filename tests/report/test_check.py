@@ -14,13 +14,17 @@ from matplotlib.patches import Rectangle
 from tests.conftest import ROOT
 from thermospindle.cli import main
 from thermospindle.model.machine import Condition
+from thermospindle.model.rotor.chain import motion_rows
 from thermospindle.model.scene.reading import load
+from thermospindle.model.units import RPM
 from thermospindle.report.check.drawing import drawing
 from thermospindle.report.check.looked import looked
 from thermospindle.report.check.odd import odd
 from thermospindle.report.check.understood import arrangement
 from thermospindle.report.check.words import of_words
 from thermospindle.sim.operating import operating_point
+from thermospindle.sim.resonance.critical import criticals
+from thermospindle.sim.running.excitation import harmonics, response
 
 SCENES = {name: ROOT / "scenes" / name / "spindle.toml" for name in ("hdd_2003", "mk7702", "five_bearing", "free_shaft")}
 SCENES |= {kind: ROOT / "scenes" / "templates" / f"{kind}.toml" for kind in ("hdd", "machine-tool", "grinding", "rotor")}
@@ -192,6 +196,8 @@ ODD = [
     ("rotor", "radial_stiffness_N_per_um = 20.0", "radial_stiffness_N_per_um = 20.0e-6", "bearing left: its radial stiffness is 20 N/m at most, on which the"),
     ("free_shaft", "damping_ratio = 1.0e-4", "damping_ratio = 1.0e-9", "4 modes up to 1100 Hz are undamped"),
     ("grinding", "outer_conformity = 0.53", "outer_conformity = 0.60", "the outer groove's radius is 0.6 ball diameters"),
+    ("machine-tool", "balls = 18\nball_diameter_mm = 10.32", "balls = 11\nball_diameter_mm = 10.32", "ball_rows.rear.catalogue, of rear1, rear2: preload, unloading force and axial rigidity ask for contacts 1.6 times as stiff as Hertz has them of 11 balls of 10.32 mm"),
+    ("machine-tool", "axial_rigidity_N_per_um = [64.5, 111.7, 162.8]", "axial_rigidity_N_per_um = [32.25, 55.85, 81.4]", "mm and grooves of a radius of 0.559 ball diameters, and bearings have 0.52 to 0.535"),
     ("free_shaft", "[tolerances]", "[[effects]]\nname = \"preload_loss\"\n[tolerances]", "effect preload_loss: nothing to act on here"),
     ("hdd_2003", 'between = ["seat", "shaft"]', 'between = ["hub", "shaft"]', "joint flange: 'hub' turns and 'shaft' does not"),
     ("hdd", "preload_N = 16.0", "preload_N = 900.0", "under preload and the loads told; balls leave dents from 4200 MPa, the static limit of ISO 76"),
@@ -331,10 +337,93 @@ def test_an_axial_load_is_told_with_its_sign_on_either_side(scene: str, outer: s
         assert found["bearings"]["front"]["preload_N"] == pytest.approx(175.0, rel=1e-9)
 
 
-def test_loads_that_bearings_given_by_numbers_do_not_feel_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bearings_given_by_numbers_bear_a_radial_load_by_the_lever_rule(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     loads = "axial_load_N = 5.0\nradial_load_N = [10.0, 0.0]\nradial_load_z_mm = 400.0\n"
     (tmp_path / "spindle.toml").write_text(loads + SCENES["rotor"].read_text(encoding="utf-8"), encoding="utf-8")
     assert main(["check", str(tmp_path)]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "External axial load 5 N along z changes nothing" in said
-    assert "External radial load 10, 0 N along x, y at z = 400 mm on shaft, changes nothing: bearings given by numbers are as stiff under any load." in said
+    assert "External radial load 10, 0 N along x, y at z = 400 mm on shaft, borne by left +3.15, +0; right +6.85, +0 N; left and right, given by numbers, are as stiff under any load." in said
+    found = {name: b["radial_force_N"] for name, b in checked(tmp_path, capsys)["bearings"].items()}
+    right = 10.0 * (400.0 - 30.0) / (570.0 - 30.0)
+    assert found["left"] == pytest.approx([10.0 - right, 0.0], abs=1e-5)
+    assert found["right"] == pytest.approx([right, 0.0], abs=1e-5)
+
+
+def critical_words(text: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> list[str]:
+    (folder / "spindle.toml").write_text(text, encoding="utf-8")
+    return [words for words in checked(folder, capsys)["odd"] if words.startswith("a natural frequency of")]
+
+
+def test_unbalance_is_told_to_drive_what_whirls_with_the_rotor(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """In supports that are alike in all directions it does nothing to the backward mode at that speed; in others to both, each by its share."""
+    text = SCENES["rotor"].read_text(encoding="utf-8").replace("nominal_speed_rpm = 4000.0", "nominal_speed_rpm = 7200.0")
+    (tmp_path / "spindle.toml").write_text(text, encoding="utf-8")
+    point = operating_point(load(tmp_path), Condition(20.0, 7200 * RPM))
+    pair = [m for m in point.modes if abs(m.frequency / 120.0 - 1) < 0.05]
+    assert [m.whirl for m in pair] == ["backward", "forward"]
+    [told] = critical_words(text, tmp_path, capsys)
+    assert told.startswith(f"a natural frequency of {pair[1].frequency:.0f} Hz lies at the nominal speed of 7200 rpm and whirls with the rotor: unbalance drives it; 5 g mm of the scene at z = 225 mm")
+
+    apart = text.replace("radial_stiffness_N_per_um = 20.0   # in every direction across the axis\naxial_stiffness_N_per_um = 5.0 ", "matrix_SI = [[2e7, 0, 0, 0, 0], [0, 1.2e7, 0, 0, 0], [0, 0, 5e6, 0, 0], [0, 0, 0, 0, 0], [0, 0, 0, 0, 0]] ")
+    assert apart != text
+    both = critical_words(apart, tmp_path, capsys)
+    assert "whirls mostly against the rotor: unbalance drives it by 22 % of the modal force; 5 g mm of the scene" in both[0]
+    assert "whirls mostly with the rotor: unbalance drives it by 78 % of the modal force; 5 g mm of the scene" in both[1]
+    assert len(both) == 2
+
+
+def test_how_far_unbalance_moves_a_mode_is_what_the_running_rotor_does_there(tmp_path: Path) -> None:
+    """At the critical speed all other modes add little to the one."""
+    text = SCENES["rotor"].read_text(encoding="utf-8")
+    (tmp_path / "spindle.toml").write_text(text, encoding="utf-8")
+    spindle = load(tmp_path)
+    speed = 7200 * RPM
+    for _ in range(6):  # to where the forward mode stands at the speed
+        point = operating_point(spindle, Condition(20.0, speed))
+        [found] = criticals(point, 0.05)
+        speed = 2 * np.pi * found.mode.frequency
+    row = motion_rows(point.chain, "disc", (0.0, 0.0, 0.225))[0]
+    assert found.of_scene
+    assert found.sense == pytest.approx(1.0, abs=1e-6)
+    assert found.moved == pytest.approx(float(np.abs(response(point, harmonics(point)) @ row)[0]), rel=0.01)
+
+
+def test_no_catalogue_of_the_shipped_bearings_is_odd(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert not [words for words in checked(SCENES["five_bearing"], capsys)["odd"] if "catalogue" in words]
+
+
+@pytest.mark.parametrize("element", [65.0, 20.0, 5.0])
+@pytest.mark.parametrize("density", [1.0, 7850.0])
+@pytest.mark.parametrize("beam", ["timoshenko", "euler-bernoulli"])
+def test_a_light_shaft_keeps_its_modes_at_any_mesh(beam: str, density: float, element: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of a disc on a shaft nearly without mass the whirl is sqrt(k / m) / 2 pi at 151 Hz, and `check` counts what `modes` finds. Where rounding hides it, that is said."""
+    text = SCENES["rotor"].read_text(encoding="utf-8").replace("density_kg_per_m3 = 7850.0", f"density_kg_per_m3 = {density}")
+    (tmp_path / "spindle.toml").write_text(text.replace("longest_element_mm = 65.0", f'beam = "{beam}"\nlongest_element_mm = {element}'), encoding="utf-8")
+    found = checked(tmp_path, capsys)
+    hidden = [words for words in found["odd"] if "cannot be told from rounding" in words]
+    if (beam, density, element) == ("euler-bernoulli", 1.0, 5.0):  # elements of a millionth of a gram
+        [said] = hidden
+        assert "3 natural frequencies below 3" in said
+        return
+    assert not hidden
+    spindle = load(tmp_path)
+    assert found["modes_Hz"] == pytest.approx([m.frequency for m in operating_point(spindle, Condition(20.0)).modes_below(1500.0)], rel=1e-3)
+    assert found["modes_Hz"][0] == pytest.approx(151.0 if density == 1.0 else 120.6, rel=5e-3)
+
+
+def test_a_rotor_that_stiffens_nothing_is_in_the_legend_and_under_no_name(tmp_path: Path) -> None:
+    """Of a shaft of 30 mm with a rotor of 160 mm around it: its hatch ends above the names below the axis."""
+    text = SCENES["rotor"].read_text(encoding="utf-8")
+    (tmp_path / "spindle.toml").write_text(text.replace("# mass_outer_mm = [[30, 600]] ", "mass_outer_mm = [[30, 250], [160, 100], [30, 250]] "), encoding="utf-8")
+    figure = drawing(operating_point(load(tmp_path), Condition(20.0)))
+    [axes] = figure.axes
+    figure.canvas.draw()
+    [hatch] = [p for p in axes.patches if p.get_hatch() and p.get_window_extent().y1 <= axes.transData.transform((0, 0))[1] + 1]
+    assert hatch.get_path().vertices[:, 1].min() == pytest.approx(-80.0)
+    below = [t for t in axes.texts if t.get_position()[1] < 0]
+    assert {"shaft", "disc"} <= {t.get_text() for t in below}
+    assert all(t.get_window_extent().y1 < hatch.get_window_extent().y0 for t in below)
+    entry = "mass that stiffens nothing"
+    assert entry in {t.get_text() for t in figure.legends[0].get_texts()}
+    assert entry not in {t.get_text() for t in drawing(operating_point(load(SCENES["rotor"]), Condition(20.0))).legends[0].get_texts()}

@@ -1,11 +1,33 @@
 """What titles say of a state of equilibrium."""
 
+import io
+
+import numpy as np
 import pytest
+from rich.console import Console
 
 from thermospindle.model.bearing.pair import IN_CONTACT
-from thermospindle.report.text.states import of_bearings
+from thermospindle.model.bearing.stiffness_table import StiffnessTable
+from thermospindle.model.units import RPM
+from thermospindle.report.text.states import of_bearings, show_told_table
 
 
 @pytest.mark.parametrize(("status", "told"), [(IN_CONTACT, "bearings in contact"), ("lower and upper bearing lost contact", "lower and upper bearing lost contact")])
 def test_a_title_names_bearings_once(status, told):
     assert of_bearings(status) == told
+
+
+def said_of(values: list[list[float]], speeds: tuple[float, ...] = (0.0,)) -> str:
+    """The first line of `table` for a bearing of so much radial stiffness (T, S) N/um at 20, 40 and 60 C."""
+    table = StiffnessTable(np.array([20.0, 40.0, 60.0]), np.array(speeds) * RPM, {"front": {"radial_stiffness_N_per_m": 1e6 * np.array(values)}}, {}, {})
+    console = Console(record=True, width=300, file=io.StringIO())
+    show_told_table(console, table)
+    return console.export_text().splitlines()[0]
+
+
+def test_the_least_and_the_most_are_told_where_they_lie_between():
+    assert said_of([[20.0], [25.0], [30.0]]) == "From 20 to 60 C at 0 rpm: front radial stiffness 20.00 to 30.00 N/um."
+    assert said_of([[20.0], [31.0], [30.0]]) == "From 20 to 60 C at 0 rpm: front radial stiffness 20.00 to 30.00 N/um (most 31.00 at 40 C)."
+    assert said_of([[30.0], [12.5], [30.0]]) == "From 20 to 60 C at 0 rpm: front radial stiffness 30.00 N/um (least 12.50 at 40 C)."
+    both = said_of([[20.0, 10.0], [31.0, 22.0], [30.0, 25.0]], (0.0, 6000.0))
+    assert both == "From 20 to 60 C and 0 to 6000 rpm: front radial stiffness 20.00 to 25.00 N/um (least 10.00 at 20 C and 6000 rpm, most 31.00 at 40 C and 0 rpm)."

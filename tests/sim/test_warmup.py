@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.conftest import coarse_warmups
+from tests.conftest import ROOT, coarse_warmups
 from thermospindle.cli import main
 from thermospindle.model.bearing.pair import solve
-from thermospindle.model.errors import BadInput
+from thermospindle.model.errors import BadInput, OutsideRange
 from thermospindle.model.machine import Addition, Condition, Friction
 from thermospindle.model.material import Law
+from thermospindle.model.scene.reading import load
 from thermospindle.model.units import RPM
 from thermospindle.report.figures.warmup import figure
 from thermospindle.report.text import warmup as text
@@ -231,6 +232,14 @@ def test_thermal_runaway_is_told(spindle, coarse):
     own = replace(spindle, materials=steel, thermal=replace(spindle.thermal, friction=hot))
     with pytest.raises(heat.NotSettled, match="settle"):
         warm_up(own, SPEED, 20.0)
+
+
+def test_rigid_rings_that_run_away_on_the_way_are_told(tmp_path):
+    """Hot inner rings in a cold housing, rigidly preloaded: time, bearing, load and ring temperatures instead of a law that ends."""
+    scene = (ROOT / "scenes" / "templates" / "grinding.toml").read_text(encoding="utf-8").replace('preload_kind = "spring" ', 'preload_kind = "rigid" ')
+    (tmp_path / "spindle.toml").write_text("".join(line for line in scene.splitlines(True) if not line.startswith(("sprung_", "preload_rate"))), encoding="utf-8")
+    with pytest.raises(OutsideRange, match=r"at 120000 rpm the bearings run away after 0\.\d+ min: rear carries \d+ N, [\d.]+ times its \d+ N at the start, with its inner ring at 1\d\d C and its outer one at \d\d C"):
+        warm_up(load(tmp_path), 120000 * RPM, 20.0)
 
 
 def test_answer_as_json_and_rows(warm):

@@ -10,6 +10,7 @@ import numpy as np
 from thermospindle.model.bearing.ball_row import respond
 from thermospindle.model.bearing.pair import BearingState, PairState, contact_status
 from thermospindle.model.bearing.row import reference_deformation
+from thermospindle.model.errors import listed
 from thermospindle.model.machine import Condition, Spindle
 from thermospindle.sim.effects.effect import ROWS, Effect, Parameter, Values, direction_parameter
 
@@ -50,6 +51,23 @@ def sized(spindle: Spindle) -> Mapping[str, float]:
     return {"tilt": min(reference_deformation(spindle, b) * 2 / b.pitch_diameter for b in spindle.bearings) / (1.054e-6 / 4.55e-3)}
 
 
+def meant(spindle: Spindle) -> Mapping[str, str]:
+    """Of which of the scene's bearings `tilt` is, and of which the others."""
+    *below, upper = (b.name for b in spindle.bearings)
+    if not below:
+        return {"tilt": TILTED.format(upper)} | dict.fromkeys(("lower_share", "lower_across"), "nothing here: the scene has one ball row alone")
+    one = f"the {below[0]} bearing's ring" if len(below) == 1 else f"the rings of the {listed(below)} bearings, of all alike"
+    other = f"over that of the {upper}'s"
+    return {
+        "tilt": TILTED.format(upper),
+        "lower_share": f"tilt of {one}, about the same axis, {other}",
+        "lower_across": f"tilt of {one} about the axis at right angles, {other}",
+    }
+
+
+TILTED = "tilt of the {} bearing's non-turning ring; the change grows with its square"
+
+
 EFFECT = Effect(
     name="bearing_misalignment",
     title="A bearing ring sits askew in its seat",
@@ -65,7 +83,7 @@ EFFECT = Effect(
             typical=0.2,
             prior_sd=0.15,
             limits=(-2.0, 2.0),
-            meaning="tilt of the upper bearing's non-turning ring; the change grows with its square",
+            meaning=TILTED.format("upper"),
             source="1 um of axial runout of a shoulder 7.5 mm across is 0.13 mrad (ISO 492 class 4 allows 2 to 3 um)",
         ),
         direction_parameter(60.0, 180.0, "axis of the tilt, from x towards y"),
@@ -97,9 +115,10 @@ EFFECT = Effect(
     resembles=("magnetic_pull", "hertz_amplitude"),
     valid=(
         "a ring that does not turn (one that turns gives speed-periodic stiffness); hub held by the other bearing: the rigid pair's "
-        "balance is not solved anew for the tilted ring's moment"
+        "balance is not solved anew for the tilted ring's moment; of more than two rows the highest is the upper, and all others are askew alike"
     ),
     pair=pair,
     sized=sized,
+    meant=meant,
     acts_on=(ROWS,),
 )

@@ -8,10 +8,11 @@ from dataclasses import replace
 from math import radians
 
 from thermospindle.model.built.imperfections import Imperfections
-from thermospindle.model.carrier import named, unbalance_carrier
+from thermospindle.model.carrier import named, permissible_unbalance, unbalance_carrier
 from thermospindle.model.machine import Condition, Spindle
+from thermospindle.model.structure import Body
 from thermospindle.model.units import RPM
-from thermospindle.sim.effects.effect import TURNING, Effect, Parameter, Values, mass_ratio, phase_parameter
+from thermospindle.sim.effects.effect import REFERENCE_HUB, TURNING, Effect, Parameter, Values, mass_ratio, phase_parameter
 
 G_MM, G_MM2 = 1e-6, 1e-9
 
@@ -19,10 +20,7 @@ G_MM, G_MM2 = 1e-6, 1e-9
 def imperfections(spindle: Spindle, condition: Condition, values: Values, imperfections: Imperfections) -> Imperfections:
     if values["amount"] == 0.0 and values["couple"] == 0.0:
         return imperfections
-    body = spindle.turning
-    if imperfections.unbalance or imperfections.couple_unbalance:  # as vectors add up only those that turn alike
-        carrier = unbalance_carrier(spindle, imperfections)
-        body = body if body.speed_ratio == carrier.speed_ratio else carrier
+    body = _on(spindle, imperfections)
     turn = cmath.rect(1.0, radians(values["phase"]))
     own = cmath.rect(imperfections.unbalance, imperfections.unbalance_phase)
     more = values["amount"] * G_MM * turn
@@ -41,9 +39,20 @@ def imperfections(spindle: Spindle, condition: Condition, values: Values, imperf
     )
 
 
+def _on(spindle: Spindle, imperfections: Imperfections) -> Body:
+    """The body that the effect acts on: as vectors add up only unbalances that turn alike."""
+    body = spindle.turning
+    if imperfections.unbalance or imperfections.couple_unbalance:
+        carrier = unbalance_carrier(spindle, imperfections)
+        body = body if body.speed_ratio == carrier.speed_ratio else carrier
+    return body
+
+
 def sized(spindle: Spindle) -> Mapping[str, float]:
-    """A balance grade allows mass over speed."""
-    amount = mass_ratio(spindle) * 7200 * RPM / spindle.nominal_speed
+    """A balance grade allows mass over speed, both of what turns together."""
+    if not spindle.structure.turns:
+        return {}
+    amount = permissible_unbalance(spindle, _on(spindle, spindle.imperfections), 1.0) / (REFERENCE_HUB / (7200 * RPM))
     return {"amount": amount, "couple": amount * mass_ratio(spindle) ** (1 / 3)}
 
 

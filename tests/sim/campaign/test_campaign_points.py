@@ -13,9 +13,11 @@ from thermospindle.diagnosis.verdict import diagnose
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
-from thermospindle.sim.campaign.beside import beside, check_points, doubtful, of_another
-from thermospindle.sim.campaign.campaign import Campaign, Test, read_campaign, write_campaign
+from thermospindle.sim.campaign.beside import beside, check_points, doubtful, of_another, on_nodes
+from thermospindle.sim.campaign.campaign import Campaign, Test, on_parts, read_campaign, write_campaign
+from thermospindle.sim.campaign.simulated import hub_points, runout_campaign
 from thermospindle.sim.identification.frf import Frf
+from thermospindle.sim.run import Run, as_campaign
 
 FOREIGN = ROOT / "tests" / "data" / "foreign_bond"
 
@@ -84,3 +86,18 @@ def test_a_point_beyond_a_shaft_that_was_shortened_is_refused(tmp_path):
     shorter = made(tmp_path, ("[[30, 600]]", "[[30, 580]]"), ("[0.0, 0.0, 600.0]", "[0.0, 0.0, 580.0]"))
     with pytest.raises(BadInput, match=r"points\.4: at z_mm = 600 beyond the shaft 'shaft' of scene \S+, which spans 0 to 580$"):
         check_points(shorter, written(made(tmp_path)))
+
+
+def test_virtual_campaigns_name_shafts_and_not_their_nodes():
+    """A height says where on it; what reads them finds the same nodes."""
+    spindle = load(ROOT / "scenes" / "five_bearing")
+    made = as_campaign(Run(spindle, (), ()), "virtual")
+    assert {p.body for p in spindle.points} > {"housing"}
+    assert {p.body for p in made.points} == {"spindle", "housing"}
+    assert on_nodes(spindle, made.points) == spindle.points
+    probes = hub_points(spindle)
+    assert "spindle" not in {p.body for p in probes}
+    assert {p.body for p in on_parts(spindle, probes)} == {"spindle"}
+    assert on_nodes(spindle, on_parts(spindle, probes)) == probes
+    turning = runout_campaign(spindle, [Condition(20.0, 100.0)], seconds=0.01, path="linear")
+    assert {p.body for p in turning.points} == {"spindle"}

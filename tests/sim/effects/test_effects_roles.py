@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import SCENE
+from tests.conftest import ROOT, SCENE
 from tests.mounting import turning_inside
 from thermospindle.diagnosis.add import new_scene
 from thermospindle.model.bearing.row import reference_motion
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import Condition
-from thermospindle.model.scene.reading import build
+from thermospindle.model.scene.reading import build, load
 from thermospindle.sim.effects import CATALOGUE, by_name, usable
 from thermospindle.sim.effects.effect import called, fitted_to, refusal
 from thermospindle.sim.effects.known import equipped
@@ -127,3 +127,15 @@ def test_the_turning_rings_groove_lags(spindle, turning):
     other = "outer" if turning == "inner" else "inner"
     assert getattr(moved, f"{turning}_strain") == pytest.approx(0.5 * 0.25 * 40 * 11.5e-6)
     assert getattr(moved, f"{other}_strain") == 0.0
+
+
+def test_misaligned_rings_are_told_by_the_names_of_the_scenes_bearings(spindle):
+    """The highest row is tilted by `tilt`, all below it by a share of that."""
+    five = load(ROOT / "scenes" / "five_bearing")
+    said = {p.name: p.meaning for p in fitted_to(by_name("bearing_misalignment"), five).parameters}
+    assert said["tilt"].startswith("tilt of the rear2 bearing's non-turning ring")
+    assert said["lower_share"] == "tilt of the rings of the front1, front2, front3 and rear1 bearings, of all alike, about the same axis, over that of the rear2's"
+    assert not any(word in text.split() for text in said.values() for word in ("lower", "upper", "upper's"))
+    assert fitted_to(by_name("bearing_misalignment"), spindle).parameters == by_name("bearing_misalignment").parameters
+    one = replace(spindle, bearings=spindle.bearings[1:])
+    assert [p.meaning for p in fitted_to(by_name("bearing_misalignment"), one).parameters][-1] == "nothing here: the scene has one ball row alone"

@@ -282,7 +282,7 @@ def test_points_on_a_flexible_shaft_are_told_by_its_name(tmp_path):
     h = FRF.value[0, 0]
     file = table(tmp_path / "T20.csv", ["Frequency", "H(77,77) real [(m/s)/N]", "H(77,77) imag"], [FREQUENCY, h.real, h.imag])
     bring([file], mapping=tmp_path / "m.toml", scene="mk7702", out=tmp_path / "c")
-    assert read_campaign(tmp_path / "c").points[0].body == shaft.node_at(height)
+    assert read_campaign(tmp_path / "c").points[0].body == shaft.name
     (tmp_path / "m.toml").write_text((tmp_path / "m.toml").read_text().replace(f'body = "{shaft.name}"', 'body = "nowhere"'))
     with pytest.raises(Unanswered, match=f"a body of the scene mk7702 .*{shaft.name}"):
         bring([file], mapping=tmp_path / "m.toml", scene="mk7702", out=tmp_path / "d")
@@ -318,3 +318,13 @@ def test_a_wrong_mapping_is_one_sentence(tmp_path, wrong, said):
     (tmp_path / "m.toml").write_text(wrong)
     with pytest.raises(BadInput, match=said):
         bring([file], mapping=tmp_path / "m.toml", out=tmp_path / "c")
+
+
+def test_the_form_proposes_conditions_of_the_scene(tmp_path):
+    """It proposed 7200 rpm to every machine."""
+    heads, found = columns("real", "(m/s)/N")
+    files = [table(tmp_path / f"run{k}.csv", ["Frequency [Hz]", *heads], [FREQUENCY, *found]) for k in range(3)]
+    for scene, speed in ((SCENE, "7200.0"), (ROOT / "scenes" / "five_bearing", "8000.0"), (ROOT / "scenes" / "free_shaft", "0.0")):
+        form = tmp_path / f"{scene.name}.toml"
+        bring(files, scene=scene, mapping=form)
+        assert form.read_text(encoding="utf-8").count(f"# speed_rpm = {speed}    # where it is another") == 3

@@ -13,9 +13,9 @@ from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
 from thermospindle.model.sense import of_conditions
 from thermospindle.model.units import RPM
-from thermospindle.report.text.resonance import sentences, show_map
+from thermospindle.report.text.resonance import map_json, nearby, sentences, show_map
 from thermospindle.sim.resonance.found import Coincidence, Interpolated, ResonanceMap
-from thermospindle.sim.resonance.map import _with
+from thermospindle.sim.resonance.map import _with, resonance_map
 
 
 @pytest.fixture
@@ -81,3 +81,24 @@ def test_a_shaft_that_its_own_rotation_tears_is_doubted():
     assert not of_conditions(spindle, [Condition(20.0, 300.0 / radius)])
     [said] = of_conditions(spindle, [Condition(20.0, 400.0 / radius)])
     assert "400 m/s at the largest diameter of shaft 'spindle'" in said
+
+
+def test_what_is_met_just_beyond_the_speeds_asked_for_is_told(spindle):
+    """20 (fo-fc) meets the axial mode at 7147 rpm: beyond 6900 rpm it is told as within a tenth, beyond 6000 it is not, and within them it is a coincidence."""
+    nominal = Condition(20.0, 6000 * RPM)
+
+    def found(highest: float) -> ResonanceMap:
+        return resonance_map(spindle, [20.0, 25.0], np.array([5500.0, highest]) * RPM, nominal, nearby=True)
+
+    near = found(6900.0)
+    [met] = [c for c in near.beyond if c.line.name == "20 (fo-fc)" and c.mode.kind == "axial" and c.line.bearing == "upper"]
+    assert met.condition.speed / RPM == pytest.approx(7147, abs=1)
+    assert met.condition.temperature == 20.0
+    [said] = nearby(near)
+    assert said.startswith("Just beyond the mapped speeds, less than 10% away, at 20 C: ")
+    assert "20 (fo-fc) (outer waviness of order 20 of the upper bearing) meets mode 1 (axial) at 7147 rpm and 1002.0 Hz" in said
+    assert said in map_json(near)["sentences"]
+    assert all(c.condition.speed / RPM < 1.1 * 6900 for c in near.beyond)
+    assert not any(5500 <= c.condition.speed / RPM <= 6900 for c in near.beyond)
+    assert "20 (fo-fc)" not in " ".join(nearby(found(6000.0)))
+    assert nearby(resonance_map(spindle, [20.0, 25.0], np.array([5500.0, 6900.0]) * RPM, nominal)) == []
