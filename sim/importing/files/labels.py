@@ -13,7 +13,9 @@ PARTS = {
     "magnitude": "magnitude", "mag": "magnitude", "abs": "magnitude", "amplitude": "magnitude", "amp": "magnitude", "modulus": "magnitude",
     "db": "decibel", "decibel": "decibel", "decibels": "decibel", "phase": "phase", "arg": "phase", "angle": "phase", "complex": "complex",
 }  # fmt: skip
-AXES = {"frequency": "frequency", "freq": "frequency", "f": "frequency", "frequenz": "frequency", "fréquence": "frequency", "time": "time", "t": "time", "zeit": "time"}
+AXES = {"frequency": "frequency", "freq": "frequency", "f": "frequency", "frequenz": "frequency", "fréquence": "frequency", "omega": "frequency", "ω": "frequency", "time": "time", "t": "time", "zeit": "time"}
+ANGULAR = ("omega", "ω")
+"""Axes that are in rad/s where they name no unit."""
 FUNCTIONS = ("h", "frf", "h1", "h2", "hv", "g", "tf")
 COHERENCE = ("coherence", "coh", "gamma2", "γ2", "γ²")
 FORCES = ("force", "hammer", "excitation", "kraft", "impact")
@@ -51,7 +53,7 @@ def _role(text: str, unit: str) -> Role | None:
     """The role that a heading without its unit tells."""
     low = text.lower().strip(" :_-")
     if (axis := re.sub(r"[ _-]+(domain|axis|vector)$", "", low)) in AXES:
-        return Role(AXES[axis], unit=unit)
+        return Role(AXES[axis], unit=unit or ("rad/s" if axis in ANGULAR else ""))
     if not unit and (axis_unit := re.fullmatch(r"([^\W_]+)_(hz|khz|s|ms)", low)) and axis_unit[1] in AXES:  # "frequency_kHz"
         return Role(AXES[axis_unit[1]], unit=axis_unit[2].replace("hz", "Hz"))
     if low in ("hz", "s", "sec"):

@@ -122,3 +122,14 @@ def test_import_says_it_and_changes_nothing(foreign, tmp_path):
         assert kept is not None
         assert found is not None
         np.testing.assert_allclose(kept.value[0, 0], found[1] * one, rtol=1e-6)
+
+
+@pytest.mark.parametrize(("scale", "mistake"), [(2 * np.pi, "rad/s told as Hz"), (0.5 / np.pi, "Hz told as rad/s")])
+@pytest.mark.parametrize("name", ["foreign_none", "foreign_bond"])
+def test_lines_in_rad_per_s_are_said(name, scale, mistake, spindle):
+    """They reach into the band of the scene's hammer test, so that their frequencies alone tell nothing."""
+    campaign = read_campaign(DATA / name)
+    tests = tuple(replace(t, frf=t.frf and replace(t.frf, frequency=scale * t.frf.frequency)) for t in campaign.tests)
+    [said] = likenesses(spindle, replace(campaign, tests=tests))
+    assert said.startswith("all FRFs fit those that hdd_2003 has far better with lines from 40")
+    assert mistake in said
