@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.command_line import refused
+from tests.conftest import DATA, SCENE
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.whole import whole
 from thermospindle.report.folder import MARK, mark, whole_folder
@@ -82,3 +84,16 @@ def test_nor_does_a_campaign_come_there(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path / "here")
     with pytest.raises(BadInput, match="is where you stand"), whole(Path("")) as folder:
         folder.mkdir()
+
+
+@pytest.mark.parametrize("verb", ["runout", "warmup", "map", "impact", "compare", "diagnose", "ladder"])
+def test_a_folder_that_cannot_be_written_is_refused_before_anything_is_worked_out(verb, tmp_path, capsys, monkeypatch):
+    """A diagnosis of minutes was lost to an --out that holds something else."""
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "notes.txt").write_text("mine")
+    of = {"impact": "chain", "compare": "compare", "diagnose": "diagnose", "ladder": "ladder"}.get(verb, "running")
+    monkeypatch.setattr(f"thermospindle.report.verbs.{of}.with_effects", lambda *_: pytest.fail("a scene is read"))
+    campaign = [DATA / "foreign_none"] if verb in ("compare", "diagnose", "ladder") else []
+    assert "holds something that spindle did not write" in refused(capsys, verb, SCENE, *campaign, "--out", tmp_path / "mine")
+    assert "is a file" in refused(capsys, verb, SCENE, *campaign, "--out", tmp_path / "mine" / "notes.txt")
+    assert [p.name for p in tmp_path.iterdir()] == ["mine"]
