@@ -11,7 +11,7 @@ from typing import Any
 
 from thermospindle.diagnosis.inference.hypothesis import DEPARTS
 from thermospindle.diagnosis.parameters.nuisance import BUILD, GAIN, TEMPERATURE
-from thermospindle.model.errors import BadInput
+from thermospindle.model.errors import BadInput, absent
 from thermospindle.model.files.formats import DIAGNOSIS, migrated
 from thermospindle.sim.effects.effect import Effect
 
@@ -43,7 +43,7 @@ class Answer:
 def read_answer(file: Path) -> Answer:
     """The file of an answer of `spindle diagnose --json`; `BadInput` for another."""
     if not file.is_file():
-        raise BadInput(f"--from {file}: cannot be read: no such file")
+        raise BadInput(f"--from {file}: cannot be read: {absent(file)}")
     try:
         raw = json.loads(file.read_text(encoding="utf-8"))
     except OSError as error:

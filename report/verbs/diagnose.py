@@ -45,6 +45,8 @@ def diagnose(
     """Which physics the scene lacks to explain a campaign; `predictions` is an earlier diagnosis: did what it predicted come true?"""
     asked = dict(locals()) | {"verb": "diagnose"}
     check_out(out)
+    if predictions:
+        outcomes(predictions, ())  # refused, where it is none, before anything is worked out
     (spindle, catalogue), whole = with_effects(scene, effect_files), without(read_campaign(campaign), held_out_tests)
     turning = _of_runout(spindle, catalogue, whole, verbose)
     tests = modal_tests(whole)
