@@ -14,6 +14,7 @@ from thermospindle.report.verbs.importing import bring
 from thermospindle.sim.campaign.campaign import read_campaign
 from thermospindle.sim.campaign.uff import write_frf
 from thermospindle.sim.identification.frf import out_of
+from thermospindle.sim.importing.files.labels import role_of
 from thermospindle.sim.importing.files.mode_tables import from_modes
 from thermospindle.sim.importing.files.reading import content
 from thermospindle.sim.importing.mapping import FileForm
@@ -122,6 +123,22 @@ def test_the_mirrored_half_of_a_spectrum_is_left_out(tmp_path):
         frf = imported(tmp_path / str(k), '[[files]]\nfile = "T20.npz"\nunit = "(m/s)/N"\n', tmp_path / str(k) / "T20.npz")
         np.testing.assert_allclose(np.diff(frf.frequency), step)
         np.testing.assert_array_equal(frf.value, FRF.value)
+
+
+def test_headings_may_be_german(tmp_path):
+    """With decimal commas, in the encoding of a German Windows."""
+    value = FRF.value[0, 0]
+    heads = ["Frequenz [Hz]", "H(1,1) Realteil [(m/s)/N]", "H(1,1) Imaginärteil [(m/s)/N]", "Kohärenz(1,1)"]
+    file = table(tmp_path / "T20.csv", ["Frequency [Hz]", "a", "b", "c"], [FREQUENCY, value.real, value.imag, 0.99 + 0 * FREQUENCY])
+    _, *rows = file.read_text().splitlines()
+    file.write_text("\n".join([";".join(heads), *(row.replace(",", ";").replace(".", ",") for row in rows)]) + "\n", encoding="latin-1")
+    frf = imported(tmp_path, "", file)
+    np.testing.assert_allclose(frf.value[0, 0], value, rtol=1e-7)
+    assert frf.coherence is not None
+    told = {"Kraft 1 [N]": "force", "Anregung [N]": "force", "Beschleunigung 3:-X [g]": "response", "Schwinggeschwindigkeit 2 [mm/s]": "response", "Zeit [s]": "time", "H(1,1) Betrag": "H"}
+    for heading, kind in told.items():
+        assert (role := role_of(heading)) is not None, heading
+        assert role.kind == kind
 
 
 @pytest.mark.parametrize("name", ["omega", "ω"])
