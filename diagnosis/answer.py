@@ -109,7 +109,7 @@ def offered_for(effects: Sequence[Effect], answer: Answer, file: Path) -> Offere
         offered = dict.fromkeys(" + ".join(c.effects) if len(names) > 1 else e for c in answer.candidates for e in c.effects)
         raise BadInput(
             f"--from {file}: no candidate has effect{'s' * (len(names) > 1)} {' and '.join(names)}; its candidates are "
-            f"{', '.join(offered) or 'none'}"
+            f"{', '.join(offered) or 'none'}" + ("; nor has it tolerances that were fitted beside what drifts: without --from the effect is added with the values of its own file" if all(e.drifts for e in effects) else "")
         )
     return found
 
