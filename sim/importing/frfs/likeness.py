@@ -108,7 +108,7 @@ def _pairs(spindle: Spindle, campaign: Campaign, test: Test, scale: float) -> li
 def _axis(spindle: Spindle, campaign: Campaign, tests: Sequence[Sequence[Pair]]) -> str | None:
     """What is said where the FRFs of all tests together fit the scene far better with their lines in another unit."""
     told = _misfit([p for pairs in tests for p in pairs if p.loud])
-    if told <= SCATTER:
+    if not SCATTER < told < float("inf"):
         return None
     for scale, mistake in AXES.items():
         if BETTER * _misfit([p for pairs in _tests(spindle, campaign, scale) for p in pairs if p.loud]) < told:
@@ -118,9 +118,9 @@ def _axis(spindle: Spindle, campaign: Campaign, tests: Sequence[Sequence[Pair]])
 
 
 def _misfit(pairs: Sequence[Pair]) -> float:
-    """Rms of ln magnitude between measured and computed, each FRF about its own median; 0 without any."""
+    """Rms of ln magnitude between measured and computed, each FRF about its own median; infinite without any, as where the model has no answer."""
     off = [p.heard[0] - p.heard[1] for p in pairs]
-    return float(np.sqrt(np.mean(np.concatenate([x - np.median(x) for x in off]) ** 2))) if off else 0.0
+    return float(np.sqrt(np.mean(np.concatenate([x - np.median(x) for x in off]) ** 2))) if off else float("inf")
 
 
 # ---------------------------------------------------------------- factors of units, and signs
