@@ -11,7 +11,7 @@ from typing import Any
 
 from thermospindle.diagnosis.inference.hypothesis import DEPARTS
 from thermospindle.diagnosis.parameters.nuisance import BUILD, GAIN, TEMPERATURE
-from thermospindle.model.errors import BadInput
+from thermospindle.model.errors import BadInput, absent
 from thermospindle.model.files.formats import DIAGNOSIS, migrated
 from thermospindle.sim.effects.effect import Effect
 
@@ -43,7 +43,7 @@ class Answer:
 def read_answer(file: Path) -> Answer:
     """The file of an answer of `spindle diagnose --json`; `BadInput` for another."""
     if not file.is_file():
-        raise BadInput(f"--from {file}: cannot be read: no such file")
+        raise BadInput(f"--from {file}: cannot be read: {absent(file)}")
     try:
         raw = json.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
@@ -109,7 +109,7 @@ def offered_for(effects: Sequence[Effect], answer: Answer, file: Path) -> Offere
         offered = dict.fromkeys(" + ".join(c.effects) if len(names) > 1 else e for c in answer.candidates for e in c.effects)
         raise BadInput(
             f"--from {file}: no candidate has effect{'s' * (len(names) > 1)} {' and '.join(names)}; its candidates are "
-            f"{', '.join(offered) or 'none'}"
+            f"{', '.join(offered) or 'none'}" + ("; nor has it tolerances that were fitted beside what drifts: without --from the effect is added with the values of its own file" if all(e.drifts for e in effects) else "")
         )
     return found
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
+from pathlib import Path
 from unicodedata import category
 
 LONGEST = 3000  # letters of a message
@@ -48,6 +49,11 @@ def instead(word: str, known: Iterable[str]) -> str:
 def listed(names: Sequence[str]) -> str:
     """a; a and b; a, b and c."""
     return ", ".join(names[:-1]) + (" and " if len(names) > 1 else "") + names[-1] if names else ""
+
+
+def absent(file: Path) -> str:
+    """Why what is no file cannot be read as one."""
+    return "it is a folder" if file.is_dir() else "no such file"
 
 
 def visible(text: str) -> str:

@@ -21,12 +21,8 @@ COMMAND: ContextVar[str] = ContextVar("COMMAND", default="")
 """The command line that a verb was called by; empty where it was called from Python."""
 
 
-@contextmanager
-def whole_folder(path: Path, scene: bool = False) -> Iterator[Path]:
-    """A temporary folder beside `path` that takes its place when the block ends well, and vanishes when it does not.
-
-    Raises `BadInput` if something stands at `path` that spindle did not write, or that was changed since; or a scene, in whose place only another `scene` comes.
-    """
+def check_folder(path: Path, scene: bool = False) -> None:
+    """`BadInput` if something stands at `path` that spindle did not write, or that was changed since; or a scene, in whose place only another `scene` comes."""
     path = path.resolve()
     check_not_here(path)  # before what it holds is looked at
     _refuse_foreign(path)
@@ -35,6 +31,13 @@ def whole_folder(path: Path, scene: bool = False) -> Iterator[Path]:
     for parent in path.parents:
         if parent.is_file():
             raise BadInput(f"--out {path}: {parent} is a file, so no folder can be made in it; name a new or empty folder")
+
+
+@contextmanager
+def whole_folder(path: Path, scene: bool = False) -> Iterator[Path]:
+    """A temporary folder beside `path` that takes its place when the block ends well, and vanishes when it does not; `BadInput` as of `check_folder`."""
+    path = path.resolve()
+    check_folder(path, scene)
     path.parent.mkdir(parents=True, exist_ok=True)
     with whole(path) as folder:
         folder.mkdir()

@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field, model_validator
 
 from thermospindle.diagnosis.decision.loss import NAMING
 from thermospindle.diagnosis.draft.laws import REFERENCE
-from thermospindle.model.errors import BadInput
+from thermospindle.model.errors import BadInput, absent
 from thermospindle.model.files.formats import DIAGNOSIS, migrated
 from thermospindle.model.types import Array
 
@@ -89,7 +89,7 @@ def place_of(diagnosis: Path, element: str | None) -> tuple[Place, float, tuple[
     of the answer are those fitted beside it. Raises `BadInput` where the file holds none, one that
     changes by nothing, or a name that cannot stand in a Python file."""
     if not diagnosis.is_file():
-        raise BadInput(f"{diagnosis}: cannot be read: no such file")
+        raise BadInput(f"{diagnosis}: cannot be read: {absent(diagnosis)}")
     try:
         told = migrated(DIAGNOSIS, json.loads(diagnosis.read_text(encoding="utf-8")), diagnosis)
         reference = float(told.get("reference_temperature_C", REFERENCE))

@@ -14,7 +14,7 @@ from scipy.special import chdtrc
 
 from thermospindle.diagnosis.data.observe import Observation
 from thermospindle.diagnosis.prediction.temperature import whitened
-from thermospindle.model.errors import BadInput
+from thermospindle.model.errors import BadInput, absent
 from thermospindle.model.files.formats import DIAGNOSIS, migrated
 from thermospindle.model.machine import Condition
 from thermospindle.model.types import Array
@@ -45,7 +45,7 @@ def outcomes(file: Path, observations: Sequence[Observation]) -> list[Outcome]:
     that it takes.
     """
     if not file.is_file():
-        raise BadInput(f"--predictions {file}: cannot be read: no such file")
+        raise BadInput(f"--predictions {file}: cannot be read: {absent(file)}")
     try:
         planned = migrated(DIAGNOSIS, json.loads(file.read_text(encoding="utf-8")), f"--predictions {file}")["next_test"]
         rows = [(dict(p["condition"]), dict(p["predicted"])) for p in planned]

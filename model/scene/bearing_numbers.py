@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field, Strict, model_validator
 
 from thermospindle.model.bearing import stiffness_table
-from thermospindle.model.errors import BadInput
+from thermospindle.model.errors import BadInput, absent
 from thermospindle.model.files.cells import plain_number
 from thermospindle.model.scene.fields import Finite, NotNegative, Positive, Share, Table, meant
 from thermospindle.model.units import RPM
@@ -77,7 +77,7 @@ class Numbers(Table):
 def _read(file: Path, bearing: str | None) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
     """The grid of a table; `BadInput` where it is none, has gaps, or a column that is not known."""
     if not file.is_file():  # a pipe would be waited for, a device has no end
-        raise BadInput(f"{file}: no such file")
+        raise BadInput(f"{file}: {absent(file)}")
     try:
         lines = [(number, line) for number, line in enumerate(file.read_text(encoding="utf-8-sig").splitlines(), 1) if line.strip() and not line.startswith("#")]
         rows = list(zip((number for number, _ in lines[1:]), csv.DictReader(line for _, line in lines), strict=True))

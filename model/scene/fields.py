@@ -13,7 +13,7 @@ from unicodedata import category
 import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, Strict, ValidationError, model_validator
 
-from thermospindle.model.errors import BadInput
+from thermospindle.model.errors import BadInput, absent
 from thermospindle.model.files.formats import CURRENT, migrated
 from thermospindle.model.material import Law
 
@@ -148,7 +148,7 @@ def values_within(low: float, high: float) -> AfterValidator:
 def read_toml(file: Path) -> dict[str, Any]:
     """The tables of a TOML file; `BadInput` for what is none, or is written so that it cannot be read."""
     if not file.is_file():  # a pipe would be waited for
-        raise BadInput(f"{file}: no such file")
+        raise BadInput(f"{file}: {absent(file)}")
     try:
         return tomllib.loads(file.read_text(encoding="utf-8-sig"))  # a byte order mark is what some editors begin a file with
     except UnicodeDecodeError as error:

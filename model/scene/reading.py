@@ -59,6 +59,8 @@ def scene_path(path: str | Path) -> Path:
         path = SCENES / path
     file = path / "spindle.toml" if path.is_dir() else path
     if not file.is_file():
+        if file.is_dir():
+            raise BadInput(f"{file}: is a folder; a scene's file is expected there")
         names = ", ".join(shipped())
         meant = f"; did you mean {near}?" if (near := _nearest(path)) else f"; expected a folder with spindle.toml, that file, or the name of a shipped scene ({names})"
         raise BadInput(f"{path}: no scene there{meant}")

@@ -70,7 +70,7 @@ class Table:
 def compared(run: Run) -> Table:
     """Measured, published, computed and identified frequencies side by side.
 
-    The temperatures are the outermost of the run at which something was measured or published, or its own if there are not two.
+    The temperatures are the outermost of the run at which something was measured or published; with one such, that and the hottest; without, the run's own.
     """
     numbers, own = numbered(run), [temperature_of(s) for s in run.steps]
     papers = () if run.steps[0].point.condition.speed else published(run.spindle)
@@ -87,7 +87,7 @@ def compared(run: Run) -> Table:
             flexibility = {n: paper.flexibility[i] for n, i in rows.items()} | flexibility
             known.append(Peaks("published", label, temperature, {n: (frequency[i], np.nan) for n, i in rows.items()}))
     common = [t for t in own if any(abs(p.temperature - t) <= SAME_TEMPERATURE for p in known)]
-    ends = common if len(common) > 1 else own
+    ends = common if len(common) > 1 else [min(own), max(own)] if not common or common[0] in (min(own), max(own)) else [common[0], max(own)]
     peaks = []
     for t in dict.fromkeys((min(ends), max(ends))):
         step, at = run.steps[own.index(t)], numbers[own.index(t)]
@@ -99,7 +99,8 @@ def compared(run: Run) -> Table:
     peaks.sort(key=lambda p: list(plots.SOURCES).index(p.source))
     missing = dict.fromkeys(p.label for p in known if p.label not in {q.label for q in peaks})
     elsewhere = [f"{x} at {', '.join(f'{p.temperature:g}' for p in known if p.label == x)} °C" for x in missing]
-    lines = tuple(_row(run.steps[0], i, n, flexibility.get(n, "")) for i, n in numbers[0].items())
+    first = own.index(min(ends))
+    lines = tuple(_row(run.steps[first], i, n, flexibility.get(n, "")) for i, n in numbers[first].items())
     return Table(lines, tuple(peaks), (min(ends), max(ends)), titles, tuple(elsewhere))
 
 

@@ -130,7 +130,7 @@ def show_warmup(console: Console, warmup: Warmup) -> None:
     total = heat_sums(warmup)
     console.print(
         f"Slowest time constant {warmup.time_constant:.0f} s. Heat of the whole time: motor {total['motor']} and bearings "
-        f"{total['friction']} in, convection {total['convection']} out, {total['stored']} stored."
+        f"{total['friction']} in, convection {total['convection']}, {total['stored']} stored."
     )
     if warmup.feedback > NEAR:
         console.print(f"Near runaway: of bearing loads that are added, {warmup.feedback:.0%} come back through the heat they make; at 100% there is no steady state. It warms up more slowly than the time constant says, which is that of loads that stay.")
@@ -206,10 +206,12 @@ def _loose_rollers(warmup: Warmup) -> str:
 
 
 def heat_sums(warmup: Warmup) -> dict[str, str]:
-    """Where the heat of the whole time came from and went, in joules or kilojoules."""
+    """Where the heat of the whole time came from and went, in joules or kilojoules; convection with its way, for air that is warmer heats."""
     total = energy(warmup)
     large = max(map(abs, total.values())) >= 1e4
-    return {name: f"{1e-3 * value:.1f} kJ" if large else f"{value:.1f} J" for name, value in total.items()}
+    way = {"convection": "out" if total["convection"] >= 0 else "in"}
+    sizes = total | {"convection": abs(total["convection"])}
+    return {name: " ".join(filter(None, (f"{1e-3 * value:.1f} kJ" if large else f"{value:.1f} J", way.get(name)))) for name, value in sizes.items()}
 
 
 def _all_loaded(moment: Moment) -> bool:
@@ -256,7 +258,7 @@ def warmup_section(warmup: Warmup) -> tuple[str, str]:
         f"{warmup.time_constant:.0f} s. In the steady state the bearings are at {escape(bearings)} °C{pressed}{fits} and bearing friction is "
         f"{scale * sum(last.friction.values()):.0f} {unit}; natural frequencies move by {shifts} Hz.</p>"
         f"{''.join(f'<p>{escape(said)}</p>' for said in _on_the_way(warmup))}"
-        f"<p>Heat: motor {total['motor']}, bearings {total['friction']} in; convection {total['convection']} out; "
+        f"<p>Heat: motor {total['motor']}, bearings {total['friction']} in; convection {total['convection']}; "
         f"stored {total['stored']}.</p>"
     )
     return "Warm-up", minus(about) + figure(svg(drawn(warmup), "warmup", "temperatures, preload, friction and natural frequencies over time"))

@@ -13,7 +13,7 @@ from rich.console import Console
 
 from thermospindle.model.errors import BadInput
 from thermospindle.model.machine import FAINTEST, Spindle
-from thermospindle.report.folder import mark, whole_folder
+from thermospindle.report.folder import check_folder, mark, whole_folder
 from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.effects.known import equipped
 
@@ -48,6 +48,12 @@ def answered(
             write(folder, answer)
             mark(folder, asked, answer)
     return Answer(answer, show)
+
+
+def check_out(out: Path | None) -> None:
+    """`BadInput`, before anything is worked out for it, where no folder `out` can be written."""
+    if out is not None:
+        check_folder(Path(out))
 
 
 def with_effects(scene: Path, effect_files: Sequence[Path]) -> tuple[Spindle, tuple[Effect, ...]]:

@@ -20,6 +20,7 @@ from thermospindle.report.text import run as text
 from thermospindle.report.verbs.answer import (
     Answer,
     answered,
+    check_out,
     temperature_or_reference,
     temperatures_or_range,
     with_effects,
@@ -73,6 +74,7 @@ def impact(
 ) -> Answer:
     """A virtual impact-hammer test and the modes it shows; a folder holds it as a campaign and a Rerun log of every hit, the FRFs and the peaks."""
     asked = dict(locals())
+    check_out(out)
     spindle = with_hammer(with_effects(scene, effect_files)[0], hits, level)
     result = _virtual_tests(spindle, [temperature_or_reference(temperature, spindle)], speed_rpm, element, seed)
     return answered(

@@ -20,8 +20,8 @@ from thermospindle.model.units import RPM
 from thermospindle.report.progress import progress_bar
 from thermospindle.report.text.compare import comparison_json, show_before_after, show_comparison
 from thermospindle.report.text.runout_compare import runout_comparison_json, show_errors, show_runout_comparison
-from thermospindle.report.verbs.answer import Answer, answered, with_effects, write_json
-from thermospindle.sim.campaign.beside import doubtful, left_out
+from thermospindle.report.verbs.answer import Answer, answered, check_out, with_effects, write_json
+from thermospindle.sim.campaign.beside import check_points, doubtful, left_out
 from thermospindle.sim.campaign.campaign import Campaign, read_campaign
 
 
@@ -36,8 +36,11 @@ def compare(
 ) -> Answer:
     """Modes, dampings, shapes and FRFs of a campaign beside the scene; with `before`, another scene, whether the error fell."""
     asked = dict(locals()) | {"verb": "compare"}
+    check_out(out)
     spindle, whole = with_effects(scene, effect_files)[0], read_campaign(campaign)
     earlier = with_effects(before, effect_files)[0] if before else None
+    for s in filter(None, (spindle, earlier)):
+        check_points(s, whole)  # before modes of minutes are found for nothing
     unseen = held_out(spindle, whole, held_out_tests)
     turning = _of_runout(spindle, earlier, whole, unseen, verbose)
     tests = modal_tests(whole)

@@ -26,7 +26,7 @@ from thermospindle.report.progress import progress_bar
 from thermospindle.report.text.diagnosis.answer import diagnosis_json
 from thermospindle.report.text.diagnosis.words import show_diagnosis
 from thermospindle.report.text.runout_diagnosis import runout_diagnosis_json, show_runout_diagnosis
-from thermospindle.report.verbs.answer import Answer, answered, with_effects, write_json
+from thermospindle.report.verbs.answer import Answer, answered, check_out, with_effects, write_json
 from thermospindle.sim.campaign.beside import doubtful, left_out
 from thermospindle.sim.campaign.campaign import Campaign, read_campaign
 from thermospindle.sim.effects.effect import Effect
@@ -44,6 +44,9 @@ def diagnose(
 ) -> Answer:
     """Which physics the scene lacks to explain a campaign; `predictions` is an earlier diagnosis: did what it predicted come true?"""
     asked = dict(locals()) | {"verb": "diagnose"}
+    check_out(out)
+    if predictions:
+        outcomes(predictions, ())  # refused, where it is none, before anything is worked out
     (spindle, catalogue), whole = with_effects(scene, effect_files), without(read_campaign(campaign), held_out_tests)
     turning = _of_runout(spindle, catalogue, whole, verbose)
     tests = modal_tests(whole)

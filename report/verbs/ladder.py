@@ -9,7 +9,7 @@ from rich.console import Console
 
 from thermospindle.diagnosis.ladder.ladder import ladder as climb
 from thermospindle.report.text.ladder_table import growing, ladder_json, show_ladder
-from thermospindle.report.verbs.answer import Answer, answered, with_effects, write_json
+from thermospindle.report.verbs.answer import Answer, answered, check_out, with_effects, write_json
 from thermospindle.sim.campaign.beside import doubtful
 from thermospindle.sim.campaign.campaign import read_campaign
 from thermospindle.sim.effects import by_name
@@ -24,6 +24,7 @@ def ladder(
 ) -> Answer:
     """The error of a scene against a campaign at every step, with `effects` in their order (those that `diagnose` names by default)."""
     asked = dict(locals()) | {"verb": "ladder"}
+    check_out(out)
     (spindle, catalogue), tests = with_effects(scene, effect_files), read_campaign(campaign)
     chosen = None if effects is None else [by_name(name, catalogue) for name in effects]
     with growing(Console(stderr=True, markup=False)) as live:

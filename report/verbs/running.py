@@ -20,6 +20,7 @@ from thermospindle.report.text.warmup import lost_contact, show_warmup, warmup_j
 from thermospindle.report.verbs.answer import (
     Answer,
     answered,
+    check_out,
     temperature_or_reference,
     temperatures_or_range,
     with_effects,
@@ -51,6 +52,7 @@ def runout(
     A folder holds tables, figures and a Rerun log with a waterfall.
     """
     asked = dict(locals()) | {"verb": "runout"}
+    check_out(out)
     spindle, _ = with_effects(scene, effect_files)
     if seed is not None:
         spindle = with_imperfections(spindle, drawn(spindle, seed))
@@ -88,6 +90,7 @@ def warmup(
 ) -> Answer:
     """From a uniform `temperature` (C) at a speed, the scene's nominal one or 0 for a `soak` in air of another temperature; a folder holds CSV, figure and a Rerun log."""
     asked = dict(locals()) | {"verb": "warmup"}
+    check_out(out)
     if minutes is not None and minutes * MINUTE < SHORTEST:
         raise BadInput(f"--minutes {minutes:g}: a warm-up lasts longer than nothing; name a positive number, {SHORTEST / MINUTE:.1g} or more")
     spindle, _ = with_effects(scene, effect_files)
@@ -118,6 +121,7 @@ def resonances(
 ) -> Answer:
     """The verb `map`: natural frequencies against every bearing and unbalance line; a folder holds tables, figures and a Rerun log."""
     asked = dict(locals()) | {"verb": "map"}
+    check_out(out)
     if speed_rpm is not None and speed_rpm <= 0:
         raise BadInput(f"--speed {speed_rpm:g}: the nominal speed of a map must be positive")
     spindle, _ = with_effects(scene, effect_files)

@@ -13,7 +13,7 @@ from markupsafe import Markup
 from thermospindle.diagnosis import verdict
 from thermospindle.diagnosis.answer import answer_of, fitted_values, read_answer
 from thermospindle.diagnosis.compare.before_after import without
-from thermospindle.model.errors import BadInput
+from thermospindle.model.errors import BadInput, absent
 from thermospindle.model.files.formats import DIAGNOSIS, migrated
 from thermospindle.model.scene.reading import content_hash
 from thermospindle.report.text.diagnosis.answer import diagnosis_json
@@ -51,7 +51,7 @@ class Explanations:
 def read_explanations(file: Path, bench: Bench) -> Explanations:
     """The explanations of an answer of `spindle diagnose --json`; `BadInput` for another file."""
     if not file.is_file():
-        raise BadInput(f"--diagnosis {file}: cannot be read: no such file")
+        raise BadInput(f"--diagnosis {file}: cannot be read: {absent(file)}")
     try:
         read_answer(file)
     except BadInput as error:

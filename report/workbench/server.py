@@ -110,7 +110,8 @@ def words(bench: Bench) -> dict[str, Any]:
 
 def serve(made: Server) -> None:
     """Serve until interrupted or told to end."""
-    logging.getLogger("tornado.access").setLevel(logging.ERROR)  # who is refused is not told to the terminal
+    for quiet in ("tornado.access", "bokeh.server.views.ws"):  # who is refused, and that a tab was closed, is not told to the terminal
+        logging.getLogger(quiet).setLevel(logging.ERROR)
     loop = made.io_loop
     before = {s: signal.signal(s, lambda *_: loop.add_callback_from_signal(loop.stop)) for s in (signal.SIGINT, signal.SIGTERM)}
     try:

@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from thermospindle.model.errors import BadInput
+from thermospindle.model.errors import BadInput, absent
 from thermospindle.model.files.cells import cells, name_of
 from thermospindle.model.scene.fields import first_error
 from thermospindle.sim.campaign.form import MODE_COLUMNS, SHAPE_COLUMNS, ModeTable, ShapeTable
@@ -83,7 +83,7 @@ def _nodes(nodes: list[int]) -> str:
 def _cells(file: Path, columns: tuple[str, ...], form: type[BaseModel]) -> Iterator[tuple[str, dict[str, Any]]]:
     """Where every row of a CSV file is, for messages, and what its cells say; an empty cell is the form's default."""
     if not file.is_file():
-        raise BadInput(f"{file}: no such file")
+        raise BadInput(f"{file}: {absent(file)}")
     try:
         reader = csv.reader(file.read_text(encoding="utf-8").splitlines(), strict=True)
         lines = [(reader.line_num, line) for line in reader]

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from thermospindle.model.errors import BadInput
+from thermospindle.model.errors import BadInput, absent
 from thermospindle.model.files.cells import plain_number
 from thermospindle.model.machine import Point
 from thermospindle.sim.campaign.uff import read_motion
@@ -67,7 +67,7 @@ def read_runout(file: Path, points: Sequence[Point], speed: float, window: str |
     Raises `BadInput` naming file and column or set for wrong units, unknown nodes, gaps, NaN, dead or held channels, a record of few revolutions.
     """
     if not file.is_file():
-        raise BadInput(f"{file}: no such file")
+        raise BadInput(f"{file}: {absent(file)}")
     record = _from_uff(file, points) if file.suffix.lower() in (".uff", ".unv") else _from_csv(file, points)
     if record.kind == "spectrum" and window is None:
         raise BadInput(f"{file}: a spectrum needs spectrum_window in its test's table; allowed are {', '.join(WINDOWS)}")

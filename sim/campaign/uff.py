@@ -28,7 +28,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pyuff
 
-from thermospindle.model.errors import BadInput
+from thermospindle.model.errors import BadInput, absent
 from thermospindle.model.machine import Point
 from thermospindle.model.scene.fields import SMALLEST
 from thermospindle.model.types import Integers
@@ -72,7 +72,7 @@ def read_uff(path: Path, padded: bool = False) -> list[dict[str, Any]]:
     beyond the number of the header, as some analysers write them, are left out.
     """
     if not path.is_file():
-        raise BadInput(f"{path}: no such file")
+        raise BadInput(f"{path}: {absent(path)}")
     data = path.read_bytes()
     if not data.rstrip().endswith(b"-1"):
         raise BadInput(f"{path}: does not end with a line '    -1' as every UFF file does; it is cut off, or no UFF file")

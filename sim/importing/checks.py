@@ -36,9 +36,11 @@ def check_content(c: Content) -> None:
             raise BadInput(f"{c.file}: {x.where}: {x.value.size} values at {x.frequency.size} frequencies; there must be as many")
         if not np.any(x.value) and x.magnitude_only:
             raise BadInput(f"{c.file}: {x.where}: zero on every line; a dead channel is not allowed: tell it as \"ignore\" in columns")
-        if len(wrong := np.flatnonzero(~np.isfinite(x.value))):
+        used = (x.frequency > 0) | x.magnitude_only  # a receptance out of an acceleration is none at 0 Hz
+        if len(wrong := np.flatnonzero(~np.isfinite(x.value) & used)):
             more = f", and {len(wrong) - 1} more lines are none either" if len(wrong) > 1 else ""
-            raise BadInput(f"{c.file}: {x.where}: its value at {x.frequency[wrong[0]]:g} Hz is no number{more}; take the FRF out of the file, or export it again")
+            at = f"on line {wrong[0] + 1}" if any(q.key == "step_Hz" for q in c.questions) else f"at {x.frequency[wrong[0]]:g} Hz"
+            raise BadInput(f"{c.file}: {x.where}: its value {at} is no number{more}; take the FRF out of the file, or export it again")
 
 
 def check_columns(form: MappingForm, contents: Sequence[Content], mapping: Path | None) -> None:

@@ -182,7 +182,9 @@ def test_what_was_drafted_comes_with_the_tolerances_that_were_fitted_beside_it(a
     assert said["added"][0]["values"]["size"] == pytest.approx(effect_of(file).typical()["size"])
     assert load(tmp_path / "new").build.deviations == TOLERANCES
     other = found | {"tolerances_beside": ["mount stiffness"], "effects": [], "candidates": []}
-    assert "no candidate has effect" in add("other", "slipping", found=other, options=["--effect", str(file)])
+    refused = add("other", "slipping", found=other, options=["--effect", str(file)])
+    assert "no candidate has effect" in refused
+    assert "without --from the effect is added with the values of its own file" in refused  # what is to be done was not said
 
 
 def test_of_the_candidate_that_is_taken_it_is_said_that_a_law_departs(add):

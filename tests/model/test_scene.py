@@ -169,6 +169,10 @@ def test_refused(raw, spoil, key, allowed):
 def test_a_file_that_is_not_there_or_not_toml(tmp_path):
     with pytest.raises(BadInput, match="no scene there"):
         load(tmp_path)
+    (tmp_path / "spindle.toml").mkdir()
+    with pytest.raises(BadInput, match=r"spindle\.toml: is a folder; a scene's file is expected there$"):  # it was asked whether the same folder was meant
+        load(tmp_path)
+    (tmp_path / "spindle.toml").rmdir()
     (tmp_path / "spindle.toml").write_text("title = ", encoding="utf-8")
     with pytest.raises(BadInput, match="not a TOML file"):
         load(tmp_path)

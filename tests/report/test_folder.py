@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.command_line import refused
+from tests.conftest import DATA, SCENE
 from thermospindle.model.errors import BadInput
 from thermospindle.model.files.whole import whole
 from thermospindle.report.folder import MARK, mark, whole_folder
@@ -82,3 +84,34 @@ def test_nor_does_a_campaign_come_there(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path / "here")
     with pytest.raises(BadInput, match="is where you stand"), whole(Path("")) as folder:
         folder.mkdir()
+
+
+@pytest.mark.parametrize("verb", ["runout", "warmup", "map", "impact", "compare", "diagnose", "ladder"])
+def test_a_folder_that_cannot_be_written_is_refused_before_anything_is_worked_out(verb, tmp_path, capsys, monkeypatch):
+    """A diagnosis of minutes was lost to an --out that holds something else."""
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "notes.txt").write_text("mine")
+    of = {"impact": "chain", "compare": "compare", "diagnose": "diagnose", "ladder": "ladder"}.get(verb, "running")
+    monkeypatch.setattr(f"thermospindle.report.verbs.{of}.with_effects", lambda *_: pytest.fail("a scene is read"))
+    campaign = [DATA / "foreign_none"] if verb in ("compare", "diagnose", "ladder") else []
+    assert "holds something that spindle did not write" in refused(capsys, verb, SCENE, *campaign, "--out", tmp_path / "mine")
+    assert "is a file" in refused(capsys, verb, SCENE, *campaign, "--out", tmp_path / "mine" / "notes.txt")
+    assert [p.name for p in tmp_path.iterdir()] == ["mine"]
+
+
+def test_what_cannot_be_used_is_refused_before_anything_is_worked_out(tmp_path, capsys, monkeypatch):
+    """A campaign of another machine, after its modes were found; an earlier diagnosis that is none, when the new one was there."""
+    (tmp_path / "none.json").write_text("{")
+    for of in ("compare", "diagnose"):
+        monkeypatch.setattr(f"thermospindle.report.verbs.{of}.progress_bar", lambda *_: pytest.fail("it is worked out"))
+    assert "points.1.body = 'hub': no body of scene free_shaft; allowed are shaft" in refused(capsys, "compare", "free_shaft", DATA / "foreign_none")
+    assert "no body of scene free_shaft" in refused(capsys, "compare", SCENE, DATA / "foreign_none", "--before", "free_shaft")
+    for file, why in ((tmp_path / "none.json", "is not an answer of spindle diagnose --json"), (tmp_path, "cannot be read: it is a folder"), (tmp_path / "no", "no such file")):
+        assert why in refused(capsys, "diagnose", SCENE, DATA / "foreign_none", "--predictions", file)
+
+
+def test_a_folder_in_the_place_of_a_file_is_said_to_be_one(tmp_path, capsys):
+    (tmp_path / "m.toml").mkdir()
+    assert refused(capsys, "import", DATA / "foreign_none" / "T20_n0.uff", "--mapping", tmp_path / "m.toml", "--out", tmp_path / "c").endswith("m.toml: it is a folder\n")
+    assert refused(capsys, "add", SCENE, "bond_softening", "--from", tmp_path, "--out", tmp_path / "mine").endswith("cannot be read: it is a folder\n")
+    assert [p.name for p in tmp_path.iterdir()] == ["m.toml"]

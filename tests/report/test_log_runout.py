@@ -25,7 +25,7 @@ from thermospindle.model.units import RPM, TO_MM
 from thermospindle.report.figures.runout import LEAST, LINE, RANGE, _polar, motion_figure, polar_figure, spectrum_figure, waterfall_figure
 from thermospindle.report.log.read import read_log
 from thermospindle.report.log.told import describe
-from thermospindle.report.log.turning.runout import log_signals, orbit_pieces, rolling_elements, write_runout_log
+from thermospindle.report.log.turning.runout import log_signals, orbit_pieces, rolling_elements, summary, write_runout_log
 from thermospindle.sim.operating import operating_point
 from thermospindle.sim.posing import cage_turns, frame_indices, turning_poses
 from thermospindle.sim.running.probes import AXIAL, X, Y
@@ -70,6 +70,13 @@ def test_numbers_come_back_bit_for_bit(record, spectra, file):
         assert own["speed_rad_per_s"] == other.speed
         for name in ("frequency", "radial", "axial", "natural"):
             assert np.array_equal(own[name], getattr(other, name))
+
+
+def test_the_summary_names_every_bearing_that_has_a_part_in_a_line(record):
+    """As the terminal and the page do; it named the first of both."""
+    shared = next(g for g in record.lines[:16] if len({c.bearing for c in g.causes}) > 1)
+    names = ", ".join(dict.fromkeys(c.bearing for c in shared.causes if c.bearing))
+    assert f"| {shared.causes[0].name} | {names} {shared.causes[0].cause} |" in summary(record)
 
 
 def test_a_logged_value_costs_at_most_25_bytes(record, file, tmp_path):

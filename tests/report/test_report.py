@@ -273,6 +273,26 @@ def test_without_measurements_or_file(run: Run, alone: str, temperatures: int):
     assert number(rows[0][3]) == pytest.approx(run.steps[0].point.modes[0].frequency, abs=0.0501)
 
 
+def test_what_was_measured_between_the_ends_of_a_run_is_shown(run: Run):
+    """It was said to be missing "for want of a run at its temperature", beside a run at just that one, as of the free shaft at 20 of 15 to 25 C."""
+    campaign = other_campaign([ModeRow("a", 1, "axial", 1010.0, 1.0)], temperature=40.0)
+    cold, hot = run.steps[0], run.steps[-1]
+    point = replace(hot.point, condition=replace(hot.point.condition, temperature=40.0))
+    table = compared(Run(replace(run.spindle, file=None), (cold, replace(hot, point=point), hot), (campaign,)))
+    assert table.elsewhere == ()
+    assert table.temperatures == (40.0, hot.point.condition.temperature)
+    assert set(table.sources()) == {"measured", "computed", "identified"}
+
+
+def test_records_without_MuJoCo_are_said_to_be_so(run: Run, text: str):
+    """Of the reduced model the page said that the spindle was struck in MuJoCo."""
+    assert "The spindle was struck in MuJoCo, in time, with linear bearing elements, and its FRFs" in text
+    reduced = [replace(s, test=replace(s.test, element="reduced")) for s in run.steps]
+    page = html(Run(replace(run.spindle, file=None), tuple(reduced), ()))
+    assert "struck in MuJoCo" not in page
+    assert "the linear model, reduced to its modes, without MuJoCo, and its FRFs" in page
+
+
 def test_measured_elsewhere_is_named_not_shown(run: Run):
     """A campaign at temperatures that the run does not have."""
     campaign = other_campaign([ModeRow("a", 1, "axial", 1010.0, 1.0)], temperature=35.0)

@@ -1,9 +1,11 @@
 """The workbench served: who is let in and who is refused, over real HTTP and websocket."""
 
 import asyncio
+import logging
 import os
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from urllib.error import HTTPError
 from urllib.request import Request, urlopen
 
@@ -14,6 +16,7 @@ from tornado.websocket import websocket_connect
 from tests.conftest import SCENE
 from tests.test_site import ANSWERS
 from thermospindle.cli import main
+from thermospindle.report.workbench.server import serve
 
 
 def status(address, method="GET", **headers):
@@ -106,3 +109,9 @@ def test_a_port_that_is_none_is_refused(port, capsys):
         main(["workbench", str(SCENE), "--port", port])
     assert ended.value.code == 2
     assert "is not a port, 1 to 65535" in capsys.readouterr().err
+
+
+def test_a_tab_that_is_closed_is_not_told_to_the_terminal(caplog):
+    """Bokeh's server warns of a message that finds nobody: a tab closed while an answer was on its way."""
+    serve(SimpleNamespace(io_loop=SimpleNamespace(start=lambda: logging.getLogger("bokeh.server.views.ws").warning("Failed sending message")), start=lambda: None, stop=lambda: None))
+    assert not caplog.records

@@ -285,6 +285,8 @@ def test_units_go_with_the_size_of_the_machine(warm, monkeypatch):
     assert axes.lines[0].get_ydata() == pytest.approx([m.friction[warm.spindle.bearings[0].name] for m in hot.moments])
     monkeypatch.setattr(text, "energy", lambda warmup: {"motor": 0.0, "friction": 2544024.0, "convection": 2139693.0, "stored": 404331.0})
     assert "bearings 2544.0 kJ in; convection 2139.7 kJ out; stored 404.3 kJ" in warmup_section(warm)[1]
+    monkeypatch.setattr(text, "energy", lambda warmup: {"motor": 0.0, "friction": 0.0, "convection": -1664.3, "stored": 1664.3})
+    assert "bearings 0.0 J in; convection 1664.3 J in; stored 1664.3 J" in warmup_section(warm)[1]  # it was -1664.3 J out of a spindle in a warm chamber
 
 
 @pytest.mark.slow

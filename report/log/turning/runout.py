@@ -172,7 +172,7 @@ def summary(runout: Runout) -> str:
         lines.append(f"| {name} | " + " | ".join(f"{TO_NM * v:.1f}" for v in row) + " |")
     lines += ["", "Strongest lines:", "", "| Hz | | nm | line | cause |", "|---|---|---|---|---|"]
     for g in runout.lines[:16]:
-        cause = f"{g.causes[0].bearing} {g.causes[0].cause}".strip() if g.causes else "unexplained"
+        cause = f"{', '.join(dict.fromkeys(c.bearing for c in g.causes if c.bearing))} {g.causes[0].cause}".strip() if g.causes else "unexplained"
         name = g.causes[0].name if g.causes else ""
         lines.append(f"| {g.frequency:.1f} | {g.direction} | {TO_NM * g.amplitude:.1f} | {name} | {cause} |")
     return "\n".join([*lines, *made_from(runout.point.spindle)]) + "\n"

@@ -137,7 +137,7 @@ def summary(warmup: Warmup) -> str:
         lines.append(f"| {k + 1} {mode.kind}, Hz | " + " | ".join(f"{f:.1f}" if np.isfinite(f) else "lost" for f in values) + " |")
     heat = heat_sums(warmup)
     lines += ["", f"Slowest time constant {warmup.time_constant:.0f} s.", ""]
-    lines += [f"Heat: motor {heat['motor']}, bearings {heat['friction']} in; convection {heat['convection']} out; stored {heat['stored']}."]
+    lines += [f"Heat: motor {heat['motor']}, bearings {heat['friction']} in; convection {heat['convection']}; stored {heat['stored']}."]
     lines += ["", f"Left out: {', '.join(warmup.left_out)}."] if warmup.left_out else []
     return "\n".join([*lines, *made_from(spindle)]) + "\n"
 

@@ -162,6 +162,9 @@ def _curves(file: Path, columns: Sequence[Column], settings: FileForm) -> tuple[
     else:
         questions.append(Question(file.name, "step_Hz", f"the frequencies of its {n} lines: step_Hz, and start_Hz where the first is not at 0 Hz"))
         frequency = np.arange(float(n))
+    if not questions and len(frequency) == n and not np.all(above := frequency > 0):  # at 0 Hz is no motion, and below it the conjugate of what is above
+        frequency, n = frequency[above], int(np.count_nonzero(above))
+        own = [replace(c, values=c.values[above]) if len(c.values) == len(above) else c for c in own]
     groups: dict[tuple[End, End], dict[str, Column]] = {}
     for c in own:
         assert c.role is not None

@@ -12,12 +12,15 @@ PARTS = {
     "real": "real", "re": "real", "imaginary": "imaginary", "imag": "imaginary", "im": "imaginary", "img": "imaginary",
     "magnitude": "magnitude", "mag": "magnitude", "abs": "magnitude", "amplitude": "magnitude", "amp": "magnitude", "modulus": "magnitude",
     "db": "decibel", "decibel": "decibel", "decibels": "decibel", "phase": "phase", "arg": "phase", "angle": "phase", "complex": "complex",
+    "realteil": "real", "imaginärteil": "imaginary", "betrag": "magnitude", "phasenwinkel": "phase", "winkel": "phase",
 }  # fmt: skip
-AXES = {"frequency": "frequency", "freq": "frequency", "f": "frequency", "frequenz": "frequency", "fréquence": "frequency", "time": "time", "t": "time", "zeit": "time"}
+AXES = {"frequency": "frequency", "freq": "frequency", "f": "frequency", "frequenz": "frequency", "fréquence": "frequency", "omega": "frequency", "ω": "frequency", "time": "time", "t": "time", "zeit": "time"}
+ANGULAR = ("omega", "ω")
+"""Axes that are in rad/s where they name no unit."""
 FUNCTIONS = ("h", "frf", "h1", "h2", "hv", "g", "tf")
-COHERENCE = ("coherence", "coh", "gamma2", "γ2", "γ²")
-FORCES = ("force", "hammer", "excitation", "kraft", "impact")
-RESPONSES = ("response", "acceleration", "accelerometer", "accel", "acc", "velocity", "vibrometer", "vel", "displacement", "disp")
+COHERENCE = ("coherence", "coh", "kohärenz", "gamma2", "γ2", "γ²")
+FORCES = ("force", "hammer", "excitation", "kraft", "anregung", "impact")
+RESPONSES = ("response", "acceleration", "accelerometer", "accel", "acc", "velocity", "vibrometer", "vel", "displacement", "disp", "antwort", "beschleunigung", "schwinggeschwindigkeit", "schwingweg")
 KINDS_OF_CHANNEL = {*FORCES, *RESPONSES}
 ROLES = 'frequency, time, "H(3,1)" with real, imaginary, magnitude, decibel or phase behind it, coherence(3,1), sd(3,1), force, response 3, ignore'
 """What may stand in `columns` of a mapping."""
@@ -51,7 +54,7 @@ def _role(text: str, unit: str) -> Role | None:
     """The role that a heading without its unit tells."""
     low = text.lower().strip(" :_-")
     if (axis := re.sub(r"[ _-]+(domain|axis|vector)$", "", low)) in AXES:
-        return Role(AXES[axis], unit=unit)
+        return Role(AXES[axis], unit=unit or ("rad/s" if axis in ANGULAR else ""))
     if not unit and (axis_unit := re.fullmatch(r"([^\W_]+)_(hz|khz|s|ms)", low)) and axis_unit[1] in AXES:  # "frequency_kHz"
         return Role(AXES[axis_unit[1]], unit=axis_unit[2].replace("hz", "Hz"))
     if low in ("hz", "s", "sec"):
@@ -67,7 +70,7 @@ def _role(text: str, unit: str) -> Role | None:
     if pair is None and (over := re.fullmatch(r"([^\s/|]+)\s*[/|]\s*([^\s/|]+)[\s_:]+([A-Za-z]+)\W*", text)) and over[3].lower() in PARTS and not {*map(str.lower, over.groups()[:2])} & KINDS_OF_CHANNEL:
         return _role(f"H({over[1]},{over[2]}) {over[3]}", unit)  # "hub/seat mag"
     rest = text[: pair.start()] + " " + text[pair.end() :] if pair else text
-    words = [w for w in re.split(r"[^A-Za-zéγ²0-9]+", rest.lower()) if w]
+    words = [w for w in re.split(r"[^A-Za-zäöüéγ²0-9]+", rest.lower()) if w]
     told = Role("H", "", *ends, unit)
     if any(w in COHERENCE for w in words):
         return replace(told, kind="coherence")

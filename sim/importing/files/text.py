@@ -168,7 +168,7 @@ def _number(text: str, comma: bool) -> float | complex:
 
 
 def _numbers(file: Path, lines: list[tuple[int, str]], separator: str | None, comma: bool) -> tuple[list[list[float | complex]], int]:
-    """The rows of the last block of numbers, and the index of its first line."""
+    """The rows of the last block of numbers, and the index of its first line. The first one may hold what is no number, where its axis begins at 0."""
     rows: list[list[float | complex]] = []
     for index in range(len(lines) - 1, -1, -1):
         number, line = lines[index]
@@ -191,7 +191,7 @@ def _numbers(file: Path, lines: list[tuple[int, str]], separator: str | None, co
         index = -1
     rows.reverse()
     for at, row in enumerate(rows):
-        if not np.all(np.isfinite(row)):
+        if not np.all(np.isfinite(row)) and not (at == 0 and row[0] == 0):  # an FRF at 0 Hz, where 20 log10(0) and 0 / 0 are none
             column = int(np.argmin(np.isfinite(row))) + 1
             raise BadInput(f"{file}: line {lines[index + 1 + at][0]}: column {column}: NaN or infinite; only finite numbers are allowed")
     return rows, index + 1

@@ -1,8 +1,8 @@
-"""Imported FRFs beside those of the scene: a channel that is larger by the ratio of two units, one that is reversed, and two channels that are each other's.
+"""Imported FRFs beside those of the scene: lines in another unit, a channel that is larger by the ratio of two units, one that is reversed, and two that are each other's.
 
 A model is never right, and none of this is refused. A factor is told where every FRF of a channel has it in the median over the louder half of its lines, the other sign where
 the phases of all are across from the computed ones there; two channels where each fits the other's computed FRFs at least `BETTER` times as well as its own, in rms of ln
-magnitude about the median, which no factor changes.
+magnitude about the median, which no factor changes; lines in rad/s for Hz where the FRFs of all tests fit the computed ones so much better there.
 """
 
 from __future__ import annotations
@@ -35,6 +35,8 @@ ACROSS = -0.5
 LARGEST = 1e30
 """Of any unit: a computed FRF as large as that is of a spindle that no bearing holds."""
 BETTER = 2.0
+AXES = {1 / (2 * np.pi): "rad/s told as Hz", 2 * np.pi: "Hz told as rad/s"}
+"""Factors from the lines as told to those that they may be. Others take lines out of the band of the scene's hammer test."""
 MOST_LINES = 1000
 """Of an FRF that are looked at."""
 
@@ -64,21 +66,29 @@ def likenesses(spindle: Spindle, campaign: Campaign) -> list[str]:
         return []
     try:
         check_points(spindle, campaign)
-        tests = [pairs for t in campaign.tests if (pairs := _pairs(spindle, campaign, t))]
+        tests = _tests(spindle, campaign)
+        if (axis := _axis(spindle, campaign, tests)) is not None:
+            return [axis]
     except (BadInput, NoEquilibrium, OutsideRange) as error:
         return [f"the FRFs are not set beside those of {spindle.name}: {error}"]
     names = {p.node: f"{p.node} ({p.name})" for p in campaign.points}
-    return [*_factors(tests, names, spindle.name), *_reversed(tests, names, spindle.name), *_swapped(tests, names, spindle.name)]
+    exchanged = _swapped(tests, names, spindle.name)  # beside another's FRFs, factors and signs say nothing
+    return exchanged or [*_factors(tests, names, spindle.name), *_reversed(tests, names, spindle.name)]
 
 
-def _pairs(spindle: Spindle, campaign: Campaign, test: Test) -> list[Pair]:
+def _tests(spindle: Spindle, campaign: Campaign, scale: float = 1.0) -> list[list[Pair]]:
+    """The FRFs of every test that has some, its lines taken `scale` times as high as they are told."""
+    return [pairs for t in campaign.tests if (pairs := _pairs(spindle, campaign, t, scale))]
+
+
+def _pairs(spindle: Spindle, campaign: Campaign, test: Test, scale: float) -> list[Pair]:
     """The FRFs of a test at some of its lines; none of a table of modes, or where the model has no answer."""
     own = beside(spindle, campaign.points, test, condition_of(test))
     if own is None or not len(own.measured.frequency):
         return []
     step = -(-len(own.measured.frequency) // MOST_LINES)
     measured = own.measured.value[..., ::step]
-    computed = own.computed(own.measured.frequency[::step])
+    computed = own.computed(scale * own.measured.frequency[::step])
     if not np.abs(computed).max() < LARGEST:
         return []
     size = np.sqrt(np.mean(np.abs(computed) ** 2, axis=-1))
@@ -90,6 +100,27 @@ def _pairs(spindle: Spindle, campaign: Campaign, test: Test) -> list[Pair]:
     cosine = np.where(turns[0] & turns[1], cosine, 0.0)
     ends = [(i, j, r, h) for i, r in enumerate(own.measured.response_nodes) for j, h in enumerate(own.measured.reference_nodes)]
     return [Pair(r, h, x[i, j], a[i, j], float(cosine[i, j]), (silence[0], silence[1]), bool(size[i, j] > SILENT * size.max())) for i, j, r, h in ends]
+
+
+# ---------------------------------------------------------------- lines in another unit
+
+
+def _axis(spindle: Spindle, campaign: Campaign, tests: Sequence[Sequence[Pair]]) -> str | None:
+    """What is said where the FRFs of all tests together fit the scene far better with their lines in another unit."""
+    told = _misfit([p for pairs in tests for p in pairs if p.loud])
+    if not SCATTER < told < float("inf"):
+        return None
+    for scale, mistake in AXES.items():
+        if BETTER * _misfit([p for pairs in _tests(spindle, campaign, scale) for p in pairs if p.loud]) < told:
+            lines = next(t.frf.frequency for t in campaign.tests if t.frf is not None)
+            return f"all FRFs fit those that {spindle.name} has far better with lines from {scale * lines[0]:.4g} to {scale * lines[-1]:.4g} Hz: is the unit of their axis another than is told, as {mistake}?"
+    return None
+
+
+def _misfit(pairs: Sequence[Pair]) -> float:
+    """Rms of ln magnitude between measured and computed, each FRF about its own median; infinite without any, as where the model has no answer."""
+    off = [p.heard[0] - p.heard[1] for p in pairs]
+    return float(np.sqrt(np.mean(np.concatenate([x - np.median(x) for x in off]) ** 2))) if off else float("inf")
 
 
 # ---------------------------------------------------------------- factors of units, and signs

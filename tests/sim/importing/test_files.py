@@ -14,6 +14,7 @@ from thermospindle.report.verbs.importing import bring
 from thermospindle.sim.campaign.campaign import read_campaign
 from thermospindle.sim.campaign.uff import write_frf
 from thermospindle.sim.identification.frf import out_of
+from thermospindle.sim.importing.files.labels import role_of
 from thermospindle.sim.importing.files.mode_tables import from_modes
 from thermospindle.sim.importing.files.reading import content
 from thermospindle.sim.importing.mapping import FileForm
@@ -90,6 +91,71 @@ def test_lines_without_values_at_the_ends_are_left_out(tmp_path, first, last):
     frf = imported(tmp_path, "", file)
     np.testing.assert_allclose(frf.frequency, FREQUENCY[1:-1])
     np.testing.assert_allclose(frf.value, FRF.value[:, :, 1:-1], rtol=1e-8, atol=1e-12)
+
+
+NOT_AT_0_HZ = {"real": "nan", "imag": "nan", "mag": "0", "dB": "-inf", "phase": "nan"}
+
+
+@pytest.mark.parametrize("parts", [("real", "imag"), ("mag", "phase"), ("dB", "phase")])
+def test_a_line_at_0_Hz_without_a_value_is_left_out(tmp_path, parts):
+    """Where a motion is divided by omega^2 it is 0 / 0, and 20 log10(0); a coherence beside it has its value."""
+    value = FRF.value[0, 0]
+    cells = {"real": value.real, "imag": value.imag, "mag": np.abs(value), "dB": 20 * np.log10(np.abs(value)), "phase": np.degrees(np.angle(value))}
+    heads = [f"H(1,1) {p} [{'deg' if p == 'phase' else '(m/s)/N'}]" for p in parts if p != "dB"] if "dB" not in parts else ["H(1,1) mag [dB re 1 (m/s)/N]", "H(1,1) phase [deg]"]
+    file = table(tmp_path / "T20.csv", ["Frequency [Hz]", *heads, "coherence(1,1)"], [FREQUENCY, *(cells[p] for p in parts), 0.99 + 0 * FREQUENCY])
+    head, *rows = file.read_text().splitlines()
+    file.write_text("\n".join([head, ",".join(["0.0", *(NOT_AT_0_HZ[p] for p in parts), "1"]), *rows]) + "\n")
+    frf = imported(tmp_path, "", file)
+    np.testing.assert_allclose(frf.frequency, FREQUENCY)
+    np.testing.assert_allclose(frf.value[0, 0], value, rtol=1e-7)
+
+
+def test_the_mirrored_half_of_a_spectrum_is_left_out(tmp_path):
+    """Negative frequencies, before the others or behind them as a Fourier transform has them; at 0 Hz there is no number."""
+    step = FREQUENCY[1] - FREQUENCY[0]
+    behind = np.concatenate([FREQUENCY, -FREQUENCY[::-1]])
+    value = np.concatenate([FRF.value, FRF.value[..., ::-1].conj()], -1)
+    before = np.argsort(behind)
+    nodes = {"response_nodes": FRF.response_nodes, "reference_nodes": FRF.reference_nodes}
+    for k, (axis, own) in enumerate(((behind, value), (behind[before], value[..., before]))):
+        (tmp_path / str(k)).mkdir()
+        np.savez(tmp_path / str(k) / "T20.npz", frequency=axis, H=own, **nodes)
+        frf = imported(tmp_path / str(k), '[[files]]\nfile = "T20.npz"\nunit = "(m/s)/N"\n', tmp_path / str(k) / "T20.npz")
+        np.testing.assert_allclose(np.diff(frf.frequency), step)
+        np.testing.assert_array_equal(frf.value, FRF.value)
+
+
+def test_headings_may_be_german(tmp_path):
+    """With decimal commas, in the encoding of a German Windows."""
+    value = FRF.value[0, 0]
+    heads = ["Frequenz [Hz]", "H(1,1) Realteil [(m/s)/N]", "H(1,1) Imaginärteil [(m/s)/N]", "Kohärenz(1,1)"]
+    file = table(tmp_path / "T20.csv", ["Frequency [Hz]", "a", "b", "c"], [FREQUENCY, value.real, value.imag, 0.99 + 0 * FREQUENCY])
+    _, *rows = file.read_text().splitlines()
+    file.write_text("\n".join([";".join(heads), *(row.replace(",", ";").replace(".", ",") for row in rows)]) + "\n", encoding="latin-1")
+    frf = imported(tmp_path, "", file)
+    np.testing.assert_allclose(frf.value[0, 0], value, rtol=1e-7)
+    assert frf.coherence is not None
+    told = {"Kraft 1 [N]": "force", "Anregung [N]": "force", "Beschleunigung 3:-X [g]": "response", "Schwinggeschwindigkeit 2 [mm/s]": "response", "Zeit [s]": "time", "H(1,1) Betrag": "H"}
+    for heading, kind in told.items():
+        assert (role := role_of(heading)) is not None, heading
+        assert role.kind == kind
+
+
+@pytest.mark.parametrize("name", ["omega", "ω"])
+def test_an_axis_called_omega_is_in_rad_per_s(tmp_path, name):
+    nodes = {"response_nodes": FRF.response_nodes, "reference_nodes": FRF.reference_nodes}
+    np.savez(tmp_path / "T20.npz", **{name: 2 * np.pi * FREQUENCY}, H=FRF.value, **nodes)
+    frf = imported(tmp_path, '[[files]]\nfile = "T20.npz"\nunit = "(m/s)/N"\n', tmp_path / "T20.npz")
+    np.testing.assert_allclose(frf.frequency, FREQUENCY)
+
+
+def test_a_value_that_is_no_number_is_named_by_its_line_where_no_axis_is_told(tmp_path):
+    """It was told at so many Hz as it has lines before it."""
+    value = FRF.value.copy()
+    value[0, 0, 5] = np.nan
+    np.savez(tmp_path / "T20.npz", H=value, response_nodes=FRF.response_nodes, reference_nodes=FRF.reference_nodes)
+    with pytest.raises(BadInput, match=r"T20\.npz: H\[0,0\]: its value on line 6 is no number; take"):
+        imported(tmp_path, '[[files]]\nfile = "T20.npz"\nunit = "(m/s)/N"\n', tmp_path / "T20.npz")
 
 
 def test_a_magnitude_without_values_is_a_dead_channel(tmp_path, recwarn):

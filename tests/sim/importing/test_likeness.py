@@ -13,6 +13,7 @@ from tests.sim.importing.exported import table
 from thermospindle.model.scene.reading import load
 from thermospindle.report.verbs.importing import bring
 from thermospindle.sim.campaign.campaign import Campaign, read_campaign
+from thermospindle.sim.importing.frfs import likeness
 from thermospindle.sim.importing.frfs.likeness import likenesses
 from thermospindle.sim.importing.units import of_frf
 
@@ -122,3 +123,23 @@ def test_import_says_it_and_changes_nothing(foreign, tmp_path):
         assert kept is not None
         assert found is not None
         np.testing.assert_allclose(kept.value[0, 0], found[1] * one, rtol=1e-6)
+
+
+def test_nothing_is_said_of_lines_where_the_model_has_no_answer(spindle, foreign, monkeypatch):
+    """Neither with those that are told nor with others: what is compared with nothing fits nothing."""
+    shifted = replace(foreign, tests=tuple(replace(t, frf=t.frf and replace(t.frf, frequency=2 * np.pi * t.frf.frequency)) for t in foreign.tests))
+    own = likeness._pairs
+    for silent in ((1.0,), (1 / (2 * np.pi), 2 * np.pi)):
+        monkeypatch.setattr(likeness, "_pairs", lambda s, c, t, scale, silent=silent: [] if scale in silent else own(s, c, t, scale))
+        assert not [said for said in likenesses(spindle, shifted) if "rad/s" in said]
+
+
+@pytest.mark.parametrize(("scale", "mistake"), [(2 * np.pi, "rad/s told as Hz"), (0.5 / np.pi, "Hz told as rad/s")])
+@pytest.mark.parametrize("name", ["foreign_none", "foreign_bond"])
+def test_lines_in_rad_per_s_are_said(name, scale, mistake, spindle):
+    """They reach into the band of the scene's hammer test, so that their frequencies alone tell nothing."""
+    campaign = read_campaign(DATA / name)
+    tests = tuple(replace(t, frf=t.frf and replace(t.frf, frequency=scale * t.frf.frequency)) for t in campaign.tests)
+    [said] = likenesses(spindle, replace(campaign, tests=tests))
+    assert said.startswith("all FRFs fit those that hdd_2003 has far better with lines from 40")
+    assert mistake in said
