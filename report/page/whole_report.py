@@ -22,7 +22,8 @@ from thermospindle.report.text.warmup import warmup_section
 from thermospindle.sim.campaign.campaign import Campaign
 from thermospindle.sim.effects.effect import Effect
 from thermospindle.sim.operating import operating_point
-from thermospindle.sim.resonance.map import SEED, fastest, resonance_map, stages
+from thermospindle.sim.resonance.grid import SEED
+from thermospindle.sim.resonance.map import fastest, resonance_map, stages
 from thermospindle.sim.run import Run
 from thermospindle.sim.running.runout import planned, runout, with_imperfections
 from thermospindle.sim.warmup import STAGES, warm_up

@@ -3,6 +3,8 @@
 ========  ==============================================================================================================
 map       where natural frequencies meet the lines of bearings and unbalance, over temperature and speed: a Campbell
           diagram with two axes
+grid      the grid of a resonance map: conditions of one spindle with their modes followed from one to the next, and
+          the crossings of lines and modes between its places, and just beyond them
 found     what a map holds: modes and lines over the grid, and where they meet
 between   crossings of a line and a mode between two neighbours of the grid, interpolated
 critical  modes at the speed of what turns, which its unbalance drives, and how strongly

@@ -6,8 +6,9 @@ import pytest
 from tests.conftest import ROOT
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
-from thermospindle.sim.resonance import map as resonance
+from thermospindle.sim.resonance import grid as searched
 from thermospindle.sim.resonance.between import between
+from thermospindle.sim.resonance.map import resonance_map
 
 
 def test_a_cubic_difference_is_met_where_it_is_zero():
@@ -28,18 +29,18 @@ def test_crossings_of_a_flexible_spindle(monkeypatch):
     spindle = load(ROOT / "scenes" / "five_bearing")
     nominal = Condition(25.0, spindle.nominal_speed)
     grid = np.array([20.0, 30.0]), spindle.nominal_speed * np.linspace(0.8, 1.2, 5)
-    monkeypatch.setattr(resonance, "EXACT", 12)
+    monkeypatch.setattr(searched, "EXACT", 12)
     told: list[str] = []
-    found = resonance.resonance_map(spindle, *grid, nominal, multiples=1, progress=told.append)
+    found = resonance_map(spindle, *grid, nominal, multiples=1, progress=told.append)
     assert found.interpolated is not None
     assert found.interpolated.checked >= 8
     assert found.interpolated.crossings == sum(c.interpolated for c in found.coincidences) > 0
     assert found.interpolated.frequency_error < 1e-3
     assert found.interpolated.strength_error < 0.02
     assert found.interpolated.largest_strength_error < 0.1
-    assert len(told) > resonance.PARTS
-    monkeypatch.setattr(resonance, "EXACT", 10**6)
-    exact = resonance.resonance_map(spindle, *grid, nominal, multiples=1)
+    assert len(told) > searched.PARTS
+    monkeypatch.setattr(searched, "EXACT", 10**6)
+    exact = resonance_map(spindle, *grid, nominal, multiples=1)
     assert exact.interpolated is None
     want = {(c.line.bearing, c.line.name, c.line.direction, c.line.whirl, c.mode.number, c.at_nominal_speed): c for c in exact.coincidences}
     have = {(c.line.bearing, c.line.name, c.line.direction, c.line.whirl, c.mode.number, c.at_nominal_speed): c for c in found.coincidences}
@@ -49,6 +50,6 @@ def test_crossings_of_a_flexible_spindle(monkeypatch):
 
 
 def test_a_spindle_of_rigid_bodies_is_found_exactly(spindle):
-    found = resonance.resonance_map(spindle, [20.0, 60.0], [600.0, 900.0], Condition(20.0, 754.0), multiples=1)
+    found = resonance_map(spindle, [20.0, 60.0], [600.0, 900.0], Condition(20.0, 754.0), multiples=1)
     assert found.interpolated is None
     assert not any(c.interpolated for c in found.coincidences)
