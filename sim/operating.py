@@ -22,7 +22,7 @@ from thermospindle.model.pressure import pressures
 from thermospindle.model.rotor import mjcf
 from thermospindle.model.rotor.chain import Matrices, RotorBase, matrices, rotor_base
 from thermospindle.model.rotor.loaded import loaded
-from thermospindle.model.rotor.modes import Mode, Poles, frf, modes, point_rows, poles
+from thermospindle.model.rotor.modes import Mode, frf, modes, point_rows
 from thermospindle.model.scene.reading import content_hash
 from thermospindle.model.types import Array, ComplexArray
 from thermospindle.model.units import RPM
@@ -93,11 +93,6 @@ class OperatingPoint:
     def modes(self) -> list[Mode]:
         """All oscillating modes, in order of frequency."""
         return modes(self.chain, self.linear)
-
-    @cached_property
-    def poles(self) -> Poles:
-        """All poles of the linear model, with their vectors."""
-        return poles(self.linear)
 
     def modes_below(self, highest: float) -> list[Mode]:
         """Oscillating modes below `highest` (Hz); of a flexible shaft quicker than all `modes`."""

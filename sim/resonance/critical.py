@@ -8,7 +8,7 @@ import numpy as np
 
 from thermospindle.model.carrier import turning_parts, unbalance_carrier
 from thermospindle.model.rotor.chain import motion_rows
-from thermospindle.model.rotor.modes import Mode
+from thermospindle.model.rotor.modes import Mode, Poles, poles
 from thermospindle.model.types import Array
 from thermospindle.sim.operating import OperatingPoint
 from thermospindle.sim.resonance.point import UNIT_UNBALANCE, orbit
@@ -44,19 +44,21 @@ def criticals(point: OperatingPoint, near: float) -> list[Critical]:
     for part in turning_parts(point.spindle):
         ratio = next(b.speed_ratio for b in structure.bodies if structure.carrier(b.name) == part)
         of_speed.setdefault(point.condition.speed * ratio, []).append(part)
-    return [
-        found
+    met = [
+        (tuple(parts), speed, mode)
         for speed, parts in sorted(of_speed.items(), key=lambda item: abs(item[0]))
         for mode in point.modes
         if speed and mode.kind != "axial" and abs(2 * np.pi * mode.frequency / abs(speed) - 1) < near
-        if (found := _driven(point, tuple(parts), speed, mode)) is not None
     ]
+    if not met:
+        return []
+    p = poles(point.linear)
+    return [found for each in met if (found := _driven(point, p, *each)) is not None]
 
 
-def _driven(point: OperatingPoint, parts: tuple[str, ...], speed: float, mode: Mode) -> Critical | None:
+def _driven(point: OperatingPoint, p: Poles, parts: tuple[str, ...], speed: float, mode: Mode) -> Critical | None:
     """The mode as the unbalance of parts drives it, or None where none can."""
     structure, own = point.spindle.structure, point.imperfections
-    p = point.poles
     at = int(np.argmin(np.abs(p.value - mode.pole)))
 
     def rows(body: str, z: float) -> Array:

@@ -9,26 +9,7 @@ from tests.conftest import ROOT
 from tests.virtual_campaign import drawn, model_of, truth, virtual_campaign
 from thermospindle.diagnosis.forward.derivatives import nuisance_jacobian
 from thermospindle.diagnosis.forward.rates import rates_of
-from thermospindle.diagnosis.parameters.nuisance import (
-    APART,
-    BALLS,
-    BUILD,
-    CHANGE,
-    COEFFICIENT,
-    DAMPING,
-    DRIFT,
-    EXPANSION,
-    FLUNG,
-    GAIN,
-    HAMMER,
-    HAMMER_DRIFT,
-    MASSES,
-    MISS,
-    MISS_DRIFT,
-    RECORD,
-    STIFFNESS,
-    TEMPERATURE,
-)
+from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.model.machine import Condition
 from thermospindle.model.units import RPM
 from thermospindle.sim.campaign.campaign import Noise
@@ -36,7 +17,7 @@ from thermospindle.sim.campaign.campaign import Noise
 NOISELESS = Noise(0.0, 0.0)
 CONDITIONS = (Condition(20.0), Condition(45.0, 7200 * RPM))
 FREQUENCY = np.arange(400.0, 6000.1, 40.0)
-KINDS = (BUILD, EXPANSION, COEFFICIENT, *APART, BALLS, CHANGE, FLUNG, MASSES, TEMPERATURE, GAIN, DRIFT, HAMMER, HAMMER_DRIFT, MISS, MISS_DRIFT, STIFFNESS, DAMPING, RECORD)
+KINDS = (kinds_of.BUILD, kinds_of.EXPANSION, kinds_of.COEFFICIENT, *kinds_of.APART, kinds_of.BALLS, kinds_of.CHANGE, kinds_of.FLUNG, kinds_of.MASSES, kinds_of.TEMPERATURE, kinds_of.GAIN, kinds_of.DRIFT, kinds_of.HAMMER, kinds_of.HAMMER_DRIFT, kinds_of.MISS, kinds_of.MISS_DRIFT, kinds_of.STIFFNESS, kinds_of.DAMPING, kinds_of.RECORD)
 SCENES = {"reference": ROOT / "scenes" / "hdd_2003", "symmetric": ROOT / "tests" / "scenes" / "symmetric"}
 
 
@@ -45,7 +26,7 @@ def made(scene, **changes):
     errors = drawn(scene, 2, 3)
     model = model_of(scene, virtual_campaign(scene, CONDITIONS, 3, errors=errors, **{"frequency": FREQUENCY} | changes))
     x = truth(model, errors) + 0.7 * np.random.default_rng(11).standard_normal(len(model.parameters))
-    x[[p.kind == RECORD for p in model.parameters]] = 0.0  # records are long enough
+    x[[p.kind == kinds_of.RECORD for p in model.parameters]] = 0.0  # records are long enough
     return model, x
 
 

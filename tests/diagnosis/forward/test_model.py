@@ -17,27 +17,7 @@ from thermospindle.diagnosis.forward.derivatives import column, nuisance_jacobia
 from thermospindle.diagnosis.forward.model import CampaignModel
 from thermospindle.diagnosis.forward.rates import rates_of
 from thermospindle.diagnosis.ladder.left_out import LeftOut, unseen
-from thermospindle.diagnosis.parameters.nuisance import (
-    APART,
-    BALLS,
-    BUILD,
-    CHANGE,
-    COEFFICIENT,
-    DAMPING,
-    DRIFT,
-    EXPANSION,
-    FLUNG,
-    GAIN,
-    HAMMER,
-    HAMMER_DRIFT,
-    MASSES,
-    MISS,
-    MISS_DRIFT,
-    RECORD,
-    STIFFNESS,
-    TEMPERATURE,
-    changes_of,
-)
+from thermospindle.diagnosis.parameters import nuisance as kinds_of
 from thermospindle.model.machine import Condition
 from thermospindle.model.scene.reading import load
 
@@ -47,10 +27,10 @@ def test_derivatives_of_lines(scene, quantity, decay):
     """Every nuisance parameter, at speed and warm: build, rings and temperature to the error of one-sided steps of matrices, the rest exactly."""
     model, x = made(scene, quantity=quantity, window_decay=decay)
     worst = worst_by_kind(model, 1, x)
-    assert set(worst) == set(KINDS) - {FLUNG}  # these scenes' balls have none
-    for kind in (GAIN, DRIFT, HAMMER, HAMMER_DRIFT, MISS, MISS_DRIFT, STIFFNESS, DAMPING, MASSES, RECORD):
+    assert set(worst) == set(KINDS) - {kinds_of.FLUNG}  # these scenes' balls have none
+    for kind in (kinds_of.GAIN, kinds_of.DRIFT, kinds_of.HAMMER, kinds_of.HAMMER_DRIFT, kinds_of.MISS, kinds_of.MISS_DRIFT, kinds_of.STIFFNESS, kinds_of.DAMPING, kinds_of.MASSES, kinds_of.RECORD):
         assert worst[kind] < 1e-4, kind
-    for kind in (BUILD, EXPANSION, COEFFICIENT, *APART, BALLS, CHANGE, TEMPERATURE):
+    for kind in (kinds_of.BUILD, kinds_of.EXPANSION, kinds_of.COEFFICIENT, *kinds_of.APART, kinds_of.BALLS, kinds_of.CHANGE, kinds_of.TEMPERATURE):
         assert worst[kind] < 5e-3, kind
 
 
@@ -75,10 +55,10 @@ def test_derivatives_of_lines_whose_errors_go_together(scene):
 
 def test_what_a_bearing_may_change_by_otherwise():
     """With temperature in all tests alike, a third of that in each by itself, and there a share of what speed does; nothing where nothing changes."""
-    found = changes_of(["cold", "warm", "fast"], [0.0, 1.0, 0.5], [0.0, 0.0, -0.1])
+    found = kinds_of.changes_of(["cold", "warm", "fast"], [0.0, 1.0, 0.5], [0.0, 0.0, -0.1])
     assert [p.test for p in found] == [None, 1, 1, 2, 2]
     assert [p.sd for p in found] == pytest.approx([1e-3, 3e-4, 3e-4, 1.5e-4 + 3e-3, 1.5e-4 + 3e-3])
-    assert changes_of(["cold"], [0.0], [0.0]) == []
+    assert kinds_of.changes_of(["cold"], [0.0], [0.0]) == []
 
 
 @pytest.mark.parametrize("rows", [None, 0])
@@ -108,9 +88,9 @@ def test_derivatives_of_a_flexible_shaft():
     """Of its reduced model, at speed and warm, against differences of residuals that have a basis of their own on either side: what moves the basis is off by half a per cent."""
     model, x = made(load(ROOT / "scenes" / "five_bearing"), frequency=np.arange(300.0, 4000.1, 50.0))
     worst = worst_by_kind(model, 1, x)
-    for kind in (GAIN, DRIFT, HAMMER, HAMMER_DRIFT, RECORD):
+    for kind in (kinds_of.GAIN, kinds_of.DRIFT, kinds_of.HAMMER, kinds_of.HAMMER_DRIFT, kinds_of.RECORD):
         assert worst[kind] < 1e-8, kind
-    for kind in (MISS, MISS_DRIFT, BUILD, EXPANSION, COEFFICIENT, *APART, BALLS, CHANGE, FLUNG, MASSES, TEMPERATURE, STIFFNESS, DAMPING):
+    for kind in (kinds_of.MISS, kinds_of.MISS_DRIFT, kinds_of.BUILD, kinds_of.EXPANSION, kinds_of.COEFFICIENT, *kinds_of.APART, kinds_of.BALLS, kinds_of.CHANGE, kinds_of.FLUNG, kinds_of.MASSES, kinds_of.TEMPERATURE, kinds_of.STIFFNESS, kinds_of.DAMPING):
         assert worst[kind] < 1e-2, kind
 
 
@@ -137,13 +117,13 @@ def test_gains_go_with_sensors_and_not_with_rows(rows):
         tests.append(replace(test, id=f"t{t}", frf=replace(test.frf, value=test.frf.value * gain)))
     campaign = virtual_campaign(scene, CONDITIONS[:1], 0, references=(1,), frequency=frequency)
     model = model_of(scene, replace(campaign, tests=tuple(tests)))
-    gains = [i for i, p in enumerate(model.parameters) if p.kind == GAIN]
+    gains = [i for i, p in enumerate(model.parameters) if p.kind == kinds_of.GAIN]
     assert len(gains) == 3
     x = np.zeros(len(model.parameters))
     x[gains] = np.array(list(each.values())) / model.parameters[gains[0]].sd
     assert np.abs(model.residual(1, x, [])).max() < 1e-6
     assert np.abs(model.residual(1, 0 * x, [])).max() > 1
-    assert worst_by_kind(model, 1, x)[GAIN] < 1e-4
+    assert worst_by_kind(model, 1, x)[kinds_of.GAIN] < 1e-4
 
 
 @pytest.mark.parametrize("columns", [(3, 1), (3,), (1, 3)])
@@ -157,13 +137,13 @@ def test_gains_of_hammers_go_with_their_points(columns):
         tests.append(replace(test, id=f"t{t}", frf=replace(test.frf, value=test.frf.value * gain[:, None])))
     campaign = virtual_campaign(scene, CONDITIONS[:1], 0, references=(1,), frequency=frequency)
     model = model_of(scene, replace(campaign, tests=tuple(tests)))
-    hammers = [i for i, p in enumerate(model.parameters) if p.kind == HAMMER]
+    hammers = [i for i, p in enumerate(model.parameters) if p.kind == kinds_of.HAMMER]
     assert len(hammers) == 2
     x = np.zeros(len(model.parameters))
     x[hammers] = np.array(list(each.values())) / model.parameters[hammers[0]].sd
     assert np.abs(model.residual(1, x, [])).max() < 1e-6
     assert np.abs(model.residual(1, 0 * x, [])).max() > 1
-    assert worst_by_kind(model, 1, x)[HAMMER] < 1e-4
+    assert worst_by_kind(model, 1, x)[kinds_of.HAMMER] < 1e-4
 
 
 @pytest.mark.parametrize(("name", "size", "values"), [("channel_delay", 30.0, {"skew": 0.1}), ("hammer_position", 1.5, {"axis": 0.0, "node": 0.0})])
