@@ -13,11 +13,13 @@ spindle (`thermospindle.load`). A scene and a condition are computed once a proc
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from thermospindle.failing import at_speed, behind, called, energy, odd, table
 
 if TYPE_CHECKING:
     from thermospindle.model.machine import Spindle
@@ -36,8 +38,6 @@ __all__ = [
     "assert_peak_level",
     "assert_split",
 ]
-MOST = 3  # elements named in a failure
-NEIGHBOURS = 2  # modes shown on each side of the one in question
 KEPT = 256  # conditions
 UNITS = {"receptance": "m/N", "mobility": "(m/s)/N", "accelerance": "(m/s2)/N"}
 
@@ -78,8 +78,8 @@ def assert_frequency_shift(
     after = _partner(cold, hot, index, partners)
     found = after.frequency - cold.modes[index].frequency
     if not abs(found - shift_Hz) <= within:
-        head = f"{_called(cold, mode)} moves by {found:+.2f} Hz from {from_C:g} to {to_C:g} C{_at(speed_rpm)}; wanted {shift_Hz:+g} +- {within:g} Hz"
-        raise AssertionError("\n".join([head, *_table(cold, hot, partners, f"{from_C:g} C", f"{to_C:g} C", index), *_behind(cold, hot, index, after), *_odd(cold, hot)]))
+        head = f"{called(cold, mode)} moves by {found:+.2f} Hz from {from_C:g} to {to_C:g} C{at_speed(speed_rpm)}; wanted {shift_Hz:+g} +- {within:g} Hz"
+        raise AssertionError("\n".join([head, *table(cold, hot, partners, f"{from_C:g} C", f"{to_C:g} C", index), *behind(cold, hot, index, after), *odd(cold, hot)]))
 
 
 def assert_frequency(scene: Scene, *, mode: str | int, at_C: float, frequency_Hz: float, within: float, speed_rpm: float = 0.0) -> None:
@@ -90,7 +90,7 @@ def assert_frequency(scene: Scene, *, mode: str | int, at_C: float, frequency_Hz
     index = _index(point, mode)
     found = point.modes[index].frequency
     if not abs(found - frequency_Hz) <= within:
-        raise AssertionError("\n".join([f"{_called(point, mode)} lies at {found:.2f} Hz, {at_C:g} C{_at(speed_rpm)}; wanted {frequency_Hz:g} +- {within:g} Hz", *_energy(point, index), *_odd(point)]))
+        raise AssertionError("\n".join([f"{called(point, mode)} lies at {found:.2f} Hz, {at_C:g} C{at_speed(speed_rpm)}; wanted {frequency_Hz:g} +- {within:g} Hz", *energy(point, index), *odd(point)]))
 
 
 def assert_damping(scene: Scene, *, mode: str | int, at_C: float, percent: float, within: float, speed_rpm: float = 0.0) -> None:
@@ -101,7 +101,7 @@ def assert_damping(scene: Scene, *, mode: str | int, at_C: float, percent: float
     index = _index(point, mode)
     found = 100 * point.modes[index].damping_ratio
     if not abs(found - percent) <= within:
-        raise AssertionError("\n".join([f"{_called(point, mode)} has {found:.3f} % damping, {at_C:g} C{_at(speed_rpm)}; wanted {percent:g} +- {within:g} %", *_energy(point, index), *_odd(point)]))
+        raise AssertionError("\n".join([f"{called(point, mode)} has {found:.3f} % damping, {at_C:g} C{at_speed(speed_rpm)}; wanted {percent:g} +- {within:g} %", *energy(point, index), *odd(point)]))
 
 
 def assert_peak_level(
@@ -118,8 +118,8 @@ def assert_peak_level(
     frequency = point.modes[index].damped_frequency()
     found = float(abs(frf(point, [frequency], quantity=quantity)[response, reference][0]))
     if not abs(found - level) <= within:
-        head = f"|{quantity}| of {response} to {reference} at {_called(point, mode)}, {frequency:.1f} Hz, is {found:.4g} {UNITS[quantity]}; wanted {level:g} +- {within:g}"
-        raise AssertionError("\n".join([head, *_energy(point, index), *_odd(point)]))
+        head = f"|{quantity}| of {response} to {reference} at {called(point, mode)}, {frequency:.1f} Hz, is {found:.4g} {UNITS[quantity]}; wanted {level:g} +- {within:g}"
+        raise AssertionError("\n".join([head, *energy(point, index), *odd(point)]))
 
 
 def assert_split(scene: Scene, *, modes: tuple[str | int, str | int], at_C: float, split_Hz: float, within: float, speed_rpm: float = 0.0) -> None:
@@ -135,8 +135,8 @@ def assert_split(scene: Scene, *, modes: tuple[str | int, str | int], at_C: floa
     found = point.modes[second].frequency - point.modes[first].frequency
     if not abs(found - split_Hz) <= within:
         pair = " and ".join(f"{m} at {point.modes[i].frequency:.2f} Hz ({point.modes[i].whirl} whirl)" for m, i in zip(modes, (first, second), strict=True))
-        head = f"{point.spindle.name}: {pair} lie {found:.2f} Hz apart, {at_C:g} C{_at(speed_rpm)}; wanted {split_Hz:g} +- {within:g} Hz"
-        raise AssertionError("\n".join([head, *_energy(point, first), *_energy(point, second), *_odd(point)]))
+        head = f"{point.spindle.name}: {pair} lie {found:.2f} Hz apart, {at_C:g} C{at_speed(speed_rpm)}; wanted {split_Hz:g} +- {within:g} Hz"
+        raise AssertionError("\n".join([head, *energy(point, first), *energy(point, second), *odd(point)]))
 
 
 def assert_margin(
@@ -169,8 +169,8 @@ def assert_margin(
                 near.append((percent, f"{point.condition.temperature:g} C: {line.name} ({line.cause}{bearing}) at {line.frequency:.1f} Hz, {percent:+.2f} % from {own.frequency:.1f} Hz"))
     close = sorted((row for row in near if abs(row[0]) < at_least_percent), key=lambda row: abs(row[0]))
     if close:
-        head = f"{_called(points[0], mode)}{_at(speed_rpm)}: {len(close)} lines come nearer than {at_least_percent:g} %; the nearest are"
-        raise AssertionError("\n".join([head, *(f"  {text}" for _, text in close[:5]), *_energy(points[0], index), *_odd(*points)]))
+        head = f"{called(points[0], mode)}{at_speed(speed_rpm)}: {len(close)} lines come nearer than {at_least_percent:g} %; the nearest are"
+        raise AssertionError("\n".join([head, *(f"  {text}" for _, text in close[:5]), *energy(points[0], index), *odd(*points)]))
 
 
 def assert_agreement(scene: Scene, campaign: str | Path | Any, *, rms: float) -> None:
@@ -215,7 +215,8 @@ _POINTS: dict[tuple[str, float, float], OperatingPoint] = {}
 
 def _point(spindle: Spindle, temperature: float, speed: float) -> OperatingPoint:
     __tracebackhide__ = True
-    from thermospindle.front import number, odd, soaked
+    from thermospindle import front
+    from thermospindle.front import number, soaked
     from thermospindle.model.scene.reading import content_hash
 
     key = content_hash(spindle), number("temperature_C", temperature), number("speed_rpm", speed)
@@ -223,7 +224,7 @@ def _point(spindle: Spindle, temperature: float, speed: float) -> OperatingPoint
         if len(_POINTS) >= KEPT:
             _POINTS.pop(next(iter(_POINTS)))
         _POINTS[key] = soaked(spindle, temperature, speed)
-    for doubt in odd(_POINTS[key]):  # at every call, also of what is kept
+    for doubt in front.odd(_POINTS[key]):  # at every call, also of what is kept
         warnings.warn(f"{spindle.name}: {doubt}", stacklevel=4)
     return _POINTS[key]
 
@@ -271,84 +272,6 @@ def _partner(first: OperatingPoint, then: OperatingPoint, index: int, partners: 
     __tracebackhide__ = True
     if partners[index] < 0:
         t = then.condition.temperature
-        head = f"{_called(first, index + 1)}, {first.modes[index].frequency:.1f} Hz: no mode at {t:g} C has its shape, so it cannot be followed"
-        raise AssertionError("\n".join([head, *_odd(first, then)]))
+        head = f"{called(first, index + 1)}, {first.modes[index].frequency:.1f} Hz: no mode at {t:g} C has its shape, so it cannot be followed"
+        raise AssertionError("\n".join([head, *odd(first, then)]))
     return then.modes[partners[index]]
-
-
-# ---------------------------------------------------------------- what a failure says
-
-
-def _called(point: OperatingPoint, mode: str | int) -> str:
-    return f"{point.spindle.name}: mode {mode}" if isinstance(mode, int) else f"{point.spindle.name}: {mode}"
-
-
-def _at(speed: float) -> str:
-    return f" at {speed:g} rpm" if speed else ""
-
-
-def _table(first: OperatingPoint, then: OperatingPoint, partners: Sequence[int], a: str, b: str, index: int) -> list[str]:
-    """The mode in question and two on each side of it, before and after: of a flexible shaft there are dozens below an upper one."""
-    rows = [f"    {'':14}{a:>10}{b:>10}{'change':>10} Hz"]
-    counts: dict[str, int] = {}
-    for i, m in enumerate(first.modes[: index + NEIGHBOURS + 1]):
-        counts[m.kind] = counts.get(m.kind, 0) + 1
-        if i < index - NEIGHBOURS:
-            continue
-        after = then.modes[partners[i]].frequency if partners[i] >= 0 else None
-        change = "lost" if after is None else f"{after - m.frequency:+.2f}"
-        rows.append(f"  {'>' if i == index else ' '} {m.kind + ' ' + str(counts[m.kind]):14}{m.frequency:10.2f}{'' if after is None else f'{after:10.2f}':>10}{change:>10}")
-    return rows
-
-
-def _energy(point: OperatingPoint, index: int) -> list[str]:
-    mode = point.modes[index]
-    most = sorted(_by_part(point, mode.energy).items(), key=lambda e: -e[1])[:MOST]
-    return [f"  strain energy of {mode.kind} at {mode.frequency:.1f} Hz: " + ", ".join(f"{name} {share:.0%}" for name, share in most)]
-
-
-def _by_part(point: OperatingPoint, of_elements: Mapping[str, float]) -> dict[str, float]:
-    """Sums over elements by name of bearing, joint or shaft: nobody knows the elements of a shaft's mesh by theirs."""
-    shaft_of = {element: s.name for s in point.spindle.structure.shafts for element in s.elements}
-    found: dict[str, float] = {}
-    for name, value in of_elements.items():
-        part = shaft_of.get(name, name)
-        found[part] = found.get(part, 0.0) + value
-    return found
-
-
-def _odd(*points: OperatingPoint) -> list[str]:
-    """What is odd about conditions and bearings there: what moved may be that."""
-    from thermospindle.front import odd
-
-    return [f"  {doubt}" for doubt in dict.fromkeys(d for p in points for d in odd(p))]
-
-
-def _behind(first: OperatingPoint, then: OperatingPoint, index: int, after: Mode) -> list[str]:
-    """Where the energy is, and what the change of each element's stiffness does to the mode: df = f/2 phi^T dK phi / phi^T K phi, the mean of what the shapes at both ends
-    say, which is right to the second order; and what is left, of masses, speed and higher orders."""
-    mode = first.modes[index]
-    ends = [_moved(first, then, first, mode), _moved(first, then, then, after)]
-    change = _by_part(first, {name: sum(end[name] for end in ends) / 2 for name in ends[0]})
-    moved = sorted(change.items(), key=lambda row: -abs(row[1]))[:MOST]
-    told = [f"{name} {value:+.2f} Hz" for name, value in moved if abs(value) > 5e-3]
-    whole = after.frequency - mode.frequency
-    rest = whole - sum(value for _, value in moved if abs(value) > 5e-3)
-    if abs(rest) > abs(whole) / 2:
-        return [*_energy(first, index), "  moved too far for the elements' parts in it to be told to first order"]
-    told += [f"all else {rest:+.2f} Hz"] if told and abs(rest) > 5e-3 else []
-    return [*_energy(first, index), *([f"  moved by the stiffness of: {', '.join(told)}"] if told else [])]
-
-
-def _moved(first: OperatingPoint, then: OperatingPoint, at: OperatingPoint, mode: Mode) -> dict[str, float]:
-    """What the change of each element's stiffness does to a frequency (Hz), to first order about one of two conditions."""
-    import numpy as np
-
-    from thermospindle.model.rotor.chain import element_rows
-
-    rows = {e.name: element_rows(at.chain, e) @ mode.shape for e in at.chain.elements}
-    before, after = ({e.name: e.stiffness for e in p.chain.elements} for p in (first, then))
-    quadratic: Callable[[Any, Any], float] = lambda row, k: float(np.real(row.conj() @ k @ row))  # noqa: E731
-    total = sum(quadratic(rows[e.name], e.stiffness) for e in at.chain.elements)
-    both = [name for name in rows if name in before and name in after]
-    return {name: 0.5 * mode.frequency * quadratic(rows[name], after[name] - before[name]) / total for name in both}
