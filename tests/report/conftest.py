@@ -1,17 +1,44 @@
-"""Benches and a page of the workbench, which several modules of tests here sit at."""
+"""What several modules of tests here look at: a diagnosis and its answer, benches and a page of the workbench."""
 
 import signal
+from dataclasses import replace
 
+import numpy as np
 import pytest
 from bokeh.document import Document
 
 from tests.conftest import SCENE
 from tests.report.served import started
 from tests.report.workbench_session import CAMPAIGN
+from thermospindle.diagnosis.decision.explanations import Candidate
+from thermospindle.diagnosis.inference.evidence import evidence
+from thermospindle.diagnosis.inference.fit import fit
+from thermospindle.diagnosis.inference.hypothesis import Hypothesis
+from thermospindle.diagnosis.parameters.mechanism import variants
+from thermospindle.diagnosis.prediction.next_test import ModePrediction, NextTest
+from thermospindle.model.machine import Condition
+from thermospindle.report.text.diagnosis.answer import diagnosis_json
 from thermospindle.report.workbench import bench as benches
 from thermospindle.report.workbench import state
 from thermospindle.report.workbench.page import Page
 from thermospindle.report.workbench.state import Setting
+from thermospindle.sim.effects import by_name
+
+
+@pytest.fixture(scope="session")
+def told(nothing_missing):
+    """A diagnosis as if a hub that lags had been taken for its explanation, and its answer."""
+    search, (lag, *_) = nothing_missing.search, variants(by_name("soak_lag"))
+    base = search.base
+    start = np.concatenate([base.fit.point, np.zeros(len(search.model.tests) + len(lag.shape))])
+    fitted = fit(search.model, [lag], start, base.fit.rates, (1.0,))
+    hypothesis = Hypothesis(fitted, evidence(search.model, fitted))
+    best = Candidate(hypothesis, ("soak_lag",), False, hypothesis.evidence.ln - base.evidence.ln, 0.9)
+    one, other = (ModePrediction(*row) for row in ((1000.0, 0.5, 0.01), (1010.0, 0.5, 0.01)))
+    test = NextTest(Condition(70.0), ("soak_lag", "<free>"), 1e6, 1, "the mode near 1000 Hz, which differs by 10.0 Hz", ((one,), (other,)))
+    verdict = replace(nothing_missing.verdict, word="identified", effects=("soak_lag",), candidates=(best,), accepted=hypothesis)
+    found = replace(nothing_missing, verdict=verdict, tests=(test,))
+    return found, diagnosis_json(found) | {"campaign": "lag & <haste>"}
 
 
 @pytest.fixture(scope="module")
