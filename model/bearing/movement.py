@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 import scipy
 
-from thermospindle.model.bearing.ball_row import BallRow, Centres, centred_axial, centred_axial_force
+from thermospindle.model.bearing.ball_row import BallRow
+from thermospindle.model.bearing.centred import Centres, centred_axial, centred_axial_force
 from thermospindle.model.errors import NoEquilibrium
 
 STEPS = 20  # of Newton's method, which takes six

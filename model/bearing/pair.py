@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import sin
 
 import numpy as np
 import scipy
 
-from thermospindle.model.bearing.ball_row import BallRow, Centres, RowForce, centred_axial_force, respond
+from thermospindle.model.bearing.ball_row import BallRow
+from thermospindle.model.bearing.centred import Centres, centred, centred_axial_force
 from thermospindle.model.bearing.heavy_ball import Vector
 from thermospindle.model.bearing.movement import Rings, Sleeve, equilibrium
 from thermospindle.model.bearing.roller import RollerState, roller_state
@@ -122,7 +124,7 @@ def solve(spindle: Spindle, condition: Condition, motions: Mapping[str, RingMoti
     states = []
     for b in spindle.bearings:
         row = rows[b.name]
-        states.append(bearing_state(spindle, b, replace(row, axial=row.axial + moved[b.name]), centres.get(row), moved[b.name]))
+        states.append(bearing_state(spindle, b, replace(row, axial=row.axial + moved[b.name]), centres.get(id(row)), moved[b.name]))
     sliding = {name for s in spindle.sets if s.spring is not None for name in s.spring.rings_of}
     hub = next((moved[b.name] for b in spindle.bearings if b.name not in sliding), 0.0)
     linear: tuple[LinearState, ...] = tuple(linear_state(spindle, b, condition) for b in spindle.linear_bearings)
@@ -222,10 +224,9 @@ def bearing_state(spindle: Spindle, b: Bearing, row: BallRow, centre: Vector | N
 
     Its balls settle at or near `centre`, where one knows.
     """
-    answer: RowForce = respond(row, centre=centre)
-    deformation = float(answer.deformation[0])
+    answer = centred(row, centre)
     # where rings are free to move between their balls, the equilibrium that is found lies at an end of that play, a rounding error within contact
-    felt = TOUCHING * b.preload / (b.balls * np.sin(b.contact_angle))
+    felt = TOUCHING * b.preload / (b.balls * sin(b.contact_angle))
     stiffness = answer.tangent
     if row.inertia is not None:
         # outer-race control makes the tangent of heavy balls unsymmetric, by 1e-4 of it, under radial loads with the cage's speed by up to a hundredth; springs, in MuJoCo too, carry the symmetric part
@@ -233,16 +234,16 @@ def bearing_state(spindle: Spindle, b: Bearing, row: BallRow, centre: Vector | N
     return BearingState(
         name=b.name,
         z=b.z,
-        contact_angle=float(answer.inner_angle[0]),
-        outer_contact_angle=float(answer.outer_angle[0]),
-        deformation=deformation,
-        contact_force=float(answer.ball_force[0]),
-        ball_stiffness=1.5 * row.constant * max(deformation, 0.0) ** 0.5,
-        preload=b.sense * float(answer.force[2]),
+        contact_angle=answer.inner_angle,
+        outer_contact_angle=answer.outer_angle,
+        deformation=answer.deformation,
+        contact_force=answer.ball_force,
+        ball_stiffness=1.5 * row.constant * max(answer.deformation, 0.0) ** 0.5,
+        preload=b.sense * answer.axial_force,
         stiffness=stiffness,
         damping=damping_time(spindle, b) * stiffness,
         row=row,
-        in_contact=bool(answer.in_contact.all() and answer.ball_force.min() > felt),
-        outer_contact_force=float(answer.outer_ball_force[0]),
+        in_contact=answer.ball_force > max(felt, 0.0),
+        outer_contact_force=answer.outer_ball_force,
         movement=movement,
     )
