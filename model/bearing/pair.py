@@ -22,7 +22,7 @@ from thermospindle.model.bearing.roller import RollerState, roller_state
 from thermospindle.model.bearing.row import row_at
 from thermospindle.model.bearing.state import ByDirection, LinearState, linear_state
 from thermospindle.model.errors import BadInput, NoEquilibrium, instead
-from thermospindle.model.machine import Bearing, BearingSet, Condition, RingMotion, Spindle
+from thermospindle.model.machine import Bearing, BearingSet, Condition, RingMotion, Spindle, kept
 from thermospindle.model.types import Array
 
 TOUCHING = 1e-9
@@ -119,8 +119,8 @@ def solve(spindle: Spindle, condition: Condition, motions: Mapping[str, RingMoti
     rows = {b.name: row_at(spindle, b, b.sense, motions[b.name], condition.speed) for b in spindle.bearings}
     moved: dict[str, float] = {}
     centres: Centres = {}
-    for group in joined(spindle):
-        moved |= _positions(spindle, {b.name: rows[b.name] for b in group}, group, centres)
+    for rotor in rotors(spindle):
+        moved |= _positions(spindle, rotor, rows, centres)
     states = []
     for b in spindle.bearings:
         row = rows[b.name]
@@ -132,6 +132,7 @@ def solve(spindle: Spindle, condition: Condition, motions: Mapping[str, RingMoti
     return PairState(condition, tuple(states), hub, contact_status(tuple(states)), linear)
 
 
+@kept
 def joined(spindle: Spindle) -> list[list[Bearing]]:
     """The ball rows in groups that share carriers: what one rotor's equilibrium is made of."""
     groups: list[tuple[set[str], list[Bearing]]] = []
@@ -149,48 +150,67 @@ def _carriers(spindle: Spindle, b: Bearing) -> tuple[str, str]:
     return spindle.structure.carrier(b.inner_body), spindle.structure.carrier(b.outer_body)
 
 
-def _positions(spindle: Spindle, rows: Mapping[str, BallRow], group: Sequence[Bearing], centres: Centres) -> dict[str, float]:
-    """Movement (m) of every row's outer ring against its inner one, for one group of rows that share carriers."""
+@dataclass(frozen=True)
+class Rotor:
+    """One group of rows that share carriers, as drawn: the carriers of the rings `of` every row, which way the hub takes each row (1 or -1), rows on springs, as `Sleeve` has these, and the
+    force on the hub that preloads rows which are loaded one way (N).
+
+    The one unknown of two carriers is how far the second carrier of the first row has moved against its first.
+    """
+
+    carriers: list[str]
+    of: dict[str, tuple[str, str]]
+    sets: list[BearingSet]
+    towards: dict[str, int]
+    springs: list[tuple[tuple[str, ...], float, float]]
+    outside: float
+
+
+@kept
+def rotors(spindle: Spindle) -> list[Rotor]:
+    """Every group of `joined`."""
+    return [_rotor(spindle, group) for group in joined(spindle)]
+
+
+def _rotor(spindle: Spindle, group: Sequence[Bearing]) -> Rotor:
     of = {b.name: _carriers(spindle, b) for b in group}
-    carriers = list(dict.fromkeys(c for pair in of.values() for c in pair))
-    sets = [s for s in spindle.sets if s.bearings[0] in rows]
-    springs = [(s.spring.rings_of, spindle.bearing(s.spring.rings_of[0]).sense * s.preload, s.spring.rate or 0.0) for s in sets if s.spring is not None]
-    if len(carriers) > 2:
-        if springs or spindle.axial_load:
-            raise NoEquilibrium(f"rings on springs and axial loads are for one rotor in one housing; here are {', '.join(carriers)}")
-        return _many_positions(spindle, rows, of, carriers, sets)
-    # one unknown: how far the second carrier of the first row has moved against its first
+    sets = [s for s in spindle.sets if s.bearings[0] in of]
     towards = {name: 1 if pair == of[group[0].name] else -1 for name, pair in of.items()}
+    springs = [(s.spring.rings_of, spindle.bearing(s.spring.rings_of[0]).sense * s.preload, s.spring.rate or 0.0) for s in sets if s.spring is not None]
     # rows loaded one way carry all shares together, from outside; opposed ones carry each other's
     outside = sum(towards[name] * spindle.bearing(name).sense * s.preload / len(s.bearings) for s in sets if spindle.one_way(s) for name in s.bearings)
-    sliding = [name for names, _, _ in springs for name in names]
+    return Rotor(list(dict.fromkeys(c for pair in of.values() for c in pair)), of, sets, towards, springs, outside)
+
+
+def _positions(spindle: Spindle, rotor: Rotor, every: Mapping[str, BallRow], centres: Centres) -> dict[str, float]:
+    """Movement (m) of every row's outer ring against its inner one, for one group of rows that share carriers."""
+    rows = {name: every[name] for name in rotor.of}
+    if len(rotor.carriers) > 2:
+        if rotor.springs or spindle.axial_load:
+            raise NoEquilibrium(f"rings on springs and axial loads are for one rotor in one housing; here are {', '.join(rotor.carriers)}")
+        return _many_positions(spindle, rows, rotor)
+    towards, sliding = rotor.towards, {name for names, _, _ in rotor.springs for name in names}
     fixed = tuple((row, towards[name]) for name, row in rows.items() if name not in sliding)
-    sleeves = tuple(Sleeve(tuple(rows[n] for n in names), towards[names[0]], push, rate) for names, push, rate in springs)
+    sleeves = tuple(Sleeve(tuple(rows[n] for n in names), towards[names[0]], push, rate) for names, push, rate in rotor.springs)
     try:
-        hub, *slid = equilibrium(Rings(fixed, sleeves, outside + spindle.axial_load), centres)
+        hub, *slid = equilibrium(Rings(fixed, sleeves, rotor.outside + spindle.axial_load), centres)
     except NoEquilibrium as error:
         raise NoEquilibrium(f"{error} under axial_load_N = {spindle.axial_load:g}" if spindle.axial_load else str(error)) from None
     moved = {name: towards[name] * hub for name in rows}
-    for (names, _, _), r in zip(springs, slid, strict=True):
+    for (names, _, _), r in zip(rotor.springs, slid, strict=True):
         moved |= dict.fromkeys(names, r)
     return moved
 
 
-def _many_positions(
-    spindle: Spindle,
-    rows: Mapping[str, BallRow],
-    of: Mapping[str, tuple[str, str]],
-    carriers: Sequence[str],
-    sets: Sequence[BearingSet],
-) -> dict[str, float]:
+def _many_positions(spindle: Spindle, rows: Mapping[str, BallRow], rotor: Rotor) -> dict[str, float]:
     """As `_positions` for more than two carriers, as of rotors within rotors: all balances at once, by Powell's hybrid method.
 
     The energy of rows without ball inertia is convex in the positions, so that their answer is unique; it is the start for those with it.
     """
-    names, unknown = list(rows), list(carriers[1:])
-    motion = np.array([[(of[n][1] == c) - (of[n][0] == c) for c in unknown] for n in names], float)
+    names, unknown = list(rows), rotor.carriers[1:]
+    motion = np.array([[(rotor.of[n][1] == c) - (rotor.of[n][0] == c) for c in unknown] for n in names], float)
     outside = np.zeros(len(names))
-    for s in sets:
+    for s in rotor.sets:
         if spindle.one_way(s):
             for name in s.bearings:
                 outside[names.index(name)] = spindle.bearing(name).sense * s.preload / len(s.bearings)
@@ -204,7 +224,7 @@ def _many_positions(
     start = scipy.optimize.root(imbalance, np.zeros(len(unknown)), args=(massless,), options={"xtol": 1e-13})
     end = scipy.optimize.root(imbalance, start.x, args=(list(rows.values()),), options={"xtol": 1e-13})
     if np.abs(end.fun).max() > 1e-6:
-        raise NoEquilibrium(f"the bearings between {', '.join(carriers)} find no axial equilibrium")
+        raise NoEquilibrium(f"the bearings between {', '.join(rotor.carriers)} find no axial equilibrium")
     return {name: float(m) for name, m in zip(names, motion @ (1e-6 * end.x), strict=True)}
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from thermospindle.model.bearing.pair import BearingState, LinearState, PairState
 from thermospindle.model.machine import Point, Spindle
 from thermospindle.model.rotor.loss import damping_of_loss
-from thermospindle.model.structure import MOVES, Body, Structure
+from thermospindle.model.structure import MOVES, Body, Joint, Structure
 from thermospindle.model.types import Array, Integers
 
 
@@ -126,9 +126,16 @@ def sprung(chain: RotorBase, names: Sequence[str], rate: float, mass: float) -> 
 
 
 def joint_element(structure: Structure, index: int) -> Element:
-    joint = structure.joints[index]
+    return _joint_element(structure.joints[index], structure.damping_frequency)
+
+
+@lru_cache(maxsize=1024)
+def _joint_element(joint: Joint, damping_frequency: float) -> Element:
+    """Read only."""
     stiffness = np.diag(joint.stiffness)
-    damping = 2 * joint.damping_ratio / (2 * np.pi * structure.damping_frequency) * stiffness
+    damping = 2 * joint.damping_ratio / (2 * np.pi * damping_frequency) * stiffness
+    for matrix in (stiffness, damping):
+        matrix.flags.writeable = False
     return Element(joint.name, joint.group, *joint.bodies, joint.z, stiffness, damping, loss_factor=joint.loss_factor)
 
 
@@ -182,24 +189,22 @@ def row_of(layout: Layout, point: Point) -> Array:
 def matrices(chain: RotorBase) -> Matrices:
     """M, C + G, K assembled element by element (independent of MuJoCo)."""
     n = len(chain.dofs)
-    mass, damping, stiffness = np.zeros(n), np.zeros((n, n)), np.zeros((n, n))
-    at = 0
-    for body in chain.bodies:
-        inertia = dict(zip(MOVES, (body.mass, body.mass, body.mass, *body.inertia[:2]), strict=True))
-        mass[at : at + len(body.moves)] = [inertia[move] for move in body.moves]
-        if body.turns:
-            i, j = at + body.moves.index("tilt_x"), at + body.moves.index("tilt_y")
-            damping[i, j] += body.inertia[2] * chain.speed * body.speed_ratio
-            damping[j, i] -= body.inertia[2] * chain.speed * body.speed_ratio
-        at += len(body.moves)
+    mass, felt = np.zeros(n), np.zeros((2, n, n))
     if chain.elements:
         rows, place = _places(chain.layout, tuple((e.a, e.b, e.z, e.slides) for e in chain.elements))
-        for whole, of_elements in (
-            (damping, [e.damping for e in chain.elements]),
-            (stiffness, [e.stiffness for e in chain.elements]),
-        ):
-            felt = rows.transpose(0, 2, 1) @ np.array(of_elements) @ rows
-            whole += np.bincount(place, felt.ravel(), n * n).reshape(n, n)
+        of_elements = np.array([[e.damping for e in chain.elements], [e.stiffness for e in chain.elements]])
+        felt = np.bincount(place, (rows.transpose(0, 2, 1) @ of_elements @ rows).ravel(), 2 * n * n).reshape(2, n, n)
+    damping, stiffness = felt
+    at = 0
+    for body in chain.bodies:
+        ix, iy, polar = body.inertia
+        own = (body.mass, body.mass, body.mass, ix, iy)
+        mass[at : at + len(body.moves)] = own if body.moves == MOVES else [own[MOVES.index(move)] for move in body.moves]
+        if body.turns:
+            i, j = at + body.moves.index("tilt_x"), at + body.moves.index("tilt_y")
+            damping[i, j] += polar * chain.speed * body.speed_ratio
+            damping[j, i] -= polar * chain.speed * body.speed_ratio
+        at += len(body.moves)
     if any(e.loss_factor for e in chain.elements):
         damping += lost(chain, mass, stiffness)
     return Matrices(np.diag(mass), damping, stiffness, chain.dofs)
@@ -213,7 +218,7 @@ def lost(chain: RotorBase, mass: Array, stiffness: Array) -> Array:
 @lru_cache(maxsize=64)
 def _places(layout: Layout, elements: tuple[tuple[str, str, float, str], ...]) -> tuple[Array, Integers]:
     """Rows (elements, 5, w) of the relative motion that each element (a, b, z, slides) resists, over the w degrees of freedom of its ends, and the place
-    (elements w w,) of each of its terms in a whole matrix; fewer than w are filled up with zeros at place 0."""
+    (2 elements w w,) of each of its terms in one of two whole matrices after each other; fewer than w are filled up with zeros at place 0."""
     first, at = {"ground": range(0)}, 0
     for name, _, moves in layout:
         first[name] = range(at, at + len(moves))
@@ -224,4 +229,5 @@ def _places(layout: Layout, elements: tuple[tuple[str, str, float, str], ...]) -
     for k, ((a, b, z, slides), numbers) in enumerate(zip(elements, own, strict=True)):
         rows[k, :, : len(numbers)] = _element_rows(layout, a, b, z, slides)[:, numbers]
         number[k, : len(numbers)] = numbers
-    return rows, (number[:, :, None] * at + number[:, None, :]).ravel()
+    place = (number[:, :, None] * at + number[:, None, :]).ravel()
+    return rows, np.concatenate([place, at * at + place])
