@@ -34,6 +34,7 @@ from thermospindle.model.bearing.heavy_ball import (
     settled,
 )
 from thermospindle.model.bearing.hertz import in_series
+from thermospindle.model.changed import changed
 from thermospindle.model.errors import NoEquilibrium
 from thermospindle.model.types import Array
 
@@ -214,7 +215,7 @@ def at_one_speed(row: BallRow, lines: Sequence[Vector], centre: Vector | None) -
         return sum(n * values[at] for at, n in weights.items()) / len(lines)
 
     def held(cage: float) -> HeavyBall:
-        return replace(free, inertia=replace(free.inertia, cage=cage))
+        return changed(free, inertia=changed(free.inertia, cage=cage))
 
     def at_speed(ball: HeavyBall, balances: Mapping[Vector, Balance]) -> dict[Vector, tuple[Balance, Driven]]:
         return {at: (here, driven(ball, here, at)) for at, here in balances.items()}

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import scipy
 
 from thermospindle.model.bearing.ball_row import BallRow
 from thermospindle.model.bearing.centred import Centres, centred_axial, centred_axial_force
+from thermospindle.model.changed import changed
 from thermospindle.model.errors import NoEquilibrium
 
 STEPS = 20  # of Newton's method, which takes six
@@ -42,8 +43,8 @@ class Rings:
 
     @property
     def massless(self) -> Rings:
-        fixed = tuple((replace(row, inertia=None), towards) for row, towards in self.fixed)
-        return Rings(fixed, tuple(replace(s, rows=tuple(replace(row, inertia=None) for row in s.rows)) for s in self.sleeves), self.load)
+        fixed = tuple((changed(row, inertia=None), towards) for row, towards in self.fixed)
+        return Rings(fixed, tuple(changed(s, rows=tuple(changed(row, inertia=None) for row in s.rows)) for s in self.sleeves), self.load)
 
 
 def equilibrium(rings: Rings, centres: Centres) -> tuple[float, ...]:

@@ -8,7 +8,7 @@ row's axial force rises monotonically with the hub's movement, so the root is un
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import sin
 
 import numpy as np
@@ -21,6 +21,7 @@ from thermospindle.model.bearing.movement import Rings, Sleeve, equilibrium
 from thermospindle.model.bearing.roller import RollerState, roller_state
 from thermospindle.model.bearing.row import row_at
 from thermospindle.model.bearing.state import ByDirection, LinearState, linear_state
+from thermospindle.model.changed import changed
 from thermospindle.model.errors import BadInput, NoEquilibrium, instead
 from thermospindle.model.machine import Bearing, BearingSet, Condition, RingMotion, Spindle, kept
 from thermospindle.model.types import Array
@@ -124,7 +125,7 @@ def solve(spindle: Spindle, condition: Condition, motions: Mapping[str, RingMoti
     states = []
     for b in spindle.bearings:
         row = rows[b.name]
-        states.append(bearing_state(spindle, b, replace(row, axial=row.axial + moved[b.name]), centres.get(id(row)), moved[b.name]))
+        states.append(bearing_state(spindle, b, changed(row, axial=row.axial + moved[b.name]), centres.get(id(row)), moved[b.name]))
     sliding = {name for s in spindle.sets if s.spring is not None for name in s.spring.rings_of}
     hub = next((moved[b.name] for b in spindle.bearings if b.name not in sliding), 0.0)
     linear: tuple[LinearState, ...] = tuple(linear_state(spindle, b, condition) for b in spindle.linear_bearings)
@@ -220,7 +221,7 @@ def _many_positions(spindle: Spindle, rows: Mapping[str, BallRow], rotor: Rotor)
         force = np.array([centred_axial_force(row, float(m)) for row, m in zip(at, motion @ (1e-6 * z), strict=True)])
         return np.asarray(motion.T @ (force - outside)) / scale
 
-    massless = [replace(row, inertia=None) for row in rows.values()]
+    massless = [changed(row, inertia=None) for row in rows.values()]
     start = scipy.optimize.root(imbalance, np.zeros(len(unknown)), args=(massless,), options={"xtol": 1e-13})
     end = scipy.optimize.root(imbalance, start.x, args=(list(rows.values()),), options={"xtol": 1e-13})
     if np.abs(end.fun).max() > 1e-6:

@@ -58,6 +58,11 @@ Layout = tuple[tuple[str, float, tuple[str, ...]], ...]
 """Name, height and moves of every body."""
 
 
+@lru_cache(maxsize=64)
+def _dofs(layout: Layout) -> tuple[tuple[str, str], ...]:
+    return tuple((name, move) for name, _, moves in layout for move in moves)
+
+
 @dataclass(frozen=True)
 class RotorBase:
     bodies: tuple[Body, ...]
@@ -67,7 +72,7 @@ class RotorBase:
     @cached_property
     def dofs(self) -> tuple[tuple[str, str], ...]:
         """(body, move) of every degree of freedom, in order."""
-        return tuple((b.name, move) for b in self.bodies for move in b.moves)
+        return _dofs(self.layout)
 
     @cached_property
     def layout(self) -> Layout:
@@ -188,25 +193,23 @@ def row_of(layout: Layout, point: Point) -> Array:
 
 def matrices(chain: RotorBase) -> Matrices:
     """M, C + G, K assembled element by element (independent of MuJoCo)."""
-    n = len(chain.dofs)
-    mass, felt = np.zeros(n), np.zeros((2, n, n))
+    n, speed = len(chain.dofs), chain.speed
+    mass: list[float] = []
+    felt: Array = np.zeros((2, n, n))
     if chain.elements:
         rows, place = _places(chain.layout, tuple((e.a, e.b, e.z, e.slides) for e in chain.elements))
         of_elements = np.array([[e.damping for e in chain.elements], [e.stiffness for e in chain.elements]])
-        felt = np.bincount(place, (rows.transpose(0, 2, 1) @ of_elements @ rows).ravel(), 2 * n * n).reshape(2, n, n)
+        felt = np.asarray(np.bincount(place, (rows.transpose(0, 2, 1) @ of_elements @ rows).ravel(), 2 * n * n), float).reshape(2, n, n)
     damping, stiffness = felt
-    at = 0
     for body in chain.bodies:
-        ix, iy, polar = body.inertia
-        own = (body.mass, body.mass, body.mass, ix, iy)
-        mass[at : at + len(body.moves)] = own if body.moves == MOVES else [own[MOVES.index(move)] for move in body.moves]
         if body.turns:
-            i, j = at + body.moves.index("tilt_x"), at + body.moves.index("tilt_y")
-            damping[i, j] += polar * chain.speed * body.speed_ratio
-            damping[j, i] -= polar * chain.speed * body.speed_ratio
-        at += len(body.moves)
+            i, j = len(mass) + body.moves.index("tilt_x"), len(mass) + body.moves.index("tilt_y")
+            damping[i, j] += body.inertia[2] * speed * body.speed_ratio
+            damping[j, i] -= body.inertia[2] * speed * body.speed_ratio
+        inertia = dict(zip(MOVES, (body.mass, body.mass, body.mass, *body.inertia[:2]), strict=True))
+        mass += [inertia[move] for move in body.moves]
     if any(e.loss_factor for e in chain.elements):
-        damping += lost(chain, mass, stiffness)
+        damping += lost(chain, np.array(mass), stiffness)
     return Matrices(np.diag(mass), damping, stiffness, chain.dofs)
 
 
