@@ -198,7 +198,8 @@ class CampaignModel:
         if not (len(gain) and (x[number].any() or (gain != 1.0).any())):
             return chain
         missed = np.bincount(which, x[number] * self.sd[number], 2 * (of.max() + 1)).reshape(-1, 2)  # of every hammer, either way
-        rows = chain.reference_rows + np.einsum("rw,wrn->rn", missed[of], aside(point))
+        one, other = aside(point)
+        rows = chain.reference_rows + missed[of, :1] * one + missed[of, 1:] * other
         return changed(chain, reference_rows=gain[:, None] * rows)
 
     def hammer_gain(self, t: int, x: Array) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import scipy
 
@@ -37,9 +38,10 @@ class Rings:
     sleeves: tuple[Sleeve, ...]
     load: float
 
-    @property
+    @cached_property
     def heavy(self) -> bool:
-        return any(row.inertia is not None for row in (*(row for row, _ in self.fixed), *(row for s in self.sleeves for row in s.rows)))
+        rows = [row for row, _ in self.fixed] + [row for s in self.sleeves for row in s.rows]
+        return any(row.inertia is not None for row in rows)
 
     @property
     def massless(self) -> Rings:

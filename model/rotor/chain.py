@@ -195,12 +195,7 @@ def matrices(chain: RotorBase) -> Matrices:
     """M, C + G, K assembled element by element (independent of MuJoCo)."""
     n, speed = len(chain.dofs), chain.speed
     mass: list[float] = []
-    felt: Array = np.zeros((2, n, n))
-    if chain.elements:
-        rows, place = _places(chain.layout, tuple((e.a, e.b, e.z, e.slides) for e in chain.elements))
-        of_elements = np.array([[e.damping for e in chain.elements], [e.stiffness for e in chain.elements]])
-        felt = np.asarray(np.bincount(place, (rows.transpose(0, 2, 1) @ of_elements @ rows).ravel(), 2 * n * n), float).reshape(2, n, n)
-    damping, stiffness = felt
+    damping, stiffness = _felt(chain, n) if chain.elements else np.zeros((2, n, n))
     for body in chain.bodies:
         if body.turns:
             i, j = len(mass) + body.moves.index("tilt_x"), len(mass) + body.moves.index("tilt_y")
@@ -210,7 +205,17 @@ def matrices(chain: RotorBase) -> Matrices:
         mass += [inertia[move] for move in body.moves]
     if any(e.loss_factor for e in chain.elements):
         damping += lost(chain, np.array(mass), stiffness)
-    return Matrices(np.diag(mass), damping, stiffness, chain.dofs)
+    whole = np.zeros((n, n))
+    whole.flat[:: n + 1] = mass
+    return Matrices(whole, damping, stiffness, chain.dofs)
+
+
+def _felt(chain: RotorBase, n: int) -> Array:
+    """Damping and stiffness (2, n, n) of a chain's elements."""
+    rows, place = _places(chain.layout, tuple((e.a, e.b, e.z, e.slides) for e in chain.elements))
+    of_elements = np.concatenate([*(e.damping for e in chain.elements), *(e.stiffness for e in chain.elements)]).reshape(2, -1, 5, 5)
+    found = np.bincount(place, (rows.transpose(0, 2, 1) @ (of_elements @ rows)).ravel(), 2 * n * n)
+    return np.asarray(found, float).reshape(2, n, n)
 
 
 def lost(chain: RotorBase, mass: Array, stiffness: Array) -> Array:
